@@ -1,0 +1,38 @@
+"""Errors a user can act on: one sentence that says what is wrong, what was valid, what to do."""
+
+from difflib import get_close_matches
+from collections.abc import Iterable
+
+
+class HoppingLegError(Exception):
+    """Base of every error that the command line prints as one sentence."""
+
+
+class RobotError(HoppingLegError):
+    """A robot file is missing, incomplete or physically impossible."""
+
+
+class PolicyError(HoppingLegError):
+    """A policy file is unreadable, foreign, or does not fit the robot or command."""
+
+
+class UsageError(HoppingLegError):
+    """An argument has no meaning here; the message names the valid ones."""
+
+
+class TraceError(HoppingLegError):
+    """A trace file is unreadable or has another layout."""
+
+
+def unknown_name(kind: str, name: str, valid: Iterable[str]) -> str:
+    """Return the sentence for a name that does not exist, with the valid ones.
+
+    Args:
+        kind: What the name should have been, e.g. ``"controller"``.
+        name: What was given.
+        valid: All names that exist.
+    """
+    names = sorted(valid)
+    close = get_close_matches(name, names, n=1)
+    hint = f" Did you mean '{close[0]}'?" if close else ""
+    return f"There is no {kind} '{name}'.{hint} Available: {', '.join(names)}."

@@ -1,0 +1,88 @@
+"""Kinematics of the leg in closed form.
+
+The foot in the hip's frame: x_down = L1 cos q1 + L2 cos(q1 + q2), y = L1 sin q1 + L2 sin(q1 + q2).
+The paper's base height x is the height of the hip axis above the ground.
+"""
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.robot.parameters import Robot
+
+
+def foot_position(robot: Robot, q: Array) -> Array:
+    """Map joint angles to the centre of the foot in the hip's frame.
+
+    Args:
+        robot: The leg.
+        q: Hip and knee angle, rad, (..., 2).
+
+    Returns:
+        Distance below the hip and forward offset (x_down, y), m, (..., 2).
+    """
+    thigh, shank = robot.thigh.length, robot.shank.length
+    q1, q12 = q[..., 0], q[..., 0] + q[..., 1]
+    down = thigh * np.cos(q1) + shank * np.cos(q12)
+    forward = thigh * np.sin(q1) + shank * np.sin(q12)
+    return np.stack([down, forward], axis=-1)
+
+
+def joint_angles(robot: Robot, foot: Array) -> Array:
+    """Map a foot position to joint angles with the knee bent backwards (q2 <= 0).
+
+    Args:
+        robot: The leg.
+        foot: (x_down, y), m, (..., 2).
+
+    Returns:
+        Hip and knee angle, rad, (..., 2); NaN where the foot is out of reach.
+    """
+    thigh, shank = robot.thigh.length, robot.shank.length
+    square = np.sum(np.square(foot), axis=-1)
+    cosine = (square - thigh**2 - shank**2) / (2 * thigh * shank)
+    rounding = 1e-12
+    reachable = np.abs(cosine) <= 1 + rounding
+    knee = -np.arccos(np.clip(cosine, -1, 1))
+    hip = np.arctan2(foot[..., 1], foot[..., 0]) - np.arctan2(
+        shank * np.sin(knee), thigh + shank * np.cos(knee)
+    )
+    hip = np.remainder(hip + np.pi, 2 * np.pi) - np.pi
+    angles = np.stack([hip, knee], axis=-1)
+    return np.where(reachable[..., None], angles, np.nan)
+
+
+def jacobian(robot: Robot, q: Array) -> Array:
+    """Return d(x_down, y)/d(q1, q2), m/rad, (..., 2, 2)."""
+    thigh, shank = robot.thigh.length, robot.shank.length
+    q1, q12 = q[..., 0], q[..., 0] + q[..., 1]
+    thigh_down, thigh_forward = -thigh * np.sin(q1), thigh * np.cos(q1)
+    shank_down, shank_forward = -shank * np.sin(q12), shank * np.cos(q12)
+    down = np.stack([thigh_down + shank_down, shank_down], axis=-1)
+    forward = np.stack([thigh_forward + shank_forward, shank_forward], axis=-1)
+    return np.stack([down, forward], axis=-2)
+
+
+def foot_velocity(robot: Robot, q: Array, qd: Array) -> Array:
+    """Return the foot's velocity in the hip's frame, (x_down, y) rates, m/s, (..., 2)."""
+    velocity: Array = np.einsum("...ij,...j->...i", jacobian(robot, q), qd)
+    return velocity
+
+
+def stance_height(robot: Robot, q: Array) -> Array:
+    """Return the base height if the foot stands on flat, hard ground, m, (...)."""
+    return foot_position(robot, q)[..., 0] + robot.foot.radius
+
+
+def foot_clearance(robot: Robot, height: Array, q: Array) -> Array:
+    """Return the gap between the foot and the ground, m, (...); negative when it sinks in."""
+    return height - stance_height(robot, q)
+
+
+def knee_clearance(robot: Robot, height: Array, q: Array) -> Array:
+    """Return the gap between the knee and the ground, m, (...)."""
+    return height - robot.thigh.length * np.cos(q[..., 0]) - robot.knee_cap.radius
+
+
+def base_clearance(robot: Robot, height: Array) -> Array:
+    """Return the gap between the base and the ground, m, (...)."""
+    return height - robot.base.radius

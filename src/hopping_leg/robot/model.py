@@ -1,0 +1,108 @@
+"""The leg as a MuJoCo model: geometry from leg.xml, physics from a robot's parameters."""
+
+from importlib import resources
+
+import mujoco
+import numpy as np
+
+from hopping_leg.robot.parameters import Joint, Link, Robot
+
+GRAVITY = 9.81
+"""Standard gravity, m/s2; leg.xml states the same."""
+
+TIMESTEP = 5e-4
+"""Default physics step, s: chosen by ``hop bench convergence``."""
+
+_THIN = 1e-9
+"""Inertia around the axes a planar link cannot turn about only has to be valid."""
+
+
+def get_spec(robot: Robot, timestep: float = TIMESTEP) -> mujoco.MjSpec:
+    """Build the editable model of a robot.
+
+    Controls are motor torques at the gear's output, N m: the belt is the actuator's gear, so
+    the joint sees ``belt_ratio`` times the control and the motor's reflected inertia.
+
+    Args:
+        robot: Parameters of the leg.
+        timestep: Physics step, s.
+    """
+    xml = (resources.files("hopping_leg.robot") / "leg.xml").read_text(encoding="utf-8")
+    spec = mujoco.MjSpec.from_string(xml)
+    spec.option.timestep = timestep
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    _set_base(spec, robot)
+    _set_link(spec, "thigh", robot.thigh, robot.hip)
+    _set_link(spec, "shank", robot.shank, robot.knee)
+    spec.body("shank").pos = [0, 0, -robot.thigh.length]
+    spec.geom("knee_cap").size[0] = robot.knee_cap.radius
+    tip = [0, 0, -robot.shank.length]
+    spec.geom("foot").size[0] = robot.foot.radius
+    spec.geom("foot").pos = tip
+    spec.site("foot").pos = tip
+    _set_contact(spec, robot)
+    for name, joint in (("hip", robot.hip), ("knee", robot.knee)):
+        _add_motor(spec, name, joint)
+    return spec
+
+
+def build_model(robot: Robot, timestep: float = TIMESTEP) -> mujoco.MjModel:
+    """Compile a robot's model; generalised coordinates are (rail height, hip, knee)."""
+    model = get_spec(robot, timestep).compile()
+    if mujoco.mj_isSparse(model):
+        # MuJoCo 4.0.0 factorises the sparse Hessian wrongly.
+        raise RuntimeError("the leg's constraint Jacobian must be dense")
+    return model
+
+
+def _set_base(spec: mujoco.MjSpec, robot: Robot) -> None:
+    body = spec.body("base")
+    _set_inertia(body, robot.base.mass, 0.0, _THIN)
+    spec.geom("base").size[0] = robot.base.radius
+    rail = spec.joint("rail")
+    rail.frictionloss = robot.rail.friction
+    _set_damping(rail, robot.rail.damping)
+
+
+def _set_link(spec: mujoco.MjSpec, name: str, link: Link, joint: Joint) -> None:
+    _set_inertia(spec.body(name), link.mass, -link.com, link.inertia)
+    geom = spec.geom(name)
+    geom.fromto = [0, 0, 0, 0, 0, -link.length]
+    geom.size[0] = 0.012
+    axis = spec.joint("hip" if name == "thigh" else "knee")
+    axis.frictionloss = joint.friction
+    _set_damping(axis, joint.damping)
+    axis.armature = joint.armature
+
+
+def _set_damping(joint: mujoco.MjsJoint, linear: float) -> None:
+    """Set linear damping only; the other entries are the polynomial's higher terms."""
+    joint.damping = np.array([linear, 0.0, 0.0])
+
+
+def _set_inertia(body: mujoco.MjsBody, mass: float, com_z: float, inertia: float) -> None:
+    body.explicitinertial = True
+    body.mass = mass
+    body.ipos = [0, 0, com_z]
+    body.inertia = [inertia, inertia, min(inertia, _THIN)]
+
+
+def _set_contact(spec: mujoco.MjSpec, robot: Robot) -> None:
+    floor = spec.geom("floor")
+    floor.priority = 1
+    floor.solref = [robot.contact.time_constant, robot.contact.damping_ratio]
+    floor.friction[0] = robot.contact.friction
+    floor.contype, floor.conaffinity = 1, 0
+    for name in ("base", "knee_cap", "foot"):
+        geom = spec.geom(name)
+        geom.contype, geom.conaffinity = 0, 1
+
+
+def _add_motor(spec: mujoco.MjSpec, name: str, joint: Joint) -> None:
+    limit = joint.motor.torque_limit
+    actuator = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    actuator.set_to_motor()
+    actuator.gear[0] = joint.belt_ratio
+    actuator.ctrllimited = True
+    actuator.ctrlrange = [-limit, limit]

@@ -1,0 +1,150 @@
+"""What the leg is: typed parameters of one robot, SI units, immutable."""
+
+import dataclasses
+import hashlib
+import json
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+
+
+def reflected_inertia(rotor_inertia: float, gear_ratio: float) -> float:
+    """Return a rotor's inertia as felt behind a reduction, ``I n^2``, in kg m2."""
+    return rotor_inertia * gear_ratio**2
+
+
+@dataclass(frozen=True)
+class Base:
+    """The carriage on the rail: slider and hip motor."""
+
+    mass: float = field(metadata={"unit": "kg"})
+    radius: float = field(metadata={"unit": "m"})
+    """Of the sphere that touches the ground."""
+
+
+@dataclass(frozen=True)
+class Rail:
+    """The passive vertical rail."""
+
+    friction: float = field(metadata={"unit": "N"})
+    """Coulomb friction."""
+    damping: float = field(metadata={"unit": "N s/m"})
+
+
+@dataclass(frozen=True)
+class Link:
+    """A rigid link that swings in the leg's plane."""
+
+    length: float = field(metadata={"unit": "m"})
+    mass: float = field(metadata={"unit": "kg"})
+    com: float = field(metadata={"unit": "m"})
+    """Distance of the centre of mass from the link's upper joint, along the link."""
+    inertia: float = field(metadata={"unit": "kg m2"})
+    """About the centre of mass, around the joint's axis (the paper's Z)."""
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A sphere that may touch the ground."""
+
+    radius: float = field(metadata={"unit": "m"})
+
+
+@dataclass(frozen=True)
+class Contact:
+    """The ground as MuJoCo's mass-spring-damper constraint (``solref``)."""
+
+    time_constant: float = field(metadata={"unit": "s"})
+    damping_ratio: float = field(metadata={"unit": "1"})
+    friction: float = field(metadata={"unit": "1"})
+
+
+@dataclass(frozen=True)
+class Motor:
+    """A geared motor; everything but ``rotor_inertia`` is at the gear's output."""
+
+    gear_ratio: float = field(metadata={"unit": "1"})
+    rotor_inertia: float = field(metadata={"unit": "kg m2"})
+    """Of the rotor itself, before the gear."""
+    torque_limit: float = field(metadata={"unit": "N m"})
+    """What the software allows."""
+    peak_torque: float = field(metadata={"unit": "N m"})
+    """Stall torque; the torque-speed line falls from here to zero at ``no_load_speed``."""
+    rated_torque: float = field(metadata={"unit": "N m"})
+    """Continuous."""
+    no_load_speed: float = field(metadata={"unit": "rad/s"})
+
+
+@dataclass(frozen=True)
+class Joint:
+    """An actuated joint behind a motor and a belt."""
+
+    friction: float = field(metadata={"unit": "N m"})
+    """Coulomb friction."""
+    damping: float = field(metadata={"unit": "N m s/rad"})
+    belt_ratio: float = field(metadata={"unit": "1"})
+    """Turns of the motor's output per turn of the joint."""
+    lower: float = field(metadata={"unit": "rad"})
+    """Soft limit q^l of the paper."""
+    upper: float = field(metadata={"unit": "rad"})
+    """Soft limit q^h of the paper."""
+    motor: Motor
+    armature: float = field(default=float("nan"), metadata={"unit": "kg m2"})
+    """Reflected inertia at the joint; computed from rotor, gear and belt when the file gives none."""
+
+    def __post_init__(self) -> None:
+        if np.isnan(self.armature):
+            ratio = self.motor.gear_ratio * self.belt_ratio
+            inertia = reflected_inertia(self.motor.rotor_inertia, ratio)
+            object.__setattr__(self, "armature", inertia)
+
+    @property
+    def torque_limit(self) -> float:
+        """Largest torque at the joint, N m."""
+        return self.motor.torque_limit * self.belt_ratio
+
+    @property
+    def no_load_speed(self) -> float:
+        """Speed at which the motor has no torque left, at the joint, rad/s."""
+        return self.motor.no_load_speed / self.belt_ratio
+
+
+@dataclass(frozen=True)
+class Robot:
+    """One leg. Angles: hip 0 is straight down, knee is relative to the thigh, 0 is straight."""
+
+    name: str
+    base: Base
+    rail: Rail
+    thigh: Link
+    shank: Link
+    knee_cap: Ball
+    foot: Ball
+    contact: Contact
+    hip: Joint
+    knee: Joint
+    description: str = ""
+
+    @property
+    def mass(self) -> float:
+        """Everything that moves on the rail, kg."""
+        return self.base.mass + self.thigh.mass + self.shank.mass
+
+    @property
+    def straight_height(self) -> float:
+        """Height of the hip axis with the leg straight and the foot on the ground, m."""
+        return self.thigh.length + self.shank.length + self.foot.radius
+
+    def of_joints(self, attribute: str) -> Array:
+        """Return a joint attribute of hip and knee, (2,)."""
+        return np.array([getattr(self.hip, attribute), getattr(self.knee, attribute)])
+
+    @property
+    def digest(self) -> str:
+        """Hash of every parameter that the physics depends on: 16 hex digits."""
+        values = dataclasses.asdict(self)
+        del values["name"], values["description"]
+        text = json.dumps(values, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -1,0 +1,101 @@
+"""Many legs stepped at once on all cores."""
+
+import numpy as np
+from mujoco import batch
+
+from hopping_leg.arrays import Array, IntArray
+from hopping_leg.errors import UsageError
+from hopping_leg.robot import kinematics
+from hopping_leg.robot.limits import MotorLimit
+from hopping_leg.robot.model import TIMESTEP, build_model
+from hopping_leg.robot.parameters import Robot
+
+CONTROL_RATE = 200.0
+"""Control rate of the paper, Hz."""
+
+
+class Legs:
+    """Simulations of one robot, advanced by one control period at a time.
+
+    ``height``, ``height_rate`` (n,), ``q`` and ``qd`` (n, 2) are live views of the true state in
+    m, m/s, rad and rad/s. Results do not depend on the number of threads.
+
+    Args:
+        robot: The leg.
+        count: Number of simulations n.
+        rate: Control rate, Hz; one ``step`` lasts ``1 / rate``.
+        timestep: Physics step, s; must divide the control period.
+        threads: Worker threads, 0 for one per core.
+
+    Raises:
+        UsageError: The physics step does not divide the control period.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        count: int,
+        *,
+        rate: float = CONTROL_RATE,
+        timestep: float = TIMESTEP,
+        threads: int = 0,
+    ) -> None:
+        substeps = round(1 / (rate * timestep))
+        if substeps < 1 or abs(substeps * timestep * rate - 1) > 1e-9:
+            raise UsageError(
+                f"A physics step of {timestep} s does not divide the control period of {1 / rate} s;"
+                f" take e.g. {1 / (rate * max(substeps, 1)):g} s."
+            )
+        self.robot, self.count, self.rate, self.timestep = robot, count, rate, timestep
+        self.period = 1 / rate
+        self.substeps = substeps
+        self.batch = batch.Batch(build_model(robot, timestep), count, threads)
+        self._qpos, self._qvel = self.batch.bind("qpos"), self.batch.bind("qvel")
+        self._ctrl = self.batch.bind("ctrl")
+        self.height, self.height_rate = self._qpos[:, 0], self._qvel[:, 0]
+        self.q, self.qd = self._qpos[:, 1:], self._qvel[:, 1:]
+        self._motors = MotorLimit(robot)
+        self._inverse_belt = 1 / robot.of_joints("belt_ratio")
+
+    def place(self, ids: IntArray | slice, height: Array | float, q: Array) -> None:
+        """Put legs at rest at a height and posture.
+
+        Args:
+            ids: Which legs.
+            height: Of the base above the ground, m, (k,).
+            q: Joint angles, rad, (k, 2) or (2,).
+        """
+        rows = np.arange(self.count)[ids]
+        self.batch.reset(np.sort(rows), stage=0)
+        self._qpos[ids, 0] = height
+        self._qpos[ids, 1:] = q
+
+    def stand(self, ids: IntArray | slice, q: Array, clearance: Array | float = 0.0) -> None:
+        """Put legs at rest in a posture with the foot ``clearance`` above the ground, m, (k,)."""
+        self.place(ids, kinematics.stance_height(self.robot, q) + clearance, q)
+
+    def step(self, torque: Array) -> Array:
+        """Hold joint torques for one control period; return what the motors gave, N m, (n, 2).
+
+        Args:
+            torque: Asked for at the joints, N m, (n, 2).
+
+        Raises:
+            mujoco.batch.SimulationError: Physics failed in some simulations.
+        """
+        applied = self._motors.clip(torque, self.qd)
+        np.multiply(applied, self._inverse_belt, out=self._ctrl)
+        self.batch.step(nstep=self.substeps)
+        return applied
+
+    def foot_clearance(self) -> Array:
+        """Return the gap between each foot and the ground, m, (n,)."""
+        return kinematics.foot_clearance(self.robot, self.height, self.q)
+
+    def knee_clearance(self) -> Array:
+        """Return the gap between each knee and the ground, m, (n,)."""
+        return kinematics.knee_clearance(self.robot, self.height, self.q)
+
+    def base_clearance(self) -> Array:
+        """Return the gap between each base and the ground, m, (n,)."""
+        return kinematics.base_clearance(self.robot, self.height)

@@ -1,0 +1,44 @@
+"""Legs as a controller meets them: through sensors, noise, delay and soft limits."""
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.robot.limits import SoftLimiter, SoftLimits
+from hopping_leg.sim.disturbance import Channel, Disturbance, Measurement
+from hopping_leg.sim.legs import Legs
+
+
+class Plant:
+    """Legs behind a disturbed channel, with the soft joint limits in force.
+
+    The soft limits act on the true joint state, as they run beside the motors, after the torque
+    noise and before the motors' own limit.
+
+    Args:
+        legs: The simulations.
+        disturbance: Noise and delay.
+        soft_limits: The PD at the joint limits, or None to go without.
+        rng: Source of all randomness.
+    """
+
+    def __init__(
+        self,
+        legs: Legs,
+        disturbance: Disturbance,
+        soft_limits: SoftLimits | None,
+        rng: np.random.Generator,
+    ) -> None:
+        self.legs = legs
+        self.channel = Channel(legs.count, disturbance, legs.period, rng)
+        self._limiter = SoftLimiter(legs.robot, soft_limits) if soft_limits else None
+
+    def sense(self, command: Array) -> Measurement:
+        """Return what the controllers see; ``command`` is the desired height, m, (n,)."""
+        return self.channel.sense(self.legs.q, self.legs.qd, command)
+
+    def drive(self, torque: Array) -> Array:
+        """Apply joint torques for one control period; return what the motors gave, N m, (n, 2)."""
+        disturbed = self.channel.actuate(torque)
+        if self._limiter is not None:
+            disturbed = self._limiter.apply(disturbed, self.legs.q, self.legs.qd)
+        return self.legs.step(disturbed)
