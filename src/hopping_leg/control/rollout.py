@@ -1,0 +1,128 @@
+"""Run a controller on many legs at once and record what happened."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from hopping_leg.arrays import Array
+from hopping_leg.control.protocol import Controller
+from hopping_leg.robot import kinematics
+from hopping_leg.robot.limits import SoftLimits
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim import CONTROL_RATE, Disturbance, Legs, Plant
+from hopping_leg.trace import Trace
+
+_STACKED = {
+    "height_m": 0,
+    "height_rate_m_s": 1,
+    "hip_position_rad": 2,
+    "knee_position_rad": 3,
+    "hip_velocity_rad_s": 4,
+    "knee_velocity_rad_s": 5,
+    "hip_command_nm": 6,
+    "knee_command_nm": 7,
+    "hip_torque_nm": 8,
+    "knee_torque_nm": 9,
+    "foot_clearance_m": 10,
+    "knee_clearance_m": 11,
+    "base_clearance_m": 12,
+    "command_m": 13,
+}
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Where a controller is tried: robot, disturbances, rates and start."""
+
+    robot: Robot
+    disturbance: Disturbance = Disturbance()
+    soft_limits: SoftLimits | None = SoftLimits()
+    rate: float = CONTROL_RATE
+    """Control rate, Hz."""
+    timestep: float = 5e-4
+    """Physics step, s."""
+    start_length: float = 0.2
+    """Leg length of the standing start, m, hip axis to the foot's centre, foot below the hip."""
+    threads: int = 0
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """Recorded runs of n legs.
+
+    Attributes:
+        time: (ticks,), s.
+        data: Trace columns to (ticks, n) arrays.
+        header: Shared header of the traces.
+    """
+
+    time: Array
+    data: dict[str, Array]
+    header: dict[str, Any]
+
+    def trace(self, leg: int, **header: Any) -> Trace:  # noqa: ANN401
+        """Return one leg's run; ``header`` entries are added to the shared ones."""
+        columns = {"time_s": self.time} | {k: v[:, leg] for k, v in self.data.items()}
+        return Trace(pl.DataFrame(columns), {**self.header, **header})
+
+
+def roll_out(
+    controller: Controller,
+    setup: Setup,
+    commands: Array,
+    seed: int,
+    on_tick: Callable[[int, int], None] | None = None,
+) -> Rollout:
+    """Let a controller hop from a standing start.
+
+    Args:
+        controller: Controls all legs at once.
+        setup: The world it meets.
+        commands: Desired height for every tick and leg, m, (ticks, n).
+        seed: Of noise and delay.
+        on_tick: Called with (ticks done, ticks in all), for progress bars.
+
+    Returns:
+        What happened, one row per control period; each row holds the state at its start and the
+        torques during it.
+    """
+    ticks, count = commands.shape
+    legs = Legs(setup.robot, count, rate=setup.rate, timestep=setup.timestep, threads=setup.threads)
+    plant = Plant(legs, setup.disturbance, setup.soft_limits, np.random.default_rng(seed))
+    posture = kinematics.joint_angles(setup.robot, np.array([setup.start_length, 0.0]))
+    legs.stand(slice(None), posture)
+    plant.channel.restart(slice(None), legs.q, legs.qd, commands[0])
+    controller.reset(count)
+    data = np.empty((len(_STACKED), ticks, count))
+    internals: dict[str, Array] = {}
+    for tick in range(ticks):
+        _record_state(data[:, tick], legs, commands[tick])
+        torque = controller.act(plant.sense(commands[tick]))
+        for name, values in controller.internals().items():
+            internals.setdefault(name, np.empty((ticks, count)))[tick] = values
+        data[6:8, tick] = torque.T
+        data[8:10, tick] = plant.drive(torque).T
+        if on_tick is not None:
+            on_tick(tick + 1, ticks)
+    header = {
+        "robot": setup.robot.name,
+        "robot_digest": setup.robot.digest,
+        "controller": controller.name,
+        "seed": seed,
+        "rate_hz": setup.rate,
+        "timestep_s": setup.timestep,
+    }
+    columns = {name: data[row] for name, row in _STACKED.items()}
+    return Rollout(np.arange(ticks) / setup.rate, columns | internals, header)
+
+
+def _record_state(row: Array, legs: Legs, command: Array) -> None:
+    row[0], row[1] = legs.height, legs.height_rate
+    row[2:4], row[4:6] = legs.q.T, legs.qd.T
+    row[10], row[11], row[12] = legs.foot_clearance(), legs.knee_clearance(), legs.base_clearance()
+    row[13] = command
+
+

@@ -1,0 +1,110 @@
+"""The one record of a run, shared by simulation and hardware: a table of ticks and a header.
+
+Stored as Parquet with the header in the file's metadata; nothing is ever unpickled.
+"""
+
+import io
+import json
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from hopping_leg.arrays import Array
+from hopping_leg.errors import TraceError
+
+SCHEMA = 1
+"""Version of the layout, stored in every header."""
+
+COLUMNS = {
+    "time_s": "start of the control period",
+    "command_m": "desired apex height of the base",
+    "height_m": "true base height; missing on hardware",
+    "height_rate_m_s": "true base velocity; missing on hardware",
+    "hip_position_rad": "true joint position, measured on hardware",
+    "knee_position_rad": "true joint position, measured on hardware",
+    "hip_velocity_rad_s": "true joint velocity, measured on hardware",
+    "knee_velocity_rad_s": "true joint velocity, measured on hardware",
+    "hip_command_nm": "joint torque the controller asked for",
+    "knee_command_nm": "joint torque the controller asked for",
+    "hip_torque_nm": "joint torque the motor gave",
+    "knee_torque_nm": "joint torque the motor gave",
+    "foot_clearance_m": "gap between foot and ground, negative when sunk in",
+    "knee_clearance_m": "gap between knee and ground",
+    "base_clearance_m": "gap between base and ground",
+}
+"""Every column a trace may rely on; controllers may add their own."""
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One leg's run.
+
+    Attributes:
+        table: One row per control period, columns as in ``COLUMNS``.
+        header: Robot, its digest, controller, seed, rate, versions.
+    """
+
+    table: pl.DataFrame
+    header: dict[str, Any] = field(default_factory=dict)
+
+    def column(self, name: str) -> Array:
+        """Return a column as floats, (ticks,).
+
+        Raises:
+            TraceError: The trace has no such column.
+        """
+        if name not in self.table.columns:
+            raise TraceError(f"The trace has no column '{name}'; it has: {', '.join(self.table.columns)}.")
+        return self.table[name].to_numpy().astype(np.float64)
+
+    def save(self, path: Path) -> None:
+        """Write the trace; an existing file is replaced only once the new one is complete."""
+        header = json.dumps({"schema": SCHEMA, **self.header}, sort_keys=True)
+        buffer = io.BytesIO()
+        self.table.write_parquet(buffer, metadata={"hopping_leg": header})
+        write_atomically(path, buffer.getvalue())
+
+    @staticmethod
+    def load(path: Path) -> "Trace":
+        """Read a trace.
+
+        Raises:
+            TraceError: The file is missing, truncated, foreign or of another schema.
+        """
+        try:
+            text = pl.read_parquet_metadata(path).get("hopping_leg")
+            table = pl.read_parquet(path)
+        except FileNotFoundError as error:
+            raise TraceError(f"There is no trace file {path}.") from error
+        except (pl.exceptions.PolarsError, OSError) as error:
+            raise TraceError(f"{path} is not a readable Parquet file: {error}.") from error
+        if text is None:
+            raise TraceError(f"{path} is a Parquet file but not a trace; record one with `hop evaluate --traces DIR`.")
+        header = json.loads(text)
+        schema = header.pop("schema", None)
+        if schema != SCHEMA:
+            raise TraceError(f"{path} has trace schema {schema}; this version reads schema {SCHEMA}.")
+        return Trace(table, header)
+
+
+def write_atomically(path: Path, content: bytes) -> None:
+    """Write a file so that a killed process or a full disk leaves the old one whole.
+
+    Raises:
+        TraceError: The file cannot be written.
+    """
+    part = path.with_name(path.name + ".part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with part.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise TraceError(f"Cannot write {path}: {error.strerror}; nothing was changed.") from error
