@@ -1,7 +1,7 @@
 """Errors a user can act on: one sentence that says what is wrong, what was valid, what to do."""
 
-from difflib import get_close_matches
 from collections.abc import Iterable
+from difflib import get_close_matches
 
 
 class HoppingLegError(Exception):

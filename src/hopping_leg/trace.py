@@ -3,6 +3,7 @@
 Stored as Parquet with the header in the file's metadata; nothing is ever unpickled.
 """
 
+import contextlib
 import io
 import json
 import os
@@ -58,7 +59,9 @@ class Trace:
             TraceError: The trace has no such column.
         """
         if name not in self.table.columns:
-            raise TraceError(f"The trace has no column '{name}'; it has: {', '.join(self.table.columns)}.")
+            raise TraceError(
+                f"The trace has no column '{name}'; it has: {', '.join(self.table.columns)}."
+            )
         return self.table[name].to_numpy().astype(np.float64)
 
     def save(self, path: Path) -> None:
@@ -83,11 +86,16 @@ class Trace:
         except (pl.exceptions.PolarsError, OSError) as error:
             raise TraceError(f"{path} is not a readable Parquet file: {error}.") from error
         if text is None:
-            raise TraceError(f"{path} is a Parquet file but not a trace; record one with `hop evaluate --traces DIR`.")
+            raise TraceError(
+                f"{path} is a Parquet file but not a trace;"
+                " record one with `hop evaluate --traces DIR`."
+            )
         header = json.loads(text)
         schema = header.pop("schema", None)
         if schema != SCHEMA:
-            raise TraceError(f"{path} has trace schema {schema}; this version reads schema {SCHEMA}.")
+            raise TraceError(
+                f"{path} has trace schema {schema}; this version reads schema {SCHEMA}."
+            )
         return Trace(table, header)
 
 
@@ -97,8 +105,12 @@ def write_atomically(path: Path, content: bytes) -> None:
     Raises:
         TraceError: The file cannot be written.
     """
+    path = path.resolve()
     part = path.with_name(path.name + ".part")
     try:
+        if path.exists() and not path.is_file():
+            path.write_bytes(content)  # a device or pipe must not be replaced by a file
+            return
         path.parent.mkdir(parents=True, exist_ok=True)
         with part.open("wb") as file:
             file.write(content)
@@ -106,5 +118,11 @@ def write_atomically(path: Path, content: bytes) -> None:
             os.fsync(file.fileno())
         part.replace(path)
     except OSError as error:
-        part.unlink(missing_ok=True)
+        _remove(part)
         raise TraceError(f"Cannot write {path}: {error.strerror}; nothing was changed.") from error
+
+
+def _remove(path: Path) -> None:
+    """Remove what may not be there, even where nothing can be removed."""
+    with contextlib.suppress(OSError):
+        path.unlink(missing_ok=True)

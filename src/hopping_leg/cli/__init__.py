@@ -1,0 +1,118 @@
+"""The command line `hop`: one small module per verb.
+
+A verb's module has a docstring, which is its help, and a function ``run(args)``. The annotation of
+``args`` is a frozen dataclass of options (or a union of dataclasses, which become subcommands);
+the docstring under each field is that option's help. Modules are imported only when their verb is
+called, so that ``hop --help`` is instant and nothing but training loads torch.
+"""
+
+import errno
+import importlib
+import inspect
+import sys
+import typing
+from collections.abc import Sequence
+from importlib.metadata import version
+
+import tyro
+
+from hopping_leg.errors import HoppingLegError, UsageError, unknown_name
+
+VERBS = {
+    "robots": "list the legs, show every number with its source, check your own",
+    "evaluate": "run the paper's trials for controllers and write the report",
+    "plot": "draw the figures of stored traces again",
+    "train": "train a controller from scratch, or go on after an interruption",
+    "tune": "search the gains of energy shaping",
+    "bench": "measure speed, convergence and accuracy",
+    "export": "write a leg as URDF, inspect a policy file",
+    "reproduce": "the main job: train, evaluate, compare and report",
+}
+"""Every verb with its line in the overview."""
+
+FAILED = 2
+INTERRUPTED = 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; return the exit code.
+
+    Args:
+        arguments: Without the program's name; default: those of the process.
+    """
+    try:
+        return _dispatch(list(sys.argv[1:] if arguments is None else arguments))
+    except HoppingLegError as error:
+        return _complain(str(error))
+    except KeyboardInterrupt:
+        _complain("Interrupted; finished files are whole and nothing was half-written.")
+        return INTERRUPTED
+    except BrokenPipeError:
+        sys.stderr.close()
+        return FAILED
+    except OSError as error:
+        return _complain(_system_sentence(error))
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.split(".")[0] not in _TRAINING_MODULES:
+            raise
+        return _complain(
+            f"This needs {error.name}, which comes with the training extra:"
+            " pip install 'hopping-leg[train]'."
+        )
+
+
+_TRAINING_MODULES = {"torch", "stable_baselines3", "onnx", "tensorboard"}
+
+
+def _dispatch(arguments: list[str]) -> int:
+    if not arguments or arguments[0] in ("-h", "--help", "help"):
+        print(overview())
+        return 0
+    verb, rest = arguments[0], arguments[1:]
+    if verb == "--version":
+        print(f"hop {version('hopping-leg')}")
+        return 0
+    if verb not in VERBS:
+        raise UsageError(unknown_name("verb", verb, VERBS) + " Try `hop --help`.")
+    module = importlib.import_module(f"hopping_leg.cli.{verb}")
+    options = typing.get_type_hints(module.run, include_extras=True)["args"]
+    module.run(
+        tyro.cli(
+            options,
+            prog=f"hop {verb}",
+            description=inspect.getdoc(module),
+            args=rest,
+            config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
+        )
+    )
+    return 0
+
+
+def overview() -> str:
+    """Return what ``hop --help`` prints."""
+    width = max(map(len, VERBS))
+    lines = [f"  {name:<{width}}  {line}" for name, line in VERBS.items()]
+    return "\n".join(
+        [
+            "usage: hop VERB [options]",
+            "",
+            "A one-legged robot hops to commanded heights: simulate, train, evaluate, compare.",
+            "",
+            *lines,
+            "",
+            "`hop VERB --help` explains a verb. Start here:",
+            "  hop evaluate fast energy-shaping --out runs/first",
+        ]
+    )
+
+
+def _complain(sentence: str) -> int:
+    print(f"hop: {sentence}", file=sys.stderr)
+    return FAILED
+
+
+def _system_sentence(error: OSError) -> str:
+    where = f" {error.filename}" if error.filename else ""
+    if error.errno == errno.ENOSPC:
+        return f"The disk is full; could not write{where}. Free some space and run it again."
+    return f"Could not use{where or ' a file'}: {error.strerror or error}."

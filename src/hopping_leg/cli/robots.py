@@ -1,0 +1,113 @@
+"""List the legs, show every number of one with its source, check your own file.
+
+A robot is a TOML file; your own may extend a shipped one and change only what differs.
+
+Examples:
+  hop robots list
+  hop robots show legv2-paper
+  hop robots check examples/my_leg.toml
+"""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import tyro
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from hopping_leg.cli.output import write_json
+from hopping_leg.robot import Robot, load_robot, shipped_robots
+from hopping_leg.robot.files import Tree, load_tree
+
+Target = tyro.conf.Positional[str]
+
+
+@dataclass(frozen=True)
+class List:
+    """List the robots that come with the package."""
+
+    json: Path | None = None
+    """Write the list to this file as JSON."""
+
+
+@dataclass(frozen=True)
+class Show:
+    """Show every number of a robot with unit and source, e.g. `hop robots show legv2`."""
+
+    robot: Target
+    """A shipped name or the path of a .toml file."""
+    json: Path | None = None
+    """Write the numbers to this file as JSON."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """Check a robot file, e.g. `hop robots check my_leg.toml`; exit code 2 when it is wrong."""
+
+    robot: Target
+    """The path of a .toml file, or a shipped name."""
+
+
+def run(args: List | Show | Check) -> None:
+    """List, show or check robots."""
+    if isinstance(args, List):
+        _list(args)
+    elif isinstance(args, Show):
+        _show(args)
+    else:
+        robot = load_robot(args.robot)
+        print(f"{args.robot} is a valid robot: {robot.name} ({_summary(robot)}).")
+
+
+def _list(args: List) -> None:
+    robots = [load_robot(name) for name in shipped_robots()]
+    if args.json:
+        write_json(args.json, [{"name": r.name, **derived(r)} for r in robots])
+    for robot in robots:
+        print(f"{robot.name:<12}  {robot.description}\n{'':<12}  {_summary(robot)}")
+
+
+def _show(args: Show) -> None:
+    robot, tree = load_robot(args.robot), load_tree(args.robot)
+    if args.json:
+        write_json(args.json, {**asdict(robot), "derived": derived(robot)})
+    table = Table(
+        "number", "value", "unit", "source", title=escape(f"{robot.name}: {robot.description}")
+    )
+    for path, entry in numbers(tree):
+        table.add_row(path, f"{entry['value']:g}", entry["unit"], escape(entry["source"]))
+    for path, value in derived(robot).items():
+        table.add_row(path, f"{value:g}" if isinstance(value, float) else value, "", "computed")
+    Console().print(table)
+
+
+def numbers(tree: Tree, prefix: str = "") -> list[tuple[str, Tree]]:
+    """Return (path, entry) of every number in a robot's tables, in the file's order."""
+    found: list[tuple[str, Tree]] = []
+    for key, value in tree.items():
+        if isinstance(value, dict):
+            path = f"{prefix}{key}"
+            found += [(path, value)] if "value" in value else numbers(value, f"{path}.")
+    return found
+
+
+def derived(robot: Robot) -> dict[str, Any]:
+    """Return the numbers that follow from a robot's parameters, SI units."""
+    return {
+        "mass_kg": robot.mass,
+        "straight_height_m": robot.straight_height,
+        "hip_torque_limit_nm": robot.hip.torque_limit,
+        "knee_torque_limit_nm": robot.knee.torque_limit,
+        "hip_armature_kg_m2": robot.hip.armature,
+        "knee_armature_kg_m2": robot.knee.armature,
+        "digest": robot.digest,
+    }
+
+
+def _summary(robot: Robot) -> str:
+    return (
+        f"links {robot.thigh.length:g} + {robot.shank.length:g} m, mass {robot.mass:.3f} kg,"
+        f" torque limits {robot.hip.torque_limit:g} and {robot.knee.torque_limit:g} N m"
+    )
