@@ -1,0 +1,83 @@
+"""What the learning problem leaves open, as options; the default is argued in the docs."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+from hopping_leg.errors import UsageError
+from hopping_leg.robot.limits import SoftLimits
+from hopping_leg.robot.model import TIMESTEP
+from hopping_leg.sim import CONTROL_RATE, Disturbance
+
+Start = Literal["standing", "drop", "mixed"]
+
+
+@dataclass(frozen=True)
+class TaskOptions:
+    """The learning problem around the leg."""
+
+    action_torque: tuple[float, float] = (6.0, 6.0)
+    """Joint torque of a full action at hip and knee, N m."""
+    commands: tuple[float, ...] = (0.25, 0.30, 0.35)
+    """Desired heights to draw from, m; the paper's three."""
+    command_range: tuple[float, float] | None = None
+    """Draw desired heights from this range instead, m."""
+    command_hold: tuple[float, float] | None = None
+    """Shortest and longest time between new commands, s; none keeps one command per episode."""
+    start: Start = "standing"
+    """Episodes begin standing, with a drop in a random posture, or either with equal chance."""
+    start_length: float = 0.2
+    """Leg length of the standing start, m, hip axis to the foot's centre, foot below the hip."""
+    drop_length: tuple[float, float] = (0.15, 0.25)
+    """Leg lengths of a drop, m."""
+    drop_offset: float = 0.02
+    """Largest forward or backward offset of the foot at a drop, m."""
+    drop_clearance: float = 0.1
+    """Largest gap between foot and ground at a drop, m."""
+    episode: float = 5.0
+    """Length of an episode, s."""
+    stagger: bool = False
+    """Cut the first episode of each leg at a random length, so that a batch does not end as one."""
+    fall_height: float = 0.0
+    """Base height below which an episode terminates, m; 0 never terminates."""
+    velocity_scale: float = 10.0
+    """Joint velocity that the observation shows as 1, rad/s."""
+    rate: float = CONTROL_RATE
+    """Control rate, Hz."""
+    timestep: float = TIMESTEP
+    """Physics step, s."""
+    disturbance: Disturbance = field(default_factory=Disturbance)
+    """Noise and delay; the paper trains with them."""
+    soft_limits: SoftLimits | None = field(default_factory=SoftLimits)
+    """PD at the joint limits, added to the action's torque."""
+
+    def __post_init__(self) -> None:
+        _check(self)
+
+    @property
+    def command_bounds(self) -> tuple[float, float]:
+        """Lowest and highest desired height, m."""
+        return self.command_range or (min(self.commands), max(self.commands))
+
+
+def _check(options: TaskOptions) -> None:
+    if not options.commands or not all(math.isfinite(c) and c > 0 for c in options.commands):
+        raise UsageError(
+            f"Commands must be positive heights in m, not {options.commands}; e.g. 0.25 0.30 0.35."
+        )
+    for name in ("command_range", "command_hold", "drop_length"):
+        pair = getattr(options, name)
+        if pair is not None and not 0 < pair[0] <= pair[1] < math.inf:
+            raise UsageError(
+                f"'{name}' is {pair} but must be two positive numbers, the smaller first."
+            )
+    for name in ("start_length", "episode", "velocity_scale", "rate", "timestep"):
+        value = getattr(options, name)
+        if not 0 < value < math.inf:
+            raise UsageError(f"'{name}' is {value} but must be positive and finite.")
+    if not all(0 < t < math.inf for t in options.action_torque):
+        raise UsageError(
+            f"'action_torque' is {options.action_torque} but both torques must be positive, N m."
+        )
+    if options.start not in ("standing", "drop", "mixed"):
+        raise UsageError(f"'start' is '{options.start}'; valid: standing, drop, mixed.")

@@ -1,0 +1,47 @@
+"""Where an episode begins: standing, or dropped in a random posture."""
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.env.options import TaskOptions
+from hopping_leg.errors import UsageError
+from hopping_leg.robot import kinematics
+from hopping_leg.robot.parameters import Robot
+
+
+class Starts:
+    """Draws initial states.
+
+    Raises:
+        UsageError: A start asks for a leg length that the robot does not reach.
+    """
+
+    def __init__(self, robot: Robot, options: TaskOptions) -> None:
+        self.robot, self.options = robot, options
+        lengths = (options.start_length, *options.drop_length)
+        self._standing = kinematics.joint_angles(robot, np.array([lengths[0], 0.0]))
+        reach = robot.thigh.length + robot.shank.length
+        if np.isnan(self._standing).any() or not all(0 < length < reach for length in lengths):
+            raise UsageError(
+                f"The starting leg lengths {lengths} m do not all lie within reach of {robot.name};"
+                f" take lengths below {reach:g} m."
+            )
+
+    def draw(self, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Return base heights, m, (count,), and joint angles, rad, (count, 2), at rest."""
+        if self.options.start == "standing":
+            q, gap = np.tile(self._standing, (count, 1)), np.zeros(count)
+        else:
+            q, gap = self._drop(count, rng)
+        if self.options.start == "mixed":
+            stands = rng.random(count) < 0.5
+            q[stands], gap[stands] = self._standing, 0.0
+        return kinematics.stance_height(self.robot, q) + gap, q
+
+    def _drop(self, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
+        options = self.options
+        length = rng.uniform(*options.drop_length, count)
+        offset = rng.uniform(-options.drop_offset, options.drop_offset, count)
+        q = kinematics.joint_angles(self.robot, np.stack([length, offset], axis=-1))
+        q = np.clip(q, self.robot.of_joints("lower"), self.robot.of_joints("upper"))
+        return q, rng.uniform(0.0, options.drop_clearance, count)

@@ -1,0 +1,220 @@
+"""The learning problem for many legs at once: observation, reward, commands, episodes."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hopping_leg.arrays import Array, BoolArray, IntArray
+from hopping_leg.env.observation import Array32, scaling
+from hopping_leg.env.options import TaskOptions
+from hopping_leg.env.start import Starts
+from hopping_leg.env.transition import Reward, Transition
+from hopping_leg.hops import at_apex
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim import Legs, Plant
+
+PRIVILEGED = 10
+"""Entries of the true state that a critic may see."""
+
+
+class Step(NamedTuple):
+    """Outcome of one tick of n legs; legs whose episode ended have already begun the next."""
+
+    observation: Array32
+    """Seen after the tick, (n, 15)."""
+    reward: Array
+    """(n,)."""
+    terminated: BoolArray
+    """Episode over because the leg fell; never by default, (n,)."""
+    truncated: BoolArray
+    """Episode over because its time was up, (n,)."""
+    apex_error: Array
+    """Apex height minus command where a leg just passed an in-flight apex, else NaN, m, (n,)."""
+    apex_height: Array
+    """Height of that apex, else NaN, m, (n,)."""
+    terms: dict[str, Array]
+    """Unweighted reward terms by name, each (n,)."""
+    final_observation: Array32 | None
+    """Observations before the restart, (n, 15), where any episode ended."""
+    final_privileged: Array32 | None
+    """True states before the restart, (n, 10), where any episode ended."""
+
+
+class HoppingTask:
+    """n legs learning to hop; the only place where observation and reward are put together.
+
+    Args:
+        robot: The leg.
+        count: Number of legs n.
+        options: The learning problem.
+        reward: Judges every tick.
+        rng: Source of all randomness; results do not depend on the number of threads.
+        threads: Worker threads, 0 for one per core.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        count: int,
+        options: TaskOptions,
+        reward: Reward,
+        rng: np.random.Generator,
+        threads: int = 0,
+    ) -> None:
+        self.robot, self.count, self.options, self.reward = robot, count, options, reward
+        self.legs = Legs(
+            robot, count, rate=options.rate, timestep=options.timestep, threads=threads
+        )
+        noise, self._rng = rng.spawn(2)
+        self.plant = Plant(self.legs, options.disturbance, options.soft_limits, noise)
+        self.scaling = scaling(robot, options)
+        self._starts = Starts(robot, options)
+        self._torque = np.array(options.action_torque)
+        self._horizon = max(1, round(options.episode * options.rate))
+        self._never = np.zeros(count, np.bool_)
+        self._nan = np.full(count, np.nan)
+        for constant in (self._never, self._nan):
+            constant.flags.writeable = False
+        self.command = np.empty(count)
+        self._left = np.empty(count, np.int64)
+        self._switch_in = np.empty(count, np.int64)
+        self._last = np.zeros((count, 2))
+        self.reset()
+
+    def reset(self, ids: IntArray | None = None) -> Array32:
+        """Begin new episodes.
+
+        Args:
+            ids: Which legs; all if None, and only then episodes are staggered.
+
+        Returns:
+            Observations of all legs, (n, 15).
+        """
+        rows = np.arange(self.count) if ids is None else np.asarray(ids)
+        self._begin(rows)
+        if ids is None and self.options.stagger:
+            self._left[:] = self._rng.integers(1, self._horizon + 1, self.count)
+        return self._observe()
+
+    def step(self, action: Array | Array32) -> Step:
+        """Act for one control period.
+
+        Args:
+            action: Hip and knee torque over ``action_torque``, clipped to [-1, 1], (n, 2).
+        """
+        legs = self.legs
+        taken = np.minimum(np.maximum(action, -1.0), 1.0)
+        rate_before, height_before = legs.height_rate.copy(), legs.height.copy()
+        self.plant.drive(taken * self._torque)
+        clearance = legs.foot_clearance()
+        apex = at_apex(rate_before, legs.height_rate, clearance)
+        height = np.maximum(height_before, legs.height)
+        transition = Transition(
+            legs.height, legs.height_rate, legs.q, legs.qd, self.command, taken, self._last,
+            clearance, apex, height,
+        )  # fmt: skip
+        reward, terms = self.reward(transition)
+        apex_height = apex_error = self._nan
+        if apex.any():
+            apex_height = np.where(apex, height, np.nan)
+            apex_error = apex_height - self.command
+        self._last = taken
+        return self._next(reward, terms, apex_error, apex_height)
+
+    def privileged(self) -> Array32:
+        """Return the normalised true state that a critic may see in training, (n, 10).
+
+        Base height and rate, q (2), qd (2), command, clearance of foot, knee and base.
+        """
+        legs, o = self.legs, self.scaling
+        result = np.empty((self.count, PRIVILEGED), np.float32)
+        result[:, 0] = (legs.height - o.offset[4]) * o.gain[4]
+        result[:, 1] = legs.height_rate
+        result[:, 2:4] = (legs.q - o.offset[:2]) * o.gain[:2]
+        result[:, 4:6] = legs.qd * o.gain[2:4]
+        result[:, 6] = (self.command - o.offset[4]) * o.gain[4]
+        result[:, 7] = legs.foot_clearance() * 10
+        result[:, 8] = legs.knee_clearance() * 10
+        result[:, 9] = legs.base_clearance() * 10
+        return result
+
+    def state(self) -> dict[str, Any]:
+        """Return everything needed to go on exactly from here, as arrays and plain values."""
+        return {
+            "physics": self.legs.batch.state.copy(),
+            "channel": self.plant.channel.state(),
+            "command": self.command.copy(),
+            "left": self._left.copy(),
+            "switch_in": self._switch_in.copy(),
+            "last_action": self._last.copy(),
+            "rng": self._rng.bit_generator.state,
+        }
+
+    def restore(self, state: dict[str, Any]) -> Array32:
+        """Go on from a ``state``; return the observations, (n, 15)."""
+        self.legs.batch.state[:] = state["physics"]
+        self.plant.channel.restore(state["channel"])
+        self.command[:] = state["command"]
+        self._left[:] = state["left"]
+        self._switch_in[:] = state["switch_in"]
+        self._last = np.array(state["last_action"])
+        self._rng.bit_generator.state = state["rng"]
+        return self._observe()
+
+    def _observe(self) -> Array32:
+        self.measurement = self.plant.sense(self.command)
+        return self.scaling.observe(self.measurement)
+
+    def _next(
+        self, reward: Array, terms: dict[str, Array], apex_error: Array, apex_height: Array
+    ) -> Step:
+        """End the tick: episodes that are over, new commands, what is seen."""
+        options = self.options
+        self._left -= 1
+        truncated = self._left <= 0
+        terminated = self._never
+        ended = truncated
+        if options.fall_height > 0:
+            terminated = self.legs.height < options.fall_height
+            truncated = truncated & ~terminated
+            ended = truncated | terminated
+        if options.command_hold is not None:
+            self._switch()
+        observation = self._observe()
+        final_observation = final_privileged = None
+        if ended.any():
+            final_observation, final_privileged = observation, self.privileged()
+            self._begin(np.flatnonzero(ended))
+            observation = self._observe()
+        return Step(
+            observation, reward, terminated, truncated, apex_error, apex_height, terms,
+            final_observation, final_privileged,
+        )  # fmt: skip
+
+    def _begin(self, rows: IntArray) -> None:
+        count = len(rows)
+        height, q = self._starts.draw(count, self._rng)
+        self.legs.place(rows, height, q)
+        self._left[rows] = self._horizon
+        self._last[rows] = 0.0
+        self.command[rows] = self._draw_commands(count)
+        if self.options.command_hold is not None:
+            self._switch_in[rows] = self._draw_holds(count)
+        self.plant.channel.restart(rows, self.legs.q[rows], self.legs.qd[rows], self.command[rows])
+
+    def _switch(self) -> None:
+        self._switch_in -= 1
+        due = np.flatnonzero(self._switch_in <= 0)
+        if len(due):
+            self.command[due] = self._draw_commands(len(due))
+            self._switch_in[due] = self._draw_holds(len(due))
+
+    def _draw_commands(self, count: int) -> Array:
+        if self.options.command_range is not None:
+            return self._rng.uniform(*self.options.command_range, count)
+        return self._rng.choice(self.options.commands, count)
+
+    def _draw_holds(self, count: int) -> IntArray:
+        assert self.options.command_hold is not None
+        shortest, longest = (round(t * self.options.rate) for t in self.options.command_hold)
+        return self._rng.integers(shortest, longest + 1, count)

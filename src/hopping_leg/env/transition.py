@@ -1,0 +1,41 @@
+"""What rewards see of one tick, and the Reward protocol."""
+
+from typing import NamedTuple, Protocol
+
+from hopping_leg.arrays import Array, BoolArray
+
+
+class Transition(NamedTuple):
+    """True state after a tick of n legs and the actions around it.
+
+    The arrays are live: they change with the next tick, so keep copies.
+    """
+
+    height: Array
+    """Base height x, m, (n,)."""
+    rate: Array
+    """Base velocity, m/s, (n,)."""
+    q: Array
+    """Joint positions, rad, (n, 2)."""
+    qd: Array
+    """Joint velocities, rad/s, (n, 2)."""
+    command: Array
+    """Desired height x^d in force during the tick, m, (n,)."""
+    action: Array
+    """Action of this tick, in [-1, 1], (n, 2)."""
+    last_action: Array
+    """Action of the tick before, zero at the start of an episode, (n, 2)."""
+    foot_clearance: Array
+    """Gap between foot and ground, m, (n,)."""
+    apex: BoolArray
+    """Whether the base passed an in-flight apex during the tick, (n,)."""
+    apex_height: Array
+    """Height of that apex, m; meaningless elsewhere, (n,)."""
+
+
+class Reward(Protocol):
+    """Judges one tick of every leg."""
+
+    def __call__(self, transition: Transition) -> tuple[Array, dict[str, Array]]:
+        """Return the reward, (n,), and its unweighted terms by name, each (n,)."""
+        ...
