@@ -1,0 +1,74 @@
+"""Controllers by name: energy shaping, the shipped policies, or a user's policy file."""
+
+from importlib import import_module, resources
+from pathlib import Path
+
+from hopping_leg.control.policy import Policy
+from hopping_leg.control.protocol import Controller
+from hopping_leg.errors import PolicyError, UsageError, unknown_name
+from hopping_leg.robot.parameters import Robot
+
+ENERGY_SHAPING = "energy-shaping"
+"""The tuned baseline."""
+
+ENERGY_SHAPING_LITERAL = "energy-shaping-literal"
+"""The paper's law and gains as printed."""
+
+_FACTORIES = {
+    ENERGY_SHAPING: "tuned_energy_shaping",
+    ENERGY_SHAPING_LITERAL: "literal_energy_shaping",
+}
+_SHIPPED = resources.files("hopping_leg") / "policies"
+
+
+def shipped_policies() -> list[str]:
+    """Return the names of the policies that come with the package."""
+    return sorted(
+        f.name.removesuffix(".onnx") for f in _SHIPPED.iterdir() if f.name.endswith(".onnx")
+    )
+
+
+def controller_names() -> list[str]:
+    """Return every name that ``load_controller`` knows."""
+    return [*_FACTORIES, *shipped_policies()]
+
+
+def load_policy(name_or_path: str | Path) -> Policy:
+    """Load a shipped policy by name or a policy file.
+
+    Raises:
+        PolicyError: The file is missing, truncated or foreign.
+        UsageError: There is no such shipped policy.
+    """
+    name = str(name_or_path)
+    if name in shipped_policies():
+        return Policy((_SHIPPED / f"{name}.onnx").read_bytes(), f"shipped policy '{name}'", name)
+    if name.endswith(".onnx"):
+        return Policy.load(Path(name))
+    if Path(name).exists():
+        raise PolicyError(f"{name} is not a policy file; those end in .onnx.")
+    raise UsageError(
+        unknown_name("controller", name, controller_names()) + " Or give an .onnx file."
+    )
+
+
+def load_controller(name_or_path: str | Path, robot: Robot, *, strict: bool = False) -> Controller:
+    """Load a controller for a robot.
+
+    Args:
+        name_or_path: One of ``controller_names()``, or the path of an ``.onnx`` file.
+        robot: The leg it shall drive.
+        strict: Refuse a policy that was trained on another robot instead of logging a warning.
+
+    Raises:
+        PolicyError: The file is missing, truncated or foreign, or does not fit the robot.
+        UsageError: There is no such controller.
+    """
+    factory = _FACTORIES.get(str(name_or_path))
+    if factory is not None:
+        module = import_module("hopping_leg.control.energy_shaping")
+        controller: Controller = getattr(module, factory)(robot)
+        return controller
+    policy = load_policy(name_or_path)
+    policy.check_robot(robot, strict=strict)
+    return policy

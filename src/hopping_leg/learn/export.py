@@ -1,0 +1,110 @@
+"""Write a policy file: an ONNX graph built from numpy weights.
+
+Graph: inputs (flattened, joined) -> (x - offset) * gain -> dense layers -> squash -> torque scale.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+from onnx import TensorProto, helper, numpy_helper
+
+from hopping_leg.arrays import Array
+from hopping_leg.control.layouts import make_layout
+from hopping_leg.control.policy import METADATA_KEY, Card
+from hopping_leg.errors import UsageError
+from hopping_leg.trace import write_atomically
+
+ACTIVATIONS = {"relu": "Relu", "tanh": "Tanh", "elu": "Elu"}
+"""Activation of the hidden layers, to its ONNX operator."""
+
+SQUASHES = ("tanh", "clip")
+"""How the last layer's output is brought to -1..1."""
+
+_OPSET = 17
+_IR_VERSION = 8
+
+
+@dataclass(frozen=True)
+class Network:
+    """A deterministic actor in numpy.
+
+    Attributes:
+        offset: Subtracted from the joined inputs, (size,).
+        gain: Multiplied with the rest, (size,).
+        layers: Weight (out, in) and bias (out,) of every dense layer.
+        activation: Of the hidden layers, one of ``ACTIVATIONS``.
+        squash: Of the output, one of ``SQUASHES``.
+    """
+
+    offset: Array
+    gain: Array
+    layers: Sequence[tuple[Array, Array]]
+    activation: str
+    squash: str
+
+    def __post_init__(self) -> None:
+        if self.activation not in ACTIVATIONS or self.squash not in SQUASHES:
+            raise UsageError(
+                f"Activation '{self.activation}' with squash '{self.squash}' cannot be exported;"
+                f" valid: {', '.join(ACTIVATIONS)} with {' or '.join(SQUASHES)}."
+            )
+
+
+def build_policy(network: Network, card: Card) -> bytes:
+    """Return a policy file's content.
+
+    Args:
+        network: The actor; its input is the layout's arrays, flattened row by row and joined.
+        card: Stored in the metadata.
+    """
+    shapes = make_layout(card.layout).shapes
+    nodes: list[Any] = []
+    weights: list[Any] = []
+
+    def constant(name: str, value: Array) -> str:
+        weights.append(numpy_helper.from_array(np.ascontiguousarray(value, np.float32), name))
+        return name
+
+    def apply(operator: str, inputs: list[str], output: str, **attributes: float) -> str:
+        nodes.append(helper.make_node(operator, inputs, [output], name=output, **attributes))
+        return output
+
+    flat = [
+        apply("Flatten", [n], f"{n}_flat", axis=1) if len(s) > 1 else n for n, s in shapes.items()
+    ]
+    x = apply("Concat", flat, "joined", axis=1) if len(flat) > 1 else flat[0]
+    x = apply("Sub", [x, constant("offset", network.offset)], "centred")
+    x = apply("Mul", [x, constant("gain", network.gain)], "normalised")
+    for index, (weight, bias) in enumerate(network.layers):
+        names = [x, constant(f"weight_{index}", weight.T), constant(f"bias_{index}", bias)]
+        x = apply("Gemm", names, f"dense_{index}")
+        if index < len(network.layers) - 1:
+            x = apply(ACTIVATIONS[network.activation], [x], f"hidden_{index}")
+    if network.squash == "tanh":
+        x = apply("Tanh", [x], "action")
+    else:
+        bounds = [constant("least", np.array(-1.0)), constant("most", np.array(1.0))]
+        x = apply("Clip", [x, *bounds], "action")
+    apply("Mul", [x, constant("torque_scale", np.array(card.torque_scale))], "torque")
+    inputs = [
+        helper.make_tensor_value_info(n, TensorProto.FLOAT, ["n", *s]) for n, s in shapes.items()
+    ]
+    output = helper.make_tensor_value_info("torque", TensorProto.FLOAT, ["n", 2])
+    graph = helper.make_graph(nodes, "policy", inputs, [output], weights)
+    model = helper.make_model(
+        graph, opset_imports=[helper.make_opsetid("", _OPSET)], producer_name="hopping-leg"
+    )
+    model.ir_version = _IR_VERSION
+    helper.set_model_props(model, {METADATA_KEY: card.to_json()})
+    onnx.checker.check_model(model, full_check=True)
+    content: bytes = model.SerializeToString(deterministic=True)
+    return content
+
+
+def save_policy(path: Path, network: Network, card: Card) -> None:
+    """Write a policy file; an existing one is replaced only once the new one is complete."""
+    write_atomically(path, build_policy(network, card))
