@@ -70,7 +70,10 @@ def foot_velocity(robot: Robot, q: Array, qd: Array) -> Array:
 
 def stance_height(robot: Robot, q: Array) -> Array:
     """Return the base height if the foot stands on flat, hard ground, m, (...)."""
-    return foot_position(robot, q)[..., 0] + robot.foot.radius
+    q1 = q[..., 0]
+    down = robot.thigh.length * np.cos(q1) + robot.shank.length * np.cos(q1 + q[..., 1])
+    height: Array = down + robot.foot.radius
+    return height
 
 
 def foot_clearance(robot: Robot, height: Array, q: Array) -> Array:

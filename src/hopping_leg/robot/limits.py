@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
+from hopping_leg.errors import UsageError
 from hopping_leg.robot.parameters import Robot
 
 
@@ -13,14 +14,21 @@ class MotorLimit:
 
     The driving torque falls on the line from the peak torque at rest to zero at the no-load
     speed; the software limit caps it; braking is limited by the software limit alone.
+
+    Args:
+        robot: Whose motors.
+        count: Number of legs n if all inputs are (n, 2), which is faster; any shape if None.
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, count: int | None = None) -> None:
         belt = robot.of_joints("belt_ratio")
         joints = (robot.hip, robot.knee)
-        self.limit = robot.of_joints("torque_limit")
-        self.peak = np.array([j.motor.peak_torque for j in joints]) * belt
-        self._slope = self.peak / robot.of_joints("no_load_speed")
+        peak = np.array([j.motor.peak_torque for j in joints]) * belt
+        self.limit = _per_leg(robot.of_joints("torque_limit"), count)
+        self.peak = _per_leg(peak, count)
+        self._slope = _per_leg(peak / robot.of_joints("no_load_speed"), count)
+        self._minus_limit, self._minus_peak = -self.limit, -self.peak
+        self._zero = np.zeros_like(self.limit)
 
     def clip(self, torque: Array, qd: Array) -> Array:
         """Return the torque the motors give when asked for ``torque`` at speed ``qd``.
@@ -30,14 +38,22 @@ class MotorLimit:
             qd: Joint velocity, rad/s, (..., 2).
         """
         drop = self._slope * qd
-        upper = np.minimum(np.maximum(self.peak - drop, 0.0), self.limit)
-        lower = np.maximum(np.minimum(-self.peak - drop, 0.0), -self.limit)
+        upper = self.peak - drop
+        np.maximum(upper, self._zero, out=upper)
+        np.minimum(upper, self.limit, out=upper)
+        lower = np.subtract(self._minus_peak, drop, out=drop)
+        np.minimum(lower, self._zero, out=lower)
+        np.maximum(lower, self._minus_limit, out=lower)
         return np.minimum(np.maximum(torque, lower), upper)
 
 
 @dataclass(frozen=True)
 class SoftLimits:
-    """PD that pulls the joints back into bounds once they are passed (paper, Sec. II-C)."""
+    """PD that pulls the joints back into bounds once they are passed (paper, Sec. II-C).
+
+    Raises:
+        UsageError: A value is negative.
+    """
 
     stiffness: float = 20.0
     """N m/rad."""
@@ -48,13 +64,28 @@ class SoftLimits:
     replace: bool = False
     """Replace the controller's torque while outside, as printed, instead of adding to it."""
 
+    def __post_init__(self) -> None:
+        for name in ("stiffness", "damping", "inset"):
+            if not 0 <= getattr(self, name) < float("inf"):
+                raise UsageError(
+                    f"'{name}' of the soft limits is {getattr(self, name)}"
+                    " but must be zero or more and finite."
+                )
+
 
 class SoftLimiter:
-    """Applies soft limits to a robot's joint torques."""
+    """Applies soft limits to a robot's joint torques.
 
-    def __init__(self, robot: Robot, soft: SoftLimits) -> None:
+    Args:
+        robot: Whose joint limits.
+        soft: The PD.
+        count: Number of legs n if all inputs are (n, 2), which is faster; any shape if None.
+    """
+
+    def __init__(self, robot: Robot, soft: SoftLimits, count: int | None = None) -> None:
         self.soft = soft
-        self._lower, self._upper = robot.of_joints("lower"), robot.of_joints("upper")
+        self._lower = _per_leg(robot.of_joints("lower"), count)
+        self._upper = _per_leg(robot.of_joints("upper"), count)
 
     def apply(self, torque: Array, q: Array, qd: Array) -> Array:
         """Return the torque with the PD in force where a joint is outside its limits.
@@ -64,12 +95,18 @@ class SoftLimiter:
             q: Joint position, rad, (..., 2).
             qd: Joint velocity, rad/s, (..., 2).
         """
-        below, above = q < self._lower, q > self._upper
-        outside = below | above
-        if not outside.any():
+        below = q < self._lower
+        outside = below | (q > self._upper)
+        if not np.count_nonzero(outside):
             return torque
         soft = self.soft
         target = np.where(below, self._lower + soft.inset, self._upper - soft.inset)
         pull = soft.stiffness * (target - q) - soft.damping * qd
-        inside_torque = 0.0 if soft.replace else torque
-        return np.where(outside, pull + inside_torque, torque)
+        if not soft.replace:
+            pull += torque
+        return np.where(outside, pull, torque)
+
+
+def _per_leg(of_joints: Array, count: int | None) -> Array:
+    """Repeat (2,) for every leg: numpy adds equal shapes in half the time of broadcast ones."""
+    return of_joints if count is None else np.tile(of_joints, (count, 1))

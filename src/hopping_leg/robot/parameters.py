@@ -92,7 +92,7 @@ class Joint:
     """Soft limit q^h of the paper."""
     motor: Motor
     armature: float = field(default=float("nan"), metadata={"unit": "kg m2"})
-    """Reflected inertia at the joint; computed from rotor, gear and belt when the file gives none."""
+    """Reflected inertia at the joint; a file without it gets what rotor, gear and belt give."""
 
     def __post_init__(self) -> None:
         if np.isnan(self.armature):

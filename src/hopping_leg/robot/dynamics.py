@@ -1,0 +1,112 @@
+"""Rigid-body dynamics of the leg in closed form.
+
+Generalised coordinates are the base height x and the joint angles, p = (x, q1, q2); the equations
+of motion in the air, without friction, are M(p) p'' + b(p, p') = (0, tau1, tau2). The links swing
+in the rail's plane; with l the thigh's length, c1 and c2 the distances of the centres of mass from
+the links' upper joints, s12 = sin(q1 + q2) and so on:
+
+    height of thigh CoM: x - c1 cos q1             height of shank CoM: x - l cos q1 - c2 cos q12
+    forward:             c1 sin q1                 forward:             l sin q1 + c2 sin q12
+
+Armature, the motors' reflected inertia, adds to the diagonal of M: the rotors turn with the joints
+but do not react on the links (as in MuJoCo).
+"""
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.robot.model import GRAVITY
+from hopping_leg.robot.parameters import Robot
+
+
+def mass_matrix(robot: Robot, q: Array) -> Array:
+    """Return the mass matrix over (rail, hip, knee), (..., 3, 3), kg, kg m and kg m2.
+
+    Args:
+        robot: The leg.
+        q: Hip and knee angle, rad, (..., 2).
+    """
+    thigh, shank = robot.thigh, robot.shank
+    lever = shank.mass * shank.com
+    coupling = lever * thigh.length * np.cos(q[..., 1])
+    shank_inertia = shank.inertia + lever * shank.com
+    thigh_inertia = thigh.inertia + thigh.mass * thigh.com**2 + shank.mass * thigh.length**2
+    rail_hip, rail_knee = _rail_coupling(robot, q)
+    matrix: Array = np.empty((*q.shape[:-1], 3, 3))
+    matrix[..., 0, 0] = robot.mass
+    matrix[..., 0, 1] = matrix[..., 1, 0] = rail_hip
+    matrix[..., 0, 2] = matrix[..., 2, 0] = rail_knee
+    matrix[..., 1, 1] = thigh_inertia + shank_inertia + 2 * coupling + robot.hip.armature
+    matrix[..., 1, 2] = matrix[..., 2, 1] = shank_inertia + coupling
+    matrix[..., 2, 2] = shank_inertia + robot.knee.armature
+    return matrix
+
+
+def gravity_force(robot: Robot, q: Array) -> Array:
+    """Return the forces that hold the leg against gravity, dV/dp, (..., 3), N and N m.
+
+    Args:
+        robot: The leg.
+        q: Hip and knee angle, rad, (..., 2).
+    """
+    rail = np.full(q.shape[:-1], robot.mass)
+    return GRAVITY * np.stack([rail, *_rail_coupling(robot, q)], axis=-1)
+
+
+def bias_force(robot: Robot, q: Array, qd: Array) -> Array:
+    """Return gravity, Coriolis and centrifugal forces b(p, p'), (..., 3), N and N m.
+
+    Args:
+        robot: The leg.
+        q: Hip and knee angle, rad, (..., 2).
+        qd: Joint velocities, rad/s, (..., 2).
+    """
+    thigh, shank = robot.thigh, robot.shank
+    q1, q2, q12 = q[..., 0], q[..., 1], q[..., 0] + q[..., 1]
+    w1, w2, w12 = qd[..., 0], qd[..., 1], qd[..., 0] + qd[..., 1]
+    lever = shank.mass * shank.com
+    thigh_lever = thigh.mass * thigh.com + shank.mass * thigh.length
+    bend = lever * thigh.length * np.sin(q2)
+    rail = thigh_lever * np.cos(q1) * w1**2 + lever * np.cos(q12) * w12**2
+    hip = -bend * w2 * (2 * w1 + w2)
+    knee = bend * w1**2
+    return gravity_force(robot, q) + np.stack([rail, hip, knee], axis=-1)
+
+
+def kinetic_energy(robot: Robot, q: Array, height_rate: Array, qd: Array) -> Array:
+    """Return the kinetic energy with the rotors', (...), J.
+
+    Args:
+        robot: The leg.
+        q: Hip and knee angle, rad, (..., 2).
+        height_rate: Base velocity, m/s, (...).
+        qd: Joint velocities, rad/s, (..., 2).
+    """
+    speed = np.concatenate([np.asarray(height_rate)[..., None], qd], axis=-1)
+    energy: Array = 0.5 * np.einsum("...i,...ij,...j->...", speed, mass_matrix(robot, q), speed)
+    return energy
+
+
+def potential_energy(robot: Robot, height: Array, q: Array) -> Array:
+    """Return the potential energy, (...), J; zero where all mass lies at ground level.
+
+    Args:
+        robot: The leg.
+        height: Base height, m, (...).
+        q: Hip and knee angle, rad, (..., 2).
+    """
+    thigh, shank = robot.thigh, robot.shank
+    q1, q12 = q[..., 0], q[..., 0] + q[..., 1]
+    below = thigh.mass * thigh.com * np.cos(q1) + shank.mass * (
+        thigh.length * np.cos(q1) + shank.com * np.cos(q12)
+    )
+    energy: Array = GRAVITY * (robot.mass * height - below)
+    return energy
+
+
+def _rail_coupling(robot: Robot, q: Array) -> tuple[Array, Array]:
+    """Return the first moments of mass about hip and knee, kg m, (...)."""
+    thigh, shank = robot.thigh, robot.shank
+    knee = shank.mass * shank.com * np.sin(q[..., 0] + q[..., 1])
+    thigh_lever = thigh.mass * thigh.com + shank.mass * thigh.length
+    return thigh_lever * np.sin(q[..., 0]) + knee, knee

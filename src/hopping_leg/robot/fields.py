@@ -1,0 +1,137 @@
+"""From a robot file's tables to typed parameters; each mistake gets a sentence with its field."""
+
+import dataclasses
+import difflib
+import math
+from typing import Any, TypeVar
+
+from hopping_leg.errors import RobotError
+from hopping_leg.robot.model import TIMESTEP
+from hopping_leg.robot.parameters import Robot
+
+Tree = dict[str, Any]
+"""Nested tables as read from TOML."""
+
+Field = dataclasses.Field[Any]
+Kind = TypeVar("Kind")
+
+_ENTRIES = ("value", "unit", "source")
+_MAY_BE_ZERO = {"friction", "damping"}
+_MAY_BE_NEGATIVE = {"lower", "upper"}
+
+
+def build(kind: type[Kind], tree: object, prefix: str, origin: str) -> Kind:
+    """Return the dataclass that a table describes.
+
+    Args:
+        kind: Dataclass whose number fields carry their unit in ``metadata``.
+        tree: The table.
+        prefix: Path of the table inside the file, e.g. ``"hip.motor"``; empty for the file.
+        origin: The file, for messages.
+
+    Raises:
+        RobotError: A field is missing, unknown, or holds something else than it should.
+    """
+    if not isinstance(tree, dict):
+        raise RobotError(f"{origin}: '{prefix}' must be a table, not {tree!r}.")
+    fields: dict[str, Field] = {f.name: f for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
+    _check_names(tree, fields, prefix, origin)
+    values: dict[str, Any] = {}
+    for name, spec in fields.items():
+        path = f"{prefix}.{name}" if prefix else name
+        if name not in tree:
+            if spec.default is dataclasses.MISSING:
+                raise RobotError(f"{origin}: '{path}' is missing; it needs {_form(spec)}.")
+        elif spec.type is str:
+            values[name] = _string(tree[name], path, origin)
+        elif isinstance(spec.type, type) and dataclasses.is_dataclass(spec.type):
+            values[name] = build(spec.type, tree[name], path, origin)
+        else:
+            values[name] = _number(tree[name], spec, path, origin)
+    return kind(**values)
+
+
+def check_physics(robot: Robot, origin: str) -> None:
+    """Check what no single field can tell.
+
+    Raises:
+        RobotError: Naming the fields that contradict each other.
+    """
+    for name, joint in (("hip", robot.hip), ("knee", robot.knee)):
+        motor = joint.motor
+        _below(origin, (f"{name}.lower", joint.lower), (f"{name}.upper", joint.upper), "rad")
+        for smaller in ("torque_limit", "rated_torque"):
+            _at_most(
+                origin,
+                (f"{name}.motor.{smaller}", getattr(motor, smaller)),
+                (f"{name}.motor.peak_torque", motor.peak_torque),
+                "N m",
+            )
+    for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
+        _at_most(origin, (f"{name}.com", link.com), (f"{name}.length", link.length), "m")
+    if robot.knee.lower < -math.pi or robot.knee.upper > 0:
+        raise RobotError(
+            f"{origin}: 'knee.lower' and 'knee.upper' must lie between -pi and 0 rad,"
+            " because the knee bends to the negative side."
+        )
+    least = 2 * TIMESTEP
+    if robot.contact.time_constant < least:
+        raise RobotError(
+            f"{origin}: 'contact.time_constant' is {robot.contact.time_constant:g} s but must be at"
+            f" least {least:g} s, two physics steps; MuJoCo would silently take that instead."
+        )
+
+
+def _check_names(tree: Tree, fields: dict[str, Field], prefix: str, origin: str) -> None:
+    for key in tree:
+        if key not in fields:
+            close = difflib.get_close_matches(key, fields, n=1)
+            hint = f" Did you mean '{close[0]}'?" if close else ""
+            where = f"[{prefix}]" if prefix else "the file"
+            valid = ", ".join(fields)
+            raise RobotError(f"{origin}: {where} has no field '{key}'.{hint} Valid: {valid}.")
+
+
+def _form(spec: Field) -> str:
+    """Return how a field is written in a file."""
+    unit = spec.metadata.get("unit")
+    if unit:
+        return f'{{ value = ..., unit = "{unit}", source = "..." }}'
+    return "a text in quotes" if spec.type is str else f"a table [{spec.name}]"
+
+
+def _string(value: object, path: str, origin: str) -> str:
+    if not isinstance(value, str) or (path == "name" and not value.strip()):
+        raise RobotError(f"{origin}: '{path}' must be a text in quotes, not {value!r}.")
+    return value
+
+
+def _number(entry: object, spec: Field, path: str, origin: str) -> float:
+    if not isinstance(entry, dict) or set(entry) != set(_ENTRIES):
+        raise RobotError(f"{origin}: '{path}' is {entry!r}; it needs {_form(spec)}.")
+    value, unit = entry["value"], spec.metadata["unit"]
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise RobotError(f"{origin}: '{path}' must be a finite number, not {value!r}.")
+    if entry["unit"] != unit:
+        raise RobotError(f"{origin}: '{path}' is in {entry['unit']!r} but must be in '{unit}'.")
+    if not isinstance(entry["source"], str) or not entry["source"].strip():
+        raise RobotError(f"{origin}: '{path}' has no source; say where {value} comes from.")
+    zero_is_valid = spec.name in _MAY_BE_ZERO
+    if spec.name not in _MAY_BE_NEGATIVE and (value < 0 or (value == 0 and not zero_is_valid)):
+        least = "zero or more" if zero_is_valid else "more than zero"
+        raise RobotError(f"{origin}: '{path}' is {value} {unit} but must be {least}.")
+    return float(value)
+
+
+def _below(origin: str, low: tuple[str, float], high: tuple[str, float], unit: str) -> None:
+    if low[1] >= high[1]:
+        raise RobotError(
+            f"{origin}: '{low[0]}' ({low[1]:g} {unit}) must lie below '{high[0]}' ({high[1]:g})."
+        )
+
+
+def _at_most(origin: str, low: tuple[str, float], high: tuple[str, float], unit: str) -> None:
+    if low[1] > high[1]:
+        raise RobotError(
+            f"{origin}: '{low[0]}' ({low[1]:g} {unit}) must not exceed '{high[0]}' ({high[1]:g})."
+        )

@@ -1,0 +1,147 @@
+import copy
+import math
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from hopping_leg.errors import RobotError
+from hopping_leg.robot import build_model, load_robot, shipped_robots
+from hopping_leg.robot.files import load_tree
+
+EXAMPLE = "examples/my_leg.toml"
+
+
+def numbers(tree, path=()):
+    for key, value in tree.items():
+        if isinstance(value, dict):
+            yield from [(*path, key)] if "value" in value else numbers(value, (*path, key))
+
+
+PATHS = sorted(numbers(load_tree("legv2")))
+
+
+def write_toml(tree, path):
+    def text(value):
+        if isinstance(value, dict):
+            return "{" + ", ".join(f"{k} = {text(v)}" for k, v in value.items()) + "}"
+        if isinstance(value, bool):
+            return str(value).lower()
+        return f'"{value}"' if isinstance(value, str) else repr(value)
+
+    path.write_text("".join(f"{key} = {text(value)}\n" for key, value in tree.items()))
+
+
+def changed(path, change):
+    """Return legv2's tables with ``change(table, key)`` done to one number's place."""
+    tree = copy.deepcopy(load_tree("legv2"))
+    table = tree
+    for key in path[:-1]:
+        table = table[key]
+    change(table, path[-1])
+    return tree
+
+
+def put(entry, value):
+    return lambda table, key: table[key].__setitem__(entry, value)
+
+
+MISTAKES = {
+    "missing": lambda table, key: table.pop(key),
+    "unknown": lambda table, key: table.__setitem__(key + "x", table[key]),
+    "bare": lambda table, key: table.__setitem__(key, 1.0),
+    "text": put("value", "heavy"),
+    "bool": put("value", True),
+    "nan": put("value", math.nan),
+    "infinite": put("value", math.inf),
+    "unit": put("unit", "furlong"),
+    "no source": put("source", " "),
+    "no unit": lambda table, key: table[key].pop("unit"),
+    "extra": put("sauce", "a typo"),
+    "negative": put("value", -1.0),
+}
+
+
+@pytest.mark.parametrize("name", [*shipped_robots(), EXAMPLE])
+def test_every_robot_loads_and_compiles(name):
+    model = build_model(load_robot(name))
+    assert model.nv == 3
+    assert model.nu == 2
+
+
+def test_a_file_may_change_only_what_differs():
+    mine, parent = load_robot(EXAMPLE), load_robot("legv2-paper")
+    assert mine.thigh.length != parent.thigh.length
+    assert mine.thigh.inertia == parent.thigh.inertia
+    assert mine.digest != parent.digest
+
+
+def test_armature_follows_from_rotor_gear_and_belt():
+    knee = load_robot("legv2").knee
+    ratio = knee.motor.gear_ratio * knee.belt_ratio
+    assert knee.armature == pytest.approx(knee.motor.rotor_inertia * ratio**2)
+    assert load_robot("legv2-paper").knee.armature == 0.0001
+
+
+@settings(
+    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(path=st.sampled_from(PATHS), mistake=st.sampled_from(sorted(MISTAKES)))
+def test_every_mistake_gets_a_sentence_that_names_the_field(tmp_path, path, mistake):
+    if mistake == "negative" and path[-1] in ("lower", "upper"):
+        return
+    file = tmp_path / "leg.toml"
+    write_toml(changed(path, MISTAKES[mistake]), file)
+    with pytest.raises(RobotError) as caught:
+        load_robot(file)
+    message = str(caught.value)
+    assert str(file) in message
+    assert path[-1] in message
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "named"),
+    [
+        ("hip.lower", 3.0, "hip.upper"),
+        ("knee.upper", 0.5, "knee.upper"),
+        ("thigh.com", 0.4, "thigh.length"),
+        ("hip.motor.torque_limit", 40.0, "hip.motor.peak_torque"),
+        ("knee.motor.rated_torque", 17.0, "knee.motor.peak_torque"),
+        ("contact.time_constant", 1e-4, "contact.time_constant"),
+    ],
+)
+def test_contradictions_name_the_fields(tmp_path, path, value, named):
+    file = tmp_path / "leg.toml"
+    write_toml(changed(path.split("."), put("value", value)), file)
+    with pytest.raises(RobotError, match=named):
+        load_robot(file)
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        ("base = [", "not valid TOML"),
+        ("\xff", "not valid TOML"),
+        ("base = 3", "'name' is missing"),
+        ('name = "x"\nbase = 3', "'base' must be a table"),
+        ("name = 3", "'name' must be a text"),
+        ('name = " "\nextends = "legv2"', "'name' must be a text"),
+        ("extends = 3", "'extends' must be"),
+        ('extends = "legv3"', "Did you mean 'legv"),
+        ('extends = "leg.toml"', "circle"),
+        ('extends = "legv2"\ncolour = "red"', "no field 'colour'"),
+        ('extends = "legv2"\n[hip]\nbelt_ration = 1', "Did you mean 'belt_ratio'"),
+    ],
+)
+def test_broken_files_get_a_sentence(tmp_path, content, sentence):
+    file = tmp_path / "leg.toml"
+    file.write_bytes(content.encode("latin-1"))
+    with pytest.raises(RobotError, match=sentence):
+        load_robot(file)
+
+
+@pytest.mark.parametrize("name", ["legv3", "nowhere/leg.toml", "", "../legv2"])
+def test_unknown_robots_are_told_the_valid_names(name):
+    with pytest.raises(RobotError, match="legv2-paper"):
+        load_robot(name)

@@ -1,0 +1,75 @@
+import mujoco
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hopping_leg.robot import build_model, kinematics, load_robot
+from tests.robot.legs import SEEDS, random_robot, random_state
+
+angles = st.tuples(st.floats(-3.1, 3.1), st.floats(-3.1, -0.02)).map(np.array)
+
+
+@given(SEEDS, angles)
+def test_inverse_kinematics_undoes_forward_kinematics(seed, q):
+    robot = random_robot(np.random.default_rng(seed))
+    foot = kinematics.foot_position(robot, q)
+    if np.linalg.norm(foot) < 1e-3:
+        return
+    again = kinematics.joint_angles(robot, foot)
+    np.testing.assert_allclose(kinematics.foot_position(robot, again), foot, atol=1e-9)
+    turns = (again - q) / (2 * np.pi)
+    np.testing.assert_allclose(turns, np.round(turns), atol=1e-6)
+
+
+@given(st.floats(0.2901, 10), st.floats(-np.pi, np.pi))
+def test_a_foot_out_of_reach_has_no_angles(distance, direction):
+    robot = load_robot("legv2")
+    foot = distance * np.array([np.cos(direction), np.sin(direction)])
+    assert np.isnan(kinematics.joint_angles(robot, foot)).all()
+
+
+def test_the_straight_leg_is_within_reach():
+    robot = load_robot("legv2")
+    q = kinematics.joint_angles(robot, np.array([robot.thigh.length + robot.shank.length, 0.0]))
+    np.testing.assert_allclose(q, 0, atol=1e-6)
+
+
+@given(SEEDS, angles)
+def test_jacobian_equals_the_finite_difference(seed, q):
+    robot, step = random_robot(np.random.default_rng(seed)), 1e-6
+    columns = [
+        (kinematics.foot_position(robot, q + d) - kinematics.foot_position(robot, q - d))
+        / (2 * step)
+        for d in np.eye(2) * step
+    ]
+    np.testing.assert_allclose(kinematics.jacobian(robot, q), np.stack(columns, -1), atol=1e-8)
+
+
+@settings(max_examples=25, deadline=None)
+@given(SEEDS)
+def test_foot_and_clearances_agree_with_mujoco(seed):
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng)
+    height, rate, q, qd = random_state(rng)
+    model = build_model(robot)
+    data = mujoco.MjData(model)
+    data.qpos[:] = [height[0], *q[0]]
+    data.qvel[:] = [rate[0], *qd[0]]
+    mujoco.mj_forward(model, data)
+    foot = data.site("foot").xpos
+    down, forward = kinematics.foot_position(robot, q)[0]
+    np.testing.assert_allclose([height[0] - down, forward], foot[[2, 0]], atol=1e-12)
+    bottom = {
+        "foot": kinematics.foot_clearance(robot, height, q),
+        "knee_cap": kinematics.knee_clearance(robot, height, q),
+        "base": kinematics.base_clearance(robot, height),
+    }
+    for name, clearance in bottom.items():
+        geom = model.geom(name).id
+        gap = mujoco.mj_geomDistance(model, data, model.geom("floor").id, geom, 10.0, None)
+        np.testing.assert_allclose(clearance[0], gap, atol=1e-9)
+    jacobian = np.zeros((3, 3))
+    mujoco.mj_jacSite(model, data, jacobian, None, model.site("foot").id)
+    velocity = jacobian @ data.qvel
+    rates = kinematics.foot_velocity(robot, q, qd)[0]
+    np.testing.assert_allclose([rate[0] - rates[0], rates[1]], velocity[[2, 0]], atol=1e-9)
