@@ -86,6 +86,7 @@ class Policy:
 
     Attributes:
         card: What the file says about itself.
+        content: The ONNX file.
         digest: First 16 hex digits of the file's SHA-256.
     """
 
@@ -102,6 +103,7 @@ class Policy:
         """
         self.name = name
         self.origin = origin
+        self.content = content
         self.digest = hashlib.sha256(content).hexdigest()[:16]
         self._session = _open(content, origin)
         text = self._session.get_modelmeta().custom_metadata_map.get(METADATA_KEY)
@@ -126,6 +128,11 @@ class Policy:
         except OSError as error:
             raise PolicyError(f"Cannot read policy file {path}: {error.strerror}.") from error
         return Policy(content, str(path), name or path.stem)
+
+    @property
+    def inputs(self) -> dict[str, tuple[int, ...]]:
+        """Names and shapes of the graph's inputs, without the number of legs."""
+        return self._layout.shapes
 
     def check_robot(self, robot: Robot, rate: float | None = None, *, strict: bool = True) -> None:
         """Make sure that the policy was trained for this robot and control rate.

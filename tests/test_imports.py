@@ -1,0 +1,87 @@
+"""The rooms of the house: data flows one way, and the core needs no torch."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import hopping_leg
+
+ROOT = Path(hopping_leg.__file__).parent
+ORDER = ["foundation", "robot", "sim", "control", "env", "learn", "evaluate", "cli"]
+FOUNDATION = {"", "arrays", "errors", "hops", "trace"}
+TRAINING = {"torch", "stable_baselines3", "onnx", "tensorboard"}
+BESIDE = {("evaluate", "learn"), ("evaluate", "env")}
+"""Later rooms that still must not use these earlier ones."""
+
+BLOCK = """
+import sys
+class Block:
+    def find_spec(self, name, *_):
+        if name.split(".")[0] in {0!r}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+sys.meta_path.insert(0, Block())
+"""
+
+MODULES = sorted(ROOT.rglob("*.py"))
+
+
+def room(dotted):
+    parts = dotted.split(".")
+    name = parts[1] if len(parts) > 1 else ""
+    return "foundation" if name in FOUNDATION else name
+
+
+def imports(tree):
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "relative imports hide the room"
+            yield node.module
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_no_room_imports_a_later_one(path):
+    relative = path.relative_to(ROOT)
+    here = room(".".join(("hopping_leg", *relative.with_suffix("").parts)))
+    here = "foundation" if relative == Path("__init__.py") else here
+    for name in imports(ast.parse(path.read_text(encoding="utf-8"))):
+        if name.split(".")[0] == "hopping_leg":
+            there = room(name)
+            assert ORDER.index(there) <= ORDER.index(here), f"{relative} imports {name}"
+            assert (here, there) not in BESIDE, f"{relative} imports {name}"
+        elif name.split(".")[0] in TRAINING:
+            assert here == "learn", f"{relative} imports {name}"
+        assert name.split(".")[0] not in {"pickle", "dill", "cloudpickle", "joblib"}
+
+
+def run_without_training_extra(code):
+    """Run code in a fresh interpreter in which nothing of the training extra can be imported."""
+    return subprocess.run(
+        [sys.executable, "-c", BLOCK.format(sorted(TRAINING)) + code],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+
+
+def test_everything_but_learning_imports_without_the_training_extra():
+    names = []
+    for path in MODULES:
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        if parts[-1] != "__main__" and parts[0] != "learn":
+            names.append(".".join(("hopping_leg", *parts)).removesuffix(".__init__"))
+    code = f"import importlib\nfor name in {names}: importlib.import_module(name)"
+    result = run_without_training_extra(code)
+    assert result.returncode == 0, result.stderr
+
+
+def test_training_without_the_extra_gets_a_sentence():
+    code = "from hopping_leg.cli import main; raise SystemExit(main(['train']))"
+    result = run_without_training_extra(code)
+    assert result.returncode == 2
+    assert "hopping-leg[train]" in result.stderr
+    assert "Traceback" not in result.stderr
