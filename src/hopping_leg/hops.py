@@ -1,4 +1,4 @@
-"""Hops in a run: flights, apexes, sink, skipped hops, body contact.
+"""Hops in a run: flights, apexes, bounces that never left the ground, skipped hops.
 
 An apex is a maximum of the base height with the foot at least 3 mm clear of the ground; every one
 counts.
@@ -7,11 +7,21 @@ counts.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import find_peaks
 
 from hopping_leg.arrays import Array, BoolArray, IntArray
 
 CLEAR = 0.003
 """Foot clearance that counts as flight, m."""
+
+BOUNCE = 0.01
+"""Rise and fall of the base that counts as a bounce when the foot stays on the ground, m."""
+
+SKIP_RATIO = 1.6
+"""A gap between apexes longer than this many median periods holds a skipped hop."""
+
+USUAL_PERIOD = 0.5
+"""Period assumed where a run has too few hops to tell its own, s."""
 
 
 @dataclass(frozen=True)
@@ -52,3 +62,57 @@ def find_hops(height: Array, rate: Array, clearance: Array) -> Hops:
     tick = np.flatnonzero(passed) + 1
     apex = np.maximum(height[tick], height[tick - 1])
     return Hops(tick, apex, clearance >= CLEAR)
+
+
+def find_bounces(height: Array, clearance: Array) -> IntArray:
+    """Find maxima of the base height with the foot on the ground: hops that never took off.
+
+    Args:
+        height: Base height, m, (ticks,).
+        clearance: Foot clearance, m, (ticks,).
+
+    Returns:
+        Index of each maximum that stands at least ``BOUNCE`` out of its surroundings, (bounces,).
+    """
+    peaks, _ = find_peaks(height, prominence=BOUNCE)
+    grounded: IntArray = peaks[clearance[peaks] < CLEAR]
+    return grounded
+
+
+def hop_period(apex_tick: IntArray, rate: float) -> float:
+    """Return the median time between successive apexes, s; ``USUAL_PERIOD`` below three apexes.
+
+    Args:
+        apex_tick: Index of each apex, (hops,).
+        rate: Ticks per second, Hz.
+    """
+    if len(apex_tick) < 3:
+        return USUAL_PERIOD
+    return float(np.median(np.diff(apex_tick))) / rate
+
+
+def count_skipped(
+    apex_tick: IntArray, bounce_tick: IntArray, start: int, end: int, rate: float
+) -> int:
+    """Count hops that should have happened between two ticks and did not.
+
+    The apexes cut the window into gaps. A gap longer than ``SKIP_RATIO`` median periods misses
+    ``round(gap / period) - 1`` apexes between two apexes and ``floor(gap / period)`` at the ends of
+    the window; a bounce misses one. Each gap counts the larger of the two, so that a bounce in a
+    long gap is one skipped hop, not two.
+
+    Args:
+        apex_tick: Index of each in-flight apex in the window, rising, (hops,).
+        bounce_tick: Index of each bounce, (bounces,).
+        start: First tick of the window.
+        end: One past the last tick.
+        rate: Ticks per second, Hz.
+    """
+    period = hop_period(apex_tick, rate) * rate
+    edges = np.concatenate([[start], apex_tick, [end]])
+    periods = np.diff(edges) / period
+    apexes = np.round(periods) - 1
+    apexes[[0, -1]] = np.floor(periods[[0, -1]])
+    missed = np.where(periods > SKIP_RATIO, apexes, 0)
+    bounces = np.histogram(bounce_tick, bins=edges)[0] if end > start else np.zeros(len(periods))
+    return int(np.maximum(missed, bounces).sum())

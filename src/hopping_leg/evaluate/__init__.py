@@ -1,0 +1,6 @@
+"""Trials, hop metrics, statistics, figures and the report."""
+
+from hopping_leg.evaluate.result import Evaluation
+from hopping_leg.evaluate.runner import Candidate, Judged, evaluate
+
+__all__ = ["Candidate", "Evaluation", "Judged", "evaluate"]

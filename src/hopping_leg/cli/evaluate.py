@@ -1,0 +1,212 @@
+"""Run the paper's trials for controllers and report how well they hop.
+
+Every controller hops from standing, with the paper's noise and delay: 15 s at each command, 15 s
+through all commands in turn, 30 s up a staircase, 15 s at each rung of a ladder. Errors are apex
+minus command; negative is too low.
+
+Examples:
+  hop evaluate fast energy-shaping
+  hop evaluate fast energy-shaping --out runs/first
+  hop evaluate 'runs/*/policy.onnx' --commands 0.25,0.30 --json result.json
+  hop evaluate energy-shaping --robot my_leg.toml --seeds 20 --floor stiff
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import tyro
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+from hopping_leg.cli.options import Heights
+from hopping_leg.control import Setup
+from hopping_leg.errors import UsageError
+from hopping_leg.evaluate import Candidate, Evaluation, Judged, evaluate
+from hopping_leg.evaluate.candidates import load_candidates
+from hopping_leg.evaluate.runs import save_traces
+from hopping_leg.robot import load_robot
+from hopping_leg.sim import CONTROL_RATE, NOTHING, Disturbance
+from hopping_leg.trace import write_atomically
+
+
+@dataclass(frozen=True)
+class Evaluate:
+    """What is judged, where and how often."""
+
+    controllers: tyro.conf.Positional[tuple[str, ...]]
+    """Names (energy-shaping, paper, fast, ...), .onnx files, or a quoted pattern of them."""
+    robot: str = "legv2-paper"
+    """A shipped robot or a .toml file."""
+    commands: Heights | None = None
+    """Apex heights of the fixed trials and the sequence, m; default 0.25,0.30,0.35, scaled to the
+    leg's length."""
+    seeds: int = 5
+    """Realisations of noise and delay per trial."""
+    seed: int = 1000
+    """All of them follow from it; choose one that selected nothing."""
+    out: Path | None = None
+    """Folder for evaluation.json, report.html and traces/, instead of naming each."""
+    json: Path | None = None
+    """File for every number."""
+    report: Path | None = None
+    """File for the report, one self-contained HTML page."""
+    traces: Path | None = None
+    """Folder for the runs as Parquet, for `hop plot` and your own tools."""
+    floor: Literal["soft", "stiff", "both"] = "both"
+    """The robot's own contact (soft), MuJoCo's default (stiff), or all trials on the first and the
+    fixed ones on the second."""
+    noise: bool = True
+    """The paper's sensor noise, torque noise and delay."""
+    timestep: float = 5e-4
+    """Physics step, s."""
+    rate: float = CONTROL_RATE
+    """Control rate, Hz."""
+    threads: int = 0
+    """Threads of the physics, 0 for all cores; results do not depend on it."""
+    video: bool = True
+    """Put a short video of each controller into the report, where OpenGL is to be had."""
+
+
+def run(args: Evaluate) -> None:
+    """Evaluate controllers, print the table, write what was asked for."""
+    args = _with_folder(args)
+    if args.seed < 0:
+        raise UsageError(f"A seed of {args.seed} has no meaning; give 0 or more.")
+    robot = load_robot(args.robot)
+    candidates = load_candidates(args.controllers, robot, args.rate)
+    disturbance = Disturbance() if args.noise else NOTHING
+    setup = Setup(robot, disturbance, rate=args.rate, timestep=args.timestep, threads=args.threads)
+    judged = judge(candidates, setup, args)
+    if args.traces:
+        save_traces(judged.runs, args.traces)
+    if args.json:
+        write_atomically(args.json, judged.evaluation.dumps())
+    console = Console()
+    print_tables(console, judged.evaluation)
+    for path in (args.json, args.report, args.traces):
+        if path:
+            console.print(f"Wrote {path}", highlight=False)
+
+
+def _with_folder(args: Evaluate) -> Evaluate:
+    if args.out is None:
+        return args
+    return replace(
+        args,
+        json=args.json or args.out / "evaluation.json",
+        report=args.report or args.out / "report.html",
+        traces=args.traces or args.out / "traces",
+    )
+
+
+def judge(candidates: list[Candidate], setup: Setup, args: Evaluate) -> Judged:
+    """Run all trials under a progress bar."""
+    floors = ("soft", "stiff") if args.floor == "both" else (args.floor,)
+    with progress_bar() as bar:
+        judged = _on_floor(candidates, setup, args, floors[0], bar)
+        if len(floors) == 1:
+            return judged
+        secondary = _on_floor(candidates, setup, args, floors[1], bar)
+    return Judged(replace(judged.evaluation, secondary=secondary.evaluation), judged.runs)
+
+
+def _on_floor(
+    candidates: list[Candidate], setup: Setup, args: Evaluate, floor: str, bar: Progress
+) -> Judged:
+    whole = floor == "soft" or args.floor != "both"
+    return evaluate(
+        candidates,
+        setup,
+        commands=args.commands,
+        repeats=args.seeds,
+        seed=args.seed,
+        floor=floor,
+        kinds=("fixed", "sequence", "staircase", "ladder") if whole else ("fixed",),
+        on_progress=_bar_updater(bar, floor),
+    )
+
+
+def progress_bar() -> Progress:
+    """Return a bar that shows share, elapsed and remaining time."""
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f}%"),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+    )
+
+
+def _bar_updater(bar: Progress, floor: str) -> Callable[[str, float], None]:
+    tasks: dict[str, tuple[int, float]] = {}
+
+    def update(label: str, share: float) -> None:
+        if label not in tasks:
+            tasks[label] = (bar.add_task(f"{label}, {floor} floor", total=1.0), -1.0)
+        task, shown = tasks[label]
+        if share - shown > 0.005 or share >= 1:
+            bar.update(bar.tasks[task].id, completed=share)
+            tasks[label] = (task, share)
+
+    return update
+
+
+def print_tables(console: Console, evaluation: Evaluation) -> None:
+    """Print the summary, what it was measured on, and notes."""
+    console.print(summary_table(evaluation))
+    if evaluation.secondary:
+        console.print(summary_table(evaluation.secondary))
+    for step in evaluation.staircase:
+        verdict = "rises at every step" if step.monotone else "does not rise at every step"
+        console.print(
+            f"Staircase, {step.controller}: {verdict}"
+            f" ({step.monotone_runs} of {step.runs} runs on their own),"
+            f" {step.skipped_hops} skipped hops.",
+            highlight=False,
+        )
+    for note in evaluation.notes:
+        console.print(f"Note: {note}", highlight=False)
+
+
+def summary_table(evaluation: Evaluation) -> Table:
+    """Return the summary as a table for the terminal; lengths in mm."""
+    conditions = evaluation.conditions
+    table = Table(
+        title=f"{conditions['robot']}, {conditions['floor']} floor, {conditions['seeds']} seeds"
+        f" from {conditions['seed']}; heights in mm"
+    )
+    table.add_column("controller")
+    for column in (
+        "command",
+        "median error",
+        "95 % interval",
+        "std",
+        "hops",
+        "skipped",
+        "hops/s",
+        "flight",
+        "lowest base",
+        "sink",
+        "body contacts",
+    ):
+        table.add_column(column, justify="right")
+    for row in evaluation.summary:
+        table.add_row(
+            row.controller,
+            f"{1e3 * row.command_m:.0f}",
+            f"{1e3 * row.median_error_m:+.1f}",
+            f"{1e3 * row.median_error_low_m:+.1f} .. {1e3 * row.median_error_high_m:+.1f}",
+            f"{1e3 * row.std_m:.1f}",
+            f"{row.hops}",
+            f"{row.skipped_hops}",
+            f"{row.hop_rate_hz:.2f}",
+            f"{100 * row.flight_fraction:.0f} %",
+            f"{1e3 * row.min_base_height_m:.0f}",
+            f"{1e3 * row.max_sink_m:.0f}",
+            f"{row.body_contacts}",
+        )
+    return table

@@ -1,0 +1,55 @@
+"""Names, policy files and patterns of the command line turned into what is judged."""
+
+import glob
+from collections.abc import Sequence
+
+from hopping_leg.control.library import load_controller
+from hopping_leg.control.policy import Policy
+from hopping_leg.errors import PolicyError
+from hopping_leg.evaluate.runner import Candidate
+from hopping_leg.robot.parameters import Robot
+
+
+def load_candidates(names: Sequence[str], robot: Robot, rate: float) -> list[Candidate]:
+    """Load every controller that is named.
+
+    Policy files of one recipe that differ in their training seed become a group.
+
+    Args:
+        names: Shipped names, ``.onnx`` files, or patterns of such, e.g. ``runs/*/policy.onnx``.
+        robot: The leg they shall drive.
+        rate: Control rate, Hz.
+
+    Raises:
+        PolicyError: A file is unreadable, does not fit, or a pattern matches nothing.
+        UsageError: There is no such controller.
+    """
+    expanded = [name for entry in names for name in _expand(entry)]
+    return [_load(name, robot, rate) for name in dict.fromkeys(expanded)]
+
+
+def _expand(entry: str) -> list[str]:
+    if not any(sign in entry for sign in "*?["):
+        return [entry]
+    found = sorted(glob.glob(entry, recursive=True))  # noqa: PTH207
+    if not found:
+        raise PolicyError(
+            f"No policy file matches '{entry}'; quote the pattern and check the path."
+        )
+    return found
+
+
+def _load(name: str, robot: Robot, rate: float) -> Candidate:
+    controller = load_controller(name, robot)
+    if not isinstance(controller, Policy):
+        return Candidate(name, controller)
+    controller.check_robot(robot, rate, strict=False)
+    card = controller.card
+    notes: tuple[str, ...] = ()
+    if card.robot_digest != robot.digest:
+        notes = (
+            f"{name} was trained on robot '{card.robot}' ({card.robot_digest}),"
+            f" not on '{robot.name}' ({robot.digest}).",
+        )
+    group = f"{card.recipe} from files" if name.endswith(".onnx") else None
+    return Candidate(name, controller, (card.command_low, card.command_high), group, notes)

@@ -1,0 +1,122 @@
+"""What is measured of a run; every definition stands in docs/evaluation.md."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.hops import count_skipped, find_bounces, find_hops
+from hopping_leg.trace import Trace
+
+START_SECONDS = 2.0
+"""Hops dropped after the standing start, s."""
+
+SWITCH_SECONDS = 1.0
+"""Hops dropped after a change of command, s."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """One stretch of a run with a constant command.
+
+    Apexes, skipped hops and flight are taken after the start (2 s) or switch (1 s) has settled;
+    heights, sink, contacts and torques over the whole stretch.
+
+    Attributes:
+        command: Desired apex height, m.
+        apex: Height of every in-flight apex, m, (hops,).
+        settled: Time in which apexes were counted, s.
+        flight: Time in which the foot was clear of the ground, s, of ``settled``.
+        skipped: Hops that should have happened and did not.
+        bounces: Bounces that never left the ground.
+        min_height: Lowest base height, m.
+        max_sink: Deepest the foot sank in, m.
+        base_contacts: Times the base touched the ground.
+        knee_contacts: Times the knee touched the ground.
+        peak_torque: Largest magnitude the motors gave at hip and knee, N m, (2,).
+        rms_torque: Root mean square of the same, N m, (2,).
+    """
+
+    command: float
+    apex: Array
+    settled: float
+    flight: float
+    skipped: int
+    bounces: int
+    min_height: float
+    max_sink: float
+    base_contacts: int
+    knee_contacts: int
+    peak_torque: Array
+    rms_torque: Array
+
+    @property
+    def error(self) -> Array:
+        """Apex minus command, m, (hops,)."""
+        return self.apex - self.command
+
+
+def measure(trace: Trace) -> list[Window]:
+    """Measure a run: one window per stretch of constant command, in order of time."""
+    command = trace.column("command_m")
+    rate = _rate(trace)
+    switches = np.flatnonzero(np.diff(command)) + 1
+    edges = [0, *switches.tolist(), len(command)]
+    return [
+        _window(trace, start, end, rate, START_SECONDS if start == 0 else SWITCH_SECONDS)
+        for start, end in itertools.pairwise(edges)
+    ]
+
+
+def _window(trace: Trace, start: int, end: int, rate: float, drop: float) -> Window:
+    height = trace.column("height_m")
+    clearance = trace.column("foot_clearance_m")
+    torque = np.stack([trace.column(f"{j}_torque_nm")[start:end] for j in ("hip", "knee")])
+    first = min(start + round(drop * rate), end)
+    hops = find_hops(height[:end], trace.column("height_rate_m_s")[:end], clearance[:end])
+    counted = hops.tick >= first
+    bounces = find_bounces(height[:end], clearance[:end])
+    bounces = bounces[bounces >= first]
+    return Window(
+        command=float(trace.column("command_m")[start]),
+        apex=hops.apex[counted],
+        settled=(end - first) / rate,
+        flight=float(hops.in_flight[first:].sum()) / rate,
+        skipped=count_skipped(hops.tick[counted], bounces, first, end, rate),
+        bounces=len(bounces),
+        min_height=float(height[start:end].min()),
+        max_sink=max(0.0, float(-clearance[start:end].min())),
+        base_contacts=_events(trace.column("base_clearance_m")[start:end] <= 0),
+        knee_contacts=_events(trace.column("knee_clearance_m")[start:end] <= 0),
+        peak_torque=np.abs(torque).max(axis=1),
+        rms_torque=np.sqrt(np.square(torque).mean(axis=1)),
+    )
+
+
+def _rate(trace: Trace) -> float:
+    """Return the control rate, Hz."""
+    time = trace.column("time_s")
+    return float((len(time) - 1) / (time[-1] - time[0]))
+
+
+def _events(touching: BoolArray) -> int:
+    """Count the beginnings of contacts; one that lasts counts once."""
+    began = touching[1:] & ~touching[:-1]
+    return int(began.sum()) + int(touching[:1].sum())
+
+
+def skipped_in_run(trace: Trace) -> int:
+    """Count skipped hops of a whole run after its start, switches of command included."""
+    rate = _rate(trace)
+    first = round(START_SECONDS * rate)
+    height, clearance = trace.column("height_m"), trace.column("foot_clearance_m")
+    ticks = find_hops(height, trace.column("height_rate_m_s"), clearance).tick
+    bounces = find_bounces(height, clearance)
+    return count_skipped(ticks[ticks >= first], bounces[bounces >= first], first, len(height), rate)
+
+
+def pooled_apexes(windows: Sequence[Window]) -> Array:
+    """Return the apexes of several windows in one row, m, (hops,)."""
+    return np.concatenate([w.apex for w in windows]) if windows else np.empty(0)

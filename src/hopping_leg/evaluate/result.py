@@ -1,0 +1,156 @@
+"""The numbers of an evaluation, as typed records and as JSON."""
+
+import dataclasses
+import json
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from hopping_leg.evaluate.statistics import Neighbours
+
+SCHEMA = 1
+"""Version of the JSON, raised when a name changes its meaning."""
+
+
+@dataclass(frozen=True)
+class Summary:
+    """One controller at one command, hops of all its runs pooled."""
+
+    controller: str
+    robot: str
+    command_m: float
+    median_error_m: float
+    """Median of apex minus command."""
+    median_error_low_m: float
+    """Lower end of its 95 % bootstrap interval, whole runs resampled."""
+    median_error_high_m: float
+    mean_abs_error_m: float
+    """Mean over hops of |apex - command|."""
+    std_m: float
+    """Hop-to-hop standard deviation of the apex."""
+    iqr_m: float
+    """Interquartile range of the apex."""
+    hops: int
+    """In-flight apexes counted."""
+    skipped_hops: int
+    stance_bounces: int
+    hop_rate_hz: float
+    flight_fraction: float
+    min_base_height_m: float
+    max_sink_m: float
+    body_contacts: int
+    """Times base or knee touched the ground."""
+    base_contacts: int
+    knee_contacts: int
+    peak_hip_torque_nm: float
+    peak_knee_torque_nm: float
+    rms_hip_torque_nm: float
+    rms_knee_torque_nm: float
+    measured_s: float
+    """Time in which hops were counted."""
+    runs: int
+
+
+@dataclass(frozen=True)
+class Staircase:
+    """The 30 s trial of one controller."""
+
+    controller: str
+    commands_m: list[float]
+    median_apexes_m: list[float]
+    monotone: bool
+    """Medians over all seeds rise at every step."""
+    monotone_runs: int
+    """Runs whose own medians rise at every step."""
+    runs: int
+    skipped_hops: int
+    """Over the whole 30 s after the start, all runs."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Neighbouring commands of one controller."""
+
+    controller: str
+    neighbours: list[Neighbours]
+
+
+@dataclass(frozen=True)
+class Group:
+    """Several policies of one recipe, trained with different seeds, at one command."""
+
+    group: str
+    command_m: float
+    policies: int
+    median_error_m: float
+    """Median over policies of each policy's median error."""
+    median_error_low_m: float
+    """Lower end of its 95 % bootstrap interval, policies resampled."""
+    median_error_high_m: float
+    worst_abs_error_m: float
+    median_std_m: float
+    skipped_hops: int
+    body_contacts: int
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Everything measured, without the traces.
+
+    Attributes:
+        summary: One row per controller and command: fixed trials and the sequence pooled.
+        sequence: One row per controller and command: the sequence alone.
+        ladder: One row per controller and command of the ladder.
+        staircase: One entry per controller.
+        neighbours: One entry per controller.
+        groups: One row per group of policies and command.
+        distributions: Apexes behind ``summary``: controller, command_m, apexes_m.
+        conditions: Robot, digest, floor, disturbance, seeds, steps, rates.
+        versions: Of the software.
+        notes: What was left out and why.
+        secondary: The same on another floor, if that was asked for.
+    """
+
+    summary: list[Summary]
+    sequence: list[Summary]
+    ladder: list[Summary]
+    staircase: list[Staircase]
+    neighbours: list[Comparison]
+    groups: list[Group]
+    distributions: list[dict[str, Any]]
+    conditions: dict[str, Any]
+    versions: dict[str, str]
+    notes: list[str]
+    secondary: "Evaluation | None" = None
+
+    @property
+    def controllers(self) -> list[str]:
+        """Names in the order of the rows."""
+        return list(dict.fromkeys(row.controller for row in self.summary))
+
+    def rows(self, controller: str) -> list[Summary]:
+        """Return a controller's rows of the summary, by rising command."""
+        return [row for row in self.summary if row.controller == controller]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain values; numbers that do not exist are None."""
+        return {"schema": SCHEMA, **_plain(dataclasses.asdict(self))}
+
+    def dumps(self) -> bytes:
+        """Return readable JSON."""
+        return (json.dumps(self.to_json(), indent=1, allow_nan=False) + "\n").encode()
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401
+    if isinstance(value, dict):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, float):
+        return round(value, 9) if math.isfinite(value) and abs(value) > 1e-6 else _tiny(value)
+    return value
+
+
+def _tiny(value: float) -> float | None:
+    """Keep small p-values as they are."""
+    return value if math.isfinite(value) else None

@@ -1,0 +1,93 @@
+"""Are the heights different, by how much, and how sure is that?"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from hopping_leg.arrays import Array
+
+CONFIDENCE = 0.95
+RESAMPLES = 2000
+
+
+@dataclass(frozen=True)
+class Neighbours:
+    """Two neighbouring commands compared, as in the paper's Fig. 9.
+
+    Attributes:
+        lower_m: The lower command, m.
+        upper_m: The higher command, m.
+        p: Of the two-sided Wilcoxon rank-sum test, normal approximation.
+        cliffs_delta: P(upper > lower) - P(upper < lower) over all pairs of hops; 1 is full
+            separation in the right order.
+        overlap: Share of all hops that lie between the smallest of the higher and the largest of
+            the lower command; 0 when the distributions do not overlap.
+    """
+
+    lower_m: float
+    upper_m: float
+    p: float
+    cliffs_delta: float
+    overlap: float
+
+
+def compare(lower_m: float, lower: Array, upper_m: float, upper: Array) -> Neighbours:
+    """Compare the apexes of two commands.
+
+    Args:
+        lower_m: The lower command, m.
+        lower: Its apexes, m, (hops,).
+        upper_m: The higher command, m.
+        upper: Its apexes, m, (hops,).
+    """
+    if not len(lower) or not len(upper):
+        return Neighbours(lower_m, upper_m, float("nan"), float("nan"), float("nan"))
+    both = np.concatenate([lower, upper])
+    between = (both >= upper.min()) & (both <= lower.max())
+    p = float(stats.ranksums(lower, upper).pvalue)
+    return Neighbours(lower_m, upper_m, p, cliffs_delta(lower, upper), float(between.mean()))
+
+
+def cliffs_delta(lower: Array, upper: Array) -> float:
+    """Return Cliff's delta, -1 to 1; 1 when every value of ``upper`` exceeds all of ``lower``."""
+    u = stats.mannwhitneyu(upper, lower, method="asymptotic").statistic
+    return float(2 * u / (len(lower) * len(upper)) - 1)
+
+
+def median_interval(
+    runs: Sequence[Array], seed: int, resamples: int = RESAMPLES
+) -> tuple[float, float]:
+    """Return the bootstrap interval of the median over all values.
+
+    Whole runs are resampled, because the hops of one run depend on each other; with a single run
+    its hops are.
+
+    Args:
+        runs: Values of each run, (hops,) each.
+        seed: Of the resampling.
+        resamples: How many.
+
+    Returns:
+        The 95 % percentile interval; NaN without values.
+    """
+    filled = [r for r in runs if len(r)]
+    units = filled if len(filled) > 1 else [np.array([v]) for r in filled for v in r]
+    if len(units) < 2:
+        value = float(units[0][0]) if units else float("nan")
+        return value, value
+
+    def median_of(index: Array) -> float:
+        return float(np.median(np.concatenate([units[int(i)] for i in index])))
+
+    result = stats.bootstrap(
+        (np.arange(len(units)),),
+        median_of,
+        vectorized=False,
+        n_resamples=resamples,
+        confidence_level=CONFIDENCE,
+        method="percentile",
+        rng=np.random.default_rng(seed),
+    )
+    return float(result.confidence_interval.low), float(result.confidence_interval.high)

@@ -1,0 +1,158 @@
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from hopping_leg.errors import UsageError
+from hopping_leg.evaluate import Candidate, evaluate
+from hopping_leg.evaluate.runs import floor_robot, run_trials, save_traces
+from hopping_leg.evaluate.trials import Trial
+from hopping_leg.trace import Trace
+from tests.evaluate.conftest import Spring
+
+KINDS = ("fixed", "sequence")
+
+
+@pytest.fixture(scope="module")
+def judged(setup, robot):
+    seen = []
+    result = evaluate(
+        [Candidate("spring", Spring(robot))],
+        setup,
+        commands=[0.25, 0.35],
+        repeats=2,
+        kinds=KINDS,
+        on_progress=lambda label, share: seen.append((label, share)),
+    )
+    assert seen[-1] == ("spring", pytest.approx(1.0))
+    return result
+
+
+def test_summary_rows_pool_fixed_trials_and_the_sequence(judged):
+    rows = judged.evaluation.summary
+    assert [(r.controller, r.robot, r.command_m) for r in rows] == [
+        ("spring", "legv2-paper", 0.25),
+        ("spring", "legv2-paper", 0.35),
+    ]
+    assert all(row.runs == 4 for row in rows)
+    assert rows[0].measured_s == pytest.approx(2 * (13 + 3))
+    assert rows[1].measured_s == pytest.approx(2 * (13 + 4))
+    apexes = judged.evaluation.distributions[1]["apexes_m"]
+    assert rows[1].hops == len(apexes) > 20
+    assert rows[1].median_error_m == pytest.approx(np.median(apexes) - 0.35, abs=1e-5)
+    assert rows[1].std_m == pytest.approx(np.std(apexes), abs=1e-5)
+    assert rows[1].median_error_low_m <= rows[1].median_error_m <= rows[1].median_error_high_m
+
+
+def test_the_json_has_the_promised_names_and_no_nan(judged):
+    data = json.loads(judged.evaluation.dumps())
+    promised = {
+        "controller",
+        "robot",
+        "command_m",
+        "median_error_m",
+        "std_m",
+        "hops",
+        "skipped_hops",
+        "flight_fraction",
+        "hop_rate_hz",
+        "min_base_height_m",
+        "body_contacts",
+        "max_sink_m",
+    }
+    assert promised <= data["summary"][0].keys()
+    assert data["conditions"]["robot_digest"]
+    assert data["conditions"]["seeds"] == 2
+
+
+def test_numbers_that_do_not_exist_are_null(judged):
+    row = dataclasses.replace(judged.evaluation.summary[0], median_error_m=float("nan"))
+    empty = dataclasses.replace(judged.evaluation, summary=[row])
+    assert json.loads(empty.dumps())["summary"][0]["median_error_m"] is None
+
+
+def test_the_same_seed_gives_the_same_bytes(judged, setup, robot, spring):
+    again = evaluate(
+        [Candidate("spring", spring)],
+        dataclasses.replace(setup, threads=2),
+        commands=[0.25, 0.35],
+        repeats=2,
+        kinds=KINDS,
+    )
+    assert again.evaluation.dumps() == judged.evaluation.dumps()
+
+
+def test_traces_are_stored_one_per_run(judged, tmp_path):
+    paths = save_traces(judged.runs, tmp_path)
+    assert len(set(paths)) == len(judged.runs) == 6
+    trace = Trace.load(paths[0])
+    assert trace.header["trial"] == "fixed-0.250"
+    assert trace.table.equals(judged.runs[0].trace.table)
+
+
+def test_repeats_differ_in_their_noise(judged):
+    first, second = judged.runs[:2]
+    assert not np.array_equal(first.trace.column("height_m"), second.trace.column("height_m"))
+
+
+def test_trials_of_different_length_keep_their_order_and_length(setup, spring):
+    trials = [Trial("staircase", ((0.3, 0.2), (0.32, 0.2))), Trial("fixed", ((0.3, 0.1),))]
+    runs = run_trials("spring", spring, setup, trials, repeats=2, seed=1)
+    assert [(r.trial.kind, r.repeat) for r in runs] == [
+        ("staircase", 0),
+        ("staircase", 1),
+        ("fixed", 0),
+        ("fixed", 1),
+    ]
+    assert [len(r.trace.table) for r in runs] == [80, 80, 20, 20]
+
+
+def test_the_stiff_floor_changes_the_contact_only(robot):
+    stiff = floor_robot(robot, "stiff")
+    assert (stiff.contact.time_constant, stiff.contact.damping_ratio) == (0.02, 1.0)
+    assert dataclasses.replace(stiff, contact=robot.contact) == robot
+    with pytest.raises(UsageError, match=r"no floor 'lava'.*soft, stiff"):
+        floor_robot(robot, "lava")
+
+
+def test_commands_outside_a_controllers_range_are_refused(setup, spring):
+    with pytest.raises(UsageError, match=r"'spring' cannot be asked for 0\.35 m.*0\.2 to 0\.3 m"):
+        evaluate([Candidate("spring", spring, (0.2, 0.3))], setup, commands=[0.25, 0.35])
+
+
+def test_trials_outside_a_controllers_range_are_left_out_with_a_note(setup, spring):
+    result = evaluate(
+        [Candidate("spring", spring, (0.29, 0.33))],
+        setup,
+        commands=[0.30],
+        repeats=1,
+        kinds=("ladder", "staircase"),
+    ).evaluation
+    assert [row.command_m for row in result.ladder] == [0.30, 0.32]
+    assert "left out: staircase, ladder 0.22 m" in result.notes[0]
+
+
+def test_nothing_to_do_is_said(setup, spring):
+    with pytest.raises(UsageError, match="No controller"):
+        evaluate([], setup)
+    with pytest.raises(UsageError, match="named twice"):
+        evaluate([Candidate("a", spring), Candidate("a", spring)], setup)
+    with pytest.raises(UsageError, match="0 seeds are too few"):
+        evaluate([Candidate("a", spring)], setup, repeats=0)
+
+
+def test_policies_of_one_recipe_are_pooled(setup, robot):
+    result = evaluate(
+        [Candidate(f"p{i}", Spring(robot, push=30.0 + i), group="spring") for i in range(3)],
+        setup,
+        commands=[0.35],
+        repeats=1,
+        kinds=("fixed",),
+    ).evaluation
+    (group,) = result.groups
+    errors = [row.median_error_m for row in result.summary]
+    assert (group.group, group.policies) == ("spring", 3)
+    assert group.median_error_m == np.median(errors)
+    assert group.worst_abs_error_m == np.abs(errors).max()
+    assert min(errors) <= group.median_error_low_m <= group.median_error_high_m <= max(errors)

@@ -1,0 +1,89 @@
+import numpy as np
+import pytest
+
+from hopping_leg.hops import (
+    CLEAR,
+    USUAL_PERIOD,
+    count_skipped,
+    find_bounces,
+    find_hops,
+    hop_period,
+)
+
+RATE = 200.0
+GRAVITY = 9.81
+STAND = 0.2
+
+
+def hopping(apexes, stance=0.2, sink=0.03):
+    """Ballistic flights to the given apexes, joined by half-sine stances."""
+    height, rate, gap = [], [], []
+    for apex in apexes:
+        ticks = np.arange(round(stance * RATE)) / RATE
+        dip = np.pi / stance
+        height.append(STAND - sink * np.sin(dip * ticks))
+        rate.append(-sink * dip * np.cos(dip * ticks))
+        gap.append(np.minimum(0.0, -0.2 * sink * np.sin(dip * ticks)))
+        speed = np.sqrt(2 * GRAVITY * (apex - STAND))
+        t = np.arange(int(2 * speed / GRAVITY * RATE)) / RATE
+        flight = STAND + speed * t - GRAVITY / 2 * t**2
+        height.append(flight)
+        rate.append(speed - GRAVITY * t)
+        gap.append(flight - STAND)
+    return tuple(np.concatenate(part) for part in (height, rate, gap))
+
+
+def test_every_apex_is_found_within_a_tenth_of_a_millimetre():
+    apexes = np.random.default_rng(1).uniform(0.22, 0.4, 40)
+    hops = find_hops(*hopping(apexes))
+    assert len(hops.apex) == len(apexes)
+    assert np.abs(hops.apex - apexes).max() < 1e-4
+
+
+def test_a_maximum_with_the_foot_on_the_ground_is_no_apex_but_a_bounce():
+    height, rate, gap = hopping([0.3] * 6)
+    grounded = np.minimum(gap, CLEAR / 2)
+    assert len(find_hops(height, rate, grounded).apex) == 0
+    assert len(find_bounces(height, grounded)) == 6
+    assert len(find_bounces(height, gap)) == 0
+
+
+def test_ripples_in_stance_are_no_bounces():
+    time = np.arange(2000) / RATE
+    height = STAND + 0.004 * np.sin(2 * np.pi * 3 * time)
+    assert len(find_bounces(height, np.zeros_like(height))) == 0
+
+
+def test_steady_hopping_skips_nothing():
+    height, rate, gap = hopping([0.3] * 20)
+    ticks = find_hops(height, rate, gap).tick
+    assert count_skipped(ticks, find_bounces(height, gap), 0, len(height), RATE) == 0
+
+
+@pytest.mark.parametrize("missing", [1, 2, 3])
+def test_missing_apexes_are_counted_one_by_one(missing):
+    ticks = np.arange(50, 2000, 100)
+    gone = np.delete(ticks, slice(8, 8 + missing))
+    assert count_skipped(gone, np.empty(0, dtype=int), 0, 2000, RATE) == missing
+
+
+def test_a_bounce_in_a_long_gap_is_one_skipped_hop():
+    height, rate, gap = hopping([0.3] * 6 + [0.25] + [0.3] * 6)
+    ticks = find_hops(height, rate, gap).tick
+    low = slice(ticks[5] + 45, ticks[7] - 45)
+    gap[low] = np.minimum(gap[low], 0.0)
+    hopped, bounced = find_hops(height, rate, gap).tick, find_bounces(height, gap)
+    assert len(hopped) == 12
+    assert len(bounced) == 1
+    assert count_skipped(hopped, bounced, 0, len(height), RATE) == 1
+
+
+def test_a_leg_that_stops_hopping_skips_until_the_end():
+    ticks = np.arange(50, 1000, 100)
+    assert count_skipped(ticks, np.empty(0, dtype=int), 0, 2000, RATE) == 10
+
+
+def test_a_leg_that_never_hops_skips_at_the_usual_period():
+    none = np.empty(0, dtype=int)
+    assert hop_period(none, RATE) == USUAL_PERIOD
+    assert count_skipped(none, none, 0, 2000, RATE) == 2000 / RATE / USUAL_PERIOD
