@@ -1,4 +1,7 @@
-"""The paper's reward (Sec. II-C, "Reward"): R = w1 Ge - w2 Ph - w3 Pj - w4 Pjp - w5 Pjv."""
+"""The paper's reward (Sec. II-C, "Reward"): R = w1 Ge - w2 Ph - w3 Pj - w4 Pjp - w5 Pjv.
+
+A step's ``terms`` name Ge, Ph, Pj, Pjp and Pjv energy, height, jerk, position and velocity.
+"""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -10,9 +13,6 @@ from hopping_leg.env.transition import Transition
 from hopping_leg.robot.parameters import Robot
 
 Barrier = Literal["step", "printed", "flipped"]
-
-TERMS = ("energy", "height", "jerk", "position", "velocity")
-"""Names of Ge, Ph, Pj, Pjp, Pjv in the step's ``terms``."""
 
 
 @dataclass(frozen=True)
@@ -46,42 +46,54 @@ class PaperReward:
     """
 
     def __init__(self, robot: Robot, options: PaperRewardOptions = PaperRewardOptions()) -> None:
-        self.options = options
-        self._rest = options.rest_length + robot.foot.radius
-        self._lower, self._upper = robot.of_joints("lower"), robot.of_joints("upper")
-        limit = options.velocity_limit
+        self.options = o = options
+        self._rest = o.rest_length + robot.foot.radius
+        lower, upper = robot.of_joints("lower"), robot.of_joints("upper")
+        self._slope = np.array([[-10.0, -10.0], [10.0, 10.0]])
+        self._offset = np.stack([10 * lower, -10 * upper])
+        limit = o.velocity_limit
         speed = robot.of_joints("no_load_speed") if limit is None else np.full(2, limit)
         self._speed_squared = np.square(speed)
-        o = options
         self._weights = np.array([o.energy, -o.height, -o.jerk, -o.position, -o.velocity])
 
     def __call__(self, transition: Transition) -> tuple[Array, dict[str, Array]]:
         """Return the weighted sum, (n,), and the five terms, each (n,)."""
         t = transition
-        terms = np.empty((5, len(t.height)))
-        terms[0] = np.square(t.rate) + np.square(t.height - self._rest)
-        terms[1] = self._barrier(t.height - t.command)
-        terms[2] = _sum(np.square(t.action - t.last_action))
-        terms[3] = _sum(self._position(t.q))
-        terms[4] = _sum(np.maximum(np.square(t.qd) - self._speed_squared, 0.0))
-        return self._weights @ terms, dict(zip(TERMS, terms, strict=True))
+        terms = np.zeros((5, len(t.height)))
+        energy, height, jerk, position, velocity = terms
+        np.add(np.square(t.rate), np.square(t.height - self._rest), out=energy)
+        excess = t.height - t.command
+        crossed = excess >= 0
+        if np.count_nonzero(crossed):
+            height[crossed] = self._barrier(excess[crossed])
+        change = t.action - t.last_action
+        np.vecdot(change, change, out=jerk)
+        position[:] = self._position(t.q)
+        over = np.square(t.qd) - self._speed_squared
+        if np.count_nonzero(over > 0):
+            np.add.reduce(np.maximum(over, 0.0), axis=1, out=velocity)
+        return np.dot(self._weights, terms), {
+            "energy": energy,
+            "height": height,
+            "jerk": jerk,
+            "position": position,
+            "velocity": velocity,
+        }
 
     def _barrier(self, excess: Array) -> Array:
-        crossed = excess >= 0
+        """Return Ph where the base is ``excess`` >= 0 above the desired height, m, (k,)."""
         growth = np.exp(excess)
         if self.options.barrier == "printed":
-            growth = 1 - growth
-        elif self.options.barrier == "flipped":
-            growth = growth - 1
-        return growth * crossed
+            return 1 - growth
+        return growth - 1 if self.options.barrier == "flipped" else growth
 
     def _position(self, q: Array) -> Array:
-        above, below = q - self._lower, q - self._upper
-        inside = (above >= 0) & (below <= 0)
-        near = np.exp(np.minimum(-10 * above, 0)) + np.exp(np.minimum(10 * below, 0))
-        return np.where(inside, near, 1.0)
-
-
-def _sum(of_joints: Array) -> Array:
-    """Sum over hip and knee, (n, 2) to (n,)."""
-    return of_joints[:, 0] + of_joints[:, 1]
+        """Return Pjp, (n,)."""
+        exponent = q[:, None, :] * self._slope + self._offset
+        outside = exponent > 0
+        if not np.count_nonzero(outside):
+            penalty: Array = np.add.reduce(np.exp(exponent), axis=(1, 2))
+            return penalty
+        joints = np.add.reduce(np.exp(np.minimum(exponent, 0.0)), axis=1)
+        penalty = np.add.reduce(np.where(outside.any(axis=1), 1.0, joints), axis=1)
+        return penalty

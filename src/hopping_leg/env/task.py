@@ -1,5 +1,6 @@
 """The learning problem for many legs at once: observation, reward, commands, episodes."""
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from hopping_leg.env.start import Starts
 from hopping_leg.env.transition import Reward, Transition
 from hopping_leg.hops import at_apex
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim import Legs, Plant
+from hopping_leg.sim import Legs, Measurement, Plant
 
 PRIVILEGED = 10
 """Entries of the true state that a critic may see."""
@@ -69,15 +70,17 @@ class HoppingTask:
         self.plant = Plant(self.legs, options.disturbance, options.soft_limits, noise)
         self.scaling = scaling(robot, options)
         self._starts = Starts(robot, options)
-        self._torque = np.array(options.action_torque)
+        self._torque = np.tile(options.action_torque, (count, 1))
+        self._one = np.ones((count, 2))
         self._horizon = max(1, round(options.episode * options.rate))
         self._never = np.zeros(count, np.bool_)
         self._nan = np.full(count, np.nan)
         for constant in (self._never, self._nan):
             constant.flags.writeable = False
         self.command = np.empty(count)
-        self._left = np.empty(count, np.int64)
-        self._switch_in = np.empty(count, np.int64)
+        self._tick = 0
+        self._end = np.empty(count, np.int64)
+        self._switch = np.full(count, np.iinfo(np.int64).max)
         self._last = np.zeros((count, 2))
         self.reset()
 
@@ -93,7 +96,8 @@ class HoppingTask:
         rows = np.arange(self.count) if ids is None else np.asarray(ids)
         self._begin(rows)
         if ids is None and self.options.stagger:
-            self._left[:] = self._rng.integers(1, self._horizon + 1, self.count)
+            self._end[:] = self._tick + self._rng.integers(1, self._horizon + 1, self.count)
+            self._plan()
         return self._observe()
 
     def step(self, action: Array | Array32) -> Step:
@@ -103,7 +107,9 @@ class HoppingTask:
             action: Hip and knee torque over ``action_torque``, clipped to [-1, 1], (n, 2).
         """
         legs = self.legs
-        taken = np.minimum(np.maximum(action, -1.0), 1.0)
+        taken = np.array(action, np.float64)
+        np.maximum(taken, -self._one, out=taken)
+        np.minimum(taken, self._one, out=taken)
         rate_before, height_before = legs.height_rate.copy(), legs.height.copy()
         self.plant.drive(taken * self._torque)
         clearance = legs.foot_clearance()
@@ -115,7 +121,7 @@ class HoppingTask:
         )  # fmt: skip
         reward, terms = self.reward(transition)
         apex_height = apex_error = self._nan
-        if apex.any():
+        if np.count_nonzero(apex):
             apex_height = np.where(apex, height, np.nan)
             apex_error = apex_height - self.command
         self._last = taken
@@ -144,8 +150,9 @@ class HoppingTask:
             "physics": self.legs.batch.state.copy(),
             "channel": self.plant.channel.state(),
             "command": self.command.copy(),
-            "left": self._left.copy(),
-            "switch_in": self._switch_in.copy(),
+            "tick": self._tick,
+            "end": self._end.copy(),
+            "switch": self._switch.copy(),
             "last_action": self._last.copy(),
             "rng": self._rng.bit_generator.state,
         }
@@ -155,34 +162,40 @@ class HoppingTask:
         self.legs.batch.state[:] = state["physics"]
         self.plant.channel.restore(state["channel"])
         self.command[:] = state["command"]
-        self._left[:] = state["left"]
-        self._switch_in[:] = state["switch_in"]
+        self._tick = int(state["tick"])
+        self._end[:] = state["end"]
+        self._switch[:] = state["switch"]
         self._last = np.array(state["last_action"])
         self._rng.bit_generator.state = state["rng"]
+        self._plan()
         return self._observe()
 
+    @property
+    def measurement(self) -> Measurement:
+        """What the observation was made of: samples and their age."""
+        return self.plant.channel.measurement(self._samples)
+
     def _observe(self) -> Array32:
-        self.measurement = self.plant.sense(self.command)
-        return self.scaling.observe(self.measurement)
+        self._samples = self.plant.samples(self.command)
+        return self.scaling.normalise(self._samples)
 
     def _next(
         self, reward: Array, terms: dict[str, Array], apex_error: Array, apex_height: Array
     ) -> Step:
         """End the tick: episodes that are over, new commands, what is seen."""
-        options = self.options
-        self._left -= 1
-        truncated = self._left <= 0
-        terminated = self._never
-        ended = truncated
-        if options.fall_height > 0:
-            terminated = self.legs.height < options.fall_height
+        self._tick += 1
+        if self._tick >= self._next_switch:
+            self._change_commands()
+        terminated = truncated = ended = self._never
+        if self._tick >= self._next_end:
+            truncated = ended = self._end <= self._tick
+        if self.options.fall_height > 0:
+            terminated = self.legs.height < self.options.fall_height
             truncated = truncated & ~terminated
             ended = truncated | terminated
-        if options.command_hold is not None:
-            self._switch()
         observation = self._observe()
         final_observation = final_privileged = None
-        if ended.any():
+        if ended is not self._never and np.count_nonzero(ended):
             final_observation, final_privileged = observation, self.privileged()
             self._begin(np.flatnonzero(ended))
             observation = self._observe()
@@ -195,19 +208,23 @@ class HoppingTask:
         count = len(rows)
         height, q = self._starts.draw(count, self._rng)
         self.legs.place(rows, height, q)
-        self._left[rows] = self._horizon
+        self._end[rows] = self._tick + self._horizon
         self._last[rows] = 0.0
         self.command[rows] = self._draw_commands(count)
         if self.options.command_hold is not None:
-            self._switch_in[rows] = self._draw_holds(count)
+            self._switch[rows] = self._tick + self._draw_holds(count)
         self.plant.channel.restart(rows, self.legs.q[rows], self.legs.qd[rows], self.command[rows])
+        self._plan()
 
-    def _switch(self) -> None:
-        self._switch_in -= 1
-        due = np.flatnonzero(self._switch_in <= 0)
-        if len(due):
-            self.command[due] = self._draw_commands(len(due))
-            self._switch_in[due] = self._draw_holds(len(due))
+    def _plan(self) -> None:
+        """Note the next tick at which an episode ends or a command changes."""
+        self._next_end, self._next_switch = int(self._end.min()), int(self._switch.min())
+
+    def _change_commands(self) -> None:
+        due = np.flatnonzero(self._switch <= self._tick)
+        self.command[due] = self._draw_commands(len(due))
+        self._switch[due] = self._tick + self._draw_holds(len(due))
+        self._plan()
 
     def _draw_commands(self, count: int) -> Array:
         if self.options.command_range is not None:
@@ -215,6 +232,7 @@ class HoppingTask:
         return self._rng.choice(self.options.commands, count)
 
     def _draw_holds(self, count: int) -> IntArray:
-        assert self.options.command_hold is not None
-        shortest, longest = (round(t * self.options.rate) for t in self.options.command_hold)
-        return self._rng.integers(shortest, longest + 1, count)
+        """Return after how many ticks commands change, (count,)."""
+        shortest, longest = self.options.command_hold or (math.inf, math.inf)
+        ticks = [max(1, round(time * self.options.rate)) for time in (shortest, longest)]
+        return self._rng.integers(ticks[0], ticks[1] + 1, count)

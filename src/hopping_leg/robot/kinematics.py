@@ -70,9 +70,8 @@ def foot_velocity(robot: Robot, q: Array, qd: Array) -> Array:
 
 def stance_height(robot: Robot, q: Array) -> Array:
     """Return the base height if the foot stands on flat, hard ground, m, (...)."""
-    q1 = q[..., 0]
-    down = robot.thigh.length * np.cos(q1) + robot.shank.length * np.cos(q1 + q[..., 1])
-    height: Array = down + robot.foot.radius
+    lengths = np.array([robot.thigh.length, robot.shank.length])
+    height: Array = np.vecdot(np.cos(np.add.accumulate(q, axis=-1)), lengths) + robot.foot.radius
     return height
 
 

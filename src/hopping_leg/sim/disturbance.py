@@ -7,17 +7,25 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array, IntArray
+from hopping_leg.errors import UsageError
 
 SAMPLES = 3
 """Joint samples a controller sees at a tick: t, t-1, t-2."""
 
-_BLOCK = 64
-"""Ticks of random numbers drawn at once."""
+_DRAWS = 8
+"""Random numbers per leg and tick: four for the joints, two for the delay, two for the torques."""
+
+_BLOCK_SIZE = 16384
+"""Legs times ticks whose random numbers are drawn at once."""
 
 
 @dataclass(frozen=True)
 class Disturbance:
-    """How a leg's sensors and motors deceive its controller; the defaults are the paper's."""
+    """How a leg's sensors and motors deceive its controller; the defaults are the paper's.
+
+    Raises:
+        UsageError: A value has no meaning.
+    """
 
     joint_noise: float = 0.05
     """Lambda for joint positions and velocities: uniform within +-lambda times the value."""
@@ -27,6 +35,16 @@ class Disturbance:
     """Chance at each tick to see samples drawn from the buffer instead of the latest."""
     delay_buffer: int = 10
     """Ticks the buffer remembers."""
+
+    def __post_init__(self) -> None:
+        for name in ("joint_noise", "torque_noise", "delay_probability"):
+            value = getattr(self, name)
+            if not 0 <= value <= 1:
+                raise UsageError(f"'{name}' is {value} but must lie between 0 and 1.")
+        if self.delay_buffer < SAMPLES:
+            raise UsageError(
+                f"'delay_buffer' is {self.delay_buffer} but must hold at least {SAMPLES} ticks."
+            )
 
 
 NOTHING = Disturbance(joint_noise=0.0, torque_noise=0.0, delay_probability=0.0)
@@ -53,8 +71,9 @@ class Measurement:
 class Channel:
     """Between the legs and their controller: noise on both ways, delay on the way in.
 
-    Every tick calls ``sense`` once, then ``actuate`` once. Noisy samples enter a buffer of the
-    last ten ticks; with probability 0.5 three of them, in order of time, replace the latest three.
+    Every tick calls ``sense``, then ``actuate`` once. Noisy samples enter a buffer of the last ten
+    ticks; with probability 0.5 three of them, in order of time, replace the latest three. Sensing
+    again within a tick gives the same noise.
 
     Args:
         count: Number of legs n.
@@ -69,11 +88,15 @@ class Channel:
         self.count, self.disturbance, self.period, self.rng = count, disturbance, period, rng
         depth = disturbance.delay_buffer
         self._orders = np.array(list(itertools.combinations(range(depth), SAMPLES)))
-        self._latest = np.arange(SAMPLES)
         self._buffer = np.zeros((depth, count, 5))
-        self._legs = np.arange(count)[:, None]
-        self._tick = 0
-        self._draws = np.empty((_BLOCK, count, 8))
+        self._flat = self._buffer.reshape(-1, 5)
+        self._q = [slot[:, 0:2] for slot in self._buffer]
+        self._qd = [slot[:, 2:4] for slot in self._buffer]
+        self._command = [slot[:, 4] for slot in self._buffer]
+        self._block = min(max(_BLOCK_SIZE // count, 16), 512)
+        self._draws = np.empty((self._block, count, _DRAWS))
+        self._tick = self._index = 0
+        self._draw()
 
     def restart(self, ids: IntArray | slice, q: Array, qd: Array, command: Array) -> None:
         """Forget the past of some legs: the buffer fills with their present, noiseless state.
@@ -96,27 +119,30 @@ class Channel:
             qd: Joint velocities, rad/s, (n, 2).
             command: Desired heights, m, (n,).
         """
-        index = self._tick % _BLOCK
-        if index == 0:
-            self.rng.random(out=self._draws)
-        draw = self._draws[index]
-        depth = len(self._buffer)
-        sample = self._buffer[self._tick % depth]
-        sample[:, 0:2] = q
-        sample[:, 2:4] = qd
-        sample[:, :4] *= 1 + self.disturbance.joint_noise * (2 * draw[:, :4] - 1)
-        sample[:, 4] = command
-        delayed = draw[:, 4] < self.disturbance.delay_probability
-        order = self._orders[(draw[:, 5] * len(self._orders)).astype(np.int64)]
-        back = np.where(delayed[:, None], order, self._latest)
-        seen = self._buffer[(self._tick - back) % depth, self._legs]
-        return Measurement(seen[..., 0:2], seen[..., 2:4], seen[..., 4], back * self.period)
+        return self.measurement(self.samples(q, qd, command))
+
+    def samples(self, q: Array, qd: Array, command: Array) -> Array:
+        """Return the same as ``sense`` in one array of (q1, q2, qd1, qd2, command), (n, 3, 5)."""
+        index, slot = self._index, self._tick % len(self._buffer)
+        np.multiply(q, self._q_noise[index], out=self._q[slot])
+        np.multiply(qd, self._qd_noise[index], out=self._qd[slot])
+        self._command[slot][:] = command
+        seen: Array = self._flat.take(self._rows[index], axis=0)
+        return seen
+
+    def measurement(self, samples: Array) -> Measurement:
+        """Name the parts of this tick's ``samples``."""
+        age = self._back[self._index] * self.period
+        return Measurement(samples[..., 0:2], samples[..., 2:4], samples[..., 4], age)
 
     def actuate(self, torque: Array) -> Array:
         """Return the torques that reach the motors, N m, (n, 2); ends the tick."""
-        draw = self._draws[self._tick % _BLOCK]
+        disturbed: Array = torque * self._torque_noise[self._index]
         self._tick += 1
-        return torque * (1 + self.disturbance.torque_noise * (2 * draw[:, 6:8] - 1))
+        self._index = self._tick % self._block
+        if self._index == 0:
+            self._draw()
+        return disturbed
 
     def state(self) -> dict[str, Any]:
         """Return everything needed to go on exactly from here, as arrays and plain values."""
@@ -132,4 +158,25 @@ class Channel:
         self._buffer[:] = state["buffer"]
         self._draws[:] = state["draws"]
         self._tick = int(state["tick"])
+        self._index = self._tick % self._block
         self.rng.bit_generator.state = state["rng"]
+        self._prepare(self._tick - self._index)
+
+    def _draw(self) -> None:
+        """Draw the random numbers of a whole block, which starts at this tick."""
+        self.rng.random(out=self._draws)
+        self._prepare(self._tick)
+
+    def _prepare(self, first: int) -> None:
+        """Turn the block's random numbers into noise factors and rows of the buffer."""
+        draws, disturbance = self._draws, self.disturbance
+        centred = 2 * draws - 1
+        self._q_noise = 1 + disturbance.joint_noise * centred[..., 0:2]
+        self._qd_noise = 1 + disturbance.joint_noise * centred[..., 2:4]
+        self._torque_noise = 1 + disturbance.torque_noise * centred[..., 6:8]
+        delayed = draws[..., 4] < disturbance.delay_probability
+        order = self._orders[(draws[..., 5] * len(self._orders)).astype(np.int64)]
+        self._back = np.where(delayed[..., None], order, np.arange(SAMPLES))
+        ticks = np.arange(first, first + self._block)[:, None, None]
+        slots = (ticks - self._back) % len(self._buffer)
+        self._rows = slots * self.count + np.arange(self.count)[:, None]

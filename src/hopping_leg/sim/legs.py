@@ -14,6 +14,19 @@ CONTROL_RATE = 200.0
 """Control rate of the paper, Hz."""
 
 
+def _substeps(rate: float, timestep: float) -> int:
+    for name, value in (("control rate", rate), ("physics step", timestep)):
+        if not 0 < value < np.inf:
+            raise UsageError(f"The {name} is {value} but must be positive and finite.")
+    substeps = round(1 / (rate * timestep))
+    if substeps < 1 or abs(substeps * timestep * rate - 1) > 1e-9:
+        raise UsageError(
+            f"A physics step of {timestep} s does not divide the control period of"
+            f" {1 / rate} s; take e.g. {1 / (rate * max(substeps, 1)):g} s."
+        )
+    return substeps
+
+
 class Legs:
     """Simulations of one robot, advanced by one control period at a time.
 
@@ -40,12 +53,7 @@ class Legs:
         timestep: float = TIMESTEP,
         threads: int = 0,
     ) -> None:
-        substeps = round(1 / (rate * timestep))
-        if substeps < 1 or abs(substeps * timestep * rate - 1) > 1e-9:
-            raise UsageError(
-                f"A physics step of {timestep} s does not divide the control period of {1 / rate} s;"
-                f" take e.g. {1 / (rate * max(substeps, 1)):g} s."
-            )
+        substeps = _substeps(rate, timestep)
         self.robot, self.count, self.rate, self.timestep = robot, count, rate, timestep
         self.period = 1 / rate
         self.substeps = substeps
@@ -54,8 +62,8 @@ class Legs:
         self._ctrl = self.batch.bind("ctrl")
         self.height, self.height_rate = self._qpos[:, 0], self._qvel[:, 0]
         self.q, self.qd = self._qpos[:, 1:], self._qvel[:, 1:]
-        self._motors = MotorLimit(robot)
-        self._inverse_belt = 1 / robot.of_joints("belt_ratio")
+        self._motors = MotorLimit(robot, count)
+        self._inverse_belt = np.tile(1 / robot.of_joints("belt_ratio"), (count, 1))
 
     def place(self, ids: IntArray | slice, height: Array | float, q: Array) -> None:
         """Put legs at rest at a height and posture.

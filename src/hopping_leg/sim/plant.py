@@ -30,11 +30,15 @@ class Plant:
     ) -> None:
         self.legs = legs
         self.channel = Channel(legs.count, disturbance, legs.period, rng)
-        self._limiter = SoftLimiter(legs.robot, soft_limits) if soft_limits else None
+        self._limiter = SoftLimiter(legs.robot, soft_limits, legs.count) if soft_limits else None
 
     def sense(self, command: Array) -> Measurement:
         """Return what the controllers see; ``command`` is the desired height, m, (n,)."""
         return self.channel.sense(self.legs.q, self.legs.qd, command)
+
+    def samples(self, command: Array) -> Array:
+        """Return the same as ``sense`` as (q1, q2, qd1, qd2, command), newest first, (n, 3, 5)."""
+        return self.channel.samples(self.legs.q, self.legs.qd, command)
 
     def drive(self, torque: Array) -> Array:
         """Apply joint torques for one control period; return what the motors gave, N m, (n, 2)."""
