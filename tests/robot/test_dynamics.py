@@ -15,7 +15,7 @@ def posed(model, height, rate, q, qd):
     return data
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(SEEDS)
 def test_mass_matrix_and_bias_agree_with_mujoco(seed):
     rng = np.random.default_rng(seed)
@@ -31,7 +31,7 @@ def test_mass_matrix_and_bias_agree_with_mujoco(seed):
     )
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(SEEDS)
 def test_energies_agree_with_mujoco(seed):
     rng = np.random.default_rng(seed)

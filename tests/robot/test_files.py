@@ -83,9 +83,7 @@ def test_armature_follows_from_rotor_gear_and_belt():
     assert load_robot("legv2-paper").knee.armature == 0.0001
 
 
-@settings(
-    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(path=st.sampled_from(PATHS), mistake=st.sampled_from(sorted(MISTAKES)))
 def test_every_mistake_gets_a_sentence_that_names_the_field(tmp_path, path, mistake):
     if mistake == "negative" and path[-1] in ("lower", "upper"):

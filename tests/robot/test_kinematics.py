@@ -45,7 +45,7 @@ def test_jacobian_equals_the_finite_difference(seed, q):
     np.testing.assert_allclose(kinematics.jacobian(robot, q), np.stack(columns, -1), atol=1e-8)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(SEEDS)
 def test_foot_and_clearances_agree_with_mujoco(seed):
     rng = np.random.default_rng(seed)

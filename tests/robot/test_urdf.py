@@ -10,7 +10,7 @@ from hopping_leg.robot.urdf import to_urdf
 from tests.robot.legs import SEEDS, random_robot, random_state
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(SEEDS)
 def test_mujoco_reads_the_same_dynamics_from_the_urdf(seed):
     rng = np.random.default_rng(seed)
