@@ -1,0 +1,23 @@
+"""Cartesian stiffness control of the foot through the transposed Jacobian (paper, Eq. 8)."""
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.robot import kinematics
+from hopping_leg.robot.parameters import Robot
+
+
+def foot_force_torque(robot: Robot, q: Array, push: Array, side: Array) -> Array:
+    """Return the joint torques that press the foot with a force, N m, (n, 2).
+
+    The Jacobian is that of (x_down, y), so a positive ``push`` presses the foot to the ground.
+
+    Args:
+        robot: The leg.
+        q: Joint positions, rad, (n, 2).
+        push: Force downwards, N, (n,).
+        side: Force forwards, N, (n,).
+    """
+    force = np.stack(np.broadcast_arrays(push, side), axis=-1)
+    torque: Array = np.einsum("nij,ni->nj", kinematics.jacobian(robot, q), force)
+    return torque

@@ -1,0 +1,53 @@
+"""The state machine of the paper's Fig. 3: lift-off, flight, touchdown, and again."""
+
+from enum import IntEnum
+
+import numpy as np
+
+from hopping_leg.arrays import Array, BoolArray
+
+PUSH_LIMIT = 0.4
+"""Longest push, s: a leg that has not left the ground by then gives up and tries afresh."""
+
+FLIGHT_LIMIT = 0.7
+"""Longest flight, s: from a drop of 0.6 m; touchdown was missed."""
+
+DAMP_LIMIT = 0.25
+"""Longest touchdown, s: an overdamped leg creeps and its velocity never turns."""
+
+
+class Phase(IntEnum):
+    """What a leg is doing; the value is recorded in traces."""
+
+    LIFTOFF = 0
+    """Pushes off, with contact."""
+    FLIGHT = 1
+    """Moves to the landing posture, without contact."""
+    TOUCHDOWN = 2
+    """Brakes the fall, with contact."""
+
+
+class Phases:
+    """Phase of each leg and the time spent in it.
+
+    Attributes:
+        phase: (n,), values of ``Phase``.
+        clock: Time since the phase began, s, (n,).
+    """
+
+    def __init__(self, count: int) -> None:
+        self.phase = np.full(count, int(Phase.LIFTOFF))
+        self.clock = np.zeros(count)
+
+    def tick(self, period: float) -> None:
+        """Let a control period pass, s."""
+        self.clock = self.clock + period
+
+    def are(self, phase: Phase) -> BoolArray:
+        """Tell which legs are in a phase, (n,)."""
+        return self.phase == phase
+
+    def enter(self, who: BoolArray, phase: Phase, since: Array | float = 0.0) -> None:
+        """Put legs into a phase that began ``since`` seconds ago, (n,)."""
+        self.phase = np.where(who, int(phase), self.phase)
+        self.clock = np.where(who, since, self.clock)

@@ -1,0 +1,122 @@
+"""Gains and options of energy shaping; the defaults are the paper's where it gives any."""
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.robot.parameters import Robot
+
+Gain = float | Array
+"""One value for all legs or one per leg, (n,)."""
+
+
+@dataclass(frozen=True)
+class ShapingGains:
+    """Everything energy shaping can be tuned by.
+
+    A gain with a ``_slope`` grows by it per metre that the command lies above ``reference``.
+    """
+
+    k0: Gain = 1.0
+    """First value of the gain k."""
+    k0_slope: Gain = 0.0
+    """1/m."""
+    exponent: Gain = 2.0
+    """Of the update k_j = k_{j-1} (E_d / E_{j-1})^exponent."""
+    kp_y: Gain = 10.0
+    """Sideways stiffness of the foot on the ground, N/m."""
+    kd_y: Gain = 3.0
+    """Sideways damping of the foot on the ground, N s/m."""
+    liftoff_length: Gain = 0.26
+    """Leg length at which the push ends, m."""
+    liftoff_slope: Gain = 0.0
+    """m/m."""
+    landing_length: Gain = 0.2
+    """Leg length in which the foot meets the ground, m."""
+    landing_slope: Gain = 0.0
+    """m/m."""
+    retract_time: Gain = 0.08
+    """From lift-off to the landing posture, s."""
+    hip_stiffness: Gain = 8.8
+    """In flight, N m/rad."""
+    hip_damping: Gain = 0.3
+    """In flight, N m s/rad."""
+    knee_stiffness: Gain = 2.3
+    """In flight, N m/rad."""
+    knee_damping: Gain = 0.074
+    """In flight, N m s/rad."""
+    touchdown_stiffness: Gain = 100.0
+    """Along the leg, N/m."""
+    touchdown_damping: Gain = 60.0
+    """Along the leg, N s/m."""
+    touchdown_rate: Gain = -0.39
+    """Leg rate, less that of the retraction, that gives the ground away, m/s."""
+    flight_min: Gain = 0.05
+    """Contact is not believed earlier than this after lift-off, s."""
+    height_offset: Gain = 0.0
+    """Added to the estimated apex, m."""
+    height_scale: Gain = 1.0
+    """Stretches the estimated apex about ``reference``."""
+    position_pull: Gain = 0.15
+    """Pull of the dated observer towards each measured position."""
+    reference: Gain = 0.3
+    """Command about which the affine gains are written, m."""
+
+
+@dataclass(frozen=True)
+class ShapingOptions:
+    """Readings of what the paper leaves open."""
+
+    state: Literal["latest", "dated"] = "latest"
+    """Joint state: the newest sample, or a filter over the dated history of samples."""
+    contact: Literal["rate", "debounced", "true"] = "rate"
+    """Touchdown: one leg rate, the median of three, or the simulator's truth."""
+    liftoff: Literal["length", "timed", "true"] = "length"
+    """End of the push: at a leg length, there within a control period, or at true loss of contact."""
+    height: Literal["ballistic", "flight_time", "true"] = "ballistic"
+    """Apex: from the lift-off speed, from the time in the air, or the simulator's truth."""
+    desired: Literal["present", "pushed"] = "present"
+    """E_d of the update: of the present command, or of the one in force at the push it judges."""
+
+
+LITERAL = ShapingOptions()
+"""The paper's description."""
+
+ROBUST = ShapingOptions("dated", "debounced", "timed", "flight_time", "pushed")
+"""The readings of the tuned controller."""
+
+_LENGTHS = ("liftoff_length", "landing_length", "height_offset", "reference")
+_FORCES = ("kp_y", "kd_y", "touchdown_stiffness", "touchdown_damping")
+
+
+def scale_gains(gains: ShapingGains, origin: Robot, robot: Robot) -> ShapingGains:
+    """Carry gains over to another leg: lengths by its size, forces by its mass, PD by inertia.
+
+    Args:
+        gains: Found for ``origin``.
+        origin: The leg they were found for.
+        robot: The leg they are wanted for.
+    """
+    size = _reach(robot) / _reach(origin)
+    mass = robot.mass / origin.mass
+    hip, knee = joint_inertia(robot) / joint_inertia(origin)
+    factors = dict.fromkeys(_LENGTHS, size) | dict.fromkeys(_FORCES, mass)
+    factors |= {"hip_stiffness": hip, "hip_damping": hip}
+    factors |= {"knee_stiffness": knee, "knee_damping": knee}
+    scaled = {name: getattr(gains, name) * factor for name, factor in factors.items()}
+    return dataclasses.replace(gains, **scaled)
+
+
+def joint_inertia(robot: Robot) -> Array:
+    """Return the inertia about hip and knee with the knee bent by a right angle, kg m2, (2,)."""
+    thigh, shank = robot.thigh, robot.shank
+    knee = shank.inertia + shank.mass * shank.com**2
+    hip = thigh.inertia + thigh.mass * thigh.com**2 + knee + shank.mass * thigh.length**2
+    return np.array([hip, knee]) + robot.of_joints("armature")
+
+
+def _reach(robot: Robot) -> float:
+    return robot.thigh.length + robot.shank.length
