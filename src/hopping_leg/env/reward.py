@@ -68,7 +68,7 @@ class PaperReward:
             height[crossed] = self._barrier(excess[crossed])
         change = t.action - t.last_action
         np.vecdot(change, change, out=jerk)
-        position[:] = self._position(t.q)
+        self._position(t.q, out=position)
         over = np.square(t.qd) - self._speed_squared
         if np.count_nonzero(over > 0):
             np.add.reduce(np.maximum(over, 0.0), axis=1, out=velocity)
@@ -87,13 +87,12 @@ class PaperReward:
             return 1 - growth
         return growth - 1 if self.options.barrier == "flipped" else growth
 
-    def _position(self, q: Array) -> Array:
-        """Return Pjp, (n,)."""
+    def _position(self, q: Array, out: Array) -> None:
+        """Write Pjp, (n,)."""
         exponent = q[:, None, :] * self._slope + self._offset
         outside = exponent > 0
         if not np.count_nonzero(outside):
-            penalty: Array = np.add.reduce(np.exp(exponent), axis=(1, 2))
-            return penalty
+            np.add.reduce(np.exp(exponent), axis=(1, 2), out=out)
+            return
         joints = np.add.reduce(np.exp(np.minimum(exponent, 0.0)), axis=1)
-        penalty = np.add.reduce(np.where(outside.any(axis=1), 1.0, joints), axis=1)
-        return penalty
+        np.add.reduce(np.where(outside.any(axis=1), 1.0, joints), axis=1, out=out)

@@ -33,6 +33,8 @@ class Step(NamedTuple):
     """Apex height minus command where a leg just passed an in-flight apex, else NaN, m, (n,)."""
     apex_height: Array
     """Height of that apex, else NaN, m, (n,)."""
+    height: Array
+    """Base height at the end of the tick, before any restart, m, (n,)."""
     terms: dict[str, Array]
     """Unweighted reward terms by name, each (n,)."""
     final_observation: Array32 | None
@@ -51,6 +53,8 @@ class HoppingTask:
         reward: Judges every tick.
         rng: Source of all randomness; results do not depend on the number of threads.
         threads: Worker threads, 0 for one per core.
+        autoreset: Begin the next episode within the tick that ends one; otherwise the leg goes on
+            until ``reset``.
     """
 
     def __init__(
@@ -61,7 +65,10 @@ class HoppingTask:
         reward: Reward,
         rng: np.random.Generator,
         threads: int = 0,
+        *,
+        autoreset: bool = True,
     ) -> None:
+        self.autoreset = autoreset
         self.robot, self.count, self.options, self.reward = robot, count, options, reward
         self.legs = Legs(
             robot, count, rate=options.rate, timestep=options.timestep, threads=threads
@@ -83,6 +90,12 @@ class HoppingTask:
         self._switch = np.full(count, np.iinfo(np.int64).max)
         self._last = np.zeros((count, 2))
         self.reset()
+
+    def reseed(self, rng: np.random.Generator) -> Array32:
+        """Take all randomness from another source and begin anew; return observations, (n, 15)."""
+        noise, self._rng = rng.spawn(2)
+        self.plant.channel.reseed(noise)
+        return self.reset()
 
     def reset(self, ids: IntArray | None = None) -> Array32:
         """Begin new episodes.
@@ -195,12 +208,13 @@ class HoppingTask:
             ended = truncated | terminated
         observation = self._observe()
         final_observation = final_privileged = None
-        if ended is not self._never and np.count_nonzero(ended):
+        height = self.legs.height.copy()
+        if self.autoreset and ended is not self._never and np.count_nonzero(ended):
             final_observation, final_privileged = observation, self.privileged()
             self._begin(np.flatnonzero(ended))
             observation = self._observe()
         return Step(
-            observation, reward, terminated, truncated, apex_error, apex_height, terms,
+            observation, reward, terminated, truncated, apex_error, apex_height, height, terms,
             final_observation, final_privileged,
         )  # fmt: skip
 

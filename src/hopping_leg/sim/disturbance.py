@@ -98,6 +98,12 @@ class Channel:
         self._tick = self._index = 0
         self._draw()
 
+    def reseed(self, rng: np.random.Generator) -> None:
+        """Take all randomness from here on from another source."""
+        self.rng = rng
+        self._tick = self._index = 0
+        self._draw()
+
     def restart(self, ids: IntArray | slice, q: Array, qd: Array, command: Array) -> None:
         """Forget the past of some legs: the buffer fills with their present, noiseless state.
 
@@ -112,7 +118,7 @@ class Channel:
         self._buffer[:, ids, 4] = command
 
     def sense(self, q: Array, qd: Array, command: Array) -> Measurement:
-        """Return what the controllers see of the true state.
+        """Return what the controllers see of the true state; again in a tick, the same noise.
 
         Args:
             q: Joint positions, rad, (n, 2).
@@ -150,6 +156,7 @@ class Channel:
             "buffer": self._buffer.copy(),
             "draws": self._draws.copy(),
             "tick": self._tick,
+            "drawn_at": self._drawn_at,
             "rng": self.rng.bit_generator.state,
         }
 
@@ -158,6 +165,7 @@ class Channel:
         self._buffer[:] = state["buffer"]
         self._draws[:] = state["draws"]
         self._tick = int(state["tick"])
+        self._drawn_at = int(state["drawn_at"])
         self._index = self._tick % self._block
         self.rng.bit_generator.state = state["rng"]
         self._prepare(self._tick - self._index)
