@@ -156,7 +156,6 @@ class Channel:
             "buffer": self._buffer.copy(),
             "draws": self._draws.copy(),
             "tick": self._tick,
-            "drawn_at": self._drawn_at,
             "rng": self.rng.bit_generator.state,
         }
 
@@ -165,7 +164,6 @@ class Channel:
         self._buffer[:] = state["buffer"]
         self._draws[:] = state["draws"]
         self._tick = int(state["tick"])
-        self._drawn_at = int(state["drawn_at"])
         self._index = self._tick % self._block
         self.rng.bit_generator.state = state["rng"]
         self._prepare(self._tick - self._index)
