@@ -1,0 +1,1 @@
+"""Training: recipes, checkpoints that survive a kill, choice of snapshots, policy files."""

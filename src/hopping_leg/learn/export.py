@@ -38,6 +38,7 @@ class Network:
         layers: Weight (out, in) and bias (out,) of every dense layer.
         activation: Of the hidden layers, one of ``ACTIVATIONS``.
         squash: Of the output, one of ``SQUASHES``.
+        bound: The last layer's output is clipped to +-bound before the squash.
     """
 
     offset: Array
@@ -45,6 +46,7 @@ class Network:
     layers: Sequence[tuple[Array, Array]]
     activation: str
     squash: str
+    bound: float = float("inf")
 
     def __post_init__(self) -> None:
         if self.activation not in ACTIVATIONS or self.squash not in SQUASHES:
@@ -84,11 +86,12 @@ def build_policy(network: Network, card: Card) -> bytes:
         x = apply("Gemm", names, f"dense_{index}")
         if index < len(network.layers) - 1:
             x = apply(ACTIVATIONS[network.activation], [x], f"hidden_{index}")
+    bound = network.bound if network.squash == "tanh" else min(network.bound, 1.0)
+    if np.isfinite(bound):
+        bounds = [constant("least", np.array(-bound)), constant("most", np.array(bound))]
+        x = apply("Clip", [x, *bounds], "bounded")
     if network.squash == "tanh":
         x = apply("Tanh", [x], "action")
-    else:
-        bounds = [constant("least", np.array(-1.0)), constant("most", np.array(1.0))]
-        x = apply("Clip", [x, *bounds], "action")
     apply("Mul", [x, constant("torque_scale", np.array(card.torque_scale))], "torque")
     inputs = [
         helper.make_tensor_value_info(n, TensorProto.FLOAT, ["n", *s]) for n, s in shapes.items()

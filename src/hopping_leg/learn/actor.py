@@ -1,0 +1,68 @@
+"""Take the deterministic actor out of a stable-baselines3 model."""
+
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3 import SAC
+from stable_baselines3.common.base_class import BaseAlgorithm
+from torch import nn
+
+from hopping_leg.arrays import Array
+from hopping_leg.env.observation import Scaling
+from hopping_leg.errors import UsageError
+from hopping_leg.learn.export import Network
+from hopping_leg.sim.disturbance import SAMPLES
+
+_NAMES = {nn.ReLU: "relu", nn.Tanh: "tanh", nn.ELU: "elu"}
+
+
+def network_of(model: BaseAlgorithm, scaling: Scaling) -> Network:
+    """Return a model's actor with the task's normalisation, for layout ``three-samples``.
+
+    Args:
+        model: SAC, or PPO with separate networks of plain layers.
+        scaling: Of the task it learns.
+
+    Raises:
+        UsageError: The actor is no stack of dense layers.
+    """
+    if isinstance(model, SAC):
+        modules = _flatten(model.actor.latent_pi) + _flatten(model.actor.mu)
+        squash = "tanh"
+    else:
+        modules = _flatten(model.policy.mlp_extractor.policy_net)
+        modules += _flatten(model.policy.action_net)
+        squash = "clip"
+    bound = float("inf")
+    if isinstance(modules[-1], nn.Hardtanh):
+        bound = float(modules[-1].max_val)
+        modules = modules[:-1]
+    layers = [_weights(m) for m in modules if isinstance(m, nn.Linear)]
+    kinds = {type(m) for m in modules} - {nn.Linear}
+    if len(kinds) != 1 or not kinds <= _NAMES.keys():
+        raise UsageError(
+            f"An actor of {sorted(k.__name__ for k in kinds)} cannot be exported; use dense layers"
+            f" with one of {', '.join(_NAMES.values())}."
+        )
+    order = layout_order()
+    layers[0] = (layers[0][0][:, order], layers[0][1])
+    offset, gain = np.tile(scaling.offset, SAMPLES)[order], np.tile(scaling.gain, SAMPLES)[order]
+    return Network(offset, gain, layers, _NAMES[kinds.pop()], squash, bound)
+
+
+def layout_order() -> Any:  # noqa: ANN401
+    """Return where each input of layout ``three-samples`` stands in the task's observation."""
+    place = np.arange(5 * SAMPLES).reshape(SAMPLES, 5)
+    return np.concatenate([place[:, 0:2].ravel(), place[:, 2:4].ravel(), place[:, 4]])
+
+
+def _flatten(module: nn.Module) -> list[nn.Module]:
+    if isinstance(module, nn.Sequential):
+        return [leaf for child in module for leaf in _flatten(child)]
+    return [module]
+
+
+def _weights(layer: nn.Linear) -> tuple[Array, Array]:
+    with torch.no_grad():
+        return layer.weight.double().numpy(), layer.bias.double().numpy()

@@ -1,0 +1,75 @@
+"""Write a policy's model card from the results of its training."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from hopping_leg.trace import write_atomically
+
+
+def write_card(folder: Path) -> Path:
+    """Write ``model_card.md`` into a run's folder from its ``result.json``."""
+    result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    path = folder / "model_card.md"
+    write_atomically(path, render(result).encode())
+    return path
+
+
+def render(result: dict[str, Any]) -> str:
+    """Return the card of a finished training as Markdown.
+
+    Args:
+        result: Content of ``result.json``.
+    """
+    selected, task = result["selected"], result["options"]["task"]
+    minutes = f" --minutes {result['minutes_budget']:g}" if result.get("minutes_budget") else ""
+    command = (
+        f"hop train --recipe {result['recipe']} --robot {result['robot']}"
+        f" --seed {result['seed']}{minutes} --out runs/{result['recipe']}-seed{result['seed']}"
+    )
+    commands = task["command_range"] or (min(task["commands"]), max(task["commands"]))
+    versions = ", ".join(f"{name} {number}" for name, number in result["versions"].items())
+    return f"""# Policy `{result["recipe"]}`, seed {result["seed"]}
+
+One network from joint measurements to joint torques, for robot `{result["robot"]}`
+(parameters {result["robot_digest"]}), commands {commands[0]:g} to {commands[1]:g} m,
+{task["rate"]:g} Hz. Made by
+
+    {command}
+
+- Training: {result["steps"]} control steps, {result["minutes"]:.1f} min of wall-clock time, physics
+  step {1000 * task["timestep"]:g} ms.
+- Selection: the policy after {selected["steps"]} steps ({selected["minutes"]:.1f} min), the best of
+  {len(selected["finalists"])} finalists out of {len(result["history"])} snapshots.
+- Versions: {versions}.
+
+Trials on the selection seeds {", ".join(map(str, selected["seeds"]))}, noise and delay on, physics
+step 0.5 ms, the first 2 s of each trial dropped. These seeds chose the policy; `hop evaluate
+{result["recipe"]}` judges it on others.
+
+{table(selected["trials"])}
+"""
+
+
+def table(trials: list[dict[str, Any]]) -> str:
+    """Return trials as a Markdown table.
+
+    Args:
+        trials: Rows of ``judge``.
+    """
+    head = (
+        "| command m | median error mm | std mm | hops/s | flight % | skipped | body contact ticks"
+        " | lowest base m |\n|---|---|---|---|---|---|---|---|"
+    )
+    rows = [
+        f"| {t['command_m']:.2f} | {_mm(t['median_error_m'])} | {_mm(t['std_m'])}"
+        f" | {t['hops_per_s']:.2f} | {100 * t['flight_fraction']:.0f} | {t['skipped_hops']}"
+        f" of {t['hops'] + t['skipped_hops']} | {t['body_contact_ticks']}"
+        f" | {t['min_height_m']:.3f} |"
+        for t in trials
+    ]
+    return "\n".join([head, *rows])
+
+
+def _mm(metres: float | None) -> str:
+    return "no hops" if metres is None else f"{1000 * metres:.1f}"

@@ -1,0 +1,76 @@
+"""The paper's recipe: soft actor-critic with state-dependent exploration (Sec. II-C)."""
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from torch import nn
+
+from hopping_leg.env import PaperReward, PaperRewardOptions, TaskOptions
+from hopping_leg.learn.recipe import Recipe
+from hopping_leg.learn.resumable import ResumableSAC
+from hopping_leg.learn.vecenv import TaskVecEnv
+from hopping_leg.robot.parameters import Robot
+
+
+@dataclass(frozen=True)
+class PaperRecipe(Recipe):
+    """SAC + gSDE on the paper's observation and reward.
+
+    The paper gives network, reward, weights, noise and delay; the hyper-parameters of SAC are
+    chosen here.
+    """
+
+    name: ClassVar[str] = "paper"
+
+    task: TaskOptions = field(default_factory=lambda: TaskOptions(start="mixed", stagger=True))
+    reward: PaperRewardOptions = field(default_factory=PaperRewardOptions)
+    """Weights as printed."""
+    hidden: tuple[int, ...] = (256, 256, 128, 128)
+    """Hidden layers of actor and critics, ReLU, as printed."""
+    learning_rate: float = 7e-4
+    """Of all networks at the start; falls linearly to a tenth."""
+    buffer: int = 300_000
+    """Transitions in the replay buffer."""
+    warmup: int = 5_000
+    """Steps of uniformly random torque before the first gradient step."""
+    batch: int = 256
+    """Transitions per gradient step."""
+    tau: float = 0.01
+    """Share by which the target critics follow the critics at each gradient step."""
+    gamma: float = 0.99
+    """Discount per tick: a horizon of half a second, about one hop."""
+    rollout: int = 32
+    """Ticks between updates, each leg; gSDE keeps its noise as long, 0.16 s."""
+    gradient_steps: int = 64
+    """Gradient steps after each rollout: one for every 8 steps of experience."""
+    log_std: float = -2.0
+    """Initial log standard deviation of gSDE's weights."""
+
+    def make_reward(self, robot: Robot) -> PaperReward:
+        """Build the paper's five-term reward."""
+        return PaperReward(robot, self.reward)
+
+    def make_model(self, env: TaskVecEnv, seed: int) -> ResumableSAC:
+        """Build SAC with gSDE."""
+        rate = self.learning_rate
+        return ResumableSAC(
+            "MlpPolicy",
+            env,
+            learning_rate=lambda remaining: rate * (0.1 + 0.9 * remaining),
+            buffer_size=self.buffer,
+            learning_starts=self.warmup,
+            batch_size=self.batch,
+            tau=self.tau,
+            gamma=self.gamma,
+            train_freq=self.rollout,
+            gradient_steps=self.gradient_steps,
+            use_sde=True,
+            sde_sample_freq=-1,
+            policy_kwargs={
+                "net_arch": list(self.hidden),
+                "activation_fn": nn.ReLU,
+                "log_std_init": self.log_std,
+            },
+            seed=seed,
+            device="cpu",
+        )

@@ -1,0 +1,63 @@
+"""What a recipe is: everything that decides how a controller is trained."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from hopping_leg.control.layouts import ThreeSamples
+from hopping_leg.env import HoppingTask, TaskOptions
+from hopping_leg.env.transition import Reward
+from hopping_leg.learn.actor import network_of
+from hopping_leg.learn.export import Network
+from hopping_leg.learn.vecenv import TaskVecEnv
+from hopping_leg.robot.parameters import Robot
+
+
+@dataclass(frozen=True)
+class Recipe(ABC):
+    """A way to train a controller; subclasses add the algorithm and its hyper-parameters."""
+
+    name: ClassVar[str]
+    """As on the command line."""
+    layout: ClassVar[str] = ThreeSamples.name
+    """Observation layout of the policy file."""
+
+    task: TaskOptions = field(default_factory=TaskOptions)
+    """The learning problem."""
+    legs: int = 16
+    """Legs that gather experience at once."""
+    steps: int = 1_000_000
+    """Control steps of experience in all, summed over the legs."""
+    judge_every: int = 25_000
+    """Control steps between two trials of the deterministic policy, for checkpoint selection."""
+    judge_commands: tuple[float, ...] = (0.25, 0.30, 0.35)
+    """Heights of those trials, m."""
+    log_every: int = 32
+    """Episodes (SAC) or updates (PPO) between two entries in the TensorBoard log."""
+    checkpoint_seconds: float = 60.0
+    """Time between checkpoints."""
+
+    def make_env(self, robot: Robot, seed: int, threads: int = 1) -> TaskVecEnv:
+        """Build the training environment."""
+        rng = np.random.default_rng(seed)
+        task = HoppingTask(robot, self.legs, self.task, self.make_reward(robot), rng, threads)
+        return TaskVecEnv(task)
+
+    @abstractmethod
+    def make_reward(self, robot: Robot) -> Reward:
+        """Build the reward."""
+
+    @abstractmethod
+    def make_model(self, env: TaskVecEnv, seed: int) -> Any:  # noqa: ANN401
+        """Build the untrained stable-baselines3 model, a subclass of ``AtBoundary``.
+
+        Args:
+            env: From ``make_env``.
+            seed: Of weights and exploration.
+        """
+
+    def network(self, model: Any, env: TaskVecEnv) -> Network:  # noqa: ANN401
+        """Return the deterministic actor as it stands."""
+        return network_of(model, env.task.scaling)

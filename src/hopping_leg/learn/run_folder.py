@@ -1,0 +1,107 @@
+"""The folder of one training: what it was asked for, checkpoints, snapshots, results."""
+
+import json
+from dataclasses import asdict
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from hopping_leg.errors import UsageError
+from hopping_leg.learn.checkpoint import Tree, list_checkpoints, read_checkpoint
+from hopping_leg.learn.recipe import Recipe
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.trace import write_atomically
+
+_LIBRARIES = ("hopping-leg", "mujoco", "numpy", "onnxruntime", "stable-baselines3", "torch")
+
+
+class RunFolder:
+    """Paths and files of one run.
+
+    Attributes:
+        path: The folder.
+        config: What the run was asked for, as JSON values.
+    """
+
+    def __init__(
+        self, path: Path, recipe: Recipe, robot: Robot, seed: int, minutes: float | None
+    ) -> None:
+        self.path = path
+        self.config = json.loads(
+            json.dumps(
+                {
+                    "recipe": recipe.name,
+                    "options": asdict(recipe),
+                    "robot": robot.name,
+                    "robot_digest": robot.digest,
+                    "seed": seed,
+                    "minutes_budget": minutes,
+                    "versions": library_versions(),
+                }
+            )
+        )
+
+    @property
+    def checkpoints(self) -> Path:
+        """Folder of the checkpoints."""
+        return self.path / "checkpoints"
+
+    @property
+    def policy(self) -> Path:
+        """The selected policy, once the training is over."""
+        return self.path / "policy.onnx"
+
+    def snapshot(self, steps: int) -> Path:
+        """Return the file of the policy as it was after so many steps."""
+        return self.path / "snapshots" / f"{steps:012d}.onnx"
+
+    def begin(self, *, resume: bool) -> Tree | None:
+        """Prepare the folder; return the newest checkpoint if there is one to resume from.
+
+        Raises:
+            UsageError: The folder holds a run and ``resume`` is off, or another or finished run.
+        """
+        file = self.path / "config.json"
+        if not file.exists():
+            if self.path.is_dir() and any(self.path.iterdir()):
+                raise UsageError(f"{self.path} is not empty and holds no run; give another --out.")
+            self.write("config.json", self.config)
+            return None
+        if not resume:
+            raise UsageError(
+                f"{self.path} already holds a run; go on with --resume or give another --out."
+            )
+        self._check_same(json.loads(file.read_text(encoding="utf-8")))
+        if self.policy.exists():
+            raise UsageError(f"The run in {self.path} is finished; its policy is {self.policy}.")
+        found = list_checkpoints(self.checkpoints)
+        return read_checkpoint(found[-1]) if found else None
+
+    def write(self, name: str, content: Any) -> None:  # noqa: ANN401
+        """Write a JSON file of the folder, whole or not at all."""
+        text = json.dumps(content, indent=1)
+        write_atomically(self.path / name, f"{text}\n".encode())
+
+    def _check_same(self, stored: dict[str, Any]) -> None:
+        for key in ("recipe", "robot_digest", "seed", "minutes_budget", "options"):
+            if stored[key] != self.config[key]:
+                raise UsageError(
+                    f"The run in {self.path} has another {key.replace('_', ' ')}"
+                    f" ({_short(stored[key])} instead of {_short(self.config[key])});"
+                    " resume it with the options that it began with."
+                )
+
+
+def library_versions() -> dict[str, str]:
+    """Return the versions of the libraries that decide about a training's result."""
+    found = {}
+    for name in _LIBRARIES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def _short(value: Any) -> str:  # noqa: ANN401
+    return "other values" if isinstance(value, dict) else repr(value)

@@ -1,0 +1,232 @@
+"""Train a recipe: learn, checkpoint, try snapshots, choose the best, write the policy."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import configure
+
+from hopping_leg.control.policy import Card
+from hopping_leg.errors import UsageError
+from hopping_leg.learn import resumable
+from hopping_leg.learn.checkpoint import write_checkpoint
+from hopping_leg.learn.export import build_policy
+from hopping_leg.learn.model_card import write_card
+from hopping_leg.learn.progress import TrainingProgress
+from hopping_leg.learn.recipe import Recipe
+from hopping_leg.learn.run_folder import RunFolder
+from hopping_leg.learn.selection import Selection
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.trace import write_atomically
+
+SHOWN_EVERY = 0.5
+"""Time between two updates of the progress bar, s."""
+
+
+@dataclass(frozen=True)
+class Trained:
+    """A finished training.
+
+    Attributes:
+        policy: The selected policy file.
+        folder: The run's folder.
+        minutes: Wall-clock time of the training, pauses excluded.
+        steps: Control steps of experience.
+        results: Verdicts on the selected policy, on selection seeds, as JSON rows.
+    """
+
+    policy: Path
+    folder: Path
+    minutes: float
+    steps: int
+    results: list[dict[str, Any]]
+
+
+def train(
+    recipe: Recipe,
+    robot: Robot,
+    seed: int,
+    out: Path,
+    *,
+    resume: bool = False,
+    minutes: float | None = None,
+    threads: int = 1,
+    quiet: bool = False,
+) -> Trained:
+    """Train a controller and leave its policy, card and history in ``out``.
+
+    A run that was killed at any moment continues with ``resume`` as if nothing had happened; with
+    ``minutes`` that holds up to the clock, which the learning rate then follows.
+
+    Args:
+        recipe: What to train.
+        robot: The leg.
+        seed: Of weights, exploration, task, noise and delay.
+        out: The run's folder.
+        resume: Go on with the run in ``out``; without one, begin.
+        minutes: Stop after so much wall-clock time, pauses excluded, or at the recipe's steps.
+        threads: Of torch and physics; torch's is set for the whole process.
+        quiet: Show no progress.
+
+    Raises:
+        UsageError: ``out`` holds a run that cannot be continued like this.
+    """
+    if minutes is not None and not 0 < minutes < float("inf"):
+        raise UsageError(f"--minutes is {minutes:g} but must be positive.")
+    torch.set_num_threads(max(threads, 1))
+    folder = RunFolder(out, recipe, robot, seed, minutes)
+    tree = folder.begin(resume=resume)
+    trainer = Trainer(recipe, robot, seed, folder, minutes, threads)
+    if tree is not None:
+        trainer.restore(tree)
+    with TrainingProgress(f"{recipe.name} seed {seed}", quiet=quiet) as progress:
+        return trainer.run(progress)
+
+
+class Trainer:
+    """One training in one process."""
+
+    def __init__(
+        self,
+        recipe: Recipe,
+        robot: Robot,
+        seed: int,
+        folder: RunFolder,
+        minutes: float | None,
+        threads: int,
+    ) -> None:
+        self.recipe, self.robot, self.seed, self.folder = recipe, robot, seed, folder
+        self._budget = None if minutes is None else 60 * minutes
+        self.env = recipe.make_env(robot, seed, threads)
+        self.model = recipe.make_model(self.env, seed)
+        self.model.set_logger(configure(str(folder.path / "tensorboard"), ["tensorboard"]))
+        self.model.on_boundary = self._at_boundary
+        if self._budget is not None:
+            self.model.remaining = lambda: max(0.0, 1 - self.elapsed / self._seconds)
+        self.selection = Selection(recipe, robot, folder)
+        self._earlier = 0.0
+        self._began = time.monotonic()
+        self._saved = self._began
+        self._shown = 0.0
+        self._progress: TrainingProgress | None = None
+
+    @property
+    def elapsed(self) -> float:
+        """Wall-clock time of the training, pauses excluded, s."""
+        return self._earlier + time.monotonic() - self._began
+
+    @property
+    def _seconds(self) -> float:
+        return self._budget or float("inf")
+
+    def restore(self, tree: dict[str, Any]) -> None:
+        """Go on from a checkpoint."""
+        resumable.restore(self.model, tree["model"])
+        self.selection.rows = tree["history"]
+        self._earlier = tree["elapsed"]
+        self._began = time.monotonic()
+
+    def run(self, progress: TrainingProgress) -> Trained:
+        """Learn until steps or time are used up; write the selected policy."""
+        self._progress = progress
+        model, recipe = self.model, self.recipe
+        if self.elapsed < self._seconds and model.num_timesteps < recipe.steps:
+            model.learn(
+                recipe.steps - model.num_timesteps,
+                callback=_Watch(self),
+                log_interval=recipe.log_every,
+                reset_num_timesteps=model.num_timesteps == 0,
+            )
+        self._judge()
+        minutes, steps = self.elapsed / 60, int(model.num_timesteps)
+        self._show(force=True)
+        content, results = self.selection.choose()
+        result = {
+            "minutes": minutes,
+            "steps": steps,
+            "selected": results,
+            "history": self.selection.rows,
+        }
+        self.folder.write("result.json", {**self.folder.config, **result})
+        write_card(self.folder.path)
+        write_atomically(self.folder.policy, content)
+        return Trained(self.folder.policy, self.folder.path, minutes, steps, results["trials"])
+
+    def tick(self) -> bool:
+        """Show the progress; return whether there is time left."""
+        self._show()
+        return self.elapsed < self._seconds
+
+    def _at_boundary(self) -> None:
+        if self.model.num_timesteps >= self.selection.next_at:
+            self._judge()
+        if time.monotonic() - self._saved >= self.recipe.checkpoint_seconds:
+            self.checkpoint()
+
+    def checkpoint(self) -> None:
+        """Write a checkpoint; only at a boundary does it continue exactly."""
+        tree = {
+            "model": resumable.state_of(self.model),
+            "history": self.selection.rows,
+            "elapsed": self.elapsed,
+        }
+        write_checkpoint(self.folder.checkpoints, self.model.num_timesteps, tree)
+        self._saved = time.monotonic()
+
+    def policy_content(self) -> bytes:
+        """Return the deterministic policy as it stands, as a policy file."""
+        recipe, robot = self.recipe, self.robot
+        low, high = recipe.task.command_bounds
+        hip, knee = recipe.task.action_torque
+        card = Card(
+            recipe=recipe.name,
+            layout=recipe.layout,
+            command_low=low,
+            command_high=high,
+            torque_scale=(float(hip), float(knee)),
+            robot=robot.name,
+            robot_digest=robot.digest,
+            rate=recipe.task.rate,
+            seed=self.seed,
+            steps=int(self.model.num_timesteps),
+            versions=self.folder.config["versions"],
+        )
+        return build_policy(recipe.network(self.model, self.env), card)
+
+    def _judge(self) -> None:
+        steps = int(self.model.num_timesteps)
+        content = self.policy_content()
+        row = self.selection.add(steps, self.elapsed / 60, content)
+        logger = self.model.logger
+        logger.record("trial/score_m", row["score_m"])
+        for trial in row["trials"]:
+            at = f"trial/{trial['command_m']:.2f}"
+            for name in ("median_error_m", "std_m", "hops_per_s", "skipped_hops"):
+                if trial[name] is not None:
+                    logger.record(f"{at}/{name}", trial[name])
+        logger.dump(steps)
+
+    def _show(self, *, force: bool = False) -> None:
+        now = time.monotonic()
+        if self._progress is None or (now - self._shown < SHOWN_EVERY and not force):
+            return
+        self._shown = now
+        steps = int(self.model.num_timesteps)
+        share = max(steps / self.recipe.steps, self.elapsed / self._seconds)
+        self._progress.update(
+            min(share, 1.0), steps, self.env.hops, self.env.apex_error, self.selection.describe()
+        )
+
+
+class _Watch(BaseCallback):  # type: ignore[misc]
+    """Looks at the clock after every tick."""
+
+    def __init__(self, trainer: Trainer) -> None:
+        super().__init__()
+        self._trainer = trainer
+
+    def _on_step(self) -> bool:
+        return self._trainer.tick()
