@@ -9,6 +9,7 @@ import os
 import shutil
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -77,7 +78,7 @@ def read_checkpoint(path: Path) -> Tree:
                 f"{path} has checkpoint schema {stored['schema']}; this version reads {SCHEMA}."
             )
         tree: Tree = _join(stored["tree"], arrays)
-    except (OSError, ValueError, KeyError, EOFError) as error:
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
         raise UsageError(
             f"Checkpoint {path} is damaged ({error}); delete it to resume from the one before."
         ) from error
@@ -91,6 +92,8 @@ def _split(node: Any, path: str, arrays: dict[str, Any]) -> Any:  # noqa: ANN401
     if isinstance(node, list | tuple):
         return [_split(value, f"{path}/{index}", arrays) for index, value in enumerate(node)]
     if isinstance(node, np.ndarray):
+        if node.dtype.hasobject:
+            raise TypeError(f"'{path}' is an array of objects, which only a pickle could hold")
         name = str(len(arrays))
         arrays[name] = node
         return {_ARRAY: name}

@@ -25,6 +25,8 @@ class PaperRecipe(Recipe):
     task: TaskOptions = field(default_factory=lambda: TaskOptions(start="mixed", stagger=True))
     reward: PaperRewardOptions = field(default_factory=PaperRewardOptions)
     """Weights as printed."""
+    steps: int = 500_000
+    """Control steps of experience in all, summed over the legs."""
     hidden: tuple[int, ...] = (256, 256, 128, 128)
     """Hidden layers of actor and critics, ReLU, as printed."""
     learning_rate: float = 7e-4

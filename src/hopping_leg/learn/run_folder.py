@@ -92,6 +92,19 @@ class RunFolder:
                 )
 
 
+def read_result(path: Path) -> dict[str, Any]:
+    """Return what a finished run left in ``result.json``.
+
+    Raises:
+        UsageError: The folder holds no finished run.
+    """
+    file = path / "result.json"
+    if not file.exists():
+        raise UsageError(f"{path} holds no finished run; go on with `hop train --resume`.")
+    result: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    return result
+
+
 def library_versions() -> dict[str, str]:
     """Return the versions of the libraries that decide about a training's result."""
     found = {}

@@ -1,0 +1,78 @@
+"""Train a controller from scratch, or go on after an interruption.
+
+The run's folder holds TensorBoard logs, checkpoints, snapshots and at the end the selected policy
+with its model card. A run that was stopped or killed at any moment goes on with --resume as if
+nothing had happened.
+
+Examples:
+  hop train --recipe fast --minutes 5
+  hop train --recipe paper --seed 1 --out runs/mine
+  hop train --recipe paper --seed 1 --out runs/mine --resume
+  hop evaluate runs/mine/policy.onnx
+"""
+
+import dataclasses
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from hopping_leg.cli.output import write_json
+from hopping_leg.errors import UsageError
+from hopping_leg.robot import load_robot
+
+
+@dataclass(frozen=True)
+class Options:
+    """What to train and where to keep it."""
+
+    recipe: str = "fast"
+    """How to train: `fast` for accurate hopping soon, `paper` for the paper's method."""
+    robot: str = "legv2-paper"
+    """A shipped robot or the path of a .toml file."""
+    seed: int = 0
+    """Of weights, exploration, starts, noise and delay."""
+    out: Path | None = None
+    """The run's folder; default: runs/RECIPE-seedSEED."""
+    resume: bool = False
+    """Go on with the run in the folder; without one there, begin."""
+    minutes: float | None = None
+    """Stop after so much wall-clock time; default: when the recipe's steps are done."""
+    steps: int | None = None
+    """Control steps of experience, all legs together, instead of the recipe's."""
+    threads: int = 1
+    """Threads of the networks and the physics."""
+    json: Path | None = None
+    """Write the results to this file as JSON."""
+
+
+def run(args: Options) -> None:
+    """Train a controller."""
+    from hopping_leg.learn.recipes import get_recipe
+    from hopping_leg.learn.run_folder import read_result
+    from hopping_leg.learn.train import train
+
+    recipe = get_recipe(args.recipe)
+    if args.seed < 0 or args.threads < 1:
+        raise UsageError("--seed must not be negative and --threads must be at least 1.")
+    if args.steps is not None:
+        if args.steps < 1:
+            raise UsageError(f"--steps is {args.steps} but must be at least 1.")
+        recipe = dataclasses.replace(recipe, steps=args.steps)
+    out = args.out or Path("runs") / f"{args.recipe}-seed{args.seed}"
+    try:
+        trained = train(
+            recipe,
+            load_robot(args.robot),
+            args.seed,
+            out,
+            resume=args.resume,
+            minutes=args.minutes,
+            threads=args.threads,
+        )
+    except KeyboardInterrupt:
+        print(f"Stopped; the same command with --resume goes on in {out}.", file=sys.stderr)
+        raise
+    if args.json:
+        write_json(args.json, read_result(trained.folder))
+    print((trained.folder / "model_card.md").read_text(encoding="utf-8"))
+    print(f"Policy: {trained.policy}\nJudge it: hop evaluate {trained.policy}")

@@ -1,0 +1,36 @@
+"""Small recipes that train in a second."""
+
+import dataclasses
+
+import torch
+from stable_baselines3.common.logger import configure
+
+from hopping_leg.learn.paper import PaperRecipe
+from hopping_leg.learn.resumable import ResumablePPO
+from hopping_leg.robot import load_robot
+
+ROBOT = load_robot("legv2-paper")
+TINY = PaperRecipe(
+    steps=1200, warmup=300, judge_every=10**9, hidden=(8, 8), legs=2, gradient_steps=4, batch=16
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class TinyPPO(PaperRecipe):
+    name = "ppo"
+    steps: int = 640
+    legs: int = 2
+
+    def make_model(self, env, seed):
+        return ResumablePPO(
+            "MlpPolicy", env, n_steps=32, batch_size=32, n_epochs=2, use_sde=True, seed=seed,
+            learning_rate=lambda left: 1e-3 * left, policy_kwargs={"net_arch": [8]}, device="cpu",
+        )  # fmt: skip
+
+
+def learner(recipe, seed=3):
+    torch.set_num_threads(1)
+    env = recipe.make_env(ROBOT, seed)
+    model = recipe.make_model(env, seed)
+    model.set_logger(configure(None, []))
+    return model

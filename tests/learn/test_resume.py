@@ -1,0 +1,122 @@
+import dataclasses
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from hopping_leg.errors import UsageError
+from hopping_leg.learn import train as module
+from hopping_leg.learn.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
+from hopping_leg.learn.resumable import restore, state_of
+from tests.learn.learners import ROBOT, TINY, TinyPPO, learner
+
+
+def disturb_all_generators():
+    torch.rand(100)
+    np.random.rand(100)  # noqa: NPY002
+
+
+@pytest.mark.parametrize("recipe", [TINY, TinyPPO()], ids=["sac", "ppo"])
+def test_resuming_equals_never_having_stopped(recipe, tmp_path):
+    straight = learner(recipe)
+    trees = []
+
+    def keep():
+        if straight.num_timesteps >= recipe.steps // 2 and not trees:
+            trees.append(write_checkpoint(tmp_path, straight.num_timesteps, state_of(straight)))
+
+    straight.on_boundary = keep
+    straight.learn(recipe.steps)
+    disturb_all_generators()
+    resumed = learner(recipe, seed=99)
+    restore(resumed, read_checkpoint(trees[0]))
+    assert 0 < resumed.num_timesteps < recipe.steps
+    resumed.learn(recipe.steps - resumed.num_timesteps, reset_num_timesteps=False)
+    assert resumed.num_timesteps == straight.num_timesteps
+    before, after = straight.policy.state_dict(), resumed.policy.state_dict()
+    assert all(torch.equal(before[name], after[name]) for name in before)
+    assert np.array_equal(straight._last_obs, resumed._last_obs)
+
+
+def test_only_whole_checkpoints_count_and_two_are_kept(tmp_path):
+    for steps in (1, 2, 3):
+        write_checkpoint(tmp_path, steps, {"a": np.arange(steps), "b": [steps, None, 2**100]})
+    (tmp_path / "checkpoint-000000000009.tmp").mkdir()
+    found = list_checkpoints(tmp_path)
+    assert [p.name[-1] for p in found] == ["2", "3"]
+    tree = read_checkpoint(found[-1])
+    assert tree["a"].tolist() == [0, 1, 2]
+    assert tree["b"] == [3, None, 2**100]
+
+
+@pytest.mark.parametrize("name", ["arrays.npz", "state.json"])
+def test_damaged_checkpoint_is_named(tmp_path, name):
+    path = write_checkpoint(tmp_path, 1, {"a": np.arange(500)})
+    content = (path / name).read_bytes()
+    (path / name).write_bytes(content[: len(content) // 2])
+    with pytest.raises(UsageError, match="damaged"):
+        read_checkpoint(path)
+
+
+def test_no_checkpoint_holds_a_pickle(tmp_path):
+    with pytest.raises(TypeError):
+        write_checkpoint(tmp_path, 1, {"a": object()})
+    with pytest.raises(TypeError, match="objects"):
+        write_checkpoint(tmp_path, 2, {"a": np.array([object()])})
+    assert list_checkpoints(tmp_path) == []
+
+
+def test_a_run_is_never_overwritten_or_mixed(tmp_path):
+    out = tmp_path / "run"
+    recipe = dataclasses.replace(TINY, steps=64, judge_every=32, warmup=32)
+    done = module.train(recipe, ROBOT, 0, out, quiet=True)
+    content = done.policy.read_bytes()
+    with pytest.raises(UsageError, match="--resume"):
+        module.train(recipe, ROBOT, 0, out, quiet=True)
+    with pytest.raises(UsageError, match="finished"):
+        module.train(recipe, ROBOT, 0, out, resume=True, quiet=True)
+    with pytest.raises(UsageError, match="another seed"):
+        module.train(recipe, ROBOT, 1, out, resume=True, quiet=True)
+    assert done.policy.read_bytes() == content
+
+
+_KILLED = """
+import sys
+from pathlib import Path
+from tests.learn.learners import ROBOT, TINY
+import dataclasses
+from hopping_leg.learn.train import train
+recipe = dataclasses.replace(TINY, steps=6400, checkpoint_seconds=0.0, judge_every=3200)
+train(recipe, ROBOT, 0, Path(sys.argv[1]), resume=True, quiet=True)
+"""
+
+
+def checkpoint_names(run):
+    return {path.name for path in list_checkpoints(run / "checkpoints")}
+
+
+@pytest.mark.slow
+def test_killed_runs_end_like_the_run_that_was_left_alone(tmp_path):
+    alone, killed = tmp_path / "alone", tmp_path / "killed"
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    command = [sys.executable, "-c", _KILLED]
+    subprocess.run([*command, str(alone)], check=True, env=environment)
+    kills = 0
+    for delay in (0.0, 0.05, 0.1):
+        begun = checkpoint_names(killed)
+        process = subprocess.Popen([*command, str(killed)], env=environment)
+        while process.poll() is None and checkpoint_names(killed) <= begun:
+            time.sleep(0.01)
+        time.sleep(delay)
+        kills += process.poll() is None
+        process.kill()
+        process.wait()
+    assert kills > 0
+    if not (killed / "policy.onnx").exists():
+        subprocess.run([*command, str(killed)], check=True, env=environment)
+    assert (killed / "policy.onnx").read_bytes() == (alone / "policy.onnx").read_bytes()
