@@ -1,0 +1,165 @@
+"""Fills documentation pages with numbers from docs/results and from the package, at build time.
+
+A page may hold ``{{ table(...) }}``, ``{{ value(...) }}``, ``{{ robot(...) }}`` and
+``{{ usage(...) }}``; a missing file or entry stops the build, so no page can show a number that no
+longer exists.
+"""
+
+import contextlib
+import dataclasses
+import importlib.util
+import io
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from mkdocs.exceptions import PluginError
+
+from hopping_leg import cli
+from hopping_leg.cli.robots import derived, numbers
+from hopping_leg.robot import load_robot
+from hopping_leg.robot.files import load_tree
+
+RESULTS = Path(__file__).parent / "results"
+EXAMPLES = Path(__file__).parent.parent / "examples"
+
+
+@dataclasses.dataclass(frozen=True)
+class Column:
+    """A column ``"key"``, ``"key=title"`` or ``"key*factor=title"`` of a table."""
+
+    key: str
+    title: str
+    factor: float | None
+
+    @staticmethod
+    def parse(text: str) -> "Column":
+        """Read a column's text."""
+        left, _, title = text.partition("=")
+        key, _, factor = left.partition("*")
+        return Column(key, title or key, float(factor) if factor else None)
+
+    def cell(self, row: dict[str, Any]) -> str:
+        """Return this column of a row as text."""
+        value = row[self.key]
+        if self.factor is not None and value is not None:
+            value = value * self.factor
+        return number(value)
+
+
+def number(value: Any) -> str:  # noqa: ANN401
+    """Return a value as a reader wants it."""
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}"
+    if isinstance(value, list):
+        return ", ".join(number(entry) for entry in value)
+    return str(value)
+
+
+def read(file: str) -> Any:  # noqa: ANN401
+    """Return the content of a file in docs/results."""
+    return json.loads((RESULTS / file).read_text(encoding="utf-8"))
+
+
+def pick(tree: Any, path: str) -> Any:  # noqa: ANN401
+    """Return the entry at a dotted path; numbers index lists, an empty path is the whole."""
+    for key in filter(None, path.split(".")):
+        tree = tree[int(key)] if isinstance(tree, list) else tree[key]
+    return tree
+
+
+def value(file: str, path: str, factor: float = 1.0) -> str:
+    """Return one number of a results file, times a factor."""
+    found = pick(read(file), path)
+    return number(found * factor if isinstance(found, float) and factor != 1.0 else found)
+
+
+def table(file: str, path: str, *columns: str, **where: Any) -> str:  # noqa: ANN401
+    """Return a list of records in a results file as a table, with the command that makes it.
+
+    Args:
+        file: In docs/results.
+        path: Dotted path of the list.
+        columns: See ``Column``; default: every key of the first record.
+        where: Show only records with these entries.
+    """
+    content = read(file)
+    rows = [row for row in pick(content, path) if all(row[k] == v for k, v in where.items())]
+    if not rows:
+        raise PluginError(f"docs/results/{file} has no rows at '{path}' with {where}.")
+    shown = [Column.parse(text) for text in columns or rows[0]]
+    cells = [[column.cell(row) for column in shown] for row in rows]
+    return grid([column.title for column in shown], cells) + origin(file, content)
+
+
+def origin(file: str, content: Any) -> str:  # noqa: ANN401
+    """Return the line under a table that says where it comes from."""
+    command = content.get("command") if isinstance(content, dict) else None
+    made = f", made by `{command}`" if command else ""
+    return f"\n\nFrom [`{file}`](results/{file}){made}.\n"
+
+
+def grid(titles: list[str], rows: list[list[str]]) -> str:
+    """Return a Markdown table."""
+    lines = [titles, ["---"] * len(titles), *rows]
+    return "\n".join(
+        "| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in lines
+    )
+
+
+def robot(name: str) -> str:
+    """Return every number of a shipped robot as a table."""
+    leg = load_robot(name)
+    rows = [
+        [f"`{path}`", f"{entry['value']:g}", entry["unit"], entry["source"]]
+        for path, entry in numbers(load_tree(name))
+    ]
+    rows += [[f"`{path}`", number(entry), "", "computed"] for path, entry in derived(leg).items()]
+    return grid(["number", "value", "unit", "source"], rows)
+
+
+def usage(*arguments: str) -> str:
+    """Return the help text of a command."""
+    os.environ |= {"COLUMNS": "100", "NO_COLOR": "1"}
+    text = io.StringIO()
+    with contextlib.redirect_stdout(text), contextlib.suppress(SystemExit):
+        cli.main([*arguments, "--help"])
+    return f"```text\n$ hop {' '.join((*arguments, '--help'))}\n{text.getvalue().rstrip()}\n```"
+
+
+def example(file: str) -> str:
+    """Return a file of examples/ as it is."""
+    return (EXAMPLES / file).read_text(encoding="utf-8").rstrip()
+
+
+def page(file: str, title: str) -> str:
+    """Return a link to a page of this site, or its bare title where there is none."""
+    return f"[{title}]({file})" if (Path(__file__).parent / file).is_file() else title
+
+
+MACROS = {
+    "table": table,
+    "value": value,
+    "robot": robot,
+    "usage": usage,
+    "example": example,
+    "page": page,
+    "verbs": [v for v in cli.VERBS if importlib.util.find_spec(f"hopping_leg.cli.{v}")],
+}
+
+
+def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:  # noqa: ANN401
+    """Fill one page (called by mkdocs)."""
+    environment = jinja2.Environment(
+        undefined=jinja2.StrictUndefined, autoescape=False, keep_trailing_newline=True
+    )
+    try:
+        return environment.from_string(markdown).render(MACROS)
+    except (jinja2.TemplateError, OSError, LookupError, TypeError, ValueError) as error:
+        raise PluginError(f"docs/{page.file.src_uri}: {type(error).__name__}: {error}") from error

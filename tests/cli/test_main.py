@@ -1,0 +1,97 @@
+import errno
+import importlib.util
+import subprocess
+import sys
+import time
+from types import SimpleNamespace
+
+import pytest
+
+from hopping_leg import cli
+from hopping_leg.cli import main
+from hopping_leg.errors import UsageError
+
+
+def failing(monkeypatch, error):
+    """Make `hop robots` raise."""
+
+    def run(args: int) -> None:
+        raise error
+
+    monkeypatch.setattr(cli.importlib, "import_module", lambda _: SimpleNamespace(run=run))
+    return main(["robots", "1"])
+
+
+def test_the_overview_names_every_verb(capsys):
+    assert main([]) == 0
+    shown = capsys.readouterr().out
+    assert all(f"  {verb}" in shown for verb in cli.VERBS)
+
+
+@pytest.mark.parametrize("verb", cli.VERBS)
+def test_every_verb_exists(verb):
+    assert importlib.util.find_spec(f"hopping_leg.cli.{verb}") is not None
+
+
+def test_help_is_quick_and_loads_no_simulator():
+    code = (
+        "import sys; from hopping_leg.cli import main; main(['--help']);"
+        "sys.exit(bool({'mujoco', 'torch', 'polars', 'onnxruntime'} & set(sys.modules)))"
+    )
+    start = time.perf_counter()
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True)
+    assert result.returncode == 0
+    assert time.perf_counter() - start < 5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["robot"], "Did you mean 'robots'?"),
+        (["robots", "show", "legv3"], "There is no robot 'legv3'."),
+        (["robots", "check", "missing.toml"], "There is no robot file missing.toml"),
+        (["export", "policy", "nobody"], "There is no controller 'nobody'."),
+        (["export", "policy", "LICENSE"], "not a policy file"),
+        (["export", "urdf", "--out", "/dev/full"], "No space left on device"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_exit_code_2(capsys, arguments, sentence):
+    assert main(arguments) == 2
+    captured = capsys.readouterr()
+    assert sentence in captured.err
+    assert captured.err.startswith("hop: ")
+    assert captured.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "sentence"),
+    [
+        (UsageError("Too high; 0.4 m was valid."), 2, "hop: Too high; 0.4 m was valid.\n"),
+        (KeyboardInterrupt(), 130, "Interrupted"),
+        (OSError(errno.ENOSPC, "No space left on device", "x.json"), 2, "The disk is full"),
+        (PermissionError(errno.EACCES, "Permission denied", "x.json"), 2, "x.json: Permission"),
+        (ModuleNotFoundError("no torch", name="torch"), 2, "hopping-leg[train]"),
+    ],
+)
+def test_errors_become_sentences(monkeypatch, capsys, error, code, sentence):
+    assert failing(monkeypatch, error) == code
+    assert sentence in capsys.readouterr().err
+
+
+def test_a_bug_keeps_its_traceback(monkeypatch):
+    with pytest.raises(ZeroDivisionError):
+        failing(monkeypatch, ZeroDivisionError())
+    with pytest.raises(ModuleNotFoundError):
+        failing(monkeypatch, ModuleNotFoundError("no such thing", name="hopping_leg.nothing"))
+
+
+@pytest.mark.parametrize("arguments", [["robots", "show"], ["robots", "list", "--colour", "red"]])
+def test_wrong_usage_exits_with_2(arguments, capsys):
+    with pytest.raises(SystemExit) as exit_:
+        main(arguments)
+    assert exit_.value.code == 2
+
+
+def test_version(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("hop 0.")
