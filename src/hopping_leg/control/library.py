@@ -7,6 +7,7 @@ from hopping_leg.control.policy import Policy
 from hopping_leg.control.protocol import Controller
 from hopping_leg.errors import PolicyError, UsageError, unknown_name
 from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim import CONTROL_RATE
 
 ENERGY_SHAPING = "energy-shaping"
 """The tuned baseline."""
@@ -16,7 +17,7 @@ ENERGY_SHAPING_LITERAL = "energy-shaping-literal"
 
 _FACTORIES = {
     ENERGY_SHAPING: "tuned_energy_shaping",
-    ENERGY_SHAPING_LITERAL: "literal_energy_shaping",
+    ENERGY_SHAPING_LITERAL: "paper_energy_shaping",
 }
 _SHIPPED = resources.files("hopping_leg") / "policies"
 
@@ -52,23 +53,26 @@ def load_policy(name_or_path: str | Path) -> Policy:
     )
 
 
-def load_controller(name_or_path: str | Path, robot: Robot, *, strict: bool = False) -> Controller:
+def load_controller(
+    name_or_path: str | Path, robot: Robot, *, rate: float = CONTROL_RATE, strict: bool = False
+) -> Controller:
     """Load a controller for a robot.
 
     Args:
         name_or_path: One of ``controller_names()``, or the path of an ``.onnx`` file.
         robot: The leg it shall drive.
+        rate: Control rate, Hz.
         strict: Refuse a policy that was trained on another robot instead of logging a warning.
 
     Raises:
-        PolicyError: The file is missing, truncated or foreign, or does not fit the robot.
+        PolicyError: The file is missing, truncated or foreign, or does not fit the robot or rate.
         UsageError: There is no such controller.
     """
     factory = _FACTORIES.get(str(name_or_path))
     if factory is not None:
         module = import_module("hopping_leg.control.energy_shaping")
-        controller: Controller = getattr(module, factory)(robot)
+        controller: Controller = getattr(module, factory)(robot, rate=rate)
         return controller
     policy = load_policy(name_or_path)
-    policy.check_robot(robot, strict=strict)
+    policy.check_robot(robot, rate, strict=strict)
     return policy

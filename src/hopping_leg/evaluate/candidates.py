@@ -40,10 +40,9 @@ def _expand(entry: str) -> list[str]:
 
 
 def _load(name: str, robot: Robot, rate: float) -> Candidate:
-    controller = load_controller(name, robot)
+    controller = load_controller(name, robot, rate=rate)
     if not isinstance(controller, Policy):
         return Candidate(name, controller)
-    controller.check_robot(robot, rate, strict=False)
     card = controller.card
     notes: tuple[str, ...] = ()
     if card.robot_digest != robot.digest:

@@ -79,7 +79,7 @@ class RunFolder:
 
     def write(self, name: str, content: Any) -> None:  # noqa: ANN401
         """Write a JSON file of the folder, whole or not at all."""
-        text = json.dumps(content, indent=1)
+        text = json.dumps(content, indent=1, allow_nan=False)
         write_atomically(self.path / name, f"{text}\n".encode())
 
     def _check_same(self, stored: dict[str, Any]) -> None:
