@@ -19,7 +19,8 @@ from rich.table import Table
 
 from hopping_leg.cli.output import write_json
 from hopping_leg.robot import Robot, load_robot, shipped_robots
-from hopping_leg.robot.files import Tree, load_tree
+from hopping_leg.robot.fields import Tree
+from hopping_leg.robot.files import load_tree
 
 Target = tyro.conf.Positional[str]
 
