@@ -11,12 +11,15 @@ Examples:
   hop evaluate energy-shaping --robot my_leg.toml --seeds 20 --floor stiff
 """
 
+import dataclasses
+import shlex
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 import tyro
+from rich import box
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
@@ -26,6 +29,7 @@ from hopping_leg.control import Setup
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Candidate, Evaluation, Judged, evaluate
 from hopping_leg.evaluate.candidates import load_candidates
+from hopping_leg.evaluate.report import render_videos, write_report
 from hopping_leg.evaluate.runs import save_traces
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import CONTROL_RATE, NOTHING, Disturbance
@@ -73,6 +77,9 @@ class Evaluate:
 def run(args: Evaluate) -> None:
     """Evaluate controllers, print the table, write what was asked for."""
     args = _with_folder(args)
+    for path in (args.json, args.report):
+        if path and path.is_dir():
+            raise UsageError(f"{path} is a folder; name a file.")
     if args.seed < 0:
         raise UsageError(f"A seed of {args.seed} has no meaning; give 0 or more.")
     robot = load_robot(args.robot)
@@ -84,6 +91,9 @@ def run(args: Evaluate) -> None:
         save_traces(judged.runs, args.traces)
     if args.json:
         write_atomically(args.json, judged.evaluation.dumps())
+    if args.report:
+        videos = render_videos(judged, robot) if args.video else None
+        write_atomically(args.report, write_report(judged, command_line(args), videos))
     console = Console()
     print_tables(console, judged.evaluation)
     for path in (args.json, args.report, args.traces):
@@ -100,6 +110,21 @@ def _with_folder(args: Evaluate) -> Evaluate:
         report=args.report or args.out / "report.html",
         traces=args.traces or args.out / "traces",
     )
+
+
+def command_line(args: Evaluate) -> str:
+    """Return the command that makes this evaluation again."""
+    words = ["hop evaluate", *map(shlex.quote, args.controllers)]
+    for field in dataclasses.fields(args):
+        value = getattr(args, field.name)
+        if field.name in ("controllers", "out") or value == field.default:
+            continue
+        if isinstance(value, bool):
+            words.append(f"--{'' if value else 'no-'}{field.name}")
+        else:
+            text = ",".join(f"{v:g}" for v in value) if isinstance(value, tuple) else str(value)
+            words.append(f"--{field.name} {shlex.quote(text)}")
+    return " ".join(words)
 
 
 def judge(candidates: list[Candidate], setup: Setup, args: Evaluate) -> Judged:
@@ -172,34 +197,39 @@ def print_tables(console: Console, evaluation: Evaluation) -> None:
         console.print(f"Note: {note}", highlight=False)
 
 
+_HEADINGS = (
+    "command",
+    "error",
+    "std",
+    "hops",
+    "skipped",
+    "hops/s",
+    "flight",
+    "base",
+    "sink",
+    "hits",
+)
+
+
 def summary_table(evaluation: Evaluation) -> Table:
     """Return the summary as a table for the terminal; lengths in mm."""
     conditions = evaluation.conditions
     table = Table(
         title=f"{conditions['robot']}, {conditions['floor']} floor, {conditions['seeds']} seeds"
-        f" from {conditions['seed']}; heights in mm"
+        f" from {conditions['seed']}; heights in mm",
+        caption="error: median of apex - command; base, sink: lowest and deepest over whole runs;"
+        " hits: contacts of base or knee with the ground",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
     )
-    table.add_column("controller")
-    for column in (
-        "command",
-        "median error",
-        "95 % interval",
-        "std",
-        "hops",
-        "skipped",
-        "hops/s",
-        "flight",
-        "lowest base",
-        "sink",
-        "body contacts",
-    ):
-        table.add_column(column, justify="right")
+    table.add_column("controller", overflow="fold")
+    for heading in _HEADINGS:
+        table.add_column(heading, justify="right", no_wrap=True)
     for row in evaluation.summary:
         table.add_row(
             row.controller,
             f"{1e3 * row.command_m:.0f}",
             f"{1e3 * row.median_error_m:+.1f}",
-            f"{1e3 * row.median_error_low_m:+.1f} .. {1e3 * row.median_error_high_m:+.1f}",
             f"{1e3 * row.std_m:.1f}",
             f"{row.hops}",
             f"{row.skipped_hops}",

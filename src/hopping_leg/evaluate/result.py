@@ -3,7 +3,7 @@
 import dataclasses
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from hopping_leg.evaluate.statistics import Neighbours
@@ -76,6 +76,23 @@ class Comparison:
 
 
 @dataclass(frozen=True)
+class Estimator:
+    """Estimated minus true height of a controller that estimates it, all runs pooled."""
+
+    controller: str
+    flight_bias_m: float
+    """Mean over ticks in flight."""
+    flight_std_m: float
+    stance_bias_m: float
+    stance_std_m: float
+    apex_bias_m: float
+    """Mean over hops of the apex estimated after landing minus the true one."""
+    apex_std_m: float
+    hops: int
+    """Hops that the controller noticed."""
+
+
+@dataclass(frozen=True)
 class Group:
     """Several policies of one recipe, trained with different seeds, at one command."""
 
@@ -103,8 +120,9 @@ class Evaluation:
         ladder: One row per controller and command of the ladder.
         staircase: One entry per controller.
         neighbours: One entry per controller.
-        groups: One row per group of policies and command.
         distributions: Apexes behind ``summary``: controller, command_m, apexes_m.
+        estimators: One entry per controller that estimates its height.
+        groups: One row per group of policies and command.
         conditions: Robot, digest, floor, disturbance, seeds, steps, rates.
         versions: Of the software.
         notes: What was left out and why.
@@ -116,11 +134,12 @@ class Evaluation:
     ladder: list[Summary]
     staircase: list[Staircase]
     neighbours: list[Comparison]
-    groups: list[Group]
     distributions: list[dict[str, Any]]
-    conditions: dict[str, Any]
-    versions: dict[str, str]
-    notes: list[str]
+    estimators: list[Estimator] = field(default_factory=list)
+    groups: list[Group] = field(default_factory=list)
+    conditions: dict[str, Any] = field(default_factory=dict)
+    versions: dict[str, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
     secondary: "Evaluation | None" = None
 
     @property

@@ -1,22 +1,18 @@
 """Evaluate controllers: run the paper's trials, measure, compare."""
 
 import functools
-import itertools
 import platform
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from typing import Any
 
-import numpy as np
-
 from hopping_leg.control import Controller, Setup
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.metrics import Window, measure, pooled_apexes, skipped_in_run
-from hopping_leg.evaluate.pooling import pool_group, summarise
-from hopping_leg.evaluate.result import Comparison, Evaluation, Group, Staircase, Summary
+from hopping_leg.evaluate.pooling import pool_group
+from hopping_leg.evaluate.result import Evaluation, Group, Summary
 from hopping_leg.evaluate.runs import FLOORS, Run, floor_robot, run_trials
-from hopping_leg.evaluate.statistics import compare
+from hopping_leg.evaluate.tables import tabulate
 from hopping_leg.evaluate.trials import KINDS, Trial, check_reach, paper_trials, within
 
 Bounds = tuple[float, float]
@@ -94,20 +90,11 @@ def evaluate(
             seed=seed,
             on_progress=functools.partial(on_progress, candidate.label),
         )
-    tables = [
-        _tables(c.label, world, [r for r in runs if r.controller == c.label], seed)
-        for c in candidates
-    ]
-    summary = [row for table in tables for row in table.summary]
+    measured = tabulate(runs, [c.label for c in candidates], seed)
     return Judged(
-        Evaluation(
-            summary=summary,
-            sequence=[row for table in tables for row in table.sequence],
-            ladder=[row for table in tables for row in table.ladder],
-            staircase=[table.staircase for table in tables if table.staircase],
-            neighbours=[table.neighbours for table in tables],
-            groups=_groups(candidates, summary, seed),
-            distributions=[entry for table in tables for entry in table.distributions],
+        replace(
+            measured,
+            groups=_groups(candidates, measured.summary, seed),
             conditions=_conditions(world, setup, floor, repeats, seed),
             versions=software_versions(),
             notes=notes,
@@ -154,74 +141,6 @@ def _note_left_out(
         f"{t.kind} {t.steps[0][0]:g} m" if len(t.steps) == 1 else t.kind for t in left_out
     )
     return [f"{candidate.label} was made for {low:g} to {high:g} m; left out: {names}."]
-
-
-@dataclass(frozen=True)
-class _Tables:
-    """All rows of one controller."""
-
-    summary: list[Summary]
-    sequence: list[Summary]
-    ladder: list[Summary]
-    staircase: Staircase | None
-    neighbours: Comparison
-    distributions: list[dict[str, Any]]
-
-
-def _tables(label: str, world: Setup, runs: Sequence[Run], seed: int) -> _Tables:
-    windows = {kind: _windows(runs, kind) for kind in ("fixed", "sequence", "ladder")}
-    pooled = _by_command(windows["fixed"] + windows["sequence"])
-
-    def rows(groups: dict[float, list[Window]]) -> list[Summary]:
-        return [summarise(label, world.robot.name, c, w, seed) for c, w in groups.items()]
-
-    apexes = {command: pooled_apexes(group) for command, group in pooled.items()}
-    steps = list(apexes)
-    return _Tables(
-        summary=rows(pooled),
-        sequence=rows(_by_command(windows["sequence"])),
-        ladder=rows(_by_command(windows["ladder"])),
-        staircase=_staircase(label, [r for r in runs if r.trial.kind == "staircase"]),
-        neighbours=Comparison(
-            label,
-            [compare(a, apexes[a], b, apexes[b]) for a, b in itertools.pairwise(steps)],
-        ),
-        distributions=[
-            {"controller": label, "command_m": c, "apexes_m": np.round(a, 5).tolist()}
-            for c, a in apexes.items()
-        ],
-    )
-
-
-def _windows(runs: Sequence[Run], kind: str) -> list[Window]:
-    return [w for run in runs if run.trial.kind == kind for w in measure(run.trace)]
-
-
-def _by_command(windows: Sequence[Window]) -> dict[float, list[Window]]:
-    commands = sorted({w.command for w in windows})
-    return {c: [w for w in windows if w.command == c] for c in commands}
-
-
-def _staircase(label: str, runs: Sequence[Run]) -> Staircase | None:
-    if not runs:
-        return None
-    measured = [measure(run.trace) for run in runs]
-    steps = [list(group) for group in zip(*measured, strict=True)]
-    medians = np.array([_median(pooled_apexes(step)) for step in steps])
-    per_run = np.array([[_median(w.apex) for w in run] for run in measured])
-    return Staircase(
-        controller=label,
-        commands_m=[step[0].command for step in steps],
-        median_apexes_m=medians.tolist(),
-        monotone=bool((np.diff(medians) > 0).all()),
-        monotone_runs=int((np.diff(per_run, axis=1) > 0).all(axis=1).sum()),
-        runs=len(runs),
-        skipped_hops=sum(skipped_in_run(run.trace) for run in runs),
-    )
-
-
-def _median(values: Any) -> float:  # noqa: ANN401
-    return float(np.median(values)) if len(values) else float("nan")
 
 
 def _groups(candidates: Sequence[Candidate], summary: Sequence[Summary], seed: int) -> list[Group]:

@@ -2,19 +2,12 @@
 
 from matplotlib.figure import Figure
 
+from hopping_leg.evaluate.estimator import HEIGHT
 from hopping_leg.evaluate.figures.style import COLOURS, WIDTH, styled
 from hopping_leg.evaluate.metrics import START_SECONDS
 from hopping_leg.trace import Trace
 
-COLUMN = "estimated_height_m"
-"""Trace column of controllers that estimate the height."""
-
 SHOWN_SECONDS = 3.0
-
-
-def has_estimate(trace: Trace) -> bool:
-    """Tell whether the controller of a run recorded an estimated height."""
-    return COLUMN in trace.table.columns
 
 
 @styled
@@ -25,7 +18,7 @@ def draw_estimate(trace: Trace, title: str = "") -> Figure:
         trace: A run whose controller records ``estimated_height_m``.
         title: Of the figure.
     """
-    time, height, estimate = (trace.column(n) for n in ("time_s", "height_m", COLUMN))
+    time, height, estimate = (trace.column(n) for n in ("time_s", "height_m", HEIGHT))
     figure = Figure(figsize=(WIDTH, 3.2), layout="constrained")
     over_time, spread = figure.subplots(1, 2, width_ratios=(2, 1))
     shown = (time >= START_SECONDS) & (time < START_SECONDS + SHOWN_SECONDS)

@@ -1,0 +1,50 @@
+"""Draw the figures of stored traces again.
+
+Give the traces of one controller or of several side by side; what can be drawn from them is drawn:
+heights over time, distributions, ladder, phase space, estimated height.
+
+Examples:
+  hop plot runs/first/traces/*.parquet --out runs/first/figures
+  hop plot runs/first/traces/fast-staircase-0.parquet
+  hop plot runs/first/traces/*-fixed-*.parquet --format png
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import tyro
+from rich.console import Console
+
+from hopping_leg.errors import UsageError
+from hopping_leg.evaluate.figures import to_png, to_svg
+from hopping_leg.evaluate.gallery import draw_gallery, run_of
+from hopping_leg.evaluate.tables import tabulate
+from hopping_leg.trace import write_atomically
+
+
+@dataclass(frozen=True)
+class Plot:
+    """Which traces, and where the figures go."""
+
+    traces: tyro.conf.Positional[tuple[Path, ...]]
+    """Parquet files from `hop evaluate --traces DIR` or the robot."""
+    out: Path = Path("figures")
+    """Folder for the figures."""
+    format: Literal["svg", "png"] = "svg"
+    """Kind of file."""
+
+
+def run(args: Plot) -> None:
+    """Draw and write every figure that the traces allow."""
+    if not args.traces:
+        raise UsageError("No trace was named; record some with `hop evaluate ... --traces DIR`.")
+    runs = [run_of(path) for path in args.traces]
+    controllers = list(dict.fromkeys(run.controller for run in runs))
+    evaluation = tabulate(runs, controllers, seed=0)
+    encode = to_png if args.format == "png" else to_svg
+    console = Console()
+    for picture in draw_gallery(evaluation, runs):
+        path = args.out / f"{picture.name}.{args.format}"
+        write_atomically(path, encode(picture.figure))
+        console.print(f"{picture.title}: {path}", highlight=False)

@@ -1,0 +1,120 @@
+"""The report: one HTML page that holds everything and needs nothing."""
+
+import base64
+from collections.abc import Sequence
+from importlib import resources
+from typing import Any
+
+from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup
+
+from hopping_leg.evaluate import markup
+from hopping_leg.evaluate.figures import to_svg
+from hopping_leg.evaluate.gallery import Picture, draw_gallery
+from hopping_leg.evaluate.result import Evaluation
+from hopping_leg.evaluate.runner import Judged
+from hopping_leg.evaluate.runs import Run
+from hopping_leg.evaluate.video import Video, render_video
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.trace import Trace
+
+_NO_VIDEO = Video(None, "it was not asked for")
+
+
+def write_report(judged: Judged, command: str, videos: dict[str, Video] | None = None) -> bytes:
+    """Return the report as HTML.
+
+    Args:
+        judged: The evaluation and its runs.
+        command: What makes the report again.
+        videos: Controller to its video; none are shown by default.
+    """
+    evaluation = judged.evaluation
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    template = resources.files("hopping_leg.evaluate") / "report.html.j2"
+    page = environment.from_string(template.read_text(encoding="utf-8")).render(
+        title=f"Hopping leg: {', '.join(evaluation.controllers)}",
+        subtitle=_subtitle(evaluation),
+        command=command,
+        evaluation=evaluation,
+        tables=_tables(evaluation),
+        pictures=[_picture(p, evaluation) for p in draw_gallery(evaluation, judged.runs)],
+        videos=[_video(name, video) for name, video in (videos or {}).items()],
+        conditions=_conditions(evaluation),
+    )
+    return page.encode()
+
+
+def render_videos(judged: Judged, robot: Robot) -> dict[str, Video]:
+    """Render one video per controller; after a first failure the rest are not tried."""
+    videos: dict[str, Video] = {}
+    for name in judged.evaluation.controllers:
+        failed = next((video for video in videos.values() if video.content is None), None)
+        traces = _fixed_traces(judged.runs, name)
+        videos[name] = failed or (render_video(robot, traces) if traces else _NO_VIDEO)
+    return videos
+
+
+def _fixed_traces(runs: Sequence[Run], name: str) -> dict[float, Trace]:
+    return {
+        run.trial.steps[0][0]: run.trace
+        for run in runs
+        if run.controller == name and run.trial.kind == "fixed" and run.repeat == 0
+    }
+
+
+def _subtitle(evaluation: Evaluation) -> str:
+    c = evaluation.conditions
+    noisy = any(c["disturbance"][k] for k in ("joint_noise", "torque_noise", "delay_probability"))
+    return (
+        f"{c['robot']} on its {c['floor']} floor, {c['rate_hz']:g} Hz control,"
+        f" {1e3 * c['timestep_s']:g} ms physics, {c['seeds']} seeds,"
+        f" {'sensor noise, torque noise and delay on' if noisy else 'no noise, no delay'}"
+    )
+
+
+def _tables(evaluation: Evaluation) -> dict[str, Markup]:
+    secondary = evaluation.secondary
+    return {
+        "summary": markup.summary_table(evaluation.summary),
+        "groups": markup.group_table(evaluation.groups),
+        "secondary": markup.summary_table(secondary.summary) if secondary else Markup(""),
+        "estimators": markup.estimator_table(evaluation.estimators),
+    }
+
+
+def _picture(picture: Picture, evaluation: Evaluation) -> dict[str, Any]:
+    beside = {
+        "distributions": lambda: markup.neighbour_table(evaluation.neighbours),
+        "staircase": lambda: markup.staircase_table(evaluation.staircase),
+        "ladder": lambda: markup.ladder_table(evaluation.ladder),
+    }
+    files = picture.files
+    shown = [*files[:2], "..."] if len(files) > 3 else files
+    return {
+        "title": picture.title,
+        "caption": picture.caption,
+        "source": data_uri(to_svg(picture.figure), "image/svg+xml"),
+        "command": f"hop plot {' '.join(f'TRACES/{name}' for name in shown)}",
+        "table": beside.get(picture.name, lambda: Markup(""))(),
+    }
+
+
+def _video(name: str, video: Video) -> dict[str, str]:
+    source = data_uri(video.content, "image/webp") if video.content else ""
+    return {"controller": name, "source": source, "reason": video.reason}
+
+
+def _conditions(evaluation: Evaluation) -> dict[str, str]:
+    rows: dict[str, str] = {}
+    for name, value in {**evaluation.conditions, **evaluation.versions}.items():
+        if isinstance(value, dict):
+            rows |= {f"{name}: {key}": str(entry) for key, entry in value.items()}
+        else:
+            rows[name] = str(value)
+    return {name.replace("_", " "): value for name, value in rows.items()}
+
+
+def data_uri(content: bytes, kind: str) -> str:
+    """Return content as an address that carries it."""
+    return f"data:{kind};base64,{base64.b64encode(content).decode()}"
