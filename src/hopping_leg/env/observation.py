@@ -13,7 +13,7 @@ import numpy.typing as npt
 from hopping_leg.arrays import Array
 from hopping_leg.env.options import TaskOptions
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim import Measurement
+from hopping_leg.sim import SAMPLES, Measurement
 
 SIZE = 15
 """Entries of an observation."""
@@ -35,6 +35,11 @@ class Scaling:
 
     offset: Array
     gain: Array
+
+    def repeated(self, count: int) -> "Scaling":
+        """Return the same with arrays (count, 3, 5), which numpy combines faster."""
+        shape = (count, SAMPLES, 1)
+        return Scaling(np.tile(self.offset, shape), np.tile(self.gain, shape))
 
     def observe(self, measurement: Measurement) -> Array32:
         """Return what a policy sees of a measurement, (n, 15)."""

@@ -10,7 +10,7 @@ from hopping_leg.env.observation import Array32, scaling
 from hopping_leg.env.options import TaskOptions
 from hopping_leg.env.start import Starts
 from hopping_leg.env.transition import Reward, Transition
-from hopping_leg.hops import at_apex
+from hopping_leg.hops import CLEAR
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import Legs, Measurement, Plant
 
@@ -76,9 +76,10 @@ class HoppingTask:
         noise, self._rng = rng.spawn(2)
         self.plant = Plant(self.legs, options.disturbance, options.soft_limits, noise)
         self.scaling = scaling(robot, options)
+        self._normalise = self.scaling.repeated(count).normalise
         self._starts = Starts(robot, options)
         self._torque = np.tile(options.action_torque, (count, 1))
-        self._one = np.ones((count, 2))
+        self._lowest, self._highest = np.full((count, 2), -1.0), np.full((count, 2), 1.0)
         self._horizon = max(1, round(options.episode * options.rate))
         self._never = np.zeros(count, np.bool_)
         self._nan = np.full(count, np.nan)
@@ -89,6 +90,7 @@ class HoppingTask:
         self._end = np.empty(count, np.int64)
         self._switch = np.full(count, np.iinfo(np.int64).max)
         self._last = np.zeros((count, 2))
+        self._rises = np.zeros(count, np.bool_)
         self.reset()
 
     def reseed(self, rng: np.random.Generator) -> Array32:
@@ -121,24 +123,30 @@ class HoppingTask:
         """
         legs = self.legs
         taken = np.array(action, np.float64)
-        np.maximum(taken, -self._one, out=taken)
-        np.minimum(taken, self._one, out=taken)
-        rate_before, height_before = legs.height_rate.copy(), legs.height.copy()
+        np.maximum(taken, self._lowest, out=taken)
+        np.minimum(taken, self._highest, out=taken)
+        height_before = legs.height.copy()
         self.plant.drive(taken * self._torque)
-        clearance = legs.foot_clearance()
-        apex = at_apex(rate_before, legs.height_rate, clearance)
-        height = np.maximum(height_before, legs.height)
-        transition = Transition(
-            legs.height, legs.height_rate, legs.q, legs.qd, self.command, taken, self._last,
-            clearance, apex, height,
+        apex, apex_height, apex_error = self._apexes(height_before)
+        reward, terms = self.reward(
+            Transition(
+                legs.height, legs.height_rate, legs.q, legs.qd, self.command, taken, self._last,
+                apex, apex_height, legs.foot_clearance,
+            )
         )  # fmt: skip
-        reward, terms = self.reward(transition)
-        apex_height = apex_error = self._nan
-        if np.count_nonzero(apex):
-            apex_height = np.where(apex, height, np.nan)
-            apex_error = apex_height - self.command
         self._last = taken
         return self._next(reward, terms, apex_error, apex_height)
+
+    def _apexes(self, height_before: Array) -> tuple[BoolArray, Array, Array]:
+        """Return which legs passed an in-flight apex, its height and error, m, (n,) each."""
+        legs = self.legs
+        rose, self._rises = self._rises, legs.height_rate > 0
+        peaked = rose > self._rises
+        if not np.count_nonzero(peaked):
+            return self._never, self._nan, self._nan
+        apex = peaked & (legs.foot_clearance() >= CLEAR)
+        height = np.where(apex, np.maximum(height_before, legs.height), np.nan)
+        return apex, height, height - self.command
 
     def privileged(self) -> Array32:
         """Return the normalised true state that a critic may see in training, (n, 10).
@@ -167,6 +175,7 @@ class HoppingTask:
             "end": self._end.copy(),
             "switch": self._switch.copy(),
             "last_action": self._last.copy(),
+            "rises": self._rises.copy(),
             "rng": self._rng.bit_generator.state,
         }
 
@@ -178,7 +187,7 @@ class HoppingTask:
         self._tick = int(state["tick"])
         self._end[:] = state["end"]
         self._switch[:] = state["switch"]
-        self._last = np.array(state["last_action"])
+        self._last, self._rises = np.array(state["last_action"]), np.array(state["rises"])
         self._rng.bit_generator.state = state["rng"]
         self._plan()
         return self._observe()
@@ -190,7 +199,7 @@ class HoppingTask:
 
     def _observe(self) -> Array32:
         self._samples = self.plant.samples(self.command)
-        return self.scaling.normalise(self._samples)
+        return self._normalise(self._samples)
 
     def _next(
         self, reward: Array, terms: dict[str, Array], apex_error: Array, apex_height: Array
@@ -223,7 +232,7 @@ class HoppingTask:
         height, q = self._starts.draw(count, self._rng)
         self.legs.place(rows, height, q)
         self._end[rows] = self._tick + self._horizon
-        self._last[rows] = 0.0
+        self._last[rows], self._rises[rows] = 0.0, False
         self.command[rows] = self._draw_commands(count)
         if self.options.command_hold is not None:
             self._switch[rows] = self._tick + self._draw_holds(count)

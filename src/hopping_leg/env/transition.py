@@ -1,5 +1,6 @@
 """What rewards see of one tick, and the Reward protocol."""
 
+from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 from hopping_leg.arrays import Array, BoolArray
@@ -25,12 +26,17 @@ class Transition(NamedTuple):
     """Action of this tick, in [-1, 1], (n, 2)."""
     last_action: Array
     """Action of the tick before, zero at the start of an episode, (n, 2)."""
-    foot_clearance: Array
-    """Gap between foot and ground, m, (n,)."""
     apex: BoolArray
     """Whether the base passed an in-flight apex during the tick, (n,)."""
     apex_height: Array
-    """Height of that apex, m; meaningless elsewhere, (n,)."""
+    """Height of that apex, else NaN, m, (n,)."""
+    measure_clearance: Callable[[], Array]
+    """Computes ``foot_clearance`` for the rewards that need it."""
+
+    @property
+    def foot_clearance(self) -> Array:
+        """Gap between foot and ground, m, (n,)."""
+        return self.measure_clearance()
 
 
 class Reward(Protocol):

@@ -1,7 +1,16 @@
 """The leg simulated: many legs at once at the control rate, with noise and delay."""
 
-from hopping_leg.sim.disturbance import NOTHING, Channel, Disturbance, Measurement
+from hopping_leg.sim.disturbance import NOTHING, SAMPLES, Channel, Disturbance, Measurement
 from hopping_leg.sim.legs import CONTROL_RATE, Legs
 from hopping_leg.sim.plant import Plant
 
-__all__ = ["CONTROL_RATE", "NOTHING", "Channel", "Disturbance", "Legs", "Measurement", "Plant"]
+__all__ = [
+    "CONTROL_RATE",
+    "NOTHING",
+    "SAMPLES",
+    "Channel",
+    "Disturbance",
+    "Legs",
+    "Measurement",
+    "Plant",
+]
