@@ -64,7 +64,11 @@ def _gains(tree: dict[str, Any], origin: str) -> ShapingGains:
     for name, value in table.items():
         if name not in _NAMES:
             raise UsageError(f"{origin}: there is no gain '{name}'; valid: {', '.join(_NAMES)}.")
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, int | float)
+            or not math.isfinite(value)
+        ):
             raise UsageError(f"{origin}: gain '{name}' must be a finite number, not {value!r}.")
     return ShapingGains(**{name: float(value) for name, value in table.items()})
 
@@ -72,7 +76,9 @@ def _gains(tree: dict[str, Any], origin: str) -> ShapingGains:
 def _text(tree: dict[str, Any], key: str, origin: str) -> str:
     value = tree.get(key)
     if not isinstance(value, str):
-        raise UsageError(f"{origin} must say '{key}' as text: the robot's name and how it was found.")
+        raise UsageError(
+            f"{origin} must say '{key}' as text: the robot's name and how it was found."
+        )
     return value
 
 

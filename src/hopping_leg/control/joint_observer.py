@@ -46,6 +46,7 @@ class DatedObserver:
         self._q = np.zeros((WINDOW, count, 2))
         self._qd = np.zeros((WINDOW, count, 2))
         self._anchor: Array | None = None
+        self._past: list[Array] = []
 
     def update(self, measurement: Measurement) -> JointState:
         """Take in the measurement of this tick and return the state now."""

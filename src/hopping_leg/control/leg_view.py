@@ -36,6 +36,4 @@ def view_leg(robot: Robot, joints: JointState) -> LegView:
     foot = kinematics.foot_position(robot, joints.q)
     speed = kinematics.foot_velocity(robot, joints.q, joints.qd)
     stand = foot[:, 0] + robot.foot.radius
-    return LegView(
-        joints.q, joints.qd, foot[:, 0], speed[:, 0], foot[:, 1], speed[:, 1], stand
-    )
+    return LegView(joints.q, joints.qd, foot[:, 0], speed[:, 0], foot[:, 1], speed[:, 1], stand)

@@ -1,8 +1,9 @@
 """Controllers by name: energy shaping, the shipped policies, or a user's policy file."""
 
-from importlib import import_module, resources
+from importlib import resources
 from pathlib import Path
 
+from hopping_leg.control.baselines import paper_energy_shaping, tuned_energy_shaping
 from hopping_leg.control.policy import Policy
 from hopping_leg.control.protocol import Controller
 from hopping_leg.errors import PolicyError, UsageError, unknown_name
@@ -16,8 +17,8 @@ ENERGY_SHAPING_LITERAL = "energy-shaping-literal"
 """The paper's law and gains as printed."""
 
 _FACTORIES = {
-    ENERGY_SHAPING: "tuned_energy_shaping",
-    ENERGY_SHAPING_LITERAL: "paper_energy_shaping",
+    ENERGY_SHAPING: tuned_energy_shaping,
+    ENERGY_SHAPING_LITERAL: paper_energy_shaping,
 }
 _SHIPPED = resources.files("hopping_leg") / "policies"
 
@@ -70,9 +71,7 @@ def load_controller(
     """
     factory = _FACTORIES.get(str(name_or_path))
     if factory is not None:
-        module = import_module("hopping_leg.control.energy_shaping")
-        controller: Controller = getattr(module, factory)(robot, rate=rate)
-        return controller
+        return factory(robot, rate=rate)
     policy = load_policy(name_or_path)
     policy.check_robot(robot, rate, strict=strict)
     return policy

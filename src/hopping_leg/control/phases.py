@@ -7,12 +7,12 @@ import numpy as np
 from hopping_leg.arrays import Array, BoolArray
 
 PUSH_LIMIT = 0.4
-"""Longest push, s: a leg that has not left the ground by then gives up and tries afresh."""
+"""Longest push, s: a leg that has not reached lift-off by then gives up and tries afresh."""
 
 FLIGHT_LIMIT = 0.7
-"""Longest flight, s: from a drop of 0.6 m; touchdown was missed."""
+"""Longest flight, s: that of a drop from 0.6 m; beyond it, touchdown was missed."""
 
-DAMP_LIMIT = 0.25
+BRAKE_LIMIT = 0.25
 """Longest touchdown, s: an overdamped leg creeps and its velocity never turns."""
 
 
@@ -20,18 +20,18 @@ class Phase(IntEnum):
     """What a leg is doing; the value is recorded in traces."""
 
     LIFTOFF = 0
-    """Pushes off, with contact."""
+    """Pushes off, on the ground."""
     FLIGHT = 1
-    """Moves to the landing posture, without contact."""
+    """Moves to the landing posture, in the air."""
     TOUCHDOWN = 2
-    """Brakes the fall, with contact."""
+    """Brakes the fall, on the ground."""
 
 
 class Phases:
     """Phase of each leg and the time spent in it.
 
     Attributes:
-        phase: (n,), values of ``Phase``.
+        phase: Values of ``Phase``, (n,).
         clock: Time since the phase began, s, (n,).
     """
 
@@ -45,7 +45,8 @@ class Phases:
 
     def are(self, phase: Phase) -> BoolArray:
         """Tell which legs are in a phase, (n,)."""
-        return self.phase == phase
+        answer: BoolArray = self.phase == phase
+        return answer
 
     def enter(self, who: BoolArray, phase: Phase, since: Array | float = 0.0) -> None:
         """Put legs into a phase that began ``since`` seconds ago, (n,)."""

@@ -1,29 +1,41 @@
-"""Joint PD towards a posture, reached on a smooth path."""
+"""Flight: the joints move to the landing posture on a smooth path, held there by a PD."""
 
 import numpy as np
 
 from hopping_leg.arrays import Array
+from hopping_leg.control.shaping_gains import Gain
 
 
 def smooth_step(share: Array) -> Array:
-    """Return the path of least jerk from 0 to 1, still at both ends, (...)."""
+    """Return the path of least jerk from 0 to 1, at rest at both ends, (...)."""
     s = np.clip(share, 0.0, 1.0)
-    return s**3 * (10 - 15 * s + 6 * s**2)
+    path: Array = s**3 * (10 - 15 * s + 6 * s**2)
+    return path
 
 
 def smooth_step_rate(share: Array) -> Array:
     """Return the derivative of ``smooth_step``, (...)."""
     s = np.clip(share, 0.0, 1.0)
-    return 30 * s**2 * (1 - s) ** 2
+    rate: Array = 30 * s**2 * (1 - s) ** 2
+    return rate
 
 
-def joint_pd(error: Array, rate_error: Array, stiffness: Array, damping: Array) -> Array:
-    """Return joint torques, N m, (n, 2).
+def retraction(start: Array, end: Array, elapsed: Array, duration: Gain) -> tuple[Array, Array]:
+    """Return where the joints should be and how fast, rad and rad/s, (n, 2).
 
     Args:
-        error: Target minus position, rad, (n, 2).
-        rate_error: Target minus velocity, rad/s, (n, 2).
-        stiffness: N m/rad, (n, 2) or (2,).
-        damping: N m s/rad, (n, 2) or (2,).
+        start: Joint positions at lift-off, rad, (n, 2).
+        end: Landing posture, rad, (n, 2).
+        elapsed: Time since lift-off, s, (n,).
+        duration: Of the movement, s.
     """
-    return stiffness * error + damping * rate_error
+    lasts = np.broadcast_to(duration, elapsed.shape)[:, None]
+    share = elapsed[:, None] / lasts
+    return start + (end - start) * smooth_step(share), (end - start) * smooth_step_rate(
+        share
+    ) / lasts
+
+
+def per_joint(hip: Gain, knee: Gain) -> Array:
+    """Return a gain of both joints, (2,) or (n, 2)."""
+    return np.stack(np.broadcast_arrays(np.asarray(hip, float), np.asarray(knee, float)), axis=-1)

@@ -75,6 +75,7 @@ def roll_out(
     commands: Array,
     seed: int,
     on_tick: Callable[[int, int], None] | None = None,
+    on_legs: Callable[[Legs], None] | None = None,
 ) -> Rollout:
     """Let a controller hop from a standing start.
 
@@ -84,6 +85,7 @@ def roll_out(
         commands: Desired height for every tick and leg, m, (ticks, n).
         seed: Of noise and delay.
         on_tick: Called with (ticks done, ticks in all), for progress bars.
+        on_legs: Called once with the legs, for controllers that are shown the truth.
 
     Returns:
         What happened, one row per control period; each row holds the state at its start and the
@@ -96,6 +98,8 @@ def roll_out(
     legs.stand(slice(None), posture)
     plant.channel.restart(slice(None), legs.q, legs.qd, commands[0])
     controller.reset(count)
+    if on_legs is not None:
+        on_legs(legs)
     data = np.empty((len(_STACKED), ticks, count))
     internals: dict[str, Array] = {}
     for tick in range(ticks):
@@ -124,5 +128,3 @@ def _record_state(row: Array, legs: Legs, command: Array) -> None:
     row[2:4], row[4:6] = legs.q.T, legs.qd.T
     row[10], row[11], row[12] = legs.foot_clearance(), legs.knee_clearance(), legs.base_clearance()
     row[13] = command
-
-

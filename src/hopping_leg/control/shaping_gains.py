@@ -30,9 +30,15 @@ class ShapingGains:
     """Sideways stiffness of the foot on the ground, N/m."""
     kd_y: Gain = 3.0
     """Sideways damping of the foot on the ground, N s/m."""
-    liftoff_length: Gain = 0.26
+    push_damping: Gain = 0.0
+    """Pull of the push towards its intended leg rate, N s/m."""
+    push_rate: Gain = 0.83
+    """Intended leg rate at lift-off, m/s."""
+    push_rate_slope: Gain = 5.2
+    """m/s per m."""
+    liftoff_length: Gain = 0.245
     """Leg length at which the push ends, m."""
-    liftoff_slope: Gain = 0.0
+    liftoff_slope: Gain = 0.4
     """m/m."""
     landing_length: Gain = 0.2
     """Leg length in which the foot meets the ground, m."""
@@ -56,6 +62,8 @@ class ShapingGains:
     """Leg rate, less that of the retraction, that gives the ground away, m/s."""
     flight_min: Gain = 0.05
     """Contact is not believed earlier than this after lift-off, s."""
+    flight_min_slope: Gain = 0.0
+    """s/m."""
     height_offset: Gain = 0.0
     """Added to the estimated apex, m."""
     height_scale: Gain = 1.0
@@ -75,7 +83,8 @@ class ShapingOptions:
     contact: Literal["rate", "debounced", "true"] = "rate"
     """Touchdown: one leg rate, the median of three, or the simulator's truth."""
     liftoff: Literal["length", "timed", "true"] = "length"
-    """End of the push: at a leg length, there within a control period, or at true loss of contact."""
+    """End of the push: at a leg length, there even within a control period, or when contact is
+    truly lost."""
     height: Literal["ballistic", "flight_time", "true"] = "ballistic"
     """Apex: from the lift-off speed, from the time in the air, or the simulator's truth."""
     desired: Literal["present", "pushed"] = "present"
@@ -84,6 +93,9 @@ class ShapingOptions:
 
 LITERAL = ShapingOptions()
 """The paper's description."""
+
+TRUE_CONTACT = ShapingOptions(contact="true", liftoff="true", height="true")
+"""The paper's description with perfect knowledge of contact and height."""
 
 ROBUST = ShapingOptions("dated", "debounced", "timed", "flight_time", "pushed")
 """The readings of the tuned controller."""

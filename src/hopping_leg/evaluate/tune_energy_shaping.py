@@ -1,0 +1,158 @@
+"""Search for the gains of energy shaping: CMA-ES, all candidates hopping at once.
+
+A search can be killed at any moment: the costs of every finished generation are kept, and the same
+call repeats the search from them without simulating.
+"""
+
+import dataclasses
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import cma
+import numpy as np
+
+from hopping_leg.control import Rollout, Setup, roll_out
+from hopping_leg.control.energy_shaping import EnergyShaping
+from hopping_leg.control.shaping_gains import ROBUST, ShapingGains
+from hopping_leg.errors import UsageError
+from hopping_leg.evaluate.gain_space import SPACE, from_unit, to_unit
+from hopping_leg.evaluate.hop_cost import CommandScore, calibrated, cost, score
+
+COMMANDS = (0.22, 0.25, 0.30, 0.35, 0.40)
+"""Heights that a candidate is tried at, m."""
+
+FIRST_GAINS = (0.85, 1.0, 1.15)
+"""Factors on k0, one run each: the gain update must find its way from all of them."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """How long and how finely to search."""
+
+    generations: int = 30
+    """Generations of CMA-ES."""
+    population: int = 12
+    """Candidates per generation."""
+    seconds: float = 6.0
+    """Simulated time per run, the first 2 s of which do not count."""
+    step: float = 0.12
+    """First step size, as a share of each gain's range."""
+    threads: int = 0
+    """Physics threads, 0 for one per core."""
+
+
+def evaluate(
+    candidates: list[ShapingGains], setup: Setup, seconds: float, seed: int
+) -> list[list[CommandScore]]:
+    """Let candidates hop at every command and first gain, all in one rollout.
+
+    Returns:
+        For each candidate its score at each of ``COMMANDS``.
+    """
+    runs = len(COMMANDS) * len(FIRST_GAINS)
+    stacked = stack_gains(candidates, runs)
+    factor = np.tile(FIRST_GAINS, len(candidates) * len(COMMANDS))
+    stacked = dataclasses.replace(stacked, k0=stacked.k0 * factor)
+    command = np.tile(np.repeat(COMMANDS, len(FIRST_GAINS)), len(candidates))
+    ticks = round(seconds * setup.rate)
+    controller = EnergyShaping(setup.robot, stacked, ROBUST, rate=setup.rate)
+    rollout = roll_out(controller, setup, np.tile(command, (ticks, 1)), seed)
+    return [
+        [
+            _score_command(rollout, c, i * runs + j * len(FIRST_GAINS))
+            for j, c in enumerate(COMMANDS)
+        ]
+        for i in range(len(candidates))
+    ]
+
+
+def stack_gains(candidates: list[ShapingGains], runs: int) -> ShapingGains:
+    """Return one set whose gains have a value per leg, each candidate ``runs`` times in a row."""
+    names = [f.name for f in dataclasses.fields(ShapingGains)]
+    columns = {n: np.repeat([getattr(c, n) for c in candidates], runs) for n in names}
+    return ShapingGains(**columns)
+
+
+def search(
+    start: ShapingGains,
+    setup: Setup,
+    options: Search,
+    seed: int,
+    log: Path,
+    report: Callable[[int, float], None],
+) -> ShapingGains:
+    """Improve gains.
+
+    Args:
+        start: Where to begin.
+        setup: The world to hop in.
+        options: How long.
+        seed: Of the search; noise and delay take seeds 0 to 9 in turn.
+        log: One JSON line per generation; an interrupted search goes on from it.
+        report: Called with (generations done, lowest cost so far).
+    """
+    rng = np.random.default_rng(seed)
+    settings = {
+        "bounds": [0.0, 1.0],
+        "popsize": options.population,
+        "randn": lambda *shape: rng.standard_normal(shape),
+        "seed": np.nan,
+        "verbose": -9,
+    }
+    strategy = cma.CMAEvolutionStrategy(to_unit(start), options.step, settings)
+    known = _read_log(log, options, seed)
+    lowest = np.inf
+    for generation in range(options.generations):
+        points = strategy.ask()
+        if generation < len(known):
+            costs = known[generation]
+        else:
+            candidates = [from_unit(np.asarray(p), start) for p in points]
+            scores = evaluate(candidates, setup, options.seconds, generation % 10)
+            costs = [cost(s) for s in scores]
+            _append_log(log, {"seed": seed, "costs": costs})
+        strategy.tell(points, costs)
+        lowest = min(lowest, *costs)
+        report(generation + 1, lowest)
+    return from_unit(np.asarray(strategy.result.xfavorite), start)
+
+
+def calibrate(gains: ShapingGains, setup: Setup, seconds: float, rounds: int = 2) -> ShapingGains:
+    """Return the gains with the height estimate corrected so that medians meet the commands."""
+    for seed in range(rounds):
+        scores = evaluate([gains] * 4, setup, seconds, seed)
+        gains = calibrated(gains, [s for candidate in scores for s in candidate])
+    return gains
+
+
+def _score_command(rollout: Rollout, command: float, first: int) -> CommandScore:
+    return score(rollout, command, slice(first, first + len(FIRST_GAINS)))
+
+
+def _read_log(log: Path, options: Search, seed: int) -> list[list[float]]:
+    if not log.is_file():
+        return []
+    known = []
+    for line in log.read_text(encoding="utf-8").splitlines():
+        try:
+            entry = json.loads(line)
+        except json.JSONDecodeError:
+            break
+        if entry["seed"] != seed or len(entry["costs"]) != options.population:
+            raise UsageError(
+                f"{log} belongs to a search with seed {entry['seed']} and population"
+                f" {len(entry['costs'])}; repeat with those or choose another --out."
+            )
+        known.append([float(c) for c in entry["costs"]])
+    return known
+
+
+def _append_log(log: Path, entry: dict[str, object]) -> None:
+    log.parent.mkdir(parents=True, exist_ok=True)
+    with log.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(entry) + "\n")
+
+
+__all__ = ["COMMANDS", "SPACE", "Search", "calibrate", "evaluate", "search", "stack_gains"]
