@@ -61,8 +61,7 @@ class RunFolder:
         Raises:
             UsageError: The folder holds a run and ``resume`` is off, or another or finished run.
         """
-        file = self.path / "config.json"
-        if not file.exists():
+        if not self._config_file.exists():
             if self.path.is_dir() and any(self.path.iterdir()):
                 raise UsageError(f"{self.path} is not empty and holds no run; give another --out.")
             self.write("config.json", self.config)
@@ -71,7 +70,7 @@ class RunFolder:
             raise UsageError(
                 f"{self.path} already holds a run; go on with --resume or give another --out."
             )
-        self._check_same(json.loads(file.read_text(encoding="utf-8")))
+        self.check_same()
         if self.policy.exists():
             raise UsageError(f"The run in {self.path} is finished; its policy is {self.policy}.")
         found = list_checkpoints(self.checkpoints)
@@ -82,7 +81,17 @@ class RunFolder:
         text = json.dumps(content, indent=1, allow_nan=False)
         write_atomically(self.path / name, f"{text}\n".encode())
 
-    def _check_same(self, stored: dict[str, Any]) -> None:
+    @property
+    def _config_file(self) -> Path:
+        return self.path / "config.json"
+
+    def check_same(self) -> None:
+        """Check that the run in the folder was asked for the same as this one.
+
+        Raises:
+            UsageError: It was not; the message names the first difference.
+        """
+        stored = json.loads(self._config_file.read_text(encoding="utf-8"))
         for key in ("recipe", "robot_digest", "seed", "minutes_budget", "options"):
             if stored[key] != self.config[key]:
                 raise UsageError(
