@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.control import Setup
+from hopping_leg.evaluate import Candidate, evaluate
 from hopping_leg.robot import kinematics, load_robot
 
 
@@ -44,3 +45,19 @@ def setup(robot):
 @pytest.fixture
 def spring(robot):
     return Spring(robot)
+
+
+@pytest.fixture(scope="session")
+def judged(setup, robot):
+    """One controller, everything but the ladder."""
+    progress = []
+    result = evaluate(
+        [Candidate("spring", Spring(robot))],
+        setup,
+        commands=[0.25, 0.35],
+        repeats=2,
+        kinds=("fixed", "sequence", "staircase"),
+        on_progress=lambda label, share: progress.append((label, share)),
+    )
+    assert progress[-1] == ("spring", pytest.approx(1.0))
+    return result

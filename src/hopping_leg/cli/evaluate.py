@@ -12,6 +12,7 @@ Examples:
 """
 
 import dataclasses
+import math
 import shlex
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -76,12 +77,9 @@ class Evaluate:
 
 def run(args: Evaluate) -> None:
     """Evaluate controllers, print the table, write what was asked for."""
+    command = command_line(args)
     args = _with_folder(args)
-    for path in (args.json, args.report):
-        if path and path.is_dir():
-            raise UsageError(f"{path} is a folder; name a file.")
-    if args.seed < 0:
-        raise UsageError(f"A seed of {args.seed} has no meaning; give 0 or more.")
+    _check(args)
     robot = load_robot(args.robot)
     candidates = load_candidates(args.controllers, robot, args.rate)
     disturbance = Disturbance() if args.noise else NOTHING
@@ -93,12 +91,30 @@ def run(args: Evaluate) -> None:
         write_atomically(args.json, judged.evaluation.dumps())
     if args.report:
         videos = render_videos(judged, robot) if args.video else None
-        write_atomically(args.report, write_report(judged, command_line(args), videos))
+        write_atomically(args.report, write_report(judged, command, videos))
     console = Console()
     print_tables(console, judged.evaluation)
     for path in (args.json, args.report, args.traces):
         if path:
             console.print(f"Wrote {path}", highlight=False)
+
+
+def _check(args: Evaluate) -> None:
+    """Refuse what cannot work before anything is simulated."""
+    if args.seed < 0:
+        raise UsageError(f"A seed of {args.seed} has no meaning; give 0 or more.")
+    if args.threads < 0:
+        raise UsageError(f"{args.threads} threads have no meaning; give 0 for all cores, or more.")
+    for name in ("rate", "timestep"):
+        value = getattr(args, name)
+        if not (math.isfinite(value) and value > 0):
+            raise UsageError(f"A {name} of {value} has no meaning; give a positive number.")
+    for path in (args.json, args.report):
+        if path and path.is_dir():
+            raise UsageError(f"{path} is a folder; name a file.")
+    for folder in (args.json and args.json.parent, args.report and args.report.parent, args.traces):
+        if folder:
+            folder.mkdir(parents=True, exist_ok=True)
 
 
 def _with_folder(args: Evaluate) -> Evaluate:
@@ -117,7 +133,7 @@ def command_line(args: Evaluate) -> str:
     words = ["hop evaluate", *map(shlex.quote, args.controllers)]
     for field in dataclasses.fields(args):
         value = getattr(args, field.name)
-        if field.name in ("controllers", "out") or value == field.default:
+        if field.name == "controllers" or value == field.default:
             continue
         if isinstance(value, bool):
             words.append(f"--{'' if value else 'no-'}{field.name}")

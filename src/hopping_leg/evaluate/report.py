@@ -96,6 +96,7 @@ def _picture(picture: Picture, evaluation: Evaluation) -> dict[str, Any]:
         "caption": picture.caption,
         "source": data_uri(to_svg(picture.figure), "image/svg+xml"),
         "command": f"hop plot {' '.join(f'TRACES/{name}' for name in shown)}",
+        "long": picture.name == "ladder",
         "table": beside.get(picture.name, lambda: Markup(""))(),
     }
 

@@ -116,18 +116,20 @@ def _check(
         raise UsageError(f"{repeats} seeds are too few; give --seeds 1 or more.")
     if commands is not None:
         check_reach(setup.robot, commands)
+    fixed = [t for t in paper_trials(setup.robot, commands) if t.kind == "fixed"]
     for candidate in candidates:
-        bounds = candidate.command_range
-        outside = [
-            trial.steps[0][0]
-            for trial in paper_trials(setup.robot, commands)
-            if trial.kind == "fixed" and not within(trial, bounds)
-        ]
-        if outside and bounds is not None:
-            raise UsageError(
-                f"'{candidate.label}' cannot be asked for {outside[0]:g} m: it was trained for"
-                f" {bounds[0]:g} to {bounds[1]:g} m; choose --commands within that range."
-            )
+        _check_range(candidate, fixed, asked=commands is not None)
+
+
+def _check_range(candidate: Candidate, fixed: Sequence[Trial], *, asked: bool) -> None:
+    """Refuse commands that were asked for by name, or a range that leaves none."""
+    bounds = candidate.command_range
+    outside = [trial.steps[0][0] for trial in fixed if not within(trial, bounds)]
+    if bounds is not None and outside and (asked or len(outside) == len(fixed)):
+        raise UsageError(
+            f"'{candidate.label}' cannot be asked for {outside[0]:g} m: it was trained for"
+            f" {bounds[0]:g} to {bounds[1]:g} m; choose --commands within that range."
+        )
 
 
 def _note_left_out(

@@ -1,5 +1,6 @@
 """Height as a controller estimates it beside the true one."""
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from hopping_leg.evaluate.estimator import HEIGHT
@@ -25,15 +26,18 @@ def draw_estimate(trace: Trace, title: str = "") -> Figure:
     over_time.plot(time[shown], height[shown], color=COLOURS[0], label="true")
     over_time.plot(time[shown], estimate[shown], "--", color=COLOURS[1], label="estimated")
     over_time.set(xlabel="time / s", ylabel="base height / m")
+    over_time.margins(y=0.15)
     over_time.legend(loc="upper right", ncols=2)
     settled = time >= START_SECONDS
-    flight = settled & (trace.column("foot_clearance_m") > 0)
+    flight = trace.column("foot_clearance_m") > 0
     error = 1e3 * (estimate - height)
+    known = settled & np.isfinite(error)
+    bins = np.linspace(error[known].min() - 1, error[known].max() + 1, 50)
     for name, phase, paint in (
-        ("flight", flight, COLOURS[0]),
-        ("stance", settled & ~flight, COLOURS[1]),
+        ("flight", known & flight, COLOURS[0]),
+        ("stance", known & ~flight, COLOURS[1]),
     ):
-        spread.hist(error[phase], bins=40, histtype="step", density=True, color=paint, label=name)
+        spread.hist(error[phase], bins=bins, histtype="step", density=True, color=paint, label=name)
     spread.set(xlabel="estimated - true / mm", ylabel="density / (1/mm)")
     spread.legend()
     over_time.set_title(title)

@@ -1,0 +1,67 @@
+import json
+
+import pytest
+
+from hopping_leg.cli import evaluate as verb
+from hopping_leg.cli import main
+from hopping_leg.evaluate import Candidate
+from hopping_leg.trace import Trace
+from tests.evaluate.conftest import Spring
+
+
+@pytest.fixture
+def spring(monkeypatch):
+    def load(names, robot, rate):
+        return [Candidate(name, Spring(robot), (0.29, 0.31)) for name in names]
+
+    monkeypatch.setattr(verb, "load_candidates", load)
+
+
+def test_one_folder_receives_numbers_report_and_traces(spring, tmp_path, capsys):
+    out = tmp_path / "run"
+    words = ["evaluate", "spring", "--commands", "0.3", "--seeds", "1", "--no-video"]
+    assert main([*words, "--threads", "1", "--out", str(out)]) == 0
+    data = json.loads((out / "evaluation.json").read_text())
+    assert [row["command_m"] for row in data["summary"]] == [0.3]
+    assert data["secondary"]["conditions"]["floor"] == "stiff"
+    assert b"hop evaluate spring --commands 0.3 --seeds 1" in (out / "report.html").read_bytes()
+    traces = sorted((out / "traces").iterdir())
+    assert [path.name for path in traces] == [
+        "spring-fixed-0.300-0.parquet",
+        "spring-ladder-0.300-0.parquet",
+    ]
+    assert Trace.load(traces[0]).header["controller"] == "spring"
+    assert "spring" in capsys.readouterr().out
+    figures = tmp_path / "figures"
+    assert main(["plot", *map(str, traces), "--out", str(figures), "--format", "png"]) == 0
+    assert {"heights.png", "ladder.png"} <= {path.name for path in figures.iterdir()}
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["--commands", "0.5"], "trained for 0.29 to 0.31 m"),
+        (["--commands", "9"], "out of reach"),
+        (["--commands", "high"], "not a list of heights"),
+        (["--seeds", "0"], "0 seeds are too few"),
+        (["--seed", "-1"], "A seed of -1"),
+        (["--robot", "legv9"], "There is no robot 'legv9'"),
+        (["--threads", "-1"], "-1 threads"),
+        (["--timestep", "nan"], "A timestep of nan"),
+        (["--rate", "0"], "A rate of 0.0"),
+        (["--json", "/dev/null/x/result.json"], "/dev/null"),
+        (["--json", "/"], "is a folder"),
+        (["--timestep", "0.003"], "does not divide"),
+    ],
+)
+def test_bad_input_is_one_sentence(spring, capsys, words, sentence):
+    assert main(["evaluate", "spring", *words]) == 2
+    error = capsys.readouterr().err
+    assert sentence in error
+    assert "Traceback" not in error
+
+
+def test_no_trace_is_one_sentence(capsys, tmp_path):
+    assert main(["plot"]) == 2
+    assert main(["plot", str(tmp_path / "none.parquet")]) == 2
+    assert "There is no trace file" in capsys.readouterr().err

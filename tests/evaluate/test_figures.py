@@ -1,0 +1,97 @@
+import numpy as np
+import polars as pl
+import pytest
+
+from hopping_leg.evaluate.estimator import APEX, HEIGHT, judge_estimator
+from hopping_leg.evaluate.figures import (
+    draw_distributions,
+    draw_estimate,
+    draw_heights,
+    draw_phase_space,
+    to_png,
+    to_svg,
+)
+from hopping_leg.evaluate.gallery import draw_gallery, run_of
+from hopping_leg.evaluate.metrics import START_SECONDS
+from hopping_leg.hops import CLEAR, find_hops
+from hopping_leg.trace import Trace
+
+
+def with_estimate(trace, offset=0.01):
+    """A trace of a controller that is always ``offset`` too high, also about its last apex."""
+    height = trace.column("height_m")
+    hops = find_hops(height, trace.column("height_rate_m_s"), trace.column("foot_clearance_m"))
+    apex = np.full(len(height), np.nan)
+    for tick, value in zip(hops.tick, hops.apex, strict=True):
+        apex[tick + 5 :] = value + offset
+    columns = [pl.Series(HEIGHT, height + offset), pl.Series(APEX, apex)]
+    return Trace(trace.table.with_columns(columns), trace.header)
+
+
+@pytest.fixture(scope="module")
+def fixed(judged):
+    return next(run.trace for run in judged.runs if run.trial.name == "fixed-0.350")
+
+
+def test_every_figure_names_its_axes_with_units(judged, fixed):
+    figures = [
+        draw_heights({"spring": fixed}),
+        draw_distributions(judged.evaluation),
+        draw_phase_space(fixed),
+        draw_estimate(with_estimate(fixed)),
+    ]
+    for figure in figures:
+        labels = [axes.get_xlabel() + axes.get_ylabel() for axes in figure.axes]
+        assert all("/ " in label for label in labels)
+
+
+def test_a_figure_is_the_same_bytes_twice(fixed):
+    first, second = (to_svg(draw_heights({"spring": fixed})) for _ in range(2))
+    assert first == second
+    assert to_png(draw_heights({"spring": fixed})).startswith(b"\x89PNG")
+
+
+def test_phase_space_shows_flight_and_stance_of_ten_seconds(fixed):
+    flight, stance = draw_phase_space(fixed).axes[:2]
+    points = [len(axes.collections[0].get_offsets()) for axes in (flight, stance)]
+    time = fixed.column("time_s")
+    shown = (time >= START_SECONDS) & (time < START_SECONDS + 10)
+    in_flight = int((fixed.column("foot_clearance_m")[shown] >= CLEAR).sum())
+    assert points == [in_flight, int(shown.sum()) - in_flight]
+
+
+def test_the_gallery_from_stored_traces_is_the_reports(judged, tmp_path):
+    for run in judged.runs:
+        run.trace.save(tmp_path / run.file_name)
+    again = [run_of(tmp_path / run.file_name) for run in judged.runs]
+    assert [(r.controller, r.trial.kind, r.repeat) for r in again] == [
+        (r.controller, r.trial.kind, r.repeat) for r in judged.runs
+    ]
+    before, after = (draw_gallery(judged.evaluation, runs) for runs in (judged.runs, again))
+    assert [p.name for p in before] == [
+        "sequence",
+        "staircase",
+        "distributions",
+        "phase-space-spring-fixed-0.350-0",
+    ]
+    assert [p.name for p in after] == [p.name for p in before]
+    assert to_svg(after[0].figure) == to_svg(before[0].figure)
+
+
+def test_a_trace_from_elsewhere_can_be_drawn(fixed, tmp_path):
+    path = tmp_path / "robot.parquet"
+    Trace(fixed.table).save(path)
+    run = run_of(path)
+    assert (run.controller, run.trial.kind) == ("robot", "fixed")
+    assert run.trial.seconds == pytest.approx(15.0)
+
+
+def test_an_estimators_bias_is_measured(fixed):
+    found = judge_estimator("spring", [with_estimate(fixed, 0.01)])
+    assert found.flight_bias_m == pytest.approx(0.01)
+    assert found.stance_bias_m == pytest.approx(0.01)
+    assert found.apex_bias_m == pytest.approx(0.01, abs=1e-4)
+    assert found.flight_std_m == pytest.approx(0.0, abs=1e-9)
+    assert found.apex_std_m == pytest.approx(0.0, abs=1e-4)
+    assert found.hops > 10
+    assert judge_estimator("spring", [fixed]) is None
