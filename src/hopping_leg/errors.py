@@ -12,6 +12,10 @@ class RobotError(HoppingLegError):
     """A robot file is missing, incomplete or physically impossible."""
 
 
+class PhysicsError(HoppingLegError):
+    """A simulation became unstable."""
+
+
 class PolicyError(HoppingLegError):
     """A policy file is unreadable, foreign, or does not fit the robot or command."""
 

@@ -18,7 +18,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from hopping_leg.cli.output import write_json
-from hopping_leg.robot import Robot, load_robot, shipped_robots
+from hopping_leg.robot import Robot, build_model, load_robot, shipped_robots
 from hopping_leg.robot.fields import Tree
 from hopping_leg.robot.files import load_tree
 
@@ -59,6 +59,7 @@ def run(args: List | Show | Check) -> None:
         _show(args)
     else:
         robot = load_robot(args.robot)
+        build_model(robot)
         print(f"{args.robot} is a valid robot: {robot.name} ({_summary(robot)}).")
 
 

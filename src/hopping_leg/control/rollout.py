@@ -1,7 +1,8 @@
 """Run a controller on many legs at once and record what happened."""
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -9,11 +10,18 @@ import polars as pl
 
 from hopping_leg.arrays import Array
 from hopping_leg.control.protocol import Controller
+from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.limits import SoftLimits
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import CONTROL_RATE, Disturbance, Legs, Plant
 from hopping_leg.trace import Trace
+
+_START_SHARE = 0.2 / 0.29
+"""Leg length of the standing start as a share of the straight leg's."""
+
+_IMPOSSIBLE = 1e4
+"""Joint speed that no leg reaches, rad/s."""
 
 _STACKED = {
     "height_m": 0,
@@ -38,15 +46,41 @@ class Setup:
     """Where a controller is tried: robot, disturbances, rates and start."""
 
     robot: Robot
-    disturbance: Disturbance = Disturbance()
-    soft_limits: SoftLimits | None = SoftLimits()
+    disturbance: Disturbance = field(default_factory=Disturbance)
+    soft_limits: SoftLimits | None = field(default_factory=SoftLimits)
     rate: float = CONTROL_RATE
     """Control rate, Hz."""
     timestep: float = 5e-4
     """Physics step, s."""
-    start_length: float = 0.2
-    """Leg length of the standing start, m, hip axis to the foot's centre, foot below the hip."""
+    start_length: float | None = None
+    """Leg length of the standing start, m, hip axis to the foot's centre, foot below the hip; none
+    takes the paper leg's 0.2 m, scaled to the links."""
     threads: int = 0
+    """Worker threads, 0 for one per core."""
+
+    def __post_init__(self) -> None:
+        for name in ("rate", "timestep"):
+            value = getattr(self, name)
+            if not 0 < value < math.inf:
+                raise UsageError(f"'{name}' is {value:g} but must be positive and finite.")
+        if self.threads < 0:
+            raise UsageError(f"'threads' is {self.threads} but must be 0 (all cores) or more.")
+        if np.isnan(self.start_posture).any():
+            raise UsageError(
+                f"'start_length' is {self.start_length} m, out of reach of {self.robot.name}."
+            )
+
+    @property
+    def start_posture(self) -> Array:
+        """Joint angles of the standing start, rad, (2,)."""
+        return kinematics.joint_angles(self.robot, np.array([self.standing_length, 0.0]))
+
+    @property
+    def standing_length(self) -> float:
+        """Leg length of the standing start, m."""
+        if self.start_length is not None:
+            return self.start_length
+        return _START_SHARE * (self.robot.thigh.length + self.robot.shank.length)
 
 
 @dataclass(frozen=True)
@@ -87,6 +121,9 @@ def roll_out(
         on_tick: Called with (ticks done, ticks in all), for progress bars.
         on_legs: Called once with the legs, for controllers that are shown the truth.
 
+    Raises:
+        PhysicsError: The simulation became unstable.
+
     Returns:
         What happened, one row per control period; each row holds the state at its start and the
         torques during it.
@@ -94,8 +131,7 @@ def roll_out(
     ticks, count = commands.shape
     legs = Legs(setup.robot, count, rate=setup.rate, timestep=setup.timestep, threads=setup.threads)
     plant = Plant(legs, setup.disturbance, setup.soft_limits, np.random.default_rng(seed))
-    posture = kinematics.joint_angles(setup.robot, np.array([setup.start_length, 0.0]))
-    legs.stand(slice(None), posture)
+    legs.stand(slice(None), setup.start_posture)
     plant.channel.restart(slice(None), legs.q, legs.qd, commands[0])
     controller.reset(count)
     if on_legs is not None:
@@ -111,6 +147,7 @@ def roll_out(
         data[8:10, tick] = plant.drive(torque).T
         if on_tick is not None:
             on_tick(tick + 1, ticks)
+    _check_stable(data, setup)
     header = {
         "robot": setup.robot.name,
         "robot_digest": setup.robot.digest,
@@ -121,6 +158,16 @@ def roll_out(
     }
     columns = {name: data[row] for name, row in _STACKED.items()}
     return Rollout(np.arange(ticks) / setup.rate, columns | internals, header)
+
+
+def _check_stable(data: Array, setup: Setup) -> None:
+    """MuJoCo resets an unstable simulation and goes on, so that only its speed tells."""
+    speed = np.abs(data[4:6]).max()
+    if not speed < _IMPOSSIBLE:
+        raise PhysicsError(
+            f"The simulation of {setup.robot.name} became unstable at a physics step of"
+            f" {setup.timestep:g} s; take a smaller one or check masses and inertias."
+        )
 
 
 def _record_state(row: Array, legs: Legs, command: Array) -> None:

@@ -168,7 +168,7 @@ def _conditions(world: Setup, setup: Setup, floor: str, repeats: int, seed: int)
         "seeds": repeats,
         "timestep_s": setup.timestep,
         "rate_hz": setup.rate,
-        "start_length_m": setup.start_length,
+        "start_length_m": setup.standing_length,
     }
 
 

@@ -5,6 +5,7 @@ from importlib import resources
 import mujoco
 import numpy as np
 
+from hopping_leg.errors import RobotError
 from hopping_leg.robot.parameters import Joint, Link, Robot
 
 GRAVITY = 9.81
@@ -48,8 +49,16 @@ def get_spec(robot: Robot, timestep: float = TIMESTEP) -> mujoco.MjSpec:
 
 
 def build_model(robot: Robot, timestep: float = TIMESTEP) -> mujoco.MjModel:
-    """Compile a robot's model; generalised coordinates are (rail height, hip, knee)."""
-    model = get_spec(robot, timestep).compile()
+    """Compile a robot's model; generalised coordinates are (rail height, hip, knee).
+
+    Raises:
+        RobotError: MuJoCo refuses the parameters, e.g. a mass that is too small.
+    """
+    try:
+        model = get_spec(robot, timestep).compile()
+    except ValueError as error:
+        reason = " ".join(str(error).split()).removeprefix("Error: ")
+        raise RobotError(f"MuJoCo cannot build robot '{robot.name}': {reason}.") from error
     if mujoco.mj_isSparse(model):
         # MuJoCo 4.0.0 factorises the sparse Hessian wrongly.
         raise RuntimeError("the leg's constraint Jacobian must be dense")
