@@ -5,6 +5,7 @@ import dataclasses
 import torch
 from stable_baselines3.common.logger import configure
 
+from hopping_leg.learn.fast import FastRecipe
 from hopping_leg.learn.paper import PaperRecipe
 from hopping_leg.learn.resumable import ResumablePPO
 from hopping_leg.robot import load_robot
@@ -13,6 +14,7 @@ ROBOT = load_robot("legv2-paper")
 TINY = PaperRecipe(
     steps=1200, warmup=300, judge_every=10**9, hidden=(8, 8), legs=2, gradient_steps=4, batch=16
 )
+TINY_FAST = FastRecipe(steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -26,7 +26,7 @@ def test_policy_file_gives_the_actors_torques(recipe):
     model = learner(recipe)
     with torch.no_grad():
         for parameter in model.policy.parameters():
-            parameter.mul_(100.0 if recipe is not TINY else 4.0)
+            parameter.mul_(40.0 if recipe is not TINY else 4.0)
     env = model.env
     scale = recipe.task.action_torque
     card = Card("test", recipe.layout, 0.25, 0.35, scale, ROBOT.name, ROBOT.digest, 200.0)
@@ -36,4 +36,4 @@ def test_policy_file_gives_the_actors_torques(recipe):
     expected, _ = model.predict(env.task.scaling.observe(m), deterministic=True)
     action = policy.act(m) / scale
     np.testing.assert_allclose(action, expected, atol=1e-5)
-    assert np.abs(action).max() > 0.5
+    assert np.abs(action).max() > 0.2

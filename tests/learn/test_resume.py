@@ -13,7 +13,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.learn import train as module
 from hopping_leg.learn.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
 from hopping_leg.learn.resumable import restore, state_of
-from tests.learn.learners import ROBOT, TINY, TinyPPO, learner
+from tests.learn.learners import ROBOT, TINY, TINY_FAST, TinyPPO, learner
 
 
 def disturb_all_generators():
@@ -21,7 +21,7 @@ def disturb_all_generators():
     np.random.rand(100)  # noqa: NPY002
 
 
-@pytest.mark.parametrize("recipe", [TINY, TinyPPO()], ids=["sac", "ppo"])
+@pytest.mark.parametrize("recipe", [TINY, TinyPPO(), TINY_FAST], ids=["sac", "ppo", "fast"])
 def test_resuming_equals_never_having_stopped(recipe, tmp_path):
     straight = learner(recipe)
     trees = []
@@ -30,10 +30,14 @@ def test_resuming_equals_never_having_stopped(recipe, tmp_path):
         if straight.num_timesteps >= recipe.steps // 2 and not trees:
             trees.append(write_checkpoint(tmp_path, straight.num_timesteps, state_of(straight)))
 
-    straight.on_boundary = keep
+    def boundary(model):
+        recipe.anneal(model, model.env, 1 - model._current_progress_remaining)
+
+    straight.on_boundary = lambda: (boundary(straight), keep())
     straight.learn(recipe.steps)
     disturb_all_generators()
     resumed = learner(recipe, seed=99)
+    resumed.on_boundary = lambda: boundary(resumed)
     restore(resumed, read_checkpoint(trees[0]))
     assert 0 < resumed.num_timesteps < recipe.steps
     resumed.learn(recipe.steps - resumed.num_timesteps, reset_num_timesteps=False)
@@ -91,7 +95,7 @@ from pathlib import Path
 from tests.learn.learners import ROBOT, TINY
 import dataclasses
 from hopping_leg.learn.train import train
-recipe = dataclasses.replace(TINY, steps=6400, checkpoint_seconds=0.0, judge_every=3200)
+recipe = dataclasses.replace(TINY, steps=3200, checkpoint_seconds=0.0, judge_every=1600)
 train(recipe, ROBOT, 0, Path(sys.argv[1]), resume=True, quiet=True)
 """
 

@@ -58,6 +58,12 @@ class Recipe(ABC):
             seed: Of weights and exploration.
         """
 
+    def anneal(self, model: Any, env: TaskVecEnv, share: float) -> None:  # noqa: ANN401, B027
+        """Adapt to the share of the training that is done, 0 to 1; by default nothing changes.
+
+        Called before every rollout, also of a resumed training: depend on ``share`` alone.
+        """
+
     def network(self, model: Any, env: TaskVecEnv) -> Network:  # noqa: ANN401
         """Return the deterministic actor as it stands."""
         return network_of(model, env.task.scaling)

@@ -161,6 +161,7 @@ class Trainer:
         return self.elapsed < self._seconds
 
     def _at_boundary(self) -> None:
+        self.recipe.anneal(self.model, self.env, 1 - self.model._current_progress_remaining)
         if self.model.num_timesteps >= self.selection.next_at:
             self._judge()
         if time.monotonic() - self._saved >= self.recipe.checkpoint_seconds:

@@ -13,8 +13,6 @@ from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.env.observation import SIZE, Array32
 from hopping_leg.env.task import PRIVILEGED, HoppingTask, Step
 
-Observation = Array32 | dict[str, Array32]
-
 _RECENT_HOPS = 500
 """Hops that the live numbers look back over."""
 
@@ -22,8 +20,8 @@ _RECENT_HOPS = 500
 class TaskVecEnv(VecEnv):  # type: ignore[misc]
     """A ``HoppingTask`` for stable-baselines3.
 
-    Observations are (n, 15), or with ``privileged`` a dictionary of ``policy`` (n, 15) and
-    ``privileged`` (n, 10), the true state for critics that may see it in training.
+    Observations are (n, 15); with ``privileged`` the true state, (n, 10), follows in the same rows,
+    for critics that may see it in training.
 
     Attributes:
         hops: In-flight apexes so far, of all legs.
@@ -31,11 +29,8 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
 
     def __init__(self, task: HoppingTask, *, privileged: bool = False) -> None:
         self.task, self._privileged = task, privileged
-        policy = gymnasium.spaces.Box(-np.inf, np.inf, (SIZE,), np.float32)
-        space: gymnasium.spaces.Space[Any] = policy
-        if privileged:
-            true_state = gymnasium.spaces.Box(-np.inf, np.inf, (PRIVILEGED,), np.float32)
-            space = gymnasium.spaces.Dict({"policy": policy, "privileged": true_state})
+        size = SIZE + PRIVILEGED if privileged else SIZE
+        space = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
         self.render_mode = None
         super().__init__(task.count, space, gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32))
         self.hops = 0
@@ -51,7 +46,7 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
         """Mean |apex - command| over the latest hops of all legs, m; NaN before the first."""
         return float(np.mean(np.abs(self._errors))) if self._errors else float("nan")
 
-    def reset(self) -> Observation:
+    def reset(self) -> Array32:
         """Begin new episodes of all legs."""
         self._return[:], self._length[:] = 0.0, 0
         return self._observation(self.task.reset())
@@ -60,7 +55,7 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
         """Keep the actions, (n, 2), for ``step_wait``."""
         self._action = actions
 
-    def step_wait(self) -> tuple[Observation, Array, BoolArray, list[dict[str, Any]]]:
+    def step_wait(self) -> tuple[Array32, Array, BoolArray, list[dict[str, Any]]]:
         """Step all legs; legs whose episode ended have begun the next."""
         step = self.task.step(self._action)
         self._return += step.reward
@@ -80,7 +75,7 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
             final: Any = step.final_observation[leg]
             if self._privileged:
                 assert step.final_privileged is not None
-                final = {"policy": final, "privileged": step.final_privileged[leg]}
+                final = np.concatenate([final, step.final_privileged[leg]])
             infos[leg] = {
                 "terminal_observation": final,
                 "TimeLimit.truncated": bool(step.truncated[leg]),
@@ -93,10 +88,10 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
         self._return[done], self._length[done] = 0.0, 0
         return infos
 
-    def _observation(self, policy: Array32) -> Observation:
+    def _observation(self, seen: Array32) -> Array32:
         if self._privileged:
-            return {"policy": policy, "privileged": self.task.privileged()}
-        return policy
+            return np.concatenate([seen, self.task.privileged()], axis=1)
+        return seen
 
     def state(self) -> dict[str, Any]:
         """Return everything needed to go on exactly from here."""

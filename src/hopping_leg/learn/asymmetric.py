@@ -1,0 +1,60 @@
+"""An actor that sees what the robot measures, and a critic that sees the true state.
+
+Only in training: the critic is thrown away afterwards. ``TaskVecEnv`` with ``privileged`` joins
+both to one observation, actor's part first.
+"""
+
+from typing import Any
+
+import torch
+from stable_baselines3.common.policies import ActorCriticPolicy
+from torch import nn
+
+from hopping_leg.env.observation import SIZE
+
+
+class _Split(nn.Module):
+    """Separate networks for the two parts of an observation, as stable-baselines3 wants them."""
+
+    def __init__(
+        self, actor: int, critic: int, sizes: dict[str, list[int]], activation: type[nn.Module]
+    ) -> None:
+        super().__init__()
+        self._actor = actor
+        self.policy_net = _dense(actor, sizes["pi"], activation)
+        self.value_net = _dense(critic, sizes["vf"], activation)
+        self.latent_dim_pi, self.latent_dim_vf = sizes["pi"][-1], sizes["vf"][-1]
+
+    def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Return the last hidden layers of actor and critic."""
+        return self.forward_actor(features), self.forward_critic(features)
+
+    def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
+        """Return the actor's last hidden layer."""
+        hidden: torch.Tensor = self.policy_net(features[:, : self._actor])
+        return hidden
+
+    def forward_critic(self, features: torch.Tensor) -> torch.Tensor:
+        """Return the critic's last hidden layer."""
+        hidden: torch.Tensor = self.value_net(features[:, self._actor :])
+        return hidden
+
+
+class AsymmetricPolicy(ActorCriticPolicy):  # type: ignore[misc]
+    """PPO policy whose actor sees the first ``actor_size`` entries and whose critic the others."""
+
+    def __init__(self, *args: Any, actor_size: int = SIZE, **kwargs: Any) -> None:  # noqa: ANN401
+        self._actor_size = actor_size
+        super().__init__(*args, **kwargs)
+
+    def _build_mlp_extractor(self) -> None:
+        critic = self.features_dim - self._actor_size
+        self.mlp_extractor = _Split(self._actor_size, critic, self.net_arch, self.activation_fn)
+
+
+def _dense(inputs: int, hidden: list[int], activation: type[nn.Module]) -> nn.Sequential:
+    layers: list[nn.Module] = []
+    for size in hidden:
+        layers += [nn.Linear(inputs, size), activation()]
+        inputs = size
+    return nn.Sequential(*layers)
