@@ -14,11 +14,20 @@ import mujoco
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.control.library import ENERGY_SHAPING, load_controller
 from hopping_leg.env import HoppingEnv, HoppingTask, PaperReward, TaskOptions
 from hopping_leg.evaluate.timing import Timed, host, interleave, median_ratio
 from hopping_leg.robot import Robot, build_model
+from hopping_leg.robot.kinematics import joint_angles
 from hopping_leg.sim import Legs
+
+_BENT, _STRETCHED = 0.5, 0.9
+"""Leg lengths of the recorded motion over the straight leg's."""
+
+_PERIOD = 0.5
+"""Of the recorded motion, s."""
+
+_STIFFNESS, _DAMPING = 60.0, 1.0
+"""Of its joints, N m/rad and N m s/rad."""
 
 
 @dataclass(frozen=True)
@@ -147,14 +156,16 @@ def _functions(benchmark: EnvBenchmark) -> tuple[Mapping[str, Timed], Mapping[st
 
 
 def record(task: HoppingTask, ticks: int) -> Motion:
-    """Let energy shaping hop and record what it takes to repeat the motion without it."""
-    controller = load_controller(ENERGY_SHAPING, task.robot)
-    controller.reset(task.count)
+    """Let the legs stretch and bend so fast that they hop, and record it to be repeated."""
+    lengths = np.array([[_BENT, 0.0], [_STRETCHED, 0.0]]) * task.robot.straight_height
+    postures = joint_angles(task.robot, lengths)
+    half = round(_PERIOD * task.options.rate / 2)
     task.reset()
     start = task.state()
     actions, controls = np.empty((2, ticks, task.count, 2))
     for tick in range(ticks):
-        torque = controller.act(task.measurement)
+        seen, target = task.measurement, postures[tick // half % 2]
+        torque = _STIFFNESS * (target - seen.q[:, 0]) - _DAMPING * seen.qd[:, 0]
         actions[tick] = np.clip(torque / task.options.action_torque, -1, 1)
         task.step(actions[tick])
         controls[tick] = task.legs.batch.bind("ctrl")
