@@ -213,18 +213,7 @@ def print_tables(console: Console, evaluation: Evaluation) -> None:
         console.print(f"Note: {note}", highlight=False)
 
 
-_HEADINGS = (
-    "command",
-    "error",
-    "std",
-    "hops",
-    "skipped",
-    "hops/s",
-    "flight",
-    "base",
-    "sink",
-    "hits",
-)
+_HEADINGS = ("cmd", "error", "std", "hops", "skip", "1/s", "flight", "base", "hits")
 
 
 def summary_table(evaluation: Evaluation) -> Table:
@@ -233,12 +222,12 @@ def summary_table(evaluation: Evaluation) -> Table:
     table = Table(
         title=f"{conditions['robot']}, {conditions['floor']} floor, {conditions['seeds']} seeds"
         f" from {conditions['seed']}; heights in mm",
-        caption="error: median of apex - command; base, sink: lowest and deepest over whole runs;"
-        " hits: contacts of base or knee with the ground",
+        caption="error: median of apex - command; skip: skipped hops; 1/s: hop rate;\n"
+        "base: lowest height over whole runs; hits: contacts of base or knee with the ground",
         box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
+        padding=0,
     )
-    table.add_column("controller", overflow="fold")
+    table.add_column("controller", overflow="fold", min_width=22)
     for heading in _HEADINGS:
         table.add_column(heading, justify="right", no_wrap=True)
     for row in evaluation.summary:
@@ -252,7 +241,6 @@ def summary_table(evaluation: Evaluation) -> Table:
             f"{row.hop_rate_hz:.2f}",
             f"{100 * row.flight_fraction:.0f} %",
             f"{1e3 * row.min_base_height_m:.0f}",
-            f"{1e3 * row.max_sink_m:.0f}",
             f"{row.body_contacts}",
         )
     return table

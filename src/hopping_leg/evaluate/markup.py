@@ -23,7 +23,7 @@ def table(columns: Sequence[Column], rows: Sequence[Any], caption: str = "") -> 
     """Return an HTML table; a line sets off where the first column changes."""
     if not rows:
         return Markup("")
-    head = Markup("").join(Markup("<th>{}</th>").format(c.heading) for c in columns)
+    head = Markup("").join(Markup("<th>{}</th>").format(_unbroken(c.heading)) for c in columns)
     lines = []
     before = ""
     for row in rows:
@@ -38,6 +38,11 @@ def table(columns: Sequence[Column], rows: Sequence[Any], caption: str = "") -> 
     return Markup(
         '<div class="wide"><table><caption>{}</caption><tr>{}</tr>{}</table></div>'
     ).format(caption, head, Markup("").join(lines))
+
+
+def _unbroken(heading: str) -> str:
+    """Keep a unit on the line of its slash."""
+    return heading.replace(" / ", " /\N{NO-BREAK SPACE}")
 
 
 def millimetres(value: float, sign: bool = False) -> str:
