@@ -1,5 +1,6 @@
 """The learning problem: observation, reward, reset, as a Gymnasium env and vector env."""
 
+from hopping_leg.env.apex_reward import ApexReward, ApexRewardOptions
 from hopping_leg.env.options import TaskOptions
 from hopping_leg.env.registration import ENV_ID, register_envs
 from hopping_leg.env.reward import PaperReward, PaperRewardOptions
@@ -10,6 +11,8 @@ from hopping_leg.env.vector import HoppingVectorEnv
 
 __all__ = [
     "ENV_ID",
+    "ApexReward",
+    "ApexRewardOptions",
     "HoppingEnv",
     "HoppingTask",
     "HoppingVectorEnv",

@@ -2,14 +2,14 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, get_args
 
 from hopping_leg.errors import UsageError
 from hopping_leg.robot.limits import SoftLimits
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.sim import CONTROL_RATE, Disturbance
 
-Start = Literal["standing", "drop", "mixed"]
+Start = Literal["standing", "drop", "mixed", "hop"]
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,8 @@ class TaskOptions:
     command_hold: tuple[float, float] | None = None
     """Shortest and longest time between new commands, s; none keeps one command per episode."""
     start: Start = "standing"
-    """Episodes begin standing, with a drop in a random posture, or either with equal chance."""
+    """Episodes begin standing, with a drop in a random posture, either with equal chance, or mostly
+    near the apex of the commanded hop and else standing in a random posture."""
     start_length: float = 0.2
     """Leg length of the standing start, m, hip axis to the foot's centre, foot below the hip."""
     drop_length: tuple[float, float] = (0.15, 0.25)
@@ -79,5 +80,5 @@ def _check(options: TaskOptions) -> None:
         raise UsageError(
             f"'action_torque' is {options.action_torque} but both torques must be positive, N m."
         )
-    if options.start not in ("standing", "drop", "mixed"):
-        raise UsageError(f"'start' is '{options.start}'; valid: standing, drop, mixed.")
+    if options.start not in get_args(Start):
+        raise UsageError(f"'start' is '{options.start}'; valid: {', '.join(get_args(Start))}.")

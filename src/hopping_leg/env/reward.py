@@ -4,7 +4,7 @@ A step's ``terms`` name Ge, Ph, Pj, Pjp and Pjv energy, height, jerk, position a
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -77,7 +77,7 @@ class PaperReward:
         np.add(np.square(t.rate), np.square(t.height - self._rest), out=energy)
         crossed = t.height >= t.command
         if np.count_nonzero(crossed):
-            height[crossed] = self._barrier(t.height[crossed] - t.command[crossed])
+            np.multiply(self._barrier(t.height - t.command), crossed, out=height)
         change = t.action - t.last_action
         np.vecdot(change, change, out=jerk)
         self._position(t.q, out=position)
@@ -93,8 +93,15 @@ class PaperReward:
             "velocity": velocity,
         }
 
+    def state(self) -> dict[str, Any]:
+        """Return nothing: every tick is judged by itself."""
+        return {}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Do nothing."""
+
     def _barrier(self, excess: Array) -> Array:
-        """Return Ph where the base is ``excess`` >= 0 above the desired height, m, (k,)."""
+        """Return Ph of a base that is ``excess`` >= 0 above the desired height, m, (n,)."""
         growth = np.exp(excess)
         if self.options.barrier == "printed":
             return 1 - growth

@@ -8,6 +8,12 @@ from hopping_leg.errors import UsageError
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
 
+_STANDING_SHARE = 0.3
+"""Of the starts ``hop``."""
+
+_NEAR_APEX = (-0.06, 0.03)
+"""Where the other starts ``hop`` begin, relative to the commanded apex, m."""
+
 
 class Starts:
     """Draws initial states.
@@ -27,8 +33,19 @@ class Starts:
                 f" take lengths below {reach:g} m."
             )
 
-    def draw(self, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
-        """Return base heights, m, (count,), and joint angles, rad, (count, 2), at rest."""
+    def draw(self, command: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Draw one state at rest for each desired height.
+
+        Args:
+            command: Desired heights, m, (k,).
+            rng: Source of randomness.
+
+        Returns:
+            Base heights, m, (k,), and joint angles, rad, (k, 2).
+        """
+        count = len(command)
+        if self.options.start == "hop":
+            return self._hop(command, rng)
         if self.options.start == "standing":
             q, gap = np.tile(self._standing, (count, 1)), np.zeros(count)
         else:
@@ -37,6 +54,15 @@ class Starts:
             stands = rng.random(count) < 0.5
             q[stands], gap[stands] = self._standing, 0.0
         return kinematics.stance_height(self.robot, q) + gap, q
+
+    def _hop(self, command: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Begin near the apex of the commanded hop, or standing in a random posture."""
+        count = len(command)
+        q, _ = self._drop(count, rng)
+        standing = kinematics.stance_height(self.robot, q)
+        stands = rng.random(count) < _STANDING_SHARE
+        apex = command + rng.uniform(*_NEAR_APEX, count)
+        return np.where(stands, standing, np.maximum(standing, apex)), q
 
     def _drop(self, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
         options = self.options

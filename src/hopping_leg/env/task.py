@@ -177,6 +177,7 @@ class HoppingTask:
             "last_action": self._last.copy(),
             "rises": self._rises.copy(),
             "rng": self._rng.bit_generator.state,
+            "reward": self.reward.state(),
         }
 
     def restore(self, state: dict[str, Any]) -> Array32:
@@ -189,6 +190,7 @@ class HoppingTask:
         self._switch[:] = state["switch"]
         self._last, self._rises = np.array(state["last_action"]), np.array(state["rises"])
         self._rng.bit_generator.state = state["rng"]
+        self.reward.restore(state["reward"])
         self._plan()
         return self._observe()
 
@@ -229,11 +231,11 @@ class HoppingTask:
 
     def _begin(self, rows: IntArray) -> None:
         count = len(rows)
-        height, q = self._starts.draw(count, self._rng)
+        self.command[rows] = self._draw_commands(count)
+        height, q = self._starts.draw(self.command[rows], self._rng)
         self.legs.place(rows, height, q)
         self._end[rows] = self._tick + self._horizon
         self._last[rows], self._rises[rows] = 0.0, False
-        self.command[rows] = self._draw_commands(count)
         if self.options.command_hold is not None:
             self._switch[rows] = self._tick + self._draw_holds(count)
         self.plant.channel.restart(rows, self.legs.q[rows], self.legs.qd[rows], self.command[rows])

@@ -1,7 +1,7 @@
 """What rewards see of one tick, and the Reward protocol."""
 
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from hopping_leg.arrays import Array, BoolArray
 
@@ -44,4 +44,12 @@ class Reward(Protocol):
 
     def __call__(self, transition: Transition) -> tuple[Array, dict[str, Array]]:
         """Return the reward, (n,), and its unweighted terms by name, each (n,)."""
+        ...
+
+    def state(self) -> dict[str, Any]:
+        """Return what it remembers from tick to tick, as arrays and plain values."""
+        ...
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a ``state``."""
         ...

@@ -1,10 +1,11 @@
 """The recipes by name."""
 
 from hopping_leg.errors import UsageError, unknown_name
+from hopping_leg.learn.fast import FastRecipe
 from hopping_leg.learn.paper import PaperRecipe
 from hopping_leg.learn.recipe import Recipe
 
-RECIPES: dict[str, type[Recipe]] = {recipe.name: recipe for recipe in (PaperRecipe,)}
+RECIPES: dict[str, type[Recipe]] = {recipe.name: recipe for recipe in (FastRecipe, PaperRecipe)}
 """Every recipe that ``hop train`` knows."""
 
 

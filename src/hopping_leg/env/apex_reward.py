@@ -1,0 +1,138 @@
+"""A reward that asks for what is judged: the height of every apex.
+
+While in flight, the apex that ballistics predicts is compared with the command at every tick; at
+the apex itself the true one is. Both are weighted with the motion behind them, because a leg that
+stands at the commanded height and trembles has perfect apexes too. An energy gain like the paper's
+Ge starts the motion and fades out; kernels narrow while training proceeds. The paper's penalties
+stay, and one keeps body and knee off the ground.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.env.transition import Transition
+from hopping_leg.hops import CLEAR
+from hopping_leg.robot import kinematics
+from hopping_leg.robot.parameters import Robot
+
+_SHARPNESS = 10.0
+"""Of the joint limits' penalty, 1/rad, as in the paper's Pjp."""
+
+_FASTEST_SQUARED = 4.0
+"""Base velocity squared beyond which the energy gain grows no more, m2/s2."""
+
+
+@dataclass(frozen=True)
+class ApexRewardOptions:
+    """Weights and widths; rewards are scaled down at the end for the critic's sake."""
+
+    scale: float = 0.05
+    """Of the whole."""
+    apex: float = 60.0
+    """Of the event: exp(-|apex - command| / width) (air / full_air)^2."""
+    width: tuple[float, float] = (0.030, 0.006)
+    """Of the event's kernel at the start and from 70 % of the training on, m."""
+    full_air: float = 0.12
+    """Time in the air before the apex that earns the event's full weight, s."""
+    predicted: float = 1.0
+    """Of the prediction in flight: |v| (e^(-e/15 mm) + e^(-e/60 mm) / 2)."""
+    effective_gravity: float = 10.4
+    """Deceleration in flight that the prediction assumes, rail drag included, m/s2."""
+    speed: float = 0.15
+    """Of v^2 in flight."""
+    energy: float = 0.3
+    """Of v^2 anywhere, fading to zero over the first 30 % of the training."""
+    jerk: float = 0.05
+    """Of the paper's Pj."""
+    position: float = 0.02
+    """Of the paper's Pjp."""
+    velocity: float = 0.005
+    """Of joint speed beyond ``velocity_limit``."""
+    velocity_limit: float = 20.0
+    """rad/s."""
+    clearance: float = 1.0
+    """Of coming closer to the ground than the two margins below, relative to them."""
+    base_margin: float = 0.04
+    """Wanted gap between base and ground, m."""
+    knee_margin: float = 0.02
+    """Wanted gap between knee and ground, m."""
+
+
+class ApexReward:
+    """Judges ticks by predicted and reached apexes.
+
+    Args:
+        robot: Whose joint limits and clearances count.
+        options: Weights and widths.
+        rate: Control rate, Hz.
+    """
+
+    def __init__(self, robot: Robot, options: ApexRewardOptions, rate: float) -> None:
+        self.options, self._robot, self._rate = options, robot, rate
+        self._lower, self._upper = robot.of_joints("lower"), robot.of_joints("upper")
+        self._air = np.zeros(0)
+        self.anneal(0.0)
+
+    def anneal(self, share: float) -> None:
+        """Narrow the kernel and fade the energy gain at a share of the training, 0 to 1."""
+        wide, narrow = self.options.width
+        self._width = wide + (narrow - wide) * min(1.0, share / 0.7)
+        self._energy = self.options.energy * max(0.0, 1 - share / 0.3)
+
+    def state(self) -> dict[str, Any]:
+        """Return the time in the air of every leg."""
+        return {"air": self._air.copy()}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a ``state``."""
+        self._air = np.array(state["air"])
+
+    def __call__(self, transition: Transition) -> tuple[Array, dict[str, Array]]:
+        """Return the reward, (n,), and its weighted parts before scaling, each (n,)."""
+        t, o = transition, self.options
+        flying = t.foot_clearance >= CLEAR
+        if len(self._air) != len(flying):
+            self._air = np.zeros(len(flying))
+        self._air = np.where(flying, self._air + 1 / self._rate, 0.0)
+        speed_squared = np.square(t.rate)
+        terms = {
+            "apex": o.apex * self._event(t),
+            "predicted": np.where(flying, o.predicted * self._prediction(t, speed_squared), 0.0),
+            "energy": self._energy * np.minimum(speed_squared, _FASTEST_SQUARED),
+            "jerk": -o.jerk * np.sum(np.square(t.action - t.last_action), axis=1),
+            "position": -o.position * self._position(t.q),
+            "velocity": -o.velocity
+            * np.sum(np.maximum(np.abs(t.qd) - o.velocity_limit, 0.0), axis=1),
+            "clearance": -o.clearance * self._closeness(t),
+        }
+        return o.scale * np.sum(list(terms.values()), axis=0), terms
+
+    def _event(self, t: Transition) -> Array:
+        motion = np.square(np.minimum(1.0, self._air / self.options.full_air))
+        error = np.abs(t.apex_height - t.command)
+        return np.where(t.apex, motion * np.exp(-error / self._width), 0.0)
+
+    def _prediction(self, t: Transition, speed_squared: Array) -> Array:
+        apex = t.height + speed_squared / (2 * self.options.effective_gravity)
+        error = np.abs(apex - t.command)
+        kernel = np.exp(-error / 0.015) + 0.5 * np.exp(-error / 0.06)
+        return np.abs(t.rate) * kernel + self.options.speed * speed_squared
+
+    def _position(self, q: Array) -> Array:
+        inside: BoolArray = (q >= self._lower) & (q <= self._upper)
+        to_lower, to_upper = np.abs(q - self._lower), np.abs(q - self._upper)
+        near = np.exp(-_SHARPNESS * to_lower) + np.exp(-_SHARPNESS * to_upper)
+        penalty: Array = np.sum(np.where(inside, near, 1.0), axis=1)
+        return penalty
+
+    def _closeness(self, t: Transition) -> Array:
+        """Return how far base and knee are inside their margins, relative to them, (n,)."""
+        o = self.options
+        base = kinematics.base_clearance(self._robot, t.height)
+        knee = kinematics.knee_clearance(self._robot, t.height, t.q)
+        base_inside = np.maximum(o.base_margin - base, 0.0) / o.base_margin
+        knee_inside = np.maximum(o.knee_margin - knee, 0.0) / o.knee_margin
+        return base_inside + knee_inside
