@@ -10,6 +10,7 @@ import pytest
 import torch
 
 from hopping_leg.errors import UsageError
+from hopping_leg.learn import judge
 from hopping_leg.learn import train as module
 from hopping_leg.learn.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
 from hopping_leg.learn.resumable import restore, state_of
@@ -75,7 +76,8 @@ def test_no_checkpoint_holds_a_pickle(tmp_path):
     assert list_checkpoints(tmp_path) == []
 
 
-def test_a_run_is_never_overwritten_or_mixed(tmp_path):
+def test_a_run_is_never_overwritten_or_mixed(tmp_path, monkeypatch):
+    monkeypatch.setattr(judge, "_SECONDS", 0.5)
     out = tmp_path / "run"
     recipe = dataclasses.replace(TINY, steps=64, judge_every=32, warmup=32)
     done = module.train(recipe, ROBOT, 0, out, quiet=True)
@@ -94,7 +96,9 @@ import sys
 from pathlib import Path
 from tests.learn.learners import ROBOT, TINY
 import dataclasses
+from hopping_leg.learn import judge
 from hopping_leg.learn.train import train
+judge._SECONDS = 0.5
 recipe = dataclasses.replace(TINY, steps=3200, checkpoint_seconds=0.0, judge_every=1600)
 train(recipe, ROBOT, 0, Path(sys.argv[1]), resume=True, quiet=True)
 """

@@ -20,8 +20,8 @@ FIRST_SEED = 500
 FINAL_SEEDS = (501, 502, 503, 504)
 """Judge the best snapshots once more at the end."""
 
-SETTLE = 2.0
-"""Start of a trial that does not count, s."""
+SETTLE = 0.2
+"""Share of a trial at its start that does not count."""
 
 _LEGS = 4
 _SECONDS = 10.0
@@ -100,7 +100,7 @@ def _badness(verdict: Verdict) -> float:
 
 
 def _verdict(runs: list[Rollout], command: float, legs: range, rate: float) -> Verdict:
-    start = round(SETTLE * rate)
+    start = round(SETTLE * _SECONDS * rate)
     apexes: list[Array] = []
     skipped = contacts = ticks = flight = 0
     lowest = np.inf

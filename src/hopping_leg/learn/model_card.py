@@ -22,11 +22,6 @@ def render(result: dict[str, Any]) -> str:
         result: Content of ``result.json``.
     """
     selected, task = result["selected"], result["options"]["task"]
-    minutes = f" --minutes {result['minutes_budget']:g}" if result.get("minutes_budget") else ""
-    command = (
-        f"hop train --recipe {result['recipe']} --robot {result['robot']}"
-        f" --seed {result['seed']}{minutes} --out runs/{result['recipe']}-seed{result['seed']}"
-    )
     commands = task["command_range"] or (min(task["commands"]), max(task["commands"]))
     versions = ", ".join(f"{name} {number}" for name, number in result["versions"].items())
     return f"""# Policy `{result["recipe"]}`, seed {result["seed"]}
@@ -35,7 +30,7 @@ One network from joint measurements to joint torques, for robot `{result["robot"
 (parameters {result["robot_digest"]}), commands {commands[0]:g} to {commands[1]:g} m,
 {task["rate"]:g} Hz. Made by
 
-    {command}
+    {result["command"]}
 
 - Training: {result["steps"]} control steps, {result["minutes"]:.1f} min of wall-clock time, physics
   step {1000 * task["timestep"]:g} ms.

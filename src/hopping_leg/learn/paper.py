@@ -1,6 +1,6 @@
 """The paper's recipe: soft actor-critic with state-dependent exploration (Sec. II-C)."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 from torch import nn
@@ -50,7 +50,7 @@ class PaperRecipe(Recipe):
 
     def make_reward(self, robot: Robot) -> PaperReward:
         """Build the paper's five-term reward."""
-        return PaperReward(robot, self.reward)
+        return PaperReward(robot, replace(self.reward, rest_length=self.task.start_length))
 
     def make_model(self, env: TaskVecEnv, seed: int) -> ResumableSAC:
         """Build SAC with gSDE."""

@@ -51,6 +51,16 @@ class RunFolder:
         """The selected policy, once the training is over."""
         return self.path / "policy.onnx"
 
+    @property
+    def command(self) -> str:
+        """The command that makes such a run."""
+        config = self.config
+        words = ["hop train", "--recipe", config["recipe"], "--robot", config["robot"]]
+        words += ["--seed", str(config["seed"])]
+        if config["minutes_budget"] is not None:
+            words += ["--minutes", f"{config['minutes_budget']:g}"]
+        return " ".join([*words, "--steps", str(config["options"]["steps"])])
+
     def snapshot(self, steps: int) -> Path:
         """Return the file of the policy as it was after so many steps."""
         return self.path / "snapshots" / f"{steps:012d}.onnx"

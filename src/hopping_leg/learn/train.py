@@ -18,6 +18,7 @@ from hopping_leg.learn.model_card import write_card
 from hopping_leg.learn.progress import TrainingProgress
 from hopping_leg.learn.recipe import Recipe
 from hopping_leg.learn.run_folder import RunFolder
+from hopping_leg.learn.scale import fit
 from hopping_leg.learn.selection import Selection
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import write_atomically
@@ -62,7 +63,7 @@ def train(
     ``minutes`` that holds up to the clock, which the learning rate then follows.
 
     Args:
-        recipe: What to train.
+        recipe: What to train; scaled to the robot's size.
         robot: The leg.
         seed: Of weights, exploration, task, noise and delay.
         out: The run's folder.
@@ -77,6 +78,7 @@ def train(
     if minutes is not None and not 0 < minutes < float("inf"):
         raise UsageError(f"--minutes is {minutes:g} but must be positive.")
     torch.set_num_threads(max(threads, 1))
+    recipe = fit(recipe, robot)
     folder = RunFolder(out, recipe, robot, seed, minutes)
     tree = folder.begin(resume=resume)
     trainer = Trainer(recipe, robot, seed, folder, minutes, threads)
@@ -145,6 +147,7 @@ class Trainer:
         self._show(force=True)
         content, results = self.selection.choose()
         result = {
+            "command": self.folder.command,
             "minutes": minutes,
             "steps": steps,
             "selected": results,

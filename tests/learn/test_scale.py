@@ -1,0 +1,23 @@
+import pytest
+
+from hopping_leg.learn.fast import FastRecipe
+from hopping_leg.learn.paper import PaperRecipe
+from hopping_leg.learn.scale import fit
+from hopping_leg.robot import load_robot, shipped_robots
+
+
+def test_the_papers_leg_keeps_the_recipe():
+    assert fit(PaperRecipe(), load_robot("legv2-paper")) == PaperRecipe()
+
+
+@pytest.mark.parametrize("recipe", [PaperRecipe(), FastRecipe()], ids=["paper", "fast"])
+@pytest.mark.parametrize("name", shipped_robots())
+def test_every_shipped_leg_can_stand_and_reach_its_commands(recipe, name):
+    robot = load_robot(name)
+    fitted = fit(recipe, robot)
+    low, high = fitted.task.command_bounds
+    assert 0.6 * robot.straight_height < low < high < 1.5 * robot.straight_height
+    assert low <= min(fitted.judge_commands) <= max(fitted.judge_commands) <= high
+    assert (fitted.task.action_torque <= robot.of_joints("torque_limit")).all()
+    env = fitted.__class__.make_env(fitted, robot, 0)
+    assert (env.task.legs.height > 0.3 * robot.straight_height).all()
