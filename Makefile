@@ -70,10 +70,10 @@ wheel: $(STAMP)
 	build/wheel/venv/bin/python -m pip --disable-pip-version-check install -q -c constraints.txt build/wheel/*.whl
 	cd build/wheel && venv/bin/python -c 'import hopping_leg, sys; assert "torch" not in sys.modules'
 	cd build/wheel && venv/bin/hop robots list && venv/bin/hop export urdf --out leg.urdf
-	cd build/wheel && venv/bin/hop evaluate --help >/dev/null
+	cd build/wheel && venv/bin/hop evaluate energy-shaping --commands 0.3 --seeds 1 --floor soft --out report
 
 lock: $(STAMP)
-	@{ head -n 1 constraints.txt; $(PIP) freeze --all --exclude-editable --exclude pip | sed 's/+[^ ]*$$//'; } > constraints.new
+	@{ head -n 1 constraints.txt; $(PIP) freeze --all --exclude-editable --exclude pip | sed 's/+[^ ]*$$//' | sort -f; } > constraints.new
 	@mv constraints.new constraints.txt
 
 clean:
