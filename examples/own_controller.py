@@ -1,0 +1,39 @@
+"""A controller of your own: hold the leg as a spring, and see that this alone does not hop."""
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.control import Setup, roll_out
+from hopping_leg.robot import Robot, kinematics, load_robot
+from hopping_leg.sim.disturbance import Measurement
+
+
+class Spring:
+    """Pulls the foot to 0.2 m below the hip through the transposed Jacobian."""
+
+    name = "spring"
+
+    def __init__(self, robot: Robot, stiffness: float = 400.0, damping: float = 10.0) -> None:
+        self.robot, self.stiffness, self.damping = robot, stiffness, damping
+
+    def reset(self, count: int) -> None:
+        """Start anew; a spring has no memory."""
+
+    def act(self, measurement: Measurement) -> Array:
+        """Return joint torques, N m, (n, 2)."""
+        q, qd = measurement.q[:, 0], measurement.qd[:, 0]  # the newest sample
+        foot = kinematics.foot_position(self.robot, q)
+        velocity = kinematics.foot_velocity(self.robot, q, qd)
+        force = self.stiffness * (np.array([0.2, 0.0]) - foot) - self.damping * velocity
+        return np.einsum("nij,ni->nj", kinematics.jacobian(self.robot, q), force)
+
+    def internals(self) -> dict[str, Array]:
+        """Return nothing else worth recording."""
+        return {}
+
+
+robot = load_robot("legv2-paper")
+run = roll_out(Spring(robot), Setup(robot), np.full((600, 4), 0.30), seed=0)
+height, clearance = run.data["height_m"][200:], run.data["foot_clearance_m"][200:]
+print(f"base between {height.min():.3f} and {height.max():.3f} m")
+print(f"foot off the ground {100 * (clearance > 0.003).mean():.0f} % of the time")
