@@ -23,6 +23,7 @@ def test_one_folder_receives_numbers_report_and_traces(spring, tmp_path, capsys)
     assert main([*words, "--threads", "1", "--out", str(out)]) == 0
     data = json.loads((out / "evaluation.json").read_text())
     assert [row["command_m"] for row in data["summary"]] == [0.3]
+    assert data["command"].startswith("hop evaluate spring --commands 0.3 --seeds 1")
     assert data["secondary"]["conditions"]["floor"] == "stiff"
     assert b"hop evaluate spring --commands 0.3 --seeds 1" in (out / "report.html").read_bytes()
     traces = sorted((out / "traces").iterdir())
@@ -46,9 +47,9 @@ def test_one_folder_receives_numbers_report_and_traces(spring, tmp_path, capsys)
         (["--seeds", "0"], "0 seeds are too few"),
         (["--seed", "-1"], "A seed of -1"),
         (["--robot", "legv9"], "There is no robot 'legv9'"),
-        (["--threads", "-1"], "-1 threads"),
-        (["--timestep", "nan"], "A timestep of nan"),
-        (["--rate", "0"], "A rate of 0.0"),
+        (["--threads", "-1"], "'threads' is -1"),
+        (["--timestep", "nan"], "'timestep' is nan"),
+        (["--rate", "0"], "'rate' is 0"),
         (["--json", "/dev/null/x/result.json"], "/dev/null"),
         (["--json", "/"], "is a folder"),
         (["--timestep", "0.003"], "does not divide"),

@@ -1,3 +1,4 @@
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -8,9 +9,14 @@ from hopping_leg.evaluate.candidates import load_candidates
 
 
 class FakePolicy:
-    def __init__(self, digest):
+    def __init__(self, seed):
         self.card = SimpleNamespace(
-            command_low=0.2, command_high=0.4, recipe="fast", robot="other", robot_digest=digest
+            command_low=0.2,
+            command_high=0.4,
+            recipe="fast",
+            robot="other",
+            robot_digest="0" * 16,
+            seed=seed,
         )
 
     def check_robot(self, robot, rate, strict):
@@ -27,13 +33,27 @@ def test_a_pattern_without_a_match_is_an_error(robot, tmp_path):
         load_candidates([str(tmp_path / "*.onnx")], robot, 200.0)
 
 
-def test_a_pattern_becomes_a_group_with_ranges_and_warnings(robot, tmp_path, monkeypatch):
-    for name in ("a.onnx", "b.onnx"):
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Two policy files; the training seed is the file's name."""
+    for name in ("1.onnx", "2.onnx"):
         (tmp_path / name).touch()
     monkeypatch.setattr(candidates, "Policy", FakePolicy)
-    monkeypatch.setattr(candidates, "load_controller", lambda *_, **__: FakePolicy("0" * 16))
-    found = load_candidates([str(tmp_path / "*.onnx")], robot, 200.0)
-    assert [c.label for c in found] == [str(tmp_path / "a.onnx"), str(tmp_path / "b.onnx")]
-    assert {c.group for c in found} == {"fast from files"}
+    monkeypatch.setattr(
+        candidates, "load_controller", lambda name, *_, **__: FakePolicy(int(Path(name).stem))
+    )
+    return tmp_path
+
+
+def test_a_pattern_becomes_a_group_with_ranges_and_warnings(robot, folder):
+    found = load_candidates([str(folder / "*.onnx")], robot, 200.0)
+    assert [c.label for c in found] == [str(folder / "1.onnx"), str(folder / "2.onnx")]
+    assert {c.group for c in found} == {"fast, 2 training seeds"}
     assert found[0].command_range == (0.2, 0.4)
     assert "was trained on robot 'other'" in found[0].notes[0]
+
+
+def test_snapshots_of_one_training_are_no_group(robot, folder):
+    (folder / "01.onnx").touch()
+    found = load_candidates([str(folder / "*.onnx")], robot, 200.0)
+    assert [c.group for c in found] == [None] * 3

@@ -11,8 +11,13 @@ COMMAND = "hop evaluate spring --commands 0.25,0.35"
 
 
 @pytest.fixture(scope="module")
-def page(judged):
-    return write_report(judged, COMMAND).decode()
+def commanded(judged):
+    return Judged(dataclasses.replace(judged.evaluation, command=COMMAND), judged.runs)
+
+
+@pytest.fixture(scope="module")
+def page(commanded):
+    return write_report(commanded).decode()
 
 
 def test_the_page_needs_nothing_from_outside(page):
@@ -33,25 +38,25 @@ def test_the_page_states_its_numbers_and_how_to_make_it_again(page, judged):
     assert "hop plot TRACES/spring-staircase-0.parquet" in page
 
 
-def test_the_same_evaluation_gives_the_same_page(page, judged):
-    assert write_report(judged, COMMAND).decode() == page
+def test_the_same_evaluation_gives_the_same_page(page, commanded):
+    assert write_report(commanded).decode() == page
 
 
 def test_names_are_escaped(judged):
     row = dataclasses.replace(judged.evaluation.summary[0], controller="<b>&")
     evaluation = dataclasses.replace(judged.evaluation, summary=[row], distributions=[])
-    page = write_report(Judged(evaluation, judged.runs), COMMAND).decode()
+    page = write_report(Judged(evaluation, judged.runs)).decode()
     assert "<b>" not in page
     assert "&lt;b&gt;&amp;" in page
 
 
 def test_a_missing_video_is_explained(judged):
-    page = write_report(judged, COMMAND, {"spring": Video(None, "egl: no display")}).decode()
+    page = write_report(judged, {"spring": Video(None, "egl: no display")}).decode()
     assert "No video of spring: egl: no display" in page
 
 
 def test_a_video_is_embedded(judged):
-    page = write_report(judged, COMMAND, {"spring": Video(b"RIFF")}).decode()
+    page = write_report(judged, {"spring": Video(b"RIFF")}).decode()
     assert "data:image/webp;base64,UklGRg==" in page
 
 
@@ -63,5 +68,5 @@ def test_a_controller_that_never_hopped_is_reported(judged):
     ]
     empty = [{**entry, "apexes_m": []} for entry in judged.evaluation.distributions]
     evaluation = dataclasses.replace(judged.evaluation, summary=rows, distributions=empty)
-    page = write_report(Judged(evaluation, judged.runs), COMMAND).decode()
+    page = write_report(Judged(evaluation, judged.runs)).decode()
     assert "nan" not in re.sub(r"data:[^\"]*", "", page)

@@ -81,19 +81,20 @@ def run(args: Evaluate) -> None:
     args = _with_folder(args)
     _check(args)
     robot = load_robot(args.robot)
-    candidates = load_candidates(args.controllers, robot, args.rate)
     disturbance = Disturbance() if args.noise else NOTHING
     setup = Setup(robot, disturbance, rate=args.rate, timestep=args.timestep, threads=args.threads)
+    candidates = load_candidates(args.controllers, robot, args.rate)
     judged = judge(candidates, setup, args)
-    if args.traces:
-        save_traces(judged.runs, args.traces)
-    if args.json:
-        write_atomically(args.json, judged.evaluation.dumps())
-    if args.report:
-        videos = render_videos(judged, robot) if args.video else None
-        write_atomically(args.report, write_report(judged, command, videos))
+    judged = replace(judged, evaluation=replace(judged.evaluation, command=command))
     console = Console()
     print_tables(console, judged.evaluation)
+    if args.json:
+        write_atomically(args.json, judged.evaluation.dumps())
+    if args.traces:
+        save_traces(judged.runs, args.traces)
+    if args.report:
+        videos = render_videos(judged, robot) if args.video else None
+        write_atomically(args.report, write_report(judged, videos))
     for path in (args.json, args.report, args.traces):
         if path:
             console.print(f"Wrote {path}", highlight=False)
@@ -103,12 +104,6 @@ def _check(args: Evaluate) -> None:
     """Refuse what cannot work before anything is simulated."""
     if args.seed < 0:
         raise UsageError(f"A seed of {args.seed} has no meaning; give 0 or more.")
-    if args.threads < 0:
-        raise UsageError(f"{args.threads} threads have no meaning; give 0 for all cores, or more.")
-    for name in ("rate", "timestep"):
-        value = getattr(args, name)
-        if not (math.isfinite(value) and value > 0):
-            raise UsageError(f"A {name} of {value} has no meaning; give a positive number.")
     for path in (args.json, args.report):
         if path and path.is_dir():
             raise UsageError(f"{path} is a folder; name a file.")
@@ -213,6 +208,14 @@ def print_tables(console: Console, evaluation: Evaluation) -> None:
         console.print(f"Note: {note}", highlight=False)
 
 
+def _millimetres(value: float, form: str) -> str:
+    return f"{1e3 * value:{form}}" if math.isfinite(value) else "-"
+
+
+def _seeds(count: int) -> str:
+    return f"{count} seed{'' if count == 1 else 's'}"
+
+
 _HEADINGS = ("cmd", "error", "std", "hops", "skip", "1/s", "flight", "base", "hits")
 
 
@@ -220,7 +223,7 @@ def summary_table(evaluation: Evaluation) -> Table:
     """Return the summary as a table for the terminal; lengths in mm."""
     conditions = evaluation.conditions
     table = Table(
-        title=f"{conditions['robot']}, {conditions['floor']} floor, {conditions['seeds']} seeds"
+        title=f"{conditions['robot']}, {conditions['floor']} floor, {_seeds(conditions['seeds'])}"
         f" from {conditions['seed']}; heights in mm",
         caption="error: median of apex - command; skip: skipped hops; 1/s: hop rate;\n"
         "base: lowest height over whole runs; hits: contacts of base or knee with the ground",
@@ -234,8 +237,8 @@ def summary_table(evaluation: Evaluation) -> Table:
         table.add_row(
             row.controller,
             f"{1e3 * row.command_m:.0f}",
-            f"{1e3 * row.median_error_m:+.1f}",
-            f"{1e3 * row.std_m:.1f}",
+            _millimetres(row.median_error_m, "+.1f"),
+            _millimetres(row.std_m, ".1f"),
             f"{row.hops}",
             f"{row.skipped_hops}",
             f"{row.hop_rate_hz:.2f}",

@@ -2,6 +2,7 @@
 
 import glob
 from collections.abc import Sequence
+from dataclasses import replace
 
 from hopping_leg.control.library import load_controller
 from hopping_leg.control.policy import Policy
@@ -25,7 +26,7 @@ def load_candidates(names: Sequence[str], robot: Robot, rate: float) -> list[Can
         UsageError: There is no such controller.
     """
     expanded = [name for entry in names for name in _expand(entry)]
-    return [_load(name, robot, rate) for name in dict.fromkeys(expanded)]
+    return _grouped([_load(name, robot, rate) for name in dict.fromkeys(expanded)])
 
 
 def _expand(entry: str) -> list[str]:
@@ -50,5 +51,19 @@ def _load(name: str, robot: Robot, rate: float) -> Candidate:
             f"{name} was trained on robot '{card.robot}' ({card.robot_digest}),"
             f" not on '{robot.name}' ({robot.digest}).",
         )
-    group = f"{card.recipe} from files" if name.endswith(".onnx") else None
-    return Candidate(name, controller, (card.command_low, card.command_high), group, notes)
+    return Candidate(name, controller, (card.command_low, card.command_high), notes=notes)
+
+
+def _grouped(candidates: list[Candidate]) -> list[Candidate]:
+    """Put policy files of one recipe in a group where every one has a training seed of its own."""
+    cards = {
+        c.label: c.controller.card
+        for c in candidates
+        if isinstance(c.controller, Policy) and c.label.endswith(".onnx")
+    }
+    names: dict[str, str] = {}
+    for recipe in {card.recipe for card in cards.values()}:
+        seeds = {label: card.seed for label, card in cards.items() if card.recipe == recipe}
+        if len(set(seeds.values())) == len(seeds) > 1:
+            names |= dict.fromkeys(seeds, f"{recipe}, {len(seeds)} training seeds")
+    return [replace(c, group=names.get(c.label)) for c in candidates]

@@ -160,6 +160,7 @@ def group_table(groups: Sequence[Group]) -> Markup:
             Column("group", lambda r: r.group),
             Column("command / m", lambda r: f"{r.command_m:.2f}"),
             Column("policies", lambda r: f"{r.policies}"),
+            Column("never hopped", lambda r: f"{r.motionless}", lambda r: r.motionless > 0),
             Column("median error / mm", lambda r: millimetres(r.median_error_m, sign=True)),
             Column(
                 "95 % interval",

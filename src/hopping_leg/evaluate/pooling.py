@@ -77,16 +77,19 @@ def pool_group(group: str, rows: Sequence[Summary], seed: int) -> list[Group]:
 
 def _group_row(group: str, command: float, rows: Sequence[Summary], seed: int) -> Group:
     errors = np.array([row.median_error_m for row in rows])
-    low, high = median_interval([errors[i : i + 1] for i in range(len(errors))], seed)
+    spreads = np.array([row.std_m for row in rows])
+    known = errors[np.isfinite(errors)]
+    low, high = median_interval(list(known[:, None]), seed)
     return Group(
         group=group,
         command_m=command,
         policies=len(rows),
-        median_error_m=float(np.median(errors)),
+        motionless=len(rows) - len(known),
+        median_error_m=_of(np.median, known),
         median_error_low_m=low,
         median_error_high_m=high,
-        worst_abs_error_m=float(np.abs(errors).max()),
-        median_std_m=float(np.median([row.std_m for row in rows])),
+        worst_abs_error_m=_of(np.max, np.abs(known)),
+        median_std_m=_of(np.median, spreads[np.isfinite(spreads)]),
         skipped_hops=sum(row.skipped_hops for row in rows),
         body_contacts=sum(row.body_contacts for row in rows),
     )

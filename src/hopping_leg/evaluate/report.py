@@ -21,12 +21,11 @@ from hopping_leg.trace import Trace
 _NO_VIDEO = Video(None, "it was not asked for")
 
 
-def write_report(judged: Judged, command: str, videos: dict[str, Video] | None = None) -> bytes:
+def write_report(judged: Judged, videos: dict[str, Video] | None = None) -> bytes:
     """Return the report as HTML.
 
     Args:
         judged: The evaluation and its runs.
-        command: What makes the report again.
         videos: Controller to its video; none are shown by default.
     """
     evaluation = judged.evaluation
@@ -35,7 +34,6 @@ def write_report(judged: Judged, command: str, videos: dict[str, Video] | None =
     page = environment.from_string(template.read_text(encoding="utf-8")).render(
         title=f"Hopping leg: {', '.join(evaluation.controllers)}",
         subtitle=_subtitle(evaluation),
-        command=command,
         evaluation=evaluation,
         tables=_tables(evaluation),
         pictures=[_picture(p, evaluation) for p in draw_gallery(evaluation, judged.runs)],
@@ -68,7 +66,7 @@ def _subtitle(evaluation: Evaluation) -> str:
     noisy = any(c["disturbance"][k] for k in ("joint_noise", "torque_noise", "delay_probability"))
     return (
         f"{c['robot']} on its {c['floor']} floor, {c['rate_hz']:g} Hz control,"
-        f" {1e3 * c['timestep_s']:g} ms physics, {c['seeds']} seeds,"
+        f" {1e3 * c['timestep_s']:g} ms physics, {c['seeds']} seed{'' if c['seeds'] == 1 else 's'},"
         f" {'sensor noise, torque noise and delay on' if noisy else 'no noise, no delay'}"
     )
 

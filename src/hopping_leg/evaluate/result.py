@@ -99,6 +99,8 @@ class Group:
     group: str
     command_m: float
     policies: int
+    motionless: int
+    """Policies that never hopped; they have no error and are left out of the medians."""
     median_error_m: float
     """Median over policies of each policy's median error."""
     median_error_low_m: float
@@ -126,6 +128,7 @@ class Evaluation:
         conditions: Robot, digest, floor, disturbance, seeds, steps, rates.
         versions: Of the software.
         notes: What was left out and why.
+        command: What makes this evaluation again.
         secondary: The same on another floor, if that was asked for.
     """
 
@@ -140,6 +143,7 @@ class Evaluation:
     conditions: dict[str, Any] = field(default_factory=dict)
     versions: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    command: str = ""
     secondary: "Evaluation | None" = None
 
     @property

@@ -9,7 +9,7 @@ from scipy import stats
 from hopping_leg.arrays import Array
 
 CONFIDENCE = 0.95
-RESAMPLES = 2000
+RESAMPLES = 1000
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def median_interval(
     Returns:
         The 95 % percentile interval; NaN without values.
     """
-    filled = [r for r in runs if len(r)]
+    filled = [known for r in runs if len(known := r[np.isfinite(r)])]
     units = filled if len(filled) > 1 else [np.array([v]) for r in filled for v in r]
     if len(units) < 2:
         value = float(units[0][0]) if units else float("nan")

@@ -65,7 +65,7 @@ def render_video(robot: Robot, traces: Mapping[float, Trace]) -> Video:
             if reason is None:
                 return Video(out.read_bytes())
             reasons.append(f"{backend}: {reason}")
-    return Video(None, "; ".join(reasons))
+    return Video(None, f"{'; '.join(reasons)} (Mesa's libegl1 or libosmesa6 would do)")
 
 
 def _backends() -> tuple[str, ...]:

@@ -1,6 +1,5 @@
 """Apexes of all hops for each command, controllers side by side (Fig. 9)."""
 
-from collections.abc import Sequence
 from typing import cast
 
 import numpy as np
@@ -42,8 +41,7 @@ def draw_distributions(evaluation: Evaluation) -> Figure:
     axes.grid(visible=False, axis="x")
     axes.set_xlabel("commanded apex height / m")
     axes.set_ylabel("apex height / m")
-    _fence(axes, evaluation)
-    figure.legend(loc="outside upper right", ncols=len(controllers) + 1)
+    figure.legend(loc="outside upper right", ncols=min(len(controllers) + 1, 4))
     return figure
 
 
@@ -61,12 +59,3 @@ def _draw(
         centre + jitter, apex, ".", color=paint, markersize=2.5, alpha=0.6, markeredgecolor="none"
     )
     axes.hlines(np.median(apex), centre - 0.42 * slot, centre + 0.42 * slot, color=paint, lw=2.2)
-
-
-def _fence(axes: Axes, evaluation: Evaluation) -> None:
-    """Say under the axis how many hops lie behind each shape."""
-    counts: Sequence[str] = [
-        f"{name}: " + ", ".join(str(row.hops) for row in evaluation.rows(name))
-        for name in evaluation.controllers
-    ]
-    axes.set_title("hops: " + "; ".join(counts), fontsize=8, color="0.4")
