@@ -1,3 +1,7 @@
+import json
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -55,3 +59,25 @@ def test_meaningless_options_are_refused_before_anything_runs(calls, tmp_path, w
     assert main(["reproduce", "--out", str(tmp_path / "new"), *wrong]) == 2
     assert not calls["train"]
     assert not Path(tmp_path / "new").exists()
+
+
+@pytest.mark.slow
+def test_a_killed_run_goes_on_when_called_again(tmp_path):
+    command = [sys.executable, "-m", "hopping_leg.cli", "reproduce", "--quick"]
+    command += ["--minutes", "0.3", "--out", str(tmp_path)]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    config = tmp_path / "training" / "config.json"
+    deadline = time.monotonic() + 120
+    while not config.exists() and time.monotonic() < deadline:
+        time.sleep(0.2)
+    time.sleep(3)
+    process.kill()
+    process.wait()
+    assert config.exists()
+    assert not (tmp_path / "report.html").exists()
+    again = subprocess.run(command, capture_output=True, text=True, timeout=600)
+    assert again.returncode == 0, again.stderr
+    assert "Report:" in again.stdout
+    summary = json.loads((tmp_path / "evaluation.json").read_text())["summary"]
+    assert {row["controller"] for row in summary} >= {"energy-shaping"}
+    assert (tmp_path / "report.html").stat().st_size > 10_000
