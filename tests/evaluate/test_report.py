@@ -42,6 +42,13 @@ def test_the_same_evaluation_gives_the_same_page(page, commanded):
     assert write_report(commanded).decode() == page
 
 
+@pytest.fixture
+def without_figures(monkeypatch):
+    """Skip the slow part where a test is about something else."""
+    monkeypatch.setattr("hopping_leg.evaluate.report.draw_gallery", lambda *_: [])
+
+
+@pytest.mark.usefixtures("without_figures")
 def test_names_are_escaped(judged):
     row = dataclasses.replace(judged.evaluation.summary[0], controller="<b>&")
     evaluation = dataclasses.replace(judged.evaluation, summary=[row], distributions=[])
@@ -50,11 +57,13 @@ def test_names_are_escaped(judged):
     assert "&lt;b&gt;&amp;" in page
 
 
+@pytest.mark.usefixtures("without_figures")
 def test_a_missing_video_is_explained(judged):
     page = write_report(judged, {"spring": Video(None, "egl: no display")}).decode()
     assert "No video of spring: egl: no display" in page
 
 
+@pytest.mark.usefixtures("without_figures")
 def test_a_video_is_embedded(judged):
     page = write_report(judged, {"spring": Video(b"RIFF")}).decode()
     assert "data:image/webp;base64,UklGRg==" in page

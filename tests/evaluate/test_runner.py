@@ -9,7 +9,6 @@ from hopping_leg.evaluate import Candidate, evaluate
 from hopping_leg.evaluate.runs import floor_robot, run_trials, save_traces
 from hopping_leg.evaluate.trials import Trial
 from hopping_leg.trace import Trace
-from tests.evaluate.conftest import Spring
 
 
 def test_summary_rows_pool_fixed_trials_and_the_sequence(judged):
@@ -107,14 +106,15 @@ def test_commands_outside_a_controllers_range_are_refused(setup, spring):
         evaluate([Candidate("spring", spring, (0.2, 0.3))], setup, commands=[0.25, 0.35])
 
 
-def test_trials_outside_a_controllers_range_are_left_out_with_a_note(setup, spring):
+def test_what_is_left_out_or_coarse_is_noted(setup, spring):
     result = evaluate(
         [Candidate("spring", spring, (0.29, 0.33))],
-        setup,
+        dataclasses.replace(setup, timestep=1e-3),
         commands=[0.30],
         repeats=1,
         kinds=("ladder", "staircase"),
     ).evaluation
+    assert "coarser" in result.notes.pop(0)
     assert [row.command_m for row in result.ladder] == [0.30, 0.32]
     assert "left out: staircase, ladder 0.22 m" in result.notes[0]
 
@@ -126,19 +126,3 @@ def test_nothing_to_do_is_said(setup, spring):
         evaluate([Candidate("a", spring), Candidate("a", spring)], setup)
     with pytest.raises(UsageError, match="0 seeds are too few"):
         evaluate([Candidate("a", spring)], setup, repeats=0)
-
-
-def test_policies_of_one_recipe_are_pooled(setup, robot):
-    result = evaluate(
-        [Candidate(f"p{i}", Spring(robot, push=30.0 + i), group="spring") for i in range(3)],
-        setup,
-        commands=[0.35],
-        repeats=1,
-        kinds=("fixed",),
-    ).evaluation
-    (group,) = result.groups
-    errors = [row.median_error_m for row in result.summary]
-    assert (group.group, group.policies) == ("spring", 3)
-    assert group.median_error_m == np.median(errors)
-    assert group.worst_abs_error_m == np.abs(errors).max()
-    assert min(errors) <= group.median_error_low_m <= group.median_error_high_m <= max(errors)

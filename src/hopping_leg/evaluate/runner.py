@@ -14,6 +14,7 @@ from hopping_leg.evaluate.result import Evaluation, Group, Summary
 from hopping_leg.evaluate.runs import FLOORS, Run, floor_robot, run_trials
 from hopping_leg.evaluate.tables import tabulate
 from hopping_leg.evaluate.trials import KINDS, Trial, check_reach, paper_trials, within
+from hopping_leg.robot.model import TIMESTEP
 
 Bounds = tuple[float, float]
 
@@ -75,7 +76,7 @@ def evaluate(
     _check(candidates, setup, commands, repeats)
     trials = [t for t in paper_trials(setup.robot, commands) if t.kind in kinds]
     world = replace(setup, robot=floor_robot(setup.robot, floor))
-    notes: list[str] = []
+    notes = _note_coarse(setup.timestep)
     runs: list[Run] = []
     for candidate in candidates:
         fitting = [t for t in trials if within(t, candidate.command_range)]
@@ -130,6 +131,15 @@ def _check_range(candidate: Candidate, fixed: Sequence[Trial], *, asked: bool) -
             f"'{candidate.label}' cannot be asked for {outside[0]:g} m: it was trained for"
             f" {bounds[0]:g} to {bounds[1]:g} m; choose --commands within that range."
         )
+
+
+def _note_coarse(timestep: float) -> list[str]:
+    if timestep <= TIMESTEP:
+        return []
+    return [
+        f"The physics step of {timestep:g} s is coarser than {TIMESTEP:g} s; heights may be"
+        " wrong by centimetres."
+    ]
 
 
 def _note_left_out(
