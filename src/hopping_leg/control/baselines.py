@@ -1,7 +1,7 @@
 """The energy shaping controllers that are shipped and compared."""
 
 from hopping_leg.control.energy_shaping import EnergyShaping
-from hopping_leg.control.gain_files import load_gains
+from hopping_leg.control.gain_files import TUNED, load_gains
 from hopping_leg.control.shaping_gains import (
     LITERAL,
     ROBUST,
@@ -14,11 +14,19 @@ from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import CONTROL_RATE
 
 
-def tuned_energy_shaping(robot: Robot, *, rate: float = CONTROL_RATE) -> EnergyShaping:
-    """Return the shipped baseline, its gains carried over to ``robot``."""
-    found = load_gains()
-    gains = scale_gains(found.gains, load_robot(found.robot), robot)
-    return EnergyShaping(robot, gains, ROBUST, rate=rate)
+def tuned_energy_shaping(
+    robot: Robot, *, rate: float = CONTROL_RATE, gains: str = TUNED
+) -> EnergyShaping:
+    """Return the baseline with a tuned set of gains, carried over to ``robot``.
+
+    Args:
+        robot: The leg.
+        rate: Control rate, Hz.
+        gains: Shipped name or path of a gain file.
+    """
+    found = load_gains(gains)
+    scaled = scale_gains(found.gains, load_robot(found.robot), robot)
+    return EnergyShaping(robot, scaled, ROBUST, rate=rate, name=gains)
 
 
 def paper_energy_shaping(

@@ -21,3 +21,22 @@ def foot_force_torque(robot: Robot, q: Array, push: Array, side: Array) -> Array
     force = np.stack(np.broadcast_arrays(push, side), axis=-1)
     torque: Array = np.einsum("nij,ni->nj", kinematics.jacobian(robot, q), force)
     return torque
+
+
+def leg_force(robot: Robot, q: Array, torque: Array) -> Array:
+    """Return the force along the leg that joint torques press with at rest, N, (n,).
+
+    The straight leg is singular; there the force of a slightly bent one is returned.
+
+    Args:
+        robot: The leg.
+        q: Joint positions, rad, (n, 2).
+        torque: At the joints, N m, (n, 2).
+    """
+    jacobian = kinematics.jacobian(robot, q)
+    (a, b), (c, d) = np.moveaxis(jacobian, 0, -1)
+    determinant = a * d - b * c
+    least = 0.1 * robot.thigh.length * robot.shank.length
+    bounded = np.where(determinant < 0, -1.0, 1.0) * np.maximum(np.abs(determinant), least)
+    force: Array = (d * torque[:, 0] - c * torque[:, 1]) / bounded
+    return force

@@ -1,4 +1,4 @@
-"""Touchdown from the leg's own motion: the ground pushes the leg together."""
+"""Touchdown without a sensor: the ground pushes the leg together, or the flight PD resists it."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ _MEMORY = 3
 
 
 class TouchdownDetector:
-    """Watches the leg rate beyond that of the planned retraction.
+    """Watches how the leg deviates from the planned retraction.
 
     Args:
         count: Number of legs n.
@@ -18,17 +18,26 @@ class TouchdownDetector:
     """
 
     def __init__(self, count: int, *, debounced: bool) -> None:
-        self._excess = np.zeros((_MEMORY if debounced else 1, count))
+        depth = _MEMORY if debounced else 1
+        self._excess = np.zeros((depth, count))
+        self._resisting = np.zeros((depth, count))
 
-    def update(self, rate: Array, planned_rate: Array, threshold: Gain) -> BoolArray:
-        """Return which legs are being pushed together, (n,).
+    def update(
+        self, excess: Array, force: Array, least_excess: Gain, least_force: Gain
+    ) -> BoolArray:
+        """Return which legs meet the ground, (n,).
+
+        A soft leg gives way, a stiff one resists: either tells.
 
         Args:
-            rate: Of the leg length, m/s, (n,).
-            planned_rate: What the retraction asks for, m/s, (n,).
-            threshold: Negative, m/s.
+            excess: Leg rate less the planned one, m/s, (n,).
+            force: With which the flight PD extends the leg, N, (n,).
+            least_excess: Threshold, negative, m/s.
+            least_force: Threshold, N.
         """
-        self._excess[1:] = self._excess[:-1].copy()
-        self._excess[0] = rate - planned_rate
-        pushed: BoolArray = np.median(self._excess, axis=0) < threshold
-        return pushed
+        for history, newest in ((self._excess, excess), (self._resisting, force)):
+            history[1:] = history[:-1].copy()
+            history[0] = newest
+        yields: BoolArray = np.median(self._excess, axis=0) < least_excess
+        resists: BoolArray = np.median(self._resisting, axis=0) > least_force
+        return yields | resists

@@ -9,7 +9,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.control import height_estimate, push
-from hopping_leg.control.cartesian import foot_force_torque
+from hopping_leg.control.cartesian import foot_force_torque, leg_force
 from hopping_leg.control.contact_detector import TouchdownDetector
 from hopping_leg.control.joint_observer import DatedObserver, LatestObserver
 from hopping_leg.control.leg_view import LegView, view_leg
@@ -103,13 +103,13 @@ class EnergyShaping:
         self._end_touchdown(leg, command)
         self._end_push(leg, liftoff)
         posture, posture_rate = self._posture(landing)
-        self._end_flight(leg, posture_rate, command)
+        flying = per_joint(gains.hip_stiffness, gains.knee_stiffness) * (posture - leg.q)
+        flying += per_joint(gains.hip_damping, gains.knee_damping) * (posture_rate - leg.qd)
+        self._end_flight(leg, posture_rate, flying, command)
         self._estimate_height(leg)
         pressing = foot_force_torque(
             self.robot, leg.q, self._force(leg, command, liftoff, landing), self._side(leg)
         )
-        flying = per_joint(gains.hip_stiffness, gains.knee_stiffness) * (posture - leg.q)
-        flying += per_joint(gains.hip_damping, gains.knee_damping) * (posture_rate - leg.qd)
         self._share, self._rate = self._pressing_share(leg, liftoff), leg.rate
         return flying + self._share[:, None] * (pressing - flying)
 
@@ -175,24 +175,33 @@ class EnergyShaping:
         self._highest = np.where(who, 0.0, self._highest)
         self._phases.enter(who, Phase.FLIGHT, since)
 
-    def _end_flight(self, leg: LegView, posture_rate: Array, command: Array) -> None:
+    def _end_flight(self, leg: LegView, posture_rate: Array, flying: Array, command: Array) -> None:
         gains, clock = self.gains, self._phases.clock
         along = kinematics.jacobian(self.robot, leg.q)[:, 0]
         planned = np.einsum("ni,ni->n", along, posture_rate)
-        pushed = self._detector.update(leg.rate, planned, gains.touchdown_rate)
+        pushed = self._detector.update(
+            leg.rate - planned,
+            leg_force(self.robot, leg.q, flying),
+            gains.touchdown_rate,
+            gains.touchdown_force,
+        )
         shortest = gains.flight_min + gains.flight_min_slope * (command - gains.reference)
         touched = pushed & (clock > shortest)
         if self.options.contact == "true":
             touched = (self._true().foot_clearance() <= 0) & (clock > _BLIND_TICKS * self.period)
         who = self._phases.are(Phase.FLIGHT) & (touched | (clock > FLIGHT_LIMIT))
         if who.any():
-            self._judge_hop(who, leg, command)
+            too_short = np.minimum(clock, shortest)
+            self._judge_hop(who, leg, command, np.where(touched, clock, too_short))
         self._phases.enter(who, Phase.TOUCHDOWN)
 
-    def _judge_hop(self, who: BoolArray, leg: LegView, command: Array) -> None:
-        """Estimate the apex that is over and correct k."""
+    def _judge_hop(self, who: BoolArray, leg: LegView, command: Array, airborne: Array) -> None:
+        """Estimate the apex that is over and correct k.
+
+        A touchdown that nobody noticed came before contact was believed: the hop was that short.
+        """
         gains, options = self.gains, self.options
-        airborne = np.maximum(self._phases.clock, self.period)
+        airborne = np.maximum(airborne, self.period)
         ballistic = height_estimate.ballistic_apex(self._liftoff_height, self._liftoff_rate)
         timed = height_estimate.flight_time_apex(self._liftoff_height, leg.stand, airborne)
         raw = {"ballistic": ballistic, "flight_time": timed, "true": self._highest}[options.height]

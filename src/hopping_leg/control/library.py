@@ -1,4 +1,4 @@
-"""Controllers by name: energy shaping, the shipped policies, or a user's policy file."""
+"""Controllers by name: energy shaping, the shipped policies, or a user's policy or gain file."""
 
 from importlib import resources
 from pathlib import Path
@@ -60,7 +60,8 @@ def load_controller(
     """Load a controller for a robot.
 
     Args:
-        name_or_path: One of ``controller_names()``, or the path of an ``.onnx`` file.
+        name_or_path: One of ``controller_names()``, or the path of an ``.onnx`` file or of a gain
+            file (``.toml``) for energy shaping.
         robot: The leg it shall drive.
         rate: Control rate, Hz.
         strict: Refuse a policy that was trained on another robot instead of logging a warning.
@@ -72,6 +73,8 @@ def load_controller(
     factory = _FACTORIES.get(str(name_or_path))
     if factory is not None:
         return factory(robot, rate=rate)
+    if str(name_or_path).endswith(".toml"):
+        return tuned_energy_shaping(robot, rate=rate, gains=str(name_or_path))
     policy = load_policy(name_or_path)
     policy.check_robot(robot, rate, strict=strict)
     return policy

@@ -9,8 +9,8 @@ from hopping_leg.arrays import Array, BoolArray
 PUSH_LIMIT = 0.4
 """Longest push, s: a leg that has not reached lift-off by then gives up and tries afresh."""
 
-FLIGHT_LIMIT = 0.7
-"""Longest flight, s: that of a drop from 0.6 m; beyond it, touchdown was missed."""
+FLIGHT_LIMIT = 0.5
+"""Longest flight, s: that of a jump by 0.3 m; beyond it, touchdown was missed."""
 
 BRAKE_LIMIT = 0.25
 """Longest touchdown, s: an overdamped leg creeps and its velocity never turns."""

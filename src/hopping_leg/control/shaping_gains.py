@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.parameters import Joint, Robot
 
 Gain = float | Array
 """One value for all legs or one per leg, (n,)."""
@@ -54,12 +54,14 @@ class ShapingGains:
     """In flight, N m/rad."""
     knee_damping: Gain = 0.074
     """In flight, N m s/rad."""
-    touchdown_stiffness: Gain = 100.0
+    touchdown_stiffness: Gain = 300.0
     """Along the leg, N/m."""
     touchdown_damping: Gain = 60.0
     """Along the leg, N s/m."""
     touchdown_rate: Gain = -0.39
     """Leg rate, less that of the retraction, that gives the ground away, m/s."""
+    touchdown_force: Gain = 1000.0
+    """Or so much force along the leg that the flight PD needs to keep it extended, N."""
     flight_min: Gain = 0.05
     """Contact is not believed earlier than this after lift-off, s."""
     flight_min_slope: Gain = 0.0
@@ -94,18 +96,30 @@ class ShapingOptions:
 LITERAL = ShapingOptions()
 """The paper's description."""
 
-TRUE_CONTACT = ShapingOptions(contact="true", liftoff="true", height="true")
+TRUE_CONTACT = ShapingOptions(contact="true", height="true")
 """The paper's description with perfect knowledge of contact and height."""
 
 ROBUST = ShapingOptions("dated", "debounced", "timed", "flight_time", "pushed")
 """The readings of the tuned controller."""
 
 _LENGTHS = ("liftoff_length", "landing_length", "height_offset", "reference")
-_FORCES = ("kp_y", "kd_y", "touchdown_stiffness", "touchdown_damping")
+_FORCES = (
+    "kp_y",
+    "kd_y",
+    "push_damping",
+    "touchdown_stiffness",
+    "touchdown_damping",
+    "touchdown_force",
+)
+_TIMES = ("retract_time", "flight_min", "push_rate", "touchdown_rate")
+_TIMES_PER_LENGTH = ("flight_min_slope", "push_rate_slope")
 
 
 def scale_gains(gains: ShapingGains, origin: Robot, robot: Robot) -> ShapingGains:
-    """Carry gains over to another leg: lengths by its size, forces by its mass, PD by inertia.
+    """Carry gains over to another leg.
+
+    Lengths grow with its size, forces with its mass, times and speeds with the root of its size
+    as those of a fall do, and the flight PD with its inertia, less what its joints damp anyway.
 
     Args:
         gains: Found for ``origin``.
@@ -116,10 +130,18 @@ def scale_gains(gains: ShapingGains, origin: Robot, robot: Robot) -> ShapingGain
     mass = robot.mass / origin.mass
     hip, knee = joint_inertia(robot) / joint_inertia(origin)
     factors = dict.fromkeys(_LENGTHS, size) | dict.fromkeys(_FORCES, mass)
-    factors |= {"hip_stiffness": hip, "hip_damping": hip}
-    factors |= {"knee_stiffness": knee, "knee_damping": knee}
+    factors |= dict.fromkeys(_TIMES, size**0.5) | dict.fromkeys(_TIMES_PER_LENGTH, size**-0.5)
+    factors |= {"k0_slope": 1 / size}
+    factors |= {"hip_stiffness": hip, "knee_stiffness": knee}
     scaled = {name: getattr(gains, name) * factor for name, factor in factors.items()}
+    scaled["hip_damping"] = _damping(gains.hip_damping, origin.hip, robot.hip, hip)
+    scaled["knee_damping"] = _damping(gains.knee_damping, origin.knee, robot.knee, knee)
     return dataclasses.replace(gains, **scaled)
+
+
+def _damping(gain: Gain, origin: Joint, joint: Joint, inertia: float) -> Array:
+    """Return the gain that makes the joint as damped as at its origin, N m s/rad."""
+    return np.maximum((gain + origin.damping) * inertia - joint.damping, 0.0)
 
 
 def joint_inertia(robot: Robot) -> Array:

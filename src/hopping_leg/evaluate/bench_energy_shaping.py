@@ -1,0 +1,243 @@
+"""How well energy shaping hops: the law as printed, the tuned one, and what each part is worth."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from hopping_leg.control import Setup, roll_out
+from hopping_leg.control.baselines import paper_energy_shaping, tuned_energy_shaping
+from hopping_leg.control.energy_shaping import EnergyShaping
+from hopping_leg.evaluate.estimator import APEX, apex_errors
+from hopping_leg.evaluate.metrics import Window, measure, pooled_apexes
+from hopping_leg.robot import Robot, load_robot
+from hopping_leg.sim import CONTROL_RATE, NOTHING, Disturbance
+from hopping_leg.trace import Trace
+
+COMMANDS = (0.25, 0.30, 0.35)
+"""The paper's heights, m."""
+
+RANGE = (0.22, 0.25, 0.28, 0.30, 0.32, 0.35, 0.38, 0.40)
+"""Heights over which the baseline is to hold, m."""
+
+FIRST_SEED = 1000
+"""Seeds from here on have tuned nothing."""
+
+COMMAND = "hop bench energy-shaping --json docs/results/energy_shaping.json"
+
+
+@dataclass(frozen=True)
+class Case:
+    """One row of the table.
+
+    Attributes:
+        name: Of the row.
+        controller: What hops.
+        robot: The leg it hops on, not always the one it knows.
+        disturbance: Noise and delay.
+        commands: Heights, m.
+    """
+
+    name: str
+    controller: EnergyShaping
+    robot: Robot
+    disturbance: Disturbance = Disturbance()
+    commands: Sequence[float] = COMMANDS
+
+
+def cases(robot: Robot) -> list[Case]:
+    """Return every case for a leg: laws, rates, disturbances, ablations, changed legs."""
+    tuned = tuned_energy_shaping(robot)
+    paper = paper_energy_shaping(robot)
+    knowing = paper_energy_shaping(robot, true_contact=True)
+    waiting = paper_energy_shaping(robot, true_contact=True)
+    waiting.options = replace(waiting.options, liftoff="true")
+    fast = 2 * CONTROL_RATE
+    return [
+        Case("tuned", tuned, robot, commands=RANGE),
+        Case("tuned, undisturbed", tuned, robot, NOTHING, RANGE),
+        Case("tuned, 400 Hz", tuned_energy_shaping(robot, rate=fast), robot),
+        Case("paper, true contact and height", knowing, robot, NOTHING),
+        Case("paper, true contact and height, disturbed", knowing, robot),
+        Case("paper, push until contact is lost", waiting, robot, NOTHING),
+        Case("paper", paper, robot),
+        Case("paper, undisturbed", paper, robot, NOTHING),
+        Case("paper, 400 Hz", paper_energy_shaping(robot, rate=fast), robot),
+        *_noise_shares(tuned, robot),
+        *_ablations(tuned, robot),
+        *_changed_legs(tuned, robot),
+    ]
+
+
+def _noise_shares(tuned: EnergyShaping, robot: Robot) -> list[Case]:
+    joint = replace(NOTHING, joint_noise=Disturbance.joint_noise)
+    torque = replace(NOTHING, torque_noise=Disturbance.torque_noise)
+    delay = replace(NOTHING, delay_probability=Disturbance.delay_probability)
+    return [
+        Case("tuned, joint noise only", tuned, robot, joint),
+        Case("tuned, torque noise only", tuned, robot, torque),
+        Case("tuned, delay only", tuned, robot, delay),
+    ]
+
+
+def _ablations(tuned: EnergyShaping, robot: Robot) -> list[Case]:
+    def without(name: str, gains: dict[str, float], **options: Any) -> Case:  # noqa: ANN401
+        changed = replace(tuned.gains, **gains), replace(tuned.options, **options)
+        return Case(f"tuned, {name}", EnergyShaping(robot, *changed), robot)
+
+    raw: dict[str, float] = {"height_offset": 0.0, "height_scale": 1.0}
+    return [
+        without("ballistic estimate", raw, height="ballistic"),
+        without("newest sample only", {}, state="latest"),
+        without("single-sample contact", {}, contact="rate"),
+        without("lift-off on whole periods", {}, liftoff="length"),
+        without("no pull to a leg rate", {"push_damping": 0.0}),
+        without("exponent 2", {"exponent": 2.0}),
+        without("exponent 1", {"exponent": 1.0}),
+    ]
+
+
+def _changed_legs(tuned: EnergyShaping, robot: Robot) -> list[Case]:
+    stiff = load_robot("legv2").contact
+    rail = robot.rail
+    other = load_robot("legv2")
+    return [
+        Case("tuned, 20 % more mass", tuned, _heavier(robot, 0.2)),
+        Case("tuned, 20 % less mass", tuned, _heavier(robot, -0.2)),
+        Case("tuned, stiff floor", tuned, replace(robot, contact=stiff)),
+        Case(
+            "tuned, three times the rail friction",
+            tuned,
+            replace(robot, rail=replace(rail, friction=3 * rail.friction)),
+        ),
+        Case("tuned, leg legv2", tuned_energy_shaping(other), other),
+    ]
+
+
+def _heavier(robot: Robot, share: float) -> Robot:
+    base = replace(robot.base, mass=robot.base.mass + share * robot.mass)
+    return replace(robot, base=base)
+
+
+def run(
+    seed: int = 0,
+    *,
+    runs: int = 8,
+    seconds: float = 15.0,
+    threads: int = 0,
+    on_case: Callable[[int, int], None] | None = None,
+) -> dict[str, Any]:
+    """Try every case on the leg the gains were found on.
+
+    Args:
+        seed: Counted from the first that has tuned nothing.
+        runs: Realisations of noise and delay per command.
+        seconds: Of a run, the first 2 s of which do not count.
+        threads: Physics threads, 0 for one per core.
+        on_case: Called with (cases done, cases in all).
+
+    Returns:
+        ``cases``, one record each; ``commands``, one record per case and command;
+        ``estimators``, errors of the apex estimates.
+    """
+    todo = cases(load_robot("legv2-paper"))
+    overall, single, estimators = [], [], []
+    for index, case in enumerate(todo):
+        traces = _hop(case, FIRST_SEED + seed, runs, seconds, threads)
+        rows = [
+            _row(case, c, [measure(t)[0] for t in traces[i * runs : (i + 1) * runs]])
+            for i, c in enumerate(case.commands)
+        ]
+        overall.append(_summary(case, rows))
+        single += rows
+        if case.name in ("tuned", "paper"):
+            estimators += _estimators(case, traces)
+        if on_case is not None:
+            on_case(index + 1, len(todo))
+    return {
+        "command": COMMAND,
+        "seed": FIRST_SEED + seed,
+        "runs_per_command": runs,
+        "seconds": seconds,
+        "cases": overall,
+        "commands": single,
+        "estimators": estimators,
+    }
+
+
+def _hop(case: Case, seed: int, runs: int, seconds: float, threads: int) -> list[Trace]:
+    """Return one trace per command and run, commands in the outer order."""
+    controller = case.controller
+    rate = 1 / controller.period
+    setup = Setup(case.robot, case.disturbance, rate=rate, threads=threads)
+    commands = np.tile(np.repeat(case.commands, runs), (round(seconds * rate), 1))
+
+    def show(legs: Any) -> None:  # noqa: ANN401
+        controller.truth = legs
+
+    needs_truth = "true" in (controller.options.contact, controller.options.height)
+    rollout = roll_out(controller, setup, commands, seed, on_legs=show if needs_truth else None)
+    return [rollout.trace(leg) for leg in range(commands.shape[1])]
+
+
+def _row(case: Case, command: float, windows: Sequence[Window]) -> dict[str, Any]:
+    apex = pooled_apexes(windows)
+    settled = sum(w.settled for w in windows)
+    return {
+        "case": case.name,
+        "command_m": command,
+        "median_m": float(np.median(apex)) if len(apex) else None,
+        "median_error_m": float(np.median(apex)) - command if len(apex) else None,
+        "std_m": float(np.std(apex)) if len(apex) else None,
+        "hops": len(apex),
+        "hop_rate_hz": len(apex) / settled,
+        "skipped_hops": sum(w.skipped for w in windows),
+        "flight_fraction": sum(w.flight for w in windows) / settled,
+        "min_base_height_m": min(w.min_height for w in windows),
+        "body_contacts": sum(w.base_contacts + w.knee_contacts for w in windows),
+    }
+
+
+def _summary(case: Case, rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Average over the paper's three commands."""
+    core = [row for row in rows if row["command_m"] in COMMANDS and row["hops"]]
+    errors = [abs(row["median_error_m"]) for row in core]
+    return {
+        "case": case.name,
+        "mean_abs_median_error_m": float(np.mean(errors)) if core else None,
+        "worst_median_error_m": max(errors) if core else None,
+        "mean_std_m": float(np.mean([row["std_m"] for row in core])) if core else None,
+        "hop_rate_hz": float(np.mean([row["hop_rate_hz"] for row in rows])),
+        "skipped_hops": sum(row["skipped_hops"] for row in rows),
+        "min_base_height_m": min(row["min_base_height_m"] for row in rows),
+        "body_contacts": sum(row["body_contacts"] for row in rows),
+    }
+
+
+def _estimators(case: Case, traces: Sequence[Trace]) -> list[dict[str, Any]]:
+    """Return the errors of the calibrated and of both raw apex estimates."""
+    columns = {
+        "as used": APEX,
+        "flight time": "flight_time_apex_m",
+        "ballistic": "ballistic_apex_m",
+    }
+    rows = []
+    for name, column in columns.items():
+        errors = np.concatenate([apex_errors(_estimating(t, column)) for t in traces])
+        rows.append(
+            {
+                "case": case.name,
+                "estimate": name,
+                "mean_m": float(np.mean(errors)),
+                "std_m": float(np.std(errors)),
+                "hops": len(errors),
+            }
+        )
+    return rows
+
+
+def _estimating(trace: Trace, column: str) -> Trace:
+    table = trace.table.with_columns(pl.col(column).alias(APEX))
+    return Trace(table, trace.header)
