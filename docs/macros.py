@@ -7,7 +7,6 @@ longer exists.
 
 import contextlib
 import dataclasses
-import importlib.util
 import io
 import json
 import os
@@ -150,7 +149,7 @@ MACROS = {
     "usage": usage,
     "example": example,
     "page": page,
-    "verbs": [v for v in cli.VERBS if importlib.util.find_spec(f"hopping_leg.cli.{v}")],
+    "verbs": list(cli.VERBS),
 }
 
 
