@@ -22,10 +22,7 @@ def transition(
         return np.array([value], dtype=float)
 
     return Transition(
-        height=row(height),
-        rate=row(rate),
-        q=row(q),
-        qd=row(qd),
+        state=row((height, *q, rate, *qd)),
         command=row(command),
         action=row(action),
         last_action=row(last),

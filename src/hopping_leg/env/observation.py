@@ -50,10 +50,9 @@ class Scaling:
 
     def normalise(self, samples: Array) -> Array32:
         """Return observations of samples (q1, q2, qd1, qd2, command), (n, 3, 5) to (n, 15)."""
-        result = np.empty((len(samples), SIZE), np.float32)
-        shifted = samples - self.offset
-        np.multiply(shifted, self.gain, out=result.reshape(samples.shape), casting="same_kind")
-        return result
+        centred = samples - self.offset
+        centred *= self.gain
+        return centred.reshape(-1, SIZE).astype(np.float32)
 
 
 def scaling(robot: Robot, options: TaskOptions) -> Scaling:

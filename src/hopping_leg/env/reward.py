@@ -44,6 +44,9 @@ _SHARPNESS = 10.0
 class PaperReward:
     """Five terms, each on the true state after the tick.
 
+    Between its limits Pjp is computed as 2 e^(-10 h) cosh(10 d) per joint, which is the printed sum
+    of exponentials; d is the distance from their middle and h half their span.
+
     Args:
         robot: Whose joint limits count.
         options: Weights and readings.
@@ -51,40 +54,46 @@ class PaperReward:
 
     def __init__(self, robot: Robot, options: PaperRewardOptions = PaperRewardOptions()) -> None:
         self.options = o = options
-        self._rest = o.rest_length + robot.foot.radius
         lower, upper = robot.of_joints("lower"), robot.of_joints("upper")
         half = (upper - lower) / 2
         self._steepness = 2 * np.exp(-_SHARPNESS * half)
+        self._surplus = self._steepness * np.cosh(_SHARPNESS * half) - 1
         limit = o.velocity_limit
         speed = robot.of_joints("no_load_speed") if limit is None else np.full(2, limit)
-        self._of_joints = (lower + upper) / 2, half, np.square(speed)
+        rest = o.rest_length + robot.foot.radius
         self._weights = np.array([o.energy, -o.height, -o.jerk, -o.position, -o.velocity])
-        self._fit(1)
+        self._origin_of_leg = np.array([rest, *(lower + upper) / 2, 0.0, 0.0, 0.0])
+        self._bound_of_leg = np.array([np.inf, *half, np.inf, *speed])
+        self._repeat(1)
 
-    def _fit(self, count: int) -> None:
+    def _repeat(self, count: int) -> None:
         """Repeat constants for every leg: numpy combines equal shapes in half the time."""
-        self._middle, self._half, self._speed_squared = (
-            np.tile(constant, (count, 1)) for constant in self._of_joints
-        )
+        self._origin = np.tile(self._origin_of_leg, (count, 1))
+        self._bound = np.tile(self._bound_of_leg, (count, 1))
 
     def __call__(self, transition: Transition) -> tuple[Array, dict[str, Array]]:
         """Return the weighted sum, (n,), and the five terms, each (n,)."""
-        t, count = transition, len(transition.height)
-        if len(self._middle) != count:
-            self._fit(count)
+        t, count = transition, len(transition.state)
+        if len(self._origin) != count:
+            self._repeat(count)
         terms = np.zeros((count, 5))
         energy, height, jerk, position, velocity = terms.T
-        np.add(np.square(t.rate), np.square(t.height - self._rest), out=energy)
+        offset = t.state - self._origin
+        square = offset * offset
+        np.add(square[:, 3], square[:, 0], out=energy)
         crossed = t.height >= t.command
         if np.count_nonzero(crossed):
             np.multiply(self._barrier(t.height - t.command), crossed, out=height)
         change = t.action - t.last_action
         np.vecdot(change, change, out=jerk)
-        self._position(t.q, out=position)
-        speed_squared = np.square(t.qd)
-        if np.count_nonzero(speed_squared > self._speed_squared):
-            over = np.maximum(speed_squared - self._speed_squared, 0.0)
-            np.add.reduce(over, axis=1, out=velocity)
+        size = np.abs(offset)
+        within = np.minimum(size, self._bound)
+        np.vecdot(np.cosh(_SHARPNESS * within[:, 1:3]), self._steepness, out=position)
+        outside = size > self._bound
+        if np.count_nonzero(outside):
+            position -= np.vecdot(outside[:, 1:3], self._surplus)
+            over = square - within * within
+            np.add(over[:, 4], over[:, 5], out=velocity)
         return np.vecdot(terms, self._weights), {
             "energy": energy,
             "height": height,
@@ -106,18 +115,3 @@ class PaperReward:
         if self.options.barrier == "printed":
             return 1 - growth
         return growth - 1 if self.options.barrier == "flipped" else growth
-
-    def _position(self, q: Array, out: Array) -> None:
-        """Write Pjp, (n,).
-
-        The printed sum of exponentials is 2 e^(-10 h) cosh(10 d) with d the distance from the
-        middle of the limits and h half their span.
-        """
-        distance = np.abs(q - self._middle)
-        near = np.cosh(_SHARPNESS * np.minimum(distance, self._half))
-        outside = distance > self._half
-        if np.count_nonzero(outside):
-            joints = np.where(outside, 1.0, near * self._steepness)
-            np.add.reduce(joints, axis=1, out=out)
-        else:
-            np.vecdot(near, self._steepness, out=out)

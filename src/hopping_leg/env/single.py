@@ -86,9 +86,9 @@ class HoppingEnv(gymnasium.Env[Array32, npt.NDArray[np.float32]]):
         )
 
     def _info(self, step: Step) -> dict[str, Any]:
-        info = {f"reward_{name}": values.item() for name, values in step.terms.items()}
-        info["base_height"] = step.height.item()
-        info["command"] = self.task.command.item()
+        info = {"base_height": step.height.item(), "command": self.task.command.item()}
+        for name, values in step.terms.items():
+            info["reward_" + name] = values.item()
         apex_height = step.apex_height.item()
         if not math.isnan(apex_height):
             info["apex_height"], info["apex_error"] = apex_height, step.apex_error.item()

@@ -130,7 +130,7 @@ class HoppingTask:
         apex, apex_height, apex_error = self._apexes(height_before)
         reward, terms = self.reward(
             Transition(
-                legs.height, legs.height_rate, legs.q, legs.qd, self.command, taken, self._last,
+                legs.state, self.command, taken, self._last,
                 apex, apex_height, legs.foot_clearance,
             )
         )  # fmt: skip

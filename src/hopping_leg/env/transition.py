@@ -12,14 +12,8 @@ class Transition(NamedTuple):
     The arrays are live: they change with the next tick, so keep copies.
     """
 
-    height: Array
-    """Base height x, m, (n,)."""
-    rate: Array
-    """Base velocity, m/s, (n,)."""
-    q: Array
-    """Joint positions, rad, (n, 2)."""
-    qd: Array
-    """Joint velocities, rad/s, (n, 2)."""
+    state: Array
+    """Base height, hip and knee angle, and their rates, m, rad, m/s, rad/s, (n, 6)."""
     command: Array
     """Desired height x^d in force during the tick, m, (n,)."""
     action: Array
@@ -32,6 +26,26 @@ class Transition(NamedTuple):
     """Height of that apex, else NaN, m, (n,)."""
     measure_clearance: Callable[[], Array]
     """Computes ``foot_clearance`` for the rewards that need it."""
+
+    @property
+    def height(self) -> Array:
+        """Base height x, m, (n,)."""
+        return self.state[:, 0]
+
+    @property
+    def rate(self) -> Array:
+        """Base velocity, m/s, (n,)."""
+        return self.state[:, 3]
+
+    @property
+    def q(self) -> Array:
+        """Joint positions, rad, (n, 2)."""
+        return self.state[:, 1:3]
+
+    @property
+    def qd(self) -> Array:
+        """Joint velocities, rad/s, (n, 2)."""
+        return self.state[:, 4:6]
 
     @property
     def foot_clearance(self) -> Array:

@@ -20,13 +20,13 @@ from hopping_leg.robot import Robot, build_model
 from hopping_leg.robot.kinematics import joint_angles
 from hopping_leg.sim import Legs
 
-_BENT, _STRETCHED = 0.5, 0.9
+_BENT, _STRETCHED = 0.55, 0.8
 """Leg lengths of the recorded motion over the straight leg's."""
 
 _PERIOD = 0.5
 """Of the recorded motion, s."""
 
-_STIFFNESS, _DAMPING = 60.0, 1.0
+_STIFFNESS, _DAMPING = 40.0, 1.0
 """Of its joints, N m/rad and N m s/rad."""
 
 

@@ -95,16 +95,18 @@ class SoftLimiter:
             q: Joint position, rad, (..., 2).
             qd: Joint velocity, rad/s, (..., 2).
         """
-        below = q < self._lower
-        outside = below | (q > self._upper)
-        if not np.count_nonzero(outside):
+        back = np.minimum(np.maximum(q, self._lower), self._upper) - q
+        if not np.count_nonzero(back):
             return torque
         soft = self.soft
-        target = np.where(below, self._lower + soft.inset, self._upper - soft.inset)
-        pull = soft.stiffness * (target - q) - soft.damping * qd
-        if not soft.replace:
-            pull += torque
-        return np.where(outside, pull, torque)
+        outside = back != 0
+        if soft.inset:
+            back += np.copysign(soft.inset, back)
+        pull = soft.stiffness * back - soft.damping * qd
+        if soft.replace:
+            return np.where(outside, pull, torque)
+        pull *= outside
+        return torque + pull
 
 
 def _per_leg(of_joints: Array, count: int | None) -> Array:

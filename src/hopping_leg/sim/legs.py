@@ -1,5 +1,6 @@
 """Many legs stepped at once on all cores."""
 
+import mujoco
 import numpy as np
 from mujoco import batch
 
@@ -30,8 +31,9 @@ def _substeps(rate: float, timestep: float) -> int:
 class Legs:
     """Simulations of one robot, advanced by one control period at a time.
 
-    ``height``, ``height_rate`` (n,), ``q`` and ``qd`` (n, 2) are live views of the true state in
-    m, m/s, rad and rad/s. Results do not depend on the number of threads.
+    ``state`` (n, 6) is a live view of the true state (x, q1, q2 and their rates), and so are its
+    parts ``height``, ``height_rate`` (n,), ``q`` and ``qd`` (n, 2), in m, m/s, rad and rad/s.
+    Results do not depend on the number of threads.
 
     Args:
         robot: The leg.
@@ -58,10 +60,11 @@ class Legs:
         self.period = 1 / rate
         self.substeps = substeps
         self.batch = batch.Batch(build_model(robot, timestep), count, threads)
-        self._qpos, self._qvel = self.batch.bind("qpos"), self.batch.bind("qvel")
         self._ctrl = self.batch.bind("ctrl")
-        self.height, self.height_rate = self._qpos[:, 0], self._qvel[:, 0]
-        self.q, self.qd = self._qpos[:, 1:], self._qvel[:, 1:]
+        first = mujoco.mj_stateSize(self.batch.model, mujoco.mjtState.mjSTATE_TIME)
+        self.state = self.batch.state[:, first : first + 6]
+        self.height, self.height_rate = self.state[:, 0], self.state[:, 3]
+        self.q, self.qd = self.state[:, 1:3], self.state[:, 4:6]
         self._motors = MotorLimit(robot, count)
         self._inverse_belt = np.tile(1 / robot.of_joints("belt_ratio"), (count, 1))
 
@@ -75,8 +78,8 @@ class Legs:
         """
         rows = np.arange(self.count)[ids]
         self.batch.reset(np.sort(rows), stage=0)
-        self._qpos[ids, 0] = height
-        self._qpos[ids, 1:] = q
+        self.height[ids] = height
+        self.q[ids] = q
 
     def stand(self, ids: IntArray | slice, q: Array, clearance: Array | float = 0.0) -> None:
         """Put legs at rest in a posture with the foot ``clearance`` above the ground, m, (k,)."""
