@@ -8,7 +8,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 WORKERS ?= auto
 ARGS ?=
 
-.PHONY: help install reproduce test test-fast check format lint types docs wheel lock clean
+.PHONY: help install reproduce test test-fast check format lint types docs wheel results lock clean
 
 help:
 	@echo "make reproduce   install, train from scratch, evaluate, compare, report (about 10 minutes)"
@@ -45,6 +45,15 @@ test: $(STAMP)
 
 test-fast: $(STAMP)
 	$(BIN)/pytest -q -n $(WORKERS) -m 'not slow' $(ARGS)
+
+# Every number and figure of docs/results.md; takes long, and only an idle machine gives fair timings.
+results: $(STAMP)
+	$(BIN)/hop evaluate fast paper energy-shaping energy-shaping-literal --seeds 10 --no-video \
+	  --json docs/results/evaluation.json --traces runs/results/traces
+	$(BIN)/hop plot runs/results/traces/*.parquet --out docs/results/figures
+	$(BIN)/hop bench env --json docs/results/env.json
+	$(BIN)/hop bench inference --json docs/results/inference.json
+	$(BIN)/hop bench convergence --json docs/results/convergence.json
 
 check: lint types docs wheel
 

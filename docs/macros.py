@@ -10,6 +10,7 @@ import dataclasses
 import io
 import json
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from hopping_leg.robot import load_robot
 from hopping_leg.robot.files import load_tree
 
 RESULTS = Path(__file__).parent / "results"
+MAKEFILE = Path(__file__).parent.parent / "Makefile"
 EXAMPLES = Path(__file__).parent.parent / "examples"
 
 
@@ -42,10 +44,14 @@ class Column:
 
     def cell(self, row: dict[str, Any]) -> str:
         """Return this column of a row as text."""
-        value = row[self.key]
-        if self.factor is not None and value is not None:
-            value = value * self.factor
-        return number(value)
+        return number(scaled(row[self.key], self.factor))
+
+
+def scaled(value: Any, factor: float | None) -> Any:  # noqa: ANN401
+    """Return a number, or each of a list, times a factor."""
+    if factor is None or value is None:
+        return value
+    return [entry * factor for entry in value] if isinstance(value, list) else value * factor
 
 
 def number(value: Any) -> str:  # noqa: ANN401
@@ -73,10 +79,9 @@ def pick(tree: Any, path: str) -> Any:  # noqa: ANN401
     return tree
 
 
-def value(file: str, path: str, factor: float = 1.0) -> str:
+def value(file: str, path: str, factor: float | None = None) -> str:
     """Return one number of a results file, times a factor."""
-    found = pick(read(file), path)
-    return number(found * factor if isinstance(found, float) and factor != 1.0 else found)
+    return number(scaled(pick(read(file), path), factor))
 
 
 def table(file: str, path: str, *columns: str, **where: Any) -> str:  # noqa: ANN401
@@ -97,11 +102,57 @@ def table(file: str, path: str, *columns: str, **where: Any) -> str:  # noqa: AN
     return grid([column.title for column in shown], cells) + origin(file, content)
 
 
+def entries(file: str) -> str:
+    """Return every number of a results file with its path; lists of records are tables."""
+    content = read(file)
+    return "\n\n".join(_parts(content, "")) + origin(file, content)
+
+
+def _parts(tree: dict[str, Any], prefix: str) -> list[str]:
+    plain = [[f"`{prefix}{k}`", number(v)] for k, v in tree.items() if not _is_nested(v)]
+    parts = [grid(["name", "value"], plain)] if plain else []
+    for key, entry in tree.items():
+        if isinstance(entry, dict):
+            parts += _parts(entry, f"{prefix}{key}.")
+        elif _is_nested(entry):
+            columns = [Column.parse(name) for name in entry[0]]
+            rows = [[column.cell(row) for column in columns] for row in entry]
+            parts += [f"`{prefix}{key}`:", grid([column.title for column in columns], rows)]
+    return parts
+
+
+def _is_nested(entry: Any) -> bool:  # noqa: ANN401
+    records = isinstance(entry, list) and bool(entry) and isinstance(entry[0], dict)
+    return isinstance(entry, dict) or records
+
+
+def exists(file: str) -> bool:
+    """Tell whether a results file has been measured."""
+    return (RESULTS / file).is_file()
+
+
+def pictures() -> list[str]:
+    """Return the names of all figures that ``hop plot`` left in docs/results/figures."""
+    return sorted(path.name for path in (RESULTS / "figures").glob("*.svg"))
+
+
 def origin(file: str, content: Any) -> str:  # noqa: ANN401
     """Return the line under a table that says where it comes from."""
     command = content.get("command") if isinstance(content, dict) else None
+    command = command or commands().get(file)
     made = f", made by `{command}`" if command else ""
     return f"\n\nFrom [`{file}`](results/{file}){made}.\n"
+
+
+def commands() -> dict[str, str]:
+    """Return the command behind each results file, as ``make results`` runs it."""
+    text = MAKEFILE.read_text(encoding="utf-8").replace("\\\n", " ")
+    found = {}
+    for line in text.splitlines():
+        target = re.search(r"--json docs/results/(\S+)", line)
+        if target:
+            found[target[1]] = " ".join(line.replace("$(BIN)/", "").split())
+    return found
 
 
 def grid(titles: list[str], rows: list[list[str]]) -> str:
@@ -149,6 +200,10 @@ MACROS = {
     "usage": usage,
     "example": example,
     "page": page,
+    "commands": commands(),
+    "entries": entries,
+    "exists": exists,
+    "pictures": pictures,
     "verbs": list(cli.VERBS),
 }
 
