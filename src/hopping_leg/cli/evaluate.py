@@ -86,10 +86,10 @@ def run(args: Evaluate) -> None:
     candidates = load_candidates(args.controllers, robot, args.rate)
     judged = judge(candidates, setup, args)
     judged = replace(judged, evaluation=replace(judged.evaluation, command=command))
-    console = Console()
-    print_tables(console, judged.evaluation)
     if args.json:
         write_atomically(args.json, judged.evaluation.dumps())
+    console = Console()
+    print_tables(console, judged.evaluation)
     if args.traces:
         save_traces(judged.runs, args.traces)
     if args.report:
