@@ -4,6 +4,7 @@ Examples:
   hop bench env --json env.json
   hop bench convergence --json convergence.json
   hop bench inference fast --json inference.json
+  hop bench energy-shaping --json energy_shaping.json
 """
 
 from dataclasses import dataclass
@@ -73,10 +74,28 @@ class Inference:
     """Write every number to this file."""
 
 
-def run(args: Env | Convergence | Inference) -> None:
+@dataclass(frozen=True)
+class EnergyShaping:
+    """Judge energy shaping: the printed law, the tuned one, what each part is worth."""
+
+    runs: int = 6
+    """Realisations of noise and delay per command."""
+    duration: float = 12.0
+    """Of a run, s; the first 2 s do not count."""
+    seed: int = 0
+    """Of noise and delay; no seed of the benchmark has tuned anything."""
+    threads: int = 0
+    """Threads of the physics, 0 for all cores; results do not depend on it."""
+    json: Path | None = None
+    """Write every number to this file."""
+
+
+def run(args: Env | Convergence | Inference | EnergyShaping) -> None:
     """Run one benchmark, print its numbers, write the JSON."""
     if isinstance(args, Env):
         result = _env(args)
+    elif isinstance(args, EnergyShaping):
+        result = _energy_shaping(args)
     elif isinstance(args, Convergence):
         result = _convergence(args)
     else:
@@ -134,6 +153,36 @@ def _convergence(args: Convergence) -> dict[str, Any]:
             study, lambda done, total: bar.update(task, completed=done, total=total)
         )
     _print_convergence(result)
+    return result
+
+
+def _energy_shaping(args: EnergyShaping) -> dict[str, Any]:
+    from hopping_leg.evaluate import bench_energy_shaping
+
+    _at_least(1, runs=args.runs)
+    _at_least(0, threads=args.threads, seed=args.seed)
+    if not 4 <= args.duration <= 600:
+        raise UsageError(f"--duration is {args.duration} s but must lie between 4 and 600 s.")
+    with Progress(transient=True) as bar:
+        task = bar.add_task("hopping", total=None)
+        result = bench_energy_shaping.run(
+            args.seed,
+            runs=args.runs,
+            seconds=args.duration,
+            threads=args.threads,
+            on_case=lambda done, total: bar.update(task, completed=done, total=total),
+        )
+    table = Table("case", "median error, mm", "std, mm", "hops/s", "skipped", "body contacts")
+    for row in result["cases"]:
+        sizes = [row["mean_abs_median_error_m"], row["mean_std_m"]]
+        numbers = ["-" if x is None else f"{1e3 * x:.1f}" for x in sizes]
+        numbers += [
+            f"{row['hop_rate_hz']:.2f}",
+            f"{row['skipped_hops']}",
+            f"{row['body_contacts']}",
+        ]
+        table.add_row(row["case"], *numbers)
+    Console().print(table)
     return result
 
 

@@ -1,5 +1,6 @@
 """Controllers by name: energy shaping, the shipped policies, or a user's policy or gain file."""
 
+from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 
@@ -16,7 +17,7 @@ ENERGY_SHAPING = "energy-shaping"
 ENERGY_SHAPING_LITERAL = "energy-shaping-literal"
 """The paper's law and gains as printed."""
 
-_FACTORIES = {
+_FACTORIES: dict[str, Callable[..., Controller]] = {
     ENERGY_SHAPING: tuned_energy_shaping,
     ENERGY_SHAPING_LITERAL: paper_energy_shaping,
 }

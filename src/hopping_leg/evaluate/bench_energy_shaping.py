@@ -124,8 +124,8 @@ def _heavier(robot: Robot, share: float) -> Robot:
 def run(
     seed: int = 0,
     *,
-    runs: int = 8,
-    seconds: float = 15.0,
+    runs: int = 6,
+    seconds: float = 12.0,
     threads: int = 0,
     on_case: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.gain_space import from_unit, to_unit
 from hopping_leg.evaluate.hop_cost import CommandScore, calibrated, cost, score
 from hopping_leg.robot import Robot, load_robot
+from hopping_leg.trace import write_atomically
 
 COMMANDS = (0.22, 0.25, 0.30, 0.35, 0.40)
 """Heights that a candidate is tried at, m."""
@@ -201,10 +202,11 @@ def _score_command(rollout: Rollout, command: float, first: int) -> CommandScore
 
 
 def _read_log(log: Path, options: Search, seed: int) -> list[list[float]]:
+    """Return the costs of finished generations; a line cut short by a kill is dropped."""
     if not log.is_file():
         return []
-    known = []
-    for line in log.read_text(encoding="utf-8").splitlines():
+    lines, known = log.read_text(encoding="utf-8").splitlines(), []
+    for line in lines:
         try:
             entry = json.loads(line)
         except json.JSONDecodeError:
@@ -215,6 +217,7 @@ def _read_log(log: Path, options: Search, seed: int) -> list[list[float]]:
                 f" {len(entry['costs'])}; repeat with those or choose another --out."
             )
         known.append([float(c) for c in entry["costs"]])
+    write_atomically(log, "".join(f"{line}\n" for line in lines[: len(known)]).encode())
     return known
 
 

@@ -1,0 +1,84 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hopping_leg.control import Setup
+from hopping_leg.control.gain_files import load_gains
+from hopping_leg.errors import UsageError
+from hopping_leg.evaluate import tune_energy_shaping
+from hopping_leg.evaluate.gain_space import SPACE, from_unit, to_unit
+from hopping_leg.evaluate.hop_cost import CommandScore, calibrated, cost
+from hopping_leg.evaluate.tune_energy_shaping import Search, evaluate, search
+from hopping_leg.robot import load_robot
+
+GAINS = load_gains().gains
+SETUP = Setup(load_robot("legv2-paper"), threads=1)
+
+
+def scores(shift=0.0, scale=1.0, **changed):
+    return [
+        replace(CommandScore(c, 0.3 + shift + scale * (c - 0.3), 0.002, 2.0, 0.03, 0.08), **changed)
+        for c in tune_energy_shaping.COMMANDS
+    ]
+
+
+def fake_evaluate(candidates, setup, seconds, seed):
+    return [scores(std=abs(g.exponent - 1.0) + 0.001) for g in candidates]
+
+
+def quiet(done, lowest):
+    pass
+
+
+def test_unit_cube_round_trip():
+    point = np.linspace(0.1, 0.9, len(SPACE))
+    np.testing.assert_allclose(to_unit(from_unit(point, GAINS)), point)
+
+
+def test_shipped_gains_lie_in_the_box():
+    np.testing.assert_allclose(
+        [getattr(from_unit(to_unit(GAINS), GAINS), n) for n in SPACE],
+        [getattr(GAINS, n) for n in SPACE],
+    )
+
+
+def test_cost_ignores_what_calibration_removes_and_counts_the_rest():
+    assert cost(scores(shift=0.02, scale=0.9)) == pytest.approx(cost(scores()))
+    assert cost(scores(std=0.010)) > cost(scores()) + 7
+    assert cost(scores(rate=0.5)) > cost(scores()) + 7
+    assert cost(scores(knee_clearance=-0.01)) > cost(scores()) + 7
+    assert cost(scores(median=float("nan"))) > 100
+
+
+def test_calibration_moves_the_estimate_by_what_the_medians_missed():
+    found = calibrated(GAINS, scores(shift=0.01, scale=1.1))
+    assert found.height_scale == pytest.approx(1.1 * GAINS.height_scale)
+    assert found.height_offset == pytest.approx(0.01 + 1.1 * GAINS.height_offset)
+
+
+def test_search_goes_down_and_resumes_without_simulating(tmp_path, monkeypatch):
+    monkeypatch.setattr(tune_energy_shaping, "evaluate", fake_evaluate)
+    start, log = replace(GAINS, exponent=1.9), tmp_path / "log.jsonl"
+    found = search(start, SETUP, Search(generations=15), 3, log, quiet)
+    assert abs(found.exponent - 1.0) < 0.3
+    lines = log.read_text().splitlines()
+    log.write_text("\n".join(lines[:7]) + "\n" + lines[7][:20])
+    again = search(start, SETUP, Search(generations=15), 3, log, quiet)
+    assert again == found
+    monkeypatch.setattr(tune_energy_shaping, "evaluate", None)
+    assert search(start, SETUP, Search(generations=15), 3, log, quiet) == found
+
+
+def test_log_of_another_search_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(tune_energy_shaping, "evaluate", fake_evaluate)
+    log = tmp_path / "log.jsonl"
+    search(GAINS, SETUP, Search(generations=1), 3, log, quiet)
+    with pytest.raises(UsageError, match="seed 3"):
+        search(GAINS, SETUP, Search(generations=1), 4, log, quiet)
+
+
+def test_candidates_are_judged_side_by_side():
+    useless = replace(GAINS, k0=0.3, exponent=0.0)
+    good, bad = evaluate([GAINS, useless], SETUP, 3.5, 0)
+    assert cost(good) < cost(bad)
