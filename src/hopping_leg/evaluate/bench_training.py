@@ -1,0 +1,114 @@
+"""From scratch to accurate hopping: how long a recipe takes, over training seeds.
+
+Training chooses its snapshots on its own seeds; every snapshot is judged here once more on seeds
+that chose nothing, so that the curve is what a user gets who stops early.
+"""
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hopping_leg.control import Setup
+from hopping_leg.control.policy import Policy
+from hopping_leg.evaluate.runner import Candidate, evaluate, software_versions
+from hopping_leg.learn.recipe import Recipe
+from hopping_leg.learn.train import train
+from hopping_leg.robot.parameters import Robot
+
+JUDGING_SEED = 1000
+"""First of the evaluation seeds."""
+
+
+def bench_training(
+    recipe: Recipe,
+    robot: Robot,
+    out: Path,
+    *,
+    training_seeds: Sequence[int] = (0, 1, 2),
+    evaluation_seeds: int = 5,
+    threads: int = 2,
+    on_progress: Callable[[str], None] = lambda _note: None,
+) -> dict[str, Any]:
+    """Train from scratch with several seeds and judge every snapshot and every selected policy.
+
+    A run that is already complete in ``out`` is not trained again; one that was killed goes on.
+
+    Args:
+        recipe: What to train.
+        robot: The leg.
+        out: Folder of the runs, one per training seed.
+        training_seeds: Of the trainings.
+        evaluation_seeds: Realisations of noise and delay per command.
+        threads: Of torch and physics.
+        on_progress: Called with a sentence on what begins.
+
+    Returns:
+        Per training seed: minutes, the selected policy's summary rows, and the curve of
+        (minutes, worst and mean |median error| over commands) of all snapshots.
+    """
+    runs = []
+    for seed in training_seeds:
+        folder = out / f"{recipe.name}-seed{seed}"
+        on_progress(f"training {recipe.name} with seed {seed}")
+        if not (folder / "policy.onnx").exists():
+            train(recipe, robot, seed, folder, resume=folder.exists(), threads=threads)
+        result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+        on_progress(f"judging {recipe.name} with seed {seed}")
+        content = (folder / "policy.onnx").read_bytes()
+        selected = _judge({"selected": content}, robot, evaluation_seeds)
+        snapshots = {f.stem: f.read_bytes() for f in sorted((folder / "snapshots").glob("*.onnx"))}
+        rows = _judge(snapshots, robot, evaluation_seeds)
+        minutes = {f"{row['steps']:012d}": row["minutes"] for row in result["history"]}
+        runs.append(
+            {
+                "seed": seed,
+                "minutes": result["minutes"],
+                "steps": result["steps"],
+                "selected": selected,
+                "curve": [
+                    {"steps": int(name), "minutes": minutes[name], **_errors(rows, name)}
+                    for name in snapshots
+                ],
+            }
+        )
+    return {
+        "recipe": recipe.name,
+        "robot": robot.name,
+        "threads": threads,
+        "evaluation_seed": JUDGING_SEED,
+        "evaluation_seeds": evaluation_seeds,
+        "runs": runs,
+        "minutes_max": max(run["minutes"] for run in runs),
+        "worst_abs_median_error_m": max(
+            abs(row["median_error_m"]) for run in runs for row in run["selected"]
+        ),
+        "versions": software_versions(),
+    }
+
+
+def _judge(policies: dict[str, bytes], robot: Robot, seeds: int) -> list[dict[str, Any]]:
+    candidates = []
+    for label, content in policies.items():
+        policy = Policy(content, label, label)
+        bounds = (policy.card.command_low, policy.card.command_high)
+        candidates.append(Candidate(label, policy, bounds))
+    judged = evaluate(candidates, Setup(robot), repeats=seeds, seed=JUDGING_SEED, kinds=("fixed",))
+    rows: list[dict[str, Any]] = judged.evaluation.to_json()["summary"]
+    return rows
+
+
+def _errors(rows: list[dict[str, Any]], label: str) -> dict[str, float | None]:
+    """Return how far off a policy's hops are; null where it does not hop at some command."""
+    mine = [row for row in rows if row["controller"] == label]
+    errors = [row["median_error_m"] for row in mine]
+    spreads = [row["std_m"] for row in mine]
+    if any(error is None for error in errors):
+        return {"worst_abs_median_error_m": None, "mean_abs_median_error_m": None, "std_m": None}
+    return {
+        "worst_abs_median_error_m": float(np.max(np.abs(errors))),
+        "mean_abs_median_error_m": float(np.mean(np.abs(errors))),
+        "std_m": float(np.mean(spreads)),
+    }
