@@ -52,7 +52,7 @@ def test_rewards_are_explained_in_info():
     assert info["base_height"] == pytest.approx(0.21)
     _, reward, _, _, info = env.step(np.zeros(2, np.float32))
     weights = {"energy": 0.5, "height": -2, "jerk": -0.05, "position": -0.02, "velocity": -0.005}
-    total = sum(weight * info[f"reward_{name}"] for name, weight in weights.items())
+    total = sum(weight * info["reward_terms"][name] for name, weight in weights.items())
     assert reward == pytest.approx(total)
 
 

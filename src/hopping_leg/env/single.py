@@ -28,8 +28,8 @@ class HoppingEnv(gymnasium.Env[Array32, npt.NDArray[np.float32]]):
     """One leg hopping to commanded heights, ``HoppingLeg-v0``.
 
     A thin view of a ``HoppingTask`` with one leg. ``info`` holds ``base_height`` and ``command``,
-    m, the reward's unweighted terms as ``reward_<term>``, and, in a step that passes an in-flight
-    apex, ``apex_height`` and ``apex_error`` (its height above the command), m.
+    m, ``reward_terms``, the reward's unweighted terms by name, and, in a step that passes an
+    in-flight apex, ``apex_height`` and ``apex_error`` (its height above the command), m.
 
     Args:
         robot: The leg, or its name, or the path of its TOML file.
@@ -86,9 +86,11 @@ class HoppingEnv(gymnasium.Env[Array32, npt.NDArray[np.float32]]):
         )
 
     def _info(self, step: Step) -> dict[str, Any]:
-        info = {"base_height": step.height.item(), "command": self.task.command.item()}
-        for name, values in step.terms.items():
-            info["reward_" + name] = values.item()
+        info: dict[str, Any] = {
+            "base_height": step.height.item(),
+            "command": self.task.command.item(),
+            "reward_terms": {name: values.item() for name, values in step.terms.items()},
+        }
         apex_height = step.apex_height.item()
         if not math.isnan(apex_height):
             info["apex_height"], info["apex_error"] = apex_height, step.apex_error.item()

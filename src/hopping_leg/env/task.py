@@ -122,7 +122,7 @@ class HoppingTask:
             action: Hip and knee torque over ``action_torque``, clipped to [-1, 1], (n, 2).
         """
         legs = self.legs
-        taken = np.array(action, np.float64)
+        taken = action.astype(np.float64)
         np.maximum(taken, self._lowest, out=taken)
         np.minimum(taken, self._highest, out=taken)
         height_before = legs.height.copy()
