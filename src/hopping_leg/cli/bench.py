@@ -4,10 +4,11 @@ Examples:
   hop bench env --json env.json
   hop bench convergence --json convergence.json
   hop bench inference fast --json inference.json
+  hop bench training --training-seeds 0 1 2 --json training.json
   hop bench energy-shaping --json energy_shaping.json
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -90,7 +91,29 @@ class EnergyShaping:
     """Write every number to this file."""
 
 
-def run(args: Env | Convergence | Inference | EnergyShaping) -> None:
+@dataclass(frozen=True)
+class Training:
+    """Train a recipe from scratch with several seeds; judge every snapshot on other seeds."""
+
+    recipe: str = "fast"
+    """As for ``hop train``."""
+    robot: str = "legv2-paper"
+    """A shipped name or the path of a .toml file."""
+    training_seeds: tuple[int, ...] = (0, 1, 2)
+    """One training each."""
+    evaluation_seeds: int = 5
+    """Realisations of noise and delay per command."""
+    steps: int | None = None
+    """Control steps of experience instead of the recipe's."""
+    threads: int = 2
+    """Of torch and physics."""
+    out: Path = Path("runs/bench-training")
+    """Where the trainings are kept; finished ones are not repeated, killed ones go on."""
+    json: Path | None = None
+    """Write every number to this file."""
+
+
+def run(args: Env | Convergence | Inference | EnergyShaping | Training) -> None:
     """Run one benchmark, print its numbers, write the JSON."""
     if isinstance(args, Env):
         result = _env(args)
@@ -98,6 +121,8 @@ def run(args: Env | Convergence | Inference | EnergyShaping) -> None:
         result = _energy_shaping(args)
     elif isinstance(args, Convergence):
         result = _convergence(args)
+    elif isinstance(args, Training):
+        result = _training(args)
     else:
         result = _inference(args)
     if args.json is not None:
@@ -197,6 +222,41 @@ def _inference(args: Inference) -> dict[str, Any]:
         cells = [f"{row[name]:.1f}" for name in (*times, "controller_p99_us")]
         table.add_row(row["policy"], *cells)
     Console().print(table)
+    return result
+
+
+def _training(args: Training) -> dict[str, Any]:
+    from hopping_leg.evaluate.bench_training import bench_training
+    from hopping_leg.learn.recipes import get_recipe
+
+    _at_least(1, evaluation_seeds=args.evaluation_seeds, threads=args.threads)
+    if not args.training_seeds:
+        raise UsageError("--training-seeds names no seed; give e.g. --training-seeds 0 1 2.")
+    recipe = get_recipe(args.recipe)
+    if args.steps is not None:
+        recipe = replace(recipe, steps=args.steps)
+    console = Console()
+    result = bench_training(
+        recipe,
+        load_robot(args.robot),
+        args.out,
+        training_seeds=args.training_seeds,
+        evaluation_seeds=args.evaluation_seeds,
+        threads=args.threads,
+        on_progress=console.print,
+    )
+    table = Table("seed", "minutes", "command, m", "median error, mm", "std, mm", "skipped")
+    for training in result["runs"]:
+        for row in training["selected"]:
+            table.add_row(
+                str(training["seed"]),
+                f"{training['minutes']:.1f}",
+                f"{row['command_m']:.2f}",
+                _mm(row["median_error_m"]),
+                _mm(row["std_m"]),
+                str(row["skipped_hops"]),
+            )
+    console.print(table)
     return result
 
 
