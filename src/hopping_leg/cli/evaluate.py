@@ -12,7 +12,6 @@ Examples:
 """
 
 import dataclasses
-import math
 import shlex
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -20,18 +19,18 @@ from pathlib import Path
 from typing import Literal
 
 import tyro
-from rich import box
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from rich.table import Table
 
 from hopping_leg.cli.options import Heights
 from hopping_leg.control import Setup
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate import Candidate, Evaluation, Judged, evaluate
+from hopping_leg.evaluate import Candidate, Judged, evaluate
 from hopping_leg.evaluate.candidates import load_candidates
 from hopping_leg.evaluate.report import render_videos, write_report
 from hopping_leg.evaluate.runs import save_traces
+from hopping_leg.evaluate.terminal import print_tables
+from hopping_leg.evaluate.trials import KINDS
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import CONTROL_RATE, NOTHING, Disturbance
 from hopping_leg.trace import write_atomically
@@ -160,7 +159,7 @@ def _on_floor(
         repeats=args.seeds,
         seed=args.seed,
         floor=floor,
-        kinds=("fixed", "sequence", "staircase", "ladder") if whole else ("fixed",),
+        kinds=KINDS if whole else ("fixed",),
         on_progress=_bar_updater(bar, floor),
     )
 
@@ -189,61 +188,3 @@ def _bar_updater(bar: Progress, floor: str) -> Callable[[str, float], None]:
             tasks[label] = (task, share)
 
     return update
-
-
-def print_tables(console: Console, evaluation: Evaluation) -> None:
-    """Print the summary, what it was measured on, and notes."""
-    console.print(summary_table(evaluation))
-    if evaluation.secondary:
-        console.print(summary_table(evaluation.secondary))
-    for step in evaluation.staircase:
-        verdict = "rises at every step" if step.monotone else "does not rise at every step"
-        console.print(
-            f"Staircase, {step.controller}: {verdict}"
-            f" ({step.monotone_runs} of {step.runs} runs on their own),"
-            f" {step.skipped_hops} skipped hops.",
-            highlight=False,
-        )
-    for note in evaluation.notes:
-        console.print(f"Note: {note}", highlight=False)
-
-
-def _millimetres(value: float, form: str) -> str:
-    return f"{1e3 * value:{form}}" if math.isfinite(value) else "-"
-
-
-def _seeds(count: int) -> str:
-    return f"{count} seed{'' if count == 1 else 's'}"
-
-
-_HEADINGS = ("cmd", "error", "std", "hops", "skip", "1/s", "flight", "base", "hits")
-
-
-def summary_table(evaluation: Evaluation) -> Table:
-    """Return the summary as a table for the terminal; lengths in mm."""
-    conditions = evaluation.conditions
-    table = Table(
-        title=f"{conditions['robot']}, {conditions['floor']} floor, {_seeds(conditions['seeds'])}"
-        f" from {conditions['seed']}; heights in mm",
-        caption="error: median of apex - command; skip: skipped hops; 1/s: hop rate;\n"
-        "base: lowest height over whole runs; hits: contacts of base or knee with the ground",
-        box=box.SIMPLE_HEAD,
-        padding=0,
-    )
-    table.add_column("controller", overflow="fold", min_width=22)
-    for heading in _HEADINGS:
-        table.add_column(heading, justify="right", no_wrap=True)
-    for row in evaluation.summary:
-        table.add_row(
-            row.controller,
-            f"{1e3 * row.command_m:.0f}",
-            _millimetres(row.median_error_m, "+.1f"),
-            _millimetres(row.std_m, ".1f"),
-            f"{row.hops}",
-            f"{row.skipped_hops}",
-            f"{row.hop_rate_hz:.2f}",
-            f"{100 * row.flight_fraction:.0f} %",
-            f"{1e3 * row.min_base_height_m:.0f}",
-            f"{row.body_contacts}",
-        )
-    return table
