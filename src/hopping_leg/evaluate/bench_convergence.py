@@ -60,20 +60,19 @@ def bench_convergence(
     """Compare all steps with the reference.
 
     Returns:
-        ``rows``, one per robot and step, and ``largest_step_for_judging_s`` and
+        ``rows``, one per robot, step and controller, and ``largest_step_for_judging_s`` and
         ``largest_step_for_training_s``: the coarsest steps from which on no median apex of any
         robot shifts by more than ``JUDGING`` and ``TRAINING``.
     """
     rows: list[dict[str, Any]] = []
-    total = len(study.robots) * (len(study.steps) + 1)
+    total, done = len(study.robots) * len(study.steps), 0
     for robot in study.robots:
         fine = _motions(study, robot, study.reference)
         for step in study.steps:
-            rows.append(
-                {"robot": robot.name, "timestep_s": step, **_errors(study, robot, step, fine)}
-            )
+            rows += _rows(study, robot, step, fine)
+            done += 1
             if on_done is not None:
-                on_done(len(rows), total)
+                on_done(done, total)
     return {
         "reference_timestep_s": study.reference,
         "rows": rows,
@@ -186,35 +185,36 @@ def _held(
     return heights
 
 
-def _errors(study: ConvergenceStudy, robot: Robot, step: float, fine: _Motions) -> dict[str, Any]:
+def _rows(
+    study: ConvergenceStudy, robot: Robot, step: float, fine: _Motions
+) -> list[dict[str, Any]]:
+    """Return the errors of one step, one row per controller."""
     coarse = _motions(study, robot, step)
-    return {
-        "drop_height_error_m": _largest(coarse.drop - fine.drop),
-        "stance_height_error_m": _largest(coarse.stance - fine.stance),
-        "hopping": {
-            name: _hopping_errors(coarse, fine, name, study.commands) for name in study.controllers
-        },
-    }
-
-
-def _hopping_errors(
-    coarse: _Motions, fine: _Motions, name: str, commands: Sequence[float]
-) -> dict[str, Any]:
-    first = np.abs(coarse.first[name] - fine.first[name])
-    result: dict[str, Any] = {
-        "first_apexes_error_m": float(np.nanmax(first)) if np.isfinite(first).any() else None
-    }
-    for kind in ("quiet", "noisy"):
-        pairs = list(zip(coarse.apexes[name][kind], fine.apexes[name][kind], strict=True))
-        medians = [_difference(np.median, a, b) for a, b in pairs]
-        result[kind] = {
-            "median_shift_m": dict(zip(map(str, commands), medians, strict=True)),
-            "largest_median_shift_m": _worst(medians),
-            "std_m": [float(np.std(a)) if len(a) else None for a, _ in pairs],
-            "reference_std_m": [float(np.std(b)) if len(b) else None for _, b in pairs],
-            "hops": [len(a) for a, _ in pairs],
-            "reference_hops": [len(b) for _, b in pairs],
+    return [
+        {
+            "robot": robot.name,
+            "timestep_s": step,
+            "controller": name,
+            "drop_height_error_m": _largest(coarse.drop - fine.drop),
+            "stance_height_error_m": _largest(coarse.stance - fine.stance),
+            "first_apexes_error_m": _largest(coarse.first[name] - fine.first[name]),
+            **_shifts(coarse.apexes[name], fine.apexes[name]),
         }
+        for name in study.controllers
+    ]
+
+
+def _shifts(coarse: dict[str, list[Array]], fine: dict[str, list[Array]]) -> dict[str, Any]:
+    """Compare apex statistics, without noise and delay (quiet) and with them (noisy)."""
+    result: dict[str, Any] = {}
+    for kind in ("quiet", "noisy"):
+        pairs = list(zip(coarse[kind], fine[kind], strict=True))
+        shifts = [_difference(np.median, a, b) for a, b in pairs]
+        spreads = [_difference(np.std, a, b) for a, b in pairs]
+        result[f"{kind}_median_shifts_m"] = shifts
+        result[f"{kind}_largest_median_shift_m"] = _worst(shifts)
+        result[f"{kind}_largest_std_change_m"] = _worst(spreads)
+        result[f"{kind}_hops"] = sum(len(a) for a, _ in pairs)
     return result
 
 
@@ -228,20 +228,17 @@ def _worst(shifts: list[float | None]) -> float | None:
     return max(sizes) if len(sizes) == len(shifts) else None
 
 
-def _largest(error: Array) -> float:
-    return float(np.abs(error).max())
+def _largest(error: Array) -> float | None:
+    """Return the largest size, or None if nothing is comparable."""
+    sizes = np.abs(error[np.isfinite(error)])
+    return float(sizes.max()) if sizes.size else None
 
 
 def _sufficient(rows: list[dict[str, Any]], tolerance: float) -> float | None:
     """Return the largest step below which every step keeps all noisy medians within tolerance."""
     largest = None
     for step in sorted({row["timestep_s"] for row in rows}):
-        shifts = [
-            hopping["noisy"]["largest_median_shift_m"]
-            for row in rows
-            if row["timestep_s"] == step
-            for hopping in row["hopping"].values()
-        ]
+        shifts = [row["noisy_largest_median_shift_m"] for row in rows if row["timestep_s"] == step]
         if any(shift is None or shift > tolerance for shift in shifts):
             break
         largest = step
