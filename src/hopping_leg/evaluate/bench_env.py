@@ -166,10 +166,10 @@ def record(task: HoppingTask, ticks: int) -> Motion:
     for tick in range(ticks):
         seen, target = task.measurement, postures[tick // half % 2]
         torque = _STIFFNESS * (target - seen.q[:, 0]) - _DAMPING * seen.qd[:, 0]
-        actions[tick] = np.clip(torque / task.options.action_torque, -1, 1)
+        actions[tick] = np.clip(torque / task.options.action_torque, -1, 1).astype(np.float32)
         task.step(actions[tick])
         controls[tick] = task.legs.batch.bind("ctrl")
-    return Motion(actions.astype(np.float32).astype(np.float64), controls, start)
+    return Motion(actions, controls, start)
 
 
 def _run_task(task: HoppingTask, motion: Motion) -> None:
