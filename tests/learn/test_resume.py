@@ -99,7 +99,7 @@ import dataclasses
 from hopping_leg.learn import judge
 from hopping_leg.learn.train import train
 judge._SECONDS = 0.5
-recipe = dataclasses.replace(TINY, steps=3200, checkpoint_seconds=0.0, judge_every=1600)
+recipe = dataclasses.replace(TINY, steps=1600, checkpoint_seconds=0.0, judge_every=800)
 train(recipe, ROBOT, 0, Path(sys.argv[1]), resume=True, quiet=True)
 """
 

@@ -109,6 +109,7 @@ class Trainer:
         if self._budget is not None:
             self.model.remaining = lambda: max(0.0, 1 - self.elapsed / self._seconds)
         self.selection = Selection(recipe, robot, folder)
+        self._restored = False
         self._earlier = 0.0
         self._began = time.monotonic()
         self._saved = self._began
@@ -129,6 +130,7 @@ class Trainer:
         resumable.restore(self.model, tree["model"])
         self.selection.rows = tree["history"]
         self._earlier = tree["elapsed"]
+        self._restored = True
         self._began = time.monotonic()
 
     def run(self, progress: TrainingProgress) -> Trained:
@@ -140,7 +142,7 @@ class Trainer:
                 recipe.steps - model.num_timesteps,
                 callback=_Watch(self),
                 log_interval=recipe.log_every,
-                reset_num_timesteps=model.num_timesteps == 0,
+                reset_num_timesteps=not self._restored,
             )
         self._judge()
         minutes, steps = self.elapsed / 60, int(model.num_timesteps)
