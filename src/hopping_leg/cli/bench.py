@@ -113,7 +113,30 @@ class Training:
     """Write every number to this file."""
 
 
-def run(args: Env | Convergence | Inference | EnergyShaping | Training) -> None:
+@dataclass(frozen=True)
+class Ablation:
+    """Train the fast recipe with one part taken away at a time."""
+
+    steps: int = 3_000_000
+    """Control steps of experience of each variant."""
+    robot: str = "legv2-paper"
+    """A shipped name or the path of a .toml file."""
+    training_seeds: tuple[int, ...] = (0,)
+    """One training of every variant each."""
+    evaluation_seeds: int = 5
+    """Realisations of noise and delay per command."""
+    threads: int = 2
+    """Of torch and physics."""
+    out: Path = Path("runs/bench-ablation")
+    """Where the trainings are kept; finished ones are not repeated, killed ones go on."""
+    json: Path | None = None
+    """Write every number to this file."""
+
+
+Benchmark = Env | Convergence | Inference | EnergyShaping | Training | Ablation
+
+
+def run(args: Benchmark) -> None:
     """Run one benchmark, print its numbers, write the JSON."""
     if isinstance(args, Env):
         result = _env(args)
@@ -123,6 +146,8 @@ def run(args: Env | Convergence | Inference | EnergyShaping | Training) -> None:
         result = _convergence(args)
     elif isinstance(args, Training):
         result = _training(args)
+    elif isinstance(args, Ablation):
+        result = _ablation(args)
     else:
         result = _inference(args)
     if args.json is not None:
@@ -255,6 +280,34 @@ def _training(args: Training) -> dict[str, Any]:
                 _mm(row["median_error_m"]),
                 _mm(row["std_m"]),
                 str(row["skipped_hops"]),
+            )
+    console.print(table)
+    return result
+
+
+def _ablation(args: Ablation) -> dict[str, Any]:
+    from hopping_leg.evaluate.bench_ablation import bench_ablation
+
+    _at_least(1, steps=args.steps, evaluation_seeds=args.evaluation_seeds, threads=args.threads)
+    console = Console()
+    result = bench_ablation(
+        load_robot(args.robot),
+        args.out,
+        steps=args.steps,
+        training_seeds=args.training_seeds,
+        evaluation_seeds=args.evaluation_seeds,
+        threads=args.threads,
+        on_progress=console.print,
+    )
+    table = Table("variant", "seed", "median errors, mm", "std, mm")
+    for variant in result["ablations"]:
+        for training in variant["runs"]:
+            rows = training["selected"]
+            table.add_row(
+                variant["meaning"],
+                str(training["seed"]),
+                " ".join(_mm(row["median_error_m"]) for row in rows),
+                " ".join(_mm(row["std_m"]) for row in rows),
             )
     console.print(table)
     return result

@@ -63,7 +63,9 @@ class FastRecipe(Recipe):
     gae_lambda: float = 0.97
     """Of the advantage estimate."""
     noise_hold: int = 24
-    """Ticks that gSDE keeps its noise, 0.12 s: about a push-off."""
+    """Ticks that gSDE keeps its noise, 0.12 s: about a push-off; 0 explores with white noise."""
+    privileged_critic: bool = True
+    """Let the critic see the true state in training."""
     log_std: tuple[float, float] = (-2.0, -4.2)
     """Log standard deviation of gSDE's weights at the start and from 85 % of the training on."""
 
@@ -71,7 +73,7 @@ class FastRecipe(Recipe):
         """Build the training environment; its critic sees the true state."""
         rng = np.random.default_rng(seed)
         task = HoppingTask(robot, self.legs, self.task, self.make_reward(robot), rng, threads)
-        return TaskVecEnv(task, privileged=True)
+        return TaskVecEnv(task, privileged=self.privileged_critic)
 
     def make_reward(self, robot: Robot) -> ApexReward:
         """Build the apex reward."""
@@ -80,7 +82,7 @@ class FastRecipe(Recipe):
     def make_model(self, env: TaskVecEnv, seed: int) -> ResumablePPO:
         """Build PPO with gSDE and an asymmetric critic."""
         return ResumablePPO(
-            AsymmetricPolicy,
+            AsymmetricPolicy if self.privileged_critic else "MlpPolicy",
             env,
             learning_rate=lambda left: self.learning_rate * _cosine(left),
             n_steps=self.rollout,
@@ -91,8 +93,8 @@ class FastRecipe(Recipe):
             ent_coef=0.0,
             vf_coef=1.0,
             max_grad_norm=1.0,
-            use_sde=True,
-            sde_sample_freq=self.noise_hold,
+            use_sde=self.noise_hold > 0,
+            sde_sample_freq=self.noise_hold or -1,
             policy_kwargs={
                 "net_arch": {"pi": list(self.actor), "vf": list(self.critic)},
                 "activation_fn": nn.Tanh,
