@@ -31,17 +31,17 @@ class ApexRewardOptions:
 
     scale: float = 0.05
     """Of the whole."""
-    apex: float = 60.0
+    apex: float = 30.0
     """Of the event: exp(-|apex - command| / width) (air / full_air)^2."""
-    width: tuple[float, float] = (0.030, 0.006)
+    width: tuple[float, float] = (0.030, 0.010)
     """Of the event's kernel at the start and from 70 % of the training on, m."""
     full_air: float = 0.12
     """Time in the air before the apex that earns the event's full weight, s."""
-    predicted: float = 1.0
+    predicted: float = 0.7
     """Of the prediction in flight: |v| (e^(-e/15 mm) + e^(-e/60 mm) / 2)."""
     effective_gravity: float = 10.4
     """Deceleration in flight that the prediction assumes, rail drag included, m/s2."""
-    speed: float = 0.15
+    speed: float = 0.1
     """Of v^2 in flight."""
     energy: float = 0.3
     """Of v^2 anywhere, fading to zero over the first 30 % of the training."""
@@ -59,6 +59,10 @@ class ApexRewardOptions:
     """Wanted gap between base and ground, m."""
     knee_margin: float = 0.02
     """Wanted gap between knee and ground, m."""
+    touch: float = 3.0
+    """Of touching the ground with base or knee, or nearly so, per tick."""
+    touch_margin: float = 0.006
+    """Gap that counts as touching, m."""
 
 
 class ApexReward:
@@ -106,7 +110,7 @@ class ApexReward:
             "position": -o.position * self._position(t.q),
             "velocity": -o.velocity
             * np.sum(np.maximum(np.abs(t.qd) - o.velocity_limit, 0.0), axis=1),
-            "clearance": -o.clearance * self._closeness(t),
+            "clearance": -self._closeness(t),
         }
         return o.scale * np.sum(list(terms.values()), axis=0), terms
 
@@ -129,10 +133,11 @@ class ApexReward:
         return penalty
 
     def _closeness(self, t: Transition) -> Array:
-        """Return how far base and knee are inside their margins, relative to them, (n,)."""
+        """Return the weighted penalty of base and knee for coming close to the ground, (n,)."""
         o = self.options
         base = kinematics.base_clearance(self._robot, t.height)
         knee = kinematics.knee_clearance(self._robot, t.height, t.q)
         base_inside = np.maximum(o.base_margin - base, 0.0) / o.base_margin
         knee_inside = np.maximum(o.knee_margin - knee, 0.0) / o.knee_margin
-        return base_inside + knee_inside
+        touching = np.minimum(base, knee) < o.touch_margin
+        return o.clearance * (base_inside + knee_inside) + o.touch * touching
