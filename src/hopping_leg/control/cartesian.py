@@ -1,4 +1,4 @@
-"""Cartesian stiffness control of the foot through the transposed Jacobian (paper, Eq. 8)."""
+"""Cartesian stiffness control of the foot through the transposed Jacobian (paper, Eq. 7)."""
 
 import numpy as np
 

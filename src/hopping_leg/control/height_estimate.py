@@ -1,4 +1,4 @@
-"""Base height from joint measurements alone (paper, "Jumping height estimation").
+"""Base height from joint measurements alone (paper, "Jumping height estimation", Eq. 8).
 
 Heights are those of the hip axis above the ground. Gravity is 9.81 m/s2 and points down; the
 paper's formula holds with g = -9.81 m/s2 and shortens to x_l + x'_l s + g s^2 / 2, s = t - t_l.

@@ -1,7 +1,7 @@
 """How well energy shaping hops: the law as printed, the tuned one, and what each part is worth."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -43,7 +43,7 @@ class Case:
     name: str
     controller: EnergyShaping
     robot: Robot
-    disturbance: Disturbance = Disturbance()
+    disturbance: Disturbance = field(default_factory=Disturbance)
     commands: Sequence[float] = COMMANDS
 
 
@@ -160,6 +160,7 @@ def run(
         "command": COMMAND,
         "seed": FIRST_SEED + seed,
         "runs_per_command": runs,
+        "exponent": float(tuned_energy_shaping(load_robot("legv2-paper")).gains.exponent),
         "seconds": seconds,
         "cases": overall,
         "commands": single,
@@ -201,7 +202,7 @@ def _row(case: Case, command: float, windows: Sequence[Window]) -> dict[str, Any
 
 
 def _summary(case: Case, rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Average over the paper's three commands."""
+    """Average errors over the paper's three commands, those with hops; the rest over all."""
     core = [row for row in rows if row["command_m"] in COMMANDS and row["hops"]]
     errors = [abs(row["median_error_m"]) for row in core]
     return {
@@ -210,6 +211,7 @@ def _summary(case: Case, rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "worst_median_error_m": max(errors) if core else None,
         "mean_std_m": float(np.mean([row["std_m"] for row in core])) if core else None,
         "hop_rate_hz": float(np.mean([row["hop_rate_hz"] for row in rows])),
+        "commands_without_hops": sum(not row["hops"] for row in rows),
         "skipped_hops": sum(row["skipped_hops"] for row in rows),
         "min_base_height_m": min(row["min_base_height_m"] for row in rows),
         "body_contacts": sum(row["body_contacts"] for row in rows),
