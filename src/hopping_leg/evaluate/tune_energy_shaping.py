@@ -49,6 +49,12 @@ class Search:
     threads: int = 0
     """Physics threads, 0 for one per core."""
 
+    def __post_init__(self) -> None:
+        if self.generations < 1 or self.population < 4:
+            raise UsageError("A search needs --generations of 1 and a --population of 4 or more.")
+        if not 3 <= self.seconds <= 600 or not 0 < self.step <= 1:
+            raise UsageError("--seconds must lie between 3 and 600, --step between 0 and 1.")
+
 
 def evaluate(
     candidates: list[ShapingGains], setup: Setup, seconds: float, seed: int
