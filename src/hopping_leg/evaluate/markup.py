@@ -42,7 +42,7 @@ def table(columns: Sequence[Column], rows: Sequence[Any], caption: str = "") -> 
 
 def _unbroken(heading: str) -> str:
     """Keep a unit on the line of its slash."""
-    return heading.replace(" / ", " /\N{NO-BREAK SPACE}")
+    return heading.replace(" / ", " /\N{NO-BREAK SPACE}").replace("N m", "N\N{NO-BREAK SPACE}m")
 
 
 def millimetres(value: float, sign: bool = False) -> str:
