@@ -270,19 +270,16 @@ def _training(args: Training) -> dict[str, Any]:
         threads=args.threads,
         on_progress=console.print,
     )
-    table = Table("seed", "minutes", "command, m", "median error, mm", "std, mm", "skipped")
-    for training in result["runs"]:
-        for row in training["selected"]:
-            table.add_row(
-                str(training["seed"]),
-                f"{training['minutes']:.1f}",
-                f"{row['command_m']:.2f}",
-                _mm(row["median_error_m"]),
-                _mm(row["std_m"]),
-                str(row["skipped_hops"]),
-            )
+    table = Table("minutes", "seed", "command, m", "median error, mm", "std, mm", "skipped")
+    for row in result["rows"]:
+        table.add_row(f"{row['minutes']:.1f}", *_hops(row))
     console.print(table)
     return result
+
+
+def _hops(row: dict[str, Any]) -> list[str]:
+    errors = [_mm(row["median_error_m"]), _mm(row["std_m"])]
+    return [str(row["seed"]), f"{row['command_m']:.2f}", *errors, str(row["skipped_hops"])]
 
 
 def _ablation(args: Ablation) -> dict[str, Any]:
@@ -299,16 +296,9 @@ def _ablation(args: Ablation) -> dict[str, Any]:
         threads=args.threads,
         on_progress=console.print,
     )
-    table = Table("variant", "seed", "median errors, mm", "std, mm")
-    for variant in result["ablations"]:
-        for training in variant["runs"]:
-            rows = training["selected"]
-            table.add_row(
-                variant["meaning"],
-                str(training["seed"]),
-                " ".join(_mm(row["median_error_m"]) for row in rows),
-                " ".join(_mm(row["std_m"]) for row in rows),
-            )
+    table = Table("variant", "seed", "command, m", "median error, mm", "std, mm", "skipped")
+    for row in result["rows"]:
+        table.add_row(row["meaning"], *_hops(row))
     console.print(table)
     return result
 

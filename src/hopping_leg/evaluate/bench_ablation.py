@@ -101,13 +101,15 @@ def bench_ablation(
             threads=threads,
             on_progress=functools.partial(_named, on_progress, ablation.name),
         )
-        rows.append({"name": ablation.name, "meaning": ablation.meaning, "runs": result["runs"]})
+        rows += [
+            {"variant": ablation.name, "meaning": ablation.meaning, **row} for row in result["rows"]
+        ]
     return {
         "robot": robot.name,
         "steps": steps,
         "threads": threads,
         "evaluation_seeds": evaluation_seeds,
-        "ablations": rows,
+        "rows": rows,
         "versions": software_versions(),
     }
 

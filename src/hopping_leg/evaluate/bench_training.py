@@ -81,6 +81,12 @@ def bench_training(
         "evaluation_seed": JUDGING_SEED,
         "evaluation_seeds": evaluation_seeds,
         "runs": runs,
+        "rows": [
+            {"seed": run["seed"], "minutes": run["minutes"], **row}
+            for run in runs
+            for row in run["selected"]
+        ],
+        "curve": [{"seed": run["seed"], **point} for run in runs for point in run["curve"]],
         "minutes_max": max(run["minutes"] for run in runs),
         "worst_abs_median_error_m": max(
             abs(row["median_error_m"]) for run in runs for row in run["selected"]
