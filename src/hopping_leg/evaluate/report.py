@@ -108,10 +108,14 @@ def _conditions(evaluation: Evaluation) -> dict[str, str]:
     rows: dict[str, str] = {}
     for name, value in {**evaluation.conditions, **evaluation.versions}.items():
         if isinstance(value, dict):
-            rows |= {f"{name}: {key}": str(entry) for key, entry in value.items()}
+            rows |= {f"{name}: {key}": _text(entry) for key, entry in value.items()}
         else:
-            rows[name] = str(value)
+            rows[name] = _text(value)
     return {name.replace("_", " "): value for name, value in rows.items()}
+
+
+def _text(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def data_uri(content: bytes, kind: str) -> str:
