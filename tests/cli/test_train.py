@@ -1,0 +1,57 @@
+import dataclasses
+
+import pytest
+
+from hopping_leg import cli
+from hopping_leg.learn import judge, recipes
+from tests.learn.learners import TINY
+
+
+@pytest.fixture
+def tiny(monkeypatch):
+    class Tiny(type(TINY)):
+        name = "tiny"
+
+        def __new__(cls):
+            return dataclasses.replace(TINY, steps=64, judge_every=32, warmup=32)
+
+    monkeypatch.setattr(judge, "_SECONDS", 0.5)
+    monkeypatch.setitem(recipes.RECIPES, "tiny", Tiny)
+
+
+def test_a_training_leaves_policy_card_and_json(tiny, tmp_path, capsys):
+    out, file = tmp_path / "run", tmp_path / "result.json"
+    arguments = ["train", "--recipe", "tiny", "--out", str(out), "--json", str(file)]
+    assert cli.main(arguments) == 0
+    shown = capsys.readouterr().out
+    assert str(out / "policy.onnx") in shown
+    assert (out / "policy.onnx").exists()
+    assert '"history"' in file.read_text()
+    assert cli.main(arguments) == cli.FAILED
+    assert "--resume" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--recipe", "slow"], "There is no recipe 'slow'"),
+        (["--minutes", "-1"], "must be positive"),
+        (["--minutes", "nan"], "must be positive"),
+        (["--seed", "-1"], "must not be negative"),
+        (["--threads", "0"], "at least 1"),
+        (["--steps", "0"], "at least 1"),
+        (["--robot", "legv9"], "There is no robot"),
+    ],
+)
+def test_bad_input_is_a_sentence_and_writes_nothing(arguments, says, tmp_path, capsys):
+    out = tmp_path / "run"
+    assert cli.main(["train", "--out", str(out), *arguments]) == cli.FAILED
+    assert says in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_a_folder_with_other_things_is_left_alone(tmp_path, capsys):
+    (tmp_path / "thesis.tex").write_text("years of work")
+    assert cli.main(["train", "--out", str(tmp_path)]) == cli.FAILED
+    assert "holds no run" in capsys.readouterr().err
+    assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
