@@ -29,7 +29,7 @@ class Env:
 
     robot: str = "legv2-paper"
     """A shipped name or the path of a .toml file."""
-    count: int = 1024
+    count: int = 512
     """Legs of the batched environment."""
     repeats: int = 15
     """Rounds; medians over them are reported."""

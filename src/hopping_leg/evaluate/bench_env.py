@@ -35,11 +35,11 @@ class EnvBenchmark:
     """What is timed, and how long."""
 
     robot: Robot
-    count: int = 1024
+    count: int = 512
     """Legs of the batched environment."""
-    ticks: int = 100
+    ticks: int = 50
     """Control periods of a batched round."""
-    single_ticks: int = 1000
+    single_ticks: int = 500
     """Control periods of a round of the single environment."""
     repeats: int = 15
     """Rounds; medians over them are reported."""
