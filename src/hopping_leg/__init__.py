@@ -1,1 +1,1 @@
-"""End-to-end reinforcement learning for torque-based, variable-height hopping of a one-legged robot."""
+"""End-to-end reinforcement learning for torque-based, variable-height hopping of one leg."""

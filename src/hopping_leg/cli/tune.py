@@ -34,7 +34,7 @@ class TuneArgs:
     robot: str = "legv2-paper"
     """A shipped name or the path of a .toml file."""
     start: str = "by-hand"
-    """Gains to begin from: by-hand, energy-shaping (the shipped result) or the path of a gain file."""
+    """Gains to begin from: by-hand, energy-shaping (the shipped result) or a gain file's path."""
     search: Annotated[Search, tyro.conf.arg(name="")] = field(default_factory=Search)
     seed: int = 0
     """Of the search; noise and delay take seeds 0 to 9."""

@@ -21,7 +21,7 @@ class Controller(Protocol):
         ...
 
     def internals(self) -> dict[str, Array]:
-        """Return what else is worth recording of the last ``act``, each (n,), e.g. the estimated height.
+        """Return what else is worth recording of the last ``act``, each (n,).
 
         Keys are trace columns and end in their unit: ``estimated_height_m``, ``phase``.
         """

@@ -38,7 +38,8 @@ def to_unit(gains: ShapingGains) -> Array:
     """Return the searched gains as a point in the unit cube."""
     low, high = np.array(list(SPACE.values())).T
     values = np.array([float(getattr(gains, name)) for name in SPACE])
-    return np.clip((values - low) / (high - low), 0.0, 1.0)
+    point: Array = np.clip((values - low) / (high - low), 0.0, 1.0)
+    return point
 
 
 def from_unit(point: Array, base: ShapingGains) -> ShapingGains:
