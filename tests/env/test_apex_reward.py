@@ -33,7 +33,7 @@ def fly(reward, ticks):
 
 
 def test_a_true_hop_earns_the_event_and_a_tremble_does_not(reward):
-    fly(reward, 30)
+    fly(reward, 100)
     _, hop = reward(transition(0.3, 0.0, apex=True))
     reward(transition(0.3, 0.0, clearance=-0.001))
     _, tremble = reward(transition(0.3, 0.0, apex=True))
@@ -41,12 +41,24 @@ def test_a_true_hop_earns_the_event_and_a_tremble_does_not(reward):
     assert tremble["apex"][0] < 0.01 * hop["apex"][0]
 
 
+def test_hasty_hops_earn_no_more_per_second(reward):
+    earned = {}
+    for period in (40, 80):
+        fresh = ApexReward(load_robot("legv2-paper"), ApexRewardOptions(), RATE)
+        total = 0.0
+        for tick in range(1, 1601):
+            _, terms = fresh(transition(0.3, 0.0, apex=tick % period == 0))
+            total += terms["apex"][0]
+        earned[period] = total
+    assert earned[40] == pytest.approx(earned[80], rel=0.05)
+
+
 def test_error_costs_alike_above_and_below_and_more_as_training_goes_on(reward):
     values = {}
     for share in (0.0, 1.0):
         reward.anneal(share)
         for error in (-0.02, 0.02):
-            fly(reward, 30)
+            fly(reward, 100)
             _, terms = reward(transition(0.3 + error, 0.0, apex=True))
             values[share, error] = terms["apex"][0]
     assert values[0.0, -0.02] == pytest.approx(values[0.0, 0.02])

@@ -1,8 +1,10 @@
 """A reward that asks for what is judged: the height of every apex.
 
-While in flight, the apex that ballistics predicts is compared with the command at every tick; at
-the apex itself the true one is. Both are weighted with the motion behind them, because a leg that
-stands at the commanded height and trembles has perfect apexes too. An energy gain like the paper's
+At an apex, its height is compared with the command; in flight, the one that ballistics predicts is
+at every tick, more weakly. Both are weighted with the motion behind them, because a leg that stands
+at the commanded height and trembles has perfect apexes too. The event is also weighted with the time
+since the last one: otherwise many hasty hops pay more than few precise ones, and the leg bounces off
+the ground without the time to correct itself. An energy gain like the paper's
 Ge starts the motion and fades out; kernels narrow while training proceeds. The paper's penalties
 stay, and one keeps body and knee off the ground.
 """
@@ -31,20 +33,20 @@ class ApexRewardOptions:
 
     scale: float = 0.05
     """Of the whole."""
-    apex: float = 30.0
-    """Of the event: exp(-|apex - command| / width) (air / full_air)^2."""
+    apex: float = 60.0
+    """Of the event: exp(-|apex - command| / width) (air / full_air)^2 (period / full_period)."""
     width: tuple[float, float] = (0.030, 0.010)
     """Of the event's kernel at the start and from 70 % of the training on, m."""
-    full_air: float = 0.12
+    full_air: float = 0.1
     """Time in the air before the apex that earns the event's full weight, s."""
-    predicted: float = 0.7
+    full_period: float = 0.45
+    """Time since the last apex that earns the event's full weight, s."""
+    predicted: float = 0.3
     """Of the prediction in flight: |v| (e^(-e/15 mm) + e^(-e/60 mm) / 2)."""
     effective_gravity: float = 10.4
     """Deceleration in flight that the prediction assumes, rail drag included, m/s2."""
-    speed: float = 0.1
-    """Of v^2 in flight."""
-    energy: float = 0.3
-    """Of v^2 anywhere, fading to zero over the first 30 % of the training."""
+    energy: float = 0.4
+    """Of v^2 anywhere, fading to zero over the first 35 % of the training."""
     jerk: float = 0.05
     """Of the paper's Pj."""
     position: float = 0.02
@@ -77,30 +79,31 @@ class ApexReward:
     def __init__(self, robot: Robot, options: ApexRewardOptions, rate: float) -> None:
         self.options, self._robot, self._rate = options, robot, rate
         self._lower, self._upper = robot.of_joints("lower"), robot.of_joints("upper")
-        self._air = np.zeros(0)
+        self._air = self._since = np.zeros(0)
         self.anneal(0.0)
 
     def anneal(self, share: float) -> None:
         """Narrow the kernel and fade the energy gain at a share of the training, 0 to 1."""
         wide, narrow = self.options.width
         self._width = wide + (narrow - wide) * min(1.0, share / 0.7)
-        self._energy = self.options.energy * max(0.0, 1 - share / 0.3)
+        self._energy = self.options.energy * max(0.0, 1 - share / 0.35)
 
     def state(self) -> dict[str, Any]:
-        """Return the time in the air of every leg."""
-        return {"air": self._air.copy()}
+        """Return every leg's time in the air and since its last apex."""
+        return {"air": self._air.copy(), "since": self._since.copy()}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go on from a ``state``."""
-        self._air = np.array(state["air"])
+        self._air, self._since = np.array(state["air"]), np.array(state["since"])
 
     def __call__(self, transition: Transition) -> tuple[Array, dict[str, Array]]:
         """Return the reward, (n,), and its weighted parts before scaling, each (n,)."""
         t, o = transition, self.options
         flying = t.foot_clearance >= CLEAR
         if len(self._air) != len(flying):
-            self._air = np.zeros(len(flying))
+            self._air, self._since = np.zeros(len(flying)), np.zeros(len(flying))
         self._air = np.where(flying, self._air + 1 / self._rate, 0.0)
+        self._since = self._since + 1 / self._rate
         speed_squared = np.square(t.rate)
         terms = {
             "apex": o.apex * self._event(t),
@@ -116,14 +119,16 @@ class ApexReward:
 
     def _event(self, t: Transition) -> Array:
         motion = np.square(np.minimum(1.0, self._air / self.options.full_air))
+        patience = np.minimum(1.0, self._since / self.options.full_period)
+        self._since = np.where(t.apex, 0.0, self._since)
         error = np.abs(t.apex_height - t.command)
-        return np.where(t.apex, motion * np.exp(-error / self._width), 0.0)
+        return np.where(t.apex, motion * patience * np.exp(-error / self._width), 0.0)
 
     def _prediction(self, t: Transition, speed_squared: Array) -> Array:
         apex = t.height + speed_squared / (2 * self.options.effective_gravity)
         error = np.abs(apex - t.command)
         kernel = np.exp(-error / 0.015) + 0.5 * np.exp(-error / 0.06)
-        return np.abs(t.rate) * kernel + self.options.speed * speed_squared
+        return np.abs(t.rate) * kernel
 
     def _position(self, q: Array) -> Array:
         inside: BoolArray = (q >= self._lower) & (q <= self._upper)

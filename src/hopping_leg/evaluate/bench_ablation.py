@@ -47,9 +47,14 @@ def ablations(base: FastRecipe) -> list[Ablation]:
             "no-event", "no reward at the apex", replace(base, reward=replace(reward, apex=0))
         ),
         Ablation(
+            "no-patience",
+            "the apex pays alike however soon it follows the last",
+            replace(base, reward=replace(reward, full_period=1e-9)),
+        ),
+        Ablation(
             "no-prediction",
             "no predicted apex in flight",
-            replace(base, reward=replace(reward, predicted=0, speed=0)),
+            replace(base, reward=replace(reward, predicted=0)),
         ),
         Ablation(
             "standing-starts",
