@@ -2,11 +2,11 @@
 
 At an apex, its height is compared with the command; in flight, the one that ballistics predicts is
 at every tick, more weakly. Both are weighted with the motion behind them, because a leg that stands
-at the commanded height and trembles has perfect apexes too. The event is also weighted with the time
-since the last one: otherwise many hasty hops pay more than few precise ones, and the leg bounces off
-the ground without the time to correct itself. An energy gain like the paper's
-Ge starts the motion and fades out; kernels narrow while training proceeds. The paper's penalties
-stay, and one keeps body and knee off the ground.
+at the commanded height and trembles has perfect apexes too. The event is also weighted with the
+time since the last one: otherwise many hasty hops pay more than few precise ones, and the leg
+bounces off the ground without the time to correct itself. An energy gain like the paper's Ge starts
+the motion and fades out; kernels narrow while training proceeds. The paper's penalties stay, and
+one keeps body and knee off the ground.
 """
 
 from dataclasses import dataclass
