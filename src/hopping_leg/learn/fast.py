@@ -29,7 +29,7 @@ class FastRecipe(Recipe):
 
     task: TaskOptions = field(
         default_factory=lambda: TaskOptions(
-            command_range=(0.22, 0.37),
+            command_range=(0.22, 0.40),
             command_hold=(1.0, 5.0),
             start="hop",
             stagger=True,
