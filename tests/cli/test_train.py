@@ -40,6 +40,9 @@ def test_a_training_leaves_policy_card_and_json(tiny, tmp_path, capsys):
         (["--seed", "-1"], "must not be negative"),
         (["--threads", "0"], "at least 1"),
         (["--steps", "0"], "at least 1"),
+        (["--set", "learning_rat=1"], "Did you mean 'learning_rate'"),
+        (["--set", "learning_rate=fast"], "give e.g. learning_rate="),
+        (["--set", "legs=2.5"], "a whole number"),
         (["--robot", "legv9"], "There is no robot"),
     ],
 )

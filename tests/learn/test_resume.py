@@ -1,4 +1,5 @@
 import dataclasses
+import json
 import os
 import subprocess
 import sys
@@ -128,3 +129,18 @@ def test_killed_runs_end_like_the_run_that_was_left_alone(tmp_path):
     if not (killed / "policy.onnx").exists():
         subprocess.run([*command, str(killed)], check=True, env=environment)
     assert (killed / "policy.onnx").read_bytes() == (alone / "policy.onnx").read_bytes()
+
+
+def test_a_run_can_begin_where_another_stopped(tmp_path, monkeypatch):
+    monkeypatch.setattr(judge, "_SECONDS", 0.5)
+    first, second = tmp_path / "first", tmp_path / "second"
+    recipe = dataclasses.replace(TINY, steps=128, judge_every=64, warmup=32, checkpoint_seconds=0)
+    module.train(recipe, ROBOT, 0, first, quiet=True)
+    with pytest.raises(UsageError, match="no checkpoint"):
+        module.train(recipe, ROBOT, 0, second, source=tmp_path, quiet=True)
+    longer = dataclasses.replace(recipe, steps=256, learning_rate=1e-4)
+    trained = module.train(longer, ROBOT, 0, second, source=first, quiet=True)
+    assert trained.steps == 256
+    history = json.loads((second / "result.json").read_text())["history"]
+    assert min(row["steps"] for row in history) >= 64
+    assert f"--source {first}" in (second / "model_card.md").read_text()

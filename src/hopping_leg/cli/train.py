@@ -35,6 +35,10 @@ class Options:
     """The run's folder; default: runs/RECIPE-seedSEED."""
     resume: bool = False
     """Go on with the run in the folder; without one there, begin."""
+    source: Path | None = None
+    """Begin from the newest checkpoint of this folder's run instead of from scratch."""
+    set: tuple[str, ...] = ()
+    """Numbers of the recipe to change, e.g. `--set learning_rate=3e-4 gamma=0.98`."""
     minutes: float | None = None
     """Stop after so much wall-clock time; default: when the recipe's steps are done."""
     steps: int | None = None
@@ -47,7 +51,7 @@ class Options:
 
 def run(args: Options) -> None:
     """Train a controller."""
-    from hopping_leg.learn.recipes import get_recipe
+    from hopping_leg.learn.recipes import change, get_recipe
     from hopping_leg.learn.run_folder import read_result
     from hopping_leg.learn.train import train
 
@@ -58,6 +62,7 @@ def run(args: Options) -> None:
         if args.steps < 1:
             raise UsageError(f"--steps is {args.steps} but must be at least 1.")
         recipe = dataclasses.replace(recipe, steps=args.steps)
+    recipe = change(recipe, args.set)
     out = args.out or Path("runs") / f"{args.recipe}-seed{args.seed}"
     try:
         trained = train(
@@ -66,6 +71,7 @@ def run(args: Options) -> None:
             args.seed,
             out,
             resume=args.resume,
+            source=args.source,
             minutes=args.minutes,
             threads=args.threads,
         )

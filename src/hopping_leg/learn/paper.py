@@ -25,7 +25,7 @@ class PaperRecipe(Recipe):
     task: TaskOptions = field(default_factory=lambda: TaskOptions(start="mixed", stagger=True))
     reward: PaperRewardOptions = field(default_factory=PaperRewardOptions)
     """Weights as printed."""
-    steps: int = 350_000
+    steps: int = 560_000
     """Control steps of experience in all, summed over the legs."""
     hidden: tuple[int, ...] = (256, 256, 128, 128)
     """Hidden layers of actor and critics, ReLU, as printed."""
@@ -48,6 +48,8 @@ class PaperRecipe(Recipe):
     """Ticks between updates, each leg; gSDE keeps its noise as long, 0.16 s."""
     gradient_steps: int = 64
     """Gradient steps after each rollout: one for every 8 steps of experience."""
+    target_entropy: float = -2.0
+    """That SAC's entropy coefficient aims for; the usual minus one per action."""
     log_std: float = -2.0
     """Initial log standard deviation of gSDE's weights."""
 
@@ -70,6 +72,7 @@ class PaperRecipe(Recipe):
             n_steps=self.returns,
             train_freq=self.rollout,
             gradient_steps=self.gradient_steps,
+            target_entropy=self.target_entropy,
             use_sde=True,
             sde_sample_freq=-1,
             policy_kwargs={

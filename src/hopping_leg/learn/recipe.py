@@ -30,6 +30,8 @@ class Recipe(ABC):
     """Legs that gather experience at once."""
     steps: int = 1_000_000
     """Control steps of experience in all, summed over the legs."""
+    learning_rate: float = 1e-3
+    """At the start of its schedule."""
     judge_every: int = 25_000
     """Control steps between two trials of the deterministic policy, for checkpoint selection."""
     judge_commands: tuple[float, ...] = (0.25, 0.30, 0.35)

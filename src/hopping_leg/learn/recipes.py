@@ -1,5 +1,10 @@
 """The recipes by name."""
 
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any
+
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.learn.fast import FastRecipe
 from hopping_leg.learn.paper import PaperRecipe
@@ -18,3 +23,49 @@ def get_recipe(name: str) -> Recipe:
     if name not in RECIPES:
         raise UsageError(unknown_name("recipe", name, RECIPES))
     return RECIPES[name]()
+
+
+def change(recipe: Recipe, changes: Sequence[str]) -> Recipe:
+    """Return a recipe with some of its numbers changed.
+
+    Args:
+        recipe: The defaults.
+        changes: Each ``name=number``.
+
+    Raises:
+        UsageError: The recipe has no such number, or the value is none.
+    """
+    numbers = numbers_of(recipe)
+    values: dict[str, Any] = {}
+    for entry in changes:
+        name, _, text = entry.partition("=")
+        if name not in numbers:
+            raise UsageError(unknown_name(f"number of recipe '{recipe.name}'", name, numbers))
+        try:
+            value = type(numbers[name])(text)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            kind = "a whole number" if isinstance(numbers[name], int) else "a number"
+            raise UsageError(f"'{entry}' does not say {kind}; give e.g. {name}={numbers[name]}.")
+        values[name] = value
+    return dataclasses.replace(recipe, **values)
+
+
+def numbers_of(recipe: Recipe) -> dict[str, int | float]:
+    """Return a recipe's plain numbers by name."""
+    fields = {f.name: getattr(recipe, f.name) for f in dataclasses.fields(recipe)}
+    return {name: value for name, value in fields.items() if isinstance(value, int | float)}
+
+
+def changes_of(recipe: str, options: dict[str, Any]) -> list[str]:
+    """Return the ``name=number`` entries in which stored options differ from a recipe's defaults.
+
+    Args:
+        recipe: Name of the recipe.
+        options: As in a run's ``config.json``.
+    """
+    if recipe not in RECIPES:
+        return []
+    defaults = numbers_of(RECIPES[recipe]())
+    return [f"{n}={options[n]:g}" for n, v in defaults.items() if options.get(n, v) != v]

@@ -9,6 +9,7 @@ from typing import Any
 from hopping_leg.errors import UsageError
 from hopping_leg.learn.checkpoint import Tree, list_checkpoints, read_checkpoint
 from hopping_leg.learn.recipe import Recipe
+from hopping_leg.learn.recipes import changes_of
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import write_atomically
 
@@ -24,9 +25,15 @@ class RunFolder:
     """
 
     def __init__(
-        self, path: Path, recipe: Recipe, robot: Robot, seed: int, minutes: float | None
+        self,
+        path: Path,
+        recipe: Recipe,
+        robot: Robot,
+        seed: int,
+        minutes: float | None,
+        source: Path | None = None,
     ) -> None:
-        self.path = path
+        self.path, self._source = path, source
         self.config = json.loads(
             json.dumps(
                 {
@@ -36,6 +43,7 @@ class RunFolder:
                     "robot_digest": robot.digest,
                     "seed": seed,
                     "minutes_budget": minutes,
+                    "source": str(source) if source else None,
                     "versions": library_versions(),
                 }
             )
@@ -57,9 +65,12 @@ class RunFolder:
         config = self.config
         words = ["hop train", "--recipe", config["recipe"], "--robot", config["robot"]]
         words += ["--seed", str(config["seed"])]
+        if config["source"] is not None:
+            words += ["--source", config["source"]]
         if config["minutes_budget"] is not None:
             words += ["--minutes", f"{config['minutes_budget']:g}"]
-        return " ".join([*words, "--steps", str(config["options"]["steps"])])
+        changes = changes_of(config["recipe"], config["options"])
+        return " ".join([*words, "--set", *changes] if changes else words)
 
     def snapshot(self, steps: int) -> Path:
         """Return the file of the policy as it was after so many steps."""
@@ -74,8 +85,9 @@ class RunFolder:
         if not self._config_file.exists():
             if self.path.is_dir() and any(self.path.iterdir()):
                 raise UsageError(f"{self.path} is not empty and holds no run; give another --out.")
+            tree = self._from_source() if self._source else None
             self.write("config.json", self.config)
-            return None
+            return tree
         if not resume:
             raise UsageError(
                 f"{self.path} already holds a run; go on with --resume or give another --out."
@@ -84,7 +96,16 @@ class RunFolder:
         if self.policy.exists():
             raise UsageError(f"The run in {self.path} is finished; its policy is {self.policy}.")
         found = list_checkpoints(self.checkpoints)
-        return read_checkpoint(found[-1]) if found else None
+        if found:
+            return read_checkpoint(found[-1])
+        return self._from_source() if self._source else None
+
+    def _from_source(self) -> Tree:
+        assert self._source is not None
+        found = list_checkpoints(self._source / "checkpoints")
+        if not found:
+            raise UsageError(f"{self._source} holds no checkpoint to begin from.")
+        return {**read_checkpoint(found[-1]), "history": []}
 
     def write(self, name: str, content: Any) -> None:  # noqa: ANN401
         """Write a JSON file of the folder, whole or not at all."""
@@ -102,11 +123,11 @@ class RunFolder:
             UsageError: It was not; the message names the first difference.
         """
         stored = json.loads(self._config_file.read_text(encoding="utf-8"))
-        for key in ("recipe", "robot_digest", "seed", "minutes_budget", "options"):
-            if stored[key] != self.config[key]:
+        for key in ("recipe", "robot_digest", "seed", "minutes_budget", "source", "options"):
+            if stored.get(key) != self.config[key]:
                 raise UsageError(
                     f"The run in {self.path} has another {key.replace('_', ' ')}"
-                    f" ({_short(stored[key])} instead of {_short(self.config[key])});"
+                    f" ({_short(stored.get(key))} instead of {_short(self.config[key])});"
                     " resume it with the options that it began with."
                 )
 

@@ -53,6 +53,7 @@ def train(
     out: Path,
     *,
     resume: bool = False,
+    source: Path | None = None,
     minutes: float | None = None,
     threads: int = 1,
     quiet: bool = False,
@@ -68,6 +69,8 @@ def train(
         seed: Of weights, exploration, task, noise and delay.
         out: The run's folder.
         resume: Go on with the run in ``out``; without one, begin.
+        source: Folder of another run of this recipe and robot; its newest checkpoint is the start,
+            its steps and time count, its snapshots do not.
         minutes: Stop after so much wall-clock time, pauses excluded, or at the recipe's steps.
         threads: Of torch and physics; torch's is set for the whole process.
         quiet: Show no progress.
@@ -79,7 +82,7 @@ def train(
         raise UsageError(f"--minutes is {minutes:g} but must be positive.")
     torch.set_num_threads(max(threads, 1))
     recipe = fit(recipe, robot)
-    folder = RunFolder(out, recipe, robot, seed, minutes)
+    folder = RunFolder(out, recipe, robot, seed, minutes, source)
     tree = folder.begin(resume=resume)
     trainer = Trainer(recipe, robot, seed, folder, minutes, threads)
     if tree is not None:
