@@ -16,7 +16,7 @@ TRAINING = {"torch", "stable_baselines3", "onnx", "tensorboard"}
 BESIDE = {("evaluate", "learn")}
 """Later rooms that still must not use these earlier ones: evaluation needs no torch."""
 
-TRAINS = {"evaluate/bench_training.py"}
+TRAINS = {"evaluate/bench_training.py", "evaluate/bench_ablation.py"}
 """Exceptions, which train and are imported only where that is asked for."""
 
 BLOCK = """
