@@ -3,6 +3,7 @@
 The seeds here select; they must never be among those that judge (1000 and above).
 """
 
+import itertools
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -22,6 +23,9 @@ FINAL_SEEDS = (501, 502, 503, 504)
 
 SETTLE = 0.2
 """Share of a trial at its start that does not count."""
+
+_DISORDER = 0.1
+"""Score for neighbouring commands whose hops are not in order, m."""
 
 _LEGS = 4
 _SECONDS = 10.0
@@ -68,7 +72,7 @@ def judge(
     Args:
         controller: To be judged.
         robot: The leg.
-        commands: Desired heights, m.
+        commands: Desired heights, rising, m.
         seeds: Of noise and delay; each adds four legs per command.
         rate: Control rate, Hz.
     """
@@ -82,8 +86,15 @@ def judge(
 
 
 def score(verdicts: list[Verdict]) -> float:
-    """Return how bad a policy is, m: median error + spread + penalties, mean over commands."""
-    return float(np.mean([_badness(v) for v in verdicts]))
+    """Return how bad a policy is, m.
+
+    Mean over commands of median error + spread + penalties, and a penalty for every pair of
+    neighbouring commands of which the higher one does not give the higher hops: a policy that
+    ignores its command must not win by hopping in between.
+    """
+    heights = [v.command_m + v.median_error_m for v in verdicts]
+    disordered = sum(not low < high for low, high in itertools.pairwise(heights))
+    return float(np.mean([_badness(v) for v in verdicts])) + _DISORDER * disordered
 
 
 def as_rows(verdicts: list[Verdict]) -> list[dict[str, Any]]:

@@ -25,7 +25,7 @@ class PaperRecipe(Recipe):
     task: TaskOptions = field(default_factory=lambda: TaskOptions(start="mixed", stagger=True))
     reward: PaperRewardOptions = field(default_factory=PaperRewardOptions)
     """Weights as printed."""
-    steps: int = 560_000
+    steps: int = 350_000
     """Control steps of experience in all, summed over the legs."""
     hidden: tuple[int, ...] = (256, 256, 128, 128)
     """Hidden layers of actor and critics, ReLU, as printed."""
