@@ -10,6 +10,9 @@ from hopping_leg.robot import load_robot
 RATE = 200.0
 
 
+NAMES = ApexReward.names
+
+
 def transition(height, rate, *, command=0.3, clearance=0.05, apex=False):
     return Transition(
         state=np.array([[height, 0.7, -1.4, rate, 0.0, 0.0]]),
@@ -37,8 +40,8 @@ def test_a_true_hop_earns_the_event_and_a_tremble_does_not(reward):
     _, hop = reward(transition(0.3, 0.0, apex=True))
     reward(transition(0.3, 0.0, clearance=-0.001))
     _, tremble = reward(transition(0.3, 0.0, apex=True))
-    assert hop["apex"][0] == pytest.approx(reward.options.apex)
-    assert tremble["apex"][0] < 0.01 * hop["apex"][0]
+    assert hop[0, NAMES.index("apex")] == pytest.approx(reward.options.apex)
+    assert tremble[0, NAMES.index("apex")] < 0.01 * hop[0, NAMES.index("apex")]
 
 
 def test_hasty_hops_earn_no_more_per_second(reward):
@@ -48,7 +51,7 @@ def test_hasty_hops_earn_no_more_per_second(reward):
         total = 0.0
         for tick in range(1, 1601):
             _, terms = fresh(transition(0.3, 0.0, apex=tick % period == 0))
-            total += terms["apex"][0]
+            total += terms[0, NAMES.index("apex")]
         earned[period] = total
     assert earned[40] == pytest.approx(earned[80], rel=0.05)
 
@@ -60,7 +63,7 @@ def test_error_costs_alike_above_and_below_and_more_as_training_goes_on(reward):
         for error in (-0.02, 0.02):
             fly(reward, 100)
             _, terms = reward(transition(0.3 + error, 0.0, apex=True))
-            values[share, error] = terms["apex"][0]
+            values[share, error] = terms[0, NAMES.index("apex")]
     assert values[0.0, -0.02] == pytest.approx(values[0.0, 0.02])
     assert values[1.0, 0.02] < values[0.0, 0.02]
 
@@ -70,24 +73,24 @@ def test_prediction_is_the_ballistic_apex(reward):
     rate = np.sqrt(2 * reward.options.effective_gravity * rise)
     _, right = reward(transition(0.2, rate))
     _, wrong = reward(transition(0.15, rate))
-    assert right["predicted"][0] > wrong["predicted"][0]
+    assert right[0, NAMES.index("predicted")] > wrong[0, NAMES.index("predicted")]
     _, standing = reward(transition(0.2, rate, clearance=0.0))
-    assert standing["predicted"][0] == 0.0
+    assert standing[0, NAMES.index("predicted")] == 0.0
 
 
 def test_energy_gain_fades(reward):
     _, early = reward(transition(0.2, 1.0, clearance=0.0))
     reward.anneal(0.5)
     _, late = reward(transition(0.2, 1.0, clearance=0.0))
-    assert early["energy"][0] > 0.0
-    assert late["energy"][0] == 0.0
+    assert early[0, NAMES.index("energy")] > 0.0
+    assert late[0, NAMES.index("energy")] == 0.0
 
 
 def test_coming_close_to_the_ground_costs(reward):
     _, high = reward(transition(0.2, 0.0))
     _, low = reward(transition(0.06, 0.0))
-    assert high["clearance"][0] == 0.0
-    assert low["clearance"][0] < 0.0
+    assert high[0, NAMES.index("clearance")] == 0.0
+    assert low[0, NAMES.index("clearance")] < 0.0
 
 
 def test_state_survives_a_restart(reward):

@@ -33,8 +33,9 @@ def transition(
 
 
 def terms_of(options=PRINTED, **state):
-    reward, terms = PaperReward(ROBOT, options)(transition(**state))
-    return float(reward[0]), {name: float(value[0]) for name, value in terms.items()}
+    paper = PaperReward(ROBOT, options)
+    reward, terms = paper(transition(**state))
+    return float(reward[0]), dict(zip(paper.names, terms[0].tolist(), strict=True))
 
 
 heights, rates = st.floats(0.05, 0.6), st.floats(-5, 5)

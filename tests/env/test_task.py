@@ -26,7 +26,7 @@ def actions(ticks, count=6, seed=7):
 
 def fingerprint(step):
     parts = [step.observation, step.reward, step.truncated, step.apex_error, step.height]
-    return [part.tobytes() for part in (*parts, *step.terms.values())]
+    return [part.tobytes() for part in (*parts, step.terms)]
 
 
 def test_same_seed_same_bytes_at_any_thread_count():

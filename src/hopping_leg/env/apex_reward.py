@@ -96,8 +96,18 @@ class ApexReward:
         """Go on from a ``state``."""
         self._air, self._since = np.array(state["air"]), np.array(state["since"])
 
-    def __call__(self, transition: Transition) -> tuple[Array, dict[str, Array]]:
-        """Return the reward, (n,), and its weighted parts before scaling, each (n,)."""
+    names: tuple[str, ...] = (
+        "apex",
+        "predicted",
+        "energy",
+        "jerk",
+        "position",
+        "velocity",
+        "clearance",
+    )
+
+    def __call__(self, transition: Transition) -> tuple[Array, Array]:
+        """Return the reward, (n,), and its weighted parts before scaling, (n, 7)."""
         t, o = transition, self.options
         flying = t.foot_clearance >= CLEAR
         if len(self._air) != len(flying):
@@ -105,17 +115,20 @@ class ApexReward:
         self._air = np.where(flying, self._air + 1 / self._rate, 0.0)
         self._since = self._since + 1 / self._rate
         speed_squared = np.square(t.rate)
-        terms = {
-            "apex": o.apex * self._event(t),
-            "predicted": np.where(flying, o.predicted * self._prediction(t, speed_squared), 0.0),
-            "energy": self._energy * np.minimum(speed_squared, _FASTEST_SQUARED),
-            "jerk": -o.jerk * np.sum(np.square(t.action - t.last_action), axis=1),
-            "position": -o.position * self._position(t.q),
-            "velocity": -o.velocity
-            * np.sum(np.maximum(np.abs(t.qd) - o.velocity_limit, 0.0), axis=1),
-            "clearance": -self._closeness(t),
-        }
-        return o.scale * np.sum(list(terms.values()), axis=0), terms
+        over_speed = np.maximum(np.abs(t.qd) - o.velocity_limit, 0.0)
+        terms = np.stack(
+            [
+                o.apex * self._event(t),
+                np.where(flying, o.predicted * self._prediction(t, speed_squared), 0.0),
+                self._energy * np.minimum(speed_squared, _FASTEST_SQUARED),
+                -o.jerk * np.sum(np.square(t.action - t.last_action), axis=1),
+                -o.position * self._position(t.q),
+                -o.velocity * np.sum(over_speed, axis=1),
+                -self._closeness(t),
+            ],
+            axis=1,
+        )
+        return o.scale * np.sum(terms, axis=1), terms
 
     def _event(self, t: Transition) -> Array:
         motion = np.square(np.minimum(1.0, self._air / self.options.full_air))

@@ -71,8 +71,10 @@ class PaperReward:
         self._origin = np.tile(self._origin_of_leg, (count, 1))
         self._bound = np.tile(self._bound_of_leg, (count, 1))
 
-    def __call__(self, transition: Transition) -> tuple[Array, dict[str, Array]]:
-        """Return the weighted sum, (n,), and the five terms, each (n,)."""
+    names: tuple[str, ...] = ("energy", "height", "jerk", "position", "velocity")
+
+    def __call__(self, transition: Transition) -> tuple[Array, Array]:
+        """Return the weighted sum, (n,), and the five unweighted terms, (n, 5)."""
         t, count = transition, len(transition.state)
         if len(self._origin) != count:
             self._repeat(count)
@@ -94,13 +96,7 @@ class PaperReward:
             position -= np.vecdot(outside[:, 1:3], self._surplus)
             over = square - within * within
             np.add(over[:, 4], over[:, 5], out=velocity)
-        return np.vecdot(terms, self._weights), {
-            "energy": energy,
-            "height": height,
-            "jerk": jerk,
-            "position": position,
-            "velocity": velocity,
-        }
+        return np.vecdot(terms, self._weights), terms
 
     def state(self) -> dict[str, Any]:
         """Return nothing: every tick is judged by itself."""

@@ -55,6 +55,7 @@ class HoppingEnv(gymnasium.Env[Array32, npt.NDArray[np.float32]]):
         self.task = HoppingTask(
             leg, 1, options, reward or PaperReward(leg), rng, threads=1, autoreset=False
         )
+        self._terms = self.task.reward.names
         self._seeded = False
         self._camera: Camera | None = None
 
@@ -89,7 +90,7 @@ class HoppingEnv(gymnasium.Env[Array32, npt.NDArray[np.float32]]):
         info: dict[str, Any] = {
             "base_height": step.height.item(),
             "command": self.task.command.item(),
-            "reward_terms": {name: values.item() for name, values in step.terms.items()},
+            "reward_terms": dict(zip(self._terms, step.terms[0].tolist(), strict=True)),
         }
         apex_height = step.apex_height.item()
         if not math.isnan(apex_height):

@@ -35,8 +35,8 @@ class Step(NamedTuple):
     """Height of that apex, else NaN, m, (n,)."""
     height: Array
     """Base height at the end of the tick, before any restart, m, (n,)."""
-    terms: dict[str, Array]
-    """Unweighted reward terms by name, each (n,)."""
+    terms: Array
+    """Reward terms in the order of the reward's ``names``, (n, k)."""
     final_observation: Array32 | None
     """Observations before the restart, (n, 15), where any episode ended."""
     final_privileged: Array32 | None
@@ -203,9 +203,7 @@ class HoppingTask:
         self._samples = self.plant.samples(self.command)
         return self._normalise(self._samples)
 
-    def _next(
-        self, reward: Array, terms: dict[str, Array], apex_error: Array, apex_height: Array
-    ) -> Step:
+    def _next(self, reward: Array, terms: Array, apex_error: Array, apex_height: Array) -> Step:
         """End the tick: episodes that are over, new commands, what is seen."""
         self._tick += 1
         if self._tick >= self._next_switch:

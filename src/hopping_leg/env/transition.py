@@ -56,8 +56,11 @@ class Transition(NamedTuple):
 class Reward(Protocol):
     """Judges one tick of every leg."""
 
-    def __call__(self, transition: Transition) -> tuple[Array, dict[str, Array]]:
-        """Return the reward, (n,), and its unweighted terms by name, each (n,)."""
+    names: tuple[str, ...]
+    """Of its terms, k in all."""
+
+    def __call__(self, transition: Transition) -> tuple[Array, Array]:
+        """Return the reward, (n,), and its terms, (n, k)."""
         ...
 
     def state(self) -> dict[str, Any]:
