@@ -95,3 +95,9 @@ def test_wrong_usage_exits_with_2(arguments, capsys):
 def test_version(capsys):
     assert main(["--version"]) == 0
     assert capsys.readouterr().out.startswith("hop 0.")
+
+
+def test_an_option_given_twice_is_refused(capsys):
+    arguments = ["train", "--set", "legs=4", "--set", "gamma=0.9"]
+    assert main(arguments) == cli.FAILED
+    assert "--set is given twice" in capsys.readouterr().err

@@ -74,6 +74,7 @@ def _dispatch(arguments: list[str]) -> int:
         return 0
     if verb not in VERBS:
         raise UsageError(unknown_name("verb", verb, VERBS) + " Try `hop --help`.")
+    _refuse_repeated(rest)
     module = importlib.import_module(f"hopping_leg.cli.{verb}")
     options = typing.get_type_hints(module.run, include_extras=True)["args"]
     module.run(
@@ -86,6 +87,14 @@ def _dispatch(arguments: list[str]) -> int:
         )
     )
     return 0
+
+
+def _refuse_repeated(arguments: list[str]) -> None:
+    """An option given twice would silently lose its first values."""
+    flags = [a.partition("=")[0] for a in arguments if a.startswith("--")]
+    for flag in flags:
+        if flags.count(flag) > 1:
+            raise UsageError(f"{flag} is given twice; give it once, with all its values behind it.")
 
 
 def overview() -> str:
