@@ -1,0 +1,23 @@
+"""Measure speed, convergence and accuracy; every number can be written as JSON.
+
+Examples:
+  hop bench env --json env.json
+  hop bench convergence --json convergence.json
+  hop bench inference fast --json inference.json
+  hop bench training --training-seeds 0 1 2 --json training.json
+  hop bench energy-shaping --json energy_shaping.json
+"""
+
+from hopping_leg.cli.bench.controllers import Ablation, EnergyShaping, Training
+from hopping_leg.cli.bench.simulation import Convergence, Env, Inference
+from hopping_leg.cli.output import write_json
+
+Benchmark = Env | Convergence | Inference | EnergyShaping | Training | Ablation
+
+
+def run(args: Benchmark) -> None:
+    """Run one benchmark, print its numbers, write the JSON."""
+    result = args.measure()
+    if args.json is not None:
+        write_json(args.json, result)
+        print(f"Wrote {args.json}.")
