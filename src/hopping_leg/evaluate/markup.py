@@ -59,6 +59,11 @@ def small(p: float) -> str:
     return "< 0.001" if p < 1e-3 else f"{p:.3f}"
 
 
+def _interval(row: Summary | Group) -> str:
+    low = millimetres(row.median_error_low_m, sign=True)
+    return f"{low} .. {millimetres(row.median_error_high_m, sign=True)}"
+
+
 def summary_table(rows: Sequence[Summary], caption: str = "") -> Markup:
     """Return the main table."""
     return table(
@@ -66,13 +71,7 @@ def summary_table(rows: Sequence[Summary], caption: str = "") -> Markup:
             Column("controller", lambda r: r.controller),
             Column("command / m", lambda r: f"{r.command_m:.2f}"),
             Column("median error / mm", lambda r: millimetres(r.median_error_m, sign=True)),
-            Column(
-                "95 % interval",
-                lambda r: (
-                    f"{millimetres(r.median_error_low_m, sign=True)}"
-                    f" .. {millimetres(r.median_error_high_m, sign=True)}"
-                ),
-            ),
+            Column("95 % interval", _interval),
             Column("std / mm", lambda r: millimetres(r.std_m)),
             Column("IQR / mm", lambda r: millimetres(r.iqr_m)),
             Column("hops", lambda r: f"{r.hops}"),
@@ -162,13 +161,7 @@ def group_table(groups: Sequence[Group]) -> Markup:
             Column("policies", lambda r: f"{r.policies}"),
             Column("never hopped", lambda r: f"{r.motionless}", lambda r: r.motionless > 0),
             Column("median error / mm", lambda r: millimetres(r.median_error_m, sign=True)),
-            Column(
-                "95 % interval",
-                lambda r: (
-                    f"{millimetres(r.median_error_low_m, sign=True)}"
-                    f" .. {millimetres(r.median_error_high_m, sign=True)}"
-                ),
-            ),
+            Column("95 % interval", _interval),
             Column("worst |error| / mm", lambda r: millimetres(r.worst_abs_error_m)),
             Column("median std / mm", lambda r: millimetres(r.median_std_m)),
             Column("skipped", lambda r: f"{r.skipped_hops}", lambda r: r.skipped_hops > 0),
