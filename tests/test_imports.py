@@ -10,7 +10,7 @@ import pytest
 import hopping_leg
 
 ROOT = Path(hopping_leg.__file__).parent
-ORDER = ["foundation", "robot", "sim", "control", "env", "learn", "evaluate", "cli"]
+ORDER = ["foundation", "robot", "sim", "control", "identify", "env", "learn", "evaluate", "cli"]
 FOUNDATION = {"", "arrays", "errors", "hops", "trace"}
 TRAINING = {"torch", "stable_baselines3", "onnx", "tensorboard"}
 BESIDE = {("evaluate", "learn")}

@@ -28,6 +28,10 @@ class TraceError(HoppingLegError):
     """A trace file is unreadable or has another layout."""
 
 
+class RecordingError(HoppingLegError):
+    """A recording cannot be read or believed; the message names file, column and row."""
+
+
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> str:
     """Return the sentence for a name that does not exist, with the valid ones.
 

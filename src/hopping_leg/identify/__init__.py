@@ -1,0 +1,1 @@
+"""From recorded trajectories to a robot file (paper, "Simulation to Reality Transfer")."""

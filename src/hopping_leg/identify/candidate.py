@@ -1,0 +1,111 @@
+"""What a fit may change: the robot, and the drives that the recording's rig put around it."""
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import Any
+
+from hopping_leg.errors import UsageError, unknown_name
+from hopping_leg.robot.parameters import Robot
+
+_DRIVE = "drive"
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One joint's drive at the joint's side; NaN takes what the recording says."""
+
+    stiffness: float = field(default=float("nan"), metadata={"unit": "N m/rad"})
+    damping: float = field(default=float("nan"), metadata={"unit": "N m s/rad"})
+    integral: float = field(default=float("nan"), metadata={"unit": "N m/(rad s)"})
+    torque_limit: float = field(default=float("nan"), metadata={"unit": "N m"})
+    torque_gain: float = field(default=1.0, metadata={"unit": "1"})
+    """Torque that the joint feels per torque that the drive aims at."""
+    torque_offset: float = field(default=0.0, metadata={"unit": "N m"})
+    """Measured torque without any true torque."""
+    sensor_gain: float = field(default=1.0, metadata={"unit": "1"})
+    """Measured torque per true torque."""
+    load_friction: float = field(default=0.0, metadata={"unit": "1"})
+    """Coulomb friction per torque that the gear transmits."""
+    backlash: float = field(default=0.0, metadata={"unit": "rad"})
+    """Half the gap between motor and joint, as the drive's position error cannot see it."""
+
+
+@dataclass(frozen=True)
+class Drives:
+    """Both drives and what they share."""
+
+    hip: Drive = field(default_factory=Drive)
+    knee: Drive = field(default_factory=Drive)
+    delay: float = field(default=0.0, metadata={"unit": "s"})
+    """From a command's time stamp to its effect."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A robot and its drives: all that a simulation of a recording needs.
+
+    Parameters are named by their path: ``"hip.friction"`` as in the robot file,
+    ``"drive.hip.stiffness"`` for what is not the robot's.
+    """
+
+    robot: Robot
+    drive: Drives = field(default_factory=Drives)
+
+    def get(self, name: str) -> float:
+        """Return a parameter's value.
+
+        Raises:
+            UsageError: There is no such parameter.
+        """
+        _check(self, name)
+        value: Any = self
+        for part in _path(name):
+            value = getattr(value, part)
+        return float(value)
+
+    def replace(self, values: dict[str, float]) -> "Candidate":
+        """Return the candidate with some parameters' values changed.
+
+        Raises:
+            UsageError: There is no such parameter.
+        """
+        candidate = self
+        for name, value in values.items():
+            _check(self, name)
+            candidate = _replaced(candidate, _path(name), float(value))
+        return candidate
+
+
+def parameter_units(candidate: Candidate) -> dict[str, str]:
+    """Return every parameter's name and unit."""
+    names = {f"{_DRIVE}.{name}": unit for name, unit in _leaves(candidate.drive)}
+    return dict(_leaves(candidate.robot)) | names
+
+
+def _path(name: str) -> list[str]:
+    parts = name.split(".")
+    return parts if parts[0] == _DRIVE else ["robot", *parts]
+
+
+def _leaves(owner: Any, prefix: str = "") -> list[tuple[str, str]]:  # noqa: ANN401
+    found: list[tuple[str, str]] = []
+    for spec in dataclasses.fields(owner):
+        value = getattr(owner, spec.name)
+        if dataclasses.is_dataclass(value):
+            found += _leaves(value, f"{prefix}{spec.name}.")
+        elif "unit" in spec.metadata:
+            found.append((prefix + spec.name, spec.metadata["unit"]))
+    return found
+
+
+def _check(candidate: Candidate, name: str) -> None:
+    units = parameter_units(candidate)
+    if name not in units:
+        raise UsageError(unknown_name("parameter", name, units))
+
+
+def _replaced(owner: Any, path: list[str], value: float) -> Any:  # noqa: ANN401
+    head, *rest = path
+    return dataclasses.replace(
+        owner, **{head: _replaced(getattr(owner, head), rest, value) if rest else value}
+    )

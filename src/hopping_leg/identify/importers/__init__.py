@@ -1,0 +1,46 @@
+"""Recordings of other loggers, recognised by their columns; a module per rig.
+
+Each rig's module has ``COLUMNS``, the names that only it has, and ``read(table)``, which returns
+the table in a recording's columns and the setup.
+"""
+
+from typing import Protocol
+
+import polars as pl
+
+from hopping_leg.identify.importers import (
+    doublependulum,
+    legv1_rail,
+    legv2_boom,
+    legv2_fixed_base,
+)
+from hopping_leg.identify.setup import RecordingSetup
+
+Imported = tuple[pl.DataFrame, RecordingSetup]
+
+
+class Importer(Protocol):
+    """A rig's module."""
+
+    COLUMNS: frozenset[str]
+
+    def read(self, table: pl.DataFrame) -> Imported:
+        """Return a recording's table and setup from the rig's own table."""
+        ...
+
+
+IMPORTERS: dict[str, Importer] = {
+    "legv2_fixed_base": legv2_fixed_base,
+    "legv1_rail": legv1_rail,
+    "legv2_boom": legv2_boom,
+    "doublependulum": doublependulum,
+}
+"""Rigs by name."""
+
+
+def recognise(columns: list[str]) -> Importer | None:
+    """Return the importer whose columns a table has, or none."""
+    for importer in IMPORTERS.values():
+        if importer.COLUMNS.issubset(columns):
+            return importer
+    return None

@@ -1,0 +1,36 @@
+"""The two-link pendulum of the same lab: base clamped, torque commands."""
+
+import dataclasses
+
+import polars as pl
+
+from hopping_leg.identify.importers.renaming import joint_columns, median_rate, take
+from hopping_leg.identify.setup import Quantisation, RecordingSetup
+
+COLUMNS = frozenset({"t", "pos_meas1", "pos_meas2", "tau_con1", "tau_con2"})
+
+_NAMES = {"t": "time_s"} | joint_columns(
+    {
+        "position": "pos_meas{}",
+        "velocity": "vel_meas{}",
+        "torque": "tau_meas{}",
+        "torque_command": "tau_con{}",
+    },
+    ("1", "2"),
+)
+
+SETUP = RecordingSetup(
+    rig="fixed-base",
+    rate_hz=500.0,
+    robot="doublependulum",
+    source="two-link pendulum, design A.0 (0.3 m, 0.2 m), T-Motor AK80-6, torque commands",
+    sample="before-command",
+    onboard="torque",
+    quantisation=Quantisation(position=3.815e-4, velocity=0.03297, torque=0.00586),
+)
+"""Joint 1 is the hip, joint 2 the knee; steps of the sensors as seen in the recordings."""
+
+
+def read(table: pl.DataFrame) -> tuple[pl.DataFrame, RecordingSetup]:
+    """Return the recording's table and setup; the rate is the clock's own."""
+    return take(table, _NAMES), dataclasses.replace(SETUP, rate_hz=median_rate(table["t"]))

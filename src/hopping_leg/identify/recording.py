@@ -1,0 +1,231 @@
+"""A recording: measured joints and commands over time, and how they were recorded.
+
+Native files are traces (Parquet) whose header holds the setup; CSV and foreign Parquet files need
+a sidecar, or come from one of the known rigs.
+"""
+
+import dataclasses
+import hashlib
+import tomllib
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.errors import RecordingError, UsageError, unknown_name
+from hopping_leg.identify.checks import check_table
+from hopping_leg.identify.columns import COLUMNS, PAIRS
+from hopping_leg.identify.importers import IMPORTERS, recognise
+from hopping_leg.identify.setup import RecordingSetup, setup_from_tree, setup_to_tree
+from hopping_leg.identify.tables import is_parquet, read_bytes, read_csv
+from hopping_leg.trace import Trace
+
+STALL = 2.0
+"""A gap between rows of more than this many periods is a stall."""
+
+_KEY = "recording"
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One run of a rig.
+
+    Attributes:
+        trace: Table in the columns of ``COLUMNS`` and the header.
+        setup: How it was recorded.
+        name: The file's name.
+        digest: SHA-256 of the file's bytes, hex.
+        warnings: What the loader found strange but could live with, a sentence each.
+    """
+
+    trace: Trace
+    setup: RecordingSetup
+    name: str
+    digest: str = ""
+    warnings: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return self.trace.table.height
+
+    @property
+    def time(self) -> Array:
+        """Time stamps, (ticks,), s."""
+        return self.trace.column("time_s")
+
+    @property
+    def exact_time(self) -> BoolArray:
+        """Where the time stamp is no guess, (ticks,)."""
+        if not self.has_column("exact_time"):
+            return np.ones(len(self), dtype=bool)
+        return self.trace.table["exact_time"].fill_null(False).to_numpy()
+
+    def has_column(self, column: str) -> bool:
+        """Return whether a column was recorded."""
+        return column in self.trace.table.columns
+
+    def has(self, quantity: str) -> bool:
+        """Return whether any value of a quantity of ``PAIRS`` was recorded."""
+        return bool(np.isfinite(self.array(quantity)).any())
+
+    def array(self, quantity: str) -> Array:
+        """Return a quantity of hip and knee, (ticks, 2), NaN where it was not recorded.
+
+        Args:
+            quantity: ``position``, ``velocity``, ``torque``, ``position_command``,
+                ``velocity_command``, ``torque_command``, ``stiffness``, ``damping``, or one of
+                the guesses ``position_estimate`` and ``velocity_estimate``.
+
+        Raises:
+            UsageError: There is no such quantity.
+        """
+        if quantity not in PAIRS:
+            raise UsageError(unknown_name("quantity of a recording", quantity, PAIRS))
+        return np.stack([self._floats(column) for column in PAIRS[quantity]], axis=-1)
+
+    def segments(self) -> list[slice]:
+        """Return the stretches of rows without a stall, in order."""
+        stalls = np.flatnonzero(np.diff(self.time) > STALL * self.setup.period) + 1
+        edges = [0, *stalls.tolist(), len(self)]
+        return [slice(a, b) for a, b in pairwise(edges)]
+
+    def save(self, path: Path) -> None:
+        """Write the native form.
+
+        Raises:
+            TraceError: The file cannot be written.
+        """
+        header = {**self.trace.header, _KEY: setup_to_tree(self.setup)}
+        Trace(self.trace.table, header).save(path)
+
+    def _floats(self, column: str) -> Array:
+        if not self.has_column(column):
+            return np.full(len(self), np.nan)
+        values: Array = self.trace.table[column].cast(pl.Float64).to_numpy()
+        return values
+
+
+def make_recording(
+    table: pl.DataFrame,
+    setup: RecordingSetup,
+    name: str,
+    *,
+    header: dict[str, Any] | None = None,
+    digest: str = "",
+) -> Recording:
+    """Check a table and return it as a recording.
+
+    Args:
+        table: Columns as in ``COLUMNS``.
+        setup: How it was recorded.
+        name: The file, for messages.
+        header: Further entries for the file's header.
+        digest: Hash of the file.
+
+    Raises:
+        RecordingError: The table cannot be believed; names file, column and row.
+    """
+    table, warnings = check_table(_typed(table, name), setup, name)
+    return Recording(Trace(table, header or {}), setup, Path(name).name, digest, tuple(warnings))
+
+
+def load_recording(path: str | Path) -> Recording:
+    """Load a recording: native Parquet, a table with a sidecar, or a known rig's log.
+
+    The sidecar of ``run.csv`` or ``run.csv.gz`` is ``run.toml`` beside it.
+
+    Raises:
+        RecordingError: It cannot be read or believed; names file, column and row.
+    """
+    path = Path(path)
+    origin = str(path)
+    content = read_bytes(path)
+    digest = hashlib.sha256(content).hexdigest()
+    table, header = _native(path) if is_parquet(content) else (read_csv(content, origin), {})
+    sidecar = _sidecar(path)
+    if sidecar is not None:
+        table, setup = _apply(sidecar, table, origin)
+    elif _KEY in header:
+        setup = setup_from_tree(header.pop(_KEY), origin)
+    else:
+        importer = recognise(table.columns)
+        if importer is None:
+            raise RecordingError(
+                f"{origin} is of no known rig ({', '.join(IMPORTERS)}) and there is no sidecar"
+                f" {sidecar_path(path).name} beside it; its columns are:"
+                f" {', '.join(table.columns[:12])}."
+            )
+        table, setup = importer.read(table)
+    return make_recording(table, setup, origin, header=header, digest=digest)
+
+
+def sidecar_path(path: Path) -> Path:
+    """Return where a table's sidecar would be."""
+    name = path.name.removesuffix(".gz")
+    return path.with_name(f"{Path(name).stem}.toml")
+
+
+def _native(path: Path) -> tuple[pl.DataFrame, dict[str, Any]]:
+    """Return a Parquet file's table, and its header if it is a trace."""
+    try:
+        text = pl.read_parquet_metadata(path).get("hopping_leg")
+        if text is not None:
+            trace = Trace.load(path)
+            return trace.table, dict(trace.header)
+        return pl.read_parquet(path), {}
+    except (pl.exceptions.PolarsError, OSError) as error:
+        raise RecordingError(f"{path} is not a readable Parquet file: {error}.") from error
+
+
+def _sidecar(path: Path) -> tuple[str, dict[str, Any]] | None:
+    file = sidecar_path(path)
+    if file == path or not file.is_file():
+        return None
+    try:
+        return str(file), tomllib.loads(file.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+        raise RecordingError(f"{file} is not valid TOML: {error}.") from error
+
+
+def _apply(
+    sidecar: tuple[str, dict[str, Any]], table: pl.DataFrame, origin: str
+) -> tuple[pl.DataFrame, RecordingSetup]:
+    """Name a table's columns as its sidecar says and return the setup."""
+    file, tree = sidecar
+    names = tree.pop("columns", {})
+    if not isinstance(names, dict) or not all(isinstance(v, str) for v in names.values()):
+        raise RecordingError(
+            f"{file}: [columns] must name the file's column for each of a recording's columns."
+        )
+    for new, old in names.items():
+        if new not in COLUMNS:
+            raise RecordingError(f"{file}: {unknown_name('recording column', new, COLUMNS)}")
+        if old not in table.columns:
+            raise RecordingError(f"{file}: {origin} {unknown_name('column', old, table.columns)}")
+    table = table.with_columns(pl.col(old).alias(new) for new, old in names.items())
+    if "row" not in table.columns:
+        table = table.with_columns(pl.int_range(pl.len()).alias("row"))
+    return table, setup_from_tree(tree, file)
+
+
+def _typed(table: pl.DataFrame, origin: str) -> pl.DataFrame:
+    """Return the columns of a recording in their types; others are left out."""
+    series = []
+    for name, (dtype, _) in COLUMNS.items():
+        if name not in table.columns:
+            continue
+        try:
+            series.append(table[name].cast(dtype))
+        except pl.exceptions.PolarsError as error:
+            raise RecordingError(
+                f"{origin}: column '{name}' holds {table[name].dtype} but must hold {dtype}."
+            ) from error
+    return pl.DataFrame(series).with_columns(pl.selectors.float().fill_nan(None))
+
+
+def with_setup(recording: Recording, **changes: Any) -> Recording:  # noqa: ANN401
+    """Return the recording with other facts in its setup, e.g. gains known from elsewhere."""
+    return dataclasses.replace(recording, setup=dataclasses.replace(recording.setup, **changes))

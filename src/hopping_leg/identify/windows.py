@@ -1,0 +1,117 @@
+"""Windows: stretches of recordings that are simulated from a measured state."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.errors import RecordingError, UsageError
+from hopping_leg.identify.recording import Recording
+
+
+@dataclass(frozen=True)
+class Window:
+    """Rows ``start`` to ``start + length`` of a recording.
+
+    Attributes:
+        recording: Index of the recording.
+        start: First row, whose state starts the simulation.
+        length: Number of rows.
+        unscored: Rows at the beginning that no residual counts, while the start's error decays.
+    """
+
+    recording: int
+    start: int
+    length: int
+    unscored: int = 1
+
+
+def cut(
+    recordings: Sequence[Recording],
+    duration: float | None = None,
+    *,
+    stride: float | None = None,
+    unscored: float = 0.0,
+) -> list[Window]:
+    """Cut recordings into windows of one duration.
+
+    Args:
+        recordings: What to cut.
+        duration: Of a window, s; None makes one window of each recording, as the paper does.
+        stride: From one window's start to the next, s; None leaves no gap and no overlap.
+        unscored: Beginning of each window that does not count, s.
+
+    Raises:
+        UsageError: A duration has no meaning.
+        RecordingError: A recording is shorter than one window.
+    """
+    for name, value in (("duration", duration), ("stride", stride)):
+        if value is not None and not 0 < value < np.inf:
+            raise UsageError(f"The windows' {name} is {value} s but must be positive and finite.")
+    windows: list[Window] = []
+    for index, recording in enumerate(recordings):
+        rows, rate = len(recording.time), recording.setup.rate_hz
+        length = rows if duration is None else round(duration * rate)
+        skip = max(1, round(unscored * rate))
+        if rows < length or length <= skip + 1:
+            raise RecordingError(
+                f"Recording {index} has {rows} rows, {rows / rate:.3g} s, too short for windows of"
+                f" {length / rate:.3g} s of which {skip / rate:.3g} s do not count; record longer."
+            )
+        step = length if stride is None else max(1, round(stride * rate))
+        windows += [Window(index, s, length, skip) for s in range(0, rows - length + 1, step)]
+    return windows
+
+
+def split(
+    windows: Sequence[Window], held_out: float, rng: np.random.Generator
+) -> tuple[list[Window], list[Window]]:
+    """Split windows into those to fit and those to judge by, at random.
+
+    Args:
+        windows: At least two.
+        held_out: Share to hold out, between 0 and 1; at least one window goes to each side.
+        rng: Source of randomness.
+
+    Raises:
+        UsageError: There is nothing to split, or the share has no meaning.
+    """
+    if not 0 < held_out < 1:
+        raise UsageError(f"The held-out share is {held_out} but must lie between 0 and 1.")
+    if len(windows) < 2:
+        raise UsageError("One window cannot be split; take shorter windows or more recordings.")
+    count = min(max(1, round(held_out * len(windows))), len(windows) - 1)
+    chosen = set(rng.choice(len(windows), count, replace=False).tolist())
+    fit = [w for i, w in enumerate(windows) if i not in chosen]
+    return fit, [w for i, w in enumerate(windows) if i in chosen]
+
+
+def initial_state(recording: Recording, row: int) -> tuple[Array, Array]:
+    """Return joint position and velocity at a row, (2,) each, rad and rad/s.
+
+    Measured where the row has them, else the estimate, else interpolated between measured rows;
+    a velocity that was never measured is the position's slope.
+
+    Raises:
+        RecordingError: A joint has no measured position at all.
+    """
+    position = _filled(recording, "position", "position_estimate")
+    if np.isnan(position).any():
+        raise RecordingError("A recording lacks measured positions of a joint; record both.")
+    velocity = _filled(recording, "velocity", "velocity_estimate")
+    slope = np.gradient(position, recording.time, axis=0)
+    velocity = np.where(np.isnan(velocity), slope, velocity)
+    return position[row], velocity[row]
+
+
+def _filled(recording: Recording, quantity: str, estimate: str) -> Array:
+    """Return a measured quantity without gaps where that is possible, (ticks, 2)."""
+    values = recording.array(quantity)
+    values = np.where(np.isnan(values), recording.array(estimate), values)
+    for joint in range(2):
+        known = ~np.isnan(values[:, joint])
+        if known.any():
+            times = recording.time
+            values[:, joint] = np.interp(times, times[known], values[known, joint])
+    return values
