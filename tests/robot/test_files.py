@@ -5,6 +5,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from hopping_leg.control.rollout import Setup
+from hopping_leg.env import HoppingEnv
 from hopping_leg.errors import RobotError
 from hopping_leg.robot import build_model, load_robot, shipped_robots
 from hopping_leg.robot.files import load_tree
@@ -76,6 +78,15 @@ def test_a_file_may_change_only_what_differs():
     assert mine.digest != parent.digest
 
 
+def test_a_pendulum_swings_freely_but_cannot_hop():
+    pendulum = load_robot("doublependulum")
+    assert pendulum.knee.lower < 0 < pendulum.knee.upper
+    with pytest.raises(RobotError, match="is a pendulum and cannot hop"):
+        Setup(pendulum)
+    with pytest.raises(RobotError, match="is a pendulum and cannot hop"):
+        HoppingEnv("doublependulum")
+
+
 def test_armature_follows_from_rotor_gear_and_belt():
     knee = load_robot("legv2").knee
     ratio = knee.motor.gear_ratio * knee.belt_ratio
@@ -102,7 +113,7 @@ def test_every_mistake_gets_a_sentence_that_names_the_field(tmp_path, path, mist
     ("path", "value", "named"),
     [
         ("hip.lower", 3.0, "hip.upper"),
-        ("knee.upper", 0.5, "knee.upper"),
+        ("knee.upper", 0.5, "knee.upper.*pendulum"),
         ("thigh.com", 0.4, "thigh.length"),
         ("hip.motor.torque_limit", 40.0, "hip.motor.peak_torque"),
         ("knee.motor.rated_torque", 17.0, "knee.motor.peak_torque"),
@@ -124,6 +135,7 @@ def test_contradictions_name_the_fields(tmp_path, path, value, named):
         ("base = 3", "'name' is missing"),
         ('name = "x"\nbase = 3', "'base' must be a table"),
         ("name = 3", "'name' must be a text"),
+        ('extends = "legv2"\nkind = "log"', "Did you mean 'leg'"),
         ('name = " "\nextends = "legv2"', "'name' must be a text"),
         ("extends = 3", "'extends' must be"),
         ('extends = "legv3"', "Did you mean 'legv"),

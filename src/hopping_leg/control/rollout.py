@@ -59,6 +59,7 @@ class Setup:
     """Worker threads, 0 for one per core."""
 
     def __post_init__(self) -> None:
+        self.robot.require_leg()
         for name in ("rate", "timestep"):
             value = getattr(self, name)
             if not 0 < value < math.inf:

@@ -19,10 +19,12 @@ class Starts:
     """Draws initial states.
 
     Raises:
+        RobotError: The robot is no leg.
         UsageError: A start asks for a leg length that the robot does not reach.
     """
 
     def __init__(self, robot: Robot, options: TaskOptions) -> None:
+        robot.require_leg()
         self.robot, self.options = robot, options
         lengths = (options.start_length, *options.drop_length)
         self._standing = kinematics.joint_angles(robot, np.array([lengths[0], 0.0]))

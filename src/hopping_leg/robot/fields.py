@@ -5,9 +5,9 @@ import difflib
 import math
 from typing import Any, TypeVar
 
-from hopping_leg.errors import RobotError
+from hopping_leg.errors import RobotError, unknown_name
 from hopping_leg.robot.model import TIMESTEP
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.parameters import KINDS, Robot
 
 Tree = dict[str, Any]
 """Nested tables as read from TOML."""
@@ -69,10 +69,13 @@ def check_physics(robot: Robot, origin: str) -> None:
             )
     for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
         _at_most(origin, (f"{name}.com", link.com), (f"{name}.length", link.length), "m")
-    if robot.knee.lower < -math.pi or robot.knee.upper > 0:
+    if robot.kind not in KINDS:
+        raise RobotError(f"{origin}: 'kind': {unknown_name('kind of robot', robot.kind, KINDS)}")
+    if robot.kind == "leg" and (robot.knee.lower < -math.pi or robot.knee.upper > 0):
         raise RobotError(
             f"{origin}: 'knee.lower' and 'knee.upper' must lie between -pi and 0 rad,"
-            " because the knee bends to the negative side."
+            " because a leg's knee bends to the negative side;"
+            " for a robot that only swings write kind = 'pendulum'."
         )
     least = 2 * TIMESTEP
     if robot.contact.time_constant < least:

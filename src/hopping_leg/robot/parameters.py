@@ -8,6 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hopping_leg.arrays import Array
+from hopping_leg.errors import RobotError
+
+KINDS = ("leg", "pendulum")
+"""What a robot may be."""
 
 
 def reflected_inertia(rotor_inertia: float, gear_ratio: float) -> float:
@@ -126,6 +130,8 @@ class Robot:
     hip: Joint
     knee: Joint
     description: str = ""
+    kind: str = "leg"
+    """``leg``, whose knee bends to the negative side, or ``pendulum``, which swings freely."""
 
     @property
     def mass(self) -> float:
@@ -137,6 +143,18 @@ class Robot:
         """Height of the hip axis with the leg straight and the foot on the ground, m."""
         return self.thigh.length + self.shank.length + self.foot.radius
 
+    def require_leg(self) -> None:
+        """Refuse a pendulum where a robot has to stand or hop.
+
+        Raises:
+            RobotError: The robot is no leg.
+        """
+        if self.kind != "leg":
+            raise RobotError(
+                f"{self.name} is a {self.kind} and cannot hop; name a leg, e.g. legv2, or use it"
+                " for identification only."
+            )
+
     def of_joints(self, attribute: str) -> Array:
         """Return a joint attribute of hip and knee, (2,)."""
         return np.array([getattr(self.hip, attribute), getattr(self.knee, attribute)])
@@ -145,6 +163,6 @@ class Robot:
     def digest(self) -> str:
         """Hash of every parameter that the physics depends on: 16 hex digits."""
         values = dataclasses.asdict(self)
-        del values["name"], values["description"]
+        del values["name"], values["description"], values["kind"]
         text = json.dumps(values, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
