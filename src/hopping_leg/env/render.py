@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hopping_leg.errors import UsageError
+from hopping_leg.robot import build_model
 from hopping_leg.sim import Legs
 
 Image = npt.NDArray[np.uint8]
@@ -26,7 +27,7 @@ class Camera:
 
     def __init__(self, legs: Legs, width: int = 640, height: int = 480) -> None:
         self.legs = legs
-        self._model = legs.batch.get_model(0)
+        self._model = build_model(legs.robot)
         self._data = mujoco.MjData(self._model)
         try:
             self._renderer: Any = mujoco.Renderer(self._model, height, width)

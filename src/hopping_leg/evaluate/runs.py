@@ -12,6 +12,7 @@ from hopping_leg.control import Controller, Setup, roll_out
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.evaluate.trials import Trial
 from hopping_leg.robot.parameters import Contact, Robot
+from hopping_leg.robot.reality import Ground
 from hopping_leg.trace import Trace
 
 FLOORS = {"soft": "the robot's own contact", "stiff": "MuJoCo's default contact, solref 0.02 1"}
@@ -54,7 +55,8 @@ def floor_robot(robot: Robot, floor: str) -> Robot:
         raise UsageError(unknown_name("floor", floor, FLOORS))
     if floor == "soft":
         return robot
-    return replace(robot, contact=Contact(0.02, 1.0, robot.contact.friction))
+    reality = replace(robot.reality, ground=Ground())
+    return replace(robot, contact=Contact(0.02, 1.0, robot.contact.friction), reality=reality)
 
 
 def run_trials(

@@ -40,7 +40,7 @@ def build(kind: type[Kind], tree: object, prefix: str, origin: str) -> Kind:
     for name, spec in fields.items():
         path = f"{prefix}.{name}" if prefix else name
         if name not in tree:
-            if spec.default is dataclasses.MISSING:
+            if spec.default is spec.default_factory is dataclasses.MISSING:
                 raise RobotError(f"{origin}: '{path}' is missing; it needs {_form(spec)}.")
         elif spec.type is str:
             values[name] = _string(tree[name], path, origin)
@@ -77,11 +77,39 @@ def check_physics(robot: Robot, origin: str) -> None:
             " because a leg's knee bends to the negative side;"
             " for a robot that only swings write kind = 'pendulum'."
         )
+    _check_reality(robot, origin)
     least = 2 * TIMESTEP
     if robot.contact.time_constant < least:
         raise RobotError(
             f"{origin}: 'contact.time_constant' is {robot.contact.time_constant:g} s but must be at"
             f" least {least:g} s, two physics steps; MuJoCo would silently take that instead."
+        )
+
+
+def _check_reality(robot: Robot, origin: str) -> None:
+    """Check what no single field of ``[reality]`` can tell."""
+    reality = robot.reality
+    for name, joint, drive in (("hip", robot.hip, reality.hip), ("knee", robot.knee, reality.knee)):
+        at = f"reality.{name}"
+        if drive.efficiency > 1:
+            raise RobotError(
+                f"{origin}: '{at}.efficiency' is {drive.efficiency:g} but no gear gives more than"
+                " it gets; give at most 1."
+            )
+        if drive.stiction < 1:
+            raise RobotError(
+                f"{origin}: '{at}.stiction' is {drive.stiction:g} but friction at rest is not below"
+                " Coulomb friction; give 1 or more."
+            )
+        if drive.torque_limit is not None:
+            peak = joint.motor.peak_torque * joint.belt_ratio
+            limit = (f"{at}.torque_limit", drive.torque_limit)
+            _at_most(origin, limit, (f"{name}.motor.peak_torque x belt_ratio", peak), "N m")
+    softest = reality.ground.time_constant
+    if softest is not None and softest < 2 * TIMESTEP:
+        raise RobotError(
+            f"{origin}: 'reality.ground.time_constant' is {softest:g} s but must be at least"
+            f" {2 * TIMESTEP:g} s, two physics steps."
         )
 
 
@@ -119,7 +147,7 @@ def _number(entry: object, spec: Field, path: str, origin: str) -> float:
         raise RobotError(f"{origin}: '{path}' is in {entry['unit']!r} but must be in '{unit}'.")
     if not isinstance(entry["source"], str) or not entry["source"].strip():
         raise RobotError(f"{origin}: '{path}' has no source; say where {value} comes from.")
-    zero_is_valid = spec.name in _MAY_BE_ZERO
+    zero_is_valid = spec.name in _MAY_BE_ZERO or spec.metadata.get("zero", False)
     if spec.name not in _MAY_BE_NEGATIVE and (value < 0 or (value == 0 and not zero_is_valid)):
         least = "zero or more" if zero_is_valid else "more than zero"
         raise RobotError(f"{origin}: '{path}' is {value} {unit} but must be {least}.")

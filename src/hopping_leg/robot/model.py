@@ -14,6 +14,9 @@ GRAVITY = 9.81
 TIMESTEP = 5e-4
 """Default physics step, s: a compromise whose price ``hop bench convergence`` measures."""
 
+_CLAMP = 1e12
+"""Inertia that no leg moves, kg: what clamps the base."""
+
 _THIN = 1e-9
 """Inertia around the axes a planar link cannot turn about only has to be valid."""
 
@@ -54,11 +57,25 @@ def build_model(robot: Robot, timestep: float = TIMESTEP) -> mujoco.MjModel:
     Raises:
         RobotError: MuJoCo refuses the parameters, e.g. a mass that is too small.
     """
+    return compile_spec(get_spec(robot, timestep), robot.name)
+
+
+def clamp_base(spec: mujoco.MjSpec) -> None:
+    """Fix the base to the rail where it stands, for fixed-base runs; coordinates stay the same."""
+    spec.joint("rail").armature = _CLAMP
+
+
+def compile_spec(spec: mujoco.MjSpec, name: str) -> mujoco.MjModel:
+    """Compile an edited model of the robot ``name``.
+
+    Raises:
+        RobotError: MuJoCo refuses the parameters, e.g. a mass that is too small.
+    """
     try:
-        model = get_spec(robot, timestep).compile()
+        model = spec.compile()
     except ValueError as error:
         reason = " ".join(str(error).split()).removeprefix("Error: ")
-        raise RobotError(f"MuJoCo cannot build robot '{robot.name}': {reason}.") from error
+        raise RobotError(f"MuJoCo cannot build robot '{name}': {reason}.") from error
     if mujoco.mj_isSparse(model):
         # MuJoCo 4.0.0 factorises the sparse Hessian wrongly.
         raise RuntimeError("the leg's constraint Jacobian must be dense")

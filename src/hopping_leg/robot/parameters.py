@@ -9,6 +9,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RobotError
+from hopping_leg.robot.reality import Reality
 
 KINDS = ("leg", "pendulum")
 """What a robot may be."""
@@ -132,6 +133,8 @@ class Robot:
     description: str = ""
     kind: str = "leg"
     """``leg``, whose knee bends to the negative side, or ``pendulum``, which swings freely."""
+    reality: Reality = field(default_factory=Reality)
+    """What the real leg does beyond this; simulated by ``hopping_leg.sim``, unknown to control."""
 
     @property
     def mass(self) -> float:
@@ -164,5 +167,7 @@ class Robot:
         """Hash of every parameter that the physics depends on: 16 hex digits."""
         values = dataclasses.asdict(self)
         del values["name"], values["description"], values["kind"]
+        if self.reality.neutral:
+            del values["reality"]
         text = json.dumps(values, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]

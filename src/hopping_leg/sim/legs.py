@@ -8,8 +8,9 @@ from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.limits import MotorLimit
-from hopping_leg.robot.model import TIMESTEP, build_model
+from hopping_leg.robot.model import TIMESTEP, clamp_base, compile_spec, get_spec
 from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim.reality import RealLegs
 
 CONTROL_RATE = 200.0
 """Control rate of the paper, Hz."""
@@ -35,12 +36,16 @@ class Legs:
     parts ``height``, ``height_rate`` (n,), ``q`` and ``qd`` (n, 2), in m, m/s, rad and rad/s.
     Results do not depend on the number of threads.
 
+    ``measured_q`` and ``measured_qd`` (n, 2) are what the joints' encoders report, live: the true
+    state, unless the robot's ``reality`` says otherwise.
+
     Args:
         robot: The leg.
         count: Number of simulations n.
         rate: Control rate, Hz; one ``step`` lasts ``1 / rate``.
         timestep: Physics step, s; must divide the control period.
         threads: Worker threads, 0 for one per core.
+        clamped: Fix the base where it is placed, for fixed-base runs.
 
     Raises:
         UsageError: The physics step does not divide the control period.
@@ -54,19 +59,50 @@ class Legs:
         rate: float = CONTROL_RATE,
         timestep: float = TIMESTEP,
         threads: int = 0,
+        clamped: bool = False,
     ) -> None:
         substeps = _substeps(rate, timestep)
         self.robot, self.count, self.rate, self.timestep = robot, count, rate, timestep
         self.period = 1 / rate
         self.substeps = substeps
-        self.batch = batch.Batch(build_model(robot, timestep), count, threads)
-        self._ctrl = self.batch.bind("ctrl")
-        first = mujoco.mj_stateSize(self.batch.model, mujoco.mjtState.mjSTATE_TIME)
-        self.state = self.batch.state[:, first : first + 6]
+        self.real: RealLegs | None = None
+        if robot.reality.neutral:
+            self._take_model(clamped, threads)
+        else:
+            self._take_reality(clamped, threads)
         self.height, self.height_rate = self.state[:, 0], self.state[:, 3]
         self.q, self.qd = self.state[:, 1:3], self.state[:, 4:6]
+        sensors = self if self.real is None else self.real.sensors
+        self.measured_q, self.measured_qd = sensors.q, sensors.qd
         self._motors = MotorLimit(robot, count)
         self._inverse_belt = np.tile(1 / robot.of_joints("belt_ratio"), (count, 1))
+        self._applied = np.zeros((count, 2))
+
+    def _take_model(self, clamped: bool, threads: int) -> None:
+        spec = get_spec(self.robot, self.timestep)
+        if clamped:
+            clamp_base(spec)
+        model = compile_spec(spec, self.robot.name)
+        self.batch = batch.Batch(model, self.count, threads)
+        self._ctrl = self.batch.bind("ctrl")
+        first = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_TIME)
+        self.state = self.batch.state[:, first : first + 6]
+
+    def _take_reality(self, clamped: bool, threads: int) -> None:
+        self.real = RealLegs(
+            self.robot,
+            self.count,
+            timestep=self.timestep,
+            substeps=self.substeps,
+            threads=threads,
+            clamped=clamped,
+        )
+        self.batch, self.state = self.real.batch, self.real.state
+
+    @property
+    def measured_torque(self) -> Array:
+        """What the motors' torque measurement reports now, N m at the joints, (n, 2)."""
+        return self._applied if self.real is None else self.real.sensors.torque
 
     def place(self, ids: IntArray | slice, height: Array | float, q: Array) -> None:
         """Put legs at rest at a height and posture.
@@ -77,6 +113,10 @@ class Legs:
             q: Joint angles, rad, (k, 2) or (2,).
         """
         rows = np.arange(self.count)[ids]
+        if self.real is not None:
+            self.real.place(rows, height, q)
+            return
+        self._applied = np.zeros((self.count, 2))
         self.batch.reset(np.sort(rows), stage=0)
         self.height[ids] = height
         self.q[ids] = q
@@ -94,7 +134,9 @@ class Legs:
         Raises:
             mujoco.batch.SimulationError: Physics failed in some simulations.
         """
-        applied = self._motors.clip(torque, self.qd)
+        if self.real is not None:
+            return self.real.step(torque)
+        self._applied = applied = self._motors.clip(torque, self.qd)
         np.multiply(applied, self._inverse_belt, out=self._ctrl)
         self.batch.step(nstep=self.substeps)
         return applied

@@ -6,13 +6,14 @@ from hopping_leg.arrays import Array
 from hopping_leg.robot.limits import SoftLimiter, SoftLimits
 from hopping_leg.sim.disturbance import Channel, Disturbance, Measurement
 from hopping_leg.sim.legs import Legs
+from hopping_leg.sim.real_channel import RealChannel
 
 
 class Plant:
     """Legs behind a disturbed channel, with the soft joint limits in force.
 
-    The soft limits act on the true joint state, as they run beside the motors, after the torque
-    noise and before the motors' own limit.
+    The soft limits act on what the encoders report, free of noise and delay, as they run beside the
+    motors, after the torque noise and before the motors' own limit.
 
     Args:
         legs: The simulations.
@@ -29,20 +30,24 @@ class Plant:
         rng: np.random.Generator,
     ) -> None:
         self.legs = legs
-        self.channel = Channel(legs.count, disturbance, legs.period, rng)
+        self.channel = (
+            Channel(legs.count, disturbance, legs.period, rng)
+            if legs.real is None
+            else RealChannel(legs.real, disturbance, legs.period, rng)
+        )
         self._limiter = SoftLimiter(legs.robot, soft_limits, legs.count) if soft_limits else None
 
     def sense(self, command: Array) -> Measurement:
         """Return what the controllers see; ``command`` is the desired height, m, (n,)."""
-        return self.channel.sense(self.legs.q, self.legs.qd, command)
+        return self.channel.sense(self.legs.measured_q, self.legs.measured_qd, command)
 
     def samples(self, command: Array) -> Array:
         """Return the same as ``sense`` as (q1, q2, qd1, qd2, command), newest first, (n, 3, 5)."""
-        return self.channel.samples(self.legs.q, self.legs.qd, command)
+        return self.channel.samples(self.legs.measured_q, self.legs.measured_qd, command)
 
     def drive(self, torque: Array) -> Array:
         """Apply joint torques for one control period; return what the motors gave, N m, (n, 2)."""
         disturbed = self.channel.actuate(torque)
         if self._limiter is not None:
-            disturbed = self._limiter.apply(disturbed, self.legs.q, self.legs.qd)
+            disturbed = self._limiter.apply(disturbed, self.legs.measured_q, self.legs.measured_qd)
         return self.legs.step(disturbed)

@@ -1,0 +1,125 @@
+"""What a real leg does that the simulator for training does not know; every default is neutral.
+
+A robot file states it in the table ``[reality]``. The rest of the file stays what controllers and
+training believe; only ``hopping_leg.sim`` makes the leg behave as stated here.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+
+
+def _value(default: float | None, unit: str) -> Any:  # noqa: ANN401
+    """Return a field that may be left out; zero and more are valid."""
+    return field(default=default, metadata={"unit": unit, "zero": True})
+
+
+def _positive(default: float | None, unit: str) -> Any:  # noqa: ANN401
+    """Return a field that may be left out; zero is not valid."""
+    return field(default=default, metadata={"unit": unit})
+
+
+@dataclass(frozen=True)
+class Latency:
+    """Time between the controller and the leg, in whole physics steps when simulated."""
+
+    command: float = _value(0.0, "s")
+    """From the controller's decision to the motor's torque."""
+    measurement: float = _value(0.0, "s")
+    """Age of the newest measurement when the controller gets it."""
+    jitter: float = _value(0.0, "s")
+    """Each command is late by a further time, uniform between zero and this."""
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """Encoder and torque measurement of one joint, at the joint's side."""
+
+    position_step: float = _value(0.0, "rad")
+    """Quantisation; zero has none."""
+    velocity_step: float = _value(0.0, "rad/s")
+    torque_step: float = _value(0.0, "N m")
+    position_noise: float = _value(0.0, "rad")
+    """Standard deviation of white noise, added before quantisation."""
+    velocity_noise: float = _value(0.0, "rad/s")
+    torque_noise: float = _value(0.0, "N m")
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Motor, gear and belt of one joint; all numbers at the joint's side."""
+
+    torque_limit: float | None = _positive(None, "N m")
+    """Where the motor saturates; without it, where the software limits."""
+    torque_gain: float = _positive(1.0, "1")
+    """Motor torque over commanded torque; the torque measurement shows it."""
+    torque_lag: float = _value(0.0, "s")
+    """Time constant with which the motor torque follows, of first order."""
+    ripple: float = _value(0.0, "N m")
+    """Amplitude of the torque that depends on the motor's angle (cogging)."""
+    ripple_periods: float = _positive(1.0, "1")
+    """Periods of the ripple per turn of the joint."""
+    efficiency: float = _positive(1.0, "1")
+    """Of the gear, in both directions of power; the torque measurement does not show it."""
+    stiction: float = _positive(1.0, "1")
+    """Friction at rest over the joint's Coulomb friction."""
+    stiction_speed: float = _positive(0.05, "rad/s")
+    """Speed at which friction has fallen to Coulomb's (Stribeck)."""
+    backlash: float = _value(0.0, "rad")
+    """Whole width of the dead band between motor and link."""
+    stiffness: float | None = _positive(None, "N m/rad")
+    """Of the belt between motor and link; without it, rigid."""
+    stiffness_damping: float = _value(0.0, "N m s/rad")
+    """Damping beside that stiffness."""
+    sensor: Sensor = field(default_factory=Sensor)
+
+
+@dataclass(frozen=True)
+class MassScale:
+    """True mass over the file's; a link's inertia scales along."""
+
+    base: float = _positive(1.0, "1")
+    thigh: float = _positive(1.0, "1")
+    shank: float = _positive(1.0, "1")
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The true ground, where it differs from ``[contact]``."""
+
+    time_constant: float | None = _positive(None, "s")
+    damping_ratio: float | None = _positive(None, "1")
+    friction: float | None = _positive(None, "1")
+
+
+@dataclass(frozen=True)
+class Reality:
+    """Every effect that the simulator for training does not know."""
+
+    voltage: float = _positive(1.0, "1")
+    """Battery over the voltage that the motors' peak torque and no-load speed belong to."""
+    latency: Latency = field(default_factory=Latency)
+    hip: Drive = field(default_factory=Drive)
+    knee: Drive = field(default_factory=Drive)
+    mass: MassScale = field(default_factory=MassScale)
+    ground: Ground = field(default_factory=Ground)
+
+    @property
+    def neutral(self) -> bool:
+        """Whether the leg behaves as the simulator for training has it."""
+        return self == NEUTRAL
+
+    def of_drives(self, attribute: str) -> Array:
+        """Return an attribute of both drives, (2,); NaN where it is None."""
+        return np.array([getattr(d, attribute) for d in (self.hip, self.knee)], dtype=np.float64)
+
+    def of_sensors(self, attribute: str) -> Array:
+        """Return an attribute of both joints' sensors, (2,)."""
+        return np.array([getattr(d.sensor, attribute) for d in (self.hip, self.knee)])
+
+
+NEUTRAL = Reality()
+"""Nothing that the simulator for training does not know."""

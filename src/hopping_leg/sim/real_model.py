@@ -1,0 +1,145 @@
+"""The leg as ``[reality]`` has it, for MuJoCo: true masses and ground, backlash and belts.
+
+Backlash is a second hinge on the joint's axis that moves freely within its limits; a belt is a
+hinge with a spring. Motor, armature, friction and encoder stay at the first hinge, the link hangs
+on the last, so that the link's angle is the sum. MuJoCo's own limits and springs keep this stable
+at the step at which training runs, which a contact force computed in between would not.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from hopping_leg.arrays import IntArray
+from hopping_leg.errors import RobotError
+from hopping_leg.robot.model import clamp_base, compile_spec, get_spec
+from hopping_leg.robot.parameters import Contact, Joint, Link, Robot
+from hopping_leg.robot.reality import Drive
+
+_HARD = (0.99, 0.999, 1e-4, 0.5, 2.0)
+"""``solimp`` of the backlash's ends: hard after a tenth of a milliradian."""
+
+_AXIS = (0.0, -1.0, 0.0)
+_BODIES = {"hip": "thigh", "knee": "shank"}
+
+
+@dataclass(frozen=True)
+class RealModel:
+    """A compiled model and where the leg's coordinates are in it.
+
+    Attributes:
+        model: Generalised coordinates are the rail and, per joint, motor, backlash, belt.
+        motor: Coordinate of each joint's motor, (2,).
+        flexible: Coordinates between motor and link, per joint; empty where rigid.
+    """
+
+    model: mujoco.MjModel
+    motor: IntArray
+    flexible: tuple[IntArray, IntArray]
+
+
+def real_model(robot: Robot, timestep: float, *, clamped: bool) -> RealModel:
+    """Build the model of a leg as it really is.
+
+    Args:
+        robot: The leg; its ``reality`` holds.
+        timestep: Physics step, s.
+        clamped: Whether the base is fixed.
+
+    Raises:
+        RobotError: A belt is too stiff for the physics step, or MuJoCo refuses a number.
+    """
+    spec = get_spec(real_parameters(robot), timestep)
+    if clamped:
+        clamp_base(spec)
+    for name, body in _BODIES.items():
+        joint, link = getattr(robot, name), getattr(robot, body)
+        _add_transmission(spec, name, getattr(robot.reality, name), timestep)
+        _check_stiffness(robot, name, joint, link, timestep)
+    for actuator in spec.actuators:
+        actuator.ctrllimited = False  # gains and ripple come after the software's limit
+    model = compile_spec(spec, robot.name)
+    motor = np.array([model.joint(name).qposadr[0] for name in _BODIES])
+    flexible = [
+        [model.joint(j).qposadr[0] for j in range(model.njnt) if _between(model.joint(j).name, n)]
+        for n in _BODIES
+    ]
+    hip, knee = (np.array(places, np.int64) for places in flexible)
+    return RealModel(model, motor, (hip, knee))
+
+
+def real_parameters(robot: Robot) -> Robot:
+    """Return the leg with true masses, ground and motor limits in place of the believed ones."""
+    reality = robot.reality
+    scale, ground, believed = reality.mass, reality.ground, robot.contact
+    contact = Contact(
+        believed.time_constant if ground.time_constant is None else ground.time_constant,
+        believed.damping_ratio if ground.damping_ratio is None else ground.damping_ratio,
+        believed.friction if ground.friction is None else ground.friction,
+    )
+    return replace(
+        robot,
+        base=replace(robot.base, mass=robot.base.mass * scale.base),
+        thigh=_scaled(robot.thigh, scale.thigh),
+        shank=_scaled(robot.shank, scale.shank),
+        contact=contact,
+        hip=_limited(robot.hip, reality.hip, reality.voltage),
+        knee=_limited(robot.knee, reality.knee, reality.voltage),
+    )
+
+
+def _scaled(link: Link, scale: float) -> Link:
+    return replace(link, mass=link.mass * scale, inertia=link.inertia * scale)
+
+
+def _limited(joint: Joint, drive: Drive, voltage: float) -> Joint:
+    """A lower voltage moves the whole torque-speed line down; its slope is the winding's."""
+    motor = joint.motor
+    limit = motor.torque_limit
+    if drive.torque_limit is not None:
+        limit = min(limit, drive.torque_limit / joint.belt_ratio)
+    line = {
+        "peak_torque": motor.peak_torque * voltage,
+        "no_load_speed": motor.no_load_speed * voltage,
+    }
+    return replace(joint, motor=replace(motor, torque_limit=limit, **line))
+
+
+def _between(name: str, joint: str) -> bool:
+    return name in (f"{joint}_backlash", f"{joint}_belt")
+
+
+def _add_transmission(spec: mujoco.MjSpec, name: str, drive: Drive, timestep: float) -> None:
+    body = spec.body(_BODIES[name])
+    hinge = mujoco.mjtJoint.mjJNT_HINGE
+    if drive.backlash:
+        gap = body.add_joint(name=f"{name}_backlash", type=hinge, axis=_AXIS)
+        gap.limited = True
+        gap.range = [-drive.backlash / 2, drive.backlash / 2]
+        gap.solref_limit = [2 * timestep, 1.0]
+        gap.solimp_limit = _HARD
+        if drive.stiffness is not None:
+            # Between gap and belt something must have inertia: as little as the step allows.
+            gap.armature = drive.stiffness * timestep**2 / 2
+    if drive.stiffness is not None:
+        belt = body.add_joint(name=f"{name}_belt", type=hinge, axis=_AXIS)
+        belt.stiffness = np.array([drive.stiffness, 0.0, 0.0])
+        belt.damping = np.array([drive.stiffness_damping, 0.0, 0.0])
+
+
+def _check_stiffness(robot: Robot, name: str, joint: Joint, link: Link, timestep: float) -> None:
+    """Motor and link against the spring oscillate at w; semi-implicit Euler needs w dt < 2."""
+    stiffness = getattr(robot.reality, name).stiffness
+    if stiffness is None:
+        return
+    about_joint = link.inertia + link.mass * link.com**2
+    reduced = 1 / (1 / joint.armature + 1 / about_joint)
+    highest = reduced / timestep**2
+    if stiffness > highest:
+        raise RobotError(
+            f"{robot.name}: 'reality.{name}.stiffness' is {stiffness:g} N m/rad, too stiff for"
+            f" a physics step of {timestep:g} s; give at most {highest:.3g}, a smaller step"
+            f" (below {math.sqrt(reduced / stiffness):.2g} s), or leave it out for a rigid belt."
+        )

@@ -1,0 +1,145 @@
+"""Legs that are more than the simulator for training knows: the physics behind ``[reality]``.
+
+Backlash, belts    further hinges with limit or spring: MuJoCo's solver keeps them stable
+Masses, ground     other numbers of the same model
+Stiction           Stribeck's curve sets MuJoCo's friction loss at each physics step: its solver
+                   holds a joint at rest, which a torque computed in between cannot
+Motor, latency     numpy at each physics step, where order matters (``real_drive``)
+Encoders           numpy once per control period; the physics never sees them (``real_sensors``)
+"""
+
+from typing import Any
+
+import numpy as np
+from mujoco import batch
+
+from hopping_leg.arrays import Array, IntArray
+from hopping_leg.robot.limits import MotorLimit
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim.real_drive import RealDrive
+from hopping_leg.sim.real_model import real_model, real_parameters
+from hopping_leg.sim.real_sensors import DRAWS, RealSensors
+
+
+class RealLegs:
+    """Simulations of a leg with its ``reality``, stepped by one physics step at a time.
+
+    ``state`` (n, 6) is (x, q1, q2 and rates) of base and links, as in ``Legs``. It is a copy of
+    the physics', renewed after each control period; what is written to it moves motor and link
+    alike before the next.
+
+    Args:
+        robot: The leg.
+        count: Number of simulations n.
+        timestep: Physics step, s.
+        substeps: Physics steps per control period.
+        threads: Worker threads, 0 for one per core.
+        clamped: Whether the base is fixed.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        count: int,
+        *,
+        timestep: float,
+        substeps: int,
+        threads: int,
+        clamped: bool,
+    ) -> None:
+        self.count, self.substeps, reality = count, substeps, robot.reality
+        real = real_model(robot, timestep, clamped=clamped)
+        self.batch = batch.Batch(real.model, count, threads)
+        self._ctrl = self.batch.bind("ctrl")
+        self._q, self._qd = self.batch.bind("qpos"), self.batch.bind("qvel")
+        self._motor, self._flexible = real.motor, real.flexible
+        self.state = np.zeros((count, 6))
+        self._shown = np.zeros((count, 6))
+        self.drive = RealDrive(
+            reality, MotorLimit(real_parameters(robot), count), count, timestep, substeps
+        )
+        self.sensors = RealSensors(reality, count, timestep)
+        self._inverse_belt = np.tile(1 / robot.of_joints("belt_ratio"), (count, 1))
+        self._coulomb = robot.of_joints("friction")
+        self._excess = self._coulomb * (reality.of_drives("stiction") - 1)
+        self._stribeck = reality.of_drives("stiction_speed")
+        if self._excess.any():
+            self._friction = self.batch.expand("dof_frictionloss")
+        self.reseed(np.random.default_rng(0))
+
+    def reseed(self, rng: np.random.Generator) -> None:
+        """Take jitter and noise from here on from another source."""
+        self.rng = rng
+
+    def place(self, rows: IntArray, height: Array | float, q: Array) -> None:
+        """Put legs at rest at a height, m, and posture, rad."""
+        self.batch.reset(np.sort(rows), stage=0)
+        self._shown[rows] = 0
+        self.state[rows] = 0
+        self.state[rows, 0] = height
+        self.state[rows, 1:3] = q
+        self.forget(rows)
+
+    def forget(self, rows: IntArray) -> None:
+        """Let some legs begin anew in their present state: no command under way, clean readings."""
+        self._push()
+        self.drive.forget(rows)
+        self.sensors.forget(rows, self._q[:, self._motor], self._qd[:, self._motor])
+
+    def step(self, torque: Array) -> Array:
+        """Command joint torques for a control period; return their mean at the joints, N m, (n, 2).
+
+        Args:
+            torque: As the controller asks, N m, (n, 2).
+        """
+        self._push()
+        self.drive.take(torque, self.rng.random(self.count))
+        mean = np.zeros((self.count, 2))
+        for substep in range(self.substeps):
+            q, qd = self._q[:, self._motor], self._qd[:, self._motor]
+            given = self.drive.torque(substep, q, qd)
+            if self._excess.any():
+                at_rest = np.exp(-np.square(qd / self._stribeck))
+                self._friction[:, self._motor] = self._coulomb + self._excess * at_rest
+            np.multiply(given, self._inverse_belt, out=self._ctrl)
+            self.batch.step(nstep=1)
+            self.sensors.watch(
+                self._q[:, self._motor], self._qd[:, self._motor], self.drive.motor_torque
+            )
+            mean += (given - mean) / (substep + 1)
+        self._show()
+        self.sensors.read(self.rng.standard_normal((self.count, DRAWS)))
+        return mean
+
+    def _push(self) -> None:
+        """Carry over what was written to ``state`` since it was shown."""
+        change = self.state - self._shown
+        if not change.any():
+            return
+        self._q[:, 0], self._qd[:, 0] = self.state[:, 0], self.state[:, 3]
+        self._q[:, self._motor] += change[:, 1:3]
+        self._qd[:, self._motor] += change[:, 4:6]
+        self._shown[:] = self.state
+
+    def _show(self) -> None:
+        """Renew ``state``: a link's angle is its motor's plus those of backlash and belt."""
+        for first, coordinates in ((0, self._q), (3, self._qd)):
+            self.state[:, first] = coordinates[:, 0]
+            for joint, (motor, places) in enumerate(
+                zip(self._motor, self._flexible, strict=True), first + 1
+            ):
+                self.state[:, joint] = coordinates[:, motor] + coordinates[:, places].sum(axis=1)
+        self._shown[:] = self.state
+
+    def memory(self) -> dict[str, Any]:
+        """Return what the physics' state lacks to go on exactly from here."""
+        drive = {f"drive_{key}": value for key, value in self.drive.memory().items()}
+        sensors = {f"sensors_{key}": value for key, value in self.sensors.memory().items()}
+        return {**drive, **sensors, "reality_rng": self.rng.bit_generator.state}
+
+    def restore(self, memory: dict[str, Any]) -> None:
+        """Go on from a ``memory``; the physics' state must have been restored."""
+        for part, prefix in ((self.drive, "drive_"), (self.sensors, "sensors_")):
+            part.restore({k[len(prefix) :]: v for k, v in memory.items() if k.startswith(prefix)})
+        self.rng.bit_generator.state = memory["reality_rng"]
+        self._show()
