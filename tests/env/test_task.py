@@ -1,10 +1,11 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from hopping_leg.env import HoppingTask, PaperReward, TaskOptions
-from hopping_leg.env.observation import scaling
+from hopping_leg.env.observation import sample_scaling
 from hopping_leg.errors import UsageError
 from hopping_leg.hops import find_hops
 from hopping_leg.robot import load_robot
@@ -64,7 +65,8 @@ def test_the_state_is_arrays_and_plain_values():
 def test_observations_are_newest_first_and_normalised():
     options = TaskOptions(disturbance=NOTHING)
     quiet = task(options, count=2)
-    offset, gain = scaling(ROBOT, options).offset, scaling(ROBOT, options).gain
+    scaling = sample_scaling(ROBOT, options)
+    offset, gain = scaling.offset, scaling.gain
     truth = []
     for action in actions(5, count=2):
         observation = quiet.step(action).observation
@@ -167,9 +169,32 @@ def test_apexes_are_those_of_the_recorded_heights():
 
 
 def test_a_fall_ends_the_episode_only_if_asked():
-    for height, falls in ((0.0, False), (0.2, True)):
-        limp = task(TaskOptions(fall_height=height, disturbance=NOTHING), count=1)
+    for clearance, falls in ((None, False), (0.05, True)):
+        limp = task(TaskOptions(fall_clearance=clearance, disturbance=NOTHING), count=1)
         assert any(limp.step(np.zeros((1, 2))).terminated[0] for _ in range(100)) == falls
+
+
+def test_a_fall_costs_its_penalty_once():
+    options = TaskOptions(fall_clearance=0.05, disturbance=NOTHING)
+    free, dear = task(options, count=1), task(replace(options, fall_penalty=7.0), count=1)
+    for _ in range(100):
+        a, b = free.step(np.zeros((1, 2))), dear.step(np.zeros((1, 2)))
+        assert a.reward[0] - b.reward[0] == pytest.approx(7.0 * a.terminated[0])
+        if a.terminated[0]:
+            return
+    pytest.fail("the limp leg never fell")
+
+
+def test_a_restart_shows_nothing_of_the_last_episode():
+    """A leg that begins anew sees as much of its past as one that never did anything."""
+    options = TaskOptions(observation="dated", episode=0.1, disturbance=NOTHING, commands=(0.3,))
+    first = task(options, count=2)
+    fresh = first.reset()
+    for action in actions(20, count=2):
+        step = first.step(action)
+    assert step.truncated.all()
+    np.testing.assert_array_equal(step.observation, fresh)
+    assert not np.allclose(step.final_observation, fresh)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import torch
 
-from hopping_leg.env.observation import SIZE
 from hopping_leg.learn.fast import FastRecipe
 from hopping_leg.robot import load_robot
 
@@ -20,20 +19,22 @@ def learner():
 
 def test_actions_depend_on_measurements_alone(learner):
     _, env, model = learner
+    size = env.task.observation.size
     observation = env.reset()
     action, _ = model.predict(observation, deterministic=True)
     blind, other = observation.copy(), observation.copy()
-    blind[:, SIZE:] += 100
-    other[:, :SIZE] += 0.1
+    blind[:, size:] += 100
+    other[:, :size] += 0.1
     np.testing.assert_array_equal(model.predict(blind, deterministic=True)[0], action)
     assert not np.array_equal(model.predict(other, deterministic=True)[0], action)
 
 
 def test_values_depend_on_the_true_state_alone(learner):
     _, env, model = learner
+    size = env.task.observation.size
     observation = torch.as_tensor(env.reset())
     blind = observation.clone()
-    blind[:, :SIZE] += 1
+    blind[:, :size] += 1
     value = model.policy.predict_values(observation)
     torch.testing.assert_close(model.policy.predict_values(blind), value)
 

@@ -56,7 +56,7 @@ def test_state_continues_exactly():
 def test_asymmetric_actor_ignores_the_true_state_and_the_critic_uses_it():
     model = ResumablePPO(
         AsymmetricPolicy, make(True), n_steps=8, batch_size=8, device="cpu",
-        policy_kwargs={"net_arch": {"pi": [8], "vf": [8]}},
+        policy_kwargs={"net_arch": {"pi": [8], "vf": [8]}, "actor_size": SIZE},
     )  # fmt: skip
     seen = torch.randn(5, SIZE)
     a, b = (torch.cat([seen, torch.randn(5, PRIVILEGED)], dim=1) for _ in range(2))

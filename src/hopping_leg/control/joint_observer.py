@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.control.dated_track import DatedTrack
 from hopping_leg.sim.disturbance import Measurement
 
 WINDOW = 11
@@ -38,13 +39,11 @@ class DatedObserver:
 
     def __init__(self, period: float, gain: float | Array) -> None:
         self.period, self.gain = period, np.asarray(gain, dtype=np.float64)[..., None]
+        self._track = DatedTrack(WINDOW, period)
 
     def reset(self, count: int) -> None:
         """Forget everything."""
-        self._legs = np.arange(count)[:, None]
-        self._known = np.zeros((WINDOW, count), dtype=np.bool_)
-        self._q = np.zeros((WINDOW, count, 2))
-        self._qd = np.zeros((WINDOW, count, 2))
+        self._track.reset(count)
         self._anchor: Array | None = None
         self._past: list[Array] = []
 
@@ -54,27 +53,16 @@ class DatedObserver:
             self._anchor = measurement.q[:, 0].copy()
         else:
             self._anchor = self._past[-2]
-            self._shift()
-        back = np.rint(measurement.age / self.period).astype(np.int64)
-        inside = back < WINDOW
-        slot = np.where(inside, back, 0)
-        legs = np.broadcast_to(self._legs, back.shape)
-        self._known[slot[inside], legs[inside]] = True
-        self._q[slot[inside], legs[inside]] = measurement.q[inside]
-        self._qd[slot[inside], legs[inside]] = measurement.qd[inside]
-        self._qd = velocity = self._fill()
+            self._track.shift()
+        self._track.insert(measurement)
+        self._track.qd = velocity = self._fill()
         self._past = self._integrate(velocity)
         return JointState(self._past[0], velocity[0])
 
-    def _shift(self) -> None:
-        for history in (self._known, self._q, self._qd):
-            history[1:] = history[:-1].copy()
-        self._known[0] = False
-
     def _fill(self) -> Array:
         """Return velocities of the window with the gaps filled, (WINDOW, n, 2)."""
-        known: BoolArray = self._known
-        filled = self._qd.copy()
+        known: BoolArray = self._track.known
+        filled = self._track.qd.copy()
         newer, gap = filled[0], np.full(known.shape[1], np.inf)
         ahead_value, ahead_gap = np.empty_like(filled), np.empty(known.shape)
         for i in range(WINDOW):
@@ -90,12 +78,12 @@ class DatedObserver:
     def _integrate(self, velocity: Array) -> list[Array]:
         """Return filtered positions of the window, newest first."""
         assert self._anchor is not None
-        weight = self.gain * self._known[..., None]
+        weight = self.gain * self._track.known[..., None]
         position = self._anchor
         past = [position]
         for i in range(WINDOW - 2, -1, -1):
             position = position + (0.5 * self.period) * (velocity[i + 1] + velocity[i])
-            position = position + weight[i] * (self._q[i] - position)
+            position = position + weight[i] * (self._track.q[i] - position)
             past.append(position)
         past.reverse()
         return past

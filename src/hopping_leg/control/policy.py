@@ -112,7 +112,7 @@ class Policy:
                 f"{origin} is an ONNX file but not a policy; make one with `hop train`."
             )
         self.card = Card.from_json(text, origin)
-        self._layout: Layout = make_layout(self.card.layout)
+        self._layout: Layout = make_layout(self.card.layout, 1 / self.card.rate)
         _check_signature(self._session, self._layout, origin)
         self._torque = np.zeros((0, 2))
 
@@ -176,7 +176,8 @@ class Policy:
             UsageError: A command lies outside the range that the policy was trained for.
         """
         self._check_command(measurement.command)
-        feeds = self._layout.inputs(measurement, self._torque)
+        self._layout.update(measurement, self._torque)
+        feeds = self._layout.inputs()
         self._torque = self._session.run(None, feeds)[0].astype(np.float64)
         return self._torque
 

@@ -47,7 +47,7 @@ class ApexRewardOptions:
     """Deceleration in flight that the prediction assumes, rail drag included, m/s2."""
     energy: float = 0.4
     """Of v^2 anywhere, fading to zero over the first 35 % of the training."""
-    jerk: float = 0.05
+    jerk: float = 0.15
     """Of the paper's Pj."""
     position: float = 0.02
     """Of the paper's Pjp."""

@@ -11,11 +11,16 @@ from hopping_leg.sim import CONTROL_RATE, Disturbance
 
 Start = Literal["standing", "drop", "mixed", "hop"]
 
+See = Literal["three-samples", "dated"]
+
 
 @dataclass(frozen=True)
 class TaskOptions:
     """The learning problem around the leg."""
 
+    observation: See = "three-samples"
+    """Policy layout whose inputs the learner sees: the paper's three samples, however late, or more
+    samples, each in its place in time, and the own past torques."""
     action_torque: tuple[float, float] = (6.0, 6.0)
     """Joint torque of a full action at hip and knee, N m."""
     commands: tuple[float, ...] = (0.25, 0.30, 0.35)
@@ -39,8 +44,10 @@ class TaskOptions:
     """Length of an episode, s."""
     stagger: bool = False
     """Cut the first episode of each leg at a random length, so that a batch does not end as one."""
-    fall_height: float = 0.0
-    """Base height below which an episode terminates, m; 0 never terminates."""
+    fall_clearance: float | None = None
+    """Gap between ground and base or knee below which an episode terminates, m; none never does."""
+    fall_penalty: float = 0.0
+    """Reward lost by such an end: without it a leg with little to win learns to fall."""
     velocity_scale: float = 10.0
     """Joint velocity that the observation shows as 1, rad/s."""
     rate: float = CONTROL_RATE
@@ -80,5 +87,6 @@ def _check(options: TaskOptions) -> None:
         raise UsageError(
             f"'action_torque' is {options.action_torque} but both torques must be positive, N m."
         )
-    if options.start not in get_args(Start):
-        raise UsageError(f"'start' is '{options.start}'; valid: {', '.join(get_args(Start))}.")
+    for name, valid in (("observation", get_args(See)), ("start", get_args(Start))):
+        if getattr(options, name) not in valid:
+            raise UsageError(f"'{name}' is '{getattr(options, name)}'; valid: {', '.join(valid)}.")

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray, IntArray
-from hopping_leg.env.observation import Array32, scaling
+from hopping_leg.env.observation import Array32, make_observation, sample_scaling
 from hopping_leg.env.options import TaskOptions
 from hopping_leg.env.start import Starts
 from hopping_leg.env.transition import Reward, Transition
@@ -22,7 +22,7 @@ class Step(NamedTuple):
     """Outcome of one tick of n legs; legs whose episode ended have already begun the next."""
 
     observation: Array32
-    """Seen after the tick, (n, 15)."""
+    """Seen after the tick, (n, size)."""
     reward: Array
     """(n,)."""
     terminated: BoolArray
@@ -38,7 +38,7 @@ class Step(NamedTuple):
     terms: Array
     """Reward terms in the order of the reward's ``names``, (n, k)."""
     final_observation: Array32 | None
-    """Observations before the restart, (n, 15), where any episode ended."""
+    """Observations before the restart, (n, size), where any episode ended."""
     final_privileged: Array32 | None
     """True states before the restart, (n, 10), where any episode ended."""
 
@@ -75,8 +75,8 @@ class HoppingTask:
         )
         noise, self._rng = rng.spawn(2)
         self.plant = Plant(self.legs, options.disturbance, options.soft_limits, noise)
-        self.scaling = scaling(robot, options)
-        self._normalise = self.scaling.repeated(count).normalise
+        self.observation = make_observation(robot, options, count)
+        self._scaling = sample_scaling(robot, options)
         self._starts = Starts(robot, options)
         self._torque = np.tile(options.action_torque, (count, 1))
         self._lowest, self._highest = np.full((count, 2), -1.0), np.full((count, 2), 1.0)
@@ -94,7 +94,7 @@ class HoppingTask:
         self.reset()
 
     def reseed(self, rng: np.random.Generator) -> Array32:
-        """Take all randomness from another source and begin anew; return observations, (n, 15)."""
+        """Take all randomness from another source and begin anew; return what is seen."""
         noise, self._rng = rng.spawn(2)
         self.plant.channel.reseed(noise)
         return self.reset()
@@ -106,14 +106,14 @@ class HoppingTask:
             ids: Which legs; all if None, and only then episodes are staggered.
 
         Returns:
-            Observations of all legs, (n, 15).
+            Observations of all legs, (n, size).
         """
         rows = np.arange(self.count) if ids is None else np.asarray(ids)
         self._begin(rows)
         if ids is None and self.options.stagger:
             self._end[:] = self._tick + self._rng.integers(1, self._horizon + 1, self.count)
             self._plan()
-        return self._observe()
+        return self._see_anew(rows)
 
     def step(self, action: Array | Array32) -> Step:
         """Act for one control period.
@@ -153,7 +153,7 @@ class HoppingTask:
 
         Base height and rate, q (2), qd (2), command, clearance of foot, knee and base.
         """
-        legs, o = self.legs, self.scaling
+        legs, o = self.legs, self._scaling
         result = np.empty((self.count, PRIVILEGED), np.float32)
         result[:, 0] = (legs.height - o.offset[4]) * o.gain[4]
         result[:, 1] = legs.height_rate
@@ -178,10 +178,11 @@ class HoppingTask:
             "rises": self._rises.copy(),
             "rng": self._rng.bit_generator.state,
             "reward": self.reward.state(),
+            "observation": self.observation.state(),
         }
 
     def restore(self, state: dict[str, Any]) -> Array32:
-        """Go on from a ``state``; return the observations, (n, 15)."""
+        """Go on from a ``state``; return the observations, (n, size)."""
         self.legs.batch.state[:] = state["physics"]
         self.plant.channel.restore(state["channel"])
         self.command[:] = state["command"]
@@ -191,8 +192,10 @@ class HoppingTask:
         self._last, self._rises = np.array(state["last_action"]), np.array(state["rises"])
         self._rng.bit_generator.state = state["rng"]
         self.reward.restore(state["reward"])
+        self.observation.restore(state["observation"])
         self._plan()
-        return self._observe()
+        self._samples = self.plant.samples(self.command)
+        return self.observation.view(self._samples)
 
     @property
     def measurement(self) -> Measurement:
@@ -200,8 +203,16 @@ class HoppingTask:
         return self.plant.channel.measurement(self._samples)
 
     def _observe(self) -> Array32:
+        """Return what is seen at a new tick."""
         self._samples = self.plant.samples(self.command)
-        return self._normalise(self._samples)
+        self.observation.advance(self._samples, self.plant.channel, self._last)
+        return self.observation.view(self._samples)
+
+    def _see_anew(self, rows: IntArray) -> Array32:
+        """Return what is seen once some legs have begun anew within the tick."""
+        self._samples = self.plant.samples(self.command)
+        self.observation.restart(rows, self._samples, self.plant.channel)
+        return self.observation.view(self._samples)
 
     def _next(self, reward: Array, terms: Array, apex_error: Array, apex_height: Array) -> Step:
         """End the tick: episodes that are over, new commands, what is seen."""
@@ -211,21 +222,28 @@ class HoppingTask:
         terminated = truncated = ended = self._never
         if self._tick >= self._next_end:
             truncated = ended = self._end <= self._tick
-        if self.options.fall_height > 0:
-            terminated = self.legs.height < self.options.fall_height
+        if self.options.fall_clearance is not None:
+            terminated = self._fallen(self.options.fall_clearance)
             truncated = truncated & ~terminated
+            reward = reward - self.options.fall_penalty * terminated
             ended = truncated | terminated
         observation = self._observe()
         final_observation = final_privileged = None
         height = self.legs.height.copy()
         if self.autoreset and ended is not self._never and np.count_nonzero(ended):
             final_observation, final_privileged = observation, self.privileged()
-            self._begin(np.flatnonzero(ended))
-            observation = self._observe()
+            rows = np.flatnonzero(ended)
+            self._begin(rows)
+            observation = self._see_anew(rows)
         return Step(
             observation, reward, terminated, truncated, apex_error, apex_height, height, terms,
             final_observation, final_privileged,
         )  # fmt: skip
+
+    def _fallen(self, least: float) -> BoolArray:
+        """Return which legs have base or knee less than a gap above the ground, (n,)."""
+        gap: Array = np.minimum(self.legs.base_clearance(), self.legs.knee_clearance())
+        return gap < least
 
     def _begin(self, rows: IntArray) -> None:
         count = len(rows)

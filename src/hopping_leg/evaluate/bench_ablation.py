@@ -34,6 +34,16 @@ def ablations(base: FastRecipe) -> list[Ablation]:
     return [
         Ablation("recipe", "the recipe", base),
         Ablation(
+            "three-samples",
+            "the paper's three samples, which do not tell their age",
+            replace(base, task=replace(task, observation="three-samples")),
+        ),
+        Ablation(
+            "cheap-jerk",
+            "a third of the price for jerky actions, the paper's",
+            replace(base, reward=replace(reward, jerk=0.05)),
+        ),
+        Ablation(
             "white-noise",
             "white exploration noise of the same size instead of gSDE",
             replace(base, noise_hold=0, log_std=(first + _LATENT, last + _LATENT)),

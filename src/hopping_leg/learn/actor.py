@@ -1,28 +1,24 @@
 """Take the deterministic actor out of a stable-baselines3 model."""
 
-from typing import Any
-
-import numpy as np
 import torch
 from stable_baselines3 import SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from torch import nn
 
 from hopping_leg.arrays import Array
-from hopping_leg.env.observation import Scaling
+from hopping_leg.env.observation import Observation
 from hopping_leg.errors import UsageError
 from hopping_leg.learn.export import Network
-from hopping_leg.sim.disturbance import SAMPLES
 
 _NAMES = {nn.ReLU: "relu", nn.Tanh: "tanh", nn.ELU: "elu"}
 
 
-def network_of(model: BaseAlgorithm, scaling: Scaling) -> Network:
-    """Return a model's actor with the task's normalisation, for layout ``three-samples``.
+def network_of(model: BaseAlgorithm, observation: Observation) -> Network:
+    """Return a model's actor with the task's normalisation, for the observation's layout.
 
     Args:
         model: SAC, or PPO with separate networks of plain layers.
-        scaling: Of the task it learns.
+        observation: Of the task it learns.
 
     Raises:
         UsageError: The actor is no stack of dense layers.
@@ -45,16 +41,9 @@ def network_of(model: BaseAlgorithm, scaling: Scaling) -> Network:
             f"An actor of {sorted(k.__name__ for k in kinds)} cannot be exported; use dense layers"
             f" with one of {', '.join(_NAMES.values())}."
         )
-    order = layout_order()
-    layers[0] = (layers[0][0][:, order], layers[0][1])
-    offset, gain = np.tile(scaling.offset, SAMPLES)[order], np.tile(scaling.gain, SAMPLES)[order]
-    return Network(offset, gain, layers, _NAMES[kinds.pop()], squash, bound)
-
-
-def layout_order() -> Any:  # noqa: ANN401
-    """Return where each input of layout ``three-samples`` stands in the task's observation."""
-    place = np.arange(5 * SAMPLES).reshape(SAMPLES, 5)
-    return np.concatenate([place[:, 0:2].ravel(), place[:, 2:4].ravel(), place[:, 4]])
+    layers[0] = (layers[0][0][:, observation.order], layers[0][1])
+    scaling = observation.scaling
+    return Network(scaling.offset, scaling.gain, layers, _NAMES[kinds.pop()], squash, bound)
 
 
 def _flatten(module: nn.Module) -> list[nn.Module]:

@@ -10,8 +10,6 @@ import torch
 from stable_baselines3.common.policies import ActorCriticPolicy
 from torch import nn
 
-from hopping_leg.env.observation import SIZE
-
 
 class _Split(nn.Module):
     """Separate networks for the two parts of an observation, as stable-baselines3 wants them."""
@@ -43,7 +41,7 @@ class _Split(nn.Module):
 class AsymmetricPolicy(ActorCriticPolicy):  # type: ignore[misc]
     """PPO policy whose actor sees the first ``actor_size`` entries and whose critic the others."""
 
-    def __init__(self, *args: Any, actor_size: int = SIZE, **kwargs: Any) -> None:  # noqa: ANN401
+    def __init__(self, *args: Any, actor_size: int, **kwargs: Any) -> None:  # noqa: ANN401
         self._actor_size = actor_size
         super().__init__(*args, **kwargs)
 

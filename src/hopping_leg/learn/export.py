@@ -63,7 +63,7 @@ def build_policy(network: Network, card: Card) -> bytes:
         network: The actor; its input is the layout's arrays, flattened row by row and joined.
         card: Stored in the metadata.
     """
-    shapes = make_layout(card.layout).shapes
+    shapes = make_layout(card.layout, 1 / card.rate).shapes
     nodes: list[Any] = []
     weights: list[Any] = []
 

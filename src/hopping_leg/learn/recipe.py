@@ -6,7 +6,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from hopping_leg.control.layouts import ThreeSamples
 from hopping_leg.env import HoppingTask, TaskOptions
 from hopping_leg.env.transition import Reward
 from hopping_leg.learn.actor import network_of
@@ -21,8 +20,6 @@ class Recipe(ABC):
 
     name: ClassVar[str]
     """As on the command line."""
-    layout: ClassVar[str] = ThreeSamples.name
-    """Observation layout of the policy file."""
 
     task: TaskOptions = field(default_factory=TaskOptions)
     """The learning problem."""
@@ -68,4 +65,4 @@ class Recipe(ABC):
 
     def network(self, model: Any, env: TaskVecEnv) -> Network:  # noqa: ANN401
         """Return the deterministic actor as it stands."""
-        return network_of(model, env.task.scaling)
+        return network_of(model, env.task.observation)

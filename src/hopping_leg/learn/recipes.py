@@ -68,4 +68,4 @@ def changes_of(recipe: str, options: dict[str, Any]) -> list[str]:
     if recipe not in RECIPES:
         return []
     defaults = numbers_of(RECIPES[recipe]())
-    return [f"{n}={options[n]:g}" for n, v in defaults.items() if options.get(n, v) != v]
+    return [f"{n}={options[n]}" for n, v in defaults.items() if options.get(n, v) != v]

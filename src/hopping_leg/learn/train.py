@@ -192,7 +192,7 @@ class Trainer:
         hip, knee = recipe.task.action_torque
         card = Card(
             recipe=recipe.name,
-            layout=recipe.layout,
+            layout=recipe.task.observation,
             command_low=low,
             command_high=high,
             torque_scale=(float(hip), float(knee)),

@@ -1,0 +1,70 @@
+"""The joints' recent past with every late sample put where it belongs in time."""
+
+from typing import Any
+
+import numpy as np
+
+from hopping_leg.arrays import Array, BoolArray, IntArray
+from hopping_leg.sim.disturbance import Measurement
+
+
+class DatedTrack:
+    """Joint samples of n legs by tick, newest first; a measurement's ages tell their places.
+
+    Attributes:
+        known: Whether a tick's sample has arrived, (length, n).
+        q: Measured positions, rad, (length, n, 2); where unknown, what was there before.
+        qd: Measured velocities, rad/s, (length, n, 2); likewise.
+
+    Args:
+        length: Ticks to remember; older samples are ignored.
+        period: Control period, s.
+    """
+
+    def __init__(self, length: int, period: float) -> None:
+        self.length, self.period = length, period
+        self.reset(0)
+
+    def reset(self, count: int) -> None:
+        """Forget everything; ``count`` legs follow."""
+        self._legs = np.arange(count)[:, None]
+        self.known: BoolArray = np.zeros((self.length, count), np.bool_)
+        self.q: Array = np.zeros((self.length, count, 2))
+        self.qd: Array = np.zeros((self.length, count, 2))
+
+    def shift(self) -> None:
+        """Begin a tick, of which nothing is known yet."""
+        for history in (self.known, self.q, self.qd):
+            history[1:] = history[:-1].copy()
+        self.known[0] = False
+
+    def insert(self, measurement: Measurement) -> None:
+        """Put this tick's three samples in their places."""
+        back = np.rint(measurement.age / self.period).astype(np.int64)
+        inside = back < self.length
+        slot, legs = back[inside], np.broadcast_to(self._legs, back.shape)[inside]
+        self.known[slot, legs] = True
+        self.q[slot, legs] = measurement.q[inside]
+        self.qd[slot, legs] = measurement.qd[inside]
+
+    def fill(self, rows: IntArray | slice, measurement: Measurement) -> None:
+        """Take the newest sample of some legs for their whole past."""
+        self.known[:, rows] = True
+        self.q[:, rows] = measurement.q[rows, 0]
+        self.qd[:, rows] = measurement.qd[rows, 0]
+
+    def hold(self, window: int) -> None:
+        """Give unknown ticks among the newest ``window`` the last sample known before them."""
+        for i in range(min(window, self.length - 1) - 1, -1, -1):
+            known = self.known[i, :, None]
+            for history in (self.q, self.qd):
+                np.copyto(history[i], history[i + 1], where=~known)
+
+    def state(self) -> dict[str, Any]:
+        """Return everything remembered, as arrays."""
+        return {"known": self.known.copy(), "q": self.q.copy(), "qd": self.qd.copy()}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a ``state``."""
+        self.reset(state["known"].shape[1])
+        self.known[:], self.q[:], self.qd[:] = state["known"], state["q"], state["qd"]

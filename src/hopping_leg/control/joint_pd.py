@@ -1,0 +1,95 @@
+"""The paper's joint PD, which tracks a trajectory ("Trajectory Generation and Data Collection").
+
+    tau = Kp (q* - q) + Kd (qd* - qd)
+
+computed once per control period from the newest measurement and held. The paper sets the target
+velocity qd* to zero.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.errors import UsageError
+from hopping_leg.sim.disturbance import Measurement
+
+
+@dataclass(frozen=True)
+class JointGains:
+    """Gains of hip and knee.
+
+    The defaults are chosen here, as the paper prints none: stiff enough to move, soft enough for
+    200 Hz and milliseconds of latency with the smallest inertia that leg V2 is said to have
+    (Table I's shank).
+
+    Raises:
+        UsageError: A gain is negative.
+    """
+
+    stiffness: tuple[float, float] = (20.0, 12.0)
+    """N m/rad."""
+    damping: tuple[float, float] = (0.3, 0.15)
+    """N m s/rad."""
+
+    def __post_init__(self) -> None:
+        for name in ("stiffness", "damping"):
+            values = getattr(self, name)
+            if not all(0 <= value < float("inf") for value in values):
+                raise UsageError(f"'{name}' of the joint PD is {values} but must be zero or more.")
+
+
+class JointPD:
+    """Tracks one trajectory with all legs; a Controller. After its end, the last row is held.
+
+    Args:
+        position: Joint positions at each control period, rad, (ticks, 2).
+        velocity: Joint velocities there, rad/s, (ticks, 2); None sets them to zero, as the paper.
+        gains: Of the PD.
+
+    Raises:
+        UsageError: The trajectory is empty or of another shape.
+    """
+
+    def __init__(
+        self, position: Array, velocity: Array | None = None, gains: JointGains | None = None
+    ) -> None:
+        if position.ndim != 2 or position.shape[1] != 2 or not len(position):
+            raise UsageError(
+                f"A joint trajectory must be (ticks, 2), hip and knee, not {position.shape}."
+            )
+        self.position = position
+        self.velocity = np.zeros_like(position) if velocity is None else velocity
+        if self.velocity.shape != position.shape:
+            raise UsageError(
+                f"Joint velocities are {self.velocity.shape} but the positions {position.shape}."
+            )
+        self.gains = gains or JointGains()
+        self._stiffness = np.array(self.gains.stiffness)
+        self._damping = np.array(self.gains.damping)
+        self.name = "joint-pd"
+        self.reset(1)
+
+    def reset(self, count: int) -> None:
+        """Begin the trajectory anew with ``count`` legs."""
+        self._tick, self._count = -1, count
+
+    def act(self, measurement: Measurement) -> Array:
+        """Return joint torques, N m, (n, 2); called once per control period."""
+        self._tick = min(self._tick + 1, len(self.position) - 1)
+        behind = self.position[self._tick] - measurement.q[:, 0]
+        slower = self.velocity[self._tick] - measurement.qd[:, 0]
+        torque: Array = self._stiffness * behind + self._damping * slower
+        return torque
+
+    def internals(self) -> dict[str, Array]:
+        """Return the targets of the last ``act``, each (n,)."""
+        tick = max(self._tick, 0)
+        return {
+            f"{joint}_{kind}": np.full(self._count, row[tick, column])
+            for kind, row in (
+                ("position_command_rad", self.position),
+                ("velocity_command_rad_s", self.velocity),
+            )
+            for column, joint in enumerate(("hip", "knee"))
+        }
