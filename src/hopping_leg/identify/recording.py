@@ -7,6 +7,7 @@ a sidecar, or come from one of the known rigs.
 import dataclasses
 import hashlib
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -18,14 +19,13 @@ import polars as pl
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.errors import RecordingError, UsageError, unknown_name
 from hopping_leg.identify.checks import check_table
+from hopping_leg.identify.clock import STALL, row_period
 from hopping_leg.identify.columns import COLUMNS, PAIRS
 from hopping_leg.identify.importers import IMPORTERS, recognise
+from hopping_leg.identify.inspection import Inspection
 from hopping_leg.identify.setup import RecordingSetup, setup_from_tree, setup_to_tree
 from hopping_leg.identify.tables import is_parquet, read_bytes, read_csv
 from hopping_leg.trace import Trace
-
-STALL = 2.0
-"""A gap between rows of more than this many periods is a stall."""
 
 _KEY = "recording"
 
@@ -88,7 +88,8 @@ class Recording:
 
     def segments(self) -> list[slice]:
         """Return the stretches of rows without a stall, in order."""
-        stalls = np.flatnonzero(np.diff(self.time) > STALL * self.setup.period) + 1
+        longest = STALL * row_period(self.time, self.setup.period)
+        stalls = np.flatnonzero(np.diff(self.time) > longest) + 1
         edges = [0, *stalls.tolist(), len(self)]
         return [slice(a, b) for a, b in pairwise(edges)]
 
@@ -113,6 +114,7 @@ def make_recording(
     setup: RecordingSetup,
     name: str,
     *,
+    names: Mapping[str, str] | None = None,
     header: dict[str, Any] | None = None,
     digest: str = "",
 ) -> Recording:
@@ -122,13 +124,15 @@ def make_recording(
         table: Columns as in ``COLUMNS``.
         setup: How it was recorded.
         name: The file, for messages.
+        names: The file's own column for a recording's column, where they differ.
         header: Further entries for the file's header.
         digest: Hash of the file.
 
     Raises:
         RecordingError: The table cannot be believed; names file, column and row.
     """
-    table, warnings = check_table(_typed(table, name), setup, name)
+    inspection = Inspection(_typed(table, name), setup, name, names or {})
+    table, warnings = check_table(inspection)
     return Recording(Trace(table, header or {}), setup, Path(name).name, digest, tuple(warnings))
 
 
@@ -146,8 +150,9 @@ def load_recording(path: str | Path) -> Recording:
     digest = hashlib.sha256(content).hexdigest()
     table, header = _native(path) if is_parquet(content) else (read_csv(content, origin), {})
     sidecar = _sidecar(path)
+    names: dict[str, str] = {}
     if sidecar is not None:
-        table, setup = _apply(sidecar, table, origin)
+        table, setup, names = _apply(sidecar, table, origin)
     elif _KEY in header:
         setup = setup_from_tree(header.pop(_KEY), origin)
     else:
@@ -159,7 +164,8 @@ def load_recording(path: str | Path) -> Recording:
                 f" {', '.join(table.columns[:12])}."
             )
         table, setup = importer.read(table)
-    return make_recording(table, setup, origin, header=header, digest=digest)
+        names = {new: old for old, new in importer.NAMES.items()}
+    return make_recording(table, setup, origin, names=names, header=header, digest=digest)
 
 
 def sidecar_path(path: Path) -> Path:
@@ -192,8 +198,8 @@ def _sidecar(path: Path) -> tuple[str, dict[str, Any]] | None:
 
 def _apply(
     sidecar: tuple[str, dict[str, Any]], table: pl.DataFrame, origin: str
-) -> tuple[pl.DataFrame, RecordingSetup]:
-    """Name a table's columns as its sidecar says and return the setup."""
+) -> tuple[pl.DataFrame, RecordingSetup, dict[str, str]]:
+    """Name a table's columns as its sidecar says; return it, the setup and the file's names."""
     file, tree = sidecar
     names = tree.pop("columns", {})
     if not isinstance(names, dict) or not all(isinstance(v, str) for v in names.values()):
@@ -208,7 +214,7 @@ def _apply(
     table = table.with_columns(pl.col(old).alias(new) for new, old in names.items())
     if "row" not in table.columns:
         table = table.with_columns(pl.int_range(pl.len()).alias("row"))
-    return table, setup_from_tree(tree, file)
+    return table, setup_from_tree(tree, file), names
 
 
 def _typed(table: pl.DataFrame, origin: str) -> pl.DataFrame:

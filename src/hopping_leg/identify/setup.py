@@ -62,6 +62,8 @@ class RecordingSetup:
     """False where the gains are estimates that a fit should refine."""
     torque_limit: Pair | None = None
     """Largest torque the rig let through, N m at the joint; none takes the robot file's."""
+    startup_rows: int = 0
+    """First rows of the file whose commands were not applied; the loader leaves them out."""
     quantisation: Quantisation = field(default_factory=Quantisation)
 
     def __post_init__(self) -> None:
@@ -69,6 +71,8 @@ class RecordingSetup:
             if not 0 < getattr(self, name) < math.inf:
                 value = getattr(self, name)
                 raise RecordingError(f"'{name}' is {value} but must be positive and finite.")
+        if self.startup_rows < 0:
+            raise RecordingError(f"'startup_rows' is {self.startup_rows} but must be 0 or more.")
         for name in ("stiffness", "damping", "integral", "torque_limit"):
             pair = getattr(self, name)
             if pair is not None and not all(0 <= value < math.inf for value in pair):
@@ -152,7 +156,7 @@ def _value(kind: Any, value: object, path: str, origin: str) -> object:  # noqa:
         ):
             raise RecordingError(f"{origin}: '{path}' is {value!r} but must be a finite number.")
         return float(value)
-    if not isinstance(value, kind):
-        names = {str: "a text in quotes", bool: "true or false"}
+    if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
+        names = {str: "a text in quotes", bool: "true or false", int: "a whole number"}
         raise RecordingError(f"{origin}: '{path}' is {value!r} but must be {names[kind]}.")
     return value

@@ -97,24 +97,18 @@ def _rows(text: str, origin: str) -> Iterator[list[str]]:
 
 
 def _parse(name: str, texts: list[str], origin: str) -> pl.Series:
-    texts = [text.strip() for text in texts]
+    words = pl.Series(name, texts, dtype=pl.String).str.strip_chars()
+    words = words.set(words == "", None)
     if name in TEXT_COLUMNS:
-        return pl.Series(name, [text or None for text in texts], dtype=pl.String)
-    return pl.Series(
-        name, [_number(t, name, row, origin) for row, t in enumerate(texts)], dtype=pl.Float64
-    )
-
-
-def _number(text: str, name: str, row: int, origin: str) -> float | None:
-    if not text:
-        return None
-    try:
-        value = float(text)
-    except ValueError:
-        if text.lower() in FLAGS:
-            return FLAGS[text.lower()]
-        shown = text if len(text) <= 20 else f"{text[:20]}..."
-        raise RecordingError(
-            f"{origin}: column '{name}', row {row}: {shown!r} is not a number."
-        ) from None
-    return None if value != value else value
+        return words
+    numbers = words.cast(pl.Float64, strict=False)
+    strange = (words.is_not_null() & numbers.is_null()).arg_true()
+    if strange.len() == 0:
+        return numbers.fill_nan(None)
+    flags = words.str.to_lowercase().replace_strict(FLAGS, default=None, return_dtype=pl.Float64)
+    numbers = numbers.zip_with(numbers.is_not_null(), flags)
+    for row in strange:
+        if numbers[row] is None:
+            text = words[row] if len(words[row]) <= 20 else f"{words[row][:20]}..."
+            raise RecordingError(f"{origin}: column '{name}', row {row}: {text!r} is no number.")
+    return numbers.fill_nan(None)

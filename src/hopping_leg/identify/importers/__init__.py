@@ -1,7 +1,7 @@
 """Recordings of other loggers, recognised by their columns; a module per rig.
 
-Each rig's module has ``COLUMNS``, the names that only it has, and ``read(table)``, which returns
-the table in a recording's columns and the setup.
+Each rig's module has ``COLUMNS``, by which it is recognised, ``NAMES``, its columns and what a
+recording calls them, and ``read(table)``, which returns a recording's table and setup.
 """
 
 from typing import Protocol
@@ -23,6 +23,7 @@ class Importer(Protocol):
     """A rig's module."""
 
     COLUMNS: frozenset[str]
+    NAMES: dict[str, str]
 
     def read(self, table: pl.DataFrame) -> Imported:
         """Return a recording's table and setup from the rig's own table."""

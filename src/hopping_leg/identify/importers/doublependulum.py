@@ -9,7 +9,7 @@ from hopping_leg.identify.setup import Quantisation, RecordingSetup
 
 COLUMNS = frozenset({"t", "pos_meas1", "pos_meas2", "tau_con1", "tau_con2"})
 
-_NAMES = {"t": "time_s"} | joint_columns(
+NAMES = {"t": "time_s"} | joint_columns(
     {
         "position": "pos_meas{}",
         "velocity": "vel_meas{}",
@@ -33,4 +33,4 @@ SETUP = RecordingSetup(
 
 def read(table: pl.DataFrame) -> tuple[pl.DataFrame, RecordingSetup]:
     """Return the recording's table and setup; the rate is the clock's own."""
-    return take(table, _NAMES), dataclasses.replace(SETUP, rate_hz=median_rate(table["t"]))
+    return take(table, NAMES), dataclasses.replace(SETUP, rate_hz=median_rate(table["t"]))

@@ -9,7 +9,7 @@ from hopping_leg.identify.setup import Quantisation, RecordingSetup
 
 COLUMNS = frozenset({"t", "hip_pos", "hip_tau_ff_cmd", "knee_pos", "knee_tau_ff_cmd"})
 
-_NAMES = {"t": "time_s"} | joint_columns(
+NAMES = {"t": "time_s"} | joint_columns(
     {
         "position": "{}_pos",
         "velocity": "{}_vel",
@@ -37,4 +37,4 @@ SETUP = RecordingSetup(
 
 def read(table: pl.DataFrame) -> tuple[pl.DataFrame, RecordingSetup]:
     """Return the recording's table and setup; the rate is the clock's own."""
-    return take(table, _NAMES), dataclasses.replace(SETUP, rate_hz=median_rate(table["t"]))
+    return take(table, NAMES), dataclasses.replace(SETUP, rate_hz=median_rate(table["t"]))

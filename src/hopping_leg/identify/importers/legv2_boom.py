@@ -1,7 +1,5 @@
 """Leg V2 on a boom, hopping on torque commands at 130 Hz."""
 
-import dataclasses
-
 import polars as pl
 
 from hopping_leg.identify.importers.renaming import joint_columns, take
@@ -12,10 +10,7 @@ COLUMNS = frozenset({"t", "phase", "hip_pos", "hip_vel", "knee_pos", "knee_vel"}
 BOOM_RADIUS = 1.146
 """Base rise per sine of boom pitch, m."""
 
-STARTUP_ROWS = 3
-"""First rows, whose commands were not applied."""
-
-_NAMES = {"t": "time_s", "phase": "phase"} | joint_columns(
+NAMES = {"t": "time_s", "phase": "phase"} | joint_columns(
     {
         "position": "{}_pos",
         "velocity": "{}_vel",
@@ -35,15 +30,16 @@ SETUP = RecordingSetup(
     effective_gravity=4.5,
     sample="before-command",
     onboard="torque",
+    startup_rows=3,
 )
 """Command n was computed from row n-1 and acts from row n's time on; gravity is that of free
 flight, with the boom's inertia and counterweight."""
 
 
 def read(table: pl.DataFrame) -> tuple[pl.DataFrame, RecordingSetup]:
-    """Return the recording's table and setup, without the start-up rows."""
-    recording = take(table, _NAMES)
+    """Return the recording's table and setup."""
+    recording = take(table, NAMES)
     if "boom_pitch" in table.columns:
         rise = BOOM_RADIUS * table["boom_pitch"].sin()
         recording = recording.with_columns(rise.alias("base_rise_m"))
-    return recording.slice(STARTUP_ROWS), dataclasses.replace(SETUP)
+    return recording, SETUP

@@ -11,7 +11,7 @@ from hopping_leg.identify.setup import RecordingSetup
 
 COLUMNS = frozenset({"n", "t", "t_exact", "hip_pos", "knee_pos", "hip_pos_cmd", "knee_pos_cmd"})
 
-_NAMES = {"t": "time_s", "t_exact": "exact_time"} | joint_columns(
+NAMES = {"t": "time_s", "t_exact": "exact_time"} | joint_columns(
     {
         "position": "{}_pos",
         "velocity": "{}_vel",
@@ -42,4 +42,4 @@ SETUP = RecordingSetup(
 
 def read(table: pl.DataFrame) -> tuple[pl.DataFrame, RecordingSetup]:
     """Return the recording's table and setup."""
-    return take(table, _NAMES).with_columns(pl.col("exact_time") > 0), SETUP
+    return take(table, NAMES).with_columns(pl.col("exact_time") > 0), SETUP

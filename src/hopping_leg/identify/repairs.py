@@ -1,0 +1,117 @@
+"""Values that are no measurements: uninitialised memory, dead columns, rows before the start."""
+
+import numpy as np
+import polars as pl
+
+from hopping_leg.arrays import BoolArray
+from hopping_leg.identify.columns import COLUMNS, MEASURED, PAIRS
+from hopping_leg.identify.inspection import Inspection
+
+TINY, HUGE = 1e-30, 1e30
+"""No sensor gives a magnitude beyond these; uninitialised memory read as a float does."""
+
+_MOSTLY = 0.1
+"""Share of garbage above which nothing in a column is believed."""
+
+_STARTUP = 10
+"""Rows at the beginning that are searched for commands that were not applied."""
+
+_JUMP = 0.05
+"""Step out of rows of zeros, rad, that only a sensor that woke up makes."""
+
+
+def drop_garbage(inspection: Inspection) -> pl.DataFrame:
+    """Leave out denormal, infinite and huge values."""
+    for column, (dtype, _) in COLUMNS.items():
+        if dtype != pl.Float64 or column not in inspection.table.columns:
+            continue
+        size = np.abs(inspection.floats(column))
+        garbage = ((size > 0) & (size < TINY)) | (size > HUGE)
+        if not garbage.any():
+            continue
+        first = int(np.argmax(garbage))
+        found = (
+            f"{inspection.named(column)}, row {inspection.row(first)}:"
+            f" {inspection.values(column)[first]:.3g} is no measurement but uninitialised memory"
+            f" ({int(garbage.sum())} such values)"
+        )
+        if garbage.mean() > _MOSTLY:
+            inspection.warn(f"{found}; the column is left out")
+            inspection.table = inspection.without(column)
+        else:
+            inspection.warn(f"{found}; left out")
+            kept = pl.when(pl.Series(garbage)).then(None).otherwise(pl.col(column))
+            inspection.table = inspection.table.with_columns(kept.alias(column))
+    return inspection.table
+
+
+def drop_zeros(inspection: Inspection) -> pl.DataFrame:
+    """Leave out measured columns that are zero throughout; a command may well be zero."""
+    joints = "torque_command" if inspection.setup.onboard == "torque" else "position_command"
+    for column in (*MEASURED, *PAIRS[joints]):
+        values = inspection.floats(column)
+        if np.isnan(values).all() or np.nanmax(np.abs(values)) > 0:
+            continue
+        sentence = f"{inspection.named(column)} is zero in all rows from {inspection.row(0)} on"
+        if column in MEASURED:
+            inspection.warn(f"{sentence}: not recorded, left out")
+            inspection.table = inspection.without(column)
+        else:
+            inspection.warn(f"{sentence}: kept as a command of zero")
+    return inspection.table
+
+
+def drop_startup(inspection: Inspection) -> pl.DataFrame:
+    """Leave out first rows in which sensors slept or commands were not applied."""
+    known = inspection.setup.startup_rows
+    rows, reason = max(
+        (min(known, inspection.table.height), "the rig's start-up"),
+        (_asleep(inspection), "all joints read zero, then jump"),
+        (_unapplied(inspection), "commands beyond all later ones that no measured torque follows"),
+        key=lambda found: found[0],
+    )
+    already = inspection.row(0)
+    if known and already:
+        return inspection.table  # saved again after they were left out
+    if rows:
+        columns = ", ".join(inspection.named(c) for c in _startup_columns(inspection))
+        inspection.warn(
+            f"rows {already} to {inspection.row(rows - 1)} are start-up rows ({reason};"
+            f" {columns}); left out"
+        )
+    return inspection.table.slice(rows)
+
+
+def _startup_columns(inspection: Inspection) -> list[str]:
+    pairs = (*PAIRS["torque_command"], *PAIRS["position"])
+    return [column for column in pairs if column in inspection.table.columns][:2]
+
+
+def _asleep(inspection: Inspection) -> int:
+    q = np.stack([inspection.floats(c) for c in PAIRS["position"]], axis=-1)
+    recorded = ~np.isnan(q).all(axis=0)
+    q = q[:, recorded]
+    awake = np.flatnonzero((np.nan_to_num(q) != 0).any(axis=-1))
+    if not len(awake) or awake[0] == 0 or awake[0] > len(q) // 2:
+        return 0
+    first = int(awake[0])
+    return first if np.nanmax(np.abs(q[first])) > _JUMP else 0
+
+
+def _unapplied(inspection: Inspection) -> int:
+    """Return the rows up to the last command that nothing followed, and its answer's delay."""
+    if inspection.setup.onboard != "torque":
+        return 0
+    last = 0
+    for commanded, measured in zip(PAIRS["torque_command"], PAIRS["torque"], strict=True):
+        command = np.abs(np.nan_to_num(inspection.floats(commanded)))
+        torque = np.abs(inspection.floats(measured))
+        if len(command) <= 2 * _STARTUP or np.isnan(torque[_STARTUP:]).all():
+            continue
+        flagged: BoolArray = command[:_STARTUP] > 1.2 * command[_STARTUP:].max()
+        answer = np.fmax(torque[: _STARTUP + 2][:-2], torque[1 : _STARTUP + 1])
+        answer = np.fmax(answer, torque[2 : _STARTUP + 2])
+        ignored = np.flatnonzero(flagged & (np.nan_to_num(answer) < 0.3 * command[:_STARTUP]))
+        if len(ignored) and command[_STARTUP:].max() > 0:
+            last = max(last, int(ignored[-1]) + 3)
+    return last
