@@ -51,16 +51,24 @@ def cut(
             raise UsageError(f"The windows' {name} is {value} s but must be positive and finite.")
     windows: list[Window] = []
     for index, recording in enumerate(recordings):
-        rows, rate = len(recording.time), recording.setup.rate_hz
-        length = rows if duration is None else round(duration * rate)
+        rate = recording.setup.rate_hz
         skip = max(1, round(unscored * rate))
-        if rows < length or length <= skip + 1:
+        found = False
+        for segment in recording.segments():
+            rows = segment.stop - segment.start
+            length = rows if duration is None else round(duration * rate)
+            if length <= skip + 1:
+                continue
+            step = length if stride is None else max(1, round(stride * rate))
+            starts = range(segment.start, segment.stop - length + 1, step)
+            windows += [Window(index, start, length, skip) for start in starts]
+            found = found or bool(starts)
+        if not found:
+            wanted = f"windows of {duration:g} s" if duration else "one window"
             raise RecordingError(
-                f"Recording {index} has {rows} rows, {rows / rate:.3g} s, too short for windows of"
-                f" {length / rate:.3g} s of which {skip / rate:.3g} s do not count; record longer."
+                f"{recording.name} has {len(recording)} rows, {len(recording) / rate:.3g} s, too"
+                f" short for {wanted} of which {skip / rate:.3g} s do not count; record longer."
             )
-        step = length if stride is None else max(1, round(stride * rate))
-        windows += [Window(index, s, length, skip) for s in range(0, rows - length + 1, step)]
     return windows
 
 
@@ -87,22 +95,21 @@ def split(
     return fit, [w for i, w in enumerate(windows) if i in chosen]
 
 
-def initial_state(recording: Recording, row: int) -> tuple[Array, Array]:
-    """Return joint position and velocity at a row, (2,) each, rad and rad/s.
+def full_states(recording: Recording) -> tuple[Array, Array]:
+    """Return joint position and velocity at every row, (rows, 2) each, rad and rad/s.
 
     Measured where the row has them, else the estimate, else interpolated between measured rows;
-    a velocity that was never measured is the position's slope.
+    a velocity that was never measured is the position's slope. For initial states only.
 
     Raises:
         RecordingError: A joint has no measured position at all.
     """
     position = _filled(recording, "position", "position_estimate")
     if np.isnan(position).any():
-        raise RecordingError("A recording lacks measured positions of a joint; record both.")
+        raise RecordingError(f"{recording.name} lacks a joint's positions; record both.")
     velocity = _filled(recording, "velocity", "velocity_estimate")
     slope = np.gradient(position, recording.time, axis=0)
-    velocity = np.where(np.isnan(velocity), slope, velocity)
-    return position[row], velocity[row]
+    return position, np.where(np.isnan(velocity), slope, velocity)
 
 
 def _filled(recording: Recording, quantity: str, estimate: str) -> Array:

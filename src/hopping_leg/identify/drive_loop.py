@@ -1,0 +1,101 @@
+"""The drives of many simulations: their gains, limits and control law, one row per simulation."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.errors import RecordingError
+from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.recording import Recording
+
+_UNLIMITED = 1e9
+
+
+def drive_values(candidates: Sequence[Candidate], name: str) -> Array:
+    """Return an attribute of both drives, (candidates, 2)."""
+    return np.array([[getattr(c.drive.hip, name), getattr(c.drive.knee, name)] for c in candidates])
+
+
+def recorded_gains(recording: Recording, name: str) -> Array:
+    """Return what a recording says about a gain of its on-board PD, (rows, 2), NaN if unknown.
+
+    Args:
+        recording: Rows win over the setup.
+        name: ``stiffness``, ``damping`` or ``integral``.
+    """
+    pair = getattr(recording.setup, name)
+    values = np.tile(np.nan if pair is None else np.array(pair), (len(recording), 1))
+    if name == "integral":
+        return np.nan_to_num(values)
+    rows = recording.array(name)
+    return np.where(np.isnan(rows), np.broadcast_to(values, rows.shape), rows)
+
+
+def require_gains(gains: Array, name: str, recording: Recording) -> Array:
+    """Return the gains.
+
+    Raises:
+        RecordingError: Neither the recording nor the candidate says what a gain is.
+    """
+    if np.isnan(gains).any():
+        raise RecordingError(
+            f"{recording.name} does not say the {name} of its on-board PD; state it in the"
+            f" sidecar, or fit 'drive.hip.{name}' and 'drive.knee.{name}'."
+        )
+    return gains
+
+
+class MotorBounds:
+    """Smallest and largest torque of each joint at its speed, as ``robot.limits.MotorLimit``.
+
+    Args:
+        candidates: Whose motors and drive limits.
+        recordings: One per window; a limit in the setup replaces the robot's software limit.
+    """
+
+    def __init__(self, candidates: Sequence[Candidate], recordings: Sequence[Recording]) -> None:
+        robots = [c.robot for c in candidates]
+        belt = np.array([r.of_joints("belt_ratio") for r in robots])
+        peak = np.array([[j.motor.peak_torque for j in (r.hip, r.knee)] for r in robots]) * belt
+        speed = np.array([r.of_joints("no_load_speed") for r in robots])
+        own = np.array([r.of_joints("torque_limit") for r in robots])
+        fitted = drive_values(candidates, "torque_limit")
+        limits = []
+        for recording in recordings:
+            pair = recording.setup.torque_limit
+            known = own if pair is None else np.broadcast_to(np.array(pair), own.shape)
+            limits.append(np.where(np.isnan(fitted), known, fitted))
+        self._limit = np.stack(limits, axis=1).reshape(-1, 2)
+        self._peak = np.repeat(peak, len(recordings), axis=0)
+        self._slope = np.repeat(peak / speed, len(recordings), axis=0)
+
+    def at(self, qd: Array) -> tuple[Array, Array]:
+        """Return lower and upper bound at joint velocities, N m, (n, 2) each."""
+        drop = self._slope * qd
+        upper = np.clip(self._peak - drop, 0.0, self._limit)
+        lower = np.clip(-self._peak - drop, -self._limit, 0.0)
+        return lower, upper
+
+
+class DelayLine:
+    """Torques that arrive a fraction of ticks late; before the first comes the first.
+
+    Args:
+        delay: In ticks, (n,).
+    """
+
+    def __init__(self, delay: Array) -> None:
+        self._whole = np.floor(delay).astype(int)
+        self._part = (delay - self._whole)[:, None]
+        self._depth = int(self._whole.max(initial=0)) + 2
+        self._past: list[Array] = []
+        self._rows = np.arange(len(delay))
+
+    def push(self, torque: Array) -> Array:
+        """Return what arrives in the tick in which ``torque`` was computed, (n, 2)."""
+        self._past = [torque, *self._past][: self._depth]
+        stack = np.stack(self._past)
+        newest = np.minimum(self._whole, len(stack) - 1)
+        older = np.minimum(self._whole + 1, len(stack) - 1)
+        return (1 - self._part) * stack[newest, self._rows] + self._part * stack[older, self._rows]

@@ -1,0 +1,242 @@
+"""Windows of one kind of rig in one batch of simulations."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from mujoco import batch
+
+from hopping_leg.arrays import Array
+from hopping_leg.errors import UsageError
+from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.drive_loop import (
+    DelayLine,
+    MotorBounds,
+    drive_values,
+    recorded_gains,
+    require_gains,
+)
+from hopping_leg.identify.held import Held
+from hopping_leg.identify.recording import Recording
+from hopping_leg.identify.rig_model import FIELDS, build_rig_model, model_field
+from hopping_leg.identify.windows import Window, full_states
+from hopping_leg.robot import kinematics
+
+_BLOCK = 256
+"""Ticks whose commands are prepared at once."""
+
+
+class WindowGroup:
+    """Windows that share rig, rate and on-board controller.
+
+    The simulation advances by ticks of the recording's period, rounded to physics steps; recorded
+    rows may lie anywhere between ticks. Row n is the state before command n acts. A ``zoh`` PD is
+    computed once per tick from the simulated state; a ``continuous`` one is the actuators' own and
+    acts at every physics step, with its integral and its speed limit renewed at every tick.
+
+    Args:
+        recordings: All recordings.
+        windows: This group's.
+        timestep: Physics step, s.
+        threads: Worker threads, 0 for one per core.
+
+    Raises:
+        UsageError: The physics step is longer than the recording's period.
+    """
+
+    def __init__(
+        self,
+        recordings: Sequence[Recording],
+        windows: Sequence[Window],
+        timestep: float,
+        threads: int,
+    ) -> None:
+        self._timestep, self._threads = timestep, threads
+        self._recordings = [recordings[w.recording] for w in windows]
+        self._setup = self._recordings[0].setup
+        period = self._setup.period
+        if timestep > period * 1.001:
+            raise UsageError(
+                f"A physics step of {timestep} s is longer than the recordings' period of"
+                f" {period:g} s; take {period:g} s or less."
+            )
+        self._substeps = max(1, round(period / timestep))
+        self._tick = self._substeps * timestep
+        self._zoh = self._setup.onboard == "zoh"
+        self._prepare_rows(recordings, windows)
+        self._prepare_commands(recordings, windows)
+        self._batches: dict[int, batch.Batch] = {}
+
+    def run(self, candidates: Sequence[Candidate]) -> tuple[Array, Array, Array]:
+        """Return position, velocity and measured torque, (candidates, windows, rows, 2) each."""
+        simulation = self._start(candidates)
+        history = self._advance(simulation, candidates)
+        shape = (self._ticks, len(candidates), -1, 2)
+        q, qd, torque = (values.reshape(shape) for values in history)
+        position, velocity = self._between_ticks(q, qd)
+        gain = drive_values(candidates, "sensor_gain")[:, None, None]
+        offset = drive_values(candidates, "torque_offset")[:, None, None]
+        measured = gain * self._linear(torque) + offset
+        for values in (position, velocity, measured):
+            values[:, self._padding] = np.nan
+        return position, velocity, measured
+
+    def _prepare_rows(self, recordings: Sequence[Recording], windows: Sequence[Window]) -> None:
+        """Place every window's rows among the ticks and collect initial states."""
+        length = max(w.length for w in windows)
+        self._begin = np.empty(len(windows))
+        times = np.zeros((len(windows), length))
+        self._padding = np.ones((len(windows), length), dtype=bool)
+        states = {w.recording: full_states(recordings[w.recording]) for w in windows}
+        self._q0, self._qd0 = np.empty((len(windows), 2)), np.empty((len(windows), 2))
+        self._height0 = np.full(len(windows), np.nan)
+        for i, w in enumerate(windows):
+            recording = recordings[w.recording]
+            stamps = recording.time[w.start : w.start + w.length]
+            self._begin[i] = stamps[0]
+            rows = np.arange(w.length) * self._tick if self._zoh else stamps - stamps[0]
+            times[i, : w.length], times[i, w.length :] = rows, rows[-1]
+            self._padding[i, : w.length] = False
+            self._q0[i], self._qd0[i] = (values[w.start] for values in states[w.recording])
+            if recording.has_column("height_m"):
+                self._height0[i] = recording.trace.column("height_m")[w.start]
+        place = times / self._tick
+        self._ticks = int(np.ceil(place.max() - 1e-6)) + 2
+        self._before = np.minimum(np.floor(place + 1e-9).astype(int), self._ticks - 2)
+        self._share = np.clip(place - self._before, 0.0, 1.0)[..., None]
+
+    def _prepare_commands(self, recordings: Sequence[Recording], windows: Sequence[Window]) -> None:
+        self._held, self._gains = [], []
+        for w in windows:
+            recording = recordings[w.recording]
+            columns = [
+                np.nan_to_num(recording.array(f"{name}_command"))
+                for name in ("position", "velocity", "torque")
+            ]
+            time = recording.time
+            self._held.append(Held(time, np.concatenate(columns, axis=1)))
+            rows = [recorded_gains(recording, n) for n in ("stiffness", "damping", "integral")]
+            self._gains.append(Held(time, np.concatenate(rows, axis=1)))
+
+    def _start(self, candidates: Sequence[Candidate]) -> batch.Batch:
+        """Return the batch with each simulation's model and initial state set."""
+        setup, windows = self._setup, len(self._begin)
+        models = [
+            build_rig_model(c.robot, setup.rig, self._timestep, setup.effective_gravity)
+            for c in candidates
+        ]
+        count = len(candidates) * windows
+        if count not in self._batches:
+            self._batches[count] = batch.Batch(models[0], count, self._threads)
+        simulation = self._batches[count]
+        for name in FIELDS:
+            values = np.stack([model_field(m, name) for m in models])
+            simulation.expand(name)[...] = np.repeat(values, windows, axis=0)
+        simulation.reset(stage=0)
+        q, qd = simulation.bind("qpos"), simulation.bind("qvel")
+        q[:, -2:] = np.tile(self._q0, (len(candidates), 1))
+        qd[:, -2:] = np.tile(self._qd0, (len(candidates), 1))
+        if setup.rig != "fixed-base":
+            standing = [kinematics.stance_height(c.robot, self._q0) for c in candidates]
+            height = np.where(np.isnan(self._height0), np.stack(standing), self._height0)
+            q[:, 0] = height.ravel()
+        return simulation
+
+    def _advance(
+        self, simulation: batch.Batch, candidates: Sequence[Candidate]
+    ) -> tuple[Array, Array, Array]:
+        """Run all ticks; return joint position, velocity and torque at each, (ticks, n, 2)."""
+        windows, count = len(self._begin), simulation.nsim
+        history = tuple(np.full((self._ticks, count, 2), np.nan) for _ in range(3))
+        positions, velocities, torques = history
+        q, qd = simulation.bind("qpos")[:, -2:], simulation.bind("qvel")[:, -2:]
+        ctrl = simulation.bind("ctrl")
+        bias = simulation.expand("actuator_biasprm")
+        force = simulation.expand("actuator_forcerange")
+        friction = simulation.expand("dof_frictionloss")[:, -2:]
+        still = friction.copy()
+        bounds = MotorBounds(candidates, self._recordings)
+        gain = np.repeat(drive_values(candidates, "torque_gain"), windows, axis=0)
+        load = np.repeat(drive_values(candidates, "load_friction"), windows, axis=0)
+        delay = np.repeat([c.drive.delay for c in candidates], windows)
+        line = DelayLine(delay / self._tick)
+        integral, last = np.zeros((count, 2)), np.zeros((count, 2))
+        alive = np.arange(count)
+        for tick in range(self._ticks):
+            if tick % _BLOCK == 0:
+                commands, gains = self._block(tick, delay, candidates)
+            target, rate, feed = np.split(commands[tick % _BLOCK], 3, axis=-1)
+            kp, kd, ki = gains[tick % _BLOCK]
+            lower, upper = bounds.at(qd)
+            push = feed + ki * integral
+            if self._zoh:
+                asked = push + kp * (target - q) + kd * (rate - qd)
+                ctrl[...] = gain * np.clip(line.push(asked), lower, upper)
+                torque = ctrl.copy()
+            else:
+                asked = push + kp * target + kd * rate
+                reply = np.clip((last if tick else asked) - kp * q - kd * qd, lower, upper)
+                torque, last = gain * reply, asked
+                ctrl[...] = gain * asked
+                bias[:, :, 1], bias[:, :, 2] = -gain * kp, -gain * kd
+                force[..., 0], force[..., 1] = gain * lower, gain * upper
+            integral += self._tick * (target - q)
+            positions[tick], velocities[tick], torques[tick] = q, qd, torque
+            if load.any():
+                friction[...] = still + load * np.abs(torque)
+            try:
+                simulation.step(ids=alive, nstep=self._substeps)
+            except batch.SimulationError:
+                failed = np.flatnonzero(np.asarray(simulation.status) != 0)
+                alive = np.setdiff1d(alive, failed)
+                if not len(alive):
+                    break
+        positions[:, np.setdiff1d(np.arange(count), alive)] = np.nan
+        return positions, velocities, torques
+
+    def _block(
+        self, tick: int, delay: Array, candidates: Sequence[Candidate]
+    ) -> tuple[Array, Array]:
+        """Return a block of ticks' commands, (ticks, n, 6), and gains, (ticks, 3, n, 2)."""
+        windows, number = len(self._begin), len(candidates)
+        ticks = np.arange(tick, min(tick + _BLOCK, self._ticks)) * self._tick
+        late = np.zeros(number) if self._zoh else delay[::windows]
+        commands = np.empty((len(ticks), number, windows, 6))
+        gains = np.empty((len(ticks), 3, number, windows, 2))
+        fitted = [drive_values(candidates, n) for n in ("stiffness", "damping", "integral")]
+        for w in range(windows):
+            start = self._begin[w] + ticks[:, None] - late
+            commands[:, :, w] = self._held[w].average(start, self._tick)
+            rows = self._gains[w].at(start + 1e-9).reshape(len(ticks), number, 3, 2)
+            gains[:, :, :, w] = np.where(np.isnan(fitted), rows.swapaxes(1, 2), fitted)
+        if self._setup.onboard == "torque":
+            gains[...] = 0.0
+        for index, name in enumerate(("stiffness", "damping")):
+            require_gains(gains[:, index], name, self._recordings[0])
+        return commands.reshape(len(ticks), -1, 6), gains.reshape(len(ticks), 3, -1, 2)
+
+    def _between_ticks(self, q: Array, qd: Array) -> tuple[Array, Array]:
+        """Return position and velocity at the rows by cubic interpolation of the ticks.
+
+        Args:
+            q: Joint positions, rad, (ticks, candidates, windows, 2).
+            qd: Joint velocities, rad/s, likewise.
+        """
+        q0, q1 = self._ends(q)
+        v0, v1 = (self._tick * v for v in self._ends(qd))
+        s, jump = self._share, q1 - q0
+        square, cube = 3 * jump - 2 * v0 - v1, v0 + v1 - 2 * jump
+        position = q0 + s * (v0 + s * (square + s * cube))
+        velocity = (v0 + s * (2 * square + s * 3 * cube)) / self._tick
+        return position, velocity
+
+    def _linear(self, values: Array) -> Array:
+        before, after = self._ends(values)
+        return before + self._share * (after - before)
+
+    def _ends(self, values: Array) -> tuple[Array, Array]:
+        """Return what stands at the ticks around each row, (candidates, windows, rows, 2)."""
+        windows = np.arange(len(self._begin))[:, None]
+        moved = np.moveaxis(values, 0, 2)
+        return moved[:, windows, self._before], moved[:, windows, self._before + 1]
+
+
