@@ -25,6 +25,7 @@ VERBS = {
     "train": "train a controller from scratch, or go on after an interruption",
     "tune": "search the gains of energy shaping",
     "bench": "measure speed, convergence and accuracy",
+    "excite": "write the trajectory that a leg is identified with",
     "export": "write a leg as URDF, inspect a policy file",
     "reproduce": "the main job: train, evaluate, compare and report",
 }
