@@ -92,3 +92,14 @@ def test_single_and_vector_agree_on_a_motion_without_noise():
         both = vector.step(np.stack([action, action]))
         np.testing.assert_array_equal(both[0], [one[0], one[0]])
         np.testing.assert_allclose(both[1], one[1], rtol=1e-12)
+
+
+def test_a_layout_may_be_chosen():
+    options = TaskOptions(observation="dated")
+    for env in (
+        gymnasium.make(ENV_ID, options=options),
+        gymnasium.make_vec(ENV_ID, num_envs=3, options=options),
+    ):
+        observation, _ = env.reset(seed=0)
+        assert env.observation_space.contains(observation)
+        assert observation.shape[-1] > 15

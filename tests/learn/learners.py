@@ -21,6 +21,7 @@ TINY_FAST = FastRecipe(steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), cr
 class TinyPPO(PaperRecipe):
     name = "ppo"
     steps: int = 640
+    privileged_critic: bool = False
     legs: int = 2
 
     def make_model(self, env, seed):

@@ -23,7 +23,7 @@ def measurement(count):
 
 @pytest.mark.parametrize("recipe", [TINY, TinyPPO()], ids=["sac", "ppo"])
 def test_policy_file_gives_the_actors_torques(recipe):
-    recipe = dataclasses.replace(recipe, hidden=(32, 32))
+    recipe = dataclasses.replace(recipe, hidden=(32, 32), privileged_critic=False)
     model = learner(recipe)
     with torch.no_grad():
         for parameter in model.policy.parameters():

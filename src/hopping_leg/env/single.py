@@ -7,7 +7,7 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from hopping_leg.env.observation import SIZE, Array32
+from hopping_leg.env.observation import Array32
 from hopping_leg.env.options import TaskOptions
 from hopping_leg.env.render import Camera, Image
 from hopping_leg.env.reward import PaperReward
@@ -17,8 +17,11 @@ from hopping_leg.robot import Robot, load_robot
 
 _LARGEST = float(np.finfo(np.float32).max)
 
-OBSERVATIONS = gymnasium.spaces.Box(-_LARGEST, _LARGEST, (SIZE,), np.float32)
-"""Unbounded: joints may pass their soft limits."""
+
+def observations(task: HoppingTask) -> "gymnasium.spaces.Box[np.float32]":
+    """Return the space of a task's observations; unbounded, as joints may pass their limits."""
+    return gymnasium.spaces.Box(-_LARGEST, _LARGEST, (task.observation.size,), np.float32)
+
 
 ACTIONS = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
 """Hip and knee torque over ``TaskOptions.action_torque``."""
@@ -48,13 +51,13 @@ class HoppingEnv(gymnasium.Env[Array32, npt.NDArray[np.float32]]):
         render_mode: str | None = None,
     ) -> None:
         leg = load_robot(robot) if isinstance(robot, str) else robot
-        self.observation_space, self.action_space = OBSERVATIONS, ACTIONS
         self.render_mode = render_mode
         self.metadata = {**type(self).metadata, "render_fps": round(options.rate)}
         rng = np.random.default_rng(0)
         self.task = HoppingTask(
             leg, 1, options, reward or PaperReward(leg), rng, threads=1, autoreset=False
         )
+        self.observation_space, self.action_space = observations(self.task), ACTIONS
         self._terms = self.task.reward.names
         self._seeded = False
         self._camera: Camera | None = None

@@ -13,7 +13,7 @@ from hopping_leg.env.observation import Array32
 from hopping_leg.env.options import TaskOptions
 from hopping_leg.env.render import Camera, Image
 from hopping_leg.env.reward import PaperReward
-from hopping_leg.env.single import ACTIONS, OBSERVATIONS
+from hopping_leg.env.single import ACTIONS, observations
 from hopping_leg.env.task import HoppingTask, Step
 from hopping_leg.env.transition import Reward
 from hopping_leg.robot import Robot, load_robot
@@ -52,12 +52,12 @@ class HoppingVectorEnv(gymnasium.vector.VectorEnv[Array32, npt.NDArray[np.float3
     ) -> None:
         leg = load_robot(robot) if isinstance(robot, str) else robot
         self.num_envs, self.render_mode = num_envs, render_mode
-        self.single_observation_space, self.single_action_space = OBSERVATIONS, ACTIONS
-        self.observation_space = batch_space(OBSERVATIONS, num_envs)
-        self.action_space = batch_space(ACTIONS, num_envs)
         self.metadata = {**type(self).metadata, "render_fps": round(options.rate)}
         judge, rng = reward or PaperReward(leg), np.random.default_rng(0)
         self.task = HoppingTask(leg, num_envs, options, judge, rng, threads)
+        self.single_observation_space, self.single_action_space = observations(self.task), ACTIONS
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(ACTIONS, num_envs)
         self._all = np.ones(num_envs, np.bool_)
         self._seeded = False
         self._camera: Camera | None = None

@@ -6,8 +6,11 @@ both to one observation, actor's part first.
 
 from typing import Any
 
+import gymnasium
 import torch
-from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.policies import ActorCriticPolicy, ContinuousCritic
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from stable_baselines3.sac.policies import Actor, SACPolicy
 from torch import nn
 
 
@@ -48,6 +51,38 @@ class AsymmetricPolicy(ActorCriticPolicy):  # type: ignore[misc]
     def _build_mlp_extractor(self) -> None:
         critic = self.features_dim - self._actor_size
         self.mlp_extractor = _Split(self._actor_size, critic, self.net_arch, self.activation_fn)
+
+
+class _Columns(BaseFeaturesExtractor):  # type: ignore[misc]
+    """Passes on some entries of an observation."""
+
+    def __init__(self, space: gymnasium.spaces.Box, columns: slice) -> None:
+        super().__init__(space, len(range(space.shape[0])[columns]))
+        self._columns = columns
+
+    def forward(self, observation: torch.Tensor) -> torch.Tensor:
+        """Return the entries, (n, features_dim)."""
+        return observation[:, self._columns]
+
+
+class AsymmetricSACPolicy(SACPolicy):  # type: ignore[misc]
+    """SAC policy whose actor sees the first ``actor_size`` entries and whose critics the others."""
+
+    def __init__(self, *args: Any, actor_size: int, **kwargs: Any) -> None:  # noqa: ANN401
+        self._actor_size = actor_size
+        super().__init__(*args, **kwargs)
+
+    def make_actor(self, features_extractor: BaseFeaturesExtractor | None = None) -> Actor:
+        """Build the actor on the measurements."""
+        seen = _Columns(self.observation_space, slice(None, self._actor_size))
+        return super().make_actor(seen)
+
+    def make_critic(
+        self, features_extractor: BaseFeaturesExtractor | None = None
+    ) -> ContinuousCritic:
+        """Build a pair of critics on the true state."""
+        seen = _Columns(self.observation_space, slice(self._actor_size, None))
+        return super().make_critic(seen)
 
 
 def _dense(inputs: int, hidden: list[int], activation: type[nn.Module]) -> nn.Sequential:

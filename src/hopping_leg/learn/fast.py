@@ -9,11 +9,10 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-import numpy as np
 import torch
 from torch import nn
 
-from hopping_leg.env import ApexReward, ApexRewardOptions, HoppingTask, TaskOptions
+from hopping_leg.env import ApexReward, ApexRewardOptions, TaskOptions
 from hopping_leg.learn.asymmetric import AsymmetricPolicy
 from hopping_leg.learn.recipe import Recipe
 from hopping_leg.learn.resumable import ResumablePPO
@@ -65,16 +64,8 @@ class FastRecipe(Recipe):
     """Of the advantage estimate."""
     noise_hold: int = 24
     """Ticks that gSDE keeps its noise, 0.12 s: about a push-off; 0 explores with white noise."""
-    privileged_critic: bool = True
-    """Let the critic see the true state in training."""
     log_std: tuple[float, float] = (-2.0, -3.8)
     """Log standard deviation of gSDE's weights at the start and from 60 % of the training on."""
-
-    def make_env(self, robot: Robot, seed: int, threads: int = 1) -> TaskVecEnv:
-        """Build the training environment; its critic sees the true state."""
-        rng = np.random.default_rng(seed)
-        task = HoppingTask(robot, self.legs, self.task, self.make_reward(robot), rng, threads)
-        return TaskVecEnv(task, privileged=self.privileged_critic)
 
     def make_reward(self, robot: Robot) -> ApexReward:
         """Build the apex reward."""

@@ -37,12 +37,15 @@ class Recipe(ABC):
     """Episodes (SAC) or updates (PPO) between two entries in the TensorBoard log."""
     checkpoint_seconds: float = 60.0
     """Time between checkpoints."""
+    privileged_critic: bool = True
+    """Let the critic see the true state in training: in flight the joints do not tell the height
+    that the reward speaks of."""
 
     def make_env(self, robot: Robot, seed: int, threads: int = 1) -> TaskVecEnv:
         """Build the training environment."""
         rng = np.random.default_rng(seed)
         task = HoppingTask(robot, self.legs, self.task, self.make_reward(robot), rng, threads)
-        return TaskVecEnv(task)
+        return TaskVecEnv(task, privileged=self.privileged_critic)
 
     @abstractmethod
     def make_reward(self, robot: Robot) -> Reward:
