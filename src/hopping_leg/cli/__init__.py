@@ -27,6 +27,7 @@ VERBS = {
     "bench": "measure speed, convergence and accuracy",
     "excite": "write the trajectory that a leg is identified with",
     "export": "write a leg as URDF, inspect a policy file",
+    "record": "play an excitation on a leg and record it",
     "reproduce": "the main job: train, evaluate, compare and report",
 }
 """Every verb with its line in the overview."""

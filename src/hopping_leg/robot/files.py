@@ -27,10 +27,33 @@ def load_robot(name_or_path: str | Path) -> Robot:
         RobotError: Naming the file, the field and what was valid.
     """
     origin = str(name_or_path)
-    tree = load_tree(origin)
-    robot = build(Robot, tree, "", origin)
+    return robot_from_tree(_read(origin), origin)
+
+
+def robot_from_tree(tree: Tree, origin: str) -> Robot:
+    """Return the robot that a file's tables describe, ``extends`` resolved.
+
+    Args:
+        tree: The tables as in a file.
+        origin: The file's path or another name for it, for messages.
+
+    Raises:
+        RobotError: Naming origin, field and what was valid.
+    """
+    robot = build(Robot, _extend(tree, origin, ()), "", origin)
     check_physics(robot, origin)
     return robot
+
+
+def parent_robot(name_or_path: str | Path) -> str | None:
+    """Return the name or path of the robot that a file extends, None if it stands alone.
+
+    Raises:
+        RobotError: The file is missing or not TOML.
+    """
+    origin = str(name_or_path)
+    parent = _read(origin).get("extends")
+    return _beside(origin, parent) if isinstance(parent, str) else None
 
 
 def load_tree(name_or_path: str | Path) -> Tree:
@@ -46,10 +69,14 @@ def _resolve(name: str, chain: tuple[str, ...]) -> Tree:
     if name in chain:
         circle = " -> ".join((*chain, name))
         raise RobotError(f"{name}: robots extend each other in a circle ({circle}).")
-    tree = _read(name)
-    parent = tree.pop("extends", None)
-    if parent is None:
+    return _extend(_read(name), name, chain)
+
+
+def _extend(tree: Tree, name: str, chain: tuple[str, ...]) -> Tree:
+    parent = tree.get("extends")
+    if "extends" not in tree:
         return tree
+    tree = {key: value for key, value in tree.items() if key != "extends"}
     if not isinstance(parent, str):
         raise RobotError(f"{name}: 'extends' must be a robot's name or file, not {parent!r}.")
     return _merge(_resolve(_beside(name, parent), (*chain, name)), tree)

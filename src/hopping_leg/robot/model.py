@@ -14,9 +14,6 @@ GRAVITY = 9.81
 TIMESTEP = 5e-4
 """Default physics step, s: a compromise whose price ``hop bench convergence`` measures."""
 
-_CLAMP = 1e12
-"""Inertia that no leg moves, kg: what clamps the base."""
-
 _THIN = 1e-9
 """Inertia around the axes a planar link cannot turn about only has to be valid."""
 
@@ -58,11 +55,6 @@ def build_model(robot: Robot, timestep: float = TIMESTEP) -> mujoco.MjModel:
         RobotError: MuJoCo refuses the parameters, e.g. a mass that is too small.
     """
     return compile_spec(get_spec(robot, timestep), robot.name)
-
-
-def clamp_base(spec: mujoco.MjSpec) -> None:
-    """Fix the base to the rail where it stands, for fixed-base runs; coordinates stay the same."""
-    spec.joint("rail").armature = _CLAMP
 
 
 def compile_spec(spec: mujoco.MjSpec, name: str) -> mujoco.MjModel:

@@ -73,7 +73,7 @@ class Drive:
     stiffness: float | None = _positive(None, "N m/rad")
     """Of the belt between motor and link; without it, rigid."""
     stiffness_damping: float = _value(0.0, "N m s/rad")
-    """Damping beside that stiffness."""
+    """Damping between motor and link, beside the stiffness."""
     sensor: Sensor = field(default_factory=Sensor)
 
 

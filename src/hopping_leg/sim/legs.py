@@ -8,7 +8,7 @@ from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.limits import MotorLimit
-from hopping_leg.robot.model import TIMESTEP, clamp_base, compile_spec, get_spec
+from hopping_leg.robot.model import TIMESTEP, build_model
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.reality import RealLegs
 
@@ -66,8 +66,8 @@ class Legs:
         self.period = 1 / rate
         self.substeps = substeps
         self.real: RealLegs | None = None
-        if robot.reality.neutral:
-            self._take_model(clamped, threads)
+        if robot.reality.neutral and not clamped:
+            self._take_model(threads)
         else:
             self._take_reality(clamped, threads)
         self.height, self.height_rate = self.state[:, 0], self.state[:, 3]
@@ -78,11 +78,8 @@ class Legs:
         self._inverse_belt = np.tile(1 / robot.of_joints("belt_ratio"), (count, 1))
         self._applied = np.zeros((count, 2))
 
-    def _take_model(self, clamped: bool, threads: int) -> None:
-        spec = get_spec(self.robot, self.timestep)
-        if clamped:
-            clamp_base(spec)
-        model = compile_spec(spec, self.robot.name)
+    def _take_model(self, threads: int) -> None:
+        model = build_model(self.robot, self.timestep)
         self.batch = batch.Batch(model, self.count, threads)
         self._ctrl = self.batch.bind("ctrl")
         first = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_TIME)

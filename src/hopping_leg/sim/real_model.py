@@ -1,9 +1,10 @@
 """The leg as ``[reality]`` has it, for MuJoCo: true masses and ground, backlash and belts.
 
-Backlash is a second hinge on the joint's axis that moves freely within its limits; a belt is a
-hinge with a spring. Motor, armature, friction and encoder stay at the first hinge, the link hangs
-on the last, so that the link's angle is the sum. MuJoCo's own limits and springs keep this stable
-at the step at which training runs, which a contact force computed in between would not.
+Backlash is a second hinge on the joint's axis that moves freely within its limits; a belt is one
+with a spring. Motor, armature, friction and encoder stay at the first hinge, the link hangs on the
+second, so that the link's angle is the sum. MuJoCo's limits and springs keep this stable at the
+step at which training runs. Where a belt has backlash, too, one hinge does for both: its spring,
+with a dead band, is a torque from ``sim.reality``, as between two hinges nothing had inertia.
 """
 
 import math
@@ -14,7 +15,7 @@ import numpy as np
 
 from hopping_leg.arrays import IntArray
 from hopping_leg.errors import RobotError
-from hopping_leg.robot.model import clamp_base, compile_spec, get_spec
+from hopping_leg.robot.model import compile_spec, get_spec
 from hopping_leg.robot.parameters import Contact, Joint, Link, Robot
 from hopping_leg.robot.reality import Drive
 
@@ -30,14 +31,15 @@ class RealModel:
     """A compiled model and where the leg's coordinates are in it.
 
     Attributes:
-        model: Generalised coordinates are the rail and, per joint, motor, backlash, belt.
+        model: Generalised coordinates are the rail, unless clamped, and per joint motor, backlash,
+            belt.
         motor: Coordinate of each joint's motor, (2,).
-        flexible: Coordinates between motor and link, per joint; empty where rigid.
+        flexible: Coordinate between motor and link, per joint; None where rigid.
     """
 
     model: mujoco.MjModel
     motor: IntArray
-    flexible: tuple[IntArray, IntArray]
+    flexible: tuple[int | None, int | None]
 
 
 def real_model(robot: Robot, timestep: float, *, clamped: bool) -> RealModel:
@@ -46,14 +48,15 @@ def real_model(robot: Robot, timestep: float, *, clamped: bool) -> RealModel:
     Args:
         robot: The leg; its ``reality`` holds.
         timestep: Physics step, s.
-        clamped: Whether the base is fixed.
+        clamped: Whether the base is fixed; then it has no rail and touches nothing.
 
     Raises:
         RobotError: A belt is too stiff for the physics step, or MuJoCo refuses a number.
     """
     spec = get_spec(real_parameters(robot), timestep)
     if clamped:
-        clamp_base(spec)
+        spec.delete(spec.joint("rail"))
+        spec.geom("floor").contype = 0
     for name, body in _BODIES.items():
         joint, link = getattr(robot, name), getattr(robot, body)
         _add_transmission(spec, name, getattr(robot.reality, name), timestep)
@@ -62,11 +65,11 @@ def real_model(robot: Robot, timestep: float, *, clamped: bool) -> RealModel:
         actuator.ctrllimited = False  # gains and ripple come after the software's limit
     model = compile_spec(spec, robot.name)
     motor = np.array([model.joint(name).qposadr[0] for name in _BODIES])
-    flexible = [
-        [model.joint(j).qposadr[0] for j in range(model.njnt) if _between(model.joint(j).name, n)]
-        for n in _BODIES
-    ]
-    hip, knee = (np.array(places, np.int64) for places in flexible)
+    names = [model.joint(number).name for number in range(model.njnt)]
+    hip, knee = (
+        int(model.joint(between).qposadr[0]) if between in names else None
+        for between in map(_between, _BODIES)
+    )
     return RealModel(model, motor, (hip, knee))
 
 
@@ -107,26 +110,24 @@ def _limited(joint: Joint, drive: Drive, voltage: float) -> Joint:
     return replace(joint, motor=replace(motor, torque_limit=limit, **line))
 
 
-def _between(name: str, joint: str) -> bool:
-    return name in (f"{joint}_backlash", f"{joint}_belt")
+def _between(joint: str) -> str:
+    return f"{joint}_transmission"
 
 
 def _add_transmission(spec: mujoco.MjSpec, name: str, drive: Drive, timestep: float) -> None:
-    body = spec.body(_BODIES[name])
-    hinge = mujoco.mjtJoint.mjJNT_HINGE
-    if drive.backlash:
-        gap = body.add_joint(name=f"{name}_backlash", type=hinge, axis=_AXIS)
-        gap.limited = True
-        gap.range = [-drive.backlash / 2, drive.backlash / 2]
-        gap.solref_limit = [2 * timestep, 1.0]
-        gap.solimp_limit = _HARD
-        if drive.stiffness is not None:
-            # Between gap and belt something must have inertia: as little as the step allows.
-            gap.armature = drive.stiffness * timestep**2 / 2
-    if drive.stiffness is not None:
-        belt = body.add_joint(name=f"{name}_belt", type=hinge, axis=_AXIS)
-        belt.stiffness = np.array([drive.stiffness, 0.0, 0.0])
-        belt.damping = np.array([drive.stiffness_damping, 0.0, 0.0])
+    if not drive.backlash and drive.stiffness is None:
+        return
+    hinge = spec.body(_BODIES[name]).add_joint(
+        name=_between(name), type=mujoco.mjtJoint.mjJNT_HINGE, axis=_AXIS
+    )
+    hinge.damping = np.array([drive.stiffness_damping, 0.0, 0.0])
+    if drive.stiffness is None:
+        hinge.limited = True
+        hinge.range = [-drive.backlash / 2, drive.backlash / 2]
+        hinge.solref_limit = [2 * timestep, 1.0]
+        hinge.solimp_limit = _HARD
+    elif not drive.backlash:
+        hinge.stiffness = np.array([drive.stiffness, 0.0, 0.0])
 
 
 def _check_stiffness(robot: Robot, name: str, joint: Joint, link: Link, timestep: float) -> None:

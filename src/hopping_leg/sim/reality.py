@@ -1,6 +1,7 @@
 """Legs that are more than the simulator for training knows: the physics behind ``[reality]``.
 
-Backlash, belts    further hinges with limit or spring: MuJoCo's solver keeps them stable
+Backlash, belts    a further hinge with limit or spring (``real_model``); both together a spring
+                   with a dead band, numpy at each physics step
 Masses, ground     other numbers of the same model
 Stiction           Stribeck's curve sets MuJoCo's friction loss at each physics step: its solver
                    holds a joint at rest, which a torque computed in between cannot
@@ -16,6 +17,7 @@ from mujoco import batch
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.robot.limits import MotorLimit
 from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.reality import Reality
 from hopping_leg.sim.real_drive import RealDrive
 from hopping_leg.sim.real_model import real_model, real_parameters
 from hopping_leg.sim.real_sensors import DRAWS, RealSensors
@@ -34,7 +36,7 @@ class RealLegs:
         timestep: Physics step, s.
         substeps: Physics steps per control period.
         threads: Worker threads, 0 for one per core.
-        clamped: Whether the base is fixed.
+        clamped: Whether the base is fixed; it then stays at the height where it was placed.
     """
 
     def __init__(
@@ -52,13 +54,14 @@ class RealLegs:
         self.batch = batch.Batch(real.model, count, threads)
         self._ctrl = self.batch.bind("ctrl")
         self._q, self._qd = self.batch.bind("qpos"), self.batch.bind("qvel")
-        self._motor, self._flexible = real.motor, real.flexible
+        self._motor, self._flexible, self._clamped = real.motor, real.flexible, clamped
         self.state = np.zeros((count, 6))
         self._shown = np.zeros((count, 6))
         self.drive = RealDrive(
             reality, MotorLimit(real_parameters(robot), count), count, timestep, substeps
         )
         self.sensors = RealSensors(reality, count, timestep)
+        self._find_dead_bands(reality)
         self._inverse_belt = np.tile(1 / robot.of_joints("belt_ratio"), (count, 1))
         self._coulomb = robot.of_joints("friction")
         self._excess = self._coulomb * (reality.of_drives("stiction") - 1)
@@ -66,6 +69,19 @@ class RealLegs:
         if self._excess.any():
             self._friction = self.batch.expand("dof_frictionloss")
         self.reseed(np.random.default_rng(0))
+
+    def _find_dead_bands(self, reality: Reality) -> None:
+        """Note the hinges whose spring has a dead band, which MuJoCo's has not."""
+        both = [
+            (place, drive)
+            for place, drive in zip(self._flexible, (reality.hip, reality.knee), strict=True)
+            if drive.backlash and drive.stiffness is not None
+        ]
+        self._slack = np.array([place for place, _ in both], np.int64)
+        self._half_band = np.array([drive.backlash / 2 for _, drive in both])
+        self._spring = np.array([drive.stiffness for _, drive in both], np.float64)
+        if both:
+            self._spring_torque = self.batch.bind("qfrc_applied")
 
     def reseed(self, rng: np.random.Generator) -> None:
         """Take jitter and noise from here on from another source."""
@@ -101,6 +117,10 @@ class RealLegs:
             if self._excess.any():
                 at_rest = np.exp(-np.square(qd / self._stribeck))
                 self._friction[:, self._motor] = self._coulomb + self._excess * at_rest
+            if len(self._slack):
+                angle = self._q[:, self._slack]
+                beyond = angle - np.clip(angle, -self._half_band, self._half_band)
+                self._spring_torque[:, self._slack] = -self._spring * beyond
             np.multiply(given, self._inverse_belt, out=self._ctrl)
             self.batch.step(nstep=1)
             self.sensors.watch(
@@ -116,19 +136,21 @@ class RealLegs:
         change = self.state - self._shown
         if not change.any():
             return
-        self._q[:, 0], self._qd[:, 0] = self.state[:, 0], self.state[:, 3]
+        if not self._clamped:
+            self._q[:, 0], self._qd[:, 0] = self.state[:, 0], self.state[:, 3]
         self._q[:, self._motor] += change[:, 1:3]
         self._qd[:, self._motor] += change[:, 4:6]
         self._shown[:] = self.state
 
     def _show(self) -> None:
-        """Renew ``state``: a link's angle is its motor's plus those of backlash and belt."""
+        """Renew ``state``: a link's angle is its motor's plus the transmission's."""
         for first, coordinates in ((0, self._q), (3, self._qd)):
-            self.state[:, first] = coordinates[:, 0]
-            for joint, (motor, places) in enumerate(
-                zip(self._motor, self._flexible, strict=True), first + 1
-            ):
-                self.state[:, joint] = coordinates[:, motor] + coordinates[:, places].sum(axis=1)
+            if not self._clamped:
+                self.state[:, first] = coordinates[:, 0]
+            self.state[:, first + 1 : first + 3] = coordinates[:, self._motor]
+            for joint, place in enumerate(self._flexible, first + 1):
+                if place is not None:
+                    self.state[:, joint] += coordinates[:, place]
         self._shown[:] = self.state
 
     def memory(self) -> dict[str, Any]:

@@ -1,0 +1,114 @@
+"""An excitation played on a simulated leg: the recording that the real one would give."""
+
+from collections.abc import Callable
+
+import numpy as np
+import polars as pl
+
+from hopping_leg.control.joint_pd import JointGains, JointPD
+from hopping_leg.errors import PhysicsError
+from hopping_leg.identify.columns import PAIRS
+from hopping_leg.identify.excitation import Excitation
+from hopping_leg.identify.recording import Recording, make_recording
+from hopping_leg.identify.setup import Quantisation, RecordingSetup
+from hopping_leg.robot.model import TIMESTEP
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim import NOTHING, Legs, Plant
+
+_IMPOSSIBLE = 1e4
+"""Joint speed that no leg reaches, rad/s."""
+
+
+def play(
+    excitation: Excitation,
+    robot: Robot,
+    *,
+    believed: str,
+    seed: int = 0,
+    gains: JointGains | None = None,
+    timestep: float = TIMESTEP,
+    on_tick: Callable[[int, int], None] | None = None,
+) -> Recording:
+    """Record a leg that tracks an excitation by the paper's joint PD.
+
+    Each row holds what the sensors reported when the command of the row was computed; the PD acts
+    from that report, once per row. Height and contact, where there is a rail, are the truth.
+
+    Args:
+        excitation: What the joints shall do.
+        robot: The leg that plays the real one; its ``reality`` holds.
+        believed: Robot file that the recording is filed under, where identification begins.
+        seed: Of jitter and sensor noise.
+        gains: Of the PD.
+        timestep: Physics step, s.
+        on_tick: Called with (ticks done, ticks in all).
+
+    Raises:
+        PhysicsError: The simulation became unstable.
+        RecordingError: The recording cannot be believed.
+    """
+    gains = gains or JointGains()
+    fixed = excitation.rig == "fixed-base"
+    legs = Legs(robot, 1, rate=excitation.rate, timestep=timestep, threads=1, clamped=fixed)
+    plant = Plant(legs, NOTHING, None, np.random.default_rng(seed))
+    controller = JointPD(excitation.position, excitation.velocity, gains)
+    start = excitation.position[0]
+    if fixed:
+        legs.place(slice(None), robot.straight_height, start)
+    else:
+        legs.stand(slice(None), start)
+    no_command = np.zeros(1)
+    plant.channel.restart(slice(None), legs.measured_q, legs.measured_qd, no_command)
+    rows = np.empty((len(excitation), 8))
+    for tick in range(len(excitation)):
+        rows[tick, 0:2], rows[tick, 2:4] = legs.measured_q[0], legs.measured_qd[0]
+        rows[tick, 4:6] = legs.measured_torque[0]
+        rows[tick, 6], rows[tick, 7] = legs.height[0], legs.foot_clearance()[0]
+        plant.drive(controller.act(plant.sense(no_command)))
+        if on_tick is not None:
+            on_tick(tick + 1, len(excitation))
+    if not np.abs(rows[:, 2:4]).max() < _IMPOSSIBLE:
+        raise PhysicsError(
+            f"The simulation of {robot.name} became unstable at a physics step of {timestep:g} s;"
+            " take a smaller one, weaker gains or a gentler excitation."
+        )
+    setup = RecordingSetup(
+        rig=excitation.rig,
+        rate_hz=excitation.rate,
+        robot=believed,
+        source=f"simulated: {robot.name} ({robot.digest}), seed {seed}",
+        onboard="zoh",
+        stiffness=gains.stiffness,
+        damping=gains.damping,
+        quantisation=_quantisation(robot),
+    )
+    header = {
+        "robot": robot.name,
+        "robot_digest": robot.digest,
+        "seed": seed,
+        "timestep_s": timestep,
+        "excitation": excitation.description,
+        "excitation_digest": excitation.digest,
+    }
+    return make_recording(_table(excitation, rows), setup, robot.name, header=header)
+
+
+def _table(excitation: Excitation, rows: np.ndarray) -> pl.DataFrame:
+    columns: dict[str, np.ndarray] = {"time_s": excitation.time}
+    pairs = {
+        "position": rows[:, 0:2],
+        "velocity": rows[:, 2:4],
+        "torque": rows[:, 4:6],
+        "position_command": excitation.position,
+        "velocity_command": excitation.velocity,
+    }
+    for quantity, values in pairs.items():
+        columns |= dict(zip(PAIRS[quantity], values.T, strict=True))
+    if excitation.rig != "fixed-base":
+        columns |= {"height_m": rows[:, 6], "contact": rows[:, 7] <= 0}
+    return pl.DataFrame(columns)
+
+
+def _quantisation(robot: Robot) -> Quantisation:
+    kinds = ("position", "velocity", "torque")
+    return Quantisation(*(float(robot.reality.of_sensors(f"{kind}_step").max()) for kind in kinds))
