@@ -26,8 +26,6 @@ class Drive:
     """Measured torque per true torque."""
     load_friction: float = field(default=0.0, metadata={"unit": "1"})
     """Coulomb friction per torque that the gear transmits."""
-    backlash: float = field(default=0.0, metadata={"unit": "rad"})
-    """Half the gap between motor and joint, as the drive's position error cannot see it."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +36,12 @@ class Drives:
     knee: Drive = field(default_factory=Drive)
     delay: float = field(default=0.0, metadata={"unit": "s"})
     """From a command's time stamp to its effect."""
+    velocity_window: float = field(default=0.0, metadata={"unit": "s"})
+    """Over which a drive that closes its own loop averages the velocity that it damps; its delay
+    makes stiff loops ring."""
+    ramp: float = field(default=0.0, metadata={"unit": "1"})
+    """Share of the commanded velocity by which a drive moves its position target on until the
+    next command: 0 holds the target, 1 ramps it as mjbots' moteus does."""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ def recorded_gains(recording: Recording, name: str) -> Array:
         name: ``stiffness``, ``damping`` or ``integral``.
     """
     pair = getattr(recording.setup, name)
-    values = np.tile(np.nan if pair is None else np.array(pair), (len(recording), 1))
+    values = np.tile((np.nan, np.nan) if pair is None else pair, (len(recording), 1))
     if name == "integral":
         return np.nan_to_num(values)
     rows = recording.array(name)
@@ -99,3 +99,36 @@ class DelayLine:
         newest = np.minimum(self._whole, len(stack) - 1)
         older = np.minimum(self._whole + 1, len(stack) - 1)
         return (1 - self._part) * stack[newest, self._rows] + self._part * stack[older, self._rows]
+
+
+class VelocityWindow:
+    """Mean velocities over the last stretch of time, from positions at ticks.
+
+    Args:
+        window: s, (n,); zero passes the velocity of the moment.
+        tick: From one position to the next, s.
+        position: At the first tick, rad, (n, 2).
+        velocity: At the first tick and, so assumed, before, rad/s, (n, 2).
+    """
+
+    def __init__(self, window: Array, tick: float, position: Array, velocity: Array) -> None:
+        self._ticks = np.maximum(window / tick, 1e-9)
+        self._instant = (window <= 0)[:, None]
+        self._whole = np.floor(self._ticks).astype(int)
+        self._part = (self._ticks - self._whole)[:, None]
+        depth = int(self._whole.max(initial=0)) + 2
+        back = np.arange(1, depth + 1)[:, None, None]
+        self._ring = position - tick * back * velocity
+        self._window = (self._ticks * tick)[:, None]
+        self._rows, self._newest = np.arange(len(window)), depth - 1
+
+    def push(self, position: Array, velocity: Array) -> Array:
+        """Return the velocity that the drive sees at this tick, rad/s, (n, 2)."""
+        depth = len(self._ring)
+        self._newest = (self._newest + 1) % depth
+        slot = (depth - 1 - self._newest) % depth
+        self._ring[slot] = position
+        near = self._ring[(slot + self._whole) % depth, self._rows]
+        far = self._ring[(slot + self._whole + 1) % depth, self._rows]
+        mean = (position - (1 - self._part) * near - self._part * far) / self._window
+        return np.where(self._instant, velocity, mean)

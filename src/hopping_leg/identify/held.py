@@ -1,4 +1,4 @@
-"""Recorded rows as functions of time: each row's value holds until the next row."""
+"""Recorded rows as functions of time: each row's value holds, or ramps, until the next row."""
 
 import numpy as np
 
@@ -6,20 +6,23 @@ from hopping_leg.arrays import Array
 
 
 class Held:
-    """Values that hold from their row to the next, averaged over any interval.
+    """Values that hold or ramp from their row to the next, averaged over any interval.
 
     The average is exact for jittered time stamps and differentiable in the interval's position,
     and so in a delay.
 
     Args:
         time: Time stamps, s, (rows,).
-        values: Columns, (rows, k); before the first row the first holds, after the last the last.
+        values: At the rows, (rows, k); before the first row and after the last they hold.
+        slopes: Rates of change from each row on, (rows, k); zero if None.
     """
 
-    def __init__(self, time: Array, values: Array) -> None:
-        self._first, self._last = time[0], time[-1]
+    def __init__(self, time: Array, values: Array, slopes: Array | None = None) -> None:
         self._time, self._values = time, values
-        area = np.diff(time)[:, None] * values[:-1]
+        self._slopes = np.zeros_like(values) if slopes is None else slopes.copy()
+        self._slopes[-1] = 0.0
+        step = np.diff(time)[:, None]
+        area = step * (values[:-1] + 0.5 * step * self._slopes[:-1])
         self._integral = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(area, axis=0)])
 
     def average(self, start: Array, duration: float) -> Array:
@@ -39,4 +42,7 @@ class Held:
     def _until(self, time: Array) -> Array:
         """Return the integral from the first row to ``time``, (..., k)."""
         row = np.clip(np.searchsorted(self._time, time, side="right") - 1, 0, len(self._time) - 1)
-        return self._integral[row] + (time - self._time[row])[..., None] * self._values[row]
+        since = (time - self._time[row])[..., None]
+        slope = np.where(since < 0, 0.0, self._slopes[row])
+        area: Array = self._integral[row] + since * (self._values[row] + 0.5 * since * slope)
+        return area

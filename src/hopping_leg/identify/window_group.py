@@ -11,6 +11,7 @@ from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.drive_loop import (
     DelayLine,
     MotorBounds,
+    VelocityWindow,
     drive_values,
     recorded_gains,
     require_gains,
@@ -24,6 +25,9 @@ from hopping_leg.robot import kinematics
 _BLOCK = 256
 """Ticks whose commands are prepared at once."""
 
+_TICKS_PER_PERIOD = 5
+"""Of a drive that closes its own loop: how often its target, integral and limits are renewed."""
+
 
 class WindowGroup:
     """Windows that share rig, rate and on-board controller.
@@ -31,7 +35,7 @@ class WindowGroup:
     The simulation advances by ticks of the recording's period, rounded to physics steps; recorded
     rows may lie anywhere between ticks. Row n is the state before command n acts. A ``zoh`` PD is
     computed once per tick from the simulated state; a ``continuous`` one is the actuators' own and
-    acts at every physics step, with its integral and its speed limit renewed at every tick.
+    acts at every physics step, its target, integral and limits renewed at several ticks a period.
 
     Args:
         recordings: All recordings.
@@ -59,7 +63,8 @@ class WindowGroup:
                 f"A physics step of {timestep} s is longer than the recordings' period of"
                 f" {period:g} s; take {period:g} s or less."
             )
-        self._substeps = max(1, round(period / timestep))
+        parts = _TICKS_PER_PERIOD if self._setup.onboard == "continuous" else 1
+        self._substeps = max(1, round(period / timestep / parts))
         self._tick = self._substeps * timestep
         self._zoh = self._setup.onboard == "zoh"
         self._prepare_rows(recordings, windows)
@@ -105,7 +110,7 @@ class WindowGroup:
         self._share = np.clip(place - self._before, 0.0, 1.0)[..., None]
 
     def _prepare_commands(self, recordings: Sequence[Recording], windows: Sequence[Window]) -> None:
-        self._held, self._gains = [], []
+        self._held, self._ramps, self._gains = [], [], []
         for w in windows:
             recording = recordings[w.recording]
             columns = [
@@ -114,6 +119,7 @@ class WindowGroup:
             ]
             time = recording.time
             self._held.append(Held(time, np.concatenate(columns, axis=1)))
+            self._ramps.append(Held(time, np.zeros_like(columns[1]), columns[1]))
             rows = [recorded_gains(recording, n) for n in ("stiffness", "damping", "integral")]
             self._gains.append(Held(time, np.concatenate(rows, axis=1)))
 
@@ -159,6 +165,10 @@ class WindowGroup:
         load = np.repeat(drive_values(candidates, "load_friction"), windows, axis=0)
         delay = np.repeat([c.drive.delay for c in candidates], windows)
         line = DelayLine(delay / self._tick)
+        window = np.repeat([c.drive.velocity_window for c in candidates], windows)
+        lagging = (window > 0)[:, None]
+        windowed = bool(lagging.any()) and not self._zoh
+        seen = VelocityWindow(window, self._tick, q, qd)
         integral, last = np.zeros((count, 2)), np.zeros((count, 2))
         alive = np.arange(count)
         for tick in range(self._ticks):
@@ -168,12 +178,15 @@ class WindowGroup:
             kp, kd, ki = gains[tick % _BLOCK]
             lower, upper = bounds.at(qd)
             push = feed + ki * integral
+            if windowed:
+                push = push - np.where(lagging, kd * seen.push(q, qd), 0.0)
             if self._zoh:
                 asked = push + kp * (target - q) + kd * (rate - qd)
                 ctrl[...] = gain * np.clip(line.push(asked), lower, upper)
                 torque = ctrl.copy()
             else:
                 asked = push + kp * target + kd * rate
+                kd = np.where(lagging, 0.0, kd)
                 reply = np.clip((last if tick else asked) - kp * q - kd * qd, lower, upper)
                 torque, last = gain * reply, asked
                 ctrl[...] = gain * asked
@@ -200,12 +213,15 @@ class WindowGroup:
         windows, number = len(self._begin), len(candidates)
         ticks = np.arange(tick, min(tick + _BLOCK, self._ticks)) * self._tick
         late = np.zeros(number) if self._zoh else delay[::windows]
+        ramp = np.array([[c.drive.ramp] for c in candidates])
         commands = np.empty((len(ticks), number, windows, 6))
         gains = np.empty((len(ticks), 3, number, windows, 2))
         fitted = [drive_values(candidates, n) for n in ("stiffness", "damping", "integral")]
         for w in range(windows):
             start = self._begin[w] + ticks[:, None] - late
             commands[:, :, w] = self._held[w].average(start, self._tick)
+            if ramp.any():
+                commands[:, :, w, :2] += ramp * self._ramps[w].average(start, self._tick)
             rows = self._gains[w].at(start + 1e-9).reshape(len(ticks), number, 3, 2)
             gains[:, :, :, w] = np.where(np.isnan(fitted), rows.swapaxes(1, 2), fitted)
         if self._setup.onboard == "torque":
@@ -238,5 +254,3 @@ class WindowGroup:
         windows = np.arange(len(self._begin))[:, None]
         moved = np.moveaxis(values, 0, 2)
         return moved[:, windows, self._before], moved[:, windows, self._before + 1]
-
-

@@ -1,0 +1,106 @@
+"""How far a simulation is from a recording: the paper's J, and what the data call for beyond it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.errors import RecordingError, UsageError
+from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.simulate import Simulated, WindowSimulator
+
+_QUANTITIES = ("position", "velocity", "torque")
+_FAILED = 1e3
+"""Residual of a simulation that broke down, in units of the scales."""
+
+
+@dataclass(frozen=True)
+class Scoring:
+    """What counts and how much: a residual is an error divided by its quantity's scale.
+
+    The paper's J, the sum of squared joint position errors in rad2, is the default.
+
+    Raises:
+        UsageError: A scale is not positive, or nothing counts.
+    """
+
+    position: float | None = 1.0
+    """Scale of position errors, rad; None leaves positions out."""
+    velocity: float | None = None
+    """Scale of velocity errors, rad/s."""
+    torque: float | None = None
+    """Scale of torque errors, N m."""
+    robust: float | None = None
+    """Residuals well beyond this many scales count linearly instead of squared."""
+
+    def __post_init__(self) -> None:
+        for name in (*_QUANTITIES, "robust"):
+            value = getattr(self, name)
+            if value is not None and not 0 < value < np.inf:
+                raise UsageError(f"The scoring's {name} is {value} but must be positive, or none.")
+        if all(getattr(self, name) is None for name in _QUANTITIES):
+            raise UsageError("The scoring counts nothing; give a scale to position or torque.")
+
+
+class Cost:
+    """Residuals of candidates on a simulator's windows.
+
+    Only measured samples with an exact time stamp count, after each window's unscored rows.
+
+    Args:
+        simulator: What to simulate.
+        scoring: What counts.
+
+    Raises:
+        RecordingError: The windows hold no sample that counts.
+    """
+
+    def __init__(self, simulator: WindowSimulator, scoring: Scoring | None = None) -> None:
+        self.simulator, self.scoring = simulator, scoring or Scoring()
+        self._measured = {n: measured(simulator, n) for n in _QUANTITIES if self._scale(n)}
+        self._counts: dict[str, BoolArray] = {n: ~np.isnan(v) for n, v in self._measured.items()}
+        self.size = sum(int(np.count_nonzero(mask)) for mask in self._counts.values())
+        if not self.size:
+            raise RecordingError(
+                "The windows hold no measured sample of what the scoring counts; record"
+                f" {' or '.join(self._measured)}."
+            )
+
+    def residuals(self, candidates: list[Candidate]) -> Array:
+        """Return residuals in units of the scales, robust if so chosen, (candidates, size)."""
+        raw = self.errors(self.simulator.run(candidates))
+        bound = self.scoring.robust
+        if bound is None:
+            return raw
+        loss = 2 * bound**2 * (np.sqrt(1 + np.square(raw / bound)) - 1)
+        return np.copysign(np.sqrt(loss), raw)
+
+    def errors(self, simulated: Simulated) -> Array:
+        """Return scaled errors of a simulation, (candidates, size)."""
+        parts = []
+        for name, mask in self._counts.items():
+            error = getattr(simulated, name) - self._measured[name]
+            parts.append(error[:, mask] / self._scale(name))
+        joined = np.concatenate(parts, axis=1)
+        return np.clip(np.nan_to_num(joined, nan=_FAILED, posinf=_FAILED), -_FAILED, _FAILED)
+
+    def values(self, candidates: list[Candidate]) -> Array:
+        """Return the sum of squared residuals, the paper's J by default, (candidates,)."""
+        total: Array = np.square(self.residuals(candidates)).sum(axis=1)
+        return total
+
+    def _scale(self, name: str) -> float | None:
+        scale: float | None = getattr(self.scoring, name)
+        return scale
+
+
+def measured(simulator: WindowSimulator, quantity: str) -> Array:
+    """Return what was measured in each window and counts, (windows, rows, 2), else NaN."""
+    values = np.full((len(simulator.windows), simulator.rows, 2), np.nan)
+    for i, w in enumerate(simulator.windows):
+        recording = simulator.recordings[w.recording]
+        rows = slice(w.start + w.unscored, w.start + w.length)
+        sampled = recording.array(quantity)[rows]
+        sampled[~recording.exact_time[rows]] = np.nan
+        values[i, w.unscored : w.length] = sampled
+    return values

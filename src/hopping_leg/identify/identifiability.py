@@ -1,0 +1,125 @@
+"""What the data can tell: intervals, correlations, and a plain statement of what stays open.
+
+Near the best fit the residuals are r + J dv, so the values' covariance is s2 (J' J)^-1 with the
+residuals' variance s2. Neighbouring samples are not independent; s2 is inflated by the residuals'
+own correlation time, else the intervals would be far too narrow.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.identify.parameters import ParameterSet
+
+_NINETY_FIVE = 1.959963984540054
+_UNTOLD = 0.5
+"""An interval wider than this share of the value, to either side, tells little."""
+_TIED = 0.95
+"""Correlation beyond which only a combination of two parameters is known."""
+_SINGULAR = 1e-10
+
+
+@dataclass(frozen=True)
+class Identifiability:
+    """How well values are known.
+
+    Attributes:
+        names: Parameters in order.
+        values: Best values, SI, (k,).
+        half_width: Of the 95 % intervals, (k,); infinite where the data say nothing.
+        correlation: (k, k).
+        at_bound: Whether a value stands at a bound of its search, (k,).
+        statements: What these data cannot tell, a sentence each.
+    """
+
+    names: list[str]
+    values: Array
+    half_width: Array
+    correlation: Array
+    at_bound: list[bool]
+    statements: list[str]
+
+
+def identifiability(
+    parameters: ParameterSet, vector: Array, residuals: Array, jacobian: Array
+) -> Identifiability:
+    """Judge a fit.
+
+    Args:
+        parameters: What was fitted.
+        vector: Best search vector, (k,).
+        residuals: There, (m,), in the order of time.
+        jacobian: Of the residuals, (m, k).
+    """
+    covariance, blind = _covariance(jacobian, _variance(residuals, len(vector)))
+    deviation = np.sqrt(np.diag(covariance))
+    scale = np.where(deviation > 0, deviation, 1.0)
+    correlation = covariance / np.outer(scale, scale)
+    np.fill_diagonal(correlation, 1.0)
+    half = np.where(blind, np.inf, _NINETY_FIVE * deviation * parameters.scale)
+    values = parameters.values(vector)
+    low, high = parameters.bounds
+    near = 1e-6 * (high - low)
+    at_bound = ((vector - low <= near) | (high - vector <= near)).tolist()
+    statements = _statements(parameters.names, values, half, correlation, at_bound)
+    return Identifiability(parameters.names, values, half, correlation, at_bound, statements)
+
+
+def correlation_time(residuals: Array) -> float:
+    """Return how many neighbouring residuals carry the information of one, at least 1."""
+    centred = residuals - residuals.mean()
+    power = float(np.mean(np.square(centred)))
+    if power == 0.0:
+        return 1.0
+    total, count = 1.0, len(centred)
+    for lag in range(1, min(count // 4, 1000)):
+        share = float(np.mean(centred[lag:] * centred[:-lag])) / power
+        if share < 0.05:
+            break
+        total += 2 * share
+    return total
+
+
+def _variance(residuals: Array, unknowns: int) -> float:
+    """Return the residuals' variance, as many times larger as fewer of them are independent."""
+    freedom = max(len(residuals) / correlation_time(residuals) - unknowns, 1.0)
+    return float(np.sum(np.square(residuals))) / freedom
+
+
+def _covariance(jacobian: Array, variance: float) -> tuple[Array, Array]:
+    """Return the covariance and which parameters take part in a blind direction."""
+    norm = np.linalg.norm(jacobian, axis=0)
+    safe = np.where(norm > 0, norm, 1.0)
+    _, singular, directions = np.linalg.svd(jacobian / safe, full_matrices=False)
+    weak = singular <= _SINGULAR * max(singular.max(initial=0.0), 1e-300)
+    inverse = np.where(weak, 0.0, 1 / np.where(weak, 1.0, singular))
+    half = directions.T * inverse
+    covariance: Array = variance * (half @ half.T) / np.outer(safe, safe)
+    blind = (norm == 0) | (np.abs(directions[weak]) > 1e-3).any(axis=0)
+    return covariance, blind
+
+
+def _statements(
+    names: Sequence[str], values: Array, half: Array, correlation: Array, at_bound: list[bool]
+) -> list[str]:
+    said = []
+    for name, value, width, stuck in zip(names, values, half, at_bound, strict=True):
+        if not np.isfinite(width):
+            said.append(f"These data say nothing about '{name}'.")
+        elif width > _UNTOLD * abs(value):
+            said.append(
+                f"'{name}' is {value:.3g} only to within {width:.2g}: these data hardly tell it."
+            )
+        if stuck:
+            said.append(f"'{name}' stands at a bound of its search; its interval means little.")
+    for i, first in enumerate(names):
+        for j in range(i):
+            if abs(correlation[i, j]) > _TIED and np.isfinite(half[[i, j]]).all():
+                sign = "sum" if correlation[i, j] < 0 else "difference"
+                said.append(
+                    f"'{names[j]}' and '{first}' trade off (correlation {correlation[i, j]:.2f}):"
+                    f" only a weighted {sign} of them is known."
+                )
+    return said

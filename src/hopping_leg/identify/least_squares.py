@@ -1,0 +1,155 @@
+"""Bounded least squares: all differences of a Jacobian times all windows in one batch."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy import optimize
+
+from hopping_leg.arrays import Array
+from hopping_leg.identify.checkpoint import load_state, save_state
+from hopping_leg.identify.parameters import ParameterSet
+
+Residuals = Callable[[Array], Array]
+"""Search vectors (n, k) to residuals (n, m)."""
+
+
+@dataclass(frozen=True)
+class LeastSquaresOptions:
+    """How to search."""
+
+    rounds: int = 8
+    """Restarts of the trust region; each is a checkpoint."""
+    evaluations: int = 6
+    """Steps tried in a round."""
+    step: float = 1e-3
+    """Of finite differences, in units of the parameters' scales."""
+    tolerance: float = 1e-5
+    """A round that lowers the cost by a smaller share ends the search."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """Where a search ended.
+
+    Attributes:
+        vector: In search coordinates, (k,).
+        cost: Sum of squared residuals.
+        evaluations: Candidates simulated.
+        history: Best cost after each round or generation.
+    """
+
+    vector: Array
+    cost: float
+    evaluations: int
+    history: list[float]
+
+
+def jacobian(
+    residuals: Residuals, vector: Array, bounds: tuple[Array, Array], step: float
+) -> Array:
+    """Return d residuals / d vector, (m, k), by differences taken towards the inside.
+
+    Args:
+        residuals: Function of search vectors.
+        vector: Where, (k,).
+        bounds: Lower and upper, (k,) each.
+        step: Difference in search coordinates.
+    """
+    room = np.minimum(step, np.maximum(bounds[1] - vector, vector - bounds[0]))
+    signed = np.where(vector + room <= bounds[1], room, -room)
+    values = residuals(np.concatenate([vector[None], vector + np.diag(signed)]))
+    slopes: Array = ((values[1:] - values[0]) / signed[:, None]).T
+    return slopes
+
+
+def least_squares(
+    residuals: Residuals,
+    parameters: ParameterSet,
+    options: LeastSquaresOptions | None = None,
+    *,
+    start: Array | None = None,
+    about: Mapping[str, object] | None = None,
+    checkpoint: Path | None = None,
+    report: Callable[[int, float], None] = lambda index, cost: None,
+) -> Found:
+    """Search from one start; a run that was killed resumes with its round and ends the same.
+
+    Args:
+        residuals: Function of search vectors.
+        parameters: Bounds and scales.
+        options: How.
+        start: Search vector to start from, (k,); None takes the parameters' start.
+        about: What else tells this search from others, e.g. the recordings' hashes.
+        checkpoint: File for the state after each round.
+        report: Called with round and cost after each round.
+
+    Raises:
+        UsageError: The checkpoint belongs to another search.
+    """
+    options = options or LeastSquaresOptions()
+    low, high = parameters.bounds
+    vector = np.clip(np.zeros(len(low)) if start is None else start, low, high)
+    identity = {
+        "parameters": repr(parameters.parameters),
+        "start": vector.tolist(),
+        "options": repr(options),
+        "about": dict(about or {}),
+    }
+    history: list[float] = []
+    evaluations = 0
+    saved = load_state(checkpoint, identity)
+    if saved is not None:
+        vector, evaluations = np.array(saved["vector"]), int(saved["evaluations"])
+        history = list(saved["history"])
+    while len(history) < options.rounds and not _settled(history, options.tolerance):
+        counter = _Counter(residuals)
+        result = optimize.least_squares(
+            lambda x: counter(x[None])[0],  # noqa: B023
+            vector,
+            jac=lambda x: jacobian(counter, x, (low, high), options.step),  # noqa: B023
+            bounds=(low, high),
+            x_scale="jac",
+            max_nfev=options.evaluations,
+        )
+        vector, cost = result.x, 2 * float(result.cost)
+        evaluations += counter.count
+        history.append(cost)
+        state = {"vector": vector.tolist(), "evaluations": evaluations, "history": history}
+        save_state(checkpoint, identity, state)
+        report(len(history), cost)
+    return Found(vector, history[-1], evaluations, history)
+
+
+def multi_start(
+    search: Callable[[int, Array], Found], parameters: ParameterSet, starts: int, seed: int
+) -> list[Found]:
+    """Search from the parameters' start and from random others; best first.
+
+    Args:
+        search: From the start's number and vector to where it ended.
+        parameters: Starts are drawn within the bounds, up to three scales from the start.
+        starts: How many.
+        seed: Of the draws.
+    """
+    low, high = parameters.bounds
+    rng = np.random.default_rng(seed)
+    draws = rng.uniform(np.maximum(low, -3), np.minimum(high, 3), (starts, len(low)))
+    draws[0] = np.clip(0.0, low, high)
+    return sorted((search(i, x) for i, x in enumerate(draws)), key=lambda found: found.cost)
+
+
+def _settled(history: list[float], tolerance: float) -> bool:
+    return len(history) > 1 and history[-2] - history[-1] <= tolerance * history[-2]
+
+
+class _Counter:
+    """Counts candidates."""
+
+    def __init__(self, residuals: Residuals) -> None:
+        self._residuals, self.count = residuals, 0
+
+    def __call__(self, vectors: Array) -> Array:
+        self.count += len(vectors)
+        return self._residuals(vectors)

@@ -1,0 +1,123 @@
+"""Judging a candidate on recordings: in closed loop, and predicting open-loop from torques."""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.cost import measured
+from hopping_leg.identify.recording import Recording
+from hopping_leg.identify.simulate import WindowSimulator
+from hopping_leg.identify.windows import Window, cut
+from hopping_leg.robot.model import TIMESTEP
+
+HORIZONS = (0.2, 0.5, 1.0)
+"""How far to predict without looking at the recording again, s."""
+
+Pair = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Root mean square errors, (hip, knee), on exact samples only; NaN where nothing counts.
+
+    Attributes:
+        closed_loop_position: Under the recording's own controller from its first row on, rad.
+        closed_loop_torque: Likewise, N m.
+        open_loop_position: By horizon in s: driven by the recorded torques alone, rad.
+    """
+
+    closed_loop_position: Pair
+    closed_loop_torque: Pair
+    open_loop_position: dict[float, Pair]
+
+
+def validate(
+    recordings: Sequence[Recording],
+    candidate: Candidate,
+    *,
+    timestep: float = TIMESTEP,
+    threads: int = 0,
+    unscored: float = 1.0,
+    horizons: Sequence[float] = HORIZONS,
+) -> Validation:
+    """Judge a candidate on recordings.
+
+    Args:
+        recordings: Best those that no fit has seen.
+        candidate: What to judge.
+        timestep: Physics step, s.
+        threads: Worker threads, 0 for one per core.
+        unscored: Beginning of each recording that does not count in closed loop, s.
+        horizons: Of the open-loop predictions, s.
+
+    Raises:
+        RecordingError: A recording is too short.
+    """
+    windows = cut(recordings, None, unscored=unscored)
+    simulator = WindowSimulator(recordings, windows, timestep=timestep, threads=threads)
+    simulated = simulator.run([candidate])
+    errors = {
+        name: getattr(simulated, name)[0] - measured(simulator, name)
+        for name in ("position", "torque")
+    }
+    return Validation(
+        _rms(errors["position"]),
+        _rms(errors["torque"]),
+        {h: open_loop(recordings, candidate, h, timestep, threads) for h in horizons},
+    )
+
+
+def open_loop(
+    recordings: Sequence[Recording],
+    candidate: Candidate,
+    horizon: float,
+    timestep: float = TIMESTEP,
+    threads: int = 0,
+) -> Pair:
+    """Return the rms position error of predictions restarted every half horizon, rad.
+
+    The motors get the measured torque, or the commanded one where the rig drives torques itself;
+    every measured row of a horizon counts.
+    """
+    driven = [as_torque_driven(r) for r in recordings]
+    windows = [w for w in cut(driven, horizon, stride=horizon / 2) if _starts_measured(driven, w)]
+    if not windows:
+        return (float("nan"), float("nan"))
+    simulator = WindowSimulator(driven, windows, timestep=timestep, threads=threads)
+    return _rms(simulator.run([candidate]).position[0] - measured(simulator, "position"))
+
+
+def as_torque_driven(recording: Recording) -> Recording:
+    """Return the recording as if its torques had been commanded, without an on-board PD."""
+    setup = dataclasses.replace(recording.setup, onboard="torque")
+    if recording.setup.onboard == "torque":
+        return dataclasses.replace(recording, setup=setup)
+    table = recording.trace.table
+    columns = {"hip_command_nm": "hip_torque_nm", "knee_command_nm": "knee_torque_nm"}
+    table = table.with_columns(
+        table[measured_].interpolate().fill_null(strategy="backward").alias(command)
+        for command, measured_ in columns.items()
+        if measured_ in table.columns
+    )
+    trace = dataclasses.replace(recording.trace, table=table)
+    return dataclasses.replace(recording, trace=trace, setup=setup)
+
+
+def _starts_measured(recordings: Sequence[Recording], window: Window) -> bool:
+    """Return whether a window's first row was measured, or is at least next to measured ones."""
+    recording = recordings[window.recording]
+    state = recording.array("position")[window.start], recording.array("velocity")[window.start]
+    return bool(np.isfinite(state).all()) or recording.has("position_estimate")
+
+
+def _rms(errors: Array) -> Pair:
+    """Return the root mean square over everything but the joint, ignoring NaN."""
+    flat = errors.reshape(-1, 2)
+    counts = np.count_nonzero(~np.isnan(flat), axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        hip, knee = np.sqrt(np.nansum(np.square(flat), axis=0) / counts)
+    return float(hip), float(knee)

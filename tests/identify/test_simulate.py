@@ -1,0 +1,109 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from hopping_leg.errors import RecordingError
+from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.recording import with_setup
+from hopping_leg.identify.simulate import WindowSimulator
+from hopping_leg.identify.windows import cut
+from tests.identify.twin import LEG, STEP, record, swing
+
+TRUE = Candidate(LEG)
+OTHER = TRUE.replace({"hip.friction": 0.3, "shank.inertia": 4e-4, "contact.time_constant": 0.05})
+
+
+def simulator(recordings, duration=None, **options):
+    return WindowSimulator(recordings, cut(recordings, duration), timestep=STEP, **options)
+
+
+@pytest.mark.parametrize("rig", ["fixed-base", "rail"])
+@pytest.mark.parametrize("candidate", [TRUE, OTHER], ids=["true", "other"])
+def test_the_batch_repeats_a_plain_loop_over_mj_step(rig, candidate):
+    run = record(candidate.robot, swing(1.0, rig), rig)
+    got = simulator([run]).run([TRUE, candidate])
+    np.testing.assert_allclose(got.position[1, 0], run.array("position"), atol=1e-9)
+    np.testing.assert_allclose(got.velocity[1, 0], run.array("velocity"), atol=1e-6)
+    np.testing.assert_allclose(got.torque[1, 0], run.array("torque"), atol=1e-6)
+
+
+def test_recorded_torques_repeat_the_run():
+    run = record(LEG, swing(1.0), onboard="torque")
+    got = simulator([run], 0.25).run([TRUE])
+    measured = run.array("position").reshape(4, 50, 2)
+    np.testing.assert_allclose(got.position[0], measured, atol=1e-9)
+
+
+def test_a_candidate_does_not_depend_on_its_company_nor_on_threads():
+    runs = [record(LEG, swing(0.5)), record(LEG, swing(0.5, "rail"), "rail")]
+    alone = simulator(runs, 0.25, threads=1).run([OTHER])
+    among = simulator(runs, 0.25, threads=2).run([TRUE, OTHER, TRUE])
+    np.testing.assert_array_equal(among.position[1], alone.position[0])
+    np.testing.assert_array_equal(among.torque[1], alone.torque[0])
+
+
+def test_a_continuous_pd_is_the_limit_of_a_fast_sampled_one():
+    run = record(LEG, swing(1.0))
+    continuous = simulator([with_setup(run, onboard="continuous")]).run([TRUE]).position
+    sampled = simulator([run]).run([TRUE]).position
+    fast = record(LEG, np.repeat(swing(1.0), 5, axis=0), rate=1000.0)
+    exact = fast.array("position")[::5]
+    assert np.abs(continuous[0, 0] - exact).max() < 0.3 * np.abs(sampled[0, 0] - exact).max()
+
+
+def test_delay_shifts_the_answer():
+    run = record(LEG, swing(1.0), onboard="torque")
+    late = simulator([run]).run([TRUE.replace({"drive.delay": 0.01})]).torque[0, 0]
+    np.testing.assert_allclose(late[10:], run.array("torque_command")[7:-3], atol=1e-9)
+
+
+def test_rows_between_ticks_are_met():
+    run = record(LEG, swing(1.0), onboard="torque")
+    jitter = np.random.default_rng(0).uniform(-0.4, 0.4, len(run)) * run.setup.period
+    jitter[0] = 0.0
+    time = run.time + jitter
+    table = run.trace.table.with_columns(time_s=time)
+    moved = dataclasses.replace(run, trace=dataclasses.replace(run.trace, table=table))
+    simulated = simulator([moved]).run([TRUE]).position[0, 0]
+    exact = simulator([run]).run([TRUE]).position[0, 0]
+    between = np.stack([np.interp(time, run.time, p) for p in exact.T], axis=1)
+    assert np.abs(simulated - between)[:20].max() < 2e-3
+    assert np.isfinite(simulated).all()
+
+
+def test_friction_that_grows_with_load_slows_the_leg():
+    run = record(LEG, swing(1.0), onboard="torque")
+    lossy = TRUE.replace({"drive.hip.load_friction": 0.3, "drive.knee.load_friction": 0.3})
+    speeds = np.abs(simulator([run]).run([TRUE, lossy]).velocity).mean(axis=(1, 2))
+    assert (speeds[1] < speeds[0]).all()
+
+
+def test_a_lagging_velocity_makes_a_stiff_drive_ring():
+    run = with_setup(record(LEG, swing(1.0)), onboard="continuous", damping=(0.3, 3.2))
+    lagging = TRUE.replace({"drive.velocity_window": 0.008})
+    torque = simulator([run]).run([TRUE, lagging]).torque[:, 0, 50:, 1]
+    rough = np.abs(np.diff(torque, n=2, axis=1)).mean(axis=1)
+    assert rough[1] > 2 * rough[0]
+
+
+def test_an_unknown_gain_gets_a_sentence():
+    run = with_setup(record(LEG, swing(0.5)), stiffness=None)
+    with pytest.raises(RecordingError, match="does not say the stiffness"):
+        simulator([run]).run([TRUE])
+    fitted = TRUE.replace({"drive.hip.stiffness": 8.0, "drive.knee.stiffness": 8.0})
+    assert np.isfinite(simulator([run]).run([fitted]).position).all()
+
+
+def test_a_candidate_that_breaks_down_spoils_no_other():
+    run = record(LEG, swing(0.5), onboard="torque")
+    wild = TRUE.replace(
+        {
+            "drive.hip.torque_gain": 1e9,
+            "drive.hip.torque_limit": 1e12,
+            "hip.motor.peak_torque": 1e12,
+        }
+    )
+    got = simulator([run]).run([wild, TRUE]).position
+    assert np.isnan(got[0]).all()
+    np.testing.assert_allclose(got[1, 0], run.array("position"), atol=1e-9)

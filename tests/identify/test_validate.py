@@ -1,0 +1,37 @@
+import numpy as np
+import pytest
+
+from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.validate import validate
+from tests.identify.twin import LEG, STEP, record, swing
+
+TRUE = Candidate(LEG)
+WRONG = TRUE.replace({"hip.friction": 0.4})
+
+
+def judge(candidate, onboard="zoh"):
+    run = record(LEG, swing(2.0), onboard=onboard)
+    return validate([run], candidate, timestep=STEP, unscored=0.5, horizons=(0.2, 0.5))
+
+
+@pytest.mark.parametrize("onboard", ["zoh", "torque"])
+def test_the_true_robot_predicts_its_own_recording(onboard):
+    told = judge(TRUE, onboard)
+    assert max(told.closed_loop_position) < 1e-6
+    assert max(told.closed_loop_torque) < 1e-6
+    assert all(max(pair) < 1e-6 for pair in told.open_loop_position.values())
+
+
+def test_a_wrong_robot_errs_the_more_the_longer_it_predicts():
+    told = judge(WRONG)
+    assert told.closed_loop_position[0] > 1e-3
+    assert told.open_loop_position[0.5][0] > told.open_loop_position[0.2][0] > 1e-3
+
+
+def test_without_torques_there_is_no_open_loop():
+    run = record(LEG, swing(2.0))
+    table = run.trace.table.with_columns(hip_torque_nm=None, knee_torque_nm=None)
+    bare = run.__class__(run.trace.__class__(table), run.setup, "bare")
+    told = validate([bare], TRUE, timestep=STEP, unscored=0.5, horizons=(0.2,))
+    assert np.isnan(told.closed_loop_torque).all()
+    assert np.isnan(told.open_loop_position[0.2]).all()

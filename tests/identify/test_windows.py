@@ -1,0 +1,43 @@
+import numpy as np
+import pytest
+
+from hopping_leg.errors import RecordingError, UsageError
+from hopping_leg.identify.windows import cut, full_states, split
+from tests.identify.twin import LEG, record, swing
+
+RUN = record(LEG, swing(3.0))
+
+
+def test_windows_tile_a_recording():
+    windows = cut([RUN], 0.5)
+    rows = [r for w in windows for r in range(w.start, w.start + w.length)]
+    assert rows == list(range(len(RUN)))
+
+
+def test_without_a_duration_a_recording_is_one_window():
+    (window,) = cut([RUN], unscored=0.1)
+    assert (window.start, window.length, window.unscored) == (0, 600, 20)
+
+
+def test_a_split_loses_and_repeats_nothing():
+    windows = cut([RUN], 0.25)
+    fit, held = split(windows, 0.25, np.random.default_rng(0))
+    assert len(held) == 3
+    assert sorted((*fit, *held), key=lambda w: w.start) == windows
+
+
+def test_a_short_recording_gets_a_sentence():
+    with pytest.raises(RecordingError, match="too short for windows of 5 s"):
+        cut([RUN], 5.0)
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_a_split_needs_a_share(share):
+    with pytest.raises(UsageError, match="between 0 and 1"):
+        split(cut([RUN], 0.5), share, np.random.default_rng(0))
+
+
+def test_states_start_from_what_was_measured():
+    position, velocity = full_states(RUN)
+    np.testing.assert_array_equal(position, RUN.array("position"))
+    np.testing.assert_array_equal(velocity, RUN.array("velocity"))

@@ -1,0 +1,60 @@
+"""Recordings of a leg that is known exactly: simulated with a plain loop over mj_step."""
+
+import mujoco
+import numpy as np
+import polars as pl
+
+from hopping_leg.identify.columns import PAIRS
+from hopping_leg.identify.recording import make_recording
+from hopping_leg.identify.rig_model import build_rig_model
+from hopping_leg.identify.setup import RecordingSetup
+from hopping_leg.robot import kinematics
+from hopping_leg.robot.files import load_robot
+from hopping_leg.robot.limits import MotorLimit
+
+STEP = 1e-3
+LEG = load_robot("legv2")
+GAINS = {"stiffness": (8.0, 8.0), "damping": (0.3, 0.3)}
+
+
+def swing(seconds, rig="fixed-base", rate=200.0, phase=0.0):
+    """Return targets, rad, (ticks, 2): swings in the air, squats on the ground."""
+    t = np.arange(round(seconds * rate)) / rate
+    if rig != "fixed-base":
+        bend = 0.8 + 0.25 * np.cos(2 * np.pi * 1.3 * t + phase)
+        return np.stack([bend, -2 * bend], axis=1)
+    hip = 0.9 * np.cos(2 * np.pi * 0.5 * t + phase) + 0.2 * np.sin(2 * np.pi * 2.1 * t)
+    knee = -1.4 + 0.8 * np.cos(2 * np.pi * 1.1 * t + 2 * phase) + 0.2 * np.sin(14 * t)
+    return np.stack([hip, knee], axis=1)
+
+
+def record(robot, targets, rig="fixed-base", rate=200.0, onboard="zoh", name="twin"):
+    """Track targets with a 200 Hz PD on a simulated robot, one simulation, no batch."""
+    model = build_rig_model(robot, rig, STEP)
+    data = mujoco.MjData(model)
+    limit = MotorLimit(robot)
+    kp, kd = (np.array(GAINS[k]) for k in ("stiffness", "damping"))
+    data.qpos[-2:] = targets[0]
+    if rig != "fixed-base":
+        data.qpos[0] = kinematics.stance_height(robot, targets[0])
+    rows = []
+    for target in targets:
+        q, qd = data.qpos[-2:].copy(), data.qvel[-2:].copy()
+        height = data.qpos[0]
+        torque = limit.clip(kp * (target - q) - kd * qd, qd)
+        rows.append((q, qd, torque, target, height))
+        data.ctrl[:] = torque
+        for _ in range(round(1 / rate / STEP)):
+            mujoco.mj_step(model, data)
+    q, qd, torque, target, height = (np.array(c) for c in zip(*rows, strict=True))
+    columns = {"time_s": np.arange(len(q)) / rate}
+    quantities = {"position": q, "velocity": qd, "torque": torque, "torque_command": torque}
+    if onboard != "torque":
+        del quantities["torque_command"]
+        quantities |= {"position_command": target, "velocity_command": 0 * target}
+    for quantity, values in quantities.items():
+        columns |= dict(zip(PAIRS[quantity], values.T, strict=True))
+    if rig != "fixed-base":
+        columns["height_m"] = height
+    setup = RecordingSetup(rig, rate, "legv2", "simulated", onboard=onboard, **GAINS)
+    return make_recording(pl.DataFrame(columns), setup, name)
