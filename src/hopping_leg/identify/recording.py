@@ -24,7 +24,7 @@ from hopping_leg.identify.columns import COLUMNS, PAIRS
 from hopping_leg.identify.importers import IMPORTERS, recognise
 from hopping_leg.identify.inspection import Inspection
 from hopping_leg.identify.setup import RecordingSetup, setup_from_tree, setup_to_tree
-from hopping_leg.identify.tables import is_parquet, read_bytes, read_csv
+from hopping_leg.identify.tables import as_numbers, is_parquet, read_bytes, read_csv
 from hopping_leg.trace import Trace
 
 _KEY = "recording"
@@ -181,7 +181,7 @@ def _native(path: Path) -> tuple[pl.DataFrame, dict[str, Any]]:
         if text is not None:
             trace = Trace.load(path)
             return trace.table, dict(trace.header)
-        return pl.read_parquet(path), {}
+        return as_numbers(pl.read_parquet(path), str(path)), {}
     except (pl.exceptions.PolarsError, OSError) as error:
         raise RecordingError(f"{path} is not a readable Parquet file: {error}.") from error
 

@@ -74,6 +74,24 @@ def read_csv(content: bytes, origin: str) -> pl.DataFrame:
     return pl.DataFrame([_parse(n, list(c), origin) for n, c in zip(header, columns, strict=True)])
 
 
+def as_numbers(table: pl.DataFrame, origin: str) -> pl.DataFrame:
+    """Return a foreign table with numbers as floats and words where words belong.
+
+    Raises:
+        RecordingError: Naming file and column of what is neither.
+    """
+    columns = []
+    for column in table.get_columns():
+        kind = pl.String if column.name in TEXT_COLUMNS else pl.Float64
+        try:
+            columns.append(column.cast(kind))
+        except pl.exceptions.PolarsError as error:
+            raise RecordingError(
+                f"{origin}: column '{column.name}' holds {column.dtype} but must hold {kind}."
+            ) from error
+    return pl.DataFrame(columns)
+
+
 def _text(content: bytes, origin: str) -> str:
     if content.startswith(_GZIP):
         try:

@@ -32,6 +32,7 @@ def take(table: pl.DataFrame, names: Mapping[str, str]) -> pl.DataFrame:
 
 def median_rate(time: pl.Series) -> float:
     """Return the rate of a clock that was never stated, Hz, to three digits; 1 where unknown."""
-    steps = np.diff(time.drop_nulls().to_numpy())
+    known = time.drop_nulls().to_numpy()
+    steps = np.diff(known[np.isfinite(known)])
     step = float(np.median(steps)) if len(steps) else 0.0
     return float(f"{1 / step:.3g}") if 0 < step < np.inf else 1.0

@@ -1,0 +1,172 @@
+import dataclasses
+
+import numpy as np
+import polars as pl
+import pytest
+
+from hopping_leg.errors import TraceError, UsageError
+from hopping_leg.identify.excitation import adapt, load_excitation, make_excitation
+from hopping_leg.identify.feasibility import HardwareRange
+from hopping_leg.identify.templates import Multisine, Stroke, Strokes, fixed_base, moving_base
+from hopping_leg.robot import kinematics, load_robot
+from hopping_leg.trace import Trace
+from tests.identify.runs import RECORDINGS, needs_recordings, swinging
+
+ROBOT = load_robot("legv2")
+REACH = ROBOT.thigh.length + ROBOT.shank.length
+LAB = fixed_base((0.1, 0.075, 0.05), (1.0, 0.5, 0.25), (5.0, 10.0), margin=0.005)
+
+
+def test_the_papers_grid_lasts_four_minutes_and_covers_every_value():
+    for template, count in ((fixed_base(), 6), (moving_base(), 3)):
+        assert template.duration == pytest.approx(240)
+        assert len(template.parts) == count
+        assert {p.amplitude for p in template.parts} == {0.15, 0.1, 0.05}
+        assert {p.period for p in template.parts} == {0.75, 0.5, 0.25}
+    assert {p.swing for p in fixed_base().parts} == {10, 20}
+    assert len(fixed_base(every_pair=True).parts) == 18
+
+
+@pytest.mark.parametrize("bend", ["backward", "forward"])
+def test_the_foot_follows_the_papers_formula(bend):
+    time = np.arange(0, 10, 0.005)
+    stroke = Stroke(0.1, 0.5, 10.0, 10.0, margin=0.005, bend=bend)
+    angles = stroke.joints(ROBOT, time)
+    distance = 0.1 * np.cos(2 * np.pi * time / 0.5) + REACH - 0.1 - 0.005
+    theta = -np.pi / 2 * np.cos(2 * np.pi * time / 10)
+    foot = kinematics.foot_position(ROBOT, angles)
+    np.testing.assert_allclose(foot[:, 0], distance * np.cos(theta), atol=1e-9)
+    np.testing.assert_allclose(foot[:, 1], distance * np.sin(theta), atol=1e-9)
+    assert (np.sign(angles[:, 1]) == (-1 if bend == "backward" else 1)).all()
+
+
+def test_vertical_strokes_keep_the_foot_below_the_hip():
+    time = np.arange(0, 2, 0.005)
+    angles = moving_base((0.1,), (0.5,), duration=2.0, margin=0.01).joints(ROBOT, time)
+    np.testing.assert_allclose(kinematics.foot_position(ROBOT, angles)[:, 1], 0, atol=1e-9)
+
+
+def test_strokes_join_without_a_jump():
+    template = fixed_base((0.1, 0.08), (0.75, 0.6), (10.0,), duration=41.0, margin=0.005)
+    excitation = make_excitation(template, ROBOT)
+    steps = np.abs(np.diff(excitation.position, axis=0)).max(axis=0)
+    assert (steps < ROBOT.of_joints("no_load_speed") / excitation.rate).all()
+
+
+def test_the_papers_own_grid_is_beyond_the_leg_and_is_refused_with_the_reason():
+    with pytest.raises(UsageError, match=r"at 0\.\d+ s, hip: the foot is out of reach"):
+        make_excitation(fixed_base(), ROBOT)
+
+
+@pytest.mark.parametrize("robot", ["legv2", "legv2-paper", "legv1", "doublependulum"])
+@pytest.mark.parametrize("template", [fixed_base(), moving_base()], ids=["fixed", "moving"])
+def test_the_adapted_grid_can_be_played(robot, template):
+    leg = load_robot(robot)
+    adapted = adapt(template, leg)
+    excitation = make_excitation(adapted, leg)
+    assert len(excitation) == 48000
+    assert all(
+        a.amplitude <= p.amplitude for a, p in zip(adapted.parts, template.parts, strict=True)
+    )
+    assert adapt(adapted, leg) == adapted
+
+
+def test_strokes_within_the_leg_are_not_adapted():
+    assert adapt(LAB, ROBOT) == LAB
+
+
+@pytest.mark.parametrize(
+    ("template", "limits", "reason"),
+    [
+        (
+            LAB,
+            HardwareRange(knee=(-2.0, 0.0)),
+            r"knee: -2\.\d+ rad is outside .* range -2 to 0 rad",
+        ),
+        (LAB, HardwareRange(hip=(0.0, 2.0)), r"at 0\.000 s, hip: .* outside"),
+        (fixed_base((0.1,), (0.2,), (10.0,), margin=0.005), None, r"knee: .* rad/s exceeds 22"),
+        (fixed_base((0.05,), (0.2,), (10.0,), margin=0.005), None, "knee: .* N m at .* exceeds"),
+        (moving_base((0.11,), (1.0,), margin=0.005), None, "knee is .* mm above the ground"),
+        (Multisine((0.7, -1.4), (0.3, 2.0)), None, "knee: .* outside"),
+    ],
+)
+def test_what_the_leg_cannot_do_is_refused_with_joint_and_time(template, limits, reason):
+    with pytest.raises(UsageError, match=reason) as caught:
+        make_excitation(template, ROBOT, limits=limits)
+    assert " s, " in str(caught.value)
+
+
+def test_a_stroke_that_no_amplitude_saves_is_refused():
+    with pytest.raises(UsageError, match="hip"):
+        adapt(LAB, ROBOT, limits=HardwareRange(hip=(0.0, 0.1)))
+
+
+def test_a_multisine_starts_and_ends_at_rest_in_its_posture():
+    template = Multisine((0.7, -1.4), (0.3, 0.4))
+    excitation = make_excitation(template, ROBOT, track_velocity=True)
+    excursion = excitation.position - [0.7, -1.4]
+    np.testing.assert_allclose(excursion[[0, -1]], 0, atol=1e-6)
+    assert (np.abs(excursion).max(axis=0) <= np.array([0.3, 0.4]) * 1.005).all()
+    assert (np.abs(excursion).max(axis=0) >= np.array([0.3, 0.4]) * 0.9).all()
+    np.testing.assert_allclose(
+        excitation.velocity, np.gradient(excitation.position, 0.005, axis=0), atol=1e-9
+    )
+
+
+def test_the_file_keeps_every_target(tmp_path):
+    for track in (False, True):
+        first = make_excitation(LAB, ROBOT, track_velocity=track)
+        first.save(tmp_path / "excitation.parquet")
+        back = load_excitation(tmp_path / "excitation.parquet")
+        np.testing.assert_array_equal(back.position, first.position)
+        np.testing.assert_array_equal(back.velocity, first.velocity)
+        assert (back.velocity == 0).all() != track
+        assert (back.rig, back.rate, back.robot) == ("fixed-base", 200.0, "legv2")
+        assert back.digest == first.digest
+        assert back.description == first.description
+
+
+def test_other_files_are_no_excitations(tmp_path):
+    Trace(swinging()).save(tmp_path / "trace.parquet")
+    with pytest.raises(TraceError, match="is no excitation"):
+        load_excitation(tmp_path / "trace.parquet")
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda: fixed_base((0.1,), (1.0, 2.0)), "1 amplitudes and 2 periods do not pair"),
+        (lambda: fixed_base((), ()), "No stroke is left"),
+        (lambda: fixed_base((0.0,), (1.0,)), "'amplitude' is 0 but must be positive"),
+        (lambda: fixed_base((0.1,), (float("nan"),)), "'period' is nan"),
+        (lambda: moving_base(margin=-0.1), "'margin' is -0.1 m but must be zero or more"),
+        (lambda: Multisine((0, 0), (1, 1), lowest=2, highest=1), "'highest' is 1 Hz"),
+        (lambda: make_excitation(LAB, ROBOT, rate=0.001), "make it longer"),
+    ],
+)
+def test_numbers_without_meaning_are_refused(make, sentence):
+    with pytest.raises(UsageError, match=sentence):
+        make()
+
+
+@needs_recordings
+@pytest.mark.parametrize(
+    ("file", "stroke", "start"),
+    [
+        ("seg0", (0.1, 1.0, 5.0), 0),
+        ("seg2", (0.075, 0.5, 10.0), 16000),
+        ("seg4", (0.05, 0.25, 40.0), 32000),
+    ],
+)
+def test_the_template_is_what_the_lab_commanded(file, stroke, start):
+    """The recordings hold their targets: L1 = L2 = 0.15 m, 5 mm margin, knee forward."""
+    leg = dataclasses.replace(ROBOT, shank=dataclasses.replace(ROBOT.shank, length=0.15))
+    table = pl.read_csv(next((RECORDINGS / "legv2_fixed_base").glob(f"*{file}*")))
+    time = np.arange(48000) * 240 / 47999
+    played = Strokes((Stroke(*stroke, 240.0, 0.005, "forward"),)).joints(leg, time)
+    velocity = np.gradient(played, time, axis=0)
+    rows = slice(start + 1, start + 7999)
+    commanded = table.select("hip_pos_cmd", "knee_pos_cmd").to_numpy()
+    np.testing.assert_allclose(played[rows], commanded[1:-1], atol=1e-6)
+    commanded = table.select("hip_vel_cmd", "knee_vel_cmd").to_numpy()
+    np.testing.assert_allclose(velocity[rows], commanded[1:-1], atol=1e-4)
