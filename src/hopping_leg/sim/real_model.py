@@ -20,7 +20,7 @@ from hopping_leg.robot.parameters import Contact, Joint, Link, Robot
 from hopping_leg.robot.reality import Drive
 
 _HARD = (0.99, 0.999, 1e-4, 0.5, 2.0)
-"""``solimp`` of the backlash's ends: hard after a tenth of a milliradian."""
+"""``solimp`` of hard limits and of friction that holds."""
 
 _AXIS = (0.0, -1.0, 0.0)
 _BODIES = {"hip": "thigh", "knee": "shank"}
@@ -59,7 +59,9 @@ def real_model(robot: Robot, timestep: float, *, clamped: bool) -> RealModel:
         spec.geom("floor").contype = 0
     for name, body in _BODIES.items():
         joint, link = getattr(robot, name), getattr(robot, body)
-        _add_transmission(spec, name, getattr(robot.reality, name), timestep)
+        drive = getattr(robot.reality, name)
+        _harden_friction(spec, name, drive, timestep)
+        _add_transmission(spec, name, drive, timestep)
         _check_stiffness(robot, name, joint, link, timestep)
     for actuator in spec.actuators:
         actuator.ctrllimited = False  # gains and ripple come after the software's limit
@@ -112,6 +114,14 @@ def _limited(joint: Joint, drive: Drive, voltage: float) -> Joint:
 
 def _between(joint: str) -> str:
     return f"{joint}_transmission"
+
+
+def _harden_friction(spec: mujoco.MjSpec, name: str, drive: Drive, timestep: float) -> None:
+    """Let friction hold: by default MuJoCo's creeps faster than where Stribeck's curve falls."""
+    if drive.stiction > 1:
+        joint = spec.joint(name)
+        joint.solref_friction = [2 * timestep, 1.0]
+        joint.solimp_friction = _HARD
 
 
 def _add_transmission(spec: mujoco.MjSpec, name: str, drive: Drive, timestep: float) -> None:
