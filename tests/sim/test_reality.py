@@ -58,9 +58,10 @@ def test_effects_without_effect_leave_every_byte(name):
     idle = with_reality(robot, hip=IDLE)
     assert Legs(idle, 1, threads=1).real is not None
     assert Legs(robot, 1, threads=1).real is None
-    assert tracked(idle, disturbance=Disturbance()).tobytes() == tracked(
-        robot, disturbance=Disturbance()
-    ).tobytes()
+    assert (
+        tracked(idle, disturbance=Disturbance()).tobytes()
+        == tracked(robot, disturbance=Disturbance()).tobytes()
+    )
 
 
 def test_a_neutral_table_does_not_change_the_digest():

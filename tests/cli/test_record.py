@@ -1,0 +1,64 @@
+import numpy as np
+import pytest
+
+from hopping_leg.cli import main
+from hopping_leg.control.joint_pd import JointGains
+from hopping_leg.identify.excitation import Excitation
+from hopping_leg.identify.recording import load_recording
+
+TIME = np.arange(300) / 200
+
+
+@pytest.fixture(params=["fixed-base", "rail"])
+def excitation(tmp_path, request):
+    bend = 0.25 * np.sin(2 * np.pi * TIME / 0.75)
+    position = np.stack([0.8 + bend, -1.6 - 2 * bend], axis=1)
+    file = tmp_path / f"{request.param}.parquet"
+    made = Excitation(TIME, position, 0 * position, request.param, 200.0, "legv2", "a sine")
+    made.save(file)
+    return file, made
+
+
+def test_a_recording_holds_what_was_played_and_measured(excitation, tmp_path):
+    file, played = excitation
+    out = tmp_path / "out"
+    words = ["record", str(file), "--robot", "twin", "--stiffness", "25", "15", "--out"]
+    assert main([*words, str(out)]) == 0
+    assert main([*words, str(tmp_path / "again")]) == 0
+    assert main([*words, str(tmp_path / "other"), "--seed", "5"]) == 0
+    name = f"twin-{file.name}"
+    content = (out / name).read_bytes()
+    assert content == (tmp_path / "again" / name).read_bytes()
+    assert content != (tmp_path / "other" / name).read_bytes()
+    recording = load_recording(out / name)
+    setup = recording.setup
+    assert (setup.rig, setup.onboard, setup.sample) == (played.rig, "zoh", "before-command")
+    assert setup.stiffness == (25.0, 15.0)
+    assert setup.damping == JointGains().damping
+    assert setup.robot == "legv2-paper"
+    assert len(recording) == len(TIME)
+    np.testing.assert_array_equal(recording.array("position_command"), played.position)
+    np.testing.assert_array_equal(recording.array("velocity_command"), 0.0)
+    position = recording.array("position")
+    assert np.abs(position - played.position).max() < 0.4
+    steps = position / [6.4e-5, 3.2e-5]
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-6)
+    assert recording.array("torque")[1:].std() > 0.1
+    assert recording.has_column("height_m") == (played.rig == "rail")
+
+
+def test_wrong_input_is_one_sentence(tmp_path, capsys, excitation):
+    file, _ = excitation
+    for words, sentence in (
+        ([], "No excitation"),
+        ([str(tmp_path / "none.parquet")], "none.parquet"),
+        ([str(file), "--robot", "twinn"], "Did you mean 'twin'"),
+        ([str(file), "--believed", "legv9"], "There is no robot 'legv9'"),
+        ([str(file), "--seed", "-1"], "A seed of -1"),
+        ([str(file), "--damping", "-1", "0"], "must be zero or more"),
+    ):
+        assert main(["record", *words, "--out", str(tmp_path / "out")]) == 2
+        error = capsys.readouterr().err
+        assert sentence in error
+        assert "Traceback" not in error
+    assert not (tmp_path / "out").exists()
