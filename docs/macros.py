@@ -21,6 +21,7 @@ from hopping_leg import cli
 from hopping_leg.cli.robots import derived, numbers
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.files import load_tree
+from hopping_leg.sim.twins import TWIN_RANGES
 
 RESULTS = Path(__file__).parent / "results"
 MAKEFILE = Path(__file__).parent.parent / "Makefile"
@@ -174,6 +175,14 @@ def robot(name: str) -> str:
     return grid(["number", "value", "unit", "source"], rows)
 
 
+def twin_ranges() -> str:
+    """Return the distribution of twins as a table."""
+    rows = [
+        [f"`{r.path}`", f"{r.low:g}", f"{r.high:g}", r.unit, r.scale, r.source] for r in TWIN_RANGES
+    ]
+    return grid(["number", "from", "to", "unit", "scale", "source"], rows)
+
+
 def usage(*arguments: str) -> str:
     """Return the help text of a command."""
     os.environ |= {"COLUMNS": "100", "NO_COLOR": "1"}
@@ -198,6 +207,7 @@ MACROS = {
     "value": value,
     "robot": robot,
     "usage": usage,
+    "twin_ranges": twin_ranges,
     "example": example,
     "page": page,
     "commands": commands(),
