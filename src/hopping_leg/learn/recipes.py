@@ -14,6 +14,10 @@ RECIPES: dict[str, type[Recipe]] = {recipe.name: recipe for recipe in (FastRecip
 """Every recipe that ``hop train`` knows."""
 
 
+_SWITCH = {"true": True, "1": True, "false": False, "0": False}
+_KINDS = {bool: "true or false", int: "a whole number", float: "a number"}
+
+
 def get_recipe(name: str) -> Recipe:
     """Return a recipe with its defaults.
 
@@ -41,13 +45,15 @@ def change(recipe: Recipe, changes: Sequence[str]) -> Recipe:
         name, _, text = entry.partition("=")
         if name not in numbers:
             raise UsageError(unknown_name(f"number of recipe '{recipe.name}'", name, numbers))
+        kind = type(numbers[name])
         try:
-            value = type(numbers[name])(text)
-        except ValueError:
+            value = _SWITCH[text.lower()] if kind is bool else kind(text)
+        except (ValueError, KeyError):
             value = math.nan
         if not math.isfinite(value):
-            kind = "a whole number" if isinstance(numbers[name], int) else "a number"
-            raise UsageError(f"'{entry}' does not say {kind}; give e.g. {name}={numbers[name]}.")
+            raise UsageError(
+                f"'{entry}' does not say {_KINDS[kind]}; give e.g. {name}={numbers[name]}."
+            )
         values[name] = value
     return dataclasses.replace(recipe, **values)
 

@@ -112,7 +112,7 @@ class Training:
 class Ablation:
     """Train the fast recipe with one part taken away at a time."""
 
-    steps: int = 3_000_000
+    steps: int = 2_000_000
     """Control steps of experience of each variant."""
     robot: str = "legv2-paper"
     """A shipped name or the path of a .toml file."""
