@@ -18,11 +18,12 @@ from rich.console import Console
 from rich.table import Table
 
 from hopping_leg.cli.output import write_json
-from hopping_leg.identify import templates
+from hopping_leg.identify import multisine, strokes
 from hopping_leg.identify.excitation import RATE, Excitation, adapt, make_excitation
 from hopping_leg.identify.feasibility import HardwareRange, demand
 from hopping_leg.identify.setup import Pair
-from hopping_leg.identify.templates import DURATION, Bend, Strokes, Template
+from hopping_leg.identify.strokes import DURATION, Bend, Strokes
+from hopping_leg.identify.templates import Template
 from hopping_leg.robot import Robot, load_robot
 
 
@@ -123,9 +124,9 @@ def run(args: FixedBase | MovingBase | Multisine) -> None:
 def _template(args: FixedBase | MovingBase | Multisine) -> Template:
     if isinstance(args, Multisine):
         sines = (args.centre, args.amplitude, args.lowest, args.highest, args.duration)
-        return templates.Multisine(*sines)
+        return multisine.Multisine(*sines)
     if isinstance(args, FixedBase):
-        return templates.fixed_base(
+        return strokes.fixed_base(
             args.amplitudes,
             args.periods,
             args.swings,
@@ -134,7 +135,7 @@ def _template(args: FixedBase | MovingBase | Multisine) -> Template:
             bend=args.bend,
             every_pair=args.every_pair,
         )
-    return templates.moving_base(
+    return strokes.moving_base(
         args.amplitudes,
         args.periods,
         duration=args.duration,

@@ -12,7 +12,8 @@ from hopping_leg.errors import TraceError, UsageError
 from hopping_leg.identify.columns import PAIRS
 from hopping_leg.identify.feasibility import HardwareRange, check_demand, demand
 from hopping_leg.identify.setup import Rig
-from hopping_leg.identify.templates import LAB_MARGIN, Stroke, Strokes, Template
+from hopping_leg.identify.strokes import LAB_MARGIN, Stroke, Strokes
+from hopping_leg.identify.templates import Template
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import Trace
 

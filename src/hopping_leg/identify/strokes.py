@@ -1,0 +1,185 @@
+"""The paper's excitation trajectories: the foot strokes along the leg, the leg may swing."""
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal, Self
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.errors import UsageError
+from hopping_leg.identify.setup import Rig
+from hopping_leg.identify.templates import require_positive
+from hopping_leg.robot import kinematics
+from hopping_leg.robot.parameters import Robot
+
+DURATION = 240.0
+"""Of the paper's recordings, s."""
+
+LAB_MARGIN = 0.005
+"""How far from straight the lab kept the leg in its recordings, m; the paper says nothing."""
+
+Bend = Literal["backward", "forward"]
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """A stretch of the paper's template with one amplitude and its periods.
+
+    The foot's distance from the hip is r = A cos(2 pi t / T1) + epsilon with
+    epsilon = L1 + L2 - A - margin; its direction is theta = -(pi/2) cos(2 pi t / T2), or straight
+    down without T2. Only whole periods are played, then the foot waits, so that strokes join.
+
+    Raises:
+        UsageError: A number is not positive, or the margin negative.
+    """
+
+    amplitude: float
+    """A, m."""
+    period: float
+    """T1, s."""
+    swing: float | None
+    """T2, s; none keeps the foot below the hip."""
+    duration: float
+    """s."""
+    margin: float = 0.0
+    """From the straight leg, m."""
+    bend: Bend = "backward"
+    """Side of the knee: negative angles are backward."""
+
+    rig: Rig = "fixed-base"
+
+    def __post_init__(self) -> None:
+        for name in ("amplitude", "period", "duration"):
+            require_positive(name, getattr(self, name))
+        if self.swing is not None:
+            require_positive("swing", self.swing)
+        if not 0 <= self.margin < math.inf:
+            raise UsageError(f"'margin' is {self.margin:g} m but must be zero or more.")
+
+    def joints(self, robot: Robot, time: Array) -> Array:
+        """Return joint angles at times from the stroke's start, rad, (ticks, 2)."""
+        reach = robot.thigh.length + robot.shank.length
+        epsilon = reach - self.amplitude - self.margin
+        distance = self.amplitude * np.cos(self._phase(time, self.period)) + epsilon
+        theta = np.zeros_like(time)
+        if self.swing is not None:
+            theta = -np.pi / 2 * np.cos(self._phase(time, self.swing))
+        side = 1.0 if self.bend == "backward" else -1.0
+        forward = side * distance * np.sin(theta)
+        foot = np.stack([distance * np.cos(theta), forward], axis=-1)
+        angles = np.where((distance > 0)[:, None], kinematics.joint_angles(robot, foot), np.nan)
+        return side * np.unwrap(angles, axis=0)
+
+    def __str__(self) -> str:
+        swing = "" if self.swing is None else f", T2 {self.swing:g} s"
+        return f"{self.duration:g} s with A {self.amplitude:.4g} m, T1 {self.period:g} s{swing}"
+
+    def smaller(self, amplitude: float, margin: float) -> Self:
+        """Return the stroke with another amplitude and margin."""
+        return dataclasses.replace(self, amplitude=amplitude, margin=margin)
+
+    def _phase(self, time: Array, period: float) -> Array:
+        periods = math.floor(self.duration / period + 1e-9)
+        whole = periods * period if periods else self.duration
+        phase: Array = 2 * np.pi * np.minimum(time, whole) / period
+        return phase
+
+
+@dataclass(frozen=True)
+class Strokes:
+    """Strokes one after the other."""
+
+    parts: tuple[Stroke, ...]
+
+    def __str__(self) -> str:
+        return "; ".join(map(str, self.parts))
+
+    @property
+    def rig(self) -> Rig:
+        """What the base is on."""
+        return self.parts[0].rig
+
+    @property
+    def duration(self) -> float:
+        """How long it lasts, s."""
+        return sum(part.duration for part in self.parts)
+
+    def joints(self, robot: Robot, time: Array) -> Array:
+        """Return joint angles at times, rad, (ticks, 2)."""
+        starts = np.cumsum([0.0, *(part.duration for part in self.parts[:-1])])
+        which = np.searchsorted(starts, time + 1e-9, side="right") - 1
+        angles = [
+            part.joints(robot, time[which == index] - start)
+            for index, (part, start) in enumerate(zip(self.parts, starts, strict=True))
+        ]
+        return np.unwrap(np.concatenate(angles), axis=0)
+
+
+def fixed_base(
+    amplitudes: tuple[float, ...] = (0.15, 0.1, 0.05),
+    periods: tuple[float, ...] = (0.75, 0.5, 0.25),
+    swings: tuple[float, ...] = (10.0, 20.0),
+    *,
+    duration: float = DURATION,
+    margin: float = 0.0,
+    bend: Bend = "backward",
+    every_pair: bool = False,
+) -> Strokes:
+    """Return the paper's fixed-base trajectory: the foot strokes while the leg swings.
+
+    Args:
+        amplitudes: A, m.
+        periods: T1, s.
+        swings: T2, s.
+        duration: Of all strokes, s, divided evenly.
+        margin: From the straight leg, m.
+        bend: Side of the knee.
+        every_pair: Combine every amplitude with every period; otherwise the first with the first
+            and so on, as in the lab's recordings.
+    """
+    pairs = _pairs(amplitudes, periods, every_pair)
+    grid = [(a, t1, t2) for (a, t1), t2 in itertools.product(pairs, swings)]
+    length = duration / max(1, len(grid))
+    return _strokes(Stroke(a, t1, t2, length, margin, bend) for a, t1, t2 in grid)
+
+
+def moving_base(
+    amplitudes: tuple[float, ...] = (0.15, 0.1, 0.05),
+    periods: tuple[float, ...] = (0.75, 0.5, 0.25),
+    *,
+    duration: float = DURATION,
+    margin: float = 0.0,
+    bend: Bend = "backward",
+    every_pair: bool = False,
+) -> Strokes:
+    """Return the paper's moving-base trajectory: vertical strokes on the ground, some leave it.
+
+    Arguments as for ``fixed_base``.
+    """
+    pairs = _pairs(amplitudes, periods, every_pair)
+    length = duration / max(1, len(pairs))
+    return _strokes(Stroke(a, t1, None, length, margin, bend, "rail") for a, t1 in pairs)
+
+
+def _pairs(
+    amplitudes: tuple[float, ...], periods: tuple[float, ...], every_pair: bool
+) -> list[tuple[float, float]]:
+    if every_pair:
+        return list(itertools.product(amplitudes, periods))
+    if len(amplitudes) != len(periods):
+        raise UsageError(
+            f"{len(amplitudes)} amplitudes and {len(periods)} periods do not pair; give as many of"
+            " one as of the other, or combine every pair."
+        )
+    return list(zip(amplitudes, periods, strict=True))
+
+
+def _strokes(parts: Iterable[Stroke]) -> Strokes:
+    strokes = Strokes(tuple(parts))
+    if not strokes.parts:
+        raise UsageError("No stroke is left; give at least one amplitude, period and swing.")
+    return strokes
