@@ -65,11 +65,12 @@ def test_unmeasured_samples_do_not_count():
         for r in (RUN, run)
     )
     assert one == both / 2
+    gone = run.__class__(
+        run.trace.__class__(table.with_columns(knee_torque_nm=None)), run.setup, "none"
+    )
+    simulator = WindowSimulator([gone], cut([gone], None), timestep=STEP)
     with pytest.raises(RecordingError, match="no measured sample"):
-        gone = run.__class__(
-            run.trace.__class__(table.with_columns(knee_torque_nm=None)), run.setup, "none"
-        )
-        Cost(WindowSimulator([gone], cut([gone], None), timestep=STEP), Scoring(None, None, 1.0))
+        Cost(simulator, Scoring(None, None, 1.0))
 
 
 @pytest.mark.parametrize(
@@ -143,14 +144,14 @@ def test_a_killed_least_squares_resumes_exactly(tmp_path):
     def curved(vectors):
         return np.concatenate([bowl(vectors), 0.5 * np.sin(3 * vectors)], axis=1)
 
-    options = LeastSquaresOptions(rounds=5, evaluations=3, tolerance=0.0)
+    options = LeastSquaresOptions(rounds=5, evaluations=2, tolerance=-1.0)
     whole = least_squares(curved, TWO, options)
     file = tmp_path / "state.json"
     with pytest.raises(KeyboardInterrupt):
-        least_squares(killed(curved, 9), TWO, options, checkpoint=file)
+        least_squares(killed(curved, 7), TWO, options, checkpoint=file)
     assert file.exists()
     resumed = least_squares(curved, TWO, options, checkpoint=file)
-    assert resumed == whole or np.array_equal(resumed.vector, whole.vector)
+    np.testing.assert_array_equal(resumed.vector, whole.vector)
     assert resumed.history == whole.history
 
 

@@ -81,7 +81,7 @@ def test_friction_that_grows_with_load_slows_the_leg():
 
 def test_a_lagging_velocity_makes_a_stiff_drive_ring():
     run = with_setup(record(LEG, swing(1.0)), onboard="continuous", damping=(0.3, 3.2))
-    lagging = TRUE.replace({"drive.velocity_window": 0.008})
+    lagging = TRUE.replace({"drive.velocity_window": 0.012})
     torque = simulator([run]).run([TRUE, lagging]).torque[:, 0, 50:, 1]
     rough = np.abs(np.diff(torque, n=2, axis=1)).mean(axis=1)
     assert rough[1] > 2 * rough[0]

@@ -8,7 +8,7 @@ from hopping_leg.robot import load_robot, shipped_robots
 LEGS = [
     name
     for name in shipped_robots()
-    if load_robot(name).kind == "leg" and not load_robot(name).reality
+    if load_robot(name).kind == "leg" and load_robot(name).reality.neutral
 ]
 
 

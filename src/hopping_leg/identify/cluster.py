@@ -62,9 +62,9 @@ def _evaluate_part(evaluate: Evaluate, vectors: Array) -> Array:
 
 def _import_ray() -> Any:  # noqa: ANN401
     try:
-        import ray  # noqa: PLC0415
+        import ray
     except ModuleNotFoundError as error:
         raise UsageError(
-            "Evaluation on a cluster needs Ray; install it with `pip install 'hopping-leg[cluster]'`."
+            "A cluster needs Ray; install it with `pip install 'hopping-leg[cluster]'`."
         ) from error
     return ray

@@ -73,7 +73,8 @@ class Cost:
         if bound is None:
             return raw
         loss = 2 * bound**2 * (np.sqrt(1 + np.square(raw / bound)) - 1)
-        return np.copysign(np.sqrt(loss), raw)
+        robust: Array = np.copysign(np.sqrt(loss), raw)
+        return robust
 
     def errors(self, simulated: Simulated) -> Array:
         """Return scaled errors of a simulation, (candidates, size)."""
@@ -81,8 +82,10 @@ class Cost:
         for name, mask in self._counts.items():
             error = getattr(simulated, name) - self._measured[name]
             parts.append(error[:, mask] / self._scale(name))
-        joined = np.concatenate(parts, axis=1)
-        return np.clip(np.nan_to_num(joined, nan=_FAILED, posinf=_FAILED), -_FAILED, _FAILED)
+        joined = np.ascontiguousarray(np.concatenate(parts, axis=1))
+        finite = np.nan_to_num(joined, nan=_FAILED, posinf=_FAILED)
+        bounded: Array = np.clip(finite, -_FAILED, _FAILED)
+        return bounded
 
     def values(self, candidates: list[Candidate]) -> Array:
         """Return the sum of squared residuals, the paper's J by default, (candidates,)."""

@@ -25,11 +25,11 @@ def recorded_gains(recording: Recording, name: str) -> Array:
         name: ``stiffness``, ``damping`` or ``integral``.
     """
     pair = getattr(recording.setup, name)
-    values = np.tile((np.nan, np.nan) if pair is None else pair, (len(recording), 1))
+    values: Array = np.tile((np.nan, np.nan) if pair is None else pair, (len(recording), 1))
     if name == "integral":
         return np.nan_to_num(values)
-    rows = recording.array(name)
-    return np.where(np.isnan(rows), np.broadcast_to(values, rows.shape), rows)
+    rows: Array = recording.array(name)
+    return np.where(np.isnan(rows), values, rows)
 
 
 def require_gains(gains: Array, name: str, recording: Recording) -> Array:
@@ -98,7 +98,9 @@ class DelayLine:
         stack = np.stack(self._past)
         newest = np.minimum(self._whole, len(stack) - 1)
         older = np.minimum(self._whole + 1, len(stack) - 1)
-        return (1 - self._part) * stack[newest, self._rows] + self._part * stack[older, self._rows]
+        part = self._part
+        due: Array = (1 - part) * stack[newest, self._rows] + part * stack[older, self._rows]
+        return due
 
 
 class VelocityWindow:

@@ -52,6 +52,8 @@ def build_rig_model(
     """
     spec = get_spec(robot, timestep)
     spec.option.gravity = [0, 0, -gravity]
+    # A simulation that breaks down must not go on from a default state unnoticed.
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     fixed = rig == "fixed-base"
     if fixed:
         spec.delete(spec.joint("rail"))

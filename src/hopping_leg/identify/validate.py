@@ -83,7 +83,9 @@ def open_loop(
     The motors get the measured torque, or the commanded one where the rig drives torques itself;
     every measured row of a horizon counts.
     """
-    driven = [as_torque_driven(r) for r in recordings]
+    driven = [d for d in map(as_torque_driven, recordings) if d.has("torque_command")]
+    if not driven:
+        return (float("nan"), float("nan"))
     windows = [w for w in cut(driven, horizon, stride=horizon / 2) if _starts_measured(driven, w)]
     if not windows:
         return (float("nan"), float("nan"))
