@@ -1,0 +1,157 @@
+"""How to identify a robot from given recordings, decided from what the recordings are."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hopping_leg.errors import UsageError, unknown_name
+from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.cost import Scoring
+from hopping_leg.identify.parameters import ParameterSet, choose
+from hopping_leg.identify.recording import Recording
+from hopping_leg.identify.two_pass import INERTIAS, pass_names
+from hopping_leg.robot import kinematics
+from hopping_leg.robot.parameters import Robot
+
+SEARCHES = ("least-squares", "cma", "two-pass")
+"""What a plan may search with."""
+
+_TIMESTEP = 1e-3
+_GAINS = {"stiffness": 10.0, "damping": 0.5, "integral": 1.0}
+"""Where a search for an unknown gain begins, in the gain's unit at the joint."""
+_CLEARANCE = 5e-3
+"""Height of the foot above the ground that only a hop reaches, m."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All decisions of an identification.
+
+    Attributes:
+        start: Robot and drives before the fit.
+        parameters: What to fit, from where, within which bounds.
+        scoring: What errors count.
+        window: Duration that is simulated from one measured state, s.
+        stride: From one window's start to the next, s.
+        unscored: Beginning of each window that does not count, s.
+        timestep: Physics step, s.
+        search: One of ``SEARCHES``.
+    """
+
+    start: Candidate
+    parameters: ParameterSet
+    scoring: Scoring
+    window: float
+    stride: float
+    unscored: float
+    timestep: float
+    search: str
+
+
+def make_plan(
+    recordings: Sequence[Recording],
+    robot: Robot,
+    *,
+    parameters: tuple[str, ...] | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    search: str | None = None,
+) -> Plan:
+    """Decide how to identify a robot.
+
+    Args:
+        recordings: Of one robot; rigs may differ.
+        robot: Its values before the fit.
+        parameters: What to fit; None decides by what the recordings can tell.
+        bounds: Bounds that differ from the widest ones.
+        search: One of ``SEARCHES``; ``two-pass`` is the paper's: CMA-ES on positions only. None
+            takes least squares.
+
+    Raises:
+        UsageError: There is no recording, a parameter or search does not exist, or bounds
+            exclude a start.
+    """
+    if not recordings:
+        raise UsageError("There is nothing to fit to; give at least one recording.")
+    search = search or "least-squares"
+    if search not in SEARCHES:
+        raise UsageError(unknown_name("search", search, SEARCHES))
+    start = _start(recordings, robot)
+    names = parameters or _names(recordings, paper=search == "two-pass")
+    window, unscored = _window(recordings, robot)
+    return Plan(
+        start=start,
+        parameters=choose(start, names, bounds=bounds),
+        scoring=_scoring(recordings, paper=search == "two-pass"),
+        window=window,
+        stride=window,
+        unscored=unscored,
+        timestep=_TIMESTEP,
+        search=search,
+    )
+
+
+def _names(recordings: Sequence[Recording], *, paper: bool) -> list[str]:
+    """Return what these recordings can tell, or Table I; and drives' gains nobody knows."""
+    first, second = pass_names([r.setup.rig for r in recordings])
+    names = [*first, *second] if paper else [*first, *(n for n in second if n not in INERTIAS)]
+    if not paper:
+        names += ["thigh.com", "shank.com", *INERTIAS, "drive.delay"]
+        names.remove("hip.armature")
+    return [*names, *_open_gains(recordings)]
+
+
+def _open_gains(recordings: Sequence[Recording]) -> list[str]:
+    """Return gains of the on-board loop that a recording leaves open."""
+    found = []
+    for gain in ("stiffness", "damping", "integral"):
+        if any(
+            r.setup.onboard != "torque"
+            and not np.isfinite(r.array(gain) if gain != "integral" else np.nan).any()
+            and (getattr(r.setup, gain) is None or not r.setup.gains_exact)
+            and (gain != "integral" or not r.setup.gains_exact)
+            for r in recordings
+        ):
+            found += [f"drive.{joint}.{gain}" for joint in ("hip", "knee")]
+    return found
+
+
+def _start(recordings: Sequence[Recording], robot: Robot) -> Candidate:
+    """Return the robot with the drives that the recordings tell of."""
+    values = {}
+    for name in _open_gains(recordings):
+        _, joint, gain = name.split(".")
+        pairs = [getattr(r.setup, gain) for r in recordings]
+        known = next((p for p in pairs if p is not None), None)
+        values[name] = _GAINS[gain] if known is None else known[joint == "knee"]
+    return Candidate(robot).replace(values)
+
+
+def _scoring(recordings: Sequence[Recording], *, paper: bool) -> Scoring:
+    if paper:
+        return Scoring()
+    if all(r.setup.onboard == "torque" for r in recordings):
+        return Scoring(position=0.02, robust=2.0)
+    torque = 0.2 if any(r.has("torque") for r in recordings) else None
+    return Scoring(position=0.005, torque=torque, robust=3.0)
+
+
+def _window(recordings: Sequence[Recording], robot: Robot) -> tuple[float, float]:
+    """Return window and unscored beginning, s."""
+    if any(_hops(r, robot) for r in recordings):
+        return 0.25, 0.0
+    if any(r.setup.onboard == "torque" for r in recordings):
+        return 0.4, 0.0
+    return 4.0, 1.0
+
+
+def _hops(recording: Recording, robot: Robot) -> bool:
+    """Return whether the foot leaves the ground, or may do so unseen."""
+    if recording.setup.rig == "fixed-base":
+        return False
+    if not recording.has_column("height_m"):
+        return True
+    clearance = recording.trace.column("height_m") - kinematics.stance_height(
+        robot, recording.array("position")
+    )
+    return bool(np.nanmax(clearance, initial=0.0) > _CLEARANCE)

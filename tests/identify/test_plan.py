@@ -1,0 +1,55 @@
+import pytest
+
+from hopping_leg.errors import UsageError
+from hopping_leg.identify.plan import make_plan
+from hopping_leg.identify.recording import with_setup
+from tests.identify.twin import LEG, record, swing
+
+FIXED = record(LEG, swing(1.0))
+STANDING = record(LEG, swing(1.0, "rail"), "rail")
+TORQUES = record(LEG, swing(1.0), onboard="torque")
+
+
+def test_a_fixed_base_says_nothing_about_rail_and_contact():
+    names = make_plan([FIXED], LEG).parameters.names
+    assert not [n for n in names if n.startswith(("rail.", "contact."))]
+    moving = make_plan([FIXED, STANDING], LEG).parameters.names
+    assert {"rail.friction", "contact.time_constant"} <= set(moving)
+
+
+def test_known_gains_are_kept_and_unknown_ones_are_fitted():
+    assert "drive.knee.stiffness" not in make_plan([FIXED], LEG).parameters.names
+    unknown = with_setup(FIXED, stiffness=None)
+    assert "drive.knee.stiffness" in make_plan([unknown], LEG).parameters.names
+    doubtful = with_setup(FIXED, gains_exact=False)
+    plan = make_plan([doubtful], LEG)
+    assert plan.start.get("drive.knee.stiffness") == FIXED.setup.stiffness[1]
+
+
+def test_windows_are_short_where_nothing_holds_the_leg():
+    closed, opened = (make_plan([r], LEG).window for r in (FIXED, TORQUES))
+    assert opened < closed
+
+
+def test_the_paper_counts_positions_only():
+    plan = make_plan([FIXED, STANDING], LEG, search="two-pass")
+    assert (plan.scoring.torque, plan.scoring.robust) == (None, None)
+    assert "thigh.inertia" in plan.parameters.names
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"search": "gradient"}, "least-squares"),
+        ({"parameters": ("hip.frction",)}, "Did you mean 'hip.friction'"),
+        ({"bounds": {"hip.friction": (0.5, 1.0)}}, "exclude its start"),
+    ],
+)
+def test_impossible_plans_get_a_sentence(options, sentence):
+    with pytest.raises(UsageError, match=sentence):
+        make_plan([FIXED], LEG, **options)
+
+
+def test_no_recording_no_plan():
+    with pytest.raises(UsageError, match="at least one recording"):
+        make_plan([], LEG)
