@@ -28,6 +28,7 @@ VERBS = {
     "excite": "write the trajectory that a leg is identified with",
     "export": "write a leg as URDF, inspect a policy file",
     "record": "play an excitation on a leg and record it",
+    "identify": "fit a leg to recordings and write its robot file",
     "reproduce": "the main job: train, evaluate, compare and report",
 }
 """Every verb with its line in the overview."""

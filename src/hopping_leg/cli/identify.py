@@ -1,0 +1,223 @@
+"""Identify a leg from recordings: a robot file, a JSON file and a report.
+
+The rig is recognised from a recording's header, sidecar or columns. Without --validate a quarter
+of each recording is held out and judges the fit. A run that was interrupted or killed goes on with
+--resume.
+
+Examples:
+  hop identify fixed-base.parquet moving-base.parquet --out my_leg.toml --report report.html
+  hop identify run1.csv.gz run2.csv.gz --validate run3.csv.gz --out leg.toml --json leg.json
+  hop identify fixed-base.parquet moving-base.parquet --search two-pass --out paper.toml
+  hop identify run1.csv.gz --parameters hip.friction,knee.friction --bounds hip.friction=0,0.5
+"""
+
+import dataclasses
+import shlex
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+from hopping_leg.cli.fit_progress import FitProgress
+from hopping_leg.cli.output import write_json
+from hopping_leg.errors import UsageError
+from hopping_leg.identify.cma import CmaOptions
+from hopping_leg.identify.ownership import robot_of
+from hopping_leg.identify.pipeline import IdentifyOptions, identify
+from hopping_leg.identify.recording import Recording, load_recording, sidecar_path
+from hopping_leg.identify.result import Identified, as_json, parameters_json
+from hopping_leg.identify.robot_file import save_robot
+from hopping_leg.identify.searching import SearchOptions
+from hopping_leg.robot import load_robot
+
+Names = Annotated[
+    tuple[str, ...],
+    tyro.constructors.PrimitiveConstructorSpec(
+        nargs=1,
+        metavar="NAME,NAME,...",
+        instance_from_str=lambda words: tuple(n.strip() for n in words[0].split(",")),
+        is_instance=lambda value: isinstance(value, tuple),
+        str_from_instance=lambda names: [",".join(names)],
+    ),
+]
+"""Parameters given as ``hip.friction,knee.damping``."""
+
+
+@dataclass(frozen=True)
+class Identify:
+    """What to identify from what, and where to put it."""
+
+    recordings: tyro.conf.Positional[tuple[Path, ...]]
+    """Recordings to fit to: Parquet, or CSV with a sidecar or of a known rig."""
+    validate: tuple[Path, ...] = ()
+    """Recordings that judge the fit; default: a quarter of each fitted one is held out."""
+    robot: str | None = None
+    """Where the fit begins: a shipped robot or a .toml file; default: the recordings' own."""
+    seed: int = 0
+    """Of the split and the search."""
+    out: Path = Path("identified.toml")
+    """Robot file to write; its name without .toml is the robot's."""
+    json: Path | None = None
+    """Write every number to this file as JSON."""
+    report: Path | None = None
+    """Write the report to this file as one HTML page."""
+    search: str | None = None
+    """`least-squares` (default), `cma`, or `two-pass` for the paper's."""
+    parameters: Names | None = None
+    """What to fit, e.g. `hip.friction,drive.delay`; default: what these recordings may tell."""
+    bounds: tuple[str, ...] = ()
+    """Bounds in SI units, e.g. `--bounds hip.friction=0,0.5 drive.delay=0,0.01`."""
+    starts: int = 1
+    """Searches from different starts; the best one counts."""
+    generations: int = CmaOptions().generations
+    """Of CMA-ES, in each pass."""
+    population: int = CmaOptions().population
+    """Candidates in a generation of CMA-ES."""
+    threads: int = 0
+    """Of the physics; 0 takes every core. They change no bit of the result."""
+    ray: str | None = None
+    """Simulate on the Ray cluster at this address; `local` starts one on this machine."""
+    folder: Path | None = None
+    """For checkpoints and the result; default: runs/identify-NAME, after --out."""
+    resume: bool = False
+    """Go on with the run in the folder; without one there, begin."""
+
+
+def run(args: Identify) -> None:
+    """Identify a leg."""
+    console = Console()
+    options = _options(args)
+    recordings = [load_recording(path) for path in args.recordings]
+    judges = [load_recording(path) for path in args.validate]
+    origin = args.robot or robot_of([*recordings, *judges])
+    _check_out(args, origin)
+    robot = load_robot(origin)
+    _show_recordings(console, recordings, judges)
+    folder = args.folder or Path("runs") / f"identify-{args.out.stem}"
+    try:
+        with FitProgress() as progress:
+            identified = identify(
+                recordings,
+                robot,
+                validate=judges,
+                options=options,
+                folder=folder,
+                resume=args.resume,
+                seed=args.seed,
+                report=progress.update,
+            )
+    except KeyboardInterrupt:
+        print(f"Stopped; the same command with --resume goes on in {folder}.", file=sys.stderr)
+        raise
+    save_robot(identified, args.out, origin)
+    if args.json:
+        write_json(args.json, {"command": _command(args), **as_json(identified)})
+    _show(console, identified)
+    console.print(f"Robot: {args.out}", highlight=False, soft_wrap=True)
+
+
+def _options(args: Identify) -> IdentifyOptions:
+    return IdentifyOptions(
+        parameters=args.parameters,
+        bounds=dict(_bounds(text) for text in args.bounds),
+        search=args.search,
+        effort=SearchOptions(
+            starts=args.starts,
+            cma=dataclasses.replace(
+                CmaOptions(), generations=args.generations, population=args.population
+            ),
+        ),
+        threads=args.threads,
+        ray=args.ray,
+    )
+
+
+def _bounds(text: str) -> tuple[str, tuple[float, float]]:
+    name, _, pair = text.partition("=")
+    try:
+        low, high = (float(part) for part in pair.split(","))
+    except ValueError as error:
+        raise UsageError(
+            f"'{text}' gives no bounds; write e.g. hip.friction=0,0.5 in SI units."
+        ) from error
+    return name.strip(), (low, high)
+
+
+def _check_out(args: Identify, origin: str) -> None:
+    """Refuse an output that would replace an input, before any time is spent."""
+    if args.out.suffix != ".toml":
+        raise UsageError(f"--out {args.out} must end in .toml, as robot files do.")
+    recordings = (*args.recordings, *args.validate)
+    inputs = {Path(origin).resolve(), *(p.resolve() for p in recordings)}
+    inputs |= {sidecar_path(p).resolve() for p in recordings}
+    for name in ("out", "json", "report"):
+        path = getattr(args, name)
+        if path is not None and path.resolve() in inputs:
+            raise UsageError(f"--{name} {path} would replace an input; give another file.")
+        if path is not None and path.is_dir():
+            raise UsageError(f"--{name} {path} is a folder; give a file.")
+
+
+def _show_recordings(
+    console: Console, recordings: list[Recording], judges: list[Recording]
+) -> None:
+    for use, group in (("fit", recordings), ("judge", judges)):
+        for r in group:
+            seconds = r.time[-1] - r.time[0]
+            console.print(
+                f"{use}: {r.name}, {r.setup.rig}, {seconds:.4g} s at {r.setup.rate_hz:g} Hz,"
+                f" {r.setup.source}",
+                highlight=False,
+                markup=False,
+            )
+            for warning in r.warnings:
+                console.print(f"  {warning}", highlight=False, markup=False)
+
+
+def _show(console: Console, identified: Identified) -> None:
+    table = Table("parameter", "start", "identified", "95 % interval", "unit")
+    for row in parameters_json(identified):
+        table.add_row(
+            row["name"],
+            f"{row['start']:.4g}",
+            f"{row['value']:.4g}" + (" (at bound)" if row["at_bound"] else ""),
+            f"{row['interval_low']:.4g} .. {row['interval_high']:.4g}",
+            row["unit"],
+        )
+    console.print(table)
+    quality = Table("on held-out data, rms", "before: hip", "knee", "after: hip", "knee", "unit")
+    before, after = identified.start_validation, identified.validation
+    rows = [
+        ("position, closed loop", before.closed_loop_position, after.closed_loop_position, "mrad"),
+        ("torque, closed loop", before.closed_loop_torque, after.closed_loop_torque, "N m"),
+    ]
+    rows += [
+        (f"position, open loop {h:g} s", pair, after.open_loop_position[h], "mrad")
+        for h, pair in before.open_loop_position.items()
+    ]
+    for name, first, second, unit in rows:
+        factor = 1e3 if unit == "mrad" else 1.0
+        quality.add_row(name, *(f"{factor * v:.3g}" for v in (*first, *second)), unit)
+    console.print(quality)
+    for sentence in identified.told.statements:
+        console.print(sentence, highlight=False, markup=False)
+
+
+def _command(args: Identify) -> str:
+    """Return the command that makes the same result."""
+    words = ["hop", "identify", *map(str, args.recordings)]
+    for spec in dataclasses.fields(args)[1:]:
+        value, flag = getattr(args, spec.name), f"--{spec.name}"
+        if value == spec.default or spec.name in ("folder", "resume", "threads", "ray"):
+            continue
+        if spec.name == "parameters":
+            words += [flag, ",".join(value)]
+        elif isinstance(value, tuple):
+            words += [flag, *map(str, value)]
+        else:
+            words += [flag, str(value)]
+    return shlex.join(words)

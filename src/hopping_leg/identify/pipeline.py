@@ -1,0 +1,185 @@
+"""From recordings to identified parameters, judged on data that the fit has not seen."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hopping_leg.errors import PhysicsError, UsageError, unknown_name
+from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.holdout import hold_out
+from hopping_leg.identify.identifiability import Identifiability, identifiability
+from hopping_leg.identify.judging import judge
+from hopping_leg.identify.least_squares import jacobian
+from hopping_leg.identify.objective import Objective
+from hopping_leg.identify.ownership import check_owner
+from hopping_leg.identify.parameters import ParameterSet
+from hopping_leg.identify.plan import Plan, make_plan
+from hopping_leg.identify.recording import Recording
+from hopping_leg.identify.result import Identified, as_json
+from hopping_leg.identify.run_folder import RunFolder
+from hopping_leg.identify.searching import Pass, Report, Searcher, SearchOptions
+from hopping_leg.identify.windows import cut
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.reality import NEUTRAL
+
+
+@dataclass(frozen=True)
+class IdentifyOptions:
+    """What to identify and how."""
+
+    parameters: tuple[str, ...] | None = None
+    """What to fit; None decides by what the recordings can tell."""
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Bounds that differ from the widest ones."""
+    search: str | None = None
+    """``least-squares``, ``cma`` or ``two-pass``; None lets the plan decide."""
+    effort: SearchOptions = field(default_factory=SearchOptions)
+    """How hard to search."""
+    threads: int = 0
+    """Worker threads, 0 for one per core; they change no bit of the result."""
+    ray: str | None = None
+    """Address of a Ray cluster to simulate on; it changes no bit of the result either."""
+
+
+def identify(
+    recordings: Sequence[Recording],
+    robot: Robot,
+    *,
+    validate: Sequence[Recording] = (),
+    options: IdentifyOptions | None = None,
+    folder: Path | None = None,
+    resume: bool = False,
+    seed: int = 0,
+    report: Report = lambda stage, share, cost: None,
+) -> Identified:
+    """Identify a robot.
+
+    A run that was killed goes on from its last generation with ``resume`` and ends bit for bit as
+    if it had not been.
+
+    Args:
+        recordings: To fit to. A quarter is held out, in stretches, unless ``validate`` is given.
+        robot: Its values before the fit; a table [reality] is left out.
+        validate: Recordings to judge by.
+        options: What and how.
+        folder: For checkpoints and the result; None keeps none.
+        resume: Go on with the folder's run, if there is one.
+        seed: Of all randomness.
+        report: Told of progress.
+
+    Raises:
+        UsageError: An option has no meaning.
+        RecordingError: A recording is another leg's, too short, or lacks what is needed.
+        PhysicsError: The fit failed.
+    """
+    options = options or IdentifyOptions()
+    if seed < 0 or options.threads < 0:
+        raise UsageError("The seed and the number of threads must not be negative.")
+    robot = dataclasses.replace(robot, reality=NEUTRAL)
+    check_owner([*recordings, *validate], robot)
+    plan = make_plan(
+        recordings,
+        robot,
+        parameters=options.parameters,
+        bounds=options.bounds,
+        search=options.search,
+    )
+    _check_bounds(options.bounds, plan.parameters)
+    fit, held, split = _split(recordings, validate, plan, seed)
+    windows = cut(fit, plan.window, stride=plan.stride, unscored=plan.unscored)
+    objective = Objective(
+        tuple(fit), tuple(windows), plan.parameters, plan.scoring, plan.timestep, options.threads
+    )
+    about = {"fitted": [r.name for r in fit], "starts": options.effort.starts}
+    run = None if folder is None else RunFolder(folder, _config(objective, options, held, seed))
+    if run is not None:
+        run.begin(resume=resume)
+    searcher = Searcher(plan, objective, options.effort, seed, folder, report, options.ray, about)
+    passes = searcher.run([r.setup.rig for r in recordings])
+    candidate, told = _conclude(objective, passes[-1], options)
+    identified = Identified(
+        candidate=candidate,
+        start=plan.start,
+        plan=plan,
+        passes=tuple(passes),
+        told=told,
+        fit=tuple(fit),
+        held=tuple(held),
+        split=split,
+        validation=judge(held, candidate, plan.timestep, options.threads),
+        start_validation=judge(held, plan.start, plan.timestep, options.threads),
+        seed=seed,
+    )
+    if run is not None:
+        run.finish(as_json(identified))
+    return identified
+
+
+def _check_bounds(bounds: Mapping[str, tuple[float, float]], parameters: ParameterSet) -> None:
+    for name in bounds:
+        if name not in parameters.names:
+            raise UsageError(
+                f"There are bounds for '{name}', which is not fitted."
+                f" {unknown_name('fitted parameter', name, parameters.names)}"
+            )
+
+
+def _split(
+    recordings: Sequence[Recording], validation: Sequence[Recording], plan: Plan, seed: int
+) -> tuple[list[Recording], list[Recording], str]:
+    if not validation:
+        rng = np.random.default_rng(seed)
+        fit, held = hold_out(recordings, plan.window, rng)
+        return fit, held, "held-out stretches"
+    for recording in validation:
+        if recording.digest and any(recording.digest == r.digest for r in recordings):
+            raise UsageError(
+                f"{recording.name} is to be fitted and to judge the fit; use each for one of the"
+                " two, or leave --validate out to hold a quarter of all out."
+            )
+    return list(recordings), list(validation), "validation recordings"
+
+
+def _conclude(
+    objective: Objective, last: Pass, options: IdentifyOptions
+) -> tuple[Candidate, Identifiability]:
+    """Return the best candidate and what is known of it.
+
+    Raises:
+        PhysicsError: It breaks down in simulation, so that nothing was identified.
+    """
+    objective = dataclasses.replace(objective, parameters=last.parameters)
+    vector = last.found.vector
+    (candidate,) = last.parameters.candidates(vector[None])
+    simulated = objective.cost.simulator.run([candidate]).position[0]
+    lengths = [w.length for w in objective.windows]
+    broken = sum(not np.isfinite(p[:n]).all() for p, n in zip(simulated, lengths, strict=True))
+    if broken or not np.isfinite(last.found.cost):
+        raise PhysicsError(
+            f"The fit failed: its best candidate breaks down in {broken} of {len(lengths)} windows;"
+            " narrow the bounds, fit fewer parameters, or check the recording's gains and units."
+        )
+    step = options.effort.least_squares.step
+    residuals = objective.residuals(vector[None])[0]
+    slopes = jacobian(objective.residuals, vector, last.parameters.bounds, step)
+    return candidate, identifiability(last.parameters, vector, residuals, slopes)
+
+
+def _config(
+    objective: Objective, options: IdentifyOptions, held: Sequence[Recording], seed: int
+) -> dict[str, Any]:
+    """Return what makes a run this run; threads and cluster change nothing."""
+    return {
+        "recordings": [[r.name, r.digest] for r in objective.recordings],
+        "recordings_to_judge_by": [[r.name, r.digest] for r in held],
+        "robot": objective.parameters.base.robot.digest,
+        "parameters": [dataclasses.asdict(p) for p in objective.parameters.parameters],
+        "scoring": dataclasses.asdict(objective.scoring),
+        "windows": len(objective.windows),
+        "search": [options.search, dataclasses.asdict(options.effort)],
+        "seed": seed,
+    }

@@ -1,0 +1,174 @@
+"""What an identification found, and all of it as JSON."""
+
+import dataclasses
+import math
+import platform
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Any
+
+from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.identifiability import Identifiability
+from hopping_leg.identify.parameters import ParameterSet
+from hopping_leg.identify.plan import Plan
+from hopping_leg.identify.recording import Recording
+from hopping_leg.identify.searching import Pass
+from hopping_leg.identify.validate import Validation
+from hopping_leg.robot.parameters import Robot
+
+_LIBRARIES = ("hopping-leg", "mujoco", "numpy", "scipy", "cma", "polars")
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What came out.
+
+    Attributes:
+        candidate: Robot and drives with the identified values.
+        start: Robot and drives before the fit.
+        plan: All decisions.
+        passes: Searches in order; the last one's end is the result.
+        told: Values, intervals, correlations, and what the data cannot tell.
+        fit: Recordings, or parts of them, that were fitted.
+        held: Recordings, or parts of them, that judge; the fit has not seen them.
+        split: ``held-out stretches`` or ``validation recordings``.
+        validation: Of the result on what was held.
+        start_validation: Of the start, likewise.
+        seed: Of all randomness.
+    """
+
+    candidate: Candidate
+    start: Candidate
+    plan: Plan
+    passes: tuple[Pass, ...]
+    told: Identifiability
+    fit: tuple[Recording, ...]
+    held: tuple[Recording, ...]
+    split: str
+    validation: Validation
+    start_validation: Validation
+    seed: int
+
+    @property
+    def robot(self) -> Robot:
+        """The robot with the identified values."""
+        return self.candidate.robot
+
+    @property
+    def parameters(self) -> ParameterSet:
+        """What the last pass fitted, with its bounds."""
+        return self.passes[-1].parameters
+
+
+def as_json(identified: Identified) -> dict[str, Any]:
+    """Return every number of an identification as JSON values; what does not exist is null."""
+    told, plan = identified.told, identified.plan
+    tree = {
+        "robot": identified.start.robot.name,
+        "robot_digest_before": identified.start.robot.digest,
+        "robot_digest": identified.robot.digest,
+        "validation": validation_json(identified.validation),
+        "start_validation": validation_json(identified.start_validation),
+        "parameters": parameters_json(identified),
+        "correlations": {"names": told.names, "matrix": told.correlation.tolist()},
+        "cannot_tell": told.statements,
+        "search": {
+            "method": plan.search,
+            "scoring": dataclasses.asdict(plan.scoring),
+            "window_s": plan.window,
+            "stride_s": plan.stride,
+            "unscored_s": plan.unscored,
+            "timestep_s": plan.timestep,
+            "passes": [_pass_json(p) for p in identified.passes],
+        },
+        "recordings": [
+            *_recordings_json(identified.fit, "fit"),
+            *_recordings_json(identified.held, "judge"),
+        ],
+        "split": identified.split,
+        "seed": identified.seed,
+        "versions": software_versions(),
+    }
+    plain: dict[str, Any] = _finite(tree)
+    return plain
+
+
+def validation_json(validation: Validation) -> dict[str, Any]:
+    """Return a validation under the names that other tools rely on, each value (hip, knee)."""
+    return {
+        "closed_loop_position_rms_rad": list(validation.closed_loop_position),
+        "closed_loop_torque_rms_nm": list(validation.closed_loop_torque),
+        "open_loop_position_rms_rad": {
+            f"{horizon:.1f}": list(pair) for horizon, pair in validation.open_loop_position.items()
+        },
+    }
+
+
+def parameters_json(identified: Identified) -> list[dict[str, Any]]:
+    """Return a record per parameter: value, 95 % interval, start and bounds, SI."""
+    told = identified.told
+    bounds = {p.name: p for p in identified.parameters.parameters}
+    first = {p.name: p.start for p in identified.plan.parameters.parameters}
+    rows = []
+    for index, name in enumerate(told.names):
+        value, half = float(told.values[index]), float(told.half_width[index])
+        rows.append(
+            {
+                "name": name,
+                "unit": bounds[name].unit,
+                "value": value,
+                "interval_low": value - half,
+                "interval_high": value + half,
+                "start": first.get(name, identified.start.get(name)),
+                "bound_low": bounds[name].low,
+                "bound_high": bounds[name].high,
+                "at_bound": bool(told.at_bound[index]),
+            }
+        )
+    return rows
+
+
+def software_versions() -> dict[str, str]:
+    """Return the versions that the numbers may depend on."""
+    return {"python": platform.python_version(), **{name: version(name) for name in _LIBRARIES}}
+
+
+def _pass_json(one: Pass) -> dict[str, Any]:
+    return {
+        "name": one.name,
+        "parameters": one.parameters.names,
+        "cost": one.found.cost,
+        "candidates": one.found.evaluations,
+        "history": one.found.history,
+        "other_starts": list(one.others),
+    }
+
+
+def _recordings_json(recordings: Iterable[Recording], use: str) -> Sequence[dict[str, Any]]:
+    return [
+        {
+            "name": r.name,
+            "use": use,
+            "sha256": r.digest,
+            "rows": len(r),
+            "first_s": float(r.time[0]),
+            "last_s": float(r.time[-1]),
+            "rig": r.setup.rig,
+            "rate_hz": r.setup.rate_hz,
+            "source": r.setup.source,
+            "warnings": list(r.warnings),
+        }
+        for r in recordings
+    ]
+
+
+def _finite(value: Any) -> Any:  # noqa: ANN401
+    """Return JSON values with null for numbers that do not exist."""
+    if isinstance(value, dict):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,68 @@
+"""The folder of one identification: what was asked for, checkpoints, result."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from hopping_leg.errors import UsageError
+from hopping_leg.trace import write_atomically
+
+_CONFIG, _RESULT = "config.json", "result.json"
+
+
+class RunFolder:
+    """Files of one run.
+
+    Args:
+        path: The folder.
+        config: What makes this run this run, as JSON values.
+    """
+
+    def __init__(self, path: Path, config: dict[str, Any]) -> None:
+        self.path, self._config = path, json.loads(json.dumps(config))
+
+    def begin(self, *, resume: bool) -> None:
+        """Prepare the folder.
+
+        Args:
+            resume: Go on with the run in it, if there is one; else a finished one is replaced.
+
+        Raises:
+            UsageError: It holds an unfinished run and ``resume`` is off, another run, or
+                something else.
+        """
+        config = self.path / _CONFIG
+        if not config.exists():
+            if self.path.exists() and (not self.path.is_dir() or any(self.path.iterdir())):
+                raise UsageError(f"{self.path} is not empty and holds no run; give another folder.")
+        elif resume:
+            self._check_same(config)
+        elif not (self.path / _RESULT).exists():
+            raise UsageError(
+                f"{self.path} holds an unfinished run; go on with --resume or give another"
+                " --folder."
+            )
+        else:
+            for file in (*self.path.glob("search-*.json"), self.path / _RESULT):
+                file.unlink()
+        _write(config, self._config)
+
+    def finish(self, result: dict[str, Any]) -> None:
+        """Write the result, which marks the run as finished."""
+        _write(self.path / _RESULT, result)
+
+    def _check_same(self, config: Path) -> None:
+        try:
+            stored = json.loads(config.read_bytes())
+            differences = [k for k, v in self._config.items() if stored.get(k) != v]
+        except (ValueError, AttributeError) as error:
+            raise UsageError(f"{config} is no run's; give another folder.") from error
+        if differences:
+            raise UsageError(
+                f"The run in {self.path} has another {differences[0].replace('_', ' ')}; resume it"
+                " with the recordings and options that it began with, or give another --folder."
+            )
+
+
+def _write(path: Path, content: dict[str, Any]) -> None:
+    write_atomically(path, f"{json.dumps(content, indent=1, allow_nan=False)}\n".encode())

@@ -1,0 +1,212 @@
+"""A plan's search carried out: every candidate with every window in one batch, on disk as it goes.
+
+Cost is the sum of squared residuals throughout.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.errors import UsageError
+from hopping_leg.identify.cluster import Cluster
+from hopping_leg.identify.cma import CmaOptions, cma_es
+from hopping_leg.identify.least_squares import (
+    Found,
+    LeastSquaresOptions,
+    Residuals,
+    least_squares,
+    multi_start,
+)
+from hopping_leg.identify.objective import Objective
+from hopping_leg.identify.parameters import ParameterSet
+from hopping_leg.identify.plan import Plan
+from hopping_leg.identify.setup import Rig
+from hopping_leg.identify.two_pass import pass_names, two_pass
+
+Report = Callable[[str, float, float], None]
+"""Called with what is being done, its share done (0 to 1) and the lowest cost so far."""
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """How hard to search."""
+
+    starts: int = 1
+    """Searches, the first from the robot's own values and the others from random ones."""
+    cma: CmaOptions = field(default_factory=CmaOptions)
+    """Of CMA-ES, in each pass."""
+    least_squares: LeastSquaresOptions = field(default_factory=LeastSquaresOptions)
+
+    def __post_init__(self) -> None:
+        if self.starts < 1 or self.cma.generations < 1 or self.cma.population < 4:
+            raise UsageError(
+                "A search needs at least one start, one generation and four candidates in each."
+            )
+
+
+@dataclass(frozen=True)
+class Pass:
+    """One search: the paper's method has two, others one.
+
+    Attributes:
+        name: Of the pass.
+        parameters: What it searched.
+        found: Where it ended, from the best of its starts.
+        others: Costs where the other starts ended, best first.
+    """
+
+    name: str
+    parameters: ParameterSet
+    found: Found
+    others: tuple[float, ...] = ()
+
+
+class Searcher:
+    """Searches as a plan says.
+
+    Args:
+        plan: What to search, how.
+        objective: Of the plan's parameters; a pass with others gets its own.
+        options: How hard.
+        seed: Of all randomness.
+        folder: For checkpoints; None keeps none.
+        report: Told of progress.
+        ray: Address of a Ray cluster that simulates, ``local`` for one on this machine; None
+            simulates here.
+        about: What else makes this run this run.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        objective: Objective,
+        options: SearchOptions,
+        seed: int,
+        folder: Path | None,
+        report: Report,
+        ray: str | None,
+        about: Mapping[str, object],
+    ) -> None:
+        self._plan, self._objective, self._options = plan, objective, options
+        self._seed, self._folder, self._report, self._ray = seed, folder, report, ray
+        self._about = dict(about)
+
+    def run(self, rigs: list[Rig]) -> list[Pass]:
+        """Return the passes in order; the last one's end is the result.
+
+        Args:
+            rigs: Of the recordings.
+        """
+        if self._plan.search != "two-pass":
+            return [self._pass(self._plan.search, self._plan.parameters, 0.0, 1.0)]
+        passes: list[Pass] = []
+
+        def search(name: str, parameters: ParameterSet) -> Found:
+            passes.append(self._pass(f"two-pass, {name}", parameters, 0.5 * len(passes), 0.5))
+            return passes[-1].found
+
+        known = [name for names in pass_names(rigs) for name in names]
+        own = self._plan.parameters.parameters
+        two_pass(
+            self._plan.start,
+            rigs,
+            search,
+            further=[p.name for p in own if p.name not in known],
+            start={p.name: p.start for p in own},
+            bounds={p.name: (p.low, p.high) for p in own},
+        )
+        return passes
+
+    def _pass(self, name: str, parameters: ParameterSet, begin: float, share: float) -> Pass:
+        """Search from every start and report within a share of the whole."""
+        objective = Objective(
+            self._objective.recordings,
+            self._objective.windows,
+            parameters,
+            self._objective.scoring,
+            self._objective.timestep,
+            self._objective.threads if self._ray is None else 1,
+        )
+        about = {**objective.about(), **self._about}
+        starts = self._options.starts
+        residuals: Residuals = objective.residuals
+        if self._ray is not None:
+            residuals = Cluster(objective.residuals, self._ray)
+
+        def search(number: int, start: Array) -> Found:
+            stage = name if starts == 1 else f"{name}, start {number + 1} of {starts}"
+
+            def told(done: float, cost: float) -> None:
+                self._report(stage, begin + share * (number + done) / starts, cost)
+
+            return self._search(f"{name}-{number}", parameters, residuals, start, about, told)
+
+        ends = multi_start(search, parameters, starts, self._seed)
+        return Pass(name, parameters, ends[0], tuple(end.cost for end in ends[1:]))
+
+    def _search(
+        self,
+        name: str,
+        parameters: ParameterSet,
+        residuals: Residuals,
+        start: Array,
+        about: Mapping[str, object],
+        told: Callable[[float, float], None],
+    ) -> Found:
+        file = f"search-{name.replace(', ', '-')}.json"
+        checkpoint = None if self._folder is None else self._folder / file
+        if self._plan.search == "least-squares":
+            rounds = _Rounds(residuals, self._options.least_squares, told)
+            return least_squares(
+                rounds,
+                parameters,
+                self._options.least_squares,
+                start=start,
+                about=about,
+                checkpoint=checkpoint,
+                report=rounds.finished,
+            )
+        generations = self._options.cma.generations
+        return cma_es(
+            lambda vectors: np.square(residuals(vectors)).sum(axis=1),
+            parameters,
+            self._options.cma,
+            seed=self._seed,
+            start=start,
+            about=about,
+            checkpoint=checkpoint,
+            report=lambda index, cost: told(index / generations, cost),
+        )
+
+
+class _Rounds:
+    """Residuals that tell how far least squares has come, counting the steps that it tries."""
+
+    def __init__(
+        self,
+        residuals: Residuals,
+        options: LeastSquaresOptions,
+        told: Callable[[float, float], None],
+    ) -> None:
+        self._residuals, self._options, self._told = residuals, options, told
+        self._round, self._tried, self._least = 0, 0, np.inf
+
+    def __call__(self, vectors: Array) -> Array:
+        """Return residuals of search vectors (n, k), (n, m)."""
+        values = self._residuals(vectors)
+        self._least = min(self._least, float(np.square(values).sum(axis=1).min()))
+        self._tried += len(vectors) == 1
+        self._tell()
+        return values
+
+    def finished(self, rounds: int, cost: float) -> None:
+        """Note that a round is over."""
+        self._round, self._tried, self._least = rounds, 0, cost
+        self._tell()
+
+    def _tell(self) -> None:
+        within = min(self._tried / self._options.evaluations, 1.0)
+        self._told(min((self._round + within) / self._options.rounds, 1.0), self._least)
