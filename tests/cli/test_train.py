@@ -44,6 +44,7 @@ def test_a_training_leaves_policy_card_and_json(tiny, tmp_path, capsys):
         (["--set", "learning_rate=fast"], "give e.g. learning_rate="),
         (["--set", "legs=2.5"], "a whole number"),
         (["--robot", "legv9"], "There is no robot"),
+        (["--robot", "twin"], "has effects in [reality] that training does not know"),
     ],
 )
 def test_bad_input_is_a_sentence_and_writes_nothing(arguments, says, tmp_path, capsys):

@@ -2,12 +2,15 @@
 
 import dataclasses
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from hopping_leg.errors import UsageError
-from hopping_leg.learn.recipes import RECIPES, change, changes_of, get_recipe
+from hopping_leg.learn.recipes import RECIPES, change, changes_of, get_recipe, randomised
+from hopping_leg.learn.run_folder import RunFolder
+from hopping_leg.robot import load_robot
 
 
 @given(
@@ -36,3 +39,27 @@ def test_a_cards_changes_give_the_recipe_again(name, steps, rate, privileged):
 def test_changes_without_meaning_get_a_sentence(entry, named):
     with pytest.raises(UsageError, match=named):
         change(get_recipe("fast"), [entry])
+
+
+def test_a_randomised_recipe_trains_legs_that_differ():
+    recipe = dataclasses.replace(get_recipe("fast"), legs=3)
+    robot = load_robot("legv2")
+    plain, mixed = recipe.make_env(robot, 0), randomised(recipe).make_env(robot, 0)
+    for env in (plain, mixed):
+        env.task.legs.stand(slice(None), [0.7, -1.4], 0.05)
+        for _ in range(40):
+            env.task.legs.step(np.full((3, 2), [1.0, -3.0]))
+    assert np.ptp(plain.task.legs.height) == 0
+    assert np.ptp(mixed.task.legs.height) > 1e-3
+
+
+def test_a_run_says_how_it_was_randomised_and_older_ones_were_not(tmp_path):
+    recipe, robot = get_recipe("fast"), load_robot("legv2")
+    folder = RunFolder(tmp_path, recipe, robot, 0, None)
+    assert "--randomise" not in folder.command
+    assert "--randomise" in RunFolder(tmp_path, randomised(recipe), robot, 0, None).command
+    del folder.config["options"]["task"]["randomised"]
+    folder.write("config.json", folder.config)
+    RunFolder(tmp_path, recipe, robot, 0, None).check_same()
+    with pytest.raises(UsageError, match="another options"):
+        RunFolder(tmp_path, randomised(recipe), robot, 0, None).check_same()

@@ -39,6 +39,8 @@ class Options:
     """Begin from the newest checkpoint of this folder's run instead of from scratch."""
     set: tuple[str, ...] = ()
     """Numbers of the recipe to change, e.g. `--set learning_rate=3e-4 gamma=0.98`."""
+    randomise: bool = False
+    """Let each leg draw friction, inertia and ground from the ranges that twins are drawn from."""
     minutes: float | None = None
     """Stop after so much wall-clock time; default: when the recipe's steps are done."""
     steps: int | None = None
@@ -51,7 +53,7 @@ class Options:
 
 def run(args: Options) -> None:
     """Train a controller."""
-    from hopping_leg.learn.recipes import change, get_recipe
+    from hopping_leg.learn.recipes import change, get_recipe, randomised
     from hopping_leg.learn.run_folder import read_result
     from hopping_leg.learn.train import train
 
@@ -63,6 +65,8 @@ def run(args: Options) -> None:
             raise UsageError(f"--steps is {args.steps} but must be at least 1.")
         recipe = dataclasses.replace(recipe, steps=args.steps)
     recipe = change(recipe, args.set)
+    if args.randomise:
+        recipe = randomised(recipe)
     out = args.out or Path("runs") / f"{args.recipe}-seed{args.seed}"
     try:
         trained = train(

@@ -8,6 +8,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.robot.limits import SoftLimits
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.sim import CONTROL_RATE, Disturbance
+from hopping_leg.sim.twins import Range
 
 Start = Literal["standing", "drop", "mixed", "hop"]
 
@@ -56,6 +57,8 @@ class TaskOptions:
     """Physics step, s."""
     disturbance: Disturbance = field(default_factory=Disturbance)
     """Noise and delay; the paper trains with them."""
+    randomised: tuple[Range, ...] = ()
+    """Where each leg draws its own numbers, once, instead of the robot's; none by default."""
     soft_limits: SoftLimits | None = field(default_factory=SoftLimits)
     """PD at the joint limits, added to the action's torque."""
 

@@ -13,6 +13,7 @@ from hopping_leg.env.transition import Reward, Transition
 from hopping_leg.hops import CLEAR
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import Legs, Measurement, Plant
+from hopping_leg.sim.variants import vary
 
 PRIVILEGED = 10
 """Entries of the true state that a critic may see."""
@@ -70,10 +71,15 @@ class HoppingTask:
     ) -> None:
         self.autoreset = autoreset
         self.robot, self.count, self.options, self.reward = robot, count, options, reward
+        noise, self._rng, draws = rng.spawn(3)
         self.legs = Legs(
-            robot, count, rate=options.rate, timestep=options.timestep, threads=threads
+            robot,
+            count,
+            rate=options.rate,
+            timestep=options.timestep,
+            threads=threads,
+            variants=vary(robot, options.randomised, count, draws) if options.randomised else (),
         )
-        noise, self._rng = rng.spawn(2)
         self.plant = Plant(self.legs, options.disturbance, options.soft_limits, noise)
         self.observation = make_observation(robot, options, count)
         self._scaling = sample_scaling(robot, options)
@@ -169,6 +175,7 @@ class HoppingTask:
         """Return everything needed to go on exactly from here, as arrays and plain values."""
         return {
             "physics": self.legs.batch.state.copy(),
+            "waiting": self.legs.waiting.copy(),
             "channel": self.plant.channel.state(),
             "command": self.command.copy(),
             "tick": self._tick,
@@ -184,6 +191,7 @@ class HoppingTask:
     def restore(self, state: dict[str, Any]) -> Array32:
         """Go on from a ``state``; return the observations, (n, size)."""
         self.legs.batch.state[:] = state["physics"]
+        self.legs.waiting[:] = state.get("waiting", 0.0)
         self.plant.channel.restore(state["channel"])
         self.command[:] = state["command"]
         self._tick = int(state["tick"])

@@ -9,6 +9,7 @@ from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.learn.fast import FastRecipe
 from hopping_leg.learn.paper import PaperRecipe
 from hopping_leg.learn.recipe import Recipe
+from hopping_leg.sim.twins import IDENTIFIABLE, Range
 
 RECIPES: dict[str, type[Recipe]] = {recipe.name: recipe for recipe in (FastRecipe, PaperRecipe)}
 """Every recipe that ``hop train`` knows."""
@@ -56,6 +57,13 @@ def change(recipe: Recipe, changes: Sequence[str]) -> Recipe:
             )
         values[name] = value
     return dataclasses.replace(recipe, **values)
+
+
+def randomised(recipe: Recipe, ranges: Sequence[Range] = IDENTIFIABLE) -> Recipe:
+    """Return the recipe on legs that each draw their own numbers, from the twins' by default."""
+    return dataclasses.replace(
+        recipe, task=dataclasses.replace(recipe.task, randomised=tuple(ranges))
+    )
 
 
 def numbers_of(recipe: Recipe) -> dict[str, int | float]:

@@ -69,6 +69,8 @@ class RunFolder:
             words += ["--source", config["source"]]
         if config["minutes_budget"] is not None:
             words += ["--minutes", f"{config['minutes_budget']:g}"]
+        if config["options"]["task"]["randomised"]:
+            words += ["--randomise"]
         changes = changes_of(config["recipe"], config["options"])
         return " ".join([*words, "--set", *changes] if changes else words)
 
@@ -123,6 +125,8 @@ class RunFolder:
             UsageError: It was not; the message names the first difference.
         """
         stored = json.loads(self._config_file.read_text(encoding="utf-8"))
+        # A run from before the option existed was asked for what is now its default.
+        stored.get("options", {}).get("task", {}).setdefault("randomised", [])
         for key in ("recipe", "robot_digest", "seed", "minutes_budget", "source", "options"):
             if stored.get(key) != self.config[key]:
                 raise UsageError(

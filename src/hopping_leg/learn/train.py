@@ -10,7 +10,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
 from hopping_leg.control.policy import Card
-from hopping_leg.errors import UsageError
+from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.learn import resumable
 from hopping_leg.learn.checkpoint import write_checkpoint
 from hopping_leg.learn.export import build_policy
@@ -77,7 +77,9 @@ def train(
 
     Raises:
         UsageError: ``out`` holds a run that cannot be continued like this.
+        RobotError: The robot has effects that training does not simulate.
     """
+    _refuse_reality(robot)
     if minutes is not None and not 0 < minutes < float("inf"):
         raise UsageError(f"--minutes is {minutes:g} but must be positive.")
     torch.set_num_threads(max(threads, 1))
@@ -89,6 +91,16 @@ def train(
         trainer.restore(tree)
     with TrainingProgress(f"{recipe.name} seed {seed}", quiet=quiet) as progress:
         return trainer.run(progress)
+
+
+def _refuse_reality(robot: Robot) -> None:
+    """Refuse a leg that plays the real one: who trains on it has nothing left to transfer."""
+    if not robot.reality.only_delays:
+        raise RobotError(
+            f"{robot.name} has effects in [reality] that training does not know; train on what is"
+            " believed of it, the robot that its file extends or one from `hop identify`, and"
+            " judge the policy on it with `hop evaluate`."
+        )
 
 
 class Trainer:

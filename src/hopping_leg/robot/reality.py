@@ -4,7 +4,7 @@ A robot file states it in the table ``[reality]``. The rest of the file stays wh
 training believe; only ``hopping_leg.sim`` makes the leg behave as stated here.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -111,6 +111,11 @@ class Reality:
     def neutral(self) -> bool:
         """Whether the leg behaves as the simulator for training has it."""
         return self == NEUTRAL
+
+    @property
+    def only_delays(self) -> bool:
+        """Whether nothing but a constant delay of commands is left, which training can simulate."""
+        return self == replace(NEUTRAL, latency=Latency(command=self.latency.command))
 
     def of_drives(self, attribute: str) -> Array:
         """Return an attribute of both drives, (2,); NaN where it is None."""

@@ -1,5 +1,7 @@
 """Many legs stepped at once on all cores."""
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 from mujoco import batch
@@ -39,6 +41,9 @@ class Legs:
     ``measured_q`` and ``measured_qd`` (n, 2) are what the joints' encoders report, live: the true
     state, unless the robot's ``reality`` says otherwise.
 
+    A command that is late by a constant time of at most one control period is all of a ``reality``
+    that is simulated here; the rest is left to ``RealLegs``, which is slower.
+
     Args:
         robot: The leg.
         count: Number of simulations n.
@@ -46,9 +51,11 @@ class Legs:
         timestep: Physics step, s; must divide the control period.
         threads: Worker threads, 0 for one per core.
         clamped: Fix the base where it is placed, for fixed-base runs.
+        variants: One robot per simulation, which may differ from ``robot`` in what ``sim.variants``
+            lets vary; none simulates ``robot`` n times.
 
     Raises:
-        UsageError: The physics step does not divide the control period.
+        UsageError: The physics step does not divide the control period, or the variants do not fit.
     """
 
     def __init__(
@@ -60,14 +67,21 @@ class Legs:
         timestep: float = TIMESTEP,
         threads: int = 0,
         clamped: bool = False,
+        variants: Sequence[Robot] = (),
     ) -> None:
         substeps = _substeps(rate, timestep)
         self.robot, self.count, self.rate, self.timestep = robot, count, rate, timestep
         self.period = 1 / rate
         self.substeps = substeps
         self.real: RealLegs | None = None
-        if robot.reality.neutral and not clamped:
-            self._take_model(threads)
+        self._late = round(robot.reality.latency.command / timestep)
+        if robot.reality.only_delays and self._late <= substeps and not clamped:
+            self._take_model(threads, variants)
+        elif variants:
+            raise UsageError(
+                f"Variants of {robot.name} cannot be simulated: it is clamped or has effects in"
+                " [reality] beyond a delay; vary a robot without."
+            )
         else:
             self._take_reality(clamped, threads)
         self.height, self.height_rate = self.state[:, 0], self.state[:, 3]
@@ -77,10 +91,16 @@ class Legs:
         self._motors = MotorLimit(robot, count)
         self._inverse_belt = np.tile(1 / robot.of_joints("belt_ratio"), (count, 1))
         self._applied = np.zeros((count, 2))
+        self.waiting = np.zeros((count, 2))
+        """Torques that the motors gave last and give on until a late command arrives, N m."""
 
-    def _take_model(self, threads: int) -> None:
+    def _take_model(self, threads: int, variants: Sequence[Robot]) -> None:
         model = build_model(self.robot, self.timestep)
         self.batch = batch.Batch(model, self.count, threads)
+        if variants:
+            if len(variants) != self.count:
+                raise UsageError(f"{len(variants)} variants were given for {self.count} legs.")
+            self.batch.set_models([build_model(v, self.timestep) for v in variants])
         self._ctrl = self.batch.bind("ctrl")
         first = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_TIME)
         self.state = self.batch.state[:, first : first + 6]
@@ -114,6 +134,7 @@ class Legs:
             self.real.place(rows, height, q)
             return
         self._applied = np.zeros((self.count, 2))
+        self.waiting[rows] = 0
         self.batch.reset(np.sort(rows), stage=0)
         self.height[ids] = height
         self.q[ids] = q
@@ -133,10 +154,25 @@ class Legs:
         """
         if self.real is not None:
             return self.real.step(torque)
+        if self._late:
+            return self._step_late(torque)
         self._applied = applied = self._motors.clip(torque, self.qd)
         np.multiply(applied, self._inverse_belt, out=self._ctrl)
         self.batch.step(nstep=self.substeps)
         return applied
+
+    def _step_late(self, torque: Array) -> Array:
+        """Go on with the torques of before until the new ones arrive; return their mean."""
+        late, before = self._late, self.waiting
+        np.multiply(before, self._inverse_belt, out=self._ctrl)
+        self.batch.step(nstep=late)
+        after = self._motors.clip(torque, self.qd)
+        if late < self.substeps:
+            np.multiply(after, self._inverse_belt, out=self._ctrl)
+            self.batch.step(nstep=self.substeps - late)
+        self.waiting = after
+        self._applied = before + (1 - late / self.substeps) * (after - before)
+        return self._applied
 
     def foot_clearance(self) -> Array:
         """Return the gap between each foot and the ground, m, (n,)."""

@@ -1,0 +1,64 @@
+"""Legs that differ: the same robot with numbers drawn anew for each, for domain randomisation.
+
+The paper fits one simulation to the robot and rejects the alternative, training on many; this is
+that alternative. Controllers and rewards go on believing the robot itself, so only what the physics
+alone reads may vary: sizes, motors and joint limits may not.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+
+from hopping_leg.errors import UsageError, unknown_name
+from hopping_leg.robot.fields import check_physics
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim.twins import Range
+
+VARIABLE = (
+    "base.mass",
+    "rail.friction",
+    "rail.damping",
+    *(f"{link}.{name}" for link in ("thigh", "shank") for name in ("mass", "com", "inertia")),
+    *(f"contact.{name}" for name in ("time_constant", "damping_ratio", "friction")),
+    *(f"{joint}.{n}" for joint in ("hip", "knee") for n in ("friction", "damping", "armature")),
+)
+"""Numbers of a robot that may differ from leg to leg."""
+
+Part = TypeVar("Part")
+
+
+def vary(
+    robot: Robot, ranges: Sequence[Range], count: int, rng: np.random.Generator
+) -> tuple[Robot, ...]:
+    """Return a robot as often as asked for, each with its own numbers.
+
+    Args:
+        robot: What is not drawn.
+        ranges: What is drawn, in this order, leg by leg.
+        count: How many.
+        rng: Source of randomness.
+
+    Raises:
+        UsageError: A range's number may not differ from leg to leg.
+        RobotError: A drawn number contradicts the robot.
+    """
+    for spread in ranges:
+        if spread.path not in VARIABLE:
+            raise UsageError(unknown_name("number that may vary", spread.path, VARIABLE))
+    variants = []
+    for number in range(count):
+        variant = robot
+        for spread in ranges:
+            variant = _with(variant, spread.path.split("."), spread.draw(rng))
+        check_physics(variant, f"variant {number} of {robot.name}")
+        variants.append(variant)
+    return tuple(variants)
+
+
+def _with(part: Part, path: list[str], value: float) -> Part:
+    """Return a nested dataclass with one number replaced."""
+    name, *rest = path
+    entry: Any = _with(getattr(part, name), rest, value) if rest else value
+    return dataclasses.replace(part, **{name: entry})  # type: ignore[type-var]

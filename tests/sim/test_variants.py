@@ -1,0 +1,126 @@
+"""Each leg of a batch gets its own numbers; a constant delay is the one that twins have."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from hopping_leg.env import HoppingTask, PaperReward, TaskOptions
+from hopping_leg.errors import RobotError, UsageError
+from hopping_leg.robot import load_robot
+from hopping_leg.robot.reality import Latency, Reality
+from hopping_leg.sim import Legs
+from hopping_leg.sim.twins import IDENTIFIABLE, Range
+from hopping_leg.sim.variants import vary
+
+LEG = load_robot("legv2")
+POSTURE = np.array([0.7, -1.4])
+
+
+def drawn(count, seed=0, ranges=IDENTIFIABLE):
+    return vary(LEG, ranges, count, np.random.default_rng(seed))
+
+
+def states(legs, ticks=60):
+    """Return the states of legs that push off and land, (ticks, n, 6)."""
+    legs.stand(slice(None), POSTURE, 0.05)
+    rng = np.random.default_rng(1)
+    found = []
+    for _ in range(ticks):
+        legs.step(np.tile(rng.uniform(-4, 4, 2), (legs.count, 1)))
+        found.append(legs.state.copy())
+    return np.stack(found)
+
+
+def test_every_leg_moves_as_its_own_robot_does_alone():
+    robots = drawn(4)
+    together = states(Legs(LEG, 4, threads=1, variants=robots))
+    for index, robot in enumerate(robots):
+        alone = states(Legs(robot, 1, threads=1))
+        np.testing.assert_array_equal(together[:, index], alone[:, 0])
+    assert np.ptp(together[-1, :, 0]) > 1e-3
+
+
+@pytest.mark.parametrize("spread", IDENTIFIABLE, ids=lambda spread: spread.path)
+def test_every_range_of_the_twins_reaches_the_physics(spread):
+    low, high = (dataclasses.replace(spread, low=v, high=v) for v in (spread.low, spread.high))
+    robots = [vary(LEG, [end], 1, np.random.default_rng(0))[0] for end in (low, high)]
+    one, other = np.moveaxis(states(Legs(LEG, 2, threads=1, variants=robots)), 1, 0)
+    assert np.abs(one - other).max() > 1e-6
+
+
+def test_the_seed_fixes_the_draws_and_ranges_hold():
+    assert drawn(5, seed=3) == drawn(5, seed=3)
+    assert drawn(5, seed=3) != drawn(5, seed=4)
+    values = [robot.contact.time_constant for robot in drawn(50)]
+    assert 0.02 <= min(values) < 0.03
+    assert 0.06 < max(values) <= 0.09
+    assert {robot.thigh.length for robot in drawn(5)} == {LEG.thigh.length}
+
+
+def test_what_controllers_believe_may_not_vary():
+    with pytest.raises(UsageError, match=r"thigh\.length"):
+        drawn(2, ranges=[Range("thigh.length", "m", 0.1, 0.2, "test")])
+    with pytest.raises(RobotError, match="time_constant"):
+        drawn(2, ranges=[Range("contact.time_constant", "s", 1e-4, 1e-4, "test")])
+    with pytest.raises(UsageError, match="3 variants were given for 2 legs"):
+        Legs(LEG, 2, variants=drawn(3))
+    with pytest.raises(UsageError, match="clamped"):
+        Legs(LEG, 2, variants=drawn(2), clamped=True)
+
+
+def task(seed, ranges=IDENTIFIABLE):
+    options = TaskOptions(randomised=tuple(ranges), start="mixed", episode=0.2)
+    return HoppingTask(LEG, 5, options, PaperReward(LEG), np.random.default_rng(seed), 1)
+
+
+def heights(one, ticks=80):
+    plan = np.random.default_rng(2).uniform(-1, 1, (ticks, 5, 2))
+    return np.stack([one.step(action).height for action in plan])
+
+
+def test_a_randomised_task_repeats_with_its_seed_and_goes_on_exactly():
+    np.testing.assert_array_equal(heights(task(0)), heights(task(0)))
+    assert not np.array_equal(heights(task(0)), heights(task(1)))
+    one, other = task(0), task(0)
+    heights(one, 30)
+    other.restore(one.state())
+    np.testing.assert_array_equal(heights(one), heights(other))
+
+
+def test_randomising_draws_nothing_from_the_task_itself():
+    fixed = Range("rail.friction", "N", LEG.rail.friction, LEG.rail.friction, "as it is")
+    np.testing.assert_array_equal(heights(task(0, [fixed])), heights(task(0, [])))
+
+
+def late(delay, **effects):
+    return dataclasses.replace(LEG, reality=Reality(latency=Latency(command=delay), **effects))
+
+
+@pytest.mark.parametrize("delay", [5e-4, 2e-3, 5e-3])
+def test_a_constant_delay_is_the_one_that_twins_have(delay):
+    fast, slow = Legs(late(delay), 3, threads=1), Legs(late(delay, voltage=1 - 1e-12), 3, threads=1)
+    assert fast.real is None
+    assert slow.real is not None
+    np.testing.assert_allclose(states(fast), states(slow), atol=1e-8)
+    assert np.abs(states(fast) - states(Legs(LEG, 3, threads=1))).max() > 1e-3
+
+
+def test_a_late_task_goes_on_exactly():
+    def begin():
+        rng = np.random.default_rng(0)
+        return HoppingTask(late(2e-3), 5, TaskOptions(episode=0.2), PaperReward(LEG), rng, 1)
+
+    one, other = begin(), begin()
+    heights(one, 33)
+    other.restore(one.state())
+    np.testing.assert_array_equal(heights(one), heights(other))
+
+
+def test_a_leg_that_begins_anew_has_no_command_under_way():
+    legs = Legs(late(2e-3), 2, threads=1)
+    legs.stand(slice(None), POSTURE, 0.1)
+    legs.step(np.full((2, 2), 5.0))
+    legs.stand(np.array([0]), POSTURE, 0.1)
+    legs.step(np.zeros((2, 2)))
+    assert np.abs(legs.qd[0]).max() < 0.2 * np.abs(legs.qd[1]).max()
