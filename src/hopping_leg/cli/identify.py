@@ -25,6 +25,7 @@ from rich.table import Table
 from hopping_leg.cli.fit_progress import FitProgress
 from hopping_leg.cli.output import write_json
 from hopping_leg.errors import UsageError
+from hopping_leg.evaluate.fit_report import write_fit_report
 from hopping_leg.identify.cma import CmaOptions
 from hopping_leg.identify.ownership import robot_of
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
@@ -33,6 +34,9 @@ from hopping_leg.identify.result import Identified, as_json, parameters_json
 from hopping_leg.identify.robot_file import save_robot
 from hopping_leg.identify.searching import SearchOptions
 from hopping_leg.robot import load_robot
+from hopping_leg.trace import write_atomically
+
+_FILES = {"out": "Robot", "json": "Numbers", "report": "Report"}
 
 Names = Annotated[
     tuple[str, ...],
@@ -116,8 +120,14 @@ def run(args: Identify) -> None:
     save_robot(identified, args.out, origin)
     if args.json:
         write_json(args.json, {"command": _command(args), **as_json(identified)})
+    if args.report:
+        page = write_fit_report(identified, _command(args), args.threads)
+        write_atomically(args.report, page)
     _show(console, identified)
-    console.print(f"Robot: {args.out}", highlight=False, soft_wrap=True)
+    for name in ("out", "json", "report"):
+        path = getattr(args, name)
+        if path is not None:
+            console.print(f"{_FILES[name]}: {path}", highlight=False, soft_wrap=True)
 
 
 def _options(args: Identify) -> IdentifyOptions:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from importlib import resources
 from typing import Any
 
-from jinja2 import Environment, StrictUndefined
+from jinja2 import Environment, StrictUndefined, Template
 from markupsafe import Markup
 
 from hopping_leg.evaluate import markup
@@ -29,9 +29,7 @@ def write_report(judged: Judged, videos: dict[str, Video] | None = None) -> byte
         videos: Controller to its video; none are shown by default.
     """
     evaluation = judged.evaluation
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    template = resources.files("hopping_leg.evaluate") / "report.html.j2"
-    page = environment.from_string(template.read_text(encoding="utf-8")).render(
+    page = page_template("report.html.j2").render(
         title=f"Hopping leg: {', '.join(evaluation.controllers)}",
         subtitle=_subtitle(evaluation),
         evaluation=evaluation,
@@ -41,6 +39,14 @@ def write_report(judged: Judged, videos: dict[str, Video] | None = None) -> byte
         conditions=_conditions(evaluation),
     )
     return page.encode()
+
+
+def page_template(name: str) -> Template:
+    """Return a page's template of this package, which finds the common look as ``style``."""
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    folder = resources.files("hopping_leg.evaluate")
+    environment.globals["style"] = Markup((folder / "report.css").read_text(encoding="utf-8"))
+    return environment.from_string((folder / name).read_text(encoding="utf-8"))
 
 
 def render_videos(judged: Judged, robot: Robot) -> dict[str, Video]:

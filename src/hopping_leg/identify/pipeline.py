@@ -100,7 +100,12 @@ def identify(
         run.begin(resume=resume)
     searcher = Searcher(plan, objective, options.effort, seed, folder, report, options.ray, about)
     passes = searcher.run([r.setup.rig for r in recordings])
-    candidate, told = _conclude(objective, passes[-1], options)
+    try:
+        candidate, told = _conclude(objective, passes[-1], options)
+    except PhysicsError as error:
+        if run is not None:
+            run.finish({"failed": str(error)})
+        raise
     identified = Identified(
         candidate=candidate,
         start=plan.start,

@@ -32,23 +32,25 @@ class RunFolder:
                 something else.
         """
         config = self.path / _CONFIG
+        checkpoints = list(self.path.glob("search-*.json"))
+        finished = (self.path / _RESULT).exists()
         if not config.exists():
             if self.path.exists() and (not self.path.is_dir() or any(self.path.iterdir())):
                 raise UsageError(f"{self.path} is not empty and holds no run; give another folder.")
-        elif resume:
+        elif resume and checkpoints:
             self._check_same(config)
-        elif not (self.path / _RESULT).exists():
+            return
+        elif checkpoints and not finished:
             raise UsageError(
                 f"{self.path} holds an unfinished run; go on with --resume or give another"
                 " --folder."
             )
-        else:
-            for file in (*self.path.glob("search-*.json"), self.path / _RESULT):
-                file.unlink()
+        for file in (*checkpoints, self.path / _RESULT):
+            file.unlink(missing_ok=True)
         _write(config, self._config)
 
     def finish(self, result: dict[str, Any]) -> None:
-        """Write the result, which marks the run as finished."""
+        """Write the result, or why there is none; either marks the run as finished."""
         _write(self.path / _RESULT, result)
 
     def _check_same(self, config: Path) -> None:

@@ -1,0 +1,145 @@
+"""How well an identified robot follows its recordings: overlays, residual spectra, cost."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.signal import lombscargle
+
+from hopping_leg.arrays import Array
+from hopping_leg.evaluate.figures.style import TORQUE_MAP, WIDTH, colour, styled
+from hopping_leg.identify.overlay import Overlay
+from hopping_leg.identify.searching import Pass
+
+JOINTS = ("hip", "knee")
+LABELS = {"position": "position / rad", "torque": "torque / N m"}
+
+_SHOWN = 6.0
+"""Longest stretch that is drawn, s."""
+
+_SAMPLES = 8000
+"""Residuals that a spectrum takes at most; more change nothing that can be seen."""
+
+
+@styled
+def draw_overlay(overlay: Overlay) -> Figure:
+    """Draw measured and simulated positions and torques of the stretch that fits worst."""
+    rows = worst_stretch(overlay)
+    time = overlay.recording.time[rows]
+    figure = Figure(figsize=(WIDTH, 4.4), layout="constrained")
+    panels = figure.subplots(2, 2, sharex=True, squeeze=False)
+    for line, (quantity, label) in zip(panels, LABELS.items(), strict=True):
+        for joint, axes in enumerate(line):
+            _draw_joint(axes, overlay, quantity, joint, rows, time)
+            axes.set_ylabel(f"{JOINTS[joint]} {label}")
+    for axes in panels[-1]:
+        axes.set_xlabel("time / s")
+    panels[0][0].legend(loc="upper right", ncols=3)
+    return figure
+
+
+def worst_stretch(overlay: Overlay) -> slice:
+    """Return the rows of the stretch with the largest position errors after the fit."""
+    time = overlay.recording.time
+    if time[-1] - time[0] <= _SHOWN:
+        return slice(0, len(time))
+    error = np.nansum(np.square(overlay.errors("position")[-1]), axis=-1)
+    stops = np.searchsorted(time, time + _SHOWN)
+    starts = np.flatnonzero(time <= time[-1] - _SHOWN)
+    total = np.concatenate([[0.0], np.cumsum(error)])
+    first = int(starts[np.argmax(total[stops[starts]] - total[starts])])
+    return slice(first, int(stops[first]))
+
+
+def _draw_joint(
+    axes: Axes, overlay: Overlay, quantity: str, joint: int, rows: slice, time: Array
+) -> None:
+    measured = getattr(overlay, quantity)[rows, joint]
+    before, after = getattr(overlay, f"simulated_{quantity}")[:, rows, joint]
+    known = ~np.isnan(measured)
+    axes.plot(
+        time[known], measured[known], ".", color="0.25", markersize=2.2, label="measured", zorder=3
+    )
+    axes.plot(time, before, color=colour(4), linewidth=0.9, label="before")
+    axes.plot(time, after, color=colour(0), linewidth=1.1, label="after", zorder=2.5)
+    if known.any():
+        _zoom(axes, measured[known], after)
+    axes.margins(x=0.01)
+
+
+def _zoom(axes: Axes, measured: Array, after: Array) -> None:
+    """Leave what runs away before the fit outside the picture."""
+    shown = np.concatenate([measured, after[np.isfinite(after)]])
+    low, high = shown.min(), shown.max()
+    room = 0.15 * (high - low) + 1e-6
+    axes.set_ylim(low - room, high + 1.6 * room)
+
+
+@styled
+def draw_spectra(overlays: Sequence[Overlay]) -> Figure:
+    """Draw the residuals' amplitude over frequency, before and after the fit."""
+    figure = Figure(figsize=(WIDTH, 4.4), layout="constrained")
+    panels = figure.subplots(2, 2, sharex=True, squeeze=False)
+    for line, (quantity, label) in zip(panels, LABELS.items(), strict=True):
+        for joint, axes in enumerate(line):
+            for index, (name, shade) in enumerate((("before", colour(4)), ("after", colour(0)))):
+                frequency, amplitude = residual_spectrum(overlays, quantity, joint, index)
+                axes.loglog(frequency, amplitude, color=shade, linewidth=1.0, label=name)
+            axes.set_ylabel(f"{JOINTS[joint]} {label}")
+    for axes in panels[-1]:
+        axes.set_xlabel("frequency / Hz")
+    if panels[0][0].lines:
+        panels[0][0].legend()
+    return figure
+
+
+def residual_spectrum(
+    overlays: Sequence[Overlay], quantity: str, joint: int, candidate: int
+) -> tuple[Array, Array]:
+    """Return frequencies, Hz, and rms amplitudes of residuals over recordings.
+
+    By Lomb and Scargle, as samples are sparse and their times jitter; empty where there is none.
+    """
+    powers, rate = [], max(o.recording.setup.rate_hz for o in overlays)
+    longest = max(float(o.recording.time[-1] - o.recording.time[0]) for o in overlays)
+    frequency = np.geomspace(max(0.2, 2 / longest), rate / 2, 150)
+    for overlay in overlays:
+        residual = overlay.errors(quantity)[candidate, :, joint]
+        known = np.flatnonzero(np.isfinite(residual))[:_SAMPLES]
+        if len(known) < 50:
+            continue
+        values = residual[known] - residual[known].mean()
+        time = overlay.recording.time[known]
+        powers.append(lombscargle(time, values, 2 * np.pi * frequency) / (len(known) / 4))
+    if not powers:
+        return np.empty(0), np.empty(0)
+    return frequency, np.sqrt(np.maximum(np.mean(powers, axis=0), 1e-24))
+
+
+@styled
+def draw_course(passes: Sequence[Pass]) -> Figure:
+    """Draw the lowest cost after each round or generation."""
+    figure = Figure(figsize=(WIDTH, 2.8), layout="constrained")
+    for axes, one in zip(figure.subplots(1, len(passes), squeeze=False)[0], passes, strict=True):
+        history = one.found.history
+        axes.semilogy(np.arange(1, len(history) + 1), history, ".-", color=colour(0), linewidth=1.0)
+        axes.set_title(one.name)
+        axes.set_xlabel("round" if one.name.startswith("least") else "generation")
+        axes.xaxis.get_major_locator().set_params(integer=True)
+        axes.set_ylabel("cost")
+    return figure
+
+
+@styled
+def draw_correlations(names: Sequence[str], matrix: Array) -> Figure:
+    """Draw how the parameters' errors hang together; white is not at all."""
+    size = 1.8 + 0.3 * len(names)
+    figure = Figure(figsize=(min(WIDTH, size + 1.0), min(WIDTH, size)), layout="constrained")
+    axes = figure.subplots()
+    shown = axes.imshow(matrix, vmin=-1, vmax=1, cmap=TORQUE_MAP)
+    axes.set_xticks(range(len(names)), names, rotation=60, ha="right", rotation_mode="anchor")
+    axes.set_yticks(range(len(names)), names)
+    axes.grid(visible=False)
+    figure.colorbar(shown, ax=axes, shrink=0.8, label="correlation")
+    return figure
