@@ -89,10 +89,11 @@ class PaperReward:
         change = t.action - t.last_action
         np.vecdot(change, change, out=jerk)
         size = np.abs(offset)
-        within = np.minimum(size, self._bound)
-        np.vecdot(np.cosh(_SHARPNESS * within[:, 1:3]), self._steepness, out=position)
         outside = size > self._bound
-        if np.count_nonzero(outside):
+        exceeds = np.count_nonzero(outside)
+        within = np.minimum(size, self._bound) if exceeds else size
+        np.vecdot(np.cosh(_SHARPNESS * within[:, 1:3]), self._steepness, out=position)
+        if exceeds:
             position -= np.vecdot(outside[:, 1:3], self._surplus)
             over = square - within * within
             np.add(over[:, 4], over[:, 5], out=velocity)
