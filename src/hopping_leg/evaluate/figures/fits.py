@@ -58,11 +58,9 @@ def _draw_joint(
     measured = getattr(overlay, quantity)[rows, joint]
     before, after = getattr(overlay, f"simulated_{quantity}")[:, rows, joint]
     known = ~np.isnan(measured)
-    axes.plot(
-        time[known], measured[known], ".", color="0.25", markersize=2.2, label="measured", zorder=3
-    )
+    axes.plot(time[known], measured[known], ".", color="0.55", markersize=3.0, label="measured")
     axes.plot(time, before, color=colour(4), linewidth=0.9, label="before")
-    axes.plot(time, after, color=colour(0), linewidth=1.1, label="after", zorder=2.5)
+    axes.plot(time, after, color=colour(0), linewidth=1.1, label="after")
     if known.any():
         _zoom(axes, measured[known], after)
     axes.margins(x=0.01)
@@ -135,7 +133,7 @@ def draw_course(passes: Sequence[Pass]) -> Figure:
 def draw_correlations(names: Sequence[str], matrix: Array) -> Figure:
     """Draw how the parameters' errors hang together; white is not at all."""
     size = 1.8 + 0.3 * len(names)
-    figure = Figure(figsize=(min(WIDTH, size + 1.0), min(WIDTH, size)), layout="constrained")
+    figure = Figure(figsize=(min(WIDTH, size + 1.5), min(WIDTH, size)), layout="constrained")
     axes = figure.subplots()
     shown = axes.imshow(matrix, vmin=-1, vmax=1, cmap=TORQUE_MAP)
     axes.set_xticks(range(len(names)), names, rotation=60, ha="right", rotation_mode="anchor")

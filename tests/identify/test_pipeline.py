@@ -1,0 +1,196 @@
+"""The whole identification on a twin: found, judged, resumed, refused."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from hopping_leg.errors import PhysicsError, RecordingError, UsageError
+from hopping_leg.identify import pipeline
+from hopping_leg.identify.pipeline import identify
+from hopping_leg.identify.result import as_json
+from hopping_leg.identify.searching import SearchOptions
+from hopping_leg.robot import load_robot
+from tests.identify.fitting import EFFORT, TRUTH, TWIN, identified, options, run
+from tests.identify.twin import LEG, record, swing
+
+
+def test_the_twin_is_found_and_predicted():
+    found = identified()
+    for name, value in TRUTH.items():
+        assert found.candidate.get(name) == pytest.approx(value, rel=5e-3)
+    assert max(found.validation.closed_loop_position) < 1e-4
+    assert max(found.start_validation.closed_loop_position) > 1e-3
+    assert found.split == "held-out stretches"
+
+
+def test_the_fit_never_sees_what_judges_it():
+    found = identified()
+    fitted = np.concatenate([r.time for r in found.fit])
+    judged = np.concatenate([r.time for r in found.held])
+    assert not set(fitted) & set(judged)
+    assert len(judged) == pytest.approx(0.25 * len(run()), abs=2)
+
+
+def test_recordings_to_judge_by_replace_the_split():
+    found = identify([run()], LEG, validate=[run(1.0)], options=options())
+    assert [r.name for r in found.fit] == [run().name]
+    assert [r.name for r in found.held] == [run(1.0).name]
+    assert max(found.validation.closed_loop_position) < 1e-4
+
+
+def test_the_reality_of_a_twin_is_no_part_of_what_is_identified():
+    found = identify([run()], load_robot("twin"), options=options())
+    assert found.robot.reality.neutral
+
+
+@pytest.mark.parametrize("search", ["least-squares", "cma", "two-pass"])
+def test_an_interrupted_run_resumes_to_the_same_bits(tmp_path, search):
+    chosen = options(search=search)
+    if search == "two-pass":
+        few = dataclasses.replace(EFFORT.cma, generations=2)
+        chosen = options(search=search, effort=dataclasses.replace(EFFORT, cma=few))
+    whole = identify([run()], LEG, options=chosen, seed=3)
+
+    def interrupt(stage, share, cost):
+        if share >= 0.5:
+            raise KeyboardInterrupt
+
+    folder = tmp_path / "run"
+    with pytest.raises(KeyboardInterrupt):
+        identify([run()], LEG, options=chosen, seed=3, folder=folder, report=interrupt)
+    shares = []
+    resumed = identify(
+        [run()],
+        LEG,
+        options=chosen,
+        seed=3,
+        folder=folder,
+        resume=True,
+        report=lambda stage, share, cost: shares.append(share),
+    )
+    assert as_json(resumed) == as_json(whole)
+    assert json.loads((folder / "result.json").read_text()) == as_json(whole)
+    assert shares == sorted(shares)
+    assert shares[-1] <= 1.0
+
+
+def test_a_folder_keeps_its_run(tmp_path):
+    folder = tmp_path / "run"
+
+    def interrupt(stage, share, cost):
+        if share > 0.3:
+            raise KeyboardInterrupt
+
+    chosen = options(search="cma")
+    with pytest.raises(KeyboardInterrupt):
+        identify([run()], LEG, options=chosen, folder=folder, report=interrupt)
+    with pytest.raises(UsageError, match="unfinished run; go on with --resume"):
+        identify([run()], LEG, options=chosen, folder=folder)
+    with pytest.raises(UsageError, match="another seed"):
+        identify([run()], LEG, options=chosen, folder=folder, resume=True, seed=1)
+    identify([run()], LEG, options=chosen, folder=folder, resume=True)
+    identify([run()], LEG, options=chosen, folder=folder, seed=1)
+    assert json.loads((folder / "result.json").read_text())["seed"] == 1
+
+
+def test_a_folder_with_other_things_is_left_alone(tmp_path):
+    (tmp_path / "thesis.tex").write_text("years of work")
+    with pytest.raises(UsageError, match="holds no run"):
+        identify([run()], LEG, options=options(), folder=tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_the_best_of_many_starts_counts():
+    many = dataclasses.replace(EFFORT, starts=2)
+    found = identify([run()], LEG, options=options(effort=many))
+    (one,) = found.passes
+    assert len(one.others) == 1
+    assert one.found.cost <= min(one.others)
+
+
+def test_the_paper_search_has_two_passes_over_its_table():
+    few = SearchOptions(cma=dataclasses.replace(EFFORT.cma, generations=1))
+    found = identify([run()], LEG, options=options(search="two-pass", parameters=None, effort=few))
+    first, second = found.passes
+    assert "thigh.inertia" not in first.parameters.names
+    assert "thigh.inertia" in second.parameters.names
+    assert found.told.names == second.parameters.names
+
+
+def test_threads_change_no_bit():
+    one, two = (
+        identify([run()], LEG, options=options(threads=threads, search="cma")) for threads in (1, 2)
+    )
+    assert as_json(one) == as_json(two)
+
+
+@pytest.mark.slow
+def test_a_cluster_changes_no_bit():
+    pytest.importorskip("ray", reason="Ray is not installed (extra 'cluster')")
+    for search in ("cma", "least-squares"):
+        here, there = (
+            identify([run()], LEG, options=options(search=search, ray=ray))
+            for ray in (None, "local")
+        )
+        assert as_json(here) == as_json(there)
+
+
+def test_a_fit_that_breaks_down_is_no_result(tmp_path, monkeypatch):
+    searched = pipeline.Searcher.run
+
+    def wild(self, rigs):
+        (one,) = searched(self, rigs)
+        _, high = one.parameters.bounds
+        return [dataclasses.replace(one, found=dataclasses.replace(one.found, vector=high))]
+
+    monkeypatch.setattr(pipeline.Searcher, "run", wild)
+    chosen = options(
+        parameters=("drive.hip.stiffness",),
+        bounds={"drive.hip.stiffness": (0.0, 1e12)},
+    )
+    setup = dataclasses.replace(
+        run().setup, gains_exact=False, onboard="continuous", torque_limit=(1e12, 1e12)
+    )
+    strong = dataclasses.replace(run(), setup=setup)
+    motor = dataclasses.replace(LEG.hip.motor, peak_torque=1e12, no_load_speed=1e12)
+    robot = dataclasses.replace(LEG, hip=dataclasses.replace(LEG.hip, motor=motor))
+    folder = tmp_path / "run"
+    with pytest.raises(PhysicsError, match="The fit failed"):
+        identify([strong], robot, options=chosen, folder=folder)
+    assert "The fit failed" in (folder / "result.json").read_text()
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"parameters": ("hip.frction",)}, "Did you mean 'hip.friction'"),
+        ({"bounds": {"hip.friction": (0.5, 1.0)}}, "exclude its start"),
+        ({"bounds": {"knee.friction": (0.0, 1.0)}}, "which is not fitted"),
+        ({"search": "two-passes"}, "Did you mean 'two-pass'"),
+        ({"threads": -1}, "must not be negative"),
+    ],
+)
+def test_options_without_meaning_get_a_sentence(changes, sentence, tmp_path):
+    with pytest.raises(UsageError, match=sentence):
+        identify([run()], LEG, options=options(**changes), folder=tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_data_without_meaning_get_a_sentence():
+    with pytest.raises(RecordingError, match="too short"):
+        identify([record(LEG, swing(2.0))], LEG, options=options())
+    with pytest.raises(RecordingError, match="another leg's robot file"):
+        identify([run()], load_robot("legv1"), options=options())
+    with pytest.raises(RecordingError, match="is a pendulum"):
+        identify([run()], load_robot("doublependulum"), options=options())
+    known = dataclasses.replace(run(), digest="abc")
+    with pytest.raises(UsageError, match="use each for one"):
+        identify([known], LEG, validate=[known], options=options())
+    with pytest.raises(UsageError, match="at least one start"):
+        SearchOptions(starts=0)
+
+
+def test_the_twin_is_another_than_where_the_fit_begins():
+    assert TWIN.digest != LEG.digest

@@ -1,0 +1,67 @@
+import dataclasses
+import tomllib
+
+import numpy as np
+import pytest
+
+from hopping_leg.errors import RobotError
+from hopping_leg.identify.robot_file import save_robot
+from hopping_leg.robot import load_robot
+from hopping_leg.robot.files import load_tree
+from tests.identify.fitting import TRUTH, identified
+
+
+def test_the_file_is_the_robot_that_was_identified(tmp_path):
+    path = tmp_path / "mine.toml"
+    save_robot(identified(), path, "legv2")
+    robot = load_robot(path)
+    assert robot.name == "mine"
+    assert robot.digest == identified().robot.digest
+
+
+def test_every_identified_number_says_so_and_all_others_stay(tmp_path):
+    path = tmp_path / "mine.toml"
+    save_robot(identified(), path, "legv2")
+    tree, before = load_tree(path), load_tree("legv2")
+    assert tree["hip"]["friction"]["source"].startswith("identified: 95 % ")
+    assert "start 0.0412" in tree["hip"]["friction"]["source"]
+    for name in TRUTH:
+        joint, field = name.split(".")
+        before[joint][field] = tree[joint][field]
+    assert {**tree, "name": "", "description": ""} == {**before, "name": "", "description": ""}
+
+
+def test_provenance_stands_above_the_numbers(tmp_path):
+    path = tmp_path / "mine.toml"
+    save_robot(identified(), path, "legv2")
+    comments = [line for line in path.read_text().splitlines() if line.startswith("#")]
+    text = "\n".join(comments)
+    for part in ("swing 0.0, 0.0-4.5 s", "seed 0", "mujoco", "least-squares", "Error after"):
+        assert part in text
+
+
+def test_what_belongs_to_the_rig_stays_out_of_the_robot(tmp_path):
+    found = identified()
+    told = dataclasses.replace(found.told, names=["hip.friction", "drive.delay"])
+    start = found.passes[-1].parameters.parameters[0]
+    parameters = dataclasses.replace(
+        found.passes[-1].parameters,
+        parameters=(start, dataclasses.replace(start, name="drive.delay", unit="s")),
+    )
+    last = dataclasses.replace(found.passes[-1], parameters=parameters)
+    path = tmp_path / "mine.toml"
+    save_robot(dataclasses.replace(found, told=told, passes=(last,)), path, "legv2")
+    assert "drive" not in tomllib.loads(path.read_text())
+    assert "#   drive.delay = " in path.read_text()
+
+
+def test_an_impossible_robot_is_not_written(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text("old")
+    values = np.array([-1.0, 0.1])
+    found = dataclasses.replace(
+        identified(), told=dataclasses.replace(identified().told, values=values)
+    )
+    with pytest.raises(RobotError, match=r"hip\.friction"):
+        save_robot(found, path, "legv2")
+    assert path.read_text() == "old"
