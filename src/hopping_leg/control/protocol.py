@@ -5,6 +5,8 @@ from typing import Protocol
 from hopping_leg.arrays import Array
 from hopping_leg.sim.disturbance import Measurement
 
+__all__ = ["Controller", "Measurement"]
+
 
 class Controller(Protocol):
     """Controls ``count`` legs at once; the real robot is a count of one."""

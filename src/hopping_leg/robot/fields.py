@@ -6,6 +6,7 @@ import math
 from typing import Any, TypeVar
 
 from hopping_leg.errors import RobotError, unknown_name
+from hopping_leg.robot import hardware
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.robot.parameters import KINDS, Robot
 
@@ -78,6 +79,9 @@ def check_physics(robot: Robot, origin: str) -> None:
             " for a robot that only swings write kind = 'pendulum'."
         )
     _check_reality(robot, origin)
+    wiring = hardware.mistake(robot.hardware)
+    if wiring is not None:
+        raise RobotError(f"{origin}: {wiring}")
     least = 2 * TIMESTEP
     if robot.contact.time_constant < least:
         raise RobotError(
@@ -148,7 +152,8 @@ def _number(entry: object, spec: Field, path: str, origin: str) -> float:
     if not isinstance(entry["source"], str) or not entry["source"].strip():
         raise RobotError(f"{origin}: '{path}' has no source; say where {value} comes from.")
     zero_is_valid = spec.name in _MAY_BE_ZERO or spec.metadata.get("zero", False)
-    if spec.name not in _MAY_BE_NEGATIVE and (value < 0 or (value == 0 and not zero_is_valid)):
+    signed = spec.name in _MAY_BE_NEGATIVE or spec.metadata.get("signed", False)
+    if not signed and (value < 0 or (value == 0 and not zero_is_valid)):
         least = "zero or more" if zero_is_valid else "more than zero"
         raise RobotError(f"{origin}: '{path}' is {value} {unit} but must be {least}.")
     return float(value)

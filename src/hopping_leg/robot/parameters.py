@@ -9,6 +9,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RobotError
+from hopping_leg.robot.hardware import Hardware
 from hopping_leg.robot.reality import Reality
 
 KINDS = ("leg", "pendulum")
@@ -135,6 +136,8 @@ class Robot:
     """``leg``, whose knee bends to the negative side, or ``pendulum``, which swings freely."""
     reality: Reality = field(default_factory=Reality)
     """What the real leg does beyond this; simulated by ``hopping_leg.sim``, unknown to control."""
+    hardware: Hardware = field(default_factory=Hardware)
+    """How the drives are wired; used by ``hopping_leg.deploy`` alone."""
 
     @property
     def mass(self) -> float:
@@ -166,7 +169,7 @@ class Robot:
     def digest(self) -> str:
         """Hash of every parameter that the physics depends on: 16 hex digits."""
         values = dataclasses.asdict(self)
-        del values["name"], values["description"], values["kind"]
+        del values["name"], values["description"], values["kind"], values["hardware"]
         if self.reality.neutral:
             del values["reality"]
         text = json.dumps(values, sort_keys=True)

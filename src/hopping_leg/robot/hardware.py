@@ -1,0 +1,95 @@
+"""How the robot's drives are wired and what they may do; a robot file's table ``[hardware]``.
+
+Nothing of it changes the physics, so that it is no part of a robot's digest. Every number may be
+left out; the defaults are leg V2's: mjbots qdd100 at 24 V, hip 1, knee 2.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+REGISTER_MAP = 5
+"""Version of the drives' register map that this package speaks (register 0x102)."""
+
+
+def _number(default: float, unit: str, **metadata: bool) -> Any:  # noqa: ANN401
+    return field(default=default, metadata={"unit": unit, **metadata})
+
+
+@dataclass(frozen=True)
+class Servo:
+    """One joint's drive; angles are the joint's, behind gear and belt."""
+
+    id: float = _number(math.nan, "1")
+    """CAN id; by default 1 at the hip, 2 at the knee."""
+    sign: float = _number(1.0, "1", signed=True)
+    """1 where the motor turns with the joint, -1 where it turns against it."""
+    zero_offset: float = _number(0.0, "rad", signed=True)
+    """Joint angle at which the motor reads zero."""
+    lower: float = _number(math.nan, "rad")
+    """Mechanical stop of the joint; by default what recordings of leg V2 show: half a turn of the
+    hip, 2.7 rad of the knee, to either side."""
+    upper: float = _number(math.nan, "rad")
+    """See ``lower``."""
+    max_current: float = _number(100.0, "A")
+    """Phase current that the drive is configured for (``servo.max_current_A``)."""
+
+
+@dataclass(frozen=True)
+class Hardware:
+    """Both drives and what they share."""
+
+    hip: Servo = field(default_factory=Servo)
+    knee: Servo = field(default_factory=Servo)
+    watchdog: float = _number(0.02, "s")
+    """Time without a command after which a drive brakes by itself: four ticks at 200 Hz."""
+    voltage_low: float = _number(18.0, "V")
+    """Bus voltage below which the leg does not run."""
+    voltage_high: float = _number(42.0, "V")
+    """Bus voltage above which the leg does not run; the drives trip at 46 V."""
+    temperature_limit: float = _number(65.0, "deg C")
+    """Of the drives' electronics; they derate from 50 and trip at 75."""
+
+    def __post_init__(self) -> None:
+        for name, default_id, reach in (("hip", 1.0, math.pi), ("knee", 2.0, 2.7)):
+            given: Servo = getattr(self, name)
+            filled = Servo(
+                id=_or(given.id, default_id),
+                sign=given.sign,
+                zero_offset=given.zero_offset,
+                lower=_or(given.lower, -reach),
+                upper=_or(given.upper, reach),
+                max_current=given.max_current,
+            )
+            object.__setattr__(self, name, filled)
+
+    @property
+    def servos(self) -> tuple[Servo, Servo]:
+        """Hip and knee."""
+        return self.hip, self.knee
+
+
+def _or(value: float, default: float) -> float:
+    return default if math.isnan(value) else value
+
+
+def mistake(hardware: Hardware) -> str | None:
+    """Return what no single field can tell: a sentence, or None if all is well."""
+    for name, servo in (("hip", hardware.hip), ("knee", hardware.knee)):
+        if servo.id not in range(1, 127):
+            return f"'hardware.{name}.id' is {servo.id:g} but must be a whole number, 1 to 126."
+        if abs(servo.sign) != 1:
+            return f"'hardware.{name}.sign' is {servo.sign:g} but must be 1 or -1."
+        if servo.lower >= servo.upper:
+            return (
+                f"'hardware.{name}.lower' ({servo.lower:g} rad) must lie below"
+                f" 'hardware.{name}.upper' ({servo.upper:g})."
+            )
+    if hardware.hip.id == hardware.knee.id:
+        return f"'hardware.hip.id' and 'hardware.knee.id' are both {hardware.hip.id:g}."
+    if hardware.voltage_low >= hardware.voltage_high:
+        return (
+            f"'hardware.voltage_low' ({hardware.voltage_low:g} V) must lie below"
+            f" 'hardware.voltage_high' ({hardware.voltage_high:g})."
+        )
+    return None

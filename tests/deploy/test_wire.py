@@ -1,0 +1,80 @@
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hopping_leg.deploy.configuration import wanted
+from hopping_leg.deploy.wire import JointWire, wires
+from hopping_leg.errors import RobotError
+from hopping_leg.robot import load_robot
+from hopping_leg.robot.hardware import Hardware, Servo
+
+ANGLES = st.floats(-10, 10)
+WIRES = st.builds(
+    JointWire, st.integers(1, 126), st.sampled_from([1.0, -1.0]), st.floats(0.5, 4), ANGLES
+)
+
+
+def wired(tmp_path, text):
+    file = tmp_path / "leg.toml"
+    file.write_text(f'name = "t"\nextends = "legv2"\n{text}')
+    return file
+
+
+def entry(value, unit):
+    return f'{{ value = {value}, unit = "{unit}", source = "[C]" }}'
+
+
+@given(WIRES, ANGLES, ANGLES)
+def test_there_and_back_is_the_identity_and_power_is_kept(wire, angle, torque):
+    assert wire.joint_position(wire.motor_position(angle)) == pytest.approx(angle, abs=1e-9)
+    assert wire.joint_torque(wire.motor_torque(torque)) == pytest.approx(torque, abs=1e-9)
+    at_motor = wire.motor_torque(torque) * math.tau * wire.motor_velocity(angle)
+    assert at_motor == pytest.approx(torque * angle, abs=1e-9)
+
+
+def test_the_knee_turns_half_as_fast_as_its_motor():
+    hip, knee = wires(load_robot("legv2"))
+    assert (hip.id, knee.id) == (1, 2)
+    assert hip.joint_velocity(1.0) == pytest.approx(math.tau)
+    assert knee.joint_velocity(1.0) == pytest.approx(math.pi)
+    assert knee.motor_torque(20.0) == pytest.approx(10.0)
+
+
+def test_the_wiring_is_no_part_of_the_physics(tmp_path):
+    text = f"[hardware.knee]\nid = {entry(7, '1')}\nsign = {entry(-1, '1')}\n"
+    robot = load_robot(wired(tmp_path, text))
+    assert wires(robot)[1].id == 7
+    assert wires(robot)[1].sign == -1
+    assert robot.digest == load_robot("legv2").digest
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (f"[hardware.knee]\nid = {entry(1, '1')}", "both 1"),
+        (f"[hardware.hip]\nid = {entry(1.5, '1')}", "whole number"),
+        (f"[hardware.hip]\nsign = {entry(0.5, '1')}", "1 or -1"),
+        (f"[hardware.hip]\nlower = {entry(4.0, 'rad')}", "must lie below"),
+        (f"[hardware]\nvoltage_low = {entry(50, 'V')}", "voltage_high"),
+        (f"[hardware]\nwatchdog = {entry(0, 's')}", "more than zero"),
+        (f"[hardware]\nwatchdg = {entry(1, 's')}", "Did you mean 'watchdog'"),
+    ],
+)
+def test_mistakes_get_a_sentence(tmp_path, text, sentence):
+    with pytest.raises(RobotError, match=sentence):
+        load_robot(wired(tmp_path, text))
+
+
+def test_limits_of_a_reversed_motor_stay_in_order():
+    robot = load_robot("legv2")
+    reversed_hip = Servo(sign=-1.0, lower=-0.5, upper=1.5)
+    robot = replace(robot, hardware=Hardware(hip=reversed_hip))
+    found = {setting.name: setting for setting in wanted(robot, 0)}
+    low, high = found["servopos.position_min"], found["servopos.position_max"]
+    assert low.value == pytest.approx(-1.5 / math.tau)
+    assert high.value == pytest.approx(0.5 / math.tau)
+    assert low.holds(float(low.text))
+    assert not low.holds(-0.01)
