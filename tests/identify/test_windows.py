@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.errors import RecordingError, UsageError
-from hopping_leg.identify.windows import cut, full_states, split
+from hopping_leg.identify.windows import cut, split
 from tests.identify.twin import LEG, record, swing
 
 RUN = record(LEG, swing(3.0))
@@ -35,9 +35,3 @@ def test_a_short_recording_gets_a_sentence():
 def test_a_split_needs_a_share(share):
     with pytest.raises(UsageError, match="between 0 and 1"):
         split(cut([RUN], 0.5), share, np.random.default_rng(0))
-
-
-def test_states_start_from_what_was_measured():
-    position, velocity = full_states(RUN)
-    np.testing.assert_array_equal(position, RUN.array("position"))
-    np.testing.assert_array_equal(velocity, RUN.array("velocity"))

@@ -7,6 +7,7 @@ import numpy as np
 
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.columns import JOINTS
 from hopping_leg.identify.cost import Scoring
 from hopping_leg.identify.parameters import ParameterSet, choose
 from hopping_leg.identify.recording import Recording
@@ -98,6 +99,8 @@ def _names(recordings: Sequence[Recording], *, paper: bool) -> list[str]:
     if not paper:
         names += ["thigh.com", "shank.com", *INERTIAS, "drive.delay"]
         names.remove("hip.armature")
+        if all(r.setup.onboard == "torque" for r in recordings):
+            names += [f"drive.{joint}.load_friction" for joint in JOINTS]
     return [*names, *_open_gains(recordings)]
 
 
@@ -112,7 +115,7 @@ def _open_gains(recordings: Sequence[Recording]) -> list[str]:
             and (gain != "integral" or not r.setup.gains_exact)
             for r in recordings
         ):
-            found += [f"drive.{joint}.{gain}" for joint in ("hip", "knee")]
+            found += [f"drive.{joint}.{gain}" for joint in JOINTS]
     return found
 
 

@@ -60,6 +60,9 @@ class RecordingSetup:
     """Of the on-board PID, N m/(rad s) at the joint; none where unknown or absent."""
     gains_exact: bool = True
     """False where the gains are estimates that a fit should refine."""
+    zeroed: bool = False
+    """Whether the encoders were zeroed with the leg hanging at rest, where friction may hold it
+    some degrees off; a fit then finds each recording's zeros from its first second."""
     torque_limit: Pair | None = None
     """Largest torque the rig let through, N m at the joint; none takes the robot file's."""
     startup_rows: int = 0

@@ -12,6 +12,7 @@ from hopping_leg.identify.cost import measured
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import Window, cut
+from hopping_leg.identify.zeros import SETTLING, has_own_zeros
 from hopping_leg.robot.model import TIMESTEP
 
 HORIZONS = (0.2, 0.5, 1.0)
@@ -81,12 +82,13 @@ def open_loop(
     """Return the rms position error of predictions restarted every half horizon, rad.
 
     The motors get the measured torque, or the commanded one where the rig drives torques itself;
-    every measured row of a horizon counts.
+    every measured row of a horizon counts. The beginning of a recording from which its own zeros
+    are found predicts nothing.
     """
     driven = [d for d in map(as_torque_driven, recordings) if d.has("torque_command")]
     if not driven:
         return (float("nan"), float("nan"))
-    windows = [w for w in cut(driven, horizon, stride=horizon / 2) if _starts_measured(driven, w)]
+    windows = [w for w in cut(driven, horizon, stride=horizon / 2) if _starts_known(driven, w)]
     if not windows:
         return (float("nan"), float("nan"))
     simulator = WindowSimulator(driven, windows, timestep=timestep, threads=threads)
@@ -109,9 +111,16 @@ def as_torque_driven(recording: Recording) -> Recording:
     return dataclasses.replace(recording, trace=trace, setup=setup)
 
 
-def _starts_measured(recordings: Sequence[Recording], window: Window) -> bool:
-    """Return whether a window's first row was measured, or is at least next to measured ones."""
+def _starts_known(recordings: Sequence[Recording], window: Window) -> bool:
+    """Return whether a window starts where the state is known.
+
+    That is in a row that was measured or is at least next to measured ones, and where zeros have
+    to be found, after the rows that tell them.
+    """
     recording = recordings[window.recording]
+    since = recording.time[window.start] - recording.time[0]
+    if has_own_zeros(recording.setup) and since < SETTLING:
+        return False
     state = recording.array("position")[window.start], recording.array("velocity")[window.start]
     return bool(np.isfinite(state).all()) or recording.has("position_estimate")
 

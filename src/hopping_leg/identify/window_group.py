@@ -19,7 +19,9 @@ from hopping_leg.identify.drive_loop import (
 from hopping_leg.identify.held import Held
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.rig_model import FIELDS, build_rig_model, model_field
-from hopping_leg.identify.windows import Window, full_states
+from hopping_leg.identify.states import start_states
+from hopping_leg.identify.windows import Window
+from hopping_leg.identify.zeros import Zeros, find_zeros, has_own_zeros
 from hopping_leg.robot import kinematics
 
 _BLOCK = 256
@@ -72,15 +74,18 @@ class WindowGroup:
         self._zoh = self._setup.onboard == "zoh"
         self._prepare_rows(recordings, windows)
         self._prepare_commands(recordings, windows)
+        self._prepare_zeros(recordings, windows)
         self._batches: dict[int, batch.Batch] = {}
 
     def run(self, candidates: Sequence[Candidate]) -> tuple[Array, Array, Array]:
         """Return position, velocity and measured torque, (candidates, windows, rows, 2) each."""
-        simulation = self._start(candidates)
+        zeros = find_zeros(self._zeros, candidates)[:, self._of_window]
+        simulation = self._start(candidates, zeros)
         history = self._advance(simulation, candidates)
         shape = (self._ticks, len(candidates), -1, 2)
         q, qd, torque = (values.reshape(shape) for values in history)
         position, velocity = self._between_ticks(q, qd)
+        position += zeros[:, :, None]
         gain = drive_values(candidates, "sensor_gain")[:, None, None]
         offset = drive_values(candidates, "torque_offset")[:, None, None]
         measured = gain * self._linear(torque) + offset
@@ -94,7 +99,7 @@ class WindowGroup:
         self._begin = np.empty(len(windows))
         times = np.zeros((len(windows), length))
         self._padding = np.ones((len(windows), length), dtype=bool)
-        states = {w.recording: full_states(recordings[w.recording]) for w in windows}
+        states = {n: start_states(recordings[n]) for n in {w.recording for w in windows}}
         self._q0, self._qd0 = np.empty((len(windows), 2)), np.empty((len(windows), 2))
         self._height0 = np.full(len(windows), np.nan)
         for i, w in enumerate(windows):
@@ -126,7 +131,15 @@ class WindowGroup:
             rows = [recorded_gains(recording, n) for n in ("stiffness", "damping", "integral")]
             self._gains.append(Held(time, np.concatenate(rows, axis=1)))
 
-    def _start(self, candidates: Sequence[Candidate]) -> batch.Batch:
+    def _prepare_zeros(self, recordings: Sequence[Recording], windows: Sequence[Window]) -> None:
+        """Note which windows share their encoders' zeros."""
+        numbers = sorted({w.recording for w in windows})
+        self._of_window = [numbers.index(w.recording) for w in windows]
+        self._zeros = [
+            Zeros(recordings[n]) if has_own_zeros(recordings[n].setup) else None for n in numbers
+        ]
+
+    def _start(self, candidates: Sequence[Candidate], zeros: Array) -> batch.Batch:
         """Return the batch with each simulation's model and initial state set."""
         setup, windows = self._setup, len(self._begin)
         models = [
@@ -142,7 +155,7 @@ class WindowGroup:
             simulation.expand(name)[...] = np.repeat(values, windows, axis=0)
         simulation.reset(stage=0)
         q, qd = simulation.bind("qpos"), simulation.bind("qvel")
-        q[:, -2:] = np.tile(self._q0, (len(candidates), 1))
+        q[:, -2:] = (self._q0 - zeros).reshape(-1, 2)
         qd[:, -2:] = np.tile(self._qd0, (len(candidates), 1))
         if setup.rig != "fixed-base":
             standing = [kinematics.stance_height(c.robot, self._q0) for c in candidates]

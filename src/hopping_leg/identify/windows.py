@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hopping_leg.arrays import Array
 from hopping_leg.errors import RecordingError, UsageError
 from hopping_leg.identify.recording import Recording
 
@@ -93,32 +92,3 @@ def split(
     chosen = set(rng.choice(len(windows), count, replace=False).tolist())
     fit = [w for i, w in enumerate(windows) if i not in chosen]
     return fit, [w for i, w in enumerate(windows) if i in chosen]
-
-
-def full_states(recording: Recording) -> tuple[Array, Array]:
-    """Return joint position and velocity at every row, (rows, 2) each, rad and rad/s.
-
-    Measured where the row has them, else the estimate, else interpolated between measured rows;
-    a velocity that was never measured is the position's slope. For initial states only.
-
-    Raises:
-        RecordingError: A joint has no measured position at all.
-    """
-    position = _filled(recording, "position", "position_estimate")
-    if np.isnan(position).any():
-        raise RecordingError(f"{recording.name} lacks a joint's positions; record both.")
-    velocity = _filled(recording, "velocity", "velocity_estimate")
-    slope = np.gradient(position, recording.time, axis=0)
-    return position, np.where(np.isnan(velocity), slope, velocity)
-
-
-def _filled(recording: Recording, quantity: str, estimate: str) -> Array:
-    """Return a measured quantity without gaps where that is possible, (ticks, 2)."""
-    values = recording.array(quantity)
-    values = np.where(np.isnan(values), recording.array(estimate), values)
-    for joint in range(2):
-        known = ~np.isnan(values[:, joint])
-        if known.any():
-            times = recording.time
-            values[:, joint] = np.interp(times, times[known], values[known, joint])
-    return values

@@ -26,9 +26,11 @@ SETUP = RecordingSetup(
     source="two-link pendulum, design A.0 (0.3 m, 0.2 m), T-Motor AK80-6, torque commands",
     sample="before-command",
     onboard="torque",
+    zeroed=True,
     quantisation=Quantisation(position=3.815e-4, velocity=0.03297, torque=0.00586),
 )
-"""Joint 1 is the hip, joint 2 the knee; steps of the sensors as seen in the recordings."""
+"""Joint 1 is the hip, joint 2 the knee; steps of the sensors as seen in the recordings, which all
+begin at zero to within one."""
 
 
 def read(table: pl.DataFrame) -> tuple[pl.DataFrame, RecordingSetup]:
