@@ -14,7 +14,7 @@ SHARE = 4
 STRETCH = 5.0
 """Usual length of a stretch, s."""
 
-_SHORTEST = 1.0
+SHORTEST = 1.0
 """A stretch below this, s, judges nothing."""
 
 
@@ -43,7 +43,7 @@ def hold_out(
     held: list[Recording] = []
     for recording in recordings:
         whole = duration(recording)
-        least = max(SHARE * _SHORTEST, window * SHARE / (SHARE - 1) + 2 * recording.setup.period)
+        least = max(SHARE * SHORTEST, window * SHARE / (SHARE - 1) + 2 * recording.setup.period)
         if whole < least:
             raise RecordingError(
                 f"{recording.name} is too short: {whole:.3g} s, but {least:.3g} s are needed to"

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.errors import PhysicsError, UsageError, unknown_name
+from hopping_leg.errors import PhysicsError, RecordingError, UsageError, unknown_name
 from hopping_leg.identify.candidate import Candidate
-from hopping_leg.identify.holdout import hold_out
+from hopping_leg.identify.holdout import SHORTEST, duration, hold_out
 from hopping_leg.identify.identifiability import Identifiability, identifiability
 from hopping_leg.identify.judging import judge
 from hopping_leg.identify.least_squares import jacobian
@@ -145,6 +145,11 @@ def _split(
             raise UsageError(
                 f"{recording.name} is to be fitted and to judge the fit; use each for one of the"
                 " two, or leave --validate out to hold a quarter of all out."
+            )
+        if duration(recording) < SHORTEST:
+            raise RecordingError(
+                f"{recording.name} is too short to judge by: {duration(recording):.3g} s; record"
+                f" at least {SHORTEST:g} s."
             )
     return list(recordings), list(validation), "validation recordings"
 

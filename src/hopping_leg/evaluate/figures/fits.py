@@ -18,8 +18,11 @@ LABELS = {"position": "position / rad", "torque": "torque / N m"}
 _SHOWN = 6.0
 """Longest stretch that is drawn, s."""
 
-_SAMPLES = 8000
+_SAMPLES = 4000
 """Residuals that a spectrum takes at most; more change nothing that can be seen."""
+
+_FREQUENCIES = 500
+"""Of a spectrum, from slow to half the rate."""
 
 
 @styled
@@ -101,7 +104,7 @@ def residual_spectrum(
     """
     powers, rate = [], max(o.recording.setup.rate_hz for o in overlays)
     longest = max(float(o.recording.time[-1] - o.recording.time[0]) for o in overlays)
-    frequency = np.geomspace(max(0.2, 2 / longest), rate / 2, 150)
+    frequency = np.geomspace(max(0.2, 2 / longest), rate / 2, _FREQUENCIES)
     for overlay in overlays:
         residual = overlay.errors(quantity)[candidate, :, joint]
         known = np.flatnonzero(np.isfinite(residual))[:_SAMPLES]

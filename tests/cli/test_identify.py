@@ -1,0 +1,195 @@
+"""`hop identify` as it is called: from files to files."""
+
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import polars as pl
+import pytest
+
+from hopping_leg.cli import FAILED, INTERRUPTED, identify, main
+from hopping_leg.identify.excitation import Excitation
+from hopping_leg.identify.playing import play
+from hopping_leg.robot import load_robot
+from hopping_leg.trace import Trace
+from tests.identify.fitting import TRUTH, TWIN, run
+from tests.identify.runs import SIDECAR, swinging, write_run
+from tests.identify.twin import swing
+
+FEW = ["--parameters", ",".join(TRUTH), "--search", "cma", "--population", "4"]
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory):
+    """Return two recordings of the twin, as `hop record` makes them."""
+    folder = tmp_path_factory.mktemp("recordings")
+    files = []
+    for number in range(2):
+        position = swing(6.0, rate=100.0, phase=float(number))
+        clock = np.arange(len(position)) / 100.0
+        excitation = Excitation(
+            clock, position, 0 * position, "fixed-base", 100.0, "legv2", "a swing"
+        )
+        files.append(folder / f"swing-{number}.parquet")
+        play(excitation, TWIN, believed="legv2", timestep=1e-3).save(files[-1])
+    return files
+
+
+def call(folder, *words):
+    """Call the verb; return its exit code."""
+    places = ["--out", folder / "leg.toml", "--folder", folder / "run"]
+    return main(["identify", *map(str, (*words, *places))])
+
+
+def test_from_recordings_to_robot_numbers_and_report(recordings, tmp_path, capsys):
+    fitted, judge = recordings
+    out, numbers, page = (tmp_path / name for name in ("leg.toml", "leg.json", "leg.html"))
+    words = [fitted, "--validate", judge, "--json", numbers, "--report", page]
+    assert call(tmp_path, *words, "--parameters", ",".join(TRUTH)) == 0
+    shown = capsys.readouterr().out
+    assert all(str(path) in re.sub(r"\n", "", shown) for path in (out, numbers, page))
+    assert "hip.friction" in shown
+
+    robot, tree = load_robot(out), json.loads(numbers.read_text())
+    assert robot.hip.friction == pytest.approx(TRUTH["hip.friction"], rel=0.02)
+    assert tree["robot_digest"] == robot.digest
+    before, after = tree["start_validation"], tree["validation"]
+    assert max(after["closed_loop_position_rms_rad"]) < 1e-3
+    assert after["open_loop_position_rms_rad"]["0.5"][0] < (
+        0.2 * before["open_loop_position_rms_rad"]["0.5"][0]
+    )
+    assert tree["command"].startswith(f"hop identify {fitted} --validate {judge}")
+    assert main(["robots", "check", str(out)]) == 0
+    assert main(["robots", "show", str(out)]) == 0
+
+    html = page.read_text()
+    assert "Table I" in html
+    assert not re.search(r'(?:src|href)="(?!data:)', html)
+    assert html.count("data:image/svg+xml") == 4
+
+
+def test_the_same_seed_gives_the_same_bytes(recordings, tmp_path):
+    for name in ("one", "two"):
+        folder = tmp_path / name
+        assert call(folder, recordings[0], *FEW, "--generations", 3, "--seed", 7) == 0
+    texts = [(tmp_path / name / "leg.toml").read_bytes() for name in ("one", "two")]
+    assert texts[0] == texts[1]
+
+
+@pytest.mark.slow
+def test_a_killed_run_resumes_to_the_same_bytes(recordings, tmp_path):
+    words = [recordings[0], *FEW, "--generations", 12, "--seed", 7]
+    assert call(tmp_path / "whole", *words) == 0
+    folder = tmp_path / "killed"
+    places = ["--out", folder / "leg.toml", "--folder", folder / "run"]
+    command = [sys.executable, "-m", "hopping_leg.cli", "identify", *words, *places]
+    process = subprocess.Popen(
+        [str(word) for word in command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    state = folder / "run" / "search-cma-0.json"
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline and (not state.exists() or _generations(state) < 2):
+        time.sleep(0.02)
+    process.send_signal(signal.SIGKILL)
+    assert process.wait() == -signal.SIGKILL
+    assert 2 <= _generations(state) < 12
+    assert not (folder / "leg.toml").exists()
+    assert call(folder, *words, "--resume") == 0
+    assert (folder / "leg.toml").read_bytes() == (tmp_path / "whole" / "leg.toml").read_bytes()
+    results = [(f / "run" / "result.json").read_bytes() for f in (folder, tmp_path / "whole")]
+    assert results[0] == results[1]
+
+
+def _generations(state):
+    return len(json.loads(state.read_text())["state"]["costs"])
+
+
+def test_an_interruption_says_how_to_go_on(recordings, tmp_path, capsys, monkeypatch):
+    def interrupt(*args, **more):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(identify, "identify", interrupt)
+    assert call(tmp_path, recordings[0]) == INTERRUPTED
+    error = capsys.readouterr().err
+    assert "--resume goes on in" in error
+    assert "Traceback" not in error
+
+
+def write_bad(folder):
+    """Write recordings with something wrong each."""
+    (folder / "empty.csv").touch()
+    (folder / "noise.csv").write_bytes(bytes(range(256)))
+    write_run(folder, swinging(100), name="short.csv")
+    rest = swinging().with_columns(hip_position_rad=pl.lit(0.3), knee_position_rad=pl.lit(-1.2))
+    write_run(folder, rest.drop("hip_velocity_rad_s", "knee_velocity_rad_s"), name="rest.csv")
+    gains = "stiffness = [8.0, 8.0]\ndamping = [0.3, 0.3]\n"
+    sidecar = SIDECAR + 'onboard = "zoh"\n' + gains
+    write_run(folder, swinging(1600), sidecar, name="good.csv")
+    other = sidecar.replace("legv2", "legv1")
+    write_run(folder, swinging(1600), other, name="other.csv")
+    Trace(swinging()).save(folder / "trace.parquet")
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ([], "No recording was given"),
+        (["none.csv"], "There is no recording"),
+        (["empty.csv"], "empty.csv is empty"),
+        (["noise.csv"], "noise.csv is neither Parquet nor a CSV"),
+        (["trace.parquet"], "is of no known rig"),
+        (["short.csv"], "short.csv is too short"),
+        (["good.csv", "--validate", "short.csv"], "too short"),
+        (["rest.csv"], "is at rest"),
+        (["good.csv", "other.csv"], "belong to several robots (legv2, legv1)"),
+        (["good.csv", "--validate", "good.csv"], "use each for one of the two"),
+        (["good.csv", "--robot", "legv9"], "There is no robot 'legv9'"),
+        (["good.csv", "--robot", "legv1"], "another leg's robot file"),
+        (["good.csv", "--robot", "doublependulum"], "is a pendulum"),
+        (["good.csv", "--parameters", "hip.frction"], "Did you mean 'hip.friction'"),
+        (["good.csv", "--search", "cmaes"], "Did you mean 'cma'"),
+        (["good.csv", "--bounds", "hip.friction=0.5,1"], "exclude its start 0.0412"),
+        (["good.csv", "--bounds", "hip.friction=low,high"], "gives no bounds"),
+        (["good.csv", "--bounds", "thigh.mass=0,1"], "which is not fitted"),
+        (["good.csv", "--seed", "-1"], "must not be negative"),
+        (["good.csv", "--starts", "0"], "at least one start"),
+        (["good.csv", "--json", "good.toml"], "would replace an input"),
+        (["good.csv", "--report", "."], "is a folder"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_overwrites_nothing(words, sentence, tmp_path, capsys):
+    write_bad(tmp_path)
+    (tmp_path / "leg.toml").write_text("old")
+    before = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
+    given = [str(tmp_path / w) if w.endswith((".csv", ".parquet", ".toml")) else w for w in words]
+    given = [str(tmp_path) if w == "." else w for w in given]
+    assert call(tmp_path, *given) == FAILED
+    error = capsys.readouterr().err
+    assert sentence in error
+    assert "Traceback" not in error
+    assert {p.name: p.read_bytes() for p in tmp_path.iterdir() if p.is_file()} == before
+
+
+@pytest.mark.parametrize(
+    ("out", "sentence"),
+    [("leg.json", "must end in .toml"), ("good.toml", "would replace an input")],
+)
+def test_the_robot_file_replaces_no_input(out, sentence, tmp_path, capsys):
+    write_bad(tmp_path)
+    assert main(["identify", str(tmp_path / "good.csv"), "--out", str(tmp_path / out)]) == FAILED
+    assert sentence in capsys.readouterr().err
+
+
+def test_warnings_of_recordings_are_shown(tmp_path, capsys):
+    table = run().trace.table.with_columns(
+        hip_torque_nm=pl.Series([1e-40, *run().trace.table["hip_torque_nm"][1:]])
+    )
+    gains = "stiffness = [8.0, 8.0]\ndamping = [0.3, 0.3]\n"
+    sidecar = SIDECAR.replace("200.0", "100.0") + 'onboard = "zoh"\n' + gains
+    path = write_run(tmp_path, table, sidecar)
+    assert call(tmp_path, path, *FEW, "--generations", "1") == 0
+    assert "uninitialised memory" in capsys.readouterr().out
