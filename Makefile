@@ -33,7 +33,7 @@ $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(PIP) install $$(grep '^torch==' constraints.txt)
 	$(PIP) install -c constraints.txt hatchling editables
-	$(PIP) install -c constraints.txt --no-build-isolation -e '.[train,cluster,docs,dev]'
+	$(PIP) install -c constraints.txt --no-build-isolation -e '.[train,cluster,hardware,docs,dev]'
 	@touch $@
 
 reproduce: $(STAMP)

@@ -1,0 +1,94 @@
+"""The simulated leg that the drives turn: motors' side in, motors' side out.
+
+The motors give what they can, up to their peak torque: what the software allows is for the host to
+keep. A latency of commands in ``[reality]`` is left to the wire, as drives act on their own sensors
+without it.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.deploy.wire import JointWire, wires
+from hopping_leg.robot.parameters import Joint, Robot
+from hopping_leg.sim import Legs
+
+TIMESTEP = 5e-4
+"""Physics step, s; the drives' control runs as often."""
+
+
+class EmulatedLeg:
+    """One leg, stepped by one physics step at a time.
+
+    Args:
+        robot: What is simulated; its ``reality`` holds.
+        q: Joint angles at the start, rad, (2,); the foot stands on the ground.
+        seed: Of sensor noise.
+        timestep: Physics step, s.
+    """
+
+    def __init__(
+        self, robot: Robot, q: Array, *, seed: int = 0, timestep: float = TIMESTEP
+    ) -> None:
+        self.wires = wires(robot)
+        free = replace(robot, hip=_unlimited(robot.hip), knee=_unlimited(robot.knee))
+        immediate = replace(robot.reality.latency, command=0.0, jitter=0.0)
+        free = replace(free, reality=replace(robot.reality, latency=immediate))
+        self._legs = Legs(free, 1, rate=1 / timestep, timestep=timestep, threads=1)
+        if self._legs.real is not None:
+            self._legs.real.reseed(np.random.default_rng(seed))
+        self._legs.stand(slice(None), np.asarray(q, np.float64))
+        self._torque = np.zeros((1, 2))
+
+    @property
+    def height(self) -> float:
+        """Of the base above the ground, m."""
+        return float(self._legs.height[0])
+
+    @property
+    def height_rate(self) -> float:
+        """Of the base, m/s."""
+        return float(self._legs.height_rate[0])
+
+    @property
+    def foot_clearance(self) -> float:
+        """Gap between foot and ground, m."""
+        return float(self._legs.foot_clearance()[0])
+
+    @property
+    def q(self) -> Array:
+        """True joint angles, rad, (2,)."""
+        return np.array(self._legs.q[0])
+
+    @property
+    def qd(self) -> Array:
+        """True joint velocities, rad/s, (2,)."""
+        return np.array(self._legs.qd[0])
+
+    def sensed(self, joint: int) -> tuple[float, float, float]:
+        """Return what one motor's sensors see: position, rev, velocity, rev/s, torque, N m."""
+        wire: JointWire = self.wires[joint]
+        legs = self._legs
+        return (
+            wire.motor_position(float(legs.measured_q[0, joint])),
+            wire.motor_velocity(float(legs.measured_qd[0, joint])),
+            wire.motor_torque(float(legs.measured_torque[0, joint])),
+        )
+
+    def step(self, motor_torque: tuple[float, float]) -> None:
+        """Go on by one physics step.
+
+        Args:
+            motor_torque: At the motors' outputs, N m.
+
+        Raises:
+            mujoco.batch.SimulationError: Physics failed.
+        """
+        for joint, (wire, torque) in enumerate(zip(self.wires, motor_torque, strict=True)):
+            self._torque[0, joint] = wire.joint_torque(torque)
+        self._legs.step(self._torque)
+
+
+def _unlimited(joint: Joint) -> Joint:
+    return replace(joint, motor=replace(joint.motor, torque_limit=joint.motor.peak_torque))

@@ -1,0 +1,112 @@
+"""Registers on the wire: how a value is packed at each resolution, and how reads are answered.
+
+Scales, saturation and NaN come from the client's own writer, so both ends agree.
+"""
+
+import io
+from collections.abc import Callable, Iterable
+
+from moteus import multiplex
+from moteus.protocol import Register, Writer
+
+_MAX_RUN = 3
+"""Registers whose count fits in the subframe's first byte."""
+
+_INT_BITS = (8, 16, 32)
+_Pack = Callable[[Writer, float, int], None]
+
+_POSITIONS = (
+    *(Register.POSITION, Register.ABS_POSITION, Register.COMMAND_POSITION),
+    *(Register.COMMAND_STOP_POSITION, Register.CONTROL_POSITION, Register.POSITION_ERROR),
+    *(Register.ENCODER_0_POSITION, Register.ENCODER_1_POSITION),
+    *(Register.COMMAND_WITHIN_LOWER_BOUND, Register.COMMAND_WITHIN_UPPER_BOUND),
+)
+_VELOCITIES = (
+    *(Register.VELOCITY, Register.COMMAND_VELOCITY, Register.COMMAND_VELOCITY_LIMIT),
+    *(Register.CONTROL_VELOCITY, Register.VELOCITY_ERROR, Register.ENCODER_0_VELOCITY),
+)
+_TORQUES = (
+    *(Register.TORQUE, Register.COMMAND_FEEDFORWARD_TORQUE, Register.COMMAND_POSITION_MAX_TORQUE),
+    *(Register.POSITION_FEEDFORWARD, Register.POSITION_COMMAND, Register.CONTROL_TORQUE),
+    Register.TORQUE_ERROR,
+)
+_CURRENTS = (Register.Q_CURRENT, Register.D_CURRENT, Register.COMMAND_FIXED_CURRENT_OVERRIDE)
+_SHARES = (*(Register.COMMAND_KP_SCALE, Register.COMMAND_KD_SCALE, Register.COMMAND_ILIMIT_SCALE),)
+_VOLTAGES = (Register.VOLTAGE, Register.COMMAND_FIXED_VOLTAGE_OVERRIDE)
+_TEMPERATURES = (Register.TEMPERATURE, Register.MOTOR_TEMPERATURE)
+
+_PACKERS: dict[int, _Pack] = {
+    **dict.fromkeys(map(int, _POSITIONS), Writer.write_position),
+    **dict.fromkeys(map(int, _VELOCITIES), Writer.write_velocity),
+    **dict.fromkeys(map(int, _TORQUES), Writer.write_torque),
+    **dict.fromkeys(map(int, _CURRENTS), Writer.write_current),
+    **dict.fromkeys(map(int, _SHARES), Writer.write_pwm),
+    **dict.fromkeys(map(int, _VOLTAGES), Writer.write_voltage),
+    **dict.fromkeys(map(int, _TEMPERATURES), Writer.write_temperature),
+    int(Register.POWER): Writer.write_power,
+    int(Register.COMMAND_ACCEL_LIMIT): Writer.write_accel,
+    int(Register.COMMAND_TIMEOUT): Writer.write_time,
+}
+"""What packs each scaled register; all others are integers."""
+
+
+class ReplyWriter:
+    """Builds the payload that answers a frame's reads."""
+
+    def __init__(self) -> None:
+        self._buffer = io.BytesIO()
+        self._writer = Writer(self._buffer)
+
+    @property
+    def data(self) -> bytes:
+        """The payload so far."""
+        return self._buffer.getvalue()
+
+    def values(self, first: int, resolution: int, values: Iterable[float]) -> None:
+        """Add a run of registers.
+
+        Args:
+            first: Number of the first register.
+            resolution: ``multiplex.INT8``, ``INT16``, ``INT32`` or ``F32``, of all of them.
+            values: One per register.
+        """
+        values = list(values)
+        head = multiplex.REPLY_BASE | (resolution << 2)
+        if len(values) <= _MAX_RUN:
+            self._buffer.write(bytes([head | len(values)]))
+        else:
+            self._buffer.write(bytes([head, len(values)]))
+        self._writer.write_varuint(first)
+        for register, value in enumerate(values, first):
+            pack = _PACKERS.get(register)
+            if pack is not None:
+                pack(self._writer, value, resolution)
+            elif resolution == multiplex.F32:
+                self._writer.write_f32(value)
+            else:
+                self._writer.write(_wrapped(int(value), _INT_BITS[resolution]), resolution)
+
+    def error(self, register: int, code: int, *, reading: bool) -> None:
+        """Add the report that a register could not be read or written."""
+        kind = multiplex.READ_ERROR if reading else multiplex.WRITE_ERROR
+        self._buffer.write(bytes([kind]))
+        self._writer.write_varuint(register)
+        self._writer.write_varuint(code)
+
+    def stream(self, channel: int, data: bytes, packet: int | None = None) -> None:
+        """Add a piece of the diagnostic stream, numbered where the host asked for that."""
+        kind = multiplex.STREAM_SERVER_DATA
+        if packet is not None:
+            kind = multiplex.STREAM_SERVER_DATA_FLOW
+        self._buffer.write(bytes([kind]))
+        self._writer.write_varuint(channel)
+        if packet is not None:
+            self._buffer.write(bytes([packet]))
+        self._writer.write_varuint(len(data))
+        self._buffer.write(data)
+
+
+def _wrapped(value: int, bits: int) -> int:
+    """Return an integer as the firmware's cast to fewer bits leaves it."""
+    half = 1 << (bits - 1)
+    return (value + half) % (2 * half) - half

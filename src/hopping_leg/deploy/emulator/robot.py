@@ -1,0 +1,113 @@
+"""The emulated robot: two drives, the leg that they turn, and the faults that befall them.
+
+Time comes as an argument. Nothing here knows of sockets, terminals or the clock on the wall.
+"""
+
+import heapq
+import itertools
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.deploy.configuration import wanted
+from hopping_leg.deploy.emulator import bus
+from hopping_leg.deploy.emulator.drive import Drive
+from hopping_leg.deploy.emulator.frames import Frame
+from hopping_leg.deploy.emulator.identity import Identity
+from hopping_leg.deploy.emulator.leg import TIMESTEP, EmulatedLeg
+from hopping_leg.deploy.emulator.settings import Settings
+from hopping_leg.deploy.wire import JOINTS
+from hopping_leg.robot.parameters import Robot
+
+NOMINAL_VOLTAGE = 26.0
+"""Bus voltage at which the qdd100 has the speed limit of the robot files, V."""
+
+
+class EmulatedRobot:
+    """Leg and drives, moved by ``advance`` and ``receive``.
+
+    A person holds the leg where it stands until both drives are powered.
+
+    Args:
+        robot: What stands behind the wire; its ``reality`` holds.
+        q: Joint angles at the start, rad, (2,).
+        configured: Whether the drives are configured as the robot's file asks; else as the
+            firmware is delivered, but for their ids.
+        homed: Whether somebody homed the drives already.
+        held: Whether the leg is held until the drives are powered.
+        seed: Of sensor noise and jitter.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        q: Array,
+        *,
+        configured: bool = True,
+        homed: bool = True,
+        held: bool = True,
+        seed: int = 0,
+        timestep: float = TIMESTEP,
+    ) -> None:
+        self.robot, self.time, self.timestep, self.held = robot, 0.0, timestep, held
+        self.leg = EmulatedLeg(robot, q, seed=seed, timestep=timestep)
+        self.drives = tuple(_drive(robot, joint, configured) for joint in range(len(JOINTS)))
+        self._latency, self._rng = robot.reality.latency, np.random.default_rng(seed)
+        self._due: list[tuple[float, int, Frame]] = []
+        self._numbers = itertools.count()
+        self._last_delivery = 0.0
+        for joint, drive in enumerate(self.drives):
+            position, *_ = self.leg.sensed(joint)
+            drive.boot(position)
+            if homed:
+                drive.encoder.set_nearest(position)
+        self._sense()
+
+    def advance(self, until: float) -> None:
+        """Simulate whole steps up to a time, s."""
+        while self.time + self.timestep <= until + 1e-9:
+            self._step()
+
+    def receive(self, frame: Frame) -> list[Frame]:
+        """Take a frame from the host now; return the drives' answers.
+
+        Where the robot's ``reality`` has a latency of commands, the frame acts later but is
+        answered at once.
+        """
+        late = self._latency.command + self._latency.jitter * float(self._rng.random())
+        if not late:
+            return bus.deliver(frame, self.drives, self.time)
+        due = max(self.time + late, self._last_delivery)
+        self._last_delivery = due
+        heapq.heappush(self._due, (due, next(self._numbers), frame))
+        return bus.deliver(frame, self.drives, self.time, acting=False)
+
+    def _step(self) -> None:
+        while self._due and self._due[0][0] <= self.time:
+            bus.deliver(heapq.heappop(self._due)[2], self.drives, self.time)
+        hip, knee = (drive.step(self.time, self.timestep) for drive in self.drives)
+        if self.held and all(drive.active for drive in self.drives):
+            self.held = False
+        if not self.held:
+            self.leg.step((hip, knee))
+        self.time += self.timestep
+        self._sense()
+
+    def _sense(self) -> None:
+        for joint, drive in enumerate(self.drives):
+            drive.sense(*self.leg.sensed(joint))
+
+
+def _drive(robot: Robot, joint: int, configured: bool) -> Drive:
+    servo = robot.hardware.servos[joint]
+    motor = (robot.hip, robot.knee)[joint].motor
+    changes: dict[str, float] = {"id.id": servo.id}
+    if configured:
+        changes |= {setting.name: setting.value for setting in wanted(robot, joint)}
+    return Drive(
+        Identity(f"{robot.name} {JOINTS[joint]}"),
+        Settings(**changes),
+        gear_ratio=motor.gear_ratio,
+        brake=motor.peak_torque / motor.no_load_speed,
+        voltage=NOMINAL_VOLTAGE * robot.reality.voltage,
+    )

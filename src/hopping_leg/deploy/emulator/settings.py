@@ -1,0 +1,113 @@
+"""What a drive can be configured to: the values of its ``conf`` tree, in RAM and in flash.
+
+Defaults are those of firmware for the controller board r4 with what the qdd100 is delivered with;
+only values that the emulator obeys or a host may want to check are here.
+"""
+
+from hopping_leg.errors import UsageError, unknown_name
+
+Value = int | float
+
+NAN = float("nan")
+
+DEFAULTS: dict[str, Value] = {
+    "id.id": 1,
+    "can.prefix": 0,
+    "motor.poles": 42,
+    "motor.phase_invert": 0,
+    "motor.resistance_ohm": 0.047,
+    "motor.Kv": 304.0,
+    "motor_position.commutation_source": 0,
+    "motor_position.output.source": 0,
+    "motor_position.output.offset": 0.0,
+    "motor_position.output.sign": 1,
+    "motor_position.output.reference_source": -1,
+    "motor_position.rotor_to_output_ratio": 1 / 6,
+    "motor_position.rotor_to_output_override": 0,
+    "servo.pwm_rate_hz": 30000,
+    "servo.max_voltage": 46.0,
+    "servo.max_power_W": NAN,
+    "servo.temperature_margin": 25.0,
+    "servo.fault_temperature": 75.0,
+    "servo.enable_motor_temperature": 0,
+    "servo.motor_temperature_margin": 20.0,
+    "servo.motor_fault_temperature": NAN,
+    "servo.fault_position_error": NAN,
+    "servo.fault_velocity_error": NAN,
+    "servo.velocity_threshold": 0.0,
+    "servo.position_derate": 0.02,
+    "servo.pid_position.kp": 50.0,
+    "servo.pid_position.ki": 0.0,
+    "servo.pid_position.kd": 1.0,
+    "servo.pid_position.ilimit": 0.0,
+    "servo.default_velocity_limit": NAN,
+    "servo.default_accel_limit": NAN,
+    "servo.default_timeout_s": 0.1,
+    "servo.timeout_max_torque_Nm": 5.0,
+    "servo.timeout_mode": 12,
+    "servo.flux_brake_margin_voltage": 3.0,
+    "servo.flux_brake_resistance_ohm": 0.025,
+    "servo.max_current_A": 100.0,
+    "servo.derate_current_A": -20.0,
+    "servo.max_velocity": 500.0,
+    "servo.max_velocity_derate": 2.0,
+    "servo.cooldown_cycles": 256,
+    "servopos.position_min": -0.01,
+    "servopos.position_max": 0.01,
+}
+"""Names as in ``conf enumerate``."""
+
+
+class Settings:
+    """One drive's configuration; changes are lost with power unless saved.
+
+    Args:
+        changes: Values that differ from the defaults, already in flash.
+
+    Raises:
+        UsageError: A name is unknown or a value has no meaning.
+    """
+
+    def __init__(self, **changes: Value) -> None:
+        self._values = dict(DEFAULTS)
+        for name, value in changes.items():
+            self.set(name, str(value))
+        self.save()
+
+    def __getitem__(self, name: str) -> Value:
+        return self._values[name]
+
+    def set(self, name: str, text: str) -> None:
+        """Change a value in RAM.
+
+        Raises:
+            UsageError: The name is unknown or the text no number.
+        """
+        if name not in self._values:
+            raise UsageError(unknown_name("drive setting", name, self._values))
+        kind = type(DEFAULTS[name])
+        try:
+            self._values[name] = kind(float(text)) if kind is int else float(text)
+        except ValueError as error:
+            raise UsageError(f"'{text}' is no value for the drive setting '{name}'.") from error
+
+    def text(self, name: str) -> str:
+        """Return a value as the firmware prints it."""
+        value = self._values[name]
+        return str(value) if isinstance(value, int) else f"{value:.6f}"
+
+    def names(self, group: str = "") -> list[str]:
+        """Return all names in a group, all if empty."""
+        return [n for n in self._values if not group or n == group or n.startswith(group + ".")]
+
+    def save(self) -> None:
+        """Write RAM to flash."""
+        self._saved = dict(self._values)
+
+    def load(self) -> None:
+        """Read flash to RAM, as after power was lost."""
+        self._values = dict(self._saved)
+
+    def reset(self) -> None:
+        """Set RAM to the firmware's defaults."""
+        self._values = dict(DEFAULTS)

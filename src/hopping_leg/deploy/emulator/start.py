@@ -1,0 +1,75 @@
+"""How an emulation begins: which robot, in which pose, with which drives."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.deploy.emulator.robot import EmulatedRobot
+from hopping_leg.errors import UsageError, unknown_name
+from hopping_leg.robot import kinematics, load_robot
+from hopping_leg.robot.parameters import Robot
+
+_LENGTHS = {"stand": 0.69, "crouch": 0.5, "stretch": 0.93}
+"""Named poses: leg length over the straight leg's, foot below the hip."""
+
+POSES = (*_LENGTHS, "zero")
+"""Named poses; ``zero`` is the leg straight down, where the joints' angles are zero."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """What is emulated and how it begins."""
+
+    robot: str = "legv2"
+    """A shipped robot or a .toml file; its [reality] holds."""
+    pose: str = "stand"
+    """One of POSES or joint angles as 'HIP,KNEE' in rad."""
+    configured: bool = True
+    """Drives configured as the robot's file asks; else as the firmware is delivered."""
+    homed: bool = True
+    """Drives homed, as somebody did by hand; else known only within a turn of their rotors."""
+    held: bool = True
+    """Somebody holds the leg until both drives are powered."""
+    seed: int = 0
+    """Of sensor noise and jitter."""
+    link: Path | None = field(default=None)
+    """Also offer the terminal under this path, which stays the same when it is plugged again."""
+
+    def build(self) -> EmulatedRobot:
+        """Return the emulated robot.
+
+        Raises:
+            RobotError: The robot is unknown, wrong or cannot stand.
+            UsageError: The pose is unknown.
+        """
+        robot = load_robot(self.robot)
+        robot.require_leg()
+        return EmulatedRobot(
+            robot,
+            posture(robot, self.pose),
+            configured=self.configured,
+            homed=self.homed,
+            held=self.held,
+            seed=self.seed,
+        )
+
+
+def posture(robot: Robot, pose: str) -> Array:
+    """Return the joint angles of a named or given pose, rad, (2,).
+
+    Raises:
+        UsageError: There is no such pose.
+    """
+    if pose == "zero":
+        return np.zeros(2)
+    if pose in _LENGTHS:
+        length = _LENGTHS[pose] * (robot.thigh.length + robot.shank.length)
+        return kinematics.joint_angles(robot, np.array([length, 0.0]))
+    try:
+        hip, knee = (float(part) for part in pose.split(","))
+    except ValueError as error:
+        valid = unknown_name("pose", pose, POSES)
+        raise UsageError(f"{valid} Or give joint angles, rad, e.g. 0.6,-1.3.") from error
+    return np.array([hip, knee])

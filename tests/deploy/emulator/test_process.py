@@ -1,0 +1,97 @@
+import asyncio
+import math
+
+import moteus
+import pytest
+from moteus.fdcanusb_device import FdcanusbDevice
+
+from hopping_leg.deploy.emulator.process import EmulatorProcess
+from hopping_leg.deploy.emulator.start import Start
+from hopping_leg.errors import UsageError
+from hopping_leg.robot import load_robot
+
+PATIENT = 1.0
+"""Watchdog of the tests, s: this machine may be busy."""
+
+TORQUE = {
+    "position": math.nan,
+    "velocity": 0.0,
+    "kp_scale": 0.0,
+    "kd_scale": 0.0,
+    "watchdog_timeout": PATIENT,
+}
+
+
+@pytest.fixture(scope="module")
+def emulator():
+    with EmulatorProcess(Start(pose="0.7,-1.4")) as running:
+        yield running
+
+
+def talk(emulator, conversation, *, checksums):
+    """Run a conversation with the client library as it is installed."""
+
+    async def run():
+        device = FdcanusbDevice(str(emulator.path))
+        if not checksums:
+            device._is_fdcanusb, device._checksum_active = True, False
+        transport = moteus.Transport([device])
+        try:
+            drives = [moteus.Controller(id=n, transport=transport) for n in (1, 2)]
+            return await asyncio.wait_for(conversation(transport, drives), 20)
+        finally:
+            asyncio.get_running_loop().remove_reader(device._serial.fd)
+            transport.close()
+
+    return asyncio.run(run())
+
+
+def test_the_client_drives_the_leg_with_checksums(emulator):
+    async def push(transport, drives):
+        frames = [
+            drive.make_position(**TORQUE, feedforward_torque=torque, maximum_torque=5.0, query=True)
+            for drive, torque in zip(drives, (0.3, -0.3), strict=True)
+        ]
+        for _ in range(20):
+            results = await transport.cycle(frames)
+            await asyncio.sleep(0.002)
+        await transport.cycle([drive.make_stop() for drive in drives])
+        return results
+
+    before = emulator.state()
+    results = talk(emulator, push, checksums=True)
+    assert [r.id for r in results] == [1, 2]
+    assert [r.values[moteus.Register.MODE] for r in results] == [10, 10]
+    assert [r.values[moteus.Register.TORQUE] for r in results] == pytest.approx([0.3, -0.3])
+    after = emulator.state()
+    assert after.time > before.time
+    assert after.modes == (0, 0)
+    assert after.q != before.q
+
+
+def test_a_client_without_checksums_learns_that_they_are_wanted(emulator):
+    async def ask(transport, drives):
+        assert (await drives[0].query()).id == 1
+        return transport.devices()[0]._checksum_active
+
+    assert talk(emulator, ask, checksums=True)
+    emulator_wants_them = talk(emulator, ask, checksums=False)
+    assert emulator_wants_them
+
+
+def test_plain_lines_and_identity():
+    robot = load_robot("legv2")
+
+    async def ask(transport, drives):
+        reply = await drives[1].custom_query(dict.fromkeys(range(0x100, 0x103), moteus.INT32))
+        return reply.values, await transport.discover()
+
+    with EmulatorProcess(Start()) as emulator:
+        values, found = talk(emulator, ask, checksums=False)
+    assert values[moteus.Register.REGISTER_MAP_VERSION] == 5
+    assert [device.can_id for device in found] == [robot.hardware.hip.id, robot.hardware.knee.id]
+
+
+def test_a_wrong_start_is_told_to_the_parent():
+    with pytest.raises(UsageError, match="There is no pose 'handstand'"):
+        EmulatorProcess(Start(pose="handstand"))
