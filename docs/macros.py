@@ -103,6 +103,11 @@ def table(file: str, path: str, *columns: str, **where: Any) -> str:  # noqa: AN
     return grid([column.title for column in shown], cells) + origin(file, content)
 
 
+def bullets(file: str, path: str) -> str:
+    """Return a list of sentences in a results file as a list."""
+    return "\n".join(f"- {sentence}" for sentence in pick(read(file), path))
+
+
 def entries(file: str) -> str:
     """Return every number of a results file with its path; lists of records are tables."""
     content = read(file)
@@ -211,6 +216,7 @@ MACROS = {
     "example": example,
     "page": page,
     "commands": commands(),
+    "bullets": bullets,
     "entries": entries,
     "exists": exists,
     "pictures": pictures,

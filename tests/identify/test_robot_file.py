@@ -36,7 +36,13 @@ def test_provenance_stands_above_the_numbers(tmp_path):
     save_robot(identified(), path, "legv2")
     comments = [line for line in path.read_text().splitlines() if line.startswith("#")]
     text = "\n".join(comments)
-    for part in ("swing 0.0, 0.0-4.5 s", "seed 0", "mujoco", "least-squares", "Error after"):
+    for part in (
+        "swing 0.0, 0.0-4.5 s",
+        "seed 0",
+        "mujoco",
+        "least-squares",
+        "position, closed loop: ",
+    ):
         assert part in text
 
 

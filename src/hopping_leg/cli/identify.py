@@ -30,7 +30,7 @@ from hopping_leg.identify.cma import CmaOptions
 from hopping_leg.identify.ownership import robot_of
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import Recording, load_recording, sidecar_path
-from hopping_leg.identify.result import Identified, as_json, parameters_json
+from hopping_leg.identify.result import Identified, as_json, parameters_json, quality_json
 from hopping_leg.identify.robot_file import save_robot
 from hopping_leg.identify.searching import SearchOptions
 from hopping_leg.robot import load_robot
@@ -200,18 +200,10 @@ def _show(console: Console, identified: Identified) -> None:
         )
     console.print(table)
     quality = Table("on held-out data, rms", "before: hip", "knee", "after: hip", "knee", "unit")
-    before, after = identified.start_validation, identified.validation
-    rows = [
-        ("position, closed loop", before.closed_loop_position, after.closed_loop_position, "mrad"),
-        ("torque, closed loop", before.closed_loop_torque, after.closed_loop_torque, "N m"),
-    ]
-    rows += [
-        (f"position, open loop {h:g} s", pair, after.open_loop_position[h], "mrad")
-        for h, pair in before.open_loop_position.items()
-    ]
-    for name, first, second, unit in rows:
-        factor = 1e3 if unit == "mrad" else 1.0
-        quality.add_row(name, *(f"{factor * v:.3g}" for v in (*first, *second)), unit)
+    for row in quality_json(identified):
+        unit, factor = ("mrad", 1e3) if row["unit"] == "rad" else (row["unit"], 1.0)
+        keys = ("hip_before", "knee_before", "hip_after", "knee_after")
+        quality.add_row(row["error"], *(f"{factor * row[key]:.3g}" for key in keys), unit)
     console.print(quality)
     for sentence in identified.told.statements:
         console.print(sentence, highlight=False, markup=False)

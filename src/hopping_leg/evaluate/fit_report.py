@@ -17,12 +17,14 @@ from hopping_leg.evaluate.figures.fits import (
 from hopping_leg.evaluate.markup import Column, table
 from hopping_leg.evaluate.report import data_uri, page_template
 from hopping_leg.identify.overlay import RESTART, Overlay, overlays
-from hopping_leg.identify.result import Identified, as_json, parameters_json
+from hopping_leg.identify.result import Identified, as_json, parameters_json, quality_json
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.fields import Tree
 from hopping_leg.robot.files import load_tree
 
 _CAD, _PAPER = "legv2", "legv2-paper"
+_UNITS = {"rad": ("mrad", 1e3), "N m": ("N m", 1.0)}
+"""What is shown for an SI unit, and how many of them it is."""
 _MOST = 12
 """Recordings drawn, those that fit worst."""
 
@@ -59,22 +61,10 @@ def write_fit_report(identified: Identified, command: str = "", threads: int = 0
 
 def quality_table(identified: Identified) -> Markup:
     """Return errors on held-out data before and after the fit."""
-    before, after = identified.start_validation, identified.validation
-    rows = [
-        ("position, closed loop / mrad", 1e3, before.closed_loop_position),
-        ("torque, closed loop / N m", 1.0, before.closed_loop_torque),
-    ]
-    ends = [after.closed_loop_position, after.closed_loop_torque]
-    for horizon, pair in before.open_loop_position.items():
-        rows.append((f"position predicted {horizon:g} s ahead / mrad", 1e3, pair))
-        ends.append(after.open_loop_position[horizon])
-    lines = [
-        (name, *(factor * v for v in (*first, *second)))
-        for (name, factor, first), second in zip(rows, ends, strict=True)
-    ]
-    headings = ("before: hip", "before: knee", "after: hip", "after: knee")
-    columns = [Column(h, _cell(i + 1)) for i, h in enumerate(headings)]
-    return table([Column("rms error", lambda row: str(row[0])), *columns], lines)
+    columns = [Column("rms error", lambda row: f"{row['error']} / {_UNITS[row['unit']][0]}")]
+    for when in ("before", "after"):
+        columns += [Column(f"{when}: {j}", _scaled(f"{j}_{when}")) for j in ("hip", "knee")]
+    return table(columns, quality_json(identified))
 
 
 def parameter_table(identified: Identified) -> Markup:
@@ -184,8 +174,8 @@ def _picture(figure: Figure) -> str:
     return data_uri(to_svg(figure), "image/svg+xml")
 
 
-def _cell(index: int) -> Callable[[Any], str]:
-    return lambda row: _number(row[index])
+def _scaled(key: str) -> Callable[[Any], str]:
+    return lambda row: _number(_UNITS[row["unit"]][1] * row[key])
 
 
 def _number(value: float) -> str:

@@ -70,6 +70,7 @@ def as_json(identified: Identified) -> dict[str, Any]:
         "robot_digest": identified.robot.digest,
         "validation": validation_json(identified.validation),
         "start_validation": validation_json(identified.start_validation),
+        "quality": quality_json(identified),
         "parameters": parameters_json(identified),
         "correlations": {"names": told.names, "matrix": told.correlation.tolist()},
         "cannot_tell": told.statements,
@@ -103,6 +104,29 @@ def validation_json(validation: Validation) -> dict[str, Any]:
             f"{horizon:.1f}": list(pair) for horizon, pair in validation.open_loop_position.items()
         },
     }
+
+
+def quality_json(identified: Identified) -> list[dict[str, Any]]:
+    """Return a record per kind of error on held-out data, rms before and after the fit, SI."""
+    before, after = identified.start_validation, identified.validation
+    rows = [
+        ("position, closed loop", "rad", before.closed_loop_position, after.closed_loop_position),
+        ("torque, closed loop", "N m", before.closed_loop_torque, after.closed_loop_torque),
+    ]
+    for horizon, pair in before.open_loop_position.items():
+        name = f"position, predicted {horizon:g} s ahead"
+        rows.append((name, "rad", pair, after.open_loop_position[horizon]))
+    return [
+        {
+            "error": name,
+            "unit": unit,
+            "hip_before": first[0],
+            "knee_before": first[1],
+            "hip_after": second[0],
+            "knee_after": second[1],
+        }
+        for name, unit, first, second in rows
+    ]
 
 
 def parameters_json(identified: Identified) -> list[dict[str, Any]]:

@@ -4,7 +4,12 @@ import copy
 from pathlib import Path
 from typing import Any
 
-from hopping_leg.identify.result import Identified, parameters_json, software_versions
+from hopping_leg.identify.result import (
+    Identified,
+    parameters_json,
+    quality_json,
+    software_versions,
+)
 from hopping_leg.robot.fields import Tree
 from hopping_leg.robot.files import load_tree, robot_from_tree
 from hopping_leg.robot.writing import robot_text
@@ -70,17 +75,12 @@ def comment(identified: Identified, origin: str) -> str:
 
 
 def _quality(identified: Identified) -> list[str]:
-    lines = []
-    for name, told in (
-        ("before", identified.start_validation),
-        ("after", identified.validation),
-    ):
-        hip, knee = (1e3 * value for value in told.closed_loop_position)
-        hip_torque, knee_torque = told.closed_loop_torque
-        lines.append(
-            f"Error {name} the fit (rms; hip, knee): {hip:.3g}, {knee:.3g} mrad and"
-            f" {hip_torque:.3g}, {knee_torque:.3g} N m in closed loop."
+    lines = ["Error on what judged (rms; hip, knee), before and after the fit:"]
+    for row in quality_json(identified):
+        before, after = (
+            f"{row[f'hip_{when}']:.3g}, {row[f'knee_{when}']:.3g}" for when in ("before", "after")
         )
+        lines.append(f"  {row['error']}: {before} and {after} {row['unit']}")
     return lines
 
 
