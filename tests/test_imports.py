@@ -33,7 +33,11 @@ torch, and what drives the robot knows nothing of a simulation."""
 PLAYS = "deploy/emulator/"
 """Exception, which simulates the leg behind the wire."""
 
-TRAINS = {"evaluate/bench_training.py", "evaluate/bench_ablation.py"}
+TRAINS = {
+    "evaluate/bench_training.py",
+    "evaluate/bench_ablation.py",
+    "evaluate/transfer/training.py",
+}
 """Exceptions, which train and are imported only where that is asked for."""
 
 BLOCK = """

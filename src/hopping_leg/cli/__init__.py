@@ -29,6 +29,7 @@ VERBS = {
     "export": "write a leg as URDF, inspect a policy file",
     "record": "play an excitation on a leg and record it",
     "identify": "fit a leg to recordings and write its robot file",
+    "experiment": "run the paper's sim-to-real experiment on twins",
     "reproduce": "the main job: train, evaluate, compare and report",
 }
 """Every verb with its line in the overview."""

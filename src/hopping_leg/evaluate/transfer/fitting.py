@@ -1,0 +1,123 @@
+"""Second stage: identify the twin from its recordings, knowing only the robot that it extends."""
+
+import dataclasses
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hopping_leg.errors import UsageError
+from hopping_leg.evaluate.transfer.methods import Method
+from hopping_leg.evaluate.transfer.study import Study, TwinFile
+from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.cma import CmaOptions
+from hopping_leg.identify.pipeline import IdentifyOptions, identify
+from hopping_leg.identify.recording import load_recording
+from hopping_leg.identify.result import Identified, as_json
+from hopping_leg.identify.robot_file import comment, identified_tree
+from hopping_leg.identify.searching import SearchOptions
+from hopping_leg.robot import load_robot
+from hopping_leg.robot.files import load_tree, robot_from_tree
+from hopping_leg.robot.writing import robot_text
+from hopping_leg.sim import CONTROL_RATE
+from hopping_leg.trace import write_atomically
+
+
+@dataclass(frozen=True)
+class Identify:
+    """A twin identified by a method."""
+
+    study: Study
+    twin: TwinFile
+    method: Method
+
+    weight = 3.0
+
+    @property
+    def name(self) -> str:
+        """What is done."""
+        return f"identify {self.twin.name}, {self.method.name}"
+
+    @property
+    def done(self) -> bool:
+        """Whether the robot file is there.
+
+        Raises:
+            UsageError: It is there, but from other recordings.
+        """
+        file = self.study.fitted(self.twin, self.method)
+        if not file.exists():
+            return False
+        asked = json.loads(file.with_suffix(".json").read_text(encoding="utf-8"))["asked"]
+        if asked != self._asked():
+            raise UsageError(
+                f"{file} was identified from other recordings or with other options; give another"
+                " --folder, or delete it to identify again."
+            )
+        return True
+
+    def run(self, *, quiet: bool) -> None:
+        """Identify and write the robot file; a fit that was killed goes on."""
+        assert self.method.fit is not None
+        study, search = self.study, self.method.fit.search
+        file = study.fitted(self.twin, self.method)
+        effort = dataclasses.replace(SearchOptions(), cma=CmaOptions(generations=study.generations))
+        identified = identify(
+            [load_recording(path) for path in self._recordings],
+            load_robot(self.twin.believed),
+            options=IdentifyOptions(search=search, effort=effort, threads=study.threads),
+            folder=file.with_suffix(""),
+            resume=True,
+        )
+        content = {"asked": self._asked(), **as_json(identified), "truth": self._truth(identified)}
+        text = json.dumps(content, indent=1, allow_nan=False)
+        write_atomically(file.with_suffix(".json"), f"{text}\n".encode())
+        write_atomically(file, robot_file(identified, self.twin.believed, file).encode())
+
+    def progress(self) -> str:
+        """Return what to show while it runs."""
+        return ""
+
+    @property
+    def _recordings(self) -> list[Path]:
+        assert self.method.fit is not None
+        return [self.study.recording(self.twin, rig) for rig in self.method.fit.rigs]
+
+    def _asked(self) -> dict[str, Any]:
+        assert self.method.fit is not None
+        search = self.method.fit.search
+        return {
+            "recordings": [load_recording(path).digest for path in self._recordings],
+            "search": search,
+            "generations": None if search == "least-squares" else self.study.generations,
+        }
+
+    def _truth(self, identified: Identified) -> dict[str, float]:
+        """Return the twin's own values of what was fitted, where it has them."""
+        truth = Candidate(self.twin.without_surprises)
+        names = identified.parameters.names
+        values = {name: truth.get(name) for name in names if not name.startswith("drive.")}
+        if "drive.delay" in names:
+            values["drive.delay"] = self.twin.robot.reality.latency.command
+        return values
+
+
+def robot_file(identified: Identified, origin: str, path: Path) -> str:
+    """Return the identified robot as a file; a delay that was found becomes the robot's latency.
+
+    Args:
+        identified: What was found.
+        origin: Robot that the fit began with.
+        path: Of the file.
+
+    Raises:
+        RobotError: The identified values make no valid robot.
+    """
+    tree = identified_tree(identified, load_tree(origin), path.stem)
+    delay = min(identified.candidate.drive.delay, 1 / CONTROL_RATE)
+    if delay > 0 and "reality" not in tree:
+        source = "identified: the recordings' loop answered so late"
+        entry = {"value": delay, "unit": "s", "source": source}
+        tree["reality"] = {"latency": {"command": entry}}
+    robot_from_tree(tree, str(path))
+    return robot_text(tree, comment(identified, origin))

@@ -1,0 +1,142 @@
+"""Last stage: hop on the twin without tuning, and count.
+
+A twin brings latency, noise and losses of its own; the paper's disturbance stays off there, as it
+would come on top. A twin without [reality] is met with the paper's disturbance.
+"""
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hopping_leg.control import Setup
+from hopping_leg.control.policy import Policy
+from hopping_leg.errors import UsageError
+from hopping_leg.evaluate.result import Evaluation
+from hopping_leg.evaluate.runner import Candidate, evaluate
+from hopping_leg.evaluate.transfer.methods import Method
+from hopping_leg.evaluate.transfer.study import Study, TwinFile
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim import NOTHING, Disturbance
+from hopping_leg.trace import write_atomically
+
+FIRST_SEED = 1000
+"""Of the trials; no seed from here on has chosen anything."""
+
+_KEPT = ("command_m", "median_error_m", "std_m", "hops", "skipped_hops", "hop_rate_hz",
+         "flight_fraction", "body_contacts")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Hop:
+    """A policy tried on a twin."""
+
+    study: Study
+    twin: TwinFile
+    method: Method
+    seed: int
+
+    weight = 1.0
+
+    @property
+    def name(self) -> str:
+        """What is done."""
+        return f"hop on {self.twin.name}, {self.method.name}, seed {self.seed}"
+
+    @property
+    def done(self) -> bool:
+        """Whether the result is there.
+
+        Raises:
+            UsageError: It is there, but of other trials.
+        """
+        if not self._file.exists():
+            return False
+        if json.loads(self._file.read_text(encoding="utf-8"))["asked"] != self._asked():
+            raise UsageError(
+                f"{self._file} holds trials of another policy, twin or length; give another"
+                " --folder, or delete it to try again."
+            )
+        return True
+
+    def run(self, *, quiet: bool) -> None:
+        """Try the policy at every command and write what was measured."""
+        content = {"asked": self._asked(), "rows": hop(self._policy, self.twin.robot, self.study)}
+        text = json.dumps(content, indent=1, allow_nan=False)
+        write_atomically(self._file, f"{text}\n".encode())
+
+    def progress(self) -> str:
+        """Return what to show while it runs."""
+        return ""
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return what was measured, one row per command."""
+        rows = json.loads(self._file.read_text(encoding="utf-8"))["rows"]
+        where = {"method": self.method.name, "twin": self.twin.name, "seed": self.seed}
+        return [{**where, **row} for row in rows]
+
+    @property
+    def _file(self) -> Path:
+        return self.study.trial(self.twin, self.method, self.seed)
+
+    @property
+    def _policy(self) -> bytes:
+        folder = self.study.training(self.twin, self.method, self.seed)
+        return (folder / "policy.onnx").read_bytes()
+
+    def _asked(self) -> dict[str, Any]:
+        return {
+            "policy": hashlib.sha256(self._policy).hexdigest()[:16],
+            "twin": self.twin.robot.digest,
+            "commands": list(self.study.commands),
+            "repeats": self.study.repeats,
+        }
+
+
+def disturbance_of(robot: Robot) -> Disturbance:
+    """Return what a leg is tried with on top of what it brings: nothing, if it brings anything."""
+    return Disturbance() if robot.reality.neutral else NOTHING
+
+
+def hop(content: bytes, robot: Robot, study: Study) -> list[dict[str, Any]]:
+    """Let a policy hop and return a row per command.
+
+    Errors are apex minus command. A leg that never leaves the ground at a command counts as
+    ``motionless`` with an error as large as the command.
+
+    Args:
+        content: The policy file.
+        robot: The twin.
+        study: Says at which commands and how often.
+    """
+    policy = Policy(content, "the trained policy", "policy")
+    bounds = (policy.card.command_low, policy.card.command_high)
+    setup = Setup(robot, disturbance_of(robot), threads=study.threads)
+    judged = evaluate(
+        [Candidate("policy", policy, bounds)],
+        setup,
+        commands=study.commands,
+        repeats=study.repeats,
+        seed=FIRST_SEED,
+        kinds=("fixed",),
+    )
+    return _rows(judged.evaluation)
+
+
+def _rows(evaluation: Evaluation) -> list[dict[str, Any]]:
+    summary = evaluation.to_json()["summary"]
+    apexes = {d["command_m"]: np.array(d["apexes_m"]) for d in evaluation.distributions}
+    rows = []
+    for full in summary:
+        row = {name: full[name] for name in _KEPT}
+        command = row["command_m"]
+        errors = apexes[command] - command
+        row["motionless"] = not len(errors)
+        row["median_abs_error_m"] = float(np.median(np.abs(errors))) if len(errors) else command
+        if row["motionless"]:
+            row["median_error_m"] = -command
+        rows.append(row)
+    return rows

@@ -1,0 +1,87 @@
+"""What a policy is trained on before it meets the twin: the paper's method and its alternatives."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from hopping_leg.errors import UsageError, unknown_name
+from hopping_leg.identify.setup import Rig
+
+Search = Literal["least-squares", "two-pass", "one-pass"]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How the simulation is fitted to recordings of the twin.
+
+    Attributes:
+        rigs: Whose recordings are used.
+        search: ``least-squares`` on positions and torques, the paper's ``two-pass`` CMA-ES on
+            positions, or ``one-pass``, the same over all parameters at once.
+    """
+
+    rigs: tuple[Rig, ...] = ("fixed-base", "rail")
+    search: Search = "least-squares"
+
+
+@dataclass(frozen=True)
+class Method:
+    """Where a policy is trained.
+
+    Attributes:
+        name: On the command line and in the results.
+        meaning: A phrase for tables.
+        fit: How the twin is identified; None if it is not.
+        robot: Robot that is trained on without a fit; None takes the one that the twin extends.
+        randomised: Whether every leg in training draws its own numbers.
+        truth: Whether the twin's own file is the robot, [reality] left out but for the delay:
+            what a perfect fit would find.
+    """
+
+    name: str
+    meaning: str
+    fit: Fit | None = None
+    robot: str | None = None
+    randomised: bool = False
+    truth: bool = False
+
+    @property
+    def of_twin(self) -> bool:
+        """Whether every twin needs a training of its own."""
+        return self.fit is not None or self.truth
+
+
+METHODS = {
+    method.name: method
+    for method in (
+        Method("identified", "identified from both recordings", Fit()),
+        Method("cad", "CAD defaults"),
+        Method("table-1", "the paper's Table I", robot="legv2-paper"),
+        Method("randomised", "domain randomisation over the twins' ranges", randomised=True),
+        Method("rail-only", "identified from the rail alone", Fit(rigs=("rail",))),
+        Method("fixed-base-only", "identified with the base clamped", Fit(rigs=("fixed-base",))),
+        Method("two-pass", "the paper's two passes of CMA-ES", Fit(search="two-pass")),
+        Method("one-pass", "the same CMA-ES in one pass", Fit(search="one-pass")),
+        Method("truth", "true parameters: what a perfect fit would find", truth=True),
+    )
+}
+"""Every method by name."""
+
+DEFAULT = ("identified", "cad", "table-1", "randomised", "rail-only", "fixed-base-only")
+"""What is compared unless asked otherwise."""
+
+
+def choose_methods(names: Sequence[str]) -> list[Method]:
+    """Return methods by name.
+
+    Raises:
+        UsageError: There is no such method, or one is named twice.
+    """
+    for name in names:
+        if name not in METHODS:
+            raise UsageError(unknown_name("method", name, METHODS))
+        if list(names).count(name) > 1:
+            raise UsageError(f"The method '{name}' is named twice; name it once.")
+    if not names:
+        raise UsageError(f"No method is left; name some of: {', '.join(METHODS)}.")
+    return [METHODS[name] for name in names]

@@ -1,0 +1,91 @@
+"""Third stage: train on what a method believes the twin to be."""
+
+import dataclasses
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from hopping_leg.evaluate.transfer.methods import Method
+from hopping_leg.evaluate.transfer.study import Study, TwinFile
+from hopping_leg.robot import load_robot
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.reality import NEUTRAL
+
+if TYPE_CHECKING:
+    from hopping_leg.learn.recipe import Recipe
+    from hopping_leg.learn.run_folder import RunFolder
+
+
+@dataclass(frozen=True)
+class Train:
+    """A training of the recipe `fast`."""
+
+    study: Study
+    twin: TwinFile
+    method: Method
+    seed: int
+
+    weight = 4.0
+
+    @property
+    def name(self) -> str:
+        """What is done."""
+        return f"train {self.study.training(self.twin, self.method, self.seed).name}"
+
+    @property
+    def done(self) -> bool:
+        """Whether the policy is there.
+
+        Raises:
+            UsageError: The folder holds another training.
+        """
+        folder = self._folder()
+        if not (folder.path / "config.json").exists():
+            return False
+        folder.check_same()
+        return folder.policy.exists()
+
+    def run(self, *, quiet: bool) -> None:
+        """Train; a training that was killed goes on."""
+        from hopping_leg.learn.train import train
+
+        folder = self._folder()
+        train(
+            self._recipe(),
+            self.robot,
+            self.seed,
+            folder.path,
+            resume=True,
+            threads=self.study.threads,
+            quiet=quiet,
+        )
+
+    def progress(self) -> str:
+        """Return what to show while it runs."""
+        snapshots = sorted((self._folder().path / "snapshots").glob("*.onnx"))
+        return f"{int(snapshots[-1].stem) / 1e6:.1f}M steps" if snapshots else "begun"
+
+    @property
+    def robot(self) -> Robot:
+        """What is trained on."""
+        method = self.method
+        if method.truth:
+            return self.twin.without_surprises
+        if method.fit is not None:
+            return load_robot(self.study.fitted(self.twin, method))
+        return dataclasses.replace(load_robot(method.robot or self.twin.believed), reality=NEUTRAL)
+
+    def _recipe(self) -> "Recipe":
+        from hopping_leg.learn.fast import FastRecipe
+        from hopping_leg.learn.recipes import randomised
+
+        recipe = FastRecipe(steps=self.study.steps)
+        return randomised(recipe) if self.method.randomised else recipe
+
+    def _folder(self) -> "RunFolder":
+        from hopping_leg.learn.run_folder import RunFolder
+        from hopping_leg.learn.scale import fit
+
+        robot = self.robot
+        recipe = fit(self._recipe(), robot)
+        path = self.study.training(self.twin, self.method, self.seed)
+        return RunFolder(path, recipe, robot, self.seed, None)
