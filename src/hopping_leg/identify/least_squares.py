@@ -14,6 +14,9 @@ from hopping_leg.identify.parameters import ParameterSet
 Residuals = Callable[[Array], Array]
 """Search vectors (n, k) to residuals (n, m)."""
 
+_MARGIN = 1.0
+"""Distance from its bounds at which a parameter starts, in units of its scale."""
+
 
 @dataclass(frozen=True)
 class LeastSquaresOptions:
@@ -90,7 +93,7 @@ def least_squares(
     """
     options = options or LeastSquaresOptions()
     low, high = parameters.bounds
-    vector = np.clip(np.zeros(len(low)) if start is None else start, low, high)
+    vector = _inside(np.zeros(len(low)) if start is None else start, low, high)
     identity = {
         "parameters": repr(parameters.parameters),
         "start": vector.tolist(),
@@ -138,6 +141,12 @@ def multi_start(
     draws = rng.uniform(np.maximum(low, -3), np.minimum(high, 3), (starts, len(low)))
     draws[0] = np.clip(0.0, low, high)
     return sorted((search(i, x) for i, x in enumerate(draws)), key=lambda found: found.cost)
+
+
+def _inside(vector: Array, low: Array, high: Array) -> Array:
+    """Return the vector off its bounds, near which the trust region would barely move it."""
+    margin = np.minimum(_MARGIN, 0.25 * (high - low))
+    return np.clip(vector, low + margin, high - margin)
 
 
 def _settled(history: list[float], tolerance: float) -> bool:
