@@ -1,0 +1,189 @@
+"""The black box: what happened, tick by tick, on disk while it happens.
+
+A file of frames, each ``kind, length, content, CRC-32``: one header (JSON), rows of floats, events
+(JSON). The loop only puts a frame into a queue; a thread writes it at once. When the process is
+killed, all but the very last frames are in the file, and a frame that was cut off is left out.
+"""
+
+import json
+import os
+import queue
+import struct
+import threading
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from hopping_leg.errors import TraceError
+from hopping_leg.trace import Trace
+
+SUFFIX = ".blackbox"
+"""Of the files."""
+
+_MAGIC = b"HOPBOX1\n"
+_FRAME = struct.Struct("<BI")
+_CRC = struct.Struct("<I")
+_HEADER, _ROW, _EVENT = range(3)
+_SYNC_SECONDS = 1.0
+_LARGEST = 1 << 24
+"""Content that no frame exceeds, bytes; a length beyond it is damage."""
+
+
+class BlackBox:
+    """Writes one run; rows and events never wait for the disk.
+
+    Args:
+        path: File to create; ends in ``SUFFIX``.
+        columns: Of the rows.
+        header: Facts about the run, JSON.
+
+    Raises:
+        TraceError: The file exists or cannot be created.
+    """
+
+    def __init__(self, path: Path, columns: Sequence[str], header: dict[str, Any]) -> None:
+        self.path, self.columns = path, tuple(columns)
+        self.error: str | None = None
+        self._row = struct.Struct(f"<{len(self.columns)}d")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
+        except OSError as error:
+            raise TraceError(f"Cannot create {path}: {error.strerror}.") from error
+        first = json.dumps({"columns": self.columns, "header": header}).encode()
+        os.write(self._file, _MAGIC + _frame(_HEADER, first))
+        self._queue: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._write, name="black-box", daemon=True)
+        self._thread.start()
+
+    def row(self, values: Sequence[float]) -> None:
+        """Record a tick; ``values`` are in the order of ``columns``."""
+        self._queue.put(_frame(_ROW, self._row.pack(*values)))
+
+    def event(self, **facts: Any) -> None:  # noqa: ANN401
+        """Record what happened beside the ticks, e.g. a transition with its reason."""
+        self._queue.put(_frame(_EVENT, json.dumps(facts).encode()))
+
+    def close(self) -> None:
+        """Write what is left and close the file."""
+        self._queue.put(None)
+        self._thread.join()
+        os.close(self._file)
+
+    def _write(self) -> None:
+        """Write frames as they come; after an error, e.g. a full disk, drop them."""
+        unsynced = 0
+        while True:
+            content = self._queue.get()
+            parts: list[bytes] = []
+            while content is not None:
+                parts.append(content)
+                try:
+                    content = self._queue.get_nowait()
+                except queue.Empty:
+                    break
+            last = content is None
+            try:
+                if parts and self.error is None:
+                    os.write(self._file, b"".join(parts))
+                    unsynced += len(parts)
+                if unsynced and (last or unsynced >= 200 * _SYNC_SECONDS):
+                    os.fsync(self._file)
+                    unsynced = 0
+            except OSError as error:
+                self.error = f"{self.path}: {error.strerror}"
+            if last:
+                return
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What a black box holds.
+
+    Attributes:
+        columns: Of the rows.
+        header: Facts about the run.
+        rows: (ticks, columns).
+        events: In order.
+        whole: Whether the file ends with a whole frame.
+    """
+
+    columns: tuple[str, ...]
+    header: dict[str, Any]
+    rows: np.ndarray
+    events: list[dict[str, Any]]
+    whole: bool
+
+    def table(self) -> pl.DataFrame:
+        """Return the rows as a table."""
+        return pl.DataFrame(dict(zip(self.columns, self.rows.T, strict=True)))
+
+
+def read_box(path: Path) -> Contents:
+    """Read a black box, also of a process that was killed.
+
+    Raises:
+        TraceError: The file is missing, or no black box.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise TraceError(f"Cannot read {path}: {error.strerror}.") from error
+    if not content.startswith(_MAGIC):
+        raise TraceError(f"{path} is no black box of `hop deploy`.")
+    frames = list(_frames(content))
+    if not frames or frames[0][0] != _HEADER:
+        raise TraceError(f"{path} ends before its header; the run had not begun.")
+    first = json.loads(frames[0][1])
+    columns = tuple(first["columns"])
+    body = b"".join(data for kind, data, _ in frames if kind == _ROW)
+    return Contents(
+        columns=columns,
+        header=first["header"],
+        rows=np.frombuffer(body, "<f8").reshape(-1, len(columns)),
+        events=[json.loads(data) for kind, data, _ in frames if kind == _EVENT],
+        whole=frames[-1][2] == len(content),
+    )
+
+
+def recover(path: Path) -> Trace:
+    """Return the common trace of a run from its black box.
+
+    Columns of the true height, which hardware does not know, hold NaN.
+
+    Raises:
+        TraceError: The file is missing, no black box, or holds no tick.
+    """
+    box = read_box(path)
+    if not len(box.rows):
+        raise TraceError(f"{path} holds no tick; the run had not begun.")
+    unknown = ("height_m", "height_rate_m_s")
+    clearances = tuple(f"{part}_clearance_m" for part in ("foot", "knee", "base"))
+    missing = [name for name in (*unknown, *clearances) if name not in box.columns]
+    table = box.table().with_columns(pl.lit(float("nan")).alias(name) for name in missing)
+    return Trace(table, {**box.header, "events": box.events})
+
+
+def _frame(kind: int, content: bytes) -> bytes:
+    head = _FRAME.pack(kind, len(content))
+    return head + content + _CRC.pack(zlib.crc32(content, zlib.crc32(head)))
+
+
+def _frames(content: bytes) -> Iterator[tuple[int, bytes, int]]:
+    """Yield kind, content and end of every whole frame up to the first that is not."""
+    at = len(_MAGIC)
+    while at + _FRAME.size <= len(content):
+        kind, length = _FRAME.unpack_from(content, at)
+        end = at + _FRAME.size + length + _CRC.size
+        if length > _LARGEST or end > len(content):
+            return
+        (crc,) = _CRC.unpack_from(content, end - _CRC.size)
+        if crc != zlib.crc32(content[at : end - _CRC.size]):
+            return
+        yield kind, content[at + _FRAME.size : end - _CRC.size], end
+        at = end

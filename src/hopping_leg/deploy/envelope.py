@@ -1,0 +1,98 @@
+"""Within what the leg may move; beyond it the supervisor damps."""
+
+from dataclasses import dataclass
+
+from hopping_leg.deploy.observation import Pair
+from hopping_leg.robot.parameters import Robot
+
+MARGIN = 0.6
+"""How far a hopping leg may pass its soft limits, rad; the soft limits' PD acts before."""
+
+RECORDING_MARGIN = 0.1
+"""How far a recorded leg may pass its mechanical range, rad: backlash and the belt's give."""
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """Limits of one run; pairs are (hip, knee) at the joint."""
+
+    lower: Pair
+    """rad"""
+    upper: Pair
+    """rad"""
+    torque: Pair
+    """Largest torque that leaves, N m."""
+    speed: Pair
+    """rad/s"""
+    voltage_low: float
+    """V"""
+    voltage_high: float
+    """V"""
+    temperature: float
+    """deg C"""
+    period: float = 0.005
+    """Control period, s."""
+    excess_torque: float = 1.5
+    """Measured torque over ``torque`` that is too much."""
+    excess_ticks: int = 4
+    """Ticks in a row with too much torque that are tolerated: one sample may be noise."""
+    jump: float = 0.15
+    """Error of a position predicted from the last one and the velocities, rad per period."""
+    missing_ticks: int = 2
+    """Ticks in a row without a reply that are tolerated."""
+    overrun_ticks: int = 4
+    """Ticks in a row that begin more than a period late and are tolerated."""
+    stall: float = 0.02
+    """Lateness of a single tick beyond which the loop stood still, s."""
+    arming_time: float = 0.5
+    """Time for the drives to begin to follow torques, s."""
+    damping_least: float = 0.3
+    """Least time of braking, s."""
+    damping_most: float = 2.0
+    """Longest time of braking, s."""
+    rest_speed: float = 0.2
+    """Joint speed that counts as rest, rad/s."""
+
+
+def hopping_envelope(robot: Robot, rate: float) -> Envelope:
+    """Return the limits for a hopping leg: its soft limits and a margin.
+
+    Args:
+        robot: The leg.
+        rate: Control rate, Hz.
+    """
+    ranges = [
+        (max(joint.lower - MARGIN, servo.lower), min(joint.upper + MARGIN, servo.upper))
+        for joint, servo in zip((robot.hip, robot.knee), robot.hardware.servos, strict=True)
+    ]
+    return _envelope(robot, rate, ranges)
+
+
+def recording_envelope(robot: Robot, rate: float) -> Envelope:
+    """Return the limits for excitations, which use the whole mechanical range.
+
+    Args:
+        robot: The leg.
+        rate: Control rate, Hz.
+    """
+    ranges = [
+        (servo.lower - RECORDING_MARGIN, servo.upper + RECORDING_MARGIN)
+        for servo in robot.hardware.servos
+    ]
+    return _envelope(robot, rate, ranges)
+
+
+def _envelope(robot: Robot, rate: float, ranges: list[Pair]) -> Envelope:
+    (hip_lower, hip_upper), (knee_lower, knee_upper) = ranges
+    hip, knee, hardware = robot.hip, robot.knee, robot.hardware
+    return Envelope(
+        lower=(hip_lower, knee_lower),
+        upper=(hip_upper, knee_upper),
+        torque=(hip.torque_limit, knee.torque_limit),
+        speed=(1.3 * hip.no_load_speed, 1.3 * knee.no_load_speed),
+        voltage_low=hardware.voltage_low,
+        voltage_high=hardware.voltage_high,
+        temperature=hardware.temperature_limit,
+        period=1 / rate,
+        stall=max(hardware.watchdog, 1 / rate),
+    )

@@ -1,0 +1,85 @@
+"""A tick as a row of the black box: the trace's columns and what only hardware has."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from hopping_leg.control.protocol import Controller
+from hopping_leg.deploy.observation import Outgoing, Pair, Replies
+from hopping_leg.deploy.sequence import Step
+from hopping_leg.deploy.supervisor import Memory
+from hopping_leg.deploy.wire import JOINTS
+
+_LOOP = ("time_s", "command_m", "state", "reason", "part", "action")
+_TIMES = ("wake_late_s", "exchange_s", "control_s", "tick_s", "skipped_ticks")
+_MEASURED = ("position_rad", "velocity_rad_s", "torque_nm")
+_DRIVE = ("mode", "fault", "voltage_v", "temperature_c", "fresh")
+_ASKED = ("command_nm", "sent_nm")
+
+_NAN_PAIR: Pair = (math.nan, math.nan)
+
+
+@dataclass(frozen=True, slots=True)
+class Timings:
+    """How a tick went, s.
+
+    Attributes:
+        late: From the deadline to the tick's beginning.
+        exchange: From there until the replies were in or given up.
+        control: From there until the torques had left.
+        tick: From the deadline to the end.
+        skipped: Ticks that were left out before this one.
+    """
+
+    late: float
+    exchange: float
+    control: float
+    tick: float
+    skipped: int
+
+
+def columns(controller: Controller) -> tuple[str, ...]:
+    """Return the columns of a run; the controller's own come last."""
+    drives = tuple(f"{joint}_{name}" for name in (*_MEASURED, *_DRIVE, *_ASKED) for joint in JOINTS)
+    return (*_LOOP, *_TIMES, *drives, *internal_names(controller))
+
+
+def internal_names(controller: Controller) -> tuple[str, ...]:
+    """Return the names of a controller's own columns."""
+    controller.reset(1)
+    return tuple(sorted(controller.internals()))
+
+
+def row(
+    time: float,
+    step: Step,
+    memory: Memory,
+    outgoing: Outgoing,
+    fresh: Replies,
+    timings: Timings,
+    internals: Sequence[float],
+) -> list[float]:
+    """Return the row of a tick; measurements are NaN where no fresh reply came."""
+    values: list[float] = [
+        time,
+        step.command,
+        memory.state,
+        memory.cause.reason,
+        step.phase,
+        outgoing.action.value,
+        timings.late,
+        timings.exchange,
+        timings.control,
+        timings.tick,
+        timings.skipped,
+    ]
+    last = memory.counts.last
+    for name in ("position", "velocity", "torque"):
+        values += [math.nan if reply is None else getattr(reply, name) for reply in fresh]
+    for name in ("mode", "fault", "voltage", "temperature"):
+        values += [math.nan if reply is None else getattr(reply, name) for reply in last]
+    values += [float(reply is not None) for reply in fresh]
+    values += step.controller
+    values += outgoing.torque
+    values += internals
+    return values

@@ -1,0 +1,100 @@
+"""Which height is commanded when."""
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from hopping_leg.control.policy import Policy
+from hopping_leg.control.protocol import Controller
+from hopping_leg.errors import UsageError
+from hopping_leg.robot import kinematics
+from hopping_leg.robot.parameters import Robot
+
+Range = tuple[float, float]
+"""Lowest and highest, m."""
+
+
+class Commands(Protocol):
+    """A source of commanded heights."""
+
+    def at(self, elapsed: float) -> float:
+        """Return the height commanded at a time since the first hop, m."""
+        ...
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Steps of height; the last one stays.
+
+    Attributes:
+        steps: (height in m, duration in s) in order.
+    """
+
+    steps: tuple[tuple[float, float], ...]
+
+    def at(self, elapsed: float) -> float:
+        """Return the height commanded at a time since the first hop, m."""
+        for height, seconds in self.steps[:-1]:
+            if elapsed < seconds:
+                return height
+            elapsed -= seconds
+        return self.steps[-1][0]
+
+    @property
+    def seconds(self) -> float:
+        """Length of all steps, s."""
+        return sum(seconds for _, seconds in self.steps)
+
+
+def parse_schedule(text: str) -> Schedule:
+    """Read a schedule such as ``0.25:5,0.30:5``: height in m and duration in s of each step.
+
+    Raises:
+        UsageError: It is no schedule.
+    """
+    steps = []
+    for part in text.split(","):
+        try:
+            height, seconds = (float(number) for number in part.split(":"))
+        except ValueError:
+            height = seconds = math.nan
+        if not (math.isfinite(height) and 0 < seconds < math.inf):
+            raise UsageError(
+                f"'{part}' is no step of a schedule; give height in m and duration in s, e.g."
+                " 0.25:5,0.30:5."
+            )
+        steps.append((height, seconds))
+    return Schedule(tuple(steps))
+
+
+def command_range(controller: Controller, robot: Robot) -> Range:
+    """Return the heights that a controller can be asked for, m.
+
+    A policy's are those of its training; others go from folded standing to twice the leg's length.
+    """
+    if isinstance(controller, Policy):
+        return controller.card.command_low, controller.card.command_high
+    return robot_range(robot)
+
+
+def robot_range(robot: Robot) -> Range:
+    """Return the heights of the hip axis that a leg may reach, m."""
+    folded = np.array([robot.hip.upper, robot.knee.lower])
+    return float(kinematics.stance_height(robot, folded)), 2 * robot.straight_height
+
+
+def check_schedule(schedule: Schedule, valid: Range, name: str) -> None:
+    """Refuse heights out of a controller's range.
+
+    Raises:
+        UsageError: Naming the height and the range.
+    """
+    slack = 1e-9
+    for height, _ in schedule.steps:
+        if not valid[0] - slack <= height <= valid[1] + slack:
+            raise UsageError(
+                f"A command of {height:g} m is outside of what {name} can be asked for; give"
+                f" heights from {valid[0]:.2f} to {valid[1]:.2f} m."
+            )

@@ -1,0 +1,183 @@
+"""What the leg does while it is armed: rise to the start pose, hop, sink down.
+
+Rising and sinking are minimum-jerk paths under the joint PD, with gains that fade in and out. The
+paper's soft limits stay in force throughout.
+"""
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.control.joint_pd import JointGains
+from hopping_leg.control.protocol import Controller, Measurement
+from hopping_leg.deploy.observation import Pair
+from hopping_leg.deploy.schedule import Commands
+from hopping_leg.robot.limits import SoftLimiter
+
+
+class Phase(IntEnum):
+    """Part of the sequence."""
+
+    WAIT = 0
+    RISE = 1
+    SETTLE = 2
+    HOP = 3
+    SINK = 4
+    DONE = 5
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How long each part lasts, s."""
+
+    hop: float = 10.0
+    rise: float = 2.0
+    settle: float = 0.5
+    sink: float = 1.5
+    fade: float = 0.3
+    """Of the gains at the beginning of the rise and the end of the sinking."""
+
+    def phase(self, elapsed: float) -> tuple[Phase, float]:
+        """Return the part at a time since the start, and how long it has lasted."""
+        for phase, seconds in (
+            (Phase.RISE, self.rise),
+            (Phase.SETTLE, self.settle),
+            (Phase.HOP, self.hop),
+            (Phase.SINK, self.sink),
+        ):
+            if elapsed < seconds:
+                return phase, elapsed
+            elapsed -= seconds
+        return Phase.DONE, elapsed
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Where the sequence leads, rad, (2,) each."""
+
+    start: Array
+    """Of the first hop."""
+    rest: Array
+    """Where the leg sinks to before the drives brake."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """What the sequence asks for at a tick.
+
+    Attributes:
+        torque: At the joints, N m.
+        command: Desired height, m.
+        phase: Part of the sequence.
+        controller: What the controller alone asked for, N m; NaN outside of the hop.
+    """
+
+    torque: Pair
+    command: float
+    phase: Phase
+    controller: Pair = (float("nan"), float("nan"))
+
+
+@dataclass
+class Sequence:
+    """Runs from the moment that the drives follow torques; steps once a tick.
+
+    Args:
+        controller: Hops.
+        commands: What it is told.
+        poses: Start and rest.
+        limiter: Soft limits; None goes without.
+        timing: Of the parts.
+        gains: Of rising and sinking.
+    """
+
+    controller: Controller
+    commands: Commands
+    poses: Poses
+    limiter: SoftLimiter | None
+    timing: Timing = field(default_factory=Timing)
+    gains: JointGains = field(default_factory=JointGains)
+
+    def __post_init__(self) -> None:
+        self._began: float | None = None
+        self._from = np.zeros(2)
+        self._phase = Phase.WAIT
+        self._stop_at: float | None = None
+        self.controller.reset(1)
+
+    @property
+    def began(self) -> bool:
+        """Whether the leg has begun to rise."""
+        return self._began is not None
+
+    @property
+    def finished(self) -> bool:
+        """Whether the leg has sunk down."""
+        return self._phase is Phase.DONE
+
+    def begin(self, time: float, q: Array) -> None:
+        """Start to rise from a posture.
+
+        Args:
+            time: Now, s.
+            q: Measured joint angles, rad, (2,).
+        """
+        self._began, self._from = time, q.copy()
+
+    def step(self, time: float, measurement: Measurement | None) -> Step:
+        """Return what to do at a tick; ``measurement`` is None as long as there is none."""
+        if self._began is None or measurement is None:
+            return Step((0.0, 0.0), self.commands.at(0.0), Phase.WAIT)
+        phase, lasted = self.timing.phase(time - self._began)
+        q, qd = measurement.q[0, 0], measurement.qd[0, 0]
+        if phase is not self._phase and phase in (Phase.SINK, Phase.DONE):
+            self._from = q.copy()
+        if phase is Phase.HOP and self._phase is not Phase.HOP:
+            self.controller.reset(1)
+        self._phase = phase
+        command = self.commands.at(self._hopped(time))
+        if phase is Phase.HOP:
+            asked = self.controller.act(measurement)[0]
+            return Step(_pair(self._limit(asked, q, qd)), command, phase, _pair(asked))
+        asked = self._hold(phase, lasted, q, qd)
+        return Step(_pair(self._limit(asked, q, qd)), command, phase)
+
+    def command(self, time: float) -> float:
+        """Return the height commanded at a time, m."""
+        return self.commands.at(self._hopped(time))
+
+    def _hopped(self, time: float) -> float:
+        if self._began is None:
+            return 0.0
+        return max(time - self._began - self.timing.rise - self.timing.settle, 0.0)
+
+    def _hold(self, phase: Phase, lasted: float, q: Array, qd: Array) -> Array:
+        """Return the torque of rising, standing or sinking."""
+        timing, gains = self.timing, self.gains
+        if phase is Phase.DONE:
+            return np.zeros(2)
+        if phase is Phase.SETTLE:
+            target, strength = self.poses.start, 1.0
+        elif phase is Phase.RISE:
+            target = _between(self._from, self.poses.start, lasted / timing.rise)
+            strength = min(lasted / timing.fade, 1.0)
+        else:
+            target = _between(self._from, self.poses.rest, lasted / (timing.sink - timing.fade))
+            strength = min((timing.sink - lasted) / timing.fade, 1.0)
+        torque: Array = strength * np.array(gains.stiffness) * (target - q)
+        return torque - np.array(gains.damping) * qd
+
+    def _limit(self, torque: Array, q: Array, qd: Array) -> Array:
+        return torque if self.limiter is None else self.limiter.apply(torque, q, qd)
+
+
+def _between(start: Array, end: Array, share: float) -> Array:
+    """Return the minimum-jerk path's point at a share of its time."""
+    s = min(max(share, 0.0), 1.0)
+    return start + (end - start) * (s * s * s * (10 + s * (6 * s - 15)))
+
+
+def _pair(values: Array) -> Pair:
+    return float(values[0]), float(values[1])

@@ -1,0 +1,129 @@
+"""A leg without wire, a clock that only moves when told, and controllers that misbehave."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from hopping_leg.deploy.black_box import BlackBox
+from hopping_leg.deploy.envelope import hopping_envelope
+from hopping_leg.deploy.link import Exchange
+from hopping_leg.deploy.loop import ControlLoop
+from hopping_leg.deploy.observation import Action, DriveMode, Reply
+from hopping_leg.deploy.rows import columns
+from hopping_leg.deploy.schedule import Schedule
+from hopping_leg.deploy.sequence import Poses, Sequence, Timing
+from hopping_leg.robot import load_robot
+from hopping_leg.robot.limits import SoftLimiter, SoftLimits
+
+LEG = load_robot("legv2")
+RATE = 200.0
+POSES = Poses(np.array([0.8, -1.6]), np.array([1.0, -2.0]))
+SHORT = Timing(hop=0.5, rise=0.3, settle=0.1, sink=0.3, fade=0.1)
+
+
+class FakeClock:
+    """Time that passes only by waiting and by what the fake link takes."""
+
+    def __init__(self):
+        self.time = 100.0
+        self.hiccups = {}
+
+    def now(self):
+        return self.time
+
+    def wait_until(self, deadline):
+        self.time = max(self.time, deadline) + self.hiccups.pop(round(deadline, 4), 0.0)
+        return self.time
+
+
+class FakeLink:
+    """Two inert joints in honey; ``alter(tick, joint, reply)`` changes or drops a reply."""
+
+    def __init__(self, clock, alter=lambda tick, joint, reply: reply, latency=5e-4):
+        self.clock, self.alter, self.latency = clock, alter, latency
+        self.q, self.qd = np.array([0.9, -1.8]), np.zeros(2)
+        self.told = []
+        self.tick = -1
+        self.mode = [DriveMode.STOPPED] * 2
+        self._command, self._moved = None, clock.now()
+
+    def exchange(self, outgoing, until):
+        self.tick += 1
+        self.send(outgoing)
+        taken = self.clock.time
+        self.clock.time += self.latency
+        replies = tuple(
+            self.alter(self.tick, joint, self._reply(joint, taken)) for joint in range(2)
+        )
+        if None in replies:
+            self.clock.time = max(self.clock.time, until)
+        return Exchange(replies)
+
+    def send(self, outgoing):
+        self._move()
+        self.told.append(outgoing)
+        self._command = outgoing
+        modes = {
+            Action.STOP: DriveMode.STOPPED,
+            Action.TORQUE: DriveMode.TORQUE,
+            Action.BRAKE: DriveMode.BRAKE,
+        }
+        self.mode = [modes[outgoing.action]] * 2
+
+    def close(self):
+        pass
+
+    def _reply(self, joint, taken):
+        position, velocity = float(self.q[joint]), float(self.qd[joint])
+        return Reply(position, velocity, 0.0, int(self.mode[joint]), 0, 24.0, 30.0, taken)
+
+    def _move(self):
+        elapsed, self._moved = self.clock.time - self._moved, self.clock.time
+        if self._command is None or elapsed <= 0:
+            return
+        torque = np.array(self._command.torque)
+        steps = max(round(elapsed / 5e-4), 1)
+        for _ in range(steps):
+            self.qd += elapsed / steps * (torque - 0.3 * self.qd) / 0.02
+            self.q += elapsed / steps * self.qd
+
+
+class Still:
+    """Holds a torque; a Controller."""
+
+    name = "still"
+
+    def __init__(self, torque=(0.0, 0.0), fail_after=None):
+        self.torque, self.fail_after, self.calls = np.array([torque]), fail_after, 0
+        self.ages = []
+
+    def reset(self, count):
+        self.calls = 0
+
+    def act(self, measurement):
+        self.calls += 1
+        self.ages.append(measurement.age[0])
+        if self.fail_after is not None and self.calls > self.fail_after:
+            raise ArithmeticError("lost the thread")
+        return self.torque
+
+    def internals(self):
+        return {"calls": np.array([float(self.calls)])}
+
+
+def make_loop(tmp_path, controller=None, *, link=None, timing=SHORT, soft=None, **limits):
+    """Return a loop on a fake link, and both."""
+    clock = link.clock if link else FakeClock()
+    link = link or FakeLink(clock)
+    controller = controller or Still()
+    sequence = Sequence(
+        controller,
+        Schedule(((0.3, 100.0),)),
+        POSES,
+        SoftLimiter(LEG, soft or SoftLimits()),
+        timing,
+    )
+    envelope = replace(hopping_envelope(LEG, RATE), **limits)
+    header = {"robot": LEG.name, "controller": controller.name}
+    box = BlackBox(tmp_path / "run.blackbox", columns(controller), header)
+    return ControlLoop(link, sequence, envelope, box, clock), link, box

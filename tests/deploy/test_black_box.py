@@ -1,0 +1,110 @@
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hopping_leg.deploy.black_box import BlackBox, read_box, recover
+from hopping_leg.errors import TraceError
+from hopping_leg.trace import Trace
+
+COLUMNS = ("time_s", "command_m", "hip_position_rad")
+
+WRITER = """
+import sys, time
+from pathlib import Path
+from hopping_leg.deploy.black_box import BlackBox
+box = BlackBox(Path(sys.argv[1]), ("time_s", "command_m", "hip_position_rad"), {"robot": "t"})
+tick = 0
+while True:
+    box.row([tick * 0.005, 0.3, float(tick)])
+    print(tick, flush=True)
+    tick += 1
+    time.sleep(0.002)
+"""
+
+
+def write(path, rows=5):
+    box = BlackBox(path, COLUMNS, {"robot": "legv2"})
+    for tick in range(rows):
+        box.row([tick * 0.005, 0.3, 1.0 + tick])
+    box.event(time_s=0.01, state="damping", reason="operator_stop")
+    box.close()
+    return box
+
+
+def test_what_was_recorded_comes_back_as_a_trace(tmp_path):
+    write(tmp_path / "a.blackbox")
+    trace = recover(tmp_path / "a.blackbox")
+    np.testing.assert_allclose(trace.column("hip_position_rad"), [1, 2, 3, 4, 5])
+    assert np.isnan(trace.column("height_m")).all()
+    assert trace.header["events"][0]["reason"] == "operator_stop"
+    trace.save(tmp_path / "a.parquet")
+    assert Trace.load(tmp_path / "a.parquet").header["robot"] == "legv2"
+
+
+def test_cut_anywhere_it_gives_all_whole_rows_before_the_cut(tmp_path):
+    path = tmp_path / "a.blackbox"
+    write(path)
+    content = path.read_bytes()
+    first = content.index(b"}}") + 2 + 4
+    size = 5 + 8 * len(COLUMNS) + 4
+    for cut in range(first, len(content)):
+        path.write_bytes(content[:cut])
+        box = read_box(path)
+        assert len(box.rows) == min((cut - first) // size, 5)
+        assert box.whole is (cut in {first + n * size for n in range(6)})
+
+
+def test_damage_ends_the_record_and_is_never_data(tmp_path):
+    path = tmp_path / "a.blackbox"
+    write(path)
+    content = bytearray(path.read_bytes())
+    content[content.index(b"}}") + 6 + 20] ^= 1
+    path.write_bytes(content)
+    assert len(read_box(path).rows) == 0
+    with pytest.raises(TraceError, match="no tick"):
+        recover(path)
+
+
+def test_a_killed_process_leaves_what_it_recorded(tmp_path):
+    path = tmp_path / "killed.blackbox"
+    process = subprocess.Popen(
+        [sys.executable, "-c", WRITER, str(path)], stdout=subprocess.PIPE, text=True
+    )
+    for _ in range(50):
+        last = int(process.stdout.readline())
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    found = recover(path).column("hip_position_rad")
+    np.testing.assert_array_equal(found, np.arange(len(found)))
+    assert len(found) >= last - 1
+
+
+def test_a_full_disk_never_stops_the_loop(tmp_path):
+    if not Path("/dev/full").exists():
+        pytest.skip("no /dev/full")
+    box = BlackBox(tmp_path / "a.blackbox", COLUMNS, {})
+    full = os.open("/dev/full", os.O_WRONLY)
+    os.dup2(full, box._file)
+    start = time.monotonic()
+    for _ in range(100):
+        box.row([0.0, 0.0, 0.0])
+    assert time.monotonic() - start < 1
+    box.close()
+    os.close(full)
+    assert "No space" in box.error
+
+
+def test_foreign_and_missing_files_get_a_sentence(tmp_path):
+    (tmp_path / "b.blackbox").write_text("hello")
+    for name, sentence in (("b", "is no black box"), ("c", "Cannot read")):
+        with pytest.raises(TraceError, match=sentence):
+            read_box(tmp_path / f"{name}.blackbox")
+    write(tmp_path / "d.blackbox")
+    with pytest.raises(TraceError, match="Cannot create"):
+        write(tmp_path / "d.blackbox")

@@ -1,0 +1,205 @@
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hopping_leg.deploy.envelope import hopping_envelope, recording_envelope
+from hopping_leg.deploy.observation import Action, DriveMode, Observation, Operator, Reply
+from hopping_leg.deploy.reasons import Reason
+from hopping_leg.deploy.supervisor import Memory, State, supervise
+from hopping_leg.robot import load_robot
+
+LEG = load_robot("legv2")
+LIMITS = hopping_envelope(LEG, 200.0)
+PERIOD = LIMITS.period
+
+ANYTHING = st.floats(allow_nan=True, allow_infinity=True)
+NEARLY_RIGHT = st.floats(-30, 30)
+NUMBERS = NEARLY_RIGHT | ANYTHING
+REPLIES = st.builds(
+    Reply,
+    position=NUMBERS,
+    velocity=NUMBERS,
+    torque=NUMBERS,
+    mode=st.sampled_from([0, 1, 2, 3, 4, 10, 10, 10, 11, 12, 15]),
+    fault=st.integers(0, 105),
+    voltage=st.just(24.0) | NUMBERS,
+    temperature=st.just(30.0) | NUMBERS,
+    taken=NUMBERS,
+)
+OBSERVATIONS = st.builds(
+    Observation,
+    time=st.floats(0, 100),
+    late=st.just(0.0) | ANYTHING,
+    replies=st.tuples(st.none() | REPLIES, st.none() | REPLIES),
+    wanted=st.none() | st.tuples(NUMBERS, NUMBERS),
+    operator=st.sampled_from(Operator),
+    finished=st.booleans(),
+)
+
+
+def good(index=0, **changes):
+    reply = Reply((0.7, -1.4)[index], 0.0, 0.0, int(DriveMode.TORQUE), 0, 24.0, 30.0, 0.0)
+    return replace(reply, **changes)
+
+
+def seen(tick, **changes):
+    calm = Observation(
+        tick * PERIOD, 0.0, (good(0, taken=tick * PERIOD), good(1, taken=tick * PERIOD)), (1.0, 2.0)
+    )
+    return replace(calm, **changes)
+
+
+def running():
+    memory, _ = supervise(LIMITS, Memory(), seen(0, operator=Operator.ARM))
+    memory, out = supervise(LIMITS, memory, seen(1))
+    assert memory.state is State.RUNNING
+    assert out.torque == (1.0, 2.0)
+    return memory
+
+
+@given(st.lists(OBSERVATIONS, min_size=1, max_size=30), st.booleans())
+def test_whatever_is_seen_what_leaves_is_finite_and_within_limits(course, already_running):
+    memory = running() if already_running else Memory()
+    for observation in course:
+        before = memory
+        memory, out = supervise(LIMITS, before, observation)
+        for torque, limit in zip(out.torque, LIMITS.torque, strict=True):
+            assert math.isfinite(torque)
+            assert abs(torque) <= limit
+        if out.torque != (0.0, 0.0):
+            assert memory.state is State.RUNNING
+        if memory.state is not before.state:
+            assert memory.cause.reason is not Reason.NONE
+            assert str(memory.cause)
+
+
+@given(st.lists(OBSERVATIONS, min_size=1, max_size=30), st.sampled_from([3, 4]))
+def test_a_stop_is_latched_until_the_operator_arms(course, state):
+    memory = Memory(State(state), 0.0)
+    for observation in course:
+        observation = replace(
+            observation,
+            operator=Operator.STOP if observation.operator is Operator.ARM else Operator.NOTHING,
+        )
+        memory, out = supervise(LIMITS, memory, observation)
+        assert memory.state in (State.DAMPING, State.STOPPED)
+        assert out.action is not Action.TORQUE
+
+
+@given(OBSERVATIONS)
+def test_nothing_but_the_operator_arms(observation):
+    memory, out = supervise(LIMITS, Memory(), observation)
+    if observation.operator is Operator.ARM:
+        assert memory.state is State.ARMING
+        assert out.torque == (0.0, 0.0)
+    else:
+        stopped = observation.operator is Operator.STOP
+        assert memory.state is (State.STOPPED if stopped else State.DISARMED)
+        assert out.action is Action.STOP
+
+
+def at(tick, index, **changes):
+    replies = [good(0, taken=tick * PERIOD), good(1, taken=tick * PERIOD)]
+    replies[index] = replace(replies[index], **changes)
+    return seen(tick, replies=tuple(replies))
+
+
+@pytest.mark.parametrize(
+    ("observation", "reason", "detail"),
+    [
+        (seen(2, operator=Operator.STOP), Reason.OPERATOR_STOP, ""),
+        (at(2, 1, mode=1, fault=35), Reason.DRIVE_FAULT, "knee: fault 35 (encoder fault)"),
+        (at(2, 0, mode=11), Reason.DRIVE_TIMEOUT, "hip"),
+        (at(2, 0, mode=0), Reason.DRIVE_LEFT_MODE, "mode 0"),
+        (at(2, 0, velocity=math.nan), Reason.MEASUREMENT_NOT_FINITE, "nan rad/s"),
+        (at(2, 0, position=1.0), Reason.ENCODER_JUMP, "0.3 rad off"),
+        (at(2, 0, velocity=60.0, position=0.75), Reason.SPEED_LIMIT, "60 rad/s"),
+        (at(2, 1, temperature=70.0), Reason.TOO_HOT, "70 deg C"),
+        (at(2, 1, temperature=math.nan), Reason.TOO_HOT, "nan"),
+        (at(2, 1, voltage=10.0), Reason.VOLTAGE_LOW, "10.0 V"),
+        (at(2, 1, voltage=45.0), Reason.VOLTAGE_HIGH, "45.0 V"),
+        (seen(2, late=0.05), Reason.LOOP_STALLED, "50.0 ms"),
+        (seen(2, wanted=None), Reason.CONTROLLER_FAILED, ""),
+        (seen(2, wanted=(math.inf, 0.0)), Reason.TORQUE_NOT_FINITE, "inf"),
+        (seen(2, finished=True), Reason.FINISHED, ""),
+    ],
+)
+def test_each_cause_damps_within_the_tick_and_says_why(observation, reason, detail):
+    memory, out = supervise(LIMITS, running(), observation)
+    assert memory.state is State.DAMPING
+    assert memory.cause.reason is reason
+    assert detail in str(memory.cause)
+    assert out.action is Action.BRAKE
+
+
+def test_a_joint_that_drifts_out_of_its_range_is_caught():
+    memory, angle, tick = running(), 0.7, 2
+    while memory.state is State.RUNNING:
+        angle, tick = angle + 0.02, tick + 1
+        memory, _ = supervise(LIMITS, memory, at(tick, 0, position=angle, velocity=4.0))
+    assert memory.cause.reason is Reason.POSITION_LIMIT
+    assert angle == pytest.approx(LIMITS.upper[0], abs=0.021)
+
+
+def test_a_notice_of_the_firmware_is_no_fault():
+    memory, _ = supervise(LIMITS, running(), at(2, 0, fault=98))
+    assert memory.state is State.RUNNING
+
+
+def test_single_lost_replies_and_late_ticks_are_tolerated_rows_of_them_are_not():
+    for change, reason, tolerated in (
+        ({"replies": (None, good(1))}, Reason.REPLIES_MISSING, LIMITS.missing_ticks),
+        ({"late": 0.007}, Reason.LOOP_OVERRUN, LIMITS.overrun_ticks),
+    ):
+        memory = running()
+        for tick in range(2, 2 + tolerated):
+            memory, _ = supervise(LIMITS, memory, seen(tick, **change))
+            assert memory.state is State.RUNNING
+        again, _ = supervise(LIMITS, memory, seen(2 + tolerated))
+        assert again.state is State.RUNNING
+        memory, _ = supervise(LIMITS, memory, seen(2 + tolerated, **change))
+        assert memory.cause.reason is reason
+
+
+def test_torque_beyond_the_limit_for_several_ticks_is_caught():
+    memory, tick = running(), 2
+    while memory.state is State.RUNNING:
+        memory, _ = supervise(LIMITS, memory, at(tick, 1, torque=1.6 * LIMITS.torque[1]))
+        tick += 1
+    assert memory.cause.reason is Reason.TORQUE_LIMIT
+    assert tick - 2 == LIMITS.excess_ticks + 1
+
+
+def test_arming_waits_for_both_drives_but_not_for_ever():
+    memory, _ = supervise(LIMITS, Memory(), seen(0, operator=Operator.ARM))
+    for tick in range(1, 90):
+        memory, out = supervise(LIMITS, memory, at(tick, 1, mode=2))
+        assert memory.state is State.ARMING
+        assert out.torque == (0.0, 0.0)
+    for tick in range(90, 110):
+        memory, _ = supervise(LIMITS, memory, at(tick, 1, mode=2))
+    assert memory.state is State.DAMPING
+    assert memory.cause.reason is Reason.ARMING_TOOK_TOO_LONG
+
+
+def test_damping_ends_at_rest_or_after_its_time():
+    for speed, reason in ((0.0, Reason.CAME_TO_REST), (3.0, Reason.DAMPED_LONG_ENOUGH)):
+        memory, _ = supervise(LIMITS, running(), seen(2, operator=Operator.STOP))
+        tick = 3
+        while memory.state is State.DAMPING:
+            memory, _ = supervise(LIMITS, memory, at(tick, 1, velocity=speed, mode=15))
+            tick += 1
+        assert memory.cause.reason is reason
+        assert memory.stop_cause.reason is Reason.OPERATOR_STOP
+        memory, _ = supervise(LIMITS, memory, seen(tick, operator=Operator.ARM))
+        assert memory.state is State.ARMING
+
+
+def test_recording_uses_the_mechanical_range_and_hopping_a_part_of_it():
+    wide = recording_envelope(LEG, 200.0)
+    for index, joint in enumerate((LEG.hip, LEG.knee)):
+        assert wide.lower[index] < LIMITS.lower[index] < joint.lower
+        assert joint.upper < LIMITS.upper[index] < wide.upper[index]
