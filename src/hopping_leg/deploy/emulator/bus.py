@@ -1,6 +1,4 @@
-"""The CAN bus: which drives hear a frame, and what they answer."""
-
-from collections.abc import Sequence
+"""The CAN bus: what a drive makes of a frame, and what it answers."""
 
 from moteus import multiplex
 from moteus.multiplex import FlowStreamSubframe, RegisterSubframe, StreamSubframe, SubframeType
@@ -15,33 +13,50 @@ _WORDS_ONLY = range(Register.MODEL_NUMBER, Register.UUID_MASK_CAPABLE)
 """Registers that can be read as 32-bit integers only."""
 
 
-def deliver(
-    frame: Frame, drives: Sequence[Drive], time: float, *, acting: bool = True
-) -> list[Frame]:
-    """Let drives act on a frame now; return their answers.
+Errors = list[tuple[int, int]]
+"""Register and error code of each write that failed."""
+
+
+def act(frame: Frame, drive: Drive, time: float) -> Errors:
+    """Let a drive take what a frame writes, if it is meant; return what it could not take."""
+    subframes = _heard(frame, drive)
+    errors = []
+    for s in subframes:
+        if isinstance(s, RegisterSubframe) and s.type is SubframeType.WRITE:
+            assert s.value is not None
+            error = drive.write(s.register, s.resolution, s.value)
+            if error:
+                errors.append((s.register, error))
+    drive.commit(time)
+    return errors
+
+
+def answer(frame: Frame, drive: Drive, time: float, errors: Errors) -> Frame | None:
+    """Return a drive's answer to a frame; None if it is not meant or none is wanted.
 
     Args:
         frame: From the host.
-        drives: All on the bus.
+        drive: On the bus.
         time: Now, s.
-        acting: Whether its writes take effect; else it is only answered.
+        errors: Of its writes.
     """
-    answers = []
-    for drive in drives:
-        if frame.destination not in (drive.id, BROADCAST):
-            continue
-        subframes = _parsed(frame.data)
-        if not _addressed(subframes, drive):
-            continue
-        reply = ReplyWriter()
-        if acting:
-            _write(subframes, drive, reply)
-            drive.commit(time)
-        _stream(subframes, drive, reply, time)
-        _read(subframes, drive, reply)
-        if frame.wants_reply:
-            answers.append(frame.reply(drive.id, reply.data))
-    return answers
+    subframes = _heard(frame, drive)
+    if not subframes:
+        return None
+    reply = ReplyWriter()
+    for register, code in errors:
+        reply.error(register, code, reading=False)
+    _stream(subframes, drive, reply, time)
+    _read(subframes, drive, reply)
+    return frame.reply(drive.id, reply.data) if frame.wants_reply else None
+
+
+def _heard(frame: Frame, drive: Drive) -> list[multiplex.Subframe]:
+    """Return what a drive hears of a frame: nothing if another is meant."""
+    if frame.destination not in (drive.id, BROADCAST):
+        return []
+    subframes = _parsed(frame.data)
+    return subframes if _addressed(subframes, drive) else []
 
 
 def _parsed(data: bytes) -> list[multiplex.Subframe]:
@@ -67,15 +82,6 @@ def _addressed(subframes: list[multiplex.Subframe], drive: Drive) -> bool:
             if own != s.value:
                 return False
     return True
-
-
-def _write(subframes: list[multiplex.Subframe], drive: Drive, reply: ReplyWriter) -> None:
-    for s in subframes:
-        if isinstance(s, RegisterSubframe) and s.type is SubframeType.WRITE:
-            assert s.value is not None
-            error = drive.write(s.register, s.resolution, s.value)
-            if error:
-                reply.error(s.register, error, reading=False)
 
 
 def _stream(

@@ -73,7 +73,7 @@ class Drive:
         self.diagnostic = Diagnostic(self)
         self.disturbances = Disturbances()
         self.uptime = 0.0
-        self._brake, self._voltage = brake * 2 * math.pi, voltage
+        self._brake, self.nominal_voltage = brake * 2 * math.pi, voltage
         self._warmth = 0.0
         self._commanded = False
         self._velocity = self._torque = self._asked = 0.0
@@ -86,7 +86,7 @@ class Drive:
     @property
     def voltage(self) -> float:
         """Of the bus, V."""
-        return self._voltage + self.disturbances.voltage
+        return self.nominal_voltage + self.disturbances.voltage
 
     @property
     def temperature(self) -> float:

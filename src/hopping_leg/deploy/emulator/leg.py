@@ -5,6 +5,7 @@ keep. A latency of commands in ``[reality]`` is left to the wire, as drives act 
 without it.
 """
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -40,6 +41,8 @@ class EmulatedLeg:
             self._legs.real.reseed(np.random.default_rng(seed))
         self._legs.stand(slice(None), np.asarray(q, np.float64))
         self._torque = np.zeros((1, 2))
+        self._links = (robot.thigh.length, robot.shank.length)
+        self._foot = robot.foot.radius
 
     @property
     def height(self) -> float:
@@ -54,7 +57,10 @@ class EmulatedLeg:
     @property
     def foot_clearance(self) -> float:
         """Gap between foot and ground, m."""
-        return float(self._legs.foot_clearance()[0])
+        hip, knee = float(self._legs.q[0, 0]), float(self._legs.q[0, 1])
+        thigh, shank = self._links
+        down = thigh * math.cos(hip) + shank * math.cos(hip + knee)
+        return self.height - down - self._foot
 
     @property
     def q(self) -> Array:

@@ -11,8 +11,10 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from types import TracebackType
 
+from hopping_leg.deploy.emulator.faults import Fault
+from hopping_leg.deploy.emulator.pty_port import PtyPort
 from hopping_leg.deploy.emulator.robot import EmulatedRobot
-from hopping_leg.deploy.emulator.server import PtyPort, Server
+from hopping_leg.deploy.emulator.server import Server
 from hopping_leg.deploy.emulator.start import Start
 from hopping_leg.errors import UsageError
 
@@ -77,6 +79,11 @@ class EmulatorProcess:
         assert isinstance(state, State)
         return state
 
+    def inflict(self, fault: Fault) -> None:
+        """Let a fault happen; its time counts from now."""
+        self._pipe.send(fault)
+        self._answer()
+
     def close(self) -> None:
         """End the process."""
         self._pipe.close()
@@ -113,7 +120,7 @@ def _serve(start: Start, pipe: Connection) -> None:
         return
     port = PtyPort(start.link)
     server = Server(robot, port)
-    pipe.send(start.link or port.path)
+    pipe.send(port.path)
     running = True
     while running:
         server.turn()
@@ -125,7 +132,9 @@ def _obey(pipe: Connection, robot: EmulatedRobot, server: Server) -> bool:
     """Answer what the parent asked; return whether it is still there."""
     try:
         while pipe.poll():
-            pipe.recv()
+            wish = pipe.recv()
+            if isinstance(wish, Fault):
+                robot.misfortune.add(wish)
             pipe.send(_state(robot, server))
     except (EOFError, OSError):
         return False

@@ -5,6 +5,7 @@ Time comes as an argument. Nothing here knows of sockets, terminals or the clock
 
 import heapq
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -12,9 +13,12 @@ from hopping_leg.arrays import Array
 from hopping_leg.deploy.configuration import wanted
 from hopping_leg.deploy.emulator import bus
 from hopping_leg.deploy.emulator.drive import Drive
+from hopping_leg.deploy.emulator.faults import Fault
 from hopping_leg.deploy.emulator.frames import Frame
 from hopping_leg.deploy.emulator.identity import Identity
 from hopping_leg.deploy.emulator.leg import TIMESTEP, EmulatedLeg
+from hopping_leg.deploy.emulator.misfortune import Misfortune
+from hopping_leg.deploy.emulator.outbox import Outbox
 from hopping_leg.deploy.emulator.settings import Settings
 from hopping_leg.deploy.wire import JOINTS
 from hopping_leg.robot.parameters import Robot
@@ -36,6 +40,8 @@ class EmulatedRobot:
         homed: Whether somebody homed the drives already.
         held: Whether the leg is held until the drives are powered.
         seed: Of sensor noise and jitter.
+        faults: What goes wrong, and when.
+        timestep: Physics step, s.
     """
 
     def __init__(
@@ -47,6 +53,7 @@ class EmulatedRobot:
         homed: bool = True,
         held: bool = True,
         seed: int = 0,
+        faults: Sequence[Fault] = (),
         timestep: float = TIMESTEP,
     ) -> None:
         self.robot, self.time, self.timestep, self.held = robot, 0.0, timestep, held
@@ -62,29 +69,38 @@ class EmulatedRobot:
             if homed:
                 drive.encoder.set_nearest(position)
         self._sense()
+        self.outbox = Outbox()
+        """What is on its way to the host."""
+        self.misfortune = Misfortune(self, faults)
 
     def advance(self, until: float) -> None:
         """Simulate whole steps up to a time, s."""
         while self.time + self.timestep <= until + 1e-9:
             self._step()
 
-    def receive(self, frame: Frame) -> list[Frame]:
-        """Take a frame from the host now; return the drives' answers.
+    def receive(self, frame: Frame) -> None:
+        """Take a frame from the host now; the drives' answers go to the outbox.
 
         Where the robot's ``reality`` has a latency of commands, the frame acts later but is
         answered at once.
         """
         late = self._latency.command + self._latency.jitter * float(self._rng.random())
-        if not late:
-            return bus.deliver(frame, self.drives, self.time)
-        due = max(self.time + late, self._last_delivery)
-        self._last_delivery = due
-        heapq.heappush(self._due, (due, next(self._numbers), frame))
-        return bus.deliver(frame, self.drives, self.time, acting=False)
+        if late:
+            due = max(self.time + late, self._last_delivery)
+            self._last_delivery = due
+            heapq.heappush(self._due, (due, next(self._numbers), frame))
+        for joint, drive in enumerate(self.drives):
+            errors = [] if late else bus.act(frame, drive, self.time)
+            answer = bus.answer(frame, drive, self.time, errors)
+            if answer is not None:
+                self.misfortune.send(answer, joint, self.outbox)
 
     def _step(self) -> None:
+        self.misfortune.step()
         while self._due and self._due[0][0] <= self.time:
-            bus.deliver(heapq.heappop(self._due)[2], self.drives, self.time)
+            frame = heapq.heappop(self._due)[2]
+            for drive in self.drives:
+                bus.act(frame, drive, self.time)
         hip, knee = (drive.step(self.time, self.timestep) for drive in self.drives)
         if self.held and all(drive.active for drive in self.drives):
             self.held = False

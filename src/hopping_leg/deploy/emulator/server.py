@@ -1,19 +1,16 @@
-"""The emulated robot in real time behind a pseudo-terminal that passes for an fdcanusb.
+"""The emulated robot in real time behind a port.
 
-One thread does all: it waits for bytes from the host or for the next step, lets the robot catch up
+One thread does all: it waits for the host, the next step or the next reply, lets the robot catch up
 with the clock, and answers.
 """
 
-import os
 import select
-import termios
 import time
-import tty
 from collections.abc import Callable
-from pathlib import Path
+from typing import Protocol
 
 from hopping_leg.deploy.emulator.frames import Frame
-from hopping_leg.deploy.emulator.line_protocol import LineProtocol, received_line
+from hopping_leg.deploy.emulator.outbox import Outgoing
 from hopping_leg.deploy.emulator.robot import EmulatedRobot
 
 _IDLE = 0.002
@@ -23,49 +20,37 @@ _FURTHEST = 0.02
 """Most that is caught up with at once after the process was held off, s; the rest is lost."""
 
 
-class PtyPort:
-    """A pseudo-terminal; the host opens ``path``."""
+class Port(Protocol):
+    """The adapter between host and drives."""
 
-    def __init__(self, link: Path | None = None) -> None:
-        self._master, self._slave = os.openpty()
-        for descriptor in (self._master, self._slave):
-            tty.setraw(descriptor, termios.TCSANOW)
-        os.set_blocking(self._master, False)
-        self.path = Path(os.ttyname(self._slave))
-        self.protocol = LineProtocol()
-        self._link = link
-        if link is not None:
-            link.unlink(missing_ok=True)
-            link.symlink_to(self.path)
+    @property
+    def plugged(self) -> bool:
+        """Whether the host can reach it."""
+        ...
 
     def fileno(self) -> int:
         """Return the descriptor to wait for."""
-        return self._master
+        ...
 
-    def receive(self) -> list[Frame | bytes]:
-        """Return what the host sent: frames, and answers that its lines call for."""
-        try:
-            return self.protocol.feed(os.read(self._master, 65536))
-        except BlockingIOError:
-            return []
+    def receive(self) -> list[Frame]:
+        """Return frames that the host sent."""
+        ...
 
-    def send(self, data: bytes) -> None:
-        """Send bytes; a host that does not read loses them."""
-        try:
-            os.write(self._master, data)
-        except BlockingIOError:
-            return
+    def send(self, item: Outgoing) -> None:
+        """Send to the host."""
+        ...
 
-    def send_frame(self, frame: Frame) -> None:
-        """Send a frame as a line."""
-        self.send(self.protocol.line(received_line(frame)))
+    def plug_in(self) -> None:
+        """Come back."""
+        ...
+
+    def unplug(self) -> None:
+        """Be gone for the host."""
+        ...
 
     def close(self) -> None:
-        """Take the terminal away, as when a plug is pulled."""
-        os.close(self._master)
-        os.close(self._slave)
-        if self._link is not None:
-            self._link.unlink(missing_ok=True)
+        """End."""
+        ...
 
 
 class Server:
@@ -74,16 +59,16 @@ class Server:
     Args:
         robot: Behind the wire.
         port: Towards the host.
-        on_idle: Called every few milliseconds, e.g. to show the state.
+        on_turn: Called every few milliseconds, e.g. to show the state.
     """
 
     def __init__(
         self,
         robot: EmulatedRobot,
-        port: PtyPort,
-        on_idle: Callable[[], None] = lambda: None,
+        port: Port,
+        on_turn: Callable[[], None] = lambda: None,
     ) -> None:
-        self.robot, self.port, self._on_idle = robot, port, on_idle
+        self.robot, self.port, self._on_turn = robot, port, on_turn
         self.lost = 0.0
         """Time that was not simulated as the process did not get the processor, s."""
         self._offset = time.monotonic() - robot.time
@@ -95,16 +80,29 @@ class Server:
 
     def turn(self) -> None:
         """Wait for the host or the clock, then do what is due."""
-        ready, _, _ = select.select([self.port], [], [], _IDLE)
+        waiting = [self.port] if self.port.plugged else []
+        ready, _, _ = select.select(waiting, [], [], self._patience())
         self._catch_up()
         if ready:
-            for item in self.port.receive():
-                if isinstance(item, bytes):
-                    self.port.send(item)
-                    continue
-                for answer in self.robot.receive(item):
-                    self.port.send_frame(answer)
-        self._on_idle()
+            for frame in self.port.receive():
+                self.robot.receive(frame)
+        for item in self.robot.outbox.take(self.robot.time):
+            if self.port.plugged:
+                self.port.send(item)
+        self._plug()
+        self._on_turn()
+
+    def _patience(self) -> float:
+        due = self.robot.outbox.next_due()
+        return _IDLE if due is None else min(max(due - self.robot.time, 0.0), _IDLE)
+
+    def _plug(self) -> None:
+        """Pull or push the plug where a fault says so."""
+        plugged = self.robot.misfortune.plugged
+        if plugged and not self.port.plugged:
+            self.port.plug_in()
+        elif self.port.plugged and not plugged:
+            self.port.unplug()
 
     def _catch_up(self) -> None:
         now = time.monotonic() - self._offset

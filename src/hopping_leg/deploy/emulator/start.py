@@ -1,11 +1,12 @@
 """How an emulation begins: which robot, in which pose, with which drives."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from hopping_leg.arrays import Array
+from hopping_leg.deploy.emulator.faults import Fault
 from hopping_leg.deploy.emulator.robot import EmulatedRobot
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.robot import kinematics, load_robot
@@ -34,7 +35,9 @@ class Start:
     """Somebody holds the leg until both drives are powered."""
     seed: int = 0
     """Of sensor noise and jitter."""
-    link: Path | None = field(default=None)
+    faults: tuple[Fault, ...] = ()
+    """What goes wrong, and when."""
+    link: Path | None = None
     """Also offer the terminal under this path, which stays the same when it is plugged again."""
 
     def build(self) -> EmulatedRobot:
@@ -53,6 +56,7 @@ class Start:
             homed=self.homed,
             held=self.held,
             seed=self.seed,
+            faults=self.faults,
         )
 
 
