@@ -101,7 +101,7 @@ class WindowGroup:
         self._padding = np.ones((len(windows), length), dtype=bool)
         states = {n: start_states(recordings[n]) for n in {w.recording for w in windows}}
         self._q0, self._qd0 = np.empty((len(windows), 2)), np.empty((len(windows), 2))
-        self._height0 = np.full(len(windows), np.nan)
+        self._height0, self._rate0 = np.full(len(windows), np.nan), np.zeros(len(windows))
         for i, w in enumerate(windows):
             recording = recordings[w.recording]
             stamps = recording.time[w.start : w.start + w.length]
@@ -111,7 +111,9 @@ class WindowGroup:
             self._padding[i, : w.length] = False
             self._q0[i], self._qd0[i] = (values[w.start] for values in states[w.recording])
             if recording.has_column("height_m"):
-                self._height0[i] = recording.trace.column("height_m")[w.start]
+                height = recording.trace.column("height_m")
+                self._height0[i] = height[w.start]
+                self._rate0[i] = np.gradient(height, recording.time)[w.start]
         place = times / self._tick
         self._ticks = int(np.ceil(place.max() - 1e-6)) + 2
         self._before = np.minimum(np.floor(place + 1e-9).astype(int), self._ticks - 2)
@@ -160,7 +162,7 @@ class WindowGroup:
         if setup.rig != "fixed-base":
             standing = [kinematics.stance_height(c.robot, self._q0) for c in candidates]
             height = np.where(np.isnan(self._height0), np.stack(standing), self._height0)
-            q[:, 0] = height.ravel()
+            q[:, 0], qd[:, 0] = height.ravel(), np.tile(self._rate0, len(candidates))
         return simulation
 
     def _advance(
