@@ -185,6 +185,14 @@ def test_data_without_meaning_get_a_sentence():
         identify([run()], load_robot("legv1"), options=options())
     with pytest.raises(RecordingError, match="is a pendulum"):
         identify([run()], load_robot("doublependulum"), options=options())
+    for onboard, what in (("torque", "commanded torques"), ("continuous", "targets of its")):
+        table = run().trace.table
+        table = table.drop([c for c in table.columns if "command" in c])
+        setup = dataclasses.replace(run().setup, onboard=onboard)
+        trace = dataclasses.replace(run().trace, table=table)
+        mute = dataclasses.replace(run(), trace=trace, setup=setup)
+        with pytest.raises(RecordingError, match=f"has no {what}"):
+            identify([mute], LEG, options=options())
     known = dataclasses.replace(run(), digest="abc")
     with pytest.raises(UsageError, match="use each for one"):
         identify([known], LEG, validate=[known], options=options())

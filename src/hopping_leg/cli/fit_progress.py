@@ -37,7 +37,7 @@ class FitProgress:
             cost: Lowest so far.
         """
         passed = time.monotonic() - self._began
-        left = f" · at most {_minutes(passed * (1 - share) / share)} left" if share > 0 else ""
+        left = f" · at most {_minutes(passed * (1 - share) / share)} left" if 0 < share < 1 else ""
         note = f"cost {cost:.5g}{left}"
         self._bar.update(self._task, description=stage, completed=share, note=note)
         if not self._console.is_terminal and passed >= self._next_line:

@@ -12,6 +12,7 @@ Examples:
 """
 
 import dataclasses
+import math
 import shlex
 import sys
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from typing import Annotated
 
 import tyro
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 
 from hopping_leg.cli.fit_progress import FitProgress
 from hopping_leg.cli.output import write_json
@@ -189,13 +190,15 @@ def _show_recordings(
 
 
 def _show(console: Console, identified: Identified) -> None:
-    table = Table("parameter", "start", "identified", "95 % interval", "unit")
+    table = Table(Column("parameter", no_wrap=True), "start", "identified", "95 % interval", "unit")
     for row in parameters_json(identified):
         table.add_row(
             row["name"],
             f"{row['start']:.4g}",
             f"{row['value']:.4g}" + (" (at bound)" if row["at_bound"] else ""),
-            f"{row['interval_low']:.4g} .. {row['interval_high']:.4g}",
+            f"{row['interval_low']:.4g} .. {row['interval_high']:.4g}"
+            if math.isfinite(row["interval_high"])
+            else "unknown",
             row["unit"],
         )
     console.print(table)
@@ -203,7 +206,9 @@ def _show(console: Console, identified: Identified) -> None:
     for row in quality_json(identified):
         unit, factor = ("mrad", 1e3) if row["unit"] == "rad" else (row["unit"], 1.0)
         keys = ("hip_before", "knee_before", "hip_after", "knee_after")
-        quality.add_row(row["error"], *(f"{factor * row[key]:.3g}" for key in keys), unit)
+        numbers = (factor * row[key] for key in keys)
+        shown = (f"{n:.3g}" if math.isfinite(n) else "-" for n in numbers)
+        quality.add_row(row["error"], *shown, unit)
     console.print(quality)
     for sentence in identified.told.statements:
         console.print(sentence, highlight=False, markup=False)

@@ -10,6 +10,7 @@ import numpy as np
 
 from hopping_leg.errors import PhysicsError, RecordingError, UsageError, unknown_name
 from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.commands import check_commands
 from hopping_leg.identify.holdout import SHORTEST, duration, hold_out
 from hopping_leg.identify.identifiability import Identifiability, identifiability
 from hopping_leg.identify.judging import judge
@@ -81,6 +82,7 @@ def identify(
         raise UsageError("The seed and the number of threads must not be negative.")
     robot = dataclasses.replace(robot, reality=NEUTRAL)
     check_owner([*recordings, *validate], robot)
+    check_commands([*recordings, *validate])
     plan = make_plan(
         recordings,
         robot,
@@ -100,12 +102,14 @@ def identify(
         run.begin(resume=resume)
     searcher = Searcher(plan, objective, options.effort, seed, folder, report, options.ray, about)
     passes = searcher.run([r.setup.rig for r in recordings])
+    report("finding intervals", 1.0, passes[-1].found.cost)
     try:
         candidate, told = _conclude(objective, passes[-1], options)
     except PhysicsError as error:
         if run is not None:
             run.finish({"failed": str(error)})
         raise
+    report("judging", 1.0, passes[-1].found.cost)
     identified = Identified(
         candidate=candidate,
         start=plan.start,
