@@ -28,6 +28,13 @@ def test_the_batch_repeats_a_plain_loop_over_mj_step(rig, candidate):
     np.testing.assert_allclose(got.torque[1, 0], run.array("torque"), atol=1e-6)
 
 
+def test_windows_on_the_rail_start_with_the_speed_of_the_base():
+    run = record(LEG, swing(2.0, "rail"), "rail")
+    assert np.abs(np.gradient(run.trace.column("height_m"), 0.005)).max() > 0.3
+    got = simulator([run], 0.1).run([TRUE]).position[0]
+    assert np.abs(got - run.array("position").reshape(20, 20, 2)).max() < 3e-3
+
+
 def test_recorded_torques_repeat_the_run():
     run = record(LEG, swing(1.0), onboard="torque")
     got = simulator([run], 0.25).run([TRUE])

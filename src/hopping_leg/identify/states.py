@@ -42,6 +42,16 @@ def start_states(recording: Recording) -> tuple[Array, Array]:
     return position, velocity
 
 
+def base_rate(recording: Recording) -> Array:
+    """Return the slope of the base's measured height at every row, m/s, (rows,).
+
+    Where both joints stand still to the last digit the leg has not begun to move.
+    """
+    rate: Array = np.gradient(recording.trace.column("height_m"), recording.time)
+    rate[(recording.array("velocity") == 0).all(axis=1)] = 0.0
+    return rate
+
+
 def full_states(recording: Recording) -> tuple[Array, Array]:
     """Return joint position and velocity at every row, (rows, 2) each, rad and rad/s.
 

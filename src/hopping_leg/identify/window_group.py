@@ -19,7 +19,7 @@ from hopping_leg.identify.drive_loop import (
 from hopping_leg.identify.held import Held
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.rig_model import FIELDS, build_rig_model, model_field
-from hopping_leg.identify.states import start_states
+from hopping_leg.identify.states import base_rate, start_states
 from hopping_leg.identify.windows import Window
 from hopping_leg.identify.zeros import Zeros, find_zeros, has_own_zeros
 from hopping_leg.robot import kinematics
@@ -111,9 +111,8 @@ class WindowGroup:
             self._padding[i, : w.length] = False
             self._q0[i], self._qd0[i] = (values[w.start] for values in states[w.recording])
             if recording.has_column("height_m"):
-                height = recording.trace.column("height_m")
-                self._height0[i] = height[w.start]
-                self._rate0[i] = np.gradient(height, recording.time)[w.start]
+                self._height0[i] = recording.trace.column("height_m")[w.start]
+                self._rate0[i] = base_rate(recording)[w.start]
         place = times / self._tick
         self._ticks = int(np.ceil(place.max() - 1e-6)) + 2
         self._before = np.minimum(np.floor(place + 1e-9).astype(int), self._ticks - 2)
