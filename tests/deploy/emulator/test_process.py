@@ -1,5 +1,6 @@
 import asyncio
 import math
+import time
 
 import moteus
 import pytest
@@ -64,6 +65,7 @@ def test_the_client_drives_the_leg_with_checksums(emulator):
     assert [values[moteus.Register.MODE] for values in seen[-1]] == [10, 10]
     torques = [[round(values[moteus.Register.TORQUE], 6) for values in pair] for pair in seen]
     assert [0.3, -0.3] in torques
+    time.sleep(0.1)
     after = emulator.state()
     assert after.time > before.time
     assert after.modes == (0, 0)
