@@ -32,6 +32,10 @@ class RecordingError(HoppingLegError):
     """A recording cannot be read or believed; the message names file, column and row."""
 
 
+class HardwareError(HoppingLegError):
+    """Drives, wire or adapter are not as they must be; nothing has moved."""
+
+
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> str:
     """Return the sentence for a name that does not exist, with the valid ones.
 

@@ -33,6 +33,8 @@ class Servo:
     """See ``lower``."""
     max_current: float = _number(100.0, "A")
     """Phase current that the drive is configured for (``servo.max_current_A``)."""
+    serial: str = ""
+    """Serial number of the drive's controller, 24 hex digits; empty accepts any."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,7 @@ class Hardware:
                 lower=_or(given.lower, -reach),
                 upper=_or(given.upper, reach),
                 max_current=given.max_current,
+                serial=given.serial,
             )
             object.__setattr__(self, name, filled)
 

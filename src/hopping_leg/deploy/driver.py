@@ -1,0 +1,174 @@
+"""Both drives through the ``moteus`` client: a ``Link`` in pure torque mode.
+
+The client waits for a lost reply without bound, loses the healthy drive's reply when it is
+cancelled, and takes late replies as fresh. Here its event loop has a thread of its own; frames are
+judged as they arrive, so that whatever came in time counts; and what is not done by its deadline is
+cancelled.
+"""
+
+import asyncio
+import math
+import time
+from collections.abc import Coroutine
+from typing import Any, TypeVar
+
+from moteus import Controller, QueryResolution, multiplex
+from moteus.protocol import Register
+
+from hopping_leg.deploy.client_thread import ClientThread
+from hopping_leg.deploy.drive_clock import DriveClock
+from hopping_leg.deploy.link import Exchange
+from hopping_leg.deploy.observation import Action, Outgoing
+from hopping_leg.deploy.replies import Question
+from hopping_leg.deploy.transport import Opener
+from hopping_leg.deploy.wire import wires
+from hopping_leg.errors import HardwareError
+from hopping_leg.robot.parameters import Robot
+
+_SEND_SECONDS = 0.004
+"""A command that could not leave within this time is dropped: it is outdated."""
+
+_OPENING_SECONDS = 10.0
+
+Result = TypeVar("Result")
+
+
+class MoteusLink:
+    """The way to two drives.
+
+    Args:
+        robot: Whose drives.
+        open_transport: Opens the adapter.
+
+    Attributes:
+        trouble: What went wrong in the client last, for the record.
+
+    Raises:
+        HardwareError: The adapter cannot be opened.
+    """
+
+    def __init__(self, robot: Robot, open_transport: Opener) -> None:
+        self.robot, self.wires = robot, wires(robot)
+        self.trouble = ""
+        joints, servos = (robot.hip, robot.knee), robot.hardware.servos
+        self._limits = [joint.motor.torque_limit for joint in joints]
+        self._watchdog = robot.hardware.watchdog
+        self._clocks = (DriveClock(), DriveClock())
+        self._client = ClientThread(self._note)
+        try:
+            self.transport = self._client.call(self._open(open_transport), _OPENING_SECONDS)
+        except HardwareError:
+            self._client.close()
+            raise
+        self.controllers = [
+            Controller(int(servo.id), query_resolution=_resolution(), transport=self.transport)
+            for servo in servos
+        ]
+
+    def exchange(self, outgoing: Outgoing, until: float) -> Exchange:
+        """Tell both drives what to do and ask for their state in the same frames."""
+        question = Question(self.wires, self._clocks, time.monotonic())
+        commands = self._commands(outgoing, query=True)
+        for joint, command in enumerate(commands):
+            self._listen(command, joint, question)
+        self._client.start_soon(lambda: self._cycle(commands, until))
+        question.done.wait(max(until - time.monotonic(), 0.0))
+        return question.result()
+
+    def send(self, outgoing: Outgoing) -> None:
+        """Tell both drives what to do; returns at once."""
+        commands = self._commands(outgoing, query=False)
+        until = time.monotonic() + _SEND_SECONDS
+        self._client.start_soon(lambda: self._cycle(commands, until))
+
+    def call(self, work: Coroutine[Any, Any, Result], seconds: float) -> Result:
+        """Do something slow in the client's thread; not while a leg is armed.
+
+        Raises:
+            HardwareError: It took too long.
+        """
+        return self._client.call(work, seconds)
+
+    def prefer(self) -> None:
+        """Give the client's thread real-time priority where that is permitted."""
+        self._client.prefer()
+
+    def forget_clocks(self) -> None:
+        """Date replies anew, as after a drive restarted."""
+        self._clocks = (DriveClock(), DriveClock())
+
+    def close(self) -> None:
+        """Give the adapter back; another link may open it then."""
+        try:
+            self._client.call(self._close(), 2.0)
+        except HardwareError as error:
+            self._note(str(error))
+        self._client.close()
+
+    async def _cycle(self, commands: list[Any], until: float) -> None:
+        """Send frames, and wait for replies as long as they are worth something."""
+        if time.monotonic() >= until:
+            return
+        try:
+            async with asyncio.timeout_at(until):
+                await self.transport.cycle(commands)
+        except TimeoutError:
+            return
+        except Exception as error:
+            # The client and the serial port raise many types when the adapter is gone.
+            self._note(str(error))
+
+    def _commands(self, outgoing: Outgoing, *, query: bool) -> list[Any]:
+        pairs = zip(self.controllers, self.wires, outgoing.torque, self._limits, strict=True)
+        match outgoing.action:
+            case Action.TORQUE:
+                return [
+                    controller.make_position(
+                        position=math.nan,
+                        velocity=0.0,
+                        kp_scale=0.0,
+                        kd_scale=0.0,
+                        ilimit_scale=0.0,
+                        feedforward_torque=wire.motor_torque(torque),
+                        maximum_torque=limit,
+                        watchdog_timeout=self._watchdog,
+                        query=query,
+                    )
+                    for controller, wire, torque, limit in pairs
+                ]
+            case Action.BRAKE:
+                return [controller.make_brake(query=query) for controller in self.controllers]
+            case Action.STOP:
+                return [controller.make_stop(query=query) for controller in self.controllers]
+
+    def _listen(self, command: Any, joint: int, question: Question) -> None:  # noqa: ANN401
+        """Let a question judge the frames that may answer a command."""
+        command.reply_filter = lambda frame: question.take(joint, frame, time.monotonic())
+        command.parse = _as_it_is
+
+    async def _open(self, open_transport: Opener) -> Any:  # noqa: ANN401
+        try:
+            return open_transport()
+        except HardwareError:
+            raise
+        except Exception as error:
+            # Serial ports and python-can raise many types.
+            raise HardwareError(f"Cannot open the adapter: {error}.") from error
+
+    async def _close(self) -> None:
+        self.transport.close()
+
+    def _note(self, words: str) -> None:
+        self.trouble = words
+
+
+def _resolution() -> QueryResolution:
+    resolution = QueryResolution()
+    resolution.voltage = multiplex.INT16
+    resolution.temperature = multiplex.INT16
+    resolution._extra = {int(Register.MILLISECOND_COUNTER): multiplex.INT32}
+    return resolution
+
+
+def _as_it_is(frame: Any) -> Any:  # noqa: ANN401
+    return frame
