@@ -117,6 +117,9 @@ def test_the_paper_search_has_two_passes_over_its_table():
     assert "thigh.inertia" not in first.parameters.names
     assert "thigh.inertia" in second.parameters.names
     assert found.told.names == second.parameters.names
+    once = identify([run()], LEG, options=options(search="one-pass", parameters=None, effort=few))
+    (only,) = once.passes
+    assert set(only.parameters.names) == set(second.parameters.names)
 
 
 def test_threads_change_no_bit():

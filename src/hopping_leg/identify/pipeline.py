@@ -37,7 +37,7 @@ class IdentifyOptions:
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Bounds that differ from the widest ones."""
     search: str | None = None
-    """``least-squares``, ``cma`` or ``two-pass``; None lets the plan decide."""
+    """``least-squares``, ``cma``, ``two-pass`` or ``one-pass``; None lets the plan decide."""
     effort: SearchOptions = field(default_factory=SearchOptions)
     """How hard to search."""
     threads: int = 0

@@ -15,8 +15,11 @@ from hopping_leg.identify.two_pass import INERTIAS, pass_names
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
 
-SEARCHES = ("least-squares", "cma", "two-pass")
+SEARCHES = ("least-squares", "cma", "two-pass", "one-pass")
 """What a plan may search with."""
+
+_PAPER = ("two-pass", "one-pass")
+"""Searches of Table I on positions only, as the paper's."""
 
 _TIMESTEP = 1e-3
 _GAINS = {"stiffness": 10.0, "damping": 0.5, "integral": 1.0}
@@ -65,7 +68,8 @@ def make_plan(
         robot: Its values before the fit.
         parameters: What to fit; None decides by what the recordings can tell.
         bounds: Bounds that differ from the widest ones.
-        search: One of ``SEARCHES``; ``two-pass`` is the paper's: CMA-ES on positions only. None
+        search: One of ``SEARCHES``; ``two-pass`` is the paper's: CMA-ES on positions only, and
+            ``one-pass`` the same over all of its parameters at once, without its bounds. None
             takes least squares.
 
     Raises:
@@ -78,12 +82,12 @@ def make_plan(
     if search not in SEARCHES:
         raise UsageError(unknown_name("search", search, SEARCHES))
     start = _start(recordings, robot)
-    names = parameters or _names(recordings, paper=search == "two-pass")
+    names = parameters or _names(recordings, paper=search in _PAPER)
     window, unscored = _window(recordings, robot)
     return Plan(
         start=start,
         parameters=choose(start, names, bounds=bounds),
-        scoring=_scoring(recordings, paper=search == "two-pass"),
+        scoring=_scoring(recordings, paper=search in _PAPER),
         window=window,
         stride=window,
         unscored=unscored,
