@@ -71,7 +71,7 @@ class Identify:
     report: Path | None = None
     """Write the report to this file as one HTML page."""
     search: str | None = None
-    """`least-squares` (default), `cma`, or `two-pass` for the paper's; `one-pass` is its ablation."""
+    """`least-squares` (default), `cma`, or the paper's `two-pass`; `one-pass` is its ablation."""
     parameters: Names | None = None
     """What to fit, e.g. `hip.friction,drive.delay`; default: what these recordings may tell."""
     bounds: tuple[str, ...] = ()

@@ -77,7 +77,7 @@ def _share_out(jobs: Sequence[Job], at_once: int, board: Board) -> None:
                 job = running.pop(future)
                 future.result()
                 board.finish(job.name, job.weight)
-            board.show(_notes(running))
+            board.show(_notes(running)[:at_once])
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
 
