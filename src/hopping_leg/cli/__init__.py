@@ -29,6 +29,7 @@ VERBS = {
     "export": "write a leg as URDF, inspect a policy file",
     "record": "play an excitation on a leg and record it",
     "identify": "fit a leg to recordings and write its robot file",
+    "emulate": "stand in for the real leg: two drives behind a real wire",
     "experiment": "run the paper's sim-to-real experiment on twins",
     "reproduce": "the main job: train, evaluate, compare and report",
 }
@@ -57,15 +58,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         return _complain(_system_sentence(error))
     except ModuleNotFoundError as error:
-        if error.name is None or error.name.split(".")[0] not in _TRAINING_MODULES:
+        extra = _EXTRAS.get((error.name or "").split(".")[0])
+        if extra is None:
             raise
         return _complain(
-            f"This needs {error.name}, which comes with the training extra:"
-            " pip install 'hopping-leg[train]'."
+            f"This needs {error.name}, which comes with the extra '{extra}':"
+            f" pip install 'hopping-leg[{extra}]'."
         )
 
 
-_TRAINING_MODULES = {"torch", "stable_baselines3", "onnx", "tensorboard"}
+_EXTRAS = {
+    **dict.fromkeys(("torch", "stable_baselines3", "onnx", "tensorboard"), "train"),
+    **dict.fromkeys(("moteus", "can", "serial", "msgpack"), "hardware"),
+}
 
 
 def _dispatch(arguments: list[str]) -> int:
