@@ -43,7 +43,7 @@ KINDS = {
     "drop_reply": Kind("replies are lost", duration=math.nan),
     "corrupt_reply": Kind("bits of replies flip on the serial line", duration=math.nan),
     "late_reply": Kind("replies arrive later", "s", 0.012, math.nan),
-    "duplicate_reply": Kind("replies arrive twice", "s", 0.0, math.nan),
+    "duplicate_reply": Kind("replies arrive twice", duration=math.nan),
     "silence": Kind("no reply arrives any more"),
     "garbage_line": Kind("noise arrives as a line of its own", duration=math.nan),
     "encoder_jump": Kind("a joint's angle is wrong from now on", "rad", 0.5),

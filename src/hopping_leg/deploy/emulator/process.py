@@ -46,7 +46,7 @@ class State:
 
 
 class EmulatorProcess:
-    """A running emulator; ``path`` is the terminal that the host opens.
+    """A running emulator; ``path`` is the terminal that the host opens, empty for a CAN bus.
 
     Args:
         start: What is emulated.
@@ -114,13 +114,12 @@ class EmulatorProcess:
 def _serve(start: Start, pipe: Connection) -> None:
     """Run in the process: serve the terminal until the pipe is closed."""
     try:
-        robot = start.build()
+        robot, port = start.build(), start.open()
     except Exception as error:
         pipe.send(str(error))
         return
-    port = PtyPort(start.link)
     server = Server(robot, port)
-    pipe.send(port.path)
+    pipe.send(port.path if isinstance(port, PtyPort) else Path())
     running = True
     while running:
         server.turn()

@@ -59,16 +59,12 @@ class Server:
     Args:
         robot: Behind the wire.
         port: Towards the host.
-        on_turn: Called every few milliseconds, e.g. to show the state.
     """
 
-    def __init__(
-        self,
-        robot: EmulatedRobot,
-        port: Port,
-        on_turn: Callable[[], None] = lambda: None,
-    ) -> None:
-        self.robot, self.port, self._on_turn = robot, port, on_turn
+    def __init__(self, robot: EmulatedRobot, port: Port) -> None:
+        self.robot, self.port = robot, port
+        self.on_turn: Callable[[], None] = lambda: None
+        """Called every few milliseconds, e.g. to show the state."""
         self.lost = 0.0
         """Time that was not simulated as the process did not get the processor, s."""
         self._offset = time.monotonic() - robot.time
@@ -90,7 +86,7 @@ class Server:
             if self.port.plugged:
                 self.port.send(item)
         self._plug()
-        self._on_turn()
+        self.on_turn()
 
     def _patience(self) -> float:
         due = self.robot.outbox.next_due()

@@ -7,7 +7,9 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.deploy.emulator.faults import Fault
+from hopping_leg.deploy.emulator.pty_port import PtyPort
 from hopping_leg.deploy.emulator.robot import EmulatedRobot
+from hopping_leg.deploy.emulator.server import Port
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.robot import kinematics, load_robot
 from hopping_leg.robot.parameters import Robot
@@ -17,6 +19,9 @@ _LENGTHS = {"stand": 0.69, "crouch": 0.5, "stretch": 0.93}
 
 POSES = (*_LENGTHS, "zero")
 """Named poses; ``zero`` is the leg straight down, where the joints' angles are zero."""
+
+PTY = "pty"
+"""A serial terminal, as an fdcanusb's."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +42,10 @@ class Start:
     """Of sensor noise and jitter."""
     faults: tuple[Fault, ...] = ()
     """What goes wrong, and when."""
+    interface: str = PTY
+    """How the host reaches it: ``pty`` or a bus of python-can, see ``can_bus``."""
+    channel: str | None = None
+    """Of a bus; none takes the interface's default."""
     link: Path | None = None
     """Also offer the terminal under this path, which stays the same when it is plugged again."""
 
@@ -58,6 +67,24 @@ class Start:
             seed=self.seed,
             faults=self.faults,
         )
+
+    def open(self) -> Port:
+        """Return the adapter.
+
+        Raises:
+            UsageError: The interface has no such option or cannot be opened.
+        """
+        if self.interface == PTY:
+            if self.channel is not None:
+                raise UsageError("A channel is for CAN buses; a pty has a link.")
+            return PtyPort(self.link)
+        if self.link is not None:
+            raise UsageError("A link is for the interface pty; a CAN bus has a channel.")
+        from hopping_leg.deploy.emulator.can_bus import DEFAULT_CHANNELS, CanPort
+
+        if self.interface not in DEFAULT_CHANNELS:
+            raise UsageError(unknown_name("interface", self.interface, (PTY, *DEFAULT_CHANNELS)))
+        return CanPort(self.interface, self.channel)
 
 
 def posture(robot: Robot, pose: str) -> Array:
