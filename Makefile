@@ -57,6 +57,9 @@ results: $(STAMP)
 	$(BIN)/hop bench energy-shaping --json docs/results/energy_shaping.json
 	$(BIN)/hop bench training --json docs/results/training.json
 	$(BIN)/hop bench ablation --json docs/results/ablation.json
+	$(BIN)/hop excite multisine --robot legv2 --centre 0.7 -1.4 --amplitude 0.3 0.4 --out runs/results/multisine.parquet
+	$(BIN)/hop record runs/results/multisine.parquet --robot twin --believed legv2 --out runs/results
+	$(BIN)/hop identify runs/results/twin-multisine.parquet --out runs/results/identified.toml --json docs/results/identify.json
 
 check: lint types docs wheel
 
