@@ -34,6 +34,9 @@ def test_a_study_is_finished_once_and_grows(tmp_path, capsys):
     words = ["experiment", "transfer", "--folder", str(folder), "--json", str(file), *CHEAP]
     assert main([*words, "--twins", "1", "--methods", "truth"]) == 0
     first = json.loads(file.read_text())
+    assert first["command"].startswith(
+        "hop experiment transfer --twins 1 --methods truth --steps 1"
+    )
     policy = folder / "training" / "twin-0-truth-seed0" / "policy.onnx"
     made = policy.stat().st_mtime_ns
     assert main([*words, "--twins", "2", "--methods", "truth", "cad", "--jobs", "2"]) == 0

@@ -4,10 +4,13 @@ import json
 import numpy as np
 import pytest
 
+from hopping_leg.control import Setup
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Candidate, evaluate
 from hopping_leg.evaluate.runs import floor_robot, run_trials, save_traces
 from hopping_leg.evaluate.trials import Trial
+from hopping_leg.robot import load_robot
+from hopping_leg.sim import NOTHING, Disturbance
 from hopping_leg.trace import Trace
 
 
@@ -126,3 +129,15 @@ def test_nothing_to_do_is_said(setup, spring):
         evaluate([Candidate("a", spring), Candidate("a", spring)], setup)
     with pytest.raises(UsageError, match="0 seeds are too few"):
         evaluate([Candidate("a", spring)], setup, repeats=0)
+
+
+def test_a_twin_under_the_papers_disturbance_is_noted(spring):
+    def notes(robot, disturbance):
+        world = Setup(load_robot(robot), disturbance, threads=1)
+        candidates = [Candidate("spring", spring)]
+        found = evaluate(candidates, world, commands=[0.3], repeats=1, kinds=("fixed",))
+        return " ".join(found.evaluation.notes)
+
+    assert "came on top" in notes("twin", Disturbance())
+    assert "came on top" not in notes("twin", NOTHING)
+    assert "came on top" not in notes("legv2-paper", Disturbance())

@@ -12,6 +12,7 @@ Examples:
   hop experiment transfer --twins my_twin.toml other_twin.toml --methods identified cad
 """
 
+import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -80,8 +81,21 @@ def run(args: Experiment) -> None:
     )
     result = transfer(study, args.jobs)
     if args.json is not None:
-        write_json(args.json, result)
+        write_json(args.json, {"command": command_line(args), **result})
     show(result)
+
+
+def command_line(args: Experiment) -> str:
+    """Return the command that makes this study again."""
+    words = ["hop experiment", args.experiment]
+    for field in dataclasses.fields(args)[1:]:
+        value = getattr(args, field.name)
+        if value == field.default or field.name in ("jobs", "threads", "folder"):
+            continue
+        separator = "," if field.name == "commands" else " "
+        text = separator.join(map(str, value)) if isinstance(value, tuple) else str(value)
+        words.append(f"--{field.name} {text}")
+    return " ".join(words)
 
 
 def show(result: dict[str, Any]) -> None:

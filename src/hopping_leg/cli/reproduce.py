@@ -1,23 +1,30 @@
-"""The main job: train a controller from scratch, evaluate it beside the shipped ones, report.
+"""The main job: the whole paper in miniature, from a leg that is not known to hops on it.
 
-Trains with the fast recipe, then runs the paper's trials for the new policy, the shipped policies
-and energy shaping, and writes one report. Takes about ten minutes on two cores. A run that was
-interrupted or killed goes on where it was when the same command is called again.
+A twin plays the real leg. It is recorded, identified from the recordings, a controller is trained
+from scratch on what was identified, evaluated there beside energy shaping with the paper's trials,
+and hops on the twin without tuning, beside a controller that was trained on the CAD's robot. Takes
+about ten minutes on two cores. A run that was interrupted or killed goes on where it was when the
+same command is called again.
 
 Examples:
   hop reproduce
   hop reproduce --quick --out runs/look
   hop reproduce --seed 1 --out runs/second
+  hop reproduce --full --out runs/full
 """
 
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from hopping_leg.cli import evaluate
-from hopping_leg.control.library import ENERGY_SHAPING, shipped_policies
+from hopping_leg.cli import evaluate, experiment
+from hopping_leg.cli.output import write_json
+from hopping_leg.control.library import ENERGY_SHAPING
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import load_robot
+from hopping_leg.evaluate.transfer.methods import DEFAULT, choose_methods
+from hopping_leg.evaluate.transfer.study import SHORTEST, Study, find_twins
+
+_MINIATURE = ("identified", "cad")
 
 
 @dataclass(frozen=True)
@@ -25,35 +32,42 @@ class Reproduce:
     """What to reproduce and where to keep it."""
 
     out: Path = Path("runs/reproduce")
-    """Folder for the training, evaluation.json, report.html and traces/."""
+    """Folder for report.html, evaluation.json, transfer.json, traces/ and, in transfer/,
+    recordings, robots, trainings and trials."""
     seed: int = 0
-    """Of the training; the evaluation's seeds follow from another number."""
-    minutes: float = 5.0
-    """Wall-clock time of the training."""
-    threads: int = 2
-    """Threads of the training."""
-    robot: str = "legv2-paper"
-    """A shipped robot or a .toml file."""
+    """Of the trainings; the evaluation's seeds follow from another number."""
+    twin: str | None = None
+    """Robot file of the leg that plays the real one; default: one that is drawn."""
+    steps: int = Study.steps
+    """Control steps of experience of each training."""
+    jobs: int = 2
+    """Recordings, trainings or trials at the same time; take the number of cores."""
     quick: bool = False
-    """A look at the whole chain in a minute or two: short training, which will not hop well, and
-    one evaluation seed."""
+    """A look at the whole chain in a few minutes: short trainings, which will not hop well, and one
+    evaluation seed."""
+    full: bool = False
+    """The paper's sizes instead: 240 s per recording, five twins, all alternatives and ablations,
+    trainings of the recipe's full length. Takes hours."""
     json: Path | None = None
-    """File for every number, besides evaluation.json."""
+    """File for every number of the evaluation, besides evaluation.json."""
 
 
 def run(args: Reproduce) -> None:
-    """Train, evaluate, compare, report."""
+    """Record, identify, train, evaluate, transfer, report."""
     start = time.monotonic()
     _check(args)
-    policy = _train(args)
-    if args.robot == Reproduce.robot:
-        others = (*shipped_policies(), ENERGY_SHAPING)
-    else:
-        others = (ENERGY_SHAPING,)
+    from hopping_leg.evaluate.transfer.run import transfer
+
+    study = make_study(args)
+    result = transfer(study, args.jobs)
+    write_json(args.out / "transfer.json", result)
+    twin, method = study.twins[0], study.methods[0]
+    policy = study.training(twin, method, args.seed) / "policy.onnx"
+    robot = study.fitted(twin, method)
     evaluate.run(
         evaluate.Evaluate(
-            controllers=(str(policy), *others),
-            robot=args.robot,
+            controllers=(str(policy), ENERGY_SHAPING),
+            robot=str(robot),
             seeds=1 if args.quick else 5,
             out=args.out,
             json=args.json,
@@ -61,34 +75,37 @@ def run(args: Reproduce) -> None:
             video=not args.quick,
         )
     )
+    experiment.show(result)
     print(
         f"Done in {(time.monotonic() - start) / 60:.1f} minutes.\n"
         f"Report: {(args.out / 'report.html').resolve()}\n"
+        f"Transfer: {args.out / 'transfer.json'}\n"
+        f"Identified robot: {robot}\n"
         f"Policy: {policy} (its model card lies beside it)"
     )
 
 
-def _check(args: Reproduce) -> None:
-    if args.seed < 0 or args.threads < 1 or not 0 < args.minutes < float("inf"):
-        raise UsageError(
-            "--seed must not be negative, --threads must be at least 1, --minutes above 0."
-        )
+def make_study(args: Reproduce) -> Study:
+    """Return what is done with how many twins."""
+    from hopping_leg.learn.fast import FastRecipe
 
-
-def _train(args: Reproduce) -> Path:
-    """Return the trained policy, trained now unless an earlier call has finished it."""
-    from hopping_leg.learn.recipes import get_recipe
-    from hopping_leg.learn.run_folder import RunFolder
-    from hopping_leg.learn.train import train
-
-    recipe, robot = get_recipe("fast"), load_robot(args.robot)
-    minutes = min(args.minutes, 0.5) if args.quick else args.minutes
-    folder = RunFolder(args.out / "training", recipe, robot, args.seed, minutes)
-    if folder.policy.exists():
-        folder.check_same()
-        print(f"{folder.policy} was trained by an earlier call; delete {folder.path} to repeat it.")
-        return folder.policy
-    trained = train(
-        recipe, robot, args.seed, folder.path, resume=True, minutes=minutes, threads=args.threads
+    folder = args.out / "transfer"
+    count = "5" if args.full else "1"
+    twins = find_twins([args.twin or count], folder / "twins")
+    steps = 1 if args.quick else args.steps
+    return Study(
+        folder,
+        twins,
+        tuple(choose_methods((*DEFAULT, "two-pass", "one-pass") if args.full else _MINIATURE)),
+        seeds=(args.seed,),
+        steps=FastRecipe.steps if args.full else steps,
+        seconds=240.0 if args.full else SHORTEST,
+        repeats=1 if args.quick else 3,
     )
-    return trained.policy
+
+
+def _check(args: Reproduce) -> None:
+    if args.seed < 0 or args.jobs < 1 or args.steps < 1:
+        raise UsageError("--seed must not be negative, --jobs and --steps must be at least 1.")
+    if args.quick and args.full:
+        raise UsageError("--quick and --full exclude each other; give one of them.")

@@ -15,6 +15,7 @@ from hopping_leg.evaluate.runs import FLOORS, Run, floor_robot, run_trials
 from hopping_leg.evaluate.tables import tabulate
 from hopping_leg.evaluate.trials import KINDS, Trial, check_reach, paper_trials, within
 from hopping_leg.robot.model import TIMESTEP
+from hopping_leg.sim import NOTHING
 
 Bounds = tuple[float, float]
 
@@ -76,7 +77,7 @@ def evaluate(
     _check(candidates, setup, commands, repeats)
     trials = [t for t in paper_trials(setup.robot, commands) if t.kind in kinds]
     world = replace(setup, robot=floor_robot(setup.robot, floor))
-    notes = _note_coarse(setup.timestep)
+    notes = _note_coarse(setup.timestep) + _note_twice(setup)
     runs: list[Run] = []
     for candidate in candidates:
         fitting = [t for t in trials if within(t, candidate.command_range)]
@@ -139,6 +140,16 @@ def _note_coarse(timestep: float) -> list[str]:
     return [
         f"The physics step of {timestep:g} s is coarser than {TIMESTEP:g} s; heights may be"
         " wrong: `hop bench convergence` measures by how much."
+    ]
+
+
+def _note_twice(setup: Setup) -> list[str]:
+    """Say so where noise and delay come from two sides."""
+    if setup.robot.reality.only_delays or setup.disturbance == NOTHING:
+        return []
+    return [
+        f"{setup.robot.name} brings latency, noise and losses of its own, and the paper's noise and"
+        " delay came on top; --no-noise meets it as it is."
     ]
 
 
