@@ -1,5 +1,7 @@
 """The CAN bus: what a drive makes of a frame, and what it answers."""
 
+from dataclasses import dataclass
+
 from moteus import multiplex
 from moteus.multiplex import FlowStreamSubframe, RegisterSubframe, StreamSubframe, SubframeType
 from moteus.protocol import Register
@@ -17,11 +19,40 @@ Errors = list[tuple[int, int]]
 """Register and error code of each write that failed."""
 
 
-def act(frame: Frame, drive: Drive, time: float) -> Errors:
-    """Let a drive take what a frame writes, if it is meant; return what it could not take."""
-    subframes = _heard(frame, drive)
+@dataclass(frozen=True)
+class Message:
+    """A frame and what its payload says.
+
+    Attributes:
+        frame: From the host.
+        subframes: Up to the first that makes no sense.
+    """
+
+    frame: Frame
+    subframes: tuple[multiplex.Subframe, ...]
+
+    @staticmethod
+    def read(frame: Frame) -> "Message":
+        """Return the message of a frame."""
+        subframes: list[multiplex.Subframe] = []
+        try:
+            subframes.extend(multiplex.parse_frame(frame.data))
+        except Exception:
+            # The parser raises whatever a short buffer leads to.
+            return Message(frame, tuple(subframes))
+        return Message(frame, tuple(subframes))
+
+    def heard(self, drive: Drive) -> tuple[multiplex.Subframe, ...]:
+        """Return what a drive hears: nothing if another is meant."""
+        if self.frame.destination not in (drive.id, BROADCAST):
+            return ()
+        return self.subframes if _addressed(self.subframes, drive) else ()
+
+
+def act(message: Message, drive: Drive, time: float) -> Errors:
+    """Let a drive take what a message writes, if it is meant; return what it could not take."""
     errors = []
-    for s in subframes:
+    for s in message.heard(drive):
         if isinstance(s, RegisterSubframe) and s.type is SubframeType.WRITE:
             assert s.value is not None
             error = drive.write(s.register, s.resolution, s.value)
@@ -31,16 +62,16 @@ def act(frame: Frame, drive: Drive, time: float) -> Errors:
     return errors
 
 
-def answer(frame: Frame, drive: Drive, time: float, errors: Errors) -> Frame | None:
-    """Return a drive's answer to a frame; None if it is not meant or none is wanted.
+def answer(message: Message, drive: Drive, time: float, errors: Errors) -> Frame | None:
+    """Return a drive's answer to a message; None if it is not meant or none is wanted.
 
     Args:
-        frame: From the host.
+        message: From the host.
         drive: On the bus.
         time: Now, s.
         errors: Of its writes.
     """
-    subframes = _heard(frame, drive)
+    subframes = message.heard(drive)
     if not subframes:
         return None
     reply = ReplyWriter()
@@ -48,29 +79,10 @@ def answer(frame: Frame, drive: Drive, time: float, errors: Errors) -> Frame | N
         reply.error(register, code, reading=False)
     _stream(subframes, drive, reply, time)
     _read(subframes, drive, reply)
-    return frame.reply(drive.id, reply.data) if frame.wants_reply else None
+    return message.frame.reply(drive.id, reply.data) if message.frame.wants_reply else None
 
 
-def _heard(frame: Frame, drive: Drive) -> list[multiplex.Subframe]:
-    """Return what a drive hears of a frame: nothing if another is meant."""
-    if frame.destination not in (drive.id, BROADCAST):
-        return []
-    subframes = _parsed(frame.data)
-    return subframes if _addressed(subframes, drive) else []
-
-
-def _parsed(data: bytes) -> list[multiplex.Subframe]:
-    """Return a payload's subframes up to the first that makes no sense."""
-    subframes: list[multiplex.Subframe] = []
-    parser = multiplex.parse_frame(data)
-    try:
-        subframes.extend(parser)
-    except Exception:
-        return subframes
-    return subframes
-
-
-def _addressed(subframes: list[multiplex.Subframe], drive: Drive) -> bool:
+def _addressed(subframes: tuple[multiplex.Subframe, ...], drive: Drive) -> bool:
     """Whether a frame that names a UUID, or its beginning, means this drive."""
     for s in subframes:
         if (
@@ -85,7 +97,7 @@ def _addressed(subframes: list[multiplex.Subframe], drive: Drive) -> bool:
 
 
 def _stream(
-    subframes: list[multiplex.Subframe], drive: Drive, reply: ReplyWriter, time: float
+    subframes: tuple[multiplex.Subframe, ...], drive: Drive, reply: ReplyWriter, time: float
 ) -> None:
     for s in subframes:
         if not isinstance(s, StreamSubframe | FlowStreamSubframe) or s.channel != CHANNEL:
@@ -99,14 +111,17 @@ def _stream(
             reply.stream(s.channel, drive.diagnostic.poll(s.data[0]))
 
 
-def _read(subframes: list[multiplex.Subframe], drive: Drive, reply: ReplyWriter) -> None:
+def _read(subframes: tuple[multiplex.Subframe, ...], drive: Drive, reply: ReplyWriter) -> None:
     """Answer reads in runs of consecutive registers of one resolution, as they were asked."""
+    state = drive.state()
     run: list[float] = []
     first = resolution = 0
     for s in subframes:
         if not isinstance(s, RegisterSubframe) or s.type is not SubframeType.READ:
             continue
-        value = drive.read(s.register)
+        value = state.get(s.register)
+        if value is None:
+            value = drive.stored(s.register)
         if s.register in _WORDS_ONLY and s.resolution != multiplex.INT32:
             value = None
         goes_on = run and s.register == first + len(run) and s.resolution == resolution

@@ -119,7 +119,8 @@ class Drive:
         elif Register.UUID_MASK1 <= register <= Register.UUID_MASK4:
             return 0
         else:
-            return NOT_WRITABLE if self.read(register) is not None else UNKNOWN_REGISTER
+            known = register in self.state() or self.stored(register) is not None
+            return NOT_WRITABLE if known else UNKNOWN_REGISTER
         return 0
 
     def _write_mode(self, mode: int) -> int:
@@ -216,17 +217,15 @@ class Drive:
         low, high = (float(self.settings[f"servopos.position_{end}"]) for end in ("min", "max"))
         return self.encoder.position < low or self.encoder.position > high
 
-    def read(self, register: int) -> float | None:
-        """Return a register's value in the drive's units, None if there is no such register."""
-        state = self._state().get(register)
-        if state is not None:
-            return state
+    def stored(self, register: int) -> float | None:
+        """Return a command or identity register, None if it is neither."""
         name = COMMAND_FIELDS.get(register)
         if name is not None:
             return float(getattr(self.command, name))
         return self.identity.register(register)
 
-    def _state(self) -> dict[int, float]:
+    def state(self) -> dict[int, float]:
+        """Return the registers that tell how the drive is, in its units."""
         position = self.encoder.position
         torque = self.encoder.torque_as_reported(self._torque)
         amperes = self._torque / (self.encoder.gear_ratio * TORQUE_CONSTANT)

@@ -60,7 +60,7 @@ class EmulatedRobot:
         self.leg = EmulatedLeg(robot, q, seed=seed, timestep=timestep)
         self.drives = tuple(_drive(robot, joint, configured) for joint in range(len(JOINTS)))
         self._latency, self._rng = robot.reality.latency, np.random.default_rng(seed)
-        self._due: list[tuple[float, int, Frame]] = []
+        self._due: list[tuple[float, int, bus.Message]] = []
         self._numbers = itertools.count()
         self._last_delivery = 0.0
         for joint, drive in enumerate(self.drives):
@@ -84,23 +84,24 @@ class EmulatedRobot:
         Where the robot's ``reality`` has a latency of commands, the frame acts later but is
         answered at once.
         """
+        message = bus.Message.read(frame)
         late = self._latency.command + self._latency.jitter * float(self._rng.random())
         if late:
             due = max(self.time + late, self._last_delivery)
             self._last_delivery = due
-            heapq.heappush(self._due, (due, next(self._numbers), frame))
+            heapq.heappush(self._due, (due, next(self._numbers), message))
         for joint, drive in enumerate(self.drives):
-            errors = [] if late else bus.act(frame, drive, self.time)
-            answer = bus.answer(frame, drive, self.time, errors)
+            errors = [] if late else bus.act(message, drive, self.time)
+            answer = bus.answer(message, drive, self.time, errors)
             if answer is not None:
                 self.misfortune.send(answer, joint, self.outbox)
 
     def _step(self) -> None:
         self.misfortune.step()
         while self._due and self._due[0][0] <= self.time:
-            frame = heapq.heappop(self._due)[2]
+            message = heapq.heappop(self._due)[2]
             for drive in self.drives:
-                bus.act(frame, drive, self.time)
+                bus.act(message, drive, self.time)
         hip, knee = (drive.step(self.time, self.timestep) for drive in self.drives)
         if self.held and all(drive.active for drive in self.drives):
             self.held = False
