@@ -15,6 +15,10 @@ class Clock(Protocol):
         """Return at a deadline, or at once if it is over; returns the time."""
         ...
 
+    def patience(self, until: float) -> float:
+        """Return how many of the computer's seconds something due at a time is worth waiting."""
+        ...
+
 
 class RealClock:
     """The computer's clock: sleeps until shortly before a deadline and spins for the rest.
@@ -38,3 +42,7 @@ class RealClock:
         while (now := time.monotonic()) < deadline:
             pass
         return now
+
+    def patience(self, until: float) -> float:
+        """Return the time that is left."""
+        return max(until - time.monotonic(), 0.0)

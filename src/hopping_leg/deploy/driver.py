@@ -8,7 +8,6 @@ cancelled.
 
 import asyncio
 import math
-import time
 from collections.abc import Coroutine
 from typing import Any, TypeVar
 
@@ -16,6 +15,7 @@ from moteus import Controller, QueryResolution, multiplex
 from moteus.protocol import Register
 
 from hopping_leg.deploy.client_thread import ClientThread
+from hopping_leg.deploy.clock import Clock, RealClock
 from hopping_leg.deploy.drive_clock import DriveClock
 from hopping_leg.deploy.link import Exchange
 from hopping_leg.deploy.observation import Action, Outgoing
@@ -39,6 +39,7 @@ class MoteusLink:
     Args:
         robot: Whose drives.
         open_transport: Opens the adapter.
+        clock: The time; none takes the computer's.
 
     Attributes:
         trouble: What went wrong in the client last, for the record.
@@ -47,7 +48,8 @@ class MoteusLink:
         HardwareError: The adapter cannot be opened.
     """
 
-    def __init__(self, robot: Robot, open_transport: Opener) -> None:
+    def __init__(self, robot: Robot, open_transport: Opener, clock: Clock | None = None) -> None:
+        self._clock = clock or RealClock()
         self.robot, self.wires = robot, wires(robot)
         self.trouble = ""
         joints, servos = (robot.hip, robot.knee), robot.hardware.servos
@@ -67,18 +69,18 @@ class MoteusLink:
 
     def exchange(self, outgoing: Outgoing, until: float) -> Exchange:
         """Tell both drives what to do and ask for their state in the same frames."""
-        question = Question(self.wires, self._clocks, time.monotonic())
+        question = Question(self.wires, self._clocks, self._clock.now())
         commands = self._commands(outgoing, query=True)
         for joint, command in enumerate(commands):
             self._listen(command, joint, question)
         self._client.start_soon(lambda: self._cycle(commands, until))
-        question.done.wait(max(until - time.monotonic(), 0.0))
+        question.done.wait(self._clock.patience(until))
         return question.result()
 
     def send(self, outgoing: Outgoing) -> None:
         """Tell both drives what to do; returns at once."""
         commands = self._commands(outgoing, query=False)
-        until = time.monotonic() + _SEND_SECONDS
+        until = self._clock.now() + _SEND_SECONDS
         self._client.start_soon(lambda: self._cycle(commands, until))
 
     def call(self, work: Coroutine[Any, Any, Result], seconds: float) -> Result:
@@ -107,10 +109,11 @@ class MoteusLink:
 
     async def _cycle(self, commands: list[Any], until: float) -> None:
         """Send frames, and wait for replies as long as they are worth something."""
-        if time.monotonic() >= until:
+        patience = self._clock.patience(until)
+        if patience <= 0:
             return
         try:
-            async with asyncio.timeout_at(until):
+            async with asyncio.timeout(patience):
                 await self.transport.cycle(commands)
         except TimeoutError:
             return
@@ -143,7 +146,7 @@ class MoteusLink:
 
     def _listen(self, command: Any, joint: int, question: Question) -> None:  # noqa: ANN401
         """Let a question judge the frames that may answer a command."""
-        command.reply_filter = lambda frame: question.take(joint, frame, time.monotonic())
+        command.reply_filter = lambda frame: question.take(joint, frame, self._clock.now())
         command.parse = _as_it_is
 
     async def _open(self, open_transport: Opener) -> Any:  # noqa: ANN401

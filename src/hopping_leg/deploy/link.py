@@ -27,7 +27,7 @@ class Link(Protocol):
 
         Args:
             outgoing: What they shall do.
-            until: When to stop waiting, s on the clock of ``time.monotonic``.
+            until: When to stop waiting, s on the loop's clock.
         """
         ...
 

@@ -1,7 +1,7 @@
 """What the leg does while it is armed: rise to the start pose, hop, sink down.
 
-Rising and sinking are minimum-jerk paths under the joint PD, with gains that fade in and out. The
-paper's soft limits stay in force throughout.
+Rising and sinking are minimum-jerk paths under the joint PD; the rise begins where the leg is, and
+the gains fade out before its end. The paper's soft limits stay in force throughout.
 """
 
 from dataclasses import dataclass, field
@@ -12,9 +12,12 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.control.joint_pd import JointGains
 from hopping_leg.control.protocol import Controller, Measurement
+from hopping_leg.control.rollout import Setup
 from hopping_leg.deploy.observation import Pair
 from hopping_leg.deploy.schedule import Commands
+from hopping_leg.robot import kinematics
 from hopping_leg.robot.limits import SoftLimiter
+from hopping_leg.robot.parameters import Robot
 
 
 class Phase(IntEnum):
@@ -37,7 +40,7 @@ class Timing:
     settle: float = 0.5
     sink: float = 1.5
     fade: float = 0.3
-    """Of the gains at the beginning of the rise and the end of the sinking."""
+    """Of the gains at the end of the sinking."""
 
     def phase(self, elapsed: float) -> tuple[Phase, float]:
         """Return the part at a time since the start, and how long it has lasted."""
@@ -61,6 +64,14 @@ class Poses:
     """Of the first hop."""
     rest: Array
     """Where the leg sinks to before the drives brake."""
+
+
+def hopping_poses(robot: Robot) -> Poses:
+    """Return the standing start of the simulated trials, and a leg nearly folded, foot below."""
+    folded = kinematics.foot_position(robot, np.array([robot.hip.upper, robot.knee.lower]))
+    length = 1.05 * float(np.hypot(*folded))
+    rest = kinematics.joint_angles(robot, np.array([length, 0.0]))
+    return Poses(Setup(robot).start_posture, rest)
 
 
 @dataclass(frozen=True)
@@ -158,11 +169,11 @@ class Sequence:
         timing, gains = self.timing, self.gains
         if phase is Phase.DONE:
             return np.zeros(2)
+        strength = 1.0
         if phase is Phase.SETTLE:
-            target, strength = self.poses.start, 1.0
+            target = self.poses.start
         elif phase is Phase.RISE:
             target = _between(self._from, self.poses.start, lasted / timing.rise)
-            strength = min(lasted / timing.fade, 1.0)
         else:
             target = _between(self._from, self.poses.rest, lasted / (timing.sink - timing.fade))
             strength = min((timing.sink - lasted) / timing.fade, 1.0)

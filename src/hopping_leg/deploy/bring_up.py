@@ -1,0 +1,152 @@
+"""Whether the drives may be armed: every check with a sentence that says why not."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from hopping_leg.deploy.configuration import wanted
+from hopping_leg.deploy.envelope import Envelope
+from hopping_leg.deploy.inspection import DriveFacts
+from hopping_leg.deploy.observation import DriveMode
+from hopping_leg.deploy.reasons import fault_text
+from hopping_leg.deploy.wire import JOINTS, wires
+from hopping_leg.errors import HardwareError
+from hopping_leg.robot.hardware import REGISTER_MAP
+from hopping_leg.robot.parameters import Robot
+
+HOMED = 2
+"""Home state of a drive that knows where its output is (register 0x00c)."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One check of one drive.
+
+    Attributes:
+        joint: 0 for the hip, 1 for the knee.
+        check: What was checked, in a word or two.
+        found: What was found.
+        complaint: Why the drive may not be armed, and what to do; empty if all is well.
+        setting: Name of the configuration entry that is wrong, if that is the complaint.
+    """
+
+    joint: int
+    check: str
+    found: str
+    complaint: str = ""
+    setting: str = ""
+
+
+def judge(robot: Robot, envelope: Envelope, drives: Sequence[DriveFacts]) -> list[Finding]:
+    """Return all checks of both drives.
+
+    Args:
+        robot: What the drives should belong to.
+        envelope: Where the leg may start, and at which voltage and temperature.
+        drives: Hip and knee.
+    """
+    findings: list[Finding] = []
+    for joint, facts in enumerate(drives):
+        findings += _of_drive(robot, envelope, joint, facts)
+    return findings
+
+
+def require(findings: Sequence[Finding]) -> None:
+    """Refuse to arm if anything is wrong.
+
+    Raises:
+        HardwareError: The first complaint, and how many more there are.
+    """
+    complaints = [f.complaint for f in findings if f.complaint]
+    if complaints:
+        more = f" {len(complaints) - 1} more: see `hop doctor`." if len(complaints) > 1 else ""
+        raise HardwareError(f"Not armed: {complaints[0]}{more}")
+
+
+def _of_drive(robot: Robot, envelope: Envelope, joint: int, facts: DriveFacts) -> list[Finding]:
+    name, address = JOINTS[joint], wires(robot)[joint].id
+    if not facts.answers:
+        complaint = (
+            f"the {name}'s drive (id {address}) does not answer; check its power, the CAN cable"
+            " and its termination, and hardware.id in the robot's file."
+        )
+        return [Finding(joint, "answers", "no", complaint)]
+    return [
+        Finding(joint, "answers", f"id {address}"),
+        *_of_identity(robot, joint, facts),
+        *_of_power(envelope, joint, facts),
+        *_of_configuration(robot, joint, facts),
+        *_of_pose(envelope, joint, facts),
+    ]
+
+
+def _of_identity(robot: Robot, joint: int, facts: DriveFacts) -> list[Finding]:
+    name, servo, address = JOINTS[joint], robot.hardware.servos[joint], wires(robot)[joint].id
+    serial = (
+        f"the drive with id {address} has serial number {facts.serial} but the robot's file"
+        f" expects {servo.serial} at the {name}; are two drives swapped?"
+    )
+    speaks = (
+        f"the {name}'s firmware has register map {facts.register_map} but this version speaks"
+        f" {REGISTER_MAP}; flash another firmware with `moteus_tool --flash`."
+    )
+    fault = fault_text(facts.fault) if facts.mode == DriveMode.FAULT else "none"
+    broken = (
+        f"the {name}'s drive reports {fault}; remove its cause and switch the power off and on."
+    )
+    version = f"{facts.register_map}, firmware {facts.firmware:#06x}"
+    return [
+        _finding(joint, "serial number", facts.serial, servo.serial in ("", facts.serial), serial),
+        _finding(joint, "register map", version, facts.register_map == REGISTER_MAP, speaks),
+        _finding(joint, "fault", fault, fault == "none", broken),
+    ]
+
+
+def _of_power(envelope: Envelope, joint: int, facts: DriveFacts) -> list[Finding]:
+    name, low, high = JOINTS[joint], envelope.voltage_low, envelope.voltage_high
+    volts, heat = f"{facts.voltage:.1f} V", f"{facts.temperature:.0f} deg C"
+    supply = (
+        f"the bus voltage at the {name} is {volts} but must lie between {low:g} and {high:g} V;"
+        " check the supply."
+    )
+    hot = f"the {name}'s drive has {heat}; let it cool below {envelope.temperature:g}."
+    return [
+        _finding(joint, "bus voltage", volts, low <= facts.voltage <= high, supply),
+        _finding(joint, "temperature", heat, facts.temperature <= envelope.temperature, hot),
+    ]
+
+
+def _of_pose(envelope: Envelope, joint: int, facts: DriveFacts) -> list[Finding]:
+    name, low, high = JOINTS[joint], envelope.lower[joint], envelope.upper[joint]
+    homed = facts.home == HOMED
+    lost = (
+        f"the {name} is not homed: after power-up its encoder is absolute only within a turn of"
+        " its rotor; bring the leg into a pose that you know and run `hop doctor --home`."
+    )
+    outside = (
+        f"the {name} stands at {facts.position:.2f} rad but may only start between {low:.2f} and"
+        f" {high:.2f} rad; move it by hand, or home it."
+    )
+    found = f"{facts.position:.3f} rad"
+    return [
+        _finding(joint, "homed", "yes" if homed else "no", homed, lost),
+        _finding(joint, "position", found, low <= facts.position <= high, outside),
+    ]
+
+
+def _of_configuration(robot: Robot, joint: int, facts: DriveFacts) -> list[Finding]:
+    findings = []
+    for setting in wanted(robot, joint):
+        found = facts.settings.get(setting.name, float("nan"))
+        complaint = (
+            ""
+            if setting.holds(found)
+            else f"the {JOINTS[joint]}'s {setting.name} is {found:.6g} but must be"
+            f" {setting.value:.6g} ({setting.why}); let `hop doctor --write` set it."
+        )
+        wrong = setting.name if complaint else ""
+        findings.append(Finding(joint, setting.name, f"{found:.6g}", complaint, wrong))
+    return findings
+
+
+def _finding(joint: int, check: str, found: str, good: bool, complaint: str) -> Finding:
+    return Finding(joint, check, found, "" if good else complaint)

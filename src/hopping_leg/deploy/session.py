@@ -1,0 +1,183 @@
+"""One run from a checked link to a trace on disk."""
+
+import datetime
+import importlib.metadata
+import platform
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hopping_leg.control.policy import Policy
+from hopping_leg.control.protocol import Controller
+from hopping_leg.deploy.black_box import SUFFIX, BlackBox, recover
+from hopping_leg.deploy.clock import Clock, RealClock
+from hopping_leg.deploy.driver import MoteusLink
+from hopping_leg.deploy.envelope import Envelope
+from hopping_leg.deploy.loop import ControlLoop, Outcome
+from hopping_leg.deploy.observation import Action
+from hopping_leg.deploy.realtime import lock_memory, prefer_this_thread, uninterrupted
+from hopping_leg.deploy.reasons import Reason
+from hopping_leg.deploy.rows import columns
+from hopping_leg.deploy.sequence import Phase, Sequence
+from hopping_leg.deploy.supervisor import State
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.trace import Trace
+
+_PACKAGES = ("hopping-leg", "numpy", "onnxruntime", "moteus", "python-can")
+
+
+@dataclass(frozen=True)
+class Performance:
+    """A finished run.
+
+    Attributes:
+        outcome: How it ended.
+        trace: What happened.
+        path: Of the trace on disk.
+        notices: What the computer did not permit.
+    """
+
+    outcome: Outcome
+    trace: Trace
+    path: Path
+    notices: tuple[str, ...]
+
+
+def perform(
+    link: MoteusLink,
+    sequence: Sequence,
+    envelope: Envelope,
+    path: Path,
+    header: dict[str, Any],
+    *,
+    clock: Clock | None = None,
+    realtime: bool = True,
+    on_loop: Callable[[ControlLoop], None] = lambda _: None,
+) -> Performance:
+    """Arm, run a sequence, stop; SIGINT and SIGTERM stop it as the operator would.
+
+    Args:
+        link: To drives that were found fit.
+        sequence: What the leg does.
+        envelope: The supervisor's limits.
+        path: Of the trace; the black box lies beside it as long as the run lasts.
+        header: Of the trace.
+        clock: The time; none takes the computer's.
+        realtime: Ask for priority and locked memory.
+        on_loop: Given the loop before it starts, e.g. for a keyboard that stops it.
+
+    Raises:
+        TraceError: The black box cannot be written.
+    """
+    box_path = path.with_suffix(SUFFIX)
+    box = BlackBox(box_path, columns(sequence.controller), header)
+    loop = ControlLoop(link, sequence, envelope, box, clock or RealClock())
+    on_loop(loop)
+    runner = _Runner(loop, realtime=realtime)
+    try:
+        with _stopped_by_signals(loop), uninterrupted():
+            if realtime:
+                link.prefer()
+            outcome = runner.run()
+    finally:
+        if link.trouble:
+            box.event(link_trouble=link.trouble)
+        box.close()
+    trace = recover(box_path)
+    trace.save(path)
+    box_path.unlink()
+    return Performance(outcome, trace, path, runner.notices)
+
+
+def header_of(robot: Robot, controller: Controller, rate: float, **facts: Any) -> dict[str, Any]:  # noqa: ANN401
+    """Return a trace's header: what ran on what, and what its codes mean."""
+    policy = {"policy_digest": controller.digest} if isinstance(controller, Policy) else {}
+    return {
+        "robot": robot.name,
+        "robot_digest": robot.digest,
+        "controller": controller.name,
+        **policy,
+        "rate_hz": rate,
+        "started": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "versions": _versions(),
+        "codes": {
+            "state": _names(State),
+            "part": _names(Phase),
+            "action": _names(Action),
+            "reason": _names(Reason),
+        },
+        **facts,
+    }
+
+
+def new_path(folder: Path, name: str) -> Path:
+    """Return a trace's path that no earlier run has."""
+    safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
+    stamp = datetime.datetime.now(datetime.UTC).strftime("%Y%m%d-%H%M%S")
+    path, count = folder / f"{safe}-{stamp}.parquet", 1
+    while path.exists() or path.with_suffix(SUFFIX).exists():
+        count += 1
+        path = folder / f"{safe}-{stamp}-{count}.parquet"
+    return path
+
+
+class _Runner:
+    """Runs a loop in a thread of its own and hands its result, or its error, on."""
+
+    def __init__(self, loop: ControlLoop, *, realtime: bool) -> None:
+        self._loop, self._realtime = loop, realtime
+        self._outcome: Outcome | None = None
+        self._error: BaseException | None = None
+        self.notices: tuple[str, ...] = ()
+
+    def run(self) -> Outcome:
+        thread = threading.Thread(target=self._run, name="control-loop")
+        thread.start()
+        while thread.is_alive():
+            thread.join(0.1)
+        if self._error is not None:
+            raise self._error
+        assert self._outcome is not None
+        return self._outcome
+
+    def _run(self) -> None:
+        try:
+            if self._realtime:
+                self.notices = tuple(n for n in (lock_memory(), prefer_this_thread()) if n)
+            self._outcome = self._loop.run()
+        except BaseException as error:
+            self._error = error
+
+
+@contextmanager
+def _stopped_by_signals(loop: ControlLoop) -> Iterator[None]:
+    """Let SIGINT and SIGTERM stop the leg; outside of the main thread there are none."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {s: signal.getsignal(s) for s in (signal.SIGINT, signal.SIGTERM)}
+    for number in before:
+        signal.signal(number, lambda *_: loop.stop())
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _names(kind: Any) -> dict[str, str]:  # noqa: ANN401
+    return {str(member.value): member.name.lower() for member in kind}
+
+
+def _versions() -> dict[str, str]:
+    found = {"python": platform.python_version()}
+    for package in _PACKAGES:
+        try:
+            found[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return found
