@@ -73,7 +73,8 @@ class Identify:
     search: str | None = None
     """`least-squares` (default), `cma`, or the paper's `two-pass`; `one-pass` is its ablation."""
     parameters: Names | None = None
-    """What to fit, e.g. `hip.friction,drive.delay`; default: what these recordings may tell."""
+    """What to fit, e.g. `hip.friction,drive.delay`; default: what these recordings may tell. With
+    `two-pass` they are fitted besides Table I."""
     bounds: tuple[str, ...] = ()
     """Bounds in SI units, e.g. `--bounds hip.friction=0,0.5 drive.delay=0,0.01`."""
     starts: int = 1

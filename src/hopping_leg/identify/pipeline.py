@@ -20,7 +20,7 @@ from hopping_leg.identify.ownership import check_owner
 from hopping_leg.identify.parameters import ParameterSet
 from hopping_leg.identify.plan import Plan, make_plan
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.result import Identified, as_json
+from hopping_leg.identify.result import Identified, as_json, software_versions
 from hopping_leg.identify.run_folder import RunFolder
 from hopping_leg.identify.searching import Pass, Report, Searcher, SearchOptions
 from hopping_leg.identify.windows import cut
@@ -196,4 +196,5 @@ def _config(
         "windows": len(objective.windows),
         "search": [options.search, dataclasses.asdict(options.effort)],
         "seed": seed,
+        "software": software_versions(),
     }
