@@ -10,19 +10,28 @@ import time
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
 from hopping_leg.errors import RobotError, UsageError
-from hopping_leg.evaluate.transfer import hopping, tables
+from hopping_leg.evaluate.transfer import fitting, hopping, tables
 from hopping_leg.evaluate.transfer.board import Board
 from hopping_leg.evaluate.transfer.methods import METHODS, choose_methods
 from hopping_leg.evaluate.transfer.ratio import compare
+from hopping_leg.evaluate.transfer.recording import Record
 from hopping_leg.evaluate.transfer.study import Study, TwinFile, find_twins
 from hopping_leg.evaluate.transfer.training import Train
 from hopping_leg.evaluate.transfer.work import work
+from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.pipeline import IdentifyOptions, identify
+from hopping_leg.identify.recording import load_recording
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import NOTHING
 from hopping_leg.sim.twins import IDENTIFIABLE
+from hopping_leg.trace import Trace
+from tests.identify.twin import record, swing
+
+LEG = Candidate(load_robot("legv2"))
 
 
 def study(folder, methods=("identified", "cad"), **options):
@@ -247,3 +256,61 @@ def test_a_twin_file_knows_who_it_is():
     assert twin.robot == load_robot("twin")
     assert twin.without_surprises.reality.only_delays
     assert twin.without_surprises.hip == load_robot("legv2-paper").hip
+
+
+@pytest.fixture(scope="module")
+def identified():
+    run = record(LEG.replace({"hip.friction": 0.12}).robot, swing(8.0))
+    options = IdentifyOptions(parameters=("hip.friction", "knee.friction"), threads=1)
+    found = identify([run], LEG.robot, options=options)
+    return dataclasses.replace(found, candidate=found.candidate.replace({"drive.delay": 0.003}))
+
+
+def test_a_delay_that_was_found_is_one_that_training_has(identified, tmp_path):
+    file = tmp_path / "found.toml"
+    file.write_text(fitting.robot_file(identified, "legv2", file))
+    robot = load_robot(file)
+    assert robot.reality.latency.command == pytest.approx(0.003)
+    assert robot.reality.only_delays
+    assert robot.hip.friction == pytest.approx(0.12, rel=0.02)
+    assert robot.rail == LEG.robot.rail
+
+
+def test_a_fit_belongs_to_its_recordings(identified, tmp_path, monkeypatch):
+    asked = []
+
+    def fake(recordings, robot, **options):
+        asked.append((recordings, robot.name))
+        return identified
+
+    monkeypatch.setattr(fitting, "identify", fake)
+    one = study(tmp_path, ("fixed-base-only",))
+    job = fitting.Identify(one, one.twins[0], one.methods[0])
+    assert not job.done
+    file = one.recording(one.twins[0], "fixed-base")
+    record(LEG.robot, swing(2.0)).save(file)
+    job.run(quiet=True)
+    [(recordings, believed)] = asked
+    assert believed == "legv2"
+    assert [r.digest for r in recordings] == [load_recording(file).digest]
+    assert job.done
+    row = tables._fit(job)
+    truth = {p["name"]: p["truth"] for p in row["parameters"]}
+    assert truth["hip.friction"] == one.twins[0].robot.hip.friction
+    record(LEG.robot, swing(3.0)).save(file)
+    with pytest.raises(UsageError, match="other recordings"):
+        assert job.done
+
+
+def test_a_recording_belongs_to_its_twin_and_time(tmp_path):
+    one = study(tmp_path)
+    job = Record(one, one.twins[0], "rail")
+    header = {"robot_digest": one.twins[0].robot.digest, "seconds": 60.0}
+    Trace(pl.DataFrame({"time_s": [0.0]}), header).save(job._file)
+    assert job.done
+    longer = dataclasses.replace(job, study=dataclasses.replace(one, seconds=90.0))
+    stranger = dataclasses.replace(job, twin=one.twins[1])
+    stranger._file.write_bytes(job._file.read_bytes())
+    for other in (longer, stranger):
+        with pytest.raises(UsageError, match="another twin or for another time"):
+            assert other.done
