@@ -88,7 +88,7 @@ def test_a_folder_keeps_its_run(tmp_path):
         identify([run()], LEG, options=chosen, folder=folder, report=interrupt)
     with pytest.raises(UsageError, match="unfinished run; go on with --resume"):
         identify([run()], LEG, options=chosen, folder=folder)
-    with pytest.raises(UsageError, match="another seed"):
+    with pytest.raises(UsageError, match="began with another seed"):
         identify([run()], LEG, options=chosen, folder=folder, resume=True, seed=1)
     identify([run()], LEG, options=chosen, folder=folder, resume=True)
     identify([run()], LEG, options=chosen, folder=folder, seed=1)
@@ -163,6 +163,22 @@ def test_a_fit_that_breaks_down_is_no_result(tmp_path, monkeypatch):
     with pytest.raises(PhysicsError, match="The fit failed"):
         identify([strong], robot, options=chosen, folder=folder)
     assert "The fit failed" in (folder / "result.json").read_text()
+
+
+def test_a_robot_that_cannot_be_is_no_result(monkeypatch):
+    searched = pipeline.Searcher.run
+
+    def high(self, rigs):
+        (one,) = searched(self, rigs)
+        _, vector = one.parameters.bounds
+        return [dataclasses.replace(one, found=dataclasses.replace(one.found, vector=vector))]
+
+    monkeypatch.setattr(pipeline.Searcher, "run", high)
+    found = identify([run()], LEG, options=options(parameters=("shank.com",)))
+    assert found.robot.shank.com == pytest.approx(LEG.shank.length)
+    wide = options(parameters=("shank.com",), bounds={"shank.com": (0.01, 0.3)})
+    with pytest.raises(PhysicsError, match=r"The fit failed: 'shank\.com' .* --bounds"):
+        identify([run()], LEG, options=wide)
 
 
 @pytest.mark.parametrize(

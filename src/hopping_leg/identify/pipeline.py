@@ -8,7 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.errors import PhysicsError, RecordingError, UsageError, unknown_name
+from hopping_leg.errors import (
+    PhysicsError,
+    RecordingError,
+    RobotError,
+    UsageError,
+    unknown_name,
+)
 from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.commands import check_commands
 from hopping_leg.identify.holdout import SHORTEST, duration, hold_out
@@ -24,6 +30,7 @@ from hopping_leg.identify.result import Identified, as_json, software_versions
 from hopping_leg.identify.run_folder import RunFolder
 from hopping_leg.identify.searching import Pass, Report, Searcher, SearchOptions
 from hopping_leg.identify.windows import cut
+from hopping_leg.robot.fields import check_physics
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.robot.reality import NEUTRAL
 
@@ -87,7 +94,7 @@ def identify(
         recordings,
         robot,
         parameters=options.parameters,
-        bounds=options.bounds,
+        bounds={**_link_bounds(robot), **options.bounds},
         search=options.search,
     )
     _check_bounds(options.bounds, plan.parameters)
@@ -126,6 +133,16 @@ def identify(
     if run is not None:
         run.finish(as_json(identified))
     return identified
+
+
+def _link_bounds(robot: Robot) -> dict[str, tuple[float, float]]:
+    """Return bounds that keep each link's centre of mass on the link, as robot files demand."""
+    links = {"thigh": robot.thigh, "shank": robot.shank}
+    return {
+        f"{name}.com": (0.25 * link.com, min(4 * link.com, (1 - 1e-9) * link.length))
+        for name, link in links.items()
+        if link.com < (1 - 1e-9) * link.length
+    }
 
 
 def _check_bounds(bounds: Mapping[str, tuple[float, float]], parameters: ParameterSet) -> None:
@@ -172,6 +189,13 @@ def _conclude(
     simulated = objective.cost.simulator.run([candidate]).position[0]
     lengths = [w.length for w in objective.windows]
     broken = sum(not np.isfinite(p[:n]).all() for p, n in zip(simulated, lengths, strict=True))
+    try:
+        check_physics(candidate.robot, "its result")
+    except RobotError as error:
+        raise PhysicsError(
+            f"The fit failed: {str(error).removeprefix('its result: ')} Bound that parameter with"
+            " --bounds, or leave it out."
+        ) from error
     if broken or not np.isfinite(last.found.cost):
         raise PhysicsError(
             f"The fit failed: its best candidate breaks down in {broken} of {len(lengths)} windows;"

@@ -61,8 +61,8 @@ class RunFolder:
             raise UsageError(f"{config} is no run's; give another folder.") from error
         if differences:
             raise UsageError(
-                f"The run in {self.path} has another {differences[0].replace('_', ' ')}; resume it"
-                " with the recordings and options that it began with, or give another --folder."
+                f"The run in {self.path} began with another {differences[0].replace('_', ' ')};"
+                " resume it with what it began with, or give another --folder."
             )
 
 
