@@ -4,12 +4,36 @@ import asyncio
 import concurrent.futures
 import threading
 from collections.abc import Callable, Coroutine
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from hopping_leg.deploy.realtime import prefer_this_thread
 from hopping_leg.errors import HardwareError
 
 Result = TypeVar("Result")
+
+
+class Client(Protocol):
+    """Where the asyncio client's work is done."""
+
+    def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        """Begin work; never waits for the motors."""
+        ...
+
+    def call(self, work: Coroutine[Any, Any, Result], seconds: float) -> Result:
+        """Do work and wait for its result.
+
+        Raises:
+            HardwareError: It took too long.
+        """
+        ...
+
+    def prefer(self) -> None:
+        """Take real-time priority where that is permitted."""
+        ...
+
+    def close(self) -> None:
+        """End it."""
+        ...
 
 
 class ClientThread:

@@ -8,13 +8,13 @@ cancelled.
 
 import asyncio
 import math
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
 from moteus import Controller, QueryResolution, multiplex
 from moteus.protocol import Register
 
-from hopping_leg.deploy.client_thread import ClientThread
+from hopping_leg.deploy.client_thread import Client, ClientThread
 from hopping_leg.deploy.clock import Clock, RealClock
 from hopping_leg.deploy.drive_clock import DriveClock
 from hopping_leg.deploy.link import Exchange
@@ -40,6 +40,7 @@ class MoteusLink:
         robot: Whose drives.
         open_transport: Opens the adapter.
         clock: The time; none takes the computer's.
+        client: Makes what does the client's work, given who is told of its errors.
 
     Attributes:
         trouble: What went wrong in the client last, for the record.
@@ -48,7 +49,13 @@ class MoteusLink:
         HardwareError: The adapter cannot be opened.
     """
 
-    def __init__(self, robot: Robot, open_transport: Opener, clock: Clock | None = None) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        open_transport: Opener,
+        clock: Clock | None = None,
+        client: Callable[[Callable[[str], None]], Client] = ClientThread,
+    ) -> None:
         self._clock = clock or RealClock()
         self.robot, self.wires = robot, wires(robot)
         self.trouble = ""
@@ -56,7 +63,7 @@ class MoteusLink:
         self._limits = [joint.motor.torque_limit for joint in joints]
         self._watchdog = robot.hardware.watchdog
         self._clocks = (DriveClock(), DriveClock())
-        self._client = ClientThread(self._note)
+        self._client = client(self._note)
         try:
             self.transport = self._client.call(self._open(open_transport), _OPENING_SECONDS)
         except HardwareError:

@@ -80,7 +80,7 @@ class CanPort:
 
     def send(self, item: Outgoing) -> None:
         """Send a frame; noise and corrupted frames are discarded by CAN controllers."""
-        if self._bus is None or item.frame is None or item.corrupted:
+        if self._bus is None or item.frame is None or item.flip >= 0:
             return
         self._bus.send(
             can.Message(

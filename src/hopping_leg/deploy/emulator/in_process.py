@@ -65,5 +65,5 @@ class InProcessDevice(TransportDevice):  # type: ignore[misc]
                 channel=self,
             )
             for item in items
-            if item.frame is not None and not item.corrupted and self.robot.misfortune.plugged
+            if item.frame is not None and item.flip < 0 and self.robot.misfortune.plugged
         ]

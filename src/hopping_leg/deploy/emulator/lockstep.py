@@ -1,59 +1,68 @@
-"""Host and emulated robot in one process on one made-up clock: exact, and as fast as it goes.
+"""Host and emulated robot in one process in virtual time: exact, and as fast as it goes.
 
-The host's own link and loop run unchanged; their clock only moves when the loop waits for its next
-tick, and the robot moves with it. Everything that the wire does to a run but its timing is there.
+The host's own loop, link and client run unchanged, down to the bytes on a terminal; the robot moves
+whenever they wait. Everything that the wire does to a run but the computer's own delays is there.
 """
 
-import asyncio
+from collections.abc import Callable
 from typing import Any
 
 from moteus import Transport
 
 from hopping_leg.deploy.driver import MoteusLink
-from hopping_leg.deploy.emulator.in_process import InProcessDevice
+from hopping_leg.deploy.emulator.pty_port import PtyPort
 from hopping_leg.deploy.emulator.robot import EmulatedRobot
+from hopping_leg.deploy.emulator.virtual_time import SteppedClient
+from hopping_leg.deploy.fdcanusb import TolerantFdcanusb
 
-_PATIENCE = 0.5
-"""What an answer that is lost costs, s of the computer's time."""
-
-_STEP_SECONDS = 60.0
+WIRE_TIME = 5e-4
+"""Time from a question to its answer, s, as measured with two motors on an fdcanusb."""
 
 
 class Lockstep:
-    """A clock that moves an emulated robot.
+    """A clock that moves an emulated robot, and the link to it.
 
     Args:
         robot: Behind the wire.
+        checksums: Whether the lines have checksums; a plain fdcanusb's have none.
 
     Attributes:
         truth: Time and base height at every tick, s and m, and the foot's clearance, m.
+        stalls: Time at which the host stands still, to how long, s.
     """
 
-    def __init__(self, robot: EmulatedRobot) -> None:
+    def __init__(self, robot: EmulatedRobot, *, checksums: bool = True) -> None:
         self.robot = robot
+        robot.wire_time = WIRE_TIME
         self.truth: list[tuple[float, float, float]] = []
-        self.link = MoteusLink(robot.robot, self._open, self)
+        self.stalls: dict[float, float] = {}
+        self._port, self._checksums = PtyPort(), checksums
+        self.link = MoteusLink(robot.robot, self._open, self, self._make_client)
 
     def now(self) -> float:
         """Return the robot's time."""
         return self.robot.time
 
     def wait_until(self, deadline: float) -> float:
-        """Let the robot move until a deadline."""
-        self.link.call(self._advance(deadline), _STEP_SECONDS)
+        """Let the robot move until a deadline, or longer where the host shall stand still."""
+        for begin, seconds in list(self.stalls.items()):
+            if deadline >= begin:
+                deadline += self.stalls.pop(begin, seconds)
+        self._client.wait(deadline)
         leg = self.robot.leg
         self.truth.append((self.robot.time, leg.height, leg.foot_clearance))
         return max(self.robot.time, deadline)
 
     def patience(self, until: float) -> float:
-        """Return how long an answer is waited for: long enough for any computer."""
-        return _PATIENCE
+        """Return the time that is left, s: none once the client has done its work."""
+        return max(until - self.robot.time, 0.0)
+
+    def _make_client(self, on_error: Callable[[str], None]) -> SteppedClient:
+        self._client = SteppedClient(self.robot, self._port, on_error)
+        return self._client
 
     def _open(self) -> Any:  # noqa: ANN401
-        return Transport([InProcessDevice(self.robot)])
-
-    async def _advance(self, until: float) -> None:
-        """Move once all commands under way have been delivered."""
-        while len(asyncio.all_tasks()) > 1:
-            await asyncio.sleep(0)
-        self.robot.advance(until)
+        device = TolerantFdcanusb(str(self._port.path))
+        if not self._checksums:
+            device._is_fdcanusb, device._checksum_active = True, False
+        return Transport([device])

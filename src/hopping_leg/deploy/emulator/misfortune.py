@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from hopping_leg.deploy.emulator.faults import Fault
 from hopping_leg.deploy.emulator.frames import Frame
 from hopping_leg.deploy.emulator.outbox import Outbox, Outgoing
@@ -12,6 +14,7 @@ from hopping_leg.deploy.emulator.outbox import Outbox, Outgoing
 if TYPE_CHECKING:
     from hopping_leg.deploy.emulator.robot import EmulatedRobot
 
+_FLIPS = 1 << 16
 _NOISE = b"@#!%\x07~ moteus?"
 _REPLIES = ("drop_reply", "corrupt_reply", "late_reply", "duplicate_reply", "silence")
 _AT_START = ("boot_pose", "configuration")
@@ -42,10 +45,13 @@ class Misfortune:
     Args:
         robot: That they befall.
         faults: The script.
+        rng: Of the bits that flip.
     """
 
-    def __init__(self, robot: "EmulatedRobot", faults: Sequence[Fault]) -> None:
-        self._robot = robot
+    def __init__(
+        self, robot: "EmulatedRobot", faults: Sequence[Fault], rng: np.random.Generator
+    ) -> None:
+        self._robot, self._rng = robot, rng
         self._waiting = [fault for fault in faults if fault.kind not in _AT_START]
         self._running: list[_Running] = []
         self.log: list[tuple[float, Fault]] = []
@@ -84,7 +90,7 @@ class Misfortune:
     def send(self, frame: Frame, joint: int, outbox: Outbox) -> None:
         """Put a drive's reply in the outbox, or what becomes of it."""
         time = self._robot.time
-        due, copies, corrupted = time, 1, False
+        due, copies, flip = time + self._robot.wire_time, 1, -1
         for running in self._running:
             fault = running.fault
             if fault.kind not in _REPLIES or joint not in fault.joints:
@@ -93,11 +99,12 @@ class Misfortune:
             if fault.kind == "late_reply":
                 due += fault.amount
             copies += fault.kind == "duplicate_reply"
-            corrupted |= fault.kind == "corrupt_reply"
+            if fault.kind == "corrupt_reply":
+                flip = int(self._rng.integers(_FLIPS))
             if fault.kind in ("drop_reply", "silence"):
                 copies = 0
         for _ in range(copies):
-            outbox.put(due, Outgoing(frame, corrupted=corrupted))
+            outbox.put(due, Outgoing(frame, flip=flip))
 
     def _watch(self) -> set[str]:
         """Return the phases of this moment; the first lift-off and power are noted."""

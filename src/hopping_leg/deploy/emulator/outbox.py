@@ -14,12 +14,13 @@ class Outgoing:
     Attributes:
         frame: From a drive; None for noise.
         noise: A line that is no frame.
-        corrupted: Whether bits flip on a serial line; a CAN controller discards such a frame.
+        flip: Which bits flip on a serial line, any number from 0; negative for none. A CAN
+            controller discards such a frame.
     """
 
     frame: Frame | None = None
     noise: bytes = b""
-    corrupted: bool = False
+    flip: int = -1
 
 
 class Outbox:

@@ -9,9 +9,6 @@ from hopping_leg.deploy.emulator.frames import Frame
 from hopping_leg.deploy.emulator.line_protocol import LineProtocol, received_line
 from hopping_leg.deploy.emulator.outbox import Outgoing
 
-_CORRUPTED_DIGIT = 14
-"""Which character of a corrupted line is another: one of the first register's value."""
-
 
 class PtyPort:
     """The adapter's end of a serial line.
@@ -81,9 +78,8 @@ class PtyPort:
             self._write(item.noise + b"\r\n")
             return
         line = self._protocol.line(received_line(item.frame))
-        if item.corrupted:
-            digit = b"7" if line[_CORRUPTED_DIGIT : _CORRUPTED_DIGIT + 1] != b"7" else b"3"
-            line = line[:_CORRUPTED_DIGIT] + digit + line[_CORRUPTED_DIGIT + 1 :]
+        if item.flip >= 0:
+            line = _flipped(line, 2 * len(item.frame.data), item.flip)
         self._write(line)
 
     def _write(self, data: bytes) -> None:
@@ -92,3 +88,10 @@ class PtyPort:
             os.write(self._master, data)
         except BlockingIOError:
             return
+
+
+def _flipped(line: bytes, digits: int, flip: int) -> bytes:
+    """Return a line with another digit in its payload: ``flip`` says which and how."""
+    which, how = flip % digits, flip // digits % 15 + 1
+    at = line.index(b" ", line.index(b" ") + 1) + 1 + which
+    return line[:at] + b"%X" % (int(line[at : at + 1], 16) ^ how) + line[at + 1 :]

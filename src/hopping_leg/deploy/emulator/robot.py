@@ -20,6 +20,7 @@ from hopping_leg.deploy.emulator.leg import TIMESTEP, EmulatedLeg
 from hopping_leg.deploy.emulator.misfortune import Misfortune
 from hopping_leg.deploy.emulator.outbox import Outbox
 from hopping_leg.deploy.emulator.settings import Settings
+from hopping_leg.deploy.emulator.wire_log import WireLog
 from hopping_leg.deploy.wire import JOINTS
 from hopping_leg.robot.parameters import Robot
 
@@ -71,7 +72,11 @@ class EmulatedRobot:
         self._sense()
         self.outbox = Outbox()
         """What is on its way to the host."""
-        self.misfortune = Misfortune(self, faults)
+        self.wire_time = 0.0
+        """What a reply takes at least, s."""
+        self.log = WireLog()
+        """What went over the wire."""
+        self.misfortune = Misfortune(self, faults, self._rng)
 
     def advance(self, until: float) -> None:
         """Simulate whole steps up to a time, s."""
@@ -93,7 +98,9 @@ class EmulatedRobot:
         for joint, drive in enumerate(self.drives):
             errors = [] if late else bus.act(message, drive, self.time)
             answer = bus.answer(message, drive, self.time, errors)
+            self.log.told(self.time, joint, message, drive)
             if answer is not None:
+                self.log.answered(self.time, joint, drive)
                 self.misfortune.send(answer, joint, self.outbox)
 
     def _step(self) -> None:

@@ -79,26 +79,12 @@ class Server:
         waiting = [self.port] if self.port.plugged else []
         ready, _, _ = select.select(waiting, [], [], self._patience())
         self._catch_up()
-        if ready:
-            for frame in self.port.receive():
-                self.robot.receive(frame)
-        for item in self.robot.outbox.take(self.robot.time):
-            if self.port.plugged:
-                self.port.send(item)
-        self._plug()
+        serve(self.robot, self.port, ready=bool(ready))
         self.on_turn()
 
     def _patience(self) -> float:
         due = self.robot.outbox.next_due()
         return _IDLE if due is None else min(max(due - self.robot.time, 0.0), _IDLE)
-
-    def _plug(self) -> None:
-        """Pull or push the plug where a fault says so."""
-        plugged = self.robot.misfortune.plugged
-        if plugged and not self.port.plugged:
-            self.port.plug_in()
-        elif self.port.plugged and not plugged:
-            self.port.unplug()
 
     def _catch_up(self) -> None:
         now = time.monotonic() - self._offset
@@ -108,3 +94,24 @@ class Server:
             self.lost += behind - _FURTHEST
             now -= behind - _FURTHEST
         self.robot.advance(now)
+
+
+def serve(robot: EmulatedRobot, port: Port, *, ready: bool) -> None:
+    """Hand over what is due between host and robot, and pull or push the plug.
+
+    Args:
+        robot: Behind the wire.
+        port: Towards the host.
+        ready: Whether the host may have sent something.
+    """
+    if ready and port.plugged:
+        for frame in port.receive():
+            robot.receive(frame)
+    for item in robot.outbox.take(robot.time):
+        if port.plugged:
+            port.send(item)
+    plugged = robot.misfortune.plugged
+    if plugged and not port.plugged:
+        port.plug_in()
+    elif port.plugged and not plugged:
+        port.unplug()

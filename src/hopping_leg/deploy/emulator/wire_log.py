@@ -1,0 +1,81 @@
+"""What went over the wire: every command of the host, every answer of a drive.
+
+It tells, independently of what the host believes, whether anything unsafe was commanded and how
+soon after a bad answer the host reacted.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from moteus.multiplex import RegisterSubframe, SubframeType
+from moteus.protocol import Register
+
+from hopping_leg.deploy.emulator.codes import Mode
+
+if TYPE_CHECKING:
+    from hopping_leg.deploy.emulator.bus import Message
+    from hopping_leg.deploy.emulator.drive import Drive
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """A command that wrote a drive's mode.
+
+    Attributes:
+        time: When it arrived, s.
+        joint: 0 for the hip, 1 for the knee.
+        mode: Commanded.
+        torque: Feedforward at the motor's output, N m.
+        most: Largest torque allowed to the drive, N m.
+    """
+
+    time: float
+    joint: int
+    mode: Mode
+    torque: float
+    most: float
+
+
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """A drive's answer when it left.
+
+    Attributes:
+        time: When it left, s.
+        joint: 0 for the hip, 1 for the knee.
+        mode: Of the drive.
+        fault: Code or notice.
+    """
+
+    time: float
+    joint: int
+    mode: Mode
+    fault: int
+
+
+class WireLog:
+    """Commands and answers in the order of time."""
+
+    def __init__(self) -> None:
+        self.commands: list[Told] = []
+        self.answers: list[Answered] = []
+
+    def told(self, time: float, joint: int, message: "Message", drive: "Drive") -> None:
+        """Note what a message commands a drive, if it does."""
+        mode, torque, most = None, 0.0, 0.0
+        for s in message.heard(drive):
+            if not isinstance(s, RegisterSubframe) or s.type is not SubframeType.WRITE:
+                continue
+            if s.register == Register.MODE and s.value in set(Mode):
+                mode = Mode(int(s.value or 0))
+            elif s.register == Register.COMMAND_FEEDFORWARD_TORQUE:
+                torque = float(s.value or 0.0)
+            elif s.register == Register.COMMAND_POSITION_MAX_TORQUE:
+                most = float(s.value or 0.0)
+        if mode is not None:
+            self.commands.append(Told(time, joint, mode, torque, most))
+
+    def answered(self, time: float, joint: int, drive: "Drive") -> None:
+        """Note a drive's answer."""
+        machine = drive.machine
+        self.answers.append(Answered(time, joint, machine.mode, int(machine.fault)))
