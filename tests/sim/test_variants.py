@@ -97,7 +97,7 @@ def late(delay, **effects):
     return dataclasses.replace(LEG, reality=Reality(latency=Latency(command=delay), **effects))
 
 
-@pytest.mark.parametrize("delay", [5e-4, 2e-3, 5e-3])
+@pytest.mark.parametrize("delay", [5e-4, 2e-3, 5e-3, 7.5e-3, 1.2e-2])
 def test_a_constant_delay_is_the_one_that_twins_have(delay):
     fast, slow = Legs(late(delay), 3, threads=1), Legs(late(delay, voltage=1 - 1e-12), 3, threads=1)
     assert fast.real is None
@@ -106,10 +106,11 @@ def test_a_constant_delay_is_the_one_that_twins_have(delay):
     assert np.abs(states(fast) - states(Legs(LEG, 3, threads=1))).max() > 1e-3
 
 
-def test_a_late_task_goes_on_exactly():
+@pytest.mark.parametrize("delay", [2e-3, 7e-3])
+def test_a_late_task_goes_on_exactly(delay):
     def begin():
         rng = np.random.default_rng(0)
-        return HoppingTask(late(2e-3), 5, TaskOptions(episode=0.2), PaperReward(LEG), rng, 1)
+        return HoppingTask(late(delay), 5, TaskOptions(episode=0.2), PaperReward(LEG), rng, 1)
 
     one, other = begin(), begin()
     heights(one, 33)

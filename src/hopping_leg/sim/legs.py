@@ -41,8 +41,8 @@ class Legs:
     ``measured_q`` and ``measured_qd`` (n, 2) are what the joints' encoders report, live: the true
     state, unless the robot's ``reality`` says otherwise.
 
-    A command that is late by a constant time of at most one control period is all of a ``reality``
-    that is simulated here; the rest is left to ``RealLegs``, which is slower.
+    Commands that are late by a constant time are all of a ``reality`` that is simulated here; the
+    rest is left to ``RealLegs``, which is slower.
 
     Args:
         robot: The leg.
@@ -74,8 +74,7 @@ class Legs:
         self.period = 1 / rate
         self.substeps = substeps
         self.real: RealLegs | None = None
-        self._late = round(robot.reality.latency.command / timestep)
-        if robot.reality.only_delays and self._late <= substeps and not clamped:
+        if robot.reality.only_delays and not clamped:
             self._take_model(threads, variants)
         elif variants:
             raise UsageError(
@@ -91,8 +90,9 @@ class Legs:
         self._motors = MotorLimit(robot, count)
         self._inverse_belt = np.tile(1 / robot.of_joints("belt_ratio"), (count, 1))
         self._applied = np.zeros((count, 2))
-        self.waiting = np.zeros((count, 2))
-        """Torques that the motors gave last and give on until a late command arrives, N m."""
+        ticks, self._late = divmod(round(robot.reality.latency.command / timestep), substeps)
+        self.waiting = np.zeros((ticks + 1, count, 2))
+        """What the motors give until a late command arrives, and the commands under way, N m."""
 
     def _take_model(self, threads: int, variants: Sequence[Robot]) -> None:
         model = build_model(self.robot, self.timestep)
@@ -134,7 +134,7 @@ class Legs:
             self.real.place(rows, height, q)
             return
         self._applied = np.zeros((self.count, 2))
-        self.waiting[rows] = 0
+        self.waiting[:, rows] = 0
         self.batch.reset(np.sort(rows), stage=0)
         self.height[ids] = height
         self.q[ids] = q
@@ -154,7 +154,7 @@ class Legs:
         """
         if self.real is not None:
             return self.real.step(torque)
-        if self._late:
+        if self._late or len(self.waiting) > 1:
             return self._step_late(torque)
         self._applied = applied = self._motors.clip(torque, self.qd)
         np.multiply(applied, self._inverse_belt, out=self._ctrl)
@@ -162,16 +162,16 @@ class Legs:
         return applied
 
     def _step_late(self, torque: Array) -> Array:
-        """Go on with the torques of before until the new ones arrive; return their mean."""
-        late, before = self._late, self.waiting
-        np.multiply(before, self._inverse_belt, out=self._ctrl)
-        self.batch.step(nstep=late)
-        after = self._motors.clip(torque, self.qd)
-        if late < self.substeps:
-            np.multiply(after, self._inverse_belt, out=self._ctrl)
-            self.batch.step(nstep=self.substeps - late)
-        self.waiting = after
-        self._applied = before + (1 - late / self.substeps) * (after - before)
+        """Go on with the torques of before until later ones arrive; return their mean."""
+        before, under_way = self.waiting[0], [*self.waiting[1:], torque]
+        if self._late:
+            np.multiply(before, self._inverse_belt, out=self._ctrl)
+            self.batch.step(nstep=self._late)
+        after = self._motors.clip(under_way[0], self.qd)
+        np.multiply(after, self._inverse_belt, out=self._ctrl)
+        self.batch.step(nstep=self.substeps - self._late)
+        self._applied = after + self._late / self.substeps * (before - after)
+        self.waiting = np.stack([after, *under_way[1:]])
         return self._applied
 
     def foot_clearance(self) -> Array:

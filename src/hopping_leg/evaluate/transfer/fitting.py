@@ -19,7 +19,6 @@ from hopping_leg.identify.searching import SearchOptions
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.files import load_tree, robot_from_tree
 from hopping_leg.robot.writing import robot_text
-from hopping_leg.sim import CONTROL_RATE
 from hopping_leg.trace import write_atomically
 
 
@@ -114,7 +113,7 @@ def robot_file(identified: Identified, origin: str, path: Path) -> str:
         RobotError: The identified values make no valid robot.
     """
     tree = identified_tree(identified, load_tree(origin), path.stem)
-    delay = min(identified.candidate.drive.delay, 1 / CONTROL_RATE)
+    delay = identified.candidate.drive.delay
     if delay > 0 and "reality" not in tree:
         source = "identified: the recordings' loop answered so late"
         entry = {"value": delay, "unit": "s", "source": source}
