@@ -159,13 +159,15 @@ def write_bad(folder):
         (["good.csv", "--starts", "0"], "at least one start"),
         (["good.csv", "--json", "good.toml"], "would replace an input"),
         (["good.csv", "--report", "."], "is a folder"),
+        (["good.csv", "--json", "good.csv/leg.json"], "cannot be written there"),
     ],
 )
 def test_bad_input_is_one_sentence_and_overwrites_nothing(words, sentence, tmp_path, capsys):
     write_bad(tmp_path)
     (tmp_path / "leg.toml").write_text("old")
     before = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
-    given = [str(tmp_path / w) if w.endswith((".csv", ".parquet", ".toml")) else w for w in words]
+    files = (".csv", ".parquet", ".toml", ".json")
+    given = [str(tmp_path / w) if w.endswith(files) else w for w in words]
     given = [str(tmp_path) if w == "." else w for w in given]
     assert call(tmp_path, *given) == FAILED
     error = capsys.readouterr().err

@@ -13,6 +13,7 @@ Examples:
 
 import dataclasses
 import math
+import os
 import shlex
 import sys
 from dataclasses import dataclass
@@ -172,6 +173,14 @@ def _check_out(args: Identify, origin: str) -> None:
             raise UsageError(f"--{name} {path} would replace an input; give another file.")
         if path is not None and path.is_dir():
             raise UsageError(f"--{name} {path} is a folder; give a file.")
+        if path is not None and not _can_write(path):
+            raise UsageError(f"--{name} {path} cannot be written there; give another place.")
+
+
+def _can_write(path: Path) -> bool:
+    """Return whether a file can be made, as far as that can be known beforehand."""
+    parent = next(p for p in path.resolve().parents if p.exists())
+    return parent.is_dir() and os.access(parent, os.W_OK)
 
 
 def _show_recordings(

@@ -162,8 +162,11 @@ def _sides(identified: Identified) -> tuple[Any, Any]:
 def _provenance(tree: dict[str, Any]) -> dict[str, str]:
     rows = {"seed": str(tree["seed"]), "split": tree["split"]}
     rows |= tree["versions"]
-    rows |= {k: str(v) for k, v in tree["search"].items() if k != "passes"}
-    for one in tree["search"]["passes"]:
+    search = dict(tree["search"])
+    passes, scales = search.pop("passes"), search.pop("scoring")
+    rows |= {k.replace("_", " "): str(v) for k, v in search.items()}
+    rows |= {f"scale of errors: {k}": f"{v:g}" for k, v in scales.items() if v is not None}
+    for one in passes:
         rows[one["name"]] = f"{one['candidates']} candidates, cost {one['cost']:.6g}"
     for r in tree["recordings"]:
         rows[f"{r['use']}: {r['name']}"] = f"{r['rows']} rows, sha256 {r['sha256'] or 'unknown'}"
