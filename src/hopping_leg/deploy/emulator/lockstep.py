@@ -28,14 +28,12 @@ class Lockstep:
 
     Attributes:
         truth: Time and base height at every tick, s and m, and the foot's clearance, m.
-        stalls: Time at which the host stands still, to how long, s.
     """
 
     def __init__(self, robot: EmulatedRobot, *, checksums: bool = True) -> None:
         self.robot = robot
         robot.wire_time = WIRE_TIME
         self.truth: list[tuple[float, float, float]] = []
-        self.stalls: dict[float, float] = {}
         self._port, self._checksums = PtyPort(), checksums
         self.link = MoteusLink(robot.robot, self._open, self, self._make_client)
 
@@ -44,10 +42,7 @@ class Lockstep:
         return self.robot.time
 
     def wait_until(self, deadline: float) -> float:
-        """Let the robot move until a deadline, or longer where the host shall stand still."""
-        for begin, seconds in list(self.stalls.items()):
-            if deadline >= begin:
-                deadline += self.stalls.pop(begin, seconds)
+        """Let the robot move until a deadline."""
         self._client.wait(deadline)
         leg = self.robot.leg
         self.truth.append((self.robot.time, leg.height, leg.foot_clearance))

@@ -14,6 +14,9 @@ from hopping_leg.deploy.emulator.outbox import Outbox, Outgoing
 if TYPE_CHECKING:
     from hopping_leg.deploy.emulator.robot import EmulatedRobot
 
+_AIRBORNE = 0.01
+"""Height of the foot in a flight that counts as the first, m: no bounce."""
+
 _FLIPS = 1 << 16
 _NOISE = b"@#!%\x07~ moteus?"
 _REPLIES = ("drop_reply", "corrupt_reply", "late_reply", "duplicate_reply", "silence")
@@ -56,7 +59,9 @@ class Misfortune:
         self._running: list[_Running] = []
         self.log: list[tuple[float, Fault]] = []
         """Which fault began when, s."""
-        self._powered = self._flown = math.inf
+        self._powered = math.inf
+        self.flown = math.inf
+        """When the foot left the ground for the first time, s."""
         self._contact, self._rate = True, 0.0
         self.plugged = True
         """Whether the adapter is plugged in."""
@@ -75,7 +80,7 @@ class Misfortune:
             self._watch()
             return
         phases = self._watch()
-        since = {"start": 0.0, "powered": self._powered, "flight": self._flown}
+        since = {"start": 0.0, "powered": self._powered, "flight": self.flown}
         for fault in list(self._waiting):
             if robot.time >= since[fault.since] + fault.at and fault.phase in phases:
                 self._waiting.remove(fault)
@@ -117,8 +122,9 @@ class Misfortune:
             phases.add("rising" if rate > 0 else "falling")
             if self._rate > 0 >= rate:
                 phases.add("apex")
-            if math.isinf(self._flown) and math.isfinite(self._powered):
-                self._flown = robot.time
+            airborne = robot.leg.foot_clearance > _AIRBORNE
+            if airborne and math.isinf(self.flown) and math.isfinite(self._powered):
+                self.flown = robot.time
         elif not self._contact:
             phases.add("touchdown")
         self._contact, self._rate = contact, rate

@@ -45,12 +45,16 @@ class Answered:
         joint: 0 for the hip, 1 for the knee.
         mode: Of the drive.
         fault: Code or notice.
+        voltage: Of the bus, V.
+        temperature: Of the output stage, degrees C.
     """
 
     time: float
     joint: int
     mode: Mode
     fault: int
+    voltage: float
+    temperature: float
 
 
 class WireLog:
@@ -78,4 +82,8 @@ class WireLog:
     def answered(self, time: float, joint: int, drive: "Drive") -> None:
         """Note a drive's answer."""
         machine = drive.machine
-        self.answers.append(Answered(time, joint, machine.mode, int(machine.fault)))
+        self.answers.append(
+            Answered(
+                time, joint, machine.mode, int(machine.fault), drive.voltage, drive.temperature
+            )
+        )

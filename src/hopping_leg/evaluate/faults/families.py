@@ -1,0 +1,195 @@
+"""Families of faults: how one is drawn, and which reason for stopping is a correct one."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hopping_leg.deploy.emulator.faults import Fault
+from hopping_leg.deploy.emulator.start import Start
+from hopping_leg.deploy.reasons import FAULTS, Reason
+
+HOP_SECONDS = 1.0
+"""Faults begin at a random time of this long after the first lift-off, s: two to three hops."""
+
+
+@dataclass(frozen=True)
+class Mishap:
+    """What happens in one trial.
+
+    Attributes:
+        fault: Of wire or drives; None where the host itself is struck.
+        stall: How long the host stands still, s; 0 if it does not.
+        dies: Whether the host is killed.
+        start: Differences of the start, where the leg must not be armed at all.
+        at: When, s after the first lift-off.
+    """
+
+    fault: Fault | None = None
+    stall: float = 0.0
+    dies: bool = False
+    start: Start | None = None
+    at: float = 0.0
+
+
+@dataclass(frozen=True)
+class Family:
+    """A kind of mishap.
+
+    Attributes:
+        name: As in results.
+        draw: Returns one.
+        reasons: For which the run may end; ``FINISHED`` where it may go on.
+        refused: Whether the leg must not be armed.
+    """
+
+    name: str
+    draw: Callable[[np.random.Generator], Mishap]
+    reasons: frozenset[Reason] = field(default=frozenset())
+    refused: bool = False
+
+
+_READINGS = {
+    *(Reason.ENCODER_JUMP, Reason.POSITION_LIMIT, Reason.SPEED_LIMIT, Reason.TORQUE_LIMIT),
+    *(Reason.MEASUREMENT_NOT_FINITE, Reason.TOO_HOT, Reason.VOLTAGE_LOW, Reason.VOLTAGE_HIGH),
+    *(Reason.DRIVE_LEFT_MODE, Reason.DRIVE_FAULT, Reason.DRIVE_TIMEOUT),
+}
+"""What flipped bits may look like where lines have no checksums."""
+
+_GLITCH = {Reason.FINISHED, Reason.REPLIES_MISSING}
+
+
+def _faulty(
+    kind: str, options: Callable[[np.random.Generator], dict[str, float | str]]
+) -> Callable[[np.random.Generator], Mishap]:
+    """Return what draws a fault of a kind at a random time of a random drive."""
+
+    def draw(rng: np.random.Generator) -> Mishap:
+        at = float(rng.uniform(0, HOP_SECONDS))
+        drive = str(rng.choice(["hip", "knee", "both"]))
+        values = {"drive": drive, **options(rng)}
+        return Mishap(Fault(kind, since="flight", at=at, **values), at=at)  # type: ignore[arg-type]
+
+    return draw
+
+
+def _nothing(_: np.random.Generator) -> dict[str, float | str]:
+    return {}
+
+
+def _few(rng: np.random.Generator) -> dict[str, float | str]:
+    return {"count": int(rng.integers(1, 6))}
+
+
+def _between(low: float, high: float) -> Callable[[np.random.Generator], dict[str, float | str]]:
+    return lambda rng: {"value": float(rng.uniform(low, high))}
+
+
+def _one_of(codes: list[int]) -> Callable[[np.random.Generator], dict[str, float | str]]:
+    return lambda rng: {"value": float(rng.choice(codes))}
+
+
+def _late(rng: np.random.Generator) -> dict[str, float | str]:
+    return {**_few(rng), "value": float(rng.uniform(0.004, 0.03))}
+
+
+def _jump(rng: np.random.Generator) -> dict[str, float | str]:
+    return {"value": float(rng.choice([-1, 1]) * rng.uniform(0.2, 2.0))}
+
+
+def _unplugged(rng: np.random.Generator) -> dict[str, float | str]:
+    return {"drive": "both", "duration": float(rng.uniform(0.05, 0.6))}
+
+
+def _stall(rng: np.random.Generator) -> Mishap:
+    at = float(rng.uniform(0, HOP_SECONDS))
+    return Mishap(stall=float(rng.uniform(0.025, 0.3)), at=at)
+
+
+def _death(rng: np.random.Generator) -> Mishap:
+    return Mishap(dies=True, at=float(rng.uniform(0, HOP_SECONDS)))
+
+
+def _pose(rng: np.random.Generator) -> Mishap:
+    """Miscounted turns of a rotor, or a pose in which the leg may not start."""
+    if rng.random() < 0.5:
+        turns = float(rng.choice([-3, -2, -1, 1, 2, 3]))
+        drive = str(rng.choice(["hip", "knee", "both"]))
+        return Mishap(start=Start(faults=(Fault("boot_pose", drive=drive, value=turns),)))
+    hip, knee = rng.uniform(2.0, 3.0), rng.uniform(0.3, 2.0)
+    return Mishap(start=Start(pose=f"{hip:.3f},{knee:.3f}"))
+
+
+_SETTINGS = {
+    "motor_position.rotor_to_output_ratio": (1.0, 0.1, 1 / 9),
+    "servopos.position_min": (-0.01, -0.2, float("nan")),
+    "servopos.position_max": (0.01, 0.2, float("nan")),
+    "servo.max_current_A": (20.0, 60.0, 150.0),
+    "servo.timeout_mode": (0.0, 10.0, 12.0),
+    "servo.default_timeout_s": (0.1, 1.0, float("nan")),
+}
+"""Settings that arming depends on, with wrong values for them."""
+
+
+def _configuration(rng: np.random.Generator) -> Mishap:
+    name = str(rng.choice(list(_SETTINGS)))
+    fault = Fault(
+        "configuration",
+        drive=str(rng.choice(["hip", "knee", "both"])),
+        name=name,
+        value=float(rng.choice(_SETTINGS[name])),
+    )
+    return Mishap(start=Start(faults=(fault,)))
+
+
+def _family(
+    name: str, draw: Callable[[np.random.Generator], Mishap], *reasons: Reason
+) -> tuple[str, Family]:
+    return name, Family(name, draw, frozenset(reasons))
+
+
+_R = Reason
+
+FAMILIES: dict[str, Family] = dict(
+    [
+        _family("dropped reply", _faulty("drop_reply", _few), *_GLITCH),
+        _family("corrupted reply", _faulty("corrupt_reply", _few), *_GLITCH, *_READINGS),
+        _family("late reply", _faulty("late_reply", _late), *_GLITCH),
+        _family("duplicated reply", _faulty("duplicate_reply", _few), _R.FINISHED),
+        _family("total loss", _faulty("silence", _nothing), _R.REPLIES_MISSING),
+        _family("garbage line", _faulty("garbage_line", _few), _R.FINISHED),
+        _family("encoder jump", _faulty("encoder_jump", _jump), _R.ENCODER_JUMP),
+        _family("drive fault", _faulty("drive_fault", _one_of(sorted(FAULTS))), _R.DRIVE_FAULT),
+        _family(
+            "over-temperature",
+            _faulty("over_temperature", _between(100.0, 2000.0)),
+            *(_R.TOO_HOT, _R.DRIVE_FAULT),
+        ),
+        _family(
+            "over-voltage",
+            _faulty("over_voltage", _between(42.5, 60.0)),
+            *(_R.VOLTAGE_HIGH, _R.DRIVE_FAULT),
+        ),
+        _family(
+            "under-voltage",
+            _faulty("under_voltage", _between(2.0, 17.5)),
+            *(_R.VOLTAGE_LOW, _R.DRIVE_FAULT),
+        ),
+        _family("limit notice", _faulty("limit_notice", _one_of([*range(96, 106)])), _R.FINISHED),
+        _family(
+            "adapter unplugged",
+            _faulty("unplug", _unplugged),
+            *(_R.REPLIES_MISSING, _R.DRIVE_TIMEOUT),
+        ),
+        _family(
+            "drive restarted",
+            _faulty("power_loss", _nothing),
+            *(_R.DRIVE_LEFT_MODE, _R.REPLIES_MISSING),
+        ),
+        _family("stalled host", _stall, _R.LOOP_STALLED, _R.DRIVE_TIMEOUT),
+        _family("killed host", _death),
+        ("wrong boot pose", Family("wrong boot pose", _pose, refused=True)),
+        ("wrong configuration", Family("wrong configuration", _configuration, refused=True)),
+    ]
+)
+"""Every family, by name."""

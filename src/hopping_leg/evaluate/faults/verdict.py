@@ -1,0 +1,85 @@
+"""What was unsafe about a trial, judged by what went over the wire and what the trace says."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from hopping_leg.deploy.emulator.codes import Mode
+from hopping_leg.deploy.emulator.wire_log import Answered, Told, WireLog
+from hopping_leg.deploy.envelope import Envelope
+from hopping_leg.robot.parameters import Robot
+
+SAFE = (Mode.STOPPED, Mode.BRAKE)
+"""Commands that cannot move the leg."""
+
+_ROUNDING = 1e-5
+"""Torques travel as 32-bit floats, N m."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What may be commanded to each motor, N m at its output, and which answers are good ones."""
+
+    torque: tuple[float, float]
+    voltage: tuple[float, float]
+    temperature: float
+
+    @staticmethod
+    def of(robot: Robot, envelope: Envelope) -> "Limits":
+        """Return the limits of a robot."""
+        motors = robot.hip.motor.torque_limit, robot.knee.motor.torque_limit
+        voltage = envelope.voltage_low, envelope.voltage_high
+        return Limits(motors, voltage, envelope.temperature)
+
+    def bad(self, answer: Answered) -> bool:
+        """Tell whether an answer shows by itself that something is wrong."""
+        low, high = self.voltage
+        healthy = answer.mode is Mode.POSITION
+        healthy &= low <= answer.voltage <= high and answer.temperature <= self.temperature
+        return not healthy
+
+
+def problems_of_commands(commands: Sequence[Told], limits: Limits) -> list[str]:
+    """Return what was wrong with commands: torque that is no number, or beyond the limits."""
+    problems = []
+    for told in commands:
+        if not math.isfinite(told.torque) or not math.isfinite(told.most):
+            problems.append(f"torque that is no number on the wire at {told.time:.4f} s")
+        limit = limits.torque[told.joint] + _ROUNDING
+        if abs(told.torque) > limit or told.most > limit:
+            problems.append(
+                f"torque {told.torque:.3f} (most {told.most:.3f}) N m on the wire at"
+                f" {told.time:.4f} s, limit {limit:.3f}"
+            )
+    return problems[:3]
+
+
+def restarts(commands: Sequence[Told], since: float) -> list[str]:
+    """Return whether torque was commanded again after a stop, from a time on."""
+    stopped = False
+    for told in commands:
+        if told.time < since:
+            continue
+        if told.mode in SAFE:
+            stopped = True
+        elif stopped:
+            return [f"torque commanded again at {told.time:.4f} s, after a stop"]
+    return []
+
+
+def reaction(log: WireLog, limits: Limits, since: float, *, jumped: bool) -> float | None:
+    """Return the time from the first bad answer to the first safe command, s; None if none.
+
+    Args:
+        log: Of the wire.
+        limits: Which answers are good ones.
+        since: When the fault began, s.
+        jumped: Whether every answer since then is bad, as positions are wrong.
+    """
+    after = (answer for answer in log.answers if answer.time >= since)
+    seen = next((answer.time for answer in after if jumped or limits.bad(answer)), None)
+    if seen is None:
+        return None
+    safe = (told.time for told in log.commands if told.time >= seen and told.mode in SAFE)
+    done = next(safe, None)
+    return math.inf if done is None else done - seen
