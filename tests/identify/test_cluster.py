@@ -42,6 +42,14 @@ def test_a_cluster_gives_the_same_bits():
     np.testing.assert_array_equal(Cluster(goal, workers=2)(VECTORS), goal(VECTORS))
 
 
+def test_where_no_cluster_answers_there_is_a_sentence_at_once():
+    ray = pytest.importorskip("ray", reason="Ray is not installed (extra 'cluster')")
+    if ray.is_initialized():
+        ray.shutdown()
+    with pytest.raises(UsageError, match=r"no Ray cluster at 127\.0\.0\.1:1: .*; start one"):
+        Cluster(objective(), address="127.0.0.1:1")
+
+
 def test_without_ray_there_is_a_sentence(monkeypatch):
     real = builtins.__import__
 

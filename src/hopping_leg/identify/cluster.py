@@ -1,5 +1,6 @@
 """A population evaluated on a Ray cluster, with the same bits as on this machine."""
 
+import socket
 from collections.abc import Callable
 from typing import Any
 
@@ -10,6 +11,10 @@ from hopping_leg.errors import UsageError
 
 Evaluate = Callable[[Array], Array]
 """Search vectors (n, k) to costs (n,) or residuals (n, m), row by row independent."""
+
+
+_PATIENCE = 5.0
+"""How long an address may take to answer, s."""
 
 
 class Cluster:
@@ -33,11 +38,12 @@ class Cluster:
         self._ray = _import_ray()
         if not self._ray.is_initialized():
             try:
+                _knock(address)
                 self._ray.init(address=address, log_to_driver=False)
-            except (ConnectionError, ValueError, RuntimeError) as error:
+            except (OSError, ValueError, RuntimeError) as error:
                 raise UsageError(
-                    f"There is no Ray cluster at {address}: {error}; start one with"
-                    " `ray start --head`, or leave the address out."
+                    f"There is no Ray cluster at {address}: {str(error).rstrip('.')}; start one"
+                    " with `ray start --head`, or leave the address out."
                 ) from error
         self.workers = workers or max(1, int(self._ray.cluster_resources().get("CPU", 1)))
         self._evaluate = self._ray.put(evaluate)
@@ -54,6 +60,17 @@ class Cluster:
 def split_population(vectors: Array, workers: int) -> list[Array]:
     """Cut a population (n, k) into at most ``workers`` parts of nearly equal size, in order."""
     return np.array_split(vectors, min(workers, len(vectors)))
+
+
+def _knock(address: str | None) -> None:
+    """Fail at once where nothing answers; Ray itself would try for minutes.
+
+    Raises:
+        OSError: Nothing answers at an address of the form ``host:port``.
+    """
+    host, _, port = (address or "").removeprefix("ray://").rpartition(":")
+    if host and port.isdigit():
+        socket.create_connection((host, int(port)), _PATIENCE).close()
 
 
 def _evaluate_part(evaluate: Evaluate, vectors: Array) -> Array:
