@@ -234,3 +234,15 @@ def test_the_second_pass_stays_near_the_first():
             assert p.start == pytest.approx(found[p.name])
             assert p.low == 0 or p.low >= 0.49 * p.start - p.scale
     assert result.best.get("hip.damping") == pytest.approx(found["hip.damping"])
+
+
+def test_the_height_of_the_base_tells_of_the_rail():
+    truth = CAD.replace({"rail.friction": 2.0})
+    air, ground = record(truth.robot, swing(1.0)), record(truth.robot, swing(2.0, "rail"), "rail")
+    simulator = WindowSimulator([air, ground], cut([air, ground], 0.1), timestep=STEP)
+    cost = Cost(simulator, Scoring(position=None, height=1e-3))
+    assert cost.size == 20 * 19
+    at_truth, beside = cost.values([truth, truth.replace({"rail.friction": 0.5})])
+    assert at_truth < 0.01 * beside
+    with pytest.raises(RecordingError, match="record height"):
+        Cost(WindowSimulator([air], cut([air], 0.1), timestep=STEP), Scoring(None, height=1e-3))

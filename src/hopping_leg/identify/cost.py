@@ -9,7 +9,7 @@ from hopping_leg.errors import RecordingError, UsageError
 from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.simulate import Simulated, WindowSimulator
 
-_QUANTITIES = ("position", "velocity", "torque")
+_QUANTITIES = ("position", "velocity", "torque", "height")
 _FAILED = 1e3
 """Residual of a simulation that broke down, in units of the scales."""
 
@@ -30,6 +30,8 @@ class Scoring:
     """Scale of velocity errors, rad/s."""
     torque: float | None = None
     """Scale of torque errors, N m."""
+    height: float | None = None
+    """Scale of errors of the base's height, where it was measured, m."""
     robust: float | None = None
     """Residuals well beyond this many scales count linearly instead of squared."""
 
@@ -98,12 +100,21 @@ class Cost:
 
 
 def measured(simulator: WindowSimulator, quantity: str) -> Array:
-    """Return what was measured in each window and counts, (windows, rows, 2), else NaN."""
-    values = np.full((len(simulator.windows), simulator.rows, 2), np.nan)
+    """Return what was measured in each window and counts, else NaN.
+
+    Of shape (windows, rows, 2), or (windows, rows) if the quantity is the base's ``height``.
+    """
+    of_joints = (2,) if quantity != "height" else ()
+    values = np.full((len(simulator.windows), simulator.rows, *of_joints), np.nan)
     for i, w in enumerate(simulator.windows):
         recording = simulator.recordings[w.recording]
         rows = slice(w.start + w.unscored, w.start + w.length)
-        sampled = recording.array(quantity)[rows]
+        if quantity != "height":
+            sampled = recording.array(quantity)[rows]
+        elif recording.setup.rig != "fixed-base" and recording.has_column("height_m"):
+            sampled = recording.trace.column("height_m")[rows].copy()
+        else:
+            continue
         sampled[~recording.exact_time[rows]] = np.nan
         values[i, w.unscored : w.length] = sampled
     return values

@@ -140,7 +140,9 @@ def _scoring(recordings: Sequence[Recording], *, paper: bool) -> Scoring:
     if all(r.setup.onboard == "torque" for r in recordings):
         return Scoring(position=0.02, robust=2.0)
     torque = 0.2 if any(r.has("torque") for r in recordings) else None
-    return Scoring(position=0.005, torque=torque, robust=3.0)
+    rails = [r for r in recordings if r.setup.rig == "rail"]
+    height = 0.002 if any(r.has_column("height_m") for r in rails) else None
+    return Scoring(position=0.005, torque=torque, height=height, robust=3.0)
 
 
 def _window(recordings: Sequence[Recording], robot: Robot) -> tuple[float, float]:

@@ -22,11 +22,13 @@ class Simulated:
         position: rad, (candidates, windows, rows, 2).
         velocity: rad/s, (candidates, windows, rows, 2).
         torque: As the rig would have measured it, N m, (candidates, windows, rows, 2).
+        height: Of the base, m, (candidates, windows, rows); NaN where it is fixed.
     """
 
     position: Array
     velocity: Array
     torque: Array
+    height: Array
 
 
 class WindowSimulator:
@@ -77,8 +79,9 @@ class WindowSimulator:
         """
         shape = (len(candidates), len(self.windows), self.rows, 2)
         position, velocity, torque = (np.full(shape, np.nan) for _ in range(3))
+        height = np.full(shape[:3], np.nan)
         for ids, group in self._groups:
             parts = group.run(candidates)
-            for whole, part in zip((position, velocity, torque), parts, strict=True):
+            for whole, part in zip((position, velocity, torque, height), parts, strict=True):
                 whole[:, ids, : part.shape[2]] = part
-        return Simulated(position, velocity, torque)
+        return Simulated(position, velocity, torque, height)

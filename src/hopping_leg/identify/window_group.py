@@ -77,21 +77,26 @@ class WindowGroup:
         self._prepare_zeros(recordings, windows)
         self._batches: dict[int, batch.Batch] = {}
 
-    def run(self, candidates: Sequence[Candidate]) -> tuple[Array, Array, Array]:
-        """Return position, velocity and measured torque, (candidates, windows, rows, 2) each."""
+    def run(self, candidates: Sequence[Candidate]) -> tuple[Array, Array, Array, Array]:
+        """Return position, velocity and measured torque of the joints, and the base's height.
+
+        Of shape (candidates, windows, rows, 2) the first three, (candidates, windows, rows) the
+        last, which is NaN where the base is fixed.
+        """
         zeros = find_zeros(self._zeros, candidates)[:, self._of_window]
         simulation = self._start(candidates, zeros)
-        history = self._advance(simulation, candidates)
+        *history, heights = self._advance(simulation, candidates)
         shape = (self._ticks, len(candidates), -1, 2)
         q, qd, torque = (values.reshape(shape) for values in history)
+        height = self._linear(heights.reshape(*shape[:3], 1))[..., 0]
         position, velocity = self._between_ticks(q, qd)
         position += zeros[:, :, None]
         gain = drive_values(candidates, "sensor_gain")[:, None, None]
         offset = drive_values(candidates, "torque_offset")[:, None, None]
         measured = gain * self._linear(torque) + offset
-        for values in (position, velocity, measured):
+        for values in (position, velocity, measured, height):
             values[:, self._padding] = np.nan
-        return position, velocity, measured
+        return position, velocity, measured, height
 
     def _prepare_rows(self, recordings: Sequence[Recording], windows: Sequence[Window]) -> None:
         """Place every window's rows among the ticks and collect initial states."""
@@ -166,12 +171,17 @@ class WindowGroup:
 
     def _advance(
         self, simulation: batch.Batch, candidates: Sequence[Candidate]
-    ) -> tuple[Array, Array, Array]:
-        """Run all ticks; return joint position, velocity and torque at each, (ticks, n, 2)."""
+    ) -> tuple[Array, Array, Array, Array]:
+        """Run all ticks; return joint position, velocity and torque, base height at each.
+
+        Of shape (ticks, n, 2) the first three, (ticks, n) the last.
+        """
         windows, count = len(self._begin), simulation.nsim
         history = tuple(np.full((self._ticks, count, 2), np.nan) for _ in range(3))
         positions, velocities, torques = history
+        heights = np.full((self._ticks, count), np.nan)
         q, qd = simulation.bind("qpos")[:, -2:], simulation.bind("qvel")[:, -2:]
+        base = simulation.bind("qpos")[:, 0] if self._setup.rig != "fixed-base" else np.nan
         ctrl = simulation.bind("ctrl")
         bias = simulation.expand("actuator_biasprm")
         force = simulation.expand("actuator_forcerange")
@@ -211,6 +221,7 @@ class WindowGroup:
                 force[..., 0], force[..., 1] = gain * lower, gain * upper
             integral += self._tick * (target - q)
             positions[tick], velocities[tick], torques[tick] = q, qd, torque
+            heights[tick] = base
             if load.any():
                 friction[...] = still + load * np.abs(torque)
             simulation.step(ids=alive, nstep=self._substeps)
@@ -220,7 +231,7 @@ class WindowGroup:
                 if not len(alive):
                     break
         positions[:, np.setdiff1d(np.arange(count), alive)] = np.nan
-        return positions, velocities, torques
+        return positions, velocities, torques, heights
 
     def _block(
         self, tick: int, delay: Array, candidates: Sequence[Candidate]
