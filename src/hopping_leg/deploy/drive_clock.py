@@ -10,6 +10,9 @@ _HALF = 1 << 31
 _DRIFT = 2e-4
 """Most that two clocks drift apart, s/s: both are quartzes."""
 
+_RESTART = -500
+"""A counter that falls back further than this, ms, began anew: no reply is held up so long."""
+
 _SLACK = 0.0015
 """A reply may seem this much older than its question, s: the counter's step and drift."""
 
@@ -34,10 +37,10 @@ class DriveClock:
             None for a reply that has been seen before.
         """
         if self._counter is None:
-            self._counter, self._time = counter, counter % _WRAP * 1e-3
-            self._offset, self._updated = arrived - self._time, arrived
-            return arrived
+            return self._begin(counter, arrived)
         step = (counter - self._counter + _HALF) % _WRAP - _HALF
+        if step < _RESTART:
+            return self._begin(counter, arrived)
         if step == 0:
             return None
         time = self._time + step * 1e-3
@@ -46,6 +49,11 @@ class DriveClock:
         allowance = _DRIFT * (arrived - self._updated)
         self._offset, self._updated = min(self._offset + allowance, arrived - time), arrived
         return time + self._offset
+
+    def _begin(self, counter: int, arrived: float) -> float:
+        self._counter, self._time = counter, counter % _WRAP * 1e-3
+        self._offset, self._updated = arrived - self._time, arrived
+        return arrived
 
     @staticmethod
     def fresh(taken: float, asked: float) -> bool:

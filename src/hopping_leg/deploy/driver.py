@@ -80,7 +80,7 @@ class MoteusLink:
         commands = self._commands(outgoing, query=True)
         for joint, command in enumerate(commands):
             self._listen(command, joint, question)
-        self._client.start_soon(lambda: self._cycle(commands, until))
+        self._client.start_soon(lambda: self._ask(question, commands, until))
         question.done.wait(self._clock.patience(until))
         return question.result()
 
@@ -113,6 +113,10 @@ class MoteusLink:
         except HardwareError as error:
             self._note(str(error))
         self._client.close()
+
+    async def _ask(self, question: Question, commands: list[Any], until: float) -> None:
+        await self._cycle(commands, until)
+        question.done.set()
 
     async def _cycle(self, commands: list[Any], until: float) -> None:
         """Send frames, and wait for replies as long as they are worth something."""

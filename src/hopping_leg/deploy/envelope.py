@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from hopping_leg.deploy.observation import Pair
 from hopping_leg.robot.parameters import Robot
 
-MARGIN = 0.6
+MARGIN = 0.5
 """How far a hopping leg may pass its soft limits, rad; the soft limits' PD acts before."""
 
 RECORDING_MARGIN = 0.1
