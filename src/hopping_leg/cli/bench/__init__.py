@@ -5,14 +5,16 @@ Examples:
   hop bench convergence --json convergence.json
   hop bench inference fast --json inference.json
   hop bench training --training-seeds 0 1 2 --json training.json
+  hop bench faults --json faults.json
   hop bench energy-shaping --json energy_shaping.json
 """
 
 from hopping_leg.cli.bench.controllers import Ablation, EnergyShaping, Training
+from hopping_leg.cli.bench.faults import Faults
 from hopping_leg.cli.bench.simulation import Convergence, Env, Inference
 from hopping_leg.cli.output import write_json
 
-Benchmark = Env | Convergence | Inference | EnergyShaping | Training | Ablation
+Benchmark = Env | Convergence | Inference | EnergyShaping | Training | Ablation | Faults
 
 
 def run(args: Benchmark) -> None:

@@ -19,7 +19,6 @@ from hopping_leg.deploy.emulator.lockstep import Lockstep
 from hopping_leg.deploy.emulator.start import Start
 from hopping_leg.deploy.envelope import Envelope, hopping_envelope
 from hopping_leg.deploy.inspection import inspect
-from hopping_leg.deploy.reasons import Reason
 from hopping_leg.deploy.schedule import Schedule
 from hopping_leg.deploy.sequence import Sequence, Timing, hopping_poses
 from hopping_leg.deploy.session import Performance, header_of, perform
@@ -222,6 +221,8 @@ class _Trial:
         fault = self._mishap.fault
         jumped = fault is not None and fault.kind == "encoder_jump"
         result.reaction = reaction(log, self._limits, result.began, jumped=jumped)
+        if result.reaction == np.inf:
+            result.problems.append("no safe command followed a bad answer")
         if any(drive.machine.mode is Mode.POSITION for drive in robot.drives):
             result.problems.append("a drive is still in torque mode at the end")
 
@@ -238,8 +239,6 @@ class _Trial:
         states = done.trace.column("state")
         if (np.diff(states) < 0).any() or states[-1] != State.STOPPED:
             result.problems.append("the supervisor did not stay stopped")
-        if cause.reason is Reason.FINISHED and result.reaction not in (None, np.inf):
-            result.reaction = None
 
 
 def _problems_of_box(folder: Path) -> list[str]:

@@ -68,7 +68,9 @@ def restarts(commands: Sequence[Told], since: float) -> list[str]:
 
 
 def reaction(log: WireLog, limits: Limits, since: float, *, jumped: bool) -> float | None:
-    """Return the time from the first bad answer to the first safe command, s; None if none.
+    """Return the time from the first bad answer to the first safe command, s.
+
+    None where the host had no bad answer to react to, infinite where it did not react.
 
     Args:
         log: Of the wire.
@@ -76,10 +78,8 @@ def reaction(log: WireLog, limits: Limits, since: float, *, jumped: bool) -> flo
         since: When the fault began, s.
         jumped: Whether every answer since then is bad, as positions are wrong.
     """
-    after = (answer for answer in log.answers if answer.time >= since)
-    seen = next((answer.time for answer in after if jumped or limits.bad(answer)), None)
-    if seen is None:
-        return None
-    safe = (told.time for told in log.commands if told.time >= seen and told.mode in SAFE)
-    done = next(safe, None)
-    return math.inf if done is None else done - seen
+    safe = (told.time for told in log.commands if told.time >= since and told.mode in SAFE)
+    done = next(safe, math.inf)
+    before = (answer for answer in log.answers if since <= answer.time < done)
+    seen = next((answer.time for answer in before if jumped or limits.bad(answer)), None)
+    return None if seen is None else done - seen
