@@ -29,6 +29,8 @@ VERBS = {
     "export": "write a leg as URDF, inspect a policy file",
     "record": "play an excitation on a leg and record it",
     "identify": "fit a leg to recordings and write its robot file",
+    "deploy": "run a controller on the real leg, or on emulated drives",
+    "doctor": "check the drives of a leg, configure and home them",
     "emulate": "stand in for the real leg: two drives behind a real wire",
     "experiment": "run the paper's sim-to-real experiment on twins",
     "reproduce": "the main job: train, evaluate, compare and report",

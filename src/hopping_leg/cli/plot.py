@@ -16,6 +16,7 @@ from typing import Literal
 import tyro
 from rich.console import Console
 
+from hopping_leg.deploy.black_box import SUFFIX, recover
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.figures import to_png, to_svg
 from hopping_leg.evaluate.gallery import draw_gallery, run_of
@@ -28,7 +29,8 @@ class Plot:
     """Which traces, and where the figures go."""
 
     traces: tyro.conf.Positional[tuple[Path, ...]]
-    """Parquet files from `hop evaluate --traces DIR` or the robot."""
+    """Parquet files from `hop evaluate --traces DIR` or `hop deploy`; also the .blackbox that a
+    killed `hop deploy` leaves, whose trace is then written beside it."""
     out: Path = Path("figures")
     """Folder for the figures."""
     format: Literal["svg", "png"] = "svg"
@@ -39,7 +41,7 @@ def run(args: Plot) -> None:
     """Draw and write every figure that the traces allow."""
     if not args.traces:
         raise UsageError("No trace was named; record some with `hop evaluate ... --traces DIR`.")
-    runs = [run_of(path) for path in args.traces]
+    runs = [run_of(_trace(path)) for path in args.traces]
     controllers = list(dict.fromkeys(run.controller for run in runs))
     evaluation = tabulate(runs, controllers, seed=0)
     encode = to_png if args.format == "png" else to_svg
@@ -48,3 +50,12 @@ def run(args: Plot) -> None:
         path = args.out / f"{picture.name}.{args.format}"
         write_atomically(path, encode(picture.figure))
         console.print(f"{picture.title}: {path}", highlight=False)
+
+
+def _trace(path: Path) -> Path:
+    """Return the trace of a run; that of a black box is made first."""
+    if path.suffix != SUFFIX:
+        return path
+    trace = path.with_suffix(".parquet")
+    recover(path).save(trace)
+    return trace

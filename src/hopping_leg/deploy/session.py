@@ -6,7 +6,7 @@ import platform
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -56,7 +56,7 @@ def perform(
     *,
     clock: Clock | None = None,
     realtime: bool = True,
-    on_loop: Callable[[ControlLoop], None] = lambda _: None,
+    beside: Callable[[ControlLoop], AbstractContextManager[None]] = lambda _: nullcontext(),
 ) -> Performance:
     """Arm, run a sequence, stop; SIGINT and SIGTERM stop it as the operator would.
 
@@ -68,7 +68,7 @@ def perform(
         header: Of the trace.
         clock: The time; none takes the computer's.
         realtime: Ask for priority and locked memory.
-        on_loop: Given the loop before it starts, e.g. for a keyboard that stops it.
+        beside: Makes what is open while the loop runs, e.g. a keyboard that stops it.
 
     Raises:
         TraceError: The black box cannot be written.
@@ -76,10 +76,9 @@ def perform(
     box_path = path.with_suffix(SUFFIX)
     box = BlackBox(box_path, columns(sequence.controller), header)
     loop = ControlLoop(link, sequence, envelope, box, clock or RealClock())
-    on_loop(loop)
     runner = _Runner(loop, realtime=realtime)
     try:
-        with _stopped_by_signals(loop), uninterrupted():
+        with _stopped_by_signals(loop), uninterrupted(), beside(loop):
             if realtime:
                 link.prefer()
             outcome = runner.run()

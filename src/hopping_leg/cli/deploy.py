@@ -1,0 +1,169 @@
+"""Run a controller on the real leg, or on `hop emulate`.
+
+The drives are checked first; the leg is armed only when all is well and you agree. It rises to the
+start pose, hops, sinks down and stops. Space, Enter, q, Ctrl-C and SIGTERM stop it at once, and a
+stop stays until you call this again. Everything is recorded, also when the process is killed:
+`hop plot` reads the trace, or the black box that a killed run leaves behind.
+
+CONTROLLER is a name (fast, paper, energy-shaping), a policy (.onnx), a gain file (.toml), or a
+joint trajectory from `hop excite` (.parquet), which a joint PD tracks.
+
+Examples:
+  hop deploy fast --transport /dev/fdcanusb --command 0.30 --seconds 20
+  hop deploy energy-shaping --transport socketcan:can0 --schedule 0.25:5,0.30:5,0.35:5
+  hop deploy runs/mine/policy.onnx --transport /dev/pts/5 --live --yes
+"""
+
+import contextlib
+import importlib
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import tyro
+from rich.console import Console
+
+from hopping_leg.cli.motors import ask, check, connect
+from hopping_leg.control.joint_pd import JointPD
+from hopping_leg.control.library import load_controller
+from hopping_leg.control.policy import Policy
+from hopping_leg.control.protocol import Controller
+from hopping_leg.deploy.envelope import hopping_envelope
+from hopping_leg.deploy.keyboard import LiveHeight, keys
+from hopping_leg.deploy.reasons import Reason
+from hopping_leg.deploy.schedule import (
+    Range,
+    Schedule,
+    check_schedule,
+    command_range,
+    parse_schedule,
+)
+from hopping_leg.deploy.sequence import Sequence, Timing, hopping_poses
+from hopping_leg.errors import HardwareError, UsageError
+from hopping_leg.identify.excitation import load_excitation
+from hopping_leg.robot import load_robot
+from hopping_leg.robot.limits import SoftLimiter, SoftLimits
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim import CONTROL_RATE
+
+if TYPE_CHECKING:
+    from hopping_leg.deploy.loop import ControlLoop
+    from hopping_leg.deploy.session import Performance
+
+_WILLED = (Reason.FINISHED, Reason.OPERATOR_STOP)
+_SECONDS = 10.0
+
+
+@dataclass(frozen=True)
+class Deploy:
+    """What runs, on which leg, for how long."""
+
+    controller: tyro.conf.Positional[str]
+    """A name, or a file: .onnx, .toml, .parquet."""
+    transport: str
+    """Path of an fdcanusb, interface:channel of python-can, or pi3hat."""
+    robot: str = "legv2-paper"
+    """A shipped robot or a .toml file; its table [hardware] says how the drives are wired."""
+    command: float | None = None
+    """Height to hop to, m; default: the middle of the policy's training, 0.30 for others."""
+    schedule: str | None = None
+    """Heights in turn instead, each with its seconds, e.g. 0.25:5,0.30:5."""
+    seconds: float | None = None
+    """Time to hop, s; default 10, or as long as schedule or trajectory."""
+    live: bool = False
+    """Change the height while the leg hops: + and -, or the arrows."""
+    soft_limits: bool = True
+    """The paper's PD that pulls joints back into bounds."""
+    other_robot: bool = False
+    """Let a policy run that was trained on another robot, at your own risk."""
+    yes: bool = False
+    """Arm without asking."""
+    out: Path = Path("runs/deploy")
+    """Folder for the trace."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What was asked for, checked against controller and robot."""
+
+    controller: Controller
+    rate: float
+    schedule: Schedule
+    seconds: float
+    valid: Range
+
+
+def run(args: Deploy) -> None:
+    """Check everything, ask, run, record."""
+    robot = load_robot(args.robot)
+    robot.require_leg()
+    done = _perform(args, robot, _plan(args, robot))
+    console = Console()
+    for notice in done.notices:
+        console.print(notice, soft_wrap=True)
+    cause = done.outcome.memory.stop_cause
+    console.print(f"{cause} {done.outcome.ticks} ticks, {done.outcome.skipped} left out.")
+    console.print(f"Wrote {done.path}", highlight=False, soft_wrap=True)
+    if cause.reason not in _WILLED:
+        raise HardwareError(f"The leg was stopped: {cause}")
+
+
+def _plan(args: Deploy, robot: Robot) -> Plan:
+    """Return what to do; everything that can be wrong with it is found here."""
+    if args.controller.endswith(".parquet"):
+        excitation = load_excitation(Path(args.controller))
+        controller: Controller = JointPD(excitation.position, excitation.velocity)
+        rate, usual = excitation.rate, len(excitation) / excitation.rate
+    else:
+        controller = load_controller(args.controller, robot, strict=not args.other_robot)
+        rate, usual = CONTROL_RATE, _SECONDS
+    valid = command_range(controller, robot)
+    schedule = _schedule(args, controller, valid)
+    check_schedule(schedule, valid, controller.name)
+    seconds = args.seconds or (schedule.seconds if args.schedule else usual)
+    if not 0 < seconds <= 3600:
+        raise UsageError(f"--seconds is {seconds:g} but must lie between 0 and 3600.")
+    return Plan(controller, rate, schedule, seconds, valid)
+
+
+def _schedule(args: Deploy, controller: Controller, valid: Range) -> Schedule:
+    if args.schedule is not None and args.command is not None:
+        raise UsageError("--command and --schedule exclude each other; give one of them.")
+    if args.schedule is not None:
+        return parse_schedule(args.schedule)
+    middle = sum(valid) / 2 if isinstance(controller, Policy) else 0.30
+    height = middle if args.command is None else args.command
+    return Schedule(((height, _SECONDS),))
+
+
+def _perform(args: Deploy, robot: Robot, plan: Plan) -> "Performance":
+    height = LiveHeight(plan.schedule.at(0.0), plan.valid) if args.live else None
+    poses = hopping_poses(robot)
+    if isinstance(plan.controller, JointPD):
+        poses = replace(poses, start=plan.controller.position[0])
+    sequence = Sequence(
+        plan.controller,
+        height or plan.schedule,
+        poses,
+        SoftLimiter(robot, SoftLimits()) if args.soft_limits else None,
+        Timing(hop=plan.seconds),
+    )
+    envelope, console = hopping_envelope(robot, plan.rate), Console()
+
+    def beside(loop: "ControlLoop") -> contextlib.AbstractContextManager[None]:
+        return keys(height, loop.stop, console.print)
+
+    with connect(robot, args.transport) as link:
+        found = check(link, robot, envelope)
+        session: Any = importlib.import_module("hopping_leg.deploy.session")
+        header = session.header_of(
+            robot, plan.controller, plan.rate, transport=args.transport, drives=found
+        )
+        ask(
+            f"All checks passed. {robot.name} will move and hop for {plan.seconds:g} s with"
+            f" {plan.controller.name}; keep a hand on the switch.",
+            yes=args.yes,
+        )
+        path = session.new_path(args.out, plan.controller.name)
+        done: Performance = session.perform(link, sequence, envelope, path, header, beside=beside)
+    return done
