@@ -1,6 +1,5 @@
 """Second stage: identify the twin from its recordings, knowing only the robot that it extends."""
 
-import dataclasses
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from hopping_leg.evaluate.transfer.methods import Method
 from hopping_leg.evaluate.transfer.study import Study, TwinFile
 from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.cma import CmaOptions
+from hopping_leg.identify.least_squares import LeastSquaresOptions
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.identify.result import Identified, as_json
@@ -18,8 +18,15 @@ from hopping_leg.identify.robot_file import comment, identified_tree
 from hopping_leg.identify.searching import SearchOptions
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.files import load_tree, robot_from_tree
+from hopping_leg.robot.parameters import Robot
 from hopping_leg.robot.writing import robot_text
 from hopping_leg.trace import write_atomically
+
+_TOLERANCE = 1e-3
+"""A round of least squares that lowers the cost by a smaller share ends the search."""
+
+_INERTIA_FACTOR = 10.0
+"""How far off the CAD's link inertias may be: the paper's Table I has nine times the shank's."""
 
 
 @dataclass(frozen=True)
@@ -60,11 +67,17 @@ class Identify:
         assert self.method.fit is not None
         study, search = self.study, self.method.fit.search
         file = study.fitted(self.twin, self.method)
-        effort = dataclasses.replace(SearchOptions(), cma=CmaOptions(generations=study.generations))
+        believed = load_robot(self.twin.believed)
+        effort = SearchOptions(
+            cma=CmaOptions(generations=study.generations),
+            least_squares=LeastSquaresOptions(tolerance=_TOLERANCE),
+        )
         identified = identify(
             [load_recording(path) for path in self._recordings],
-            load_robot(self.twin.believed),
-            options=IdentifyOptions(search=search, effort=effort, threads=study.threads),
+            believed,
+            options=IdentifyOptions(
+                search=search, bounds=_bounds(believed), effort=effort, threads=study.threads
+            ),
             folder=file.with_suffix(""),
             resume=True,
         )
@@ -99,6 +112,11 @@ class Identify:
         if "drive.delay" in names:
             values["drive.delay"] = self.twin.robot.reality.latency.command
         return values
+
+
+def _bounds(believed: Robot) -> dict[str, tuple[float, float]]:
+    links = {"thigh.inertia": believed.thigh.inertia, "shank.inertia": believed.shank.inertia}
+    return {name: (v / _INERTIA_FACTOR, v * _INERTIA_FACTOR) for name, v in links.items()}
 
 
 def robot_file(identified: Identified, origin: str, path: Path) -> str:
