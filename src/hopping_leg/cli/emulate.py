@@ -38,6 +38,7 @@ from hopping_leg.deploy.emulator.robot import EmulatedRobot
 from hopping_leg.deploy.emulator.server import Port, Server
 from hopping_leg.deploy.emulator.start import Start
 from hopping_leg.deploy.emulator.status import Events, status_line
+from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
 from hopping_leg.errors import UsageError
 
 _RENEWED = 0.2
@@ -68,6 +69,8 @@ class Emulate:
     """Somebody holds the leg until both drives are powered."""
     seed: int = 0
     """Of sensor noise and jitter."""
+    realtime: bool = True
+    """Take real-time priority where that is permitted, so that the drives answer in time."""
     seconds: float | None = None
     """End by itself after this time; default: with Ctrl-C."""
     kinds: bool = False
@@ -97,6 +100,8 @@ def run(args: Emulate) -> None:
     robot, port = start.build(), start.open()
     try:
         _greet(console, robot, port)
+        if args.realtime and prefer_this_thread() is not None:
+            console.print("Without real-time priority the drives may answer late under load.")
         _serve(robot, port, args.seconds)
     finally:
         port.close()
@@ -124,7 +129,8 @@ def _serve(robot: EmulatedRobot, port: Port, seconds: float | None) -> None:
     server.on_turn = lambda: display.renew(server.lost)
     before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        server.run(lambda: bool(over) or (seconds is not None and robot.time >= seconds))
+        with uninterrupted():
+            server.run(lambda: bool(over) or (seconds is not None and robot.time >= seconds))
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

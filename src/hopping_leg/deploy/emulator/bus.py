@@ -11,6 +11,8 @@ from hopping_leg.deploy.emulator.drive import UNKNOWN_REGISTER, Drive
 from hopping_leg.deploy.emulator.frames import BROADCAST, Frame
 from hopping_leg.deploy.emulator.registers import ReplyWriter
 
+_UUID_MASKS = range(Register.UUID_MASK1, Register.UUID_MASK4 + 1)
+
 _WORDS_ONLY = range(Register.MODEL_NUMBER, Register.UUID_MASK_CAPABLE)
 """Registers that can be read as 32-bit integers only."""
 
@@ -87,8 +89,8 @@ def _addressed(subframes: tuple[multiplex.Subframe, ...], drive: Drive) -> bool:
     for s in subframes:
         if (
             isinstance(s, RegisterSubframe)
+            and s.register in _UUID_MASKS
             and s.type is SubframeType.WRITE
-            and Register.UUID_MASK1 <= s.register <= Register.UUID_MASK4
         ):
             own = drive.identity.register(s.register - Register.UUID_MASK1 + Register.UUID1)
             if own != s.value:

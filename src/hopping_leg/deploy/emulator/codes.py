@@ -67,5 +67,8 @@ class Notice(IntEnum):
 BETWEEN = (Mode.FAULT, Mode.ENABLING, Mode.CALIBRATING, Mode.CALIBRATED)
 """Modes that no command can ask for."""
 
-CONTROLLING = frozenset(Mode) - {Mode.STOPPED, *BETWEEN}
+MODES = frozenset(Mode)
+"""All that a register may hold."""
+
+CONTROLLING = MODES - {Mode.STOPPED, *BETWEEN}
 """Modes in which the output stage is powered."""

@@ -6,9 +6,10 @@ Time comes as an argument; between two steps nothing changes but the command reg
 import math
 from dataclasses import dataclass, fields
 
+from moteus.multiplex import F32
 from moteus.protocol import Register, scale_register
 
-from hopping_leg.deploy.emulator.codes import CONTROLLING, Fault, Mode, Notice
+from hopping_leg.deploy.emulator.codes import CONTROLLING, MODES, Fault, Mode, Notice
 from hopping_leg.deploy.emulator.command import COMMAND_FIELDS, Command
 from hopping_leg.deploy.emulator.diagnostic import Diagnostic
 from hopping_leg.deploy.emulator.identity import Identity
@@ -106,7 +107,7 @@ class Drive:
 
     def write(self, register: int, resolution: int, value: float) -> int:
         """Take one register from the host; return 0 or an error code."""
-        scaled = scale_register(register, resolution, value)
+        scaled = value if resolution == F32 else scale_register(register, resolution, value)
         if register == Register.MODE:
             return self._write_mode(int(scaled))
         name = COMMAND_FIELDS.get(register)
@@ -124,7 +125,7 @@ class Drive:
         return 0
 
     def _write_mode(self, mode: int) -> int:
-        if mode not in set(Mode):
+        if mode not in MODES:
             return INVALID_VALUE
         self.command = Command(Mode(mode))
         self._commanded = True

@@ -11,13 +11,20 @@ _LONGEST = 512
 """A longer line is noise: no frame needs more than 160 characters."""
 
 
+def _divided(byte: int) -> int:
+    for _ in range(8):
+        byte = ((byte << 1) ^ _POLYNOMIAL) & 0xFF if byte & 0x80 else byte << 1
+    return byte
+
+
+_CRC_TABLE = bytes(map(_divided, range(256)))
+
+
 def crc8(data: bytes) -> int:
     """Return the CRC-8 of an fdcanusb line."""
     crc = 0
     for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = ((crc << 1) ^ _POLYNOMIAL) & 0xFF if crc & 0x80 else crc << 1
+        crc = _CRC_TABLE[crc ^ byte]
     return crc
 
 

@@ -16,6 +16,7 @@ from hopping_leg.deploy.emulator.pty_port import PtyPort
 from hopping_leg.deploy.emulator.robot import EmulatedRobot
 from hopping_leg.deploy.emulator.server import Server
 from hopping_leg.deploy.emulator.start import Start
+from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
 from hopping_leg.errors import UsageError
 
 _PATIENCE = 60.0
@@ -120,10 +121,12 @@ def _serve(start: Start, pipe: Connection) -> None:
         return
     server = Server(robot, port)
     pipe.send(port.path if isinstance(port, PtyPort) else Path())
+    prefer_this_thread()
     running = True
-    while running:
-        server.turn()
-        running = _obey(pipe, robot, server)
+    with uninterrupted():
+        while running:
+            server.turn()
+            running = _obey(pipe, robot, server)
     port.close()
 
 

@@ -13,7 +13,7 @@ from hopping_leg.deploy.emulator.frames import Frame
 from hopping_leg.deploy.emulator.outbox import Outgoing
 from hopping_leg.deploy.emulator.robot import EmulatedRobot
 
-_IDLE = 0.002
+_IDLE = 0.001
 """Longest sleep between two looks at the clock, s."""
 
 _FURTHEST = 0.02

@@ -4,13 +4,14 @@ It tells, independently of what the host believes, whether anything unsafe was c
 soon after a bad answer the host reacted.
 """
 
+from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from moteus.multiplex import RegisterSubframe, SubframeType
 from moteus.protocol import Register
 
-from hopping_leg.deploy.emulator.codes import Mode
+from hopping_leg.deploy.emulator.codes import MODES, Mode
 
 if TYPE_CHECKING:
     from hopping_leg.deploy.emulator.bus import Message
@@ -57,12 +58,16 @@ class Answered:
     temperature: float
 
 
+_REMEMBERED = 100_000
+"""Commands and answers each, about a minute's."""
+
+
 class WireLog:
-    """Commands and answers in the order of time."""
+    """Commands and answers in the order of time; the oldest are forgotten."""
 
     def __init__(self) -> None:
-        self.commands: list[Told] = []
-        self.answers: list[Answered] = []
+        self.commands: deque[Told] = deque(maxlen=_REMEMBERED)
+        self.answers: deque[Answered] = deque(maxlen=_REMEMBERED)
 
     def told(self, time: float, joint: int, message: "Message", drive: "Drive") -> None:
         """Note what a message commands a drive, if it does."""
@@ -70,7 +75,7 @@ class WireLog:
         for s in message.heard(drive):
             if not isinstance(s, RegisterSubframe) or s.type is not SubframeType.WRITE:
                 continue
-            if s.register == Register.MODE and s.value in set(Mode):
+            if s.register == Register.MODE and s.value in MODES:
                 mode = Mode(int(s.value or 0))
             elif s.register == Register.COMMAND_FEEDFORWARD_TORQUE:
                 torque = float(s.value or 0.0)

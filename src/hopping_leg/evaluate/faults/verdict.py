@@ -1,7 +1,7 @@
 """What was unsafe about a trial, judged by what went over the wire and what the trace says."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from hopping_leg.deploy.emulator.codes import Mode
@@ -39,7 +39,7 @@ class Limits:
         return not healthy
 
 
-def problems_of_commands(commands: Sequence[Told], limits: Limits) -> list[str]:
+def problems_of_commands(commands: Iterable[Told], limits: Limits) -> list[str]:
     """Return what was wrong with commands: torque that is no number, or beyond the limits."""
     problems = []
     for told in commands:
@@ -54,7 +54,7 @@ def problems_of_commands(commands: Sequence[Told], limits: Limits) -> list[str]:
     return problems[:3]
 
 
-def restarts(commands: Sequence[Told], since: float) -> list[str]:
+def restarts(commands: Iterable[Told], since: float) -> list[str]:
     """Return whether torque was commanded again after a stop, from a time on."""
     stopped = False
     for told in commands:
