@@ -113,7 +113,8 @@ def _greet(console: Console, robot: EmulatedRobot, port: Port) -> None:
         console.print(f"Drives {ids} of {robot.robot.name} behind {port.path}", soft_wrap=True)
         console.print(f"  hop deploy fast --transport {port.path}", soft_wrap=True)
     else:
-        console.print(f"Drives {ids} of {robot.robot.name} on a CAN bus.")
+        console.print(f"Drives {ids} of {robot.robot.name} on {port}.")
+        console.print(f"  hop deploy fast --transport {port}")
     sys.stdout.flush()
 
 

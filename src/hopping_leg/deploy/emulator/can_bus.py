@@ -34,6 +34,9 @@ class CanPort:
         self._bus: can.BusABC | None = None
         self.plug_in()
 
+    def __str__(self) -> str:
+        return f"{self.interface}:{self.channel}"
+
     @property
     def plugged(self) -> bool:
         """Whether the drives are on the bus."""

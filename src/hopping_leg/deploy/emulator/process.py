@@ -16,6 +16,7 @@ from hopping_leg.deploy.emulator.pty_port import PtyPort
 from hopping_leg.deploy.emulator.robot import EmulatedRobot
 from hopping_leg.deploy.emulator.server import Server
 from hopping_leg.deploy.emulator.start import Start
+from hopping_leg.deploy.emulator.wire_log import WireLog
 from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
 from hopping_leg.errors import UsageError
 
@@ -44,6 +45,21 @@ class State:
     qd: tuple[float, float]
     height: float
     lost: float
+
+
+@dataclass(frozen=True)
+class Record:
+    """What happened since the start.
+
+    Attributes:
+        log: Of the wire.
+        faults: Those that began, with when, s.
+        flown: When the foot left the ground for the first time, s; infinite if it did not.
+    """
+
+    log: WireLog
+    faults: tuple[tuple[float, Fault], ...]
+    flown: float
 
 
 class EmulatorProcess:
@@ -79,6 +95,13 @@ class EmulatorProcess:
         state = self._answer()
         assert isinstance(state, State)
         return state
+
+    def record(self) -> Record:
+        """Return what went over the wire and which faults began."""
+        self._pipe.send("record")
+        record = self._answer()
+        assert isinstance(record, Record)
+        return record
 
     def inflict(self, fault: Fault) -> None:
         """Let a fault happen; its time counts from now."""
@@ -137,7 +160,10 @@ def _obey(pipe: Connection, robot: EmulatedRobot, server: Server) -> bool:
             wish = pipe.recv()
             if isinstance(wish, Fault):
                 robot.misfortune.add(wish)
-            pipe.send(_state(robot, server))
+            if wish == "record":
+                pipe.send(Record(robot.log, tuple(robot.misfortune.log), robot.misfortune.flown))
+            else:
+                pipe.send(_state(robot, server))
     except (EOFError, OSError):
         return False
     return True

@@ -69,13 +69,13 @@ class EmulatedRobot:
             drive.boot(position)
             if homed:
                 drive.encoder.set_nearest(position)
-        self._sense()
         self.outbox = Outbox()
         """What is on its way to the host."""
         self.wire_time = 0.0
         """What a reply takes at least, s."""
         self.log = WireLog()
         """What went over the wire."""
+        self._sense()
         self.misfortune = Misfortune(self, faults, self._rng)
 
     def advance(self, until: float) -> None:
@@ -120,6 +120,7 @@ class EmulatedRobot:
     def _sense(self) -> None:
         for joint, drive in enumerate(self.drives):
             drive.sense(*self.leg.sensed(joint))
+            self.log.stepped(self.time, joint, drive)
 
 
 def _drive(robot: Robot, joint: int, configured: bool) -> Drive:

@@ -1,4 +1,4 @@
-"""What went over the wire: every command of the host, every answer of a drive.
+"""What went over the wire: every command of the host, every answer of a drive, every change.
 
 It tells, independently of what the host believes, whether anything unsafe was commanded and how
 soon after a bad answer the host reacted.
@@ -58,16 +58,33 @@ class Answered:
     temperature: float
 
 
+@dataclass(frozen=True, slots=True)
+class Changed:
+    """A drive's change of mode.
+
+    Attributes:
+        time: When, s.
+        joint: 0 for the hip, 1 for the knee.
+        mode: From then on.
+    """
+
+    time: float
+    joint: int
+    mode: Mode
+
+
 _REMEMBERED = 100_000
 """Commands and answers each, about a minute's."""
 
 
 class WireLog:
-    """Commands and answers in the order of time; the oldest are forgotten."""
+    """Commands, answers and changes of mode in the order of time; the oldest are forgotten."""
 
     def __init__(self) -> None:
         self.commands: deque[Told] = deque(maxlen=_REMEMBERED)
         self.answers: deque[Answered] = deque(maxlen=_REMEMBERED)
+        self.changes: deque[Changed] = deque(maxlen=_REMEMBERED)
+        self._modes = [Mode.STOPPED, Mode.STOPPED]
 
     def told(self, time: float, joint: int, message: "Message", drive: "Drive") -> None:
         """Note what a message commands a drive, if it does."""
@@ -92,3 +109,10 @@ class WireLog:
                 time, joint, machine.mode, int(machine.fault), drive.voltage, drive.temperature
             )
         )
+
+    def stepped(self, time: float, joint: int, drive: "Drive") -> None:
+        """Note a drive's mode after a step, if it is another."""
+        mode = drive.machine.mode
+        if mode is not self._modes[joint]:
+            self._modes[joint] = mode
+            self.changes.append(Changed(time, joint, mode))
