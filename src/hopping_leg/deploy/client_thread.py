@@ -6,7 +6,6 @@ import threading
 from collections.abc import Callable, Coroutine
 from typing import Any, Protocol, TypeVar
 
-from hopping_leg.deploy.realtime import prefer_this_thread
 from hopping_leg.errors import HardwareError
 
 Result = TypeVar("Result")
@@ -25,10 +24,6 @@ class Client(Protocol):
         Raises:
             HardwareError: It took too long.
         """
-        ...
-
-    def prefer(self) -> None:
-        """Take real-time priority where that is permitted."""
         ...
 
     def close(self) -> None:
@@ -69,10 +64,6 @@ class ClientThread:
             raise HardwareError(
                 f"The adapter did not answer within {seconds:g} s; unplug it and plug it in again."
             ) from error
-
-    def prefer(self) -> None:
-        """Give the thread real-time priority where that is permitted."""
-        self.loop.call_soon_threadsafe(prefer_this_thread)
 
     def close(self) -> None:
         """End the thread; one that is stuck in a system call is left behind."""

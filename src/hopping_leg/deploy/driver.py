@@ -98,10 +98,6 @@ class MoteusLink:
         """
         return self._client.call(work, seconds)
 
-    def prefer(self) -> None:
-        """Give the client's thread real-time priority where that is permitted."""
-        self._client.prefer()
-
     def forget_clocks(self) -> None:
         """Date replies anew, as after a drive restarted."""
         self._clocks = (DriveClock(), DriveClock())

@@ -1,4 +1,4 @@
-"""What makes a thread keep its time: priority, locked memory, no garbage collection in between."""
+"""What makes a loop keep its time: priority, locked memory, no garbage collection in between."""
 
 import contextlib
 import ctypes
@@ -6,24 +6,49 @@ import gc
 import os
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 PRIORITY = 60
 """Of SCHED_FIFO, 1 to 99; above ordinary work, below the kernel's own threads."""
 
+_NOTICE = (
+    "No permission for real-time priority (SCHED_FIFO): ticks may be late under load; run as root"
+    " or allow it with `ulimit -r` (rtprio in /etc/security/limits.conf)."
+)
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
 _SWITCH_SECONDS = 1e-4
 
 
 def prefer_this_thread() -> str | None:
     """Give the calling thread real-time priority; return a notice where that is not permitted."""
+    return None if _schedule(0, os.SCHED_FIFO, PRIORITY) else _NOTICE
+
+
+def prefer_this_process() -> str | None:
+    """Give all threads real-time priority; return a notice where that is not permitted.
+
+    One thread is not enough: whichever holds the interpreter must not be preempted either. New
+    threads inherit it.
+    """
+    threads = [int(entry.name) for entry in Path("/proc/self/task").iterdir()]
+    done = [_schedule(thread, os.SCHED_FIFO, PRIORITY) for thread in threads]
+    return None if all(done) else _NOTICE
+
+
+def prefer_nothing() -> None:
+    """Give all threads ordinary priority again."""
+    for entry in Path("/proc/self/task").iterdir():
+        _schedule(int(entry.name), os.SCHED_OTHER, 0)
+
+
+def _schedule(thread: int, policy: int, priority: int) -> bool:
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
-    except (OSError, AttributeError):
-        return (
-            "No permission for real-time priority (SCHED_FIFO): ticks may be late under load;"
-            " run as root or allow it with `ulimit -r` (rtprio in /etc/security/limits.conf)."
-        )
-    return None
+        os.sched_setscheduler(thread, policy, os.sched_param(priority))
+    except ProcessLookupError:
+        return True
+    except OSError:
+        return False
+    return True
 
 
 def lock_memory() -> str | None:
@@ -56,3 +81,19 @@ def uninterrupted() -> Iterator[None]:
         gc.unfreeze()
         if enabled:
             gc.enable()
+
+
+@contextlib.contextmanager
+def keeping_time(*, realtime: bool) -> Iterator[tuple[str, ...]]:
+    """Let a loop run undisturbed; yields notices of what the computer does not permit.
+
+    Args:
+        realtime: Ask for priority and locked memory, too.
+    """
+    notices = (lock_memory(), prefer_this_process()) if realtime else ()
+    try:
+        with uninterrupted():
+            yield tuple(notice for notice in notices if notice)
+    finally:
+        if realtime:
+            prefer_nothing()

@@ -1,5 +1,6 @@
 """One run from a checked link to a trace on disk."""
 
+import concurrent.futures
 import datetime
 import importlib.metadata
 import platform
@@ -19,7 +20,7 @@ from hopping_leg.deploy.driver import MoteusLink
 from hopping_leg.deploy.envelope import Envelope
 from hopping_leg.deploy.loop import ControlLoop, Outcome
 from hopping_leg.deploy.observation import Action
-from hopping_leg.deploy.realtime import lock_memory, prefer_this_thread, uninterrupted
+from hopping_leg.deploy.realtime import keeping_time
 from hopping_leg.deploy.reasons import Reason
 from hopping_leg.deploy.rows import columns
 from hopping_leg.deploy.sequence import Phase, Sequence
@@ -76,12 +77,10 @@ def perform(
     box_path = path.with_suffix(SUFFIX)
     box = BlackBox(box_path, columns(sequence.controller), header)
     loop = ControlLoop(link, sequence, envelope, box, clock or RealClock())
-    runner = _Runner(loop, realtime=realtime)
+    notices: tuple[str, ...] = ()
     try:
-        with _stopped_by_signals(loop), uninterrupted(), beside(loop):
-            if realtime:
-                link.prefer()
-            outcome = runner.run()
+        with _stopped_by_signals(loop), beside(loop), keeping_time(realtime=realtime) as notices:
+            outcome = _run(loop)
     finally:
         if link.trouble:
             box.event(link_trouble=link.trouble)
@@ -89,7 +88,7 @@ def perform(
     trace = recover(box_path)
     trace.save(path)
     box_path.unlink()
-    return Performance(outcome, trace, path, runner.notices)
+    return Performance(outcome, trace, path, notices)
 
 
 def header_of(robot: Robot, controller: Controller, rate: float, **facts: Any) -> dict[str, Any]:  # noqa: ANN401
@@ -124,32 +123,13 @@ def new_path(folder: Path, name: str) -> Path:
     return path
 
 
-class _Runner:
-    """Runs a loop in a thread of its own and hands its result, or its error, on."""
-
-    def __init__(self, loop: ControlLoop, *, realtime: bool) -> None:
-        self._loop, self._realtime = loop, realtime
-        self._outcome: Outcome | None = None
-        self._error: BaseException | None = None
-        self.notices: tuple[str, ...] = ()
-
-    def run(self) -> Outcome:
-        thread = threading.Thread(target=self._run, name="control-loop")
-        thread.start()
-        while thread.is_alive():
-            thread.join(0.1)
-        if self._error is not None:
-            raise self._error
-        assert self._outcome is not None
-        return self._outcome
-
-    def _run(self) -> None:
-        try:
-            if self._realtime:
-                self.notices = tuple(n for n in (lock_memory(), prefer_this_thread()) if n)
-            self._outcome = self._loop.run()
-        except BaseException as error:
-            self._error = error
+def _run(loop: ControlLoop) -> Outcome:
+    """Run a loop in a thread of its own; hand its result, or its error, on."""
+    with concurrent.futures.ThreadPoolExecutor(1, "control-loop") as threads:
+        future = threads.submit(loop.run)
+        while not future.done():
+            concurrent.futures.wait([future], 0.1)
+        return future.result()
 
 
 @contextmanager
