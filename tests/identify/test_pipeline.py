@@ -12,7 +12,7 @@ from hopping_leg.identify.pipeline import identify
 from hopping_leg.identify.result import as_json
 from hopping_leg.identify.searching import SearchOptions
 from hopping_leg.robot import load_robot
-from tests.identify.fitting import EFFORT, TRUTH, TWIN, identified, options, run
+from tests.identify.fitting import EFFORT, RATE, TRUTH, TWIN, identified, options, run
 from tests.identify.twin import LEG, record, swing
 
 
@@ -38,6 +38,17 @@ def test_recordings_to_judge_by_replace_the_split():
     assert [r.name for r in found.fit] == [run().name]
     assert [r.name for r in found.held] == [run(1.0).name]
     assert max(found.validation.closed_loop_position) < 1e-4
+
+
+def test_each_rig_is_judged_for_itself():
+    stand = record(TWIN, swing(6.0, "rail", rate=RATE), "rail", rate=RATE, name="squats")
+    few = SearchOptions(cma=dataclasses.replace(EFFORT.cma, generations=1))
+    found = identify([run(), stand], LEG, options=options(search="cma", effort=few))
+    assert set(found.by_rig) == {"fixed-base", "rail"}
+    errors = [told.closed_loop_position[0] for told in found.by_rig.values()]
+    assert min(errors) < found.validation.closed_loop_position[0] < max(errors)
+    assert "rail" in as_json(found)["validation_by_rig"]
+    assert identified().by_rig == {}
 
 
 def test_the_reality_of_a_twin_is_no_part_of_what_is_identified():

@@ -29,6 +29,8 @@ from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.result import Identified, as_json, software_versions
 from hopping_leg.identify.run_folder import RunFolder
 from hopping_leg.identify.searching import Pass, Report, Searcher, SearchOptions
+from hopping_leg.identify.setup import Rig
+from hopping_leg.identify.validate import Validation
 from hopping_leg.identify.windows import cut
 from hopping_leg.robot.fields import check_physics
 from hopping_leg.robot.parameters import Robot
@@ -117,6 +119,8 @@ def identify(
             run.finish({"failed": str(error)})
         raise
     report("judging", 1.0, passes[-1].found.cost)
+    candidates, step = (plan.start, candidate), plan.timestep
+    before, after = (judge(held, c, step, options.threads) for c in candidates)
     identified = Identified(
         candidate=candidate,
         start=plan.start,
@@ -126,13 +130,25 @@ def identify(
         fit=tuple(fit),
         held=tuple(held),
         split=split,
-        validation=judge(held, candidate, plan.timestep, options.threads),
-        start_validation=judge(held, plan.start, plan.timestep, options.threads),
+        validation=after,
+        start_validation=before,
+        by_rig=_judge_rigs(held, candidate, step, options.threads),
         seed=seed,
     )
     if run is not None:
         run.finish(as_json(identified))
     return identified
+
+
+def _judge_rigs(
+    held: Sequence[Recording], candidate: Candidate, timestep: float, threads: int
+) -> dict[Rig, Validation]:
+    """Return what a candidate is worth on each rig, if there are several."""
+    rigs = list(dict.fromkeys(r.setup.rig for r in held))
+    if len(rigs) == 1:
+        return {}
+    groups = {rig: [r for r in held if r.setup.rig == rig] for rig in rigs}
+    return {rig: judge(group, candidate, timestep, threads) for rig, group in groups.items()}
 
 
 def _link_bounds(robot: Robot) -> dict[str, tuple[float, float]]:

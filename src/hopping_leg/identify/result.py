@@ -3,7 +3,7 @@
 import dataclasses
 import math
 import platform
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
@@ -14,6 +14,7 @@ from hopping_leg.identify.parameters import ParameterSet
 from hopping_leg.identify.plan import Plan
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.searching import Pass
+from hopping_leg.identify.setup import Rig
 from hopping_leg.identify.validate import Validation
 from hopping_leg.robot.parameters import Robot
 
@@ -35,6 +36,7 @@ class Identified:
         split: ``held-out stretches`` or ``validation recordings``.
         validation: Of the result on what was held.
         start_validation: Of the start, likewise.
+        by_rig: Of the result on each rig, if there are several.
         seed: Of all randomness.
     """
 
@@ -48,6 +50,7 @@ class Identified:
     split: str
     validation: Validation
     start_validation: Validation
+    by_rig: Mapping[Rig, Validation]
     seed: int
 
     @property
@@ -70,6 +73,7 @@ def as_json(identified: Identified) -> dict[str, Any]:
         "robot_digest": identified.robot.digest,
         "validation": validation_json(identified.validation),
         "start_validation": validation_json(identified.start_validation),
+        "validation_by_rig": {r: validation_json(v) for r, v in identified.by_rig.items()},
         "quality": quality_json(identified),
         "parameters": parameters_json(identified),
         "correlations": {"names": told.names, "matrix": told.correlation.tolist()},
