@@ -36,9 +36,9 @@ def test_it_goes_from_a_twin_to_a_judged_policy(calls, tmp_path, capsys):
     assert (study.seeds, len(study.twins), at_once) == ((3,), 1, 2)
     assert not study.twins[0].robot.reality.neutral
     [judged] = calls["evaluate"]
-    policy, other = judged.controllers
+    policy, *others = judged.controllers
     assert policy.endswith("identified-seed3/policy.onnx")
-    assert other == "energy-shaping"
+    assert others == ["fast", "paper", "energy-shaping"]
     assert judged.robot.endswith("identified.toml")
     assert judged.out == tmp_path
     assert judged.seed != 3

@@ -1,10 +1,10 @@
 """The main job: the whole paper in miniature, from a leg that is not known to hops on it.
 
 A twin plays the real leg. It is recorded, identified from the recordings, a controller is trained
-from scratch on what was identified, evaluated there beside energy shaping with the paper's trials,
-and hops on the twin without tuning, beside a controller that was trained on the CAD's robot. Takes
-about ten minutes on two cores. A run that was interrupted or killed goes on where it was when the
-same command is called again.
+from scratch on what was identified, evaluated there beside the shipped controllers with the paper's
+trials, and hops on the twin without tuning, beside a controller that was trained on the CAD's
+robot. Takes about ten minutes on two cores. A run that was interrupted or killed goes on where it
+was when the same command is called again.
 
 Examples:
   hop reproduce
@@ -19,7 +19,7 @@ from pathlib import Path
 
 from hopping_leg.cli import evaluate, experiment
 from hopping_leg.cli.output import write_json
-from hopping_leg.control.library import ENERGY_SHAPING
+from hopping_leg.control.library import ENERGY_SHAPING, shipped_policies
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.transfer.methods import DEFAULT, choose_methods
 from hopping_leg.evaluate.transfer.study import SHORTEST, Study, find_twins
@@ -66,7 +66,7 @@ def run(args: Reproduce) -> None:
     robot = study.fitted(twin, method)
     evaluate.run(
         evaluate.Evaluate(
-            controllers=(str(policy), ENERGY_SHAPING),
+            controllers=(str(policy), *shipped_policies(), ENERGY_SHAPING),
             robot=str(robot),
             seeds=1 if args.quick else 5,
             out=args.out,
