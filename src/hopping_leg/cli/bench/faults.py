@@ -1,5 +1,6 @@
 """The fault campaign."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,11 +16,14 @@ from hopping_leg.cli.bench.shared import at_least
 class Faults:
     """Let everything go wrong that can, at random moments of the hop cycle; count what is unsafe.
 
-    Trials run in virtual time behind the emulated wire and are exact. Interrupted, it goes on.
+    Trials run in virtual time behind the emulated wire and are exact; some run in real time, too,
+    and measure how soon the host reacts, fairly on an idle computer only. Interrupted, it goes on.
     """
 
     repeats: int = 100
     """Random moments of each family, for each controller."""
+    live: int | None = None
+    """Of them in real time, of the families that show in an answer; default: every tenth."""
     seed: int = 0
     """Of moments, values and drives."""
     controllers: tuple[str, ...] = ("fast", "energy-shaping")
@@ -41,12 +45,13 @@ class Faults:
         from hopping_leg.evaluate.faults.families import FAMILIES
 
         at_least(1, repeats=self.repeats)
-        at_least(0, seed=self.seed, workers=self.workers)
+        at_least(0, seed=self.seed, workers=self.workers, live=self.live or 0)
         campaign = Campaign(
             controllers=self.controllers,
             robot=self.robot,
             families=self.families or tuple(FAMILIES),
             repeats=self.repeats,
+            live=math.ceil(self.repeats / 10) if self.live is None else self.live,
             seed=self.seed,
         )
         with Progress(console=Console(stderr=True)) as bar:
@@ -81,6 +86,11 @@ def _print(result: dict[str, Any]) -> None:
         f" {_ms(result['reaction_p99_s'])} ms at 99 %. Host's death to brake:"
         f" {_ms(result['host_death_to_brake_max_s'])} ms at most."
     )
+    if result["disturbed_trials"]:
+        console.print(
+            f"{result['disturbed_trials']} of {result['live_trials']} trials in real time ended"
+            " safely before their time as the computer was too busy; they tell nothing."
+        )
     for row in result["unsafe_trials"]:
         console.print(f"{row['family']}, {row['controller']}, {row['what']}: {row['problems'][0]}")
 

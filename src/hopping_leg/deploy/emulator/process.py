@@ -36,6 +36,7 @@ class State:
         qd: Joint velocities, rad/s.
         height: Of the base, m.
         lost: Time that was not simulated for want of the processor, s.
+        flown: When the foot left the ground for the first time, s; infinite if it did not yet.
     """
 
     time: float
@@ -45,6 +46,7 @@ class State:
     qd: tuple[float, float]
     height: float
     lost: float
+    flown: float
 
 
 @dataclass(frozen=True)
@@ -54,12 +56,10 @@ class Record:
     Attributes:
         log: Of the wire.
         faults: Those that began, with when, s.
-        flown: When the foot left the ground for the first time, s; infinite if it did not.
     """
 
     log: WireLog
     faults: tuple[tuple[float, Fault], ...]
-    flown: float
 
 
 class EmulatorProcess:
@@ -161,7 +161,7 @@ def _obey(pipe: Connection, robot: EmulatedRobot, server: Server) -> bool:
             if isinstance(wish, Fault):
                 robot.misfortune.add(wish)
             if wish == "record":
-                pipe.send(Record(robot.log, tuple(robot.misfortune.log), robot.misfortune.flown))
+                pipe.send(Record(robot.log, tuple(robot.misfortune.log)))
             else:
                 pipe.send(_state(robot, server))
     except (EOFError, OSError):
@@ -180,4 +180,5 @@ def _state(robot: EmulatedRobot, server: Server) -> State:
         qd=(float(qd[0]), float(qd[1])),
         height=robot.leg.height,
         lost=server.lost,
+        flown=robot.misfortune.flown,
     )

@@ -12,14 +12,17 @@ from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from importlib.metadata import version
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hopping_leg.errors import UsageError, unknown_name
+from hopping_leg.evaluate.faults.case import Case, Result
 from hopping_leg.evaluate.faults.families import FAMILIES
-from hopping_leg.evaluate.faults.trial import Case, Result, play
+from hopping_leg.evaluate.faults.live import LIVE, play_live
+from hopping_leg.evaluate.faults.trial import play
 from hopping_leg.evaluate.timing import host
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.parameters import Robot
@@ -49,6 +52,8 @@ class Campaign:
     """Of the faults."""
     repeats: int = 100
     """Random moments of each family."""
+    live: int = 10
+    """Repeats in real time of families in ``LIVE``, which measure reactions."""
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -57,11 +62,14 @@ class Campaign:
                 raise UsageError(unknown_name("fault family", name, FAMILIES))
 
     def cases(self) -> Iterator[Case]:
-        """Yield all trials, so that every family is tried early."""
-        for index in range(self.repeats):
-            for family in self.families:
-                for controller in self.controllers:
-                    yield Case(family, controller, self.robot, index, self.seed)
+        """Yield all trials, so that every family is tried early; those in real time come last."""
+        shown = [family for family in self.families if family in LIVE]
+        for live, repeats, families in (
+            (False, self.repeats, self.families),
+            (True, self.live, shown),
+        ):
+            for index, family, controller in product(range(repeats), families, self.controllers):
+                yield Case(family, controller, self.robot, index, self.seed, live)
 
 
 def run_campaign(
@@ -103,8 +111,10 @@ def run_campaign(
 
 def summary(campaign: Campaign, robot: Robot, rows: Sequence[Row]) -> dict[str, Any]:
     """Return the campaign's numbers."""
-    reactions = [row["reaction"] for row in rows if row["reaction"] is not None]
-    braked = [row["braked"] for row in rows if row["braked"] is not None]
+    fair = [row for row in rows if not row["disturbed"]]
+    measured = [row for row in fair if row["live"]] or fair
+    reactions = [row["reaction"] for row in measured if row["reaction"] is not None]
+    braked = [row["braked"] for row in fair if row["braked"] is not None]
     bad = [row for row in rows if row["problems"]]
     return {
         "families": list(campaign.families),
@@ -112,6 +122,8 @@ def summary(campaign: Campaign, robot: Robot, rows: Sequence[Row]) -> dict[str, 
         "robot": robot.name,
         "robot_digest": robot.digest,
         "repeats": campaign.repeats,
+        "live_trials": sum(row["live"] for row in rows),
+        "disturbed_trials": len(rows) - len(fair),
         "seed": campaign.seed,
         "trials": len(rows),
         "unsafe": len(bad),
@@ -146,8 +158,8 @@ def _unsafe(rows: Sequence[Row]) -> int:
     return sum(bool(row["problems"]) for row in rows)
 
 
-def _key(row: Row) -> tuple[str, str, int, int]:
-    return row["family"], row["controller"], row["index"], row["seed"]
+def _key(row: Row) -> tuple[str, str, int, int, bool]:
+    return row["family"], row["controller"], row["index"], row["seed"], row["live"]
 
 
 def _claim(folder: Path, campaign: Campaign, robot: Robot) -> None:
@@ -180,7 +192,14 @@ def _load(file: Path) -> list[Row]:
 
 
 def _run(cases: Sequence[Case], workers: int) -> Iterator[Row]:
-    """Yield rows as they come."""
+    """Yield rows as they come; what is timed has the computer for itself."""
+    live = [case for case in cases if case.live]
+    yield from _run_virtual([case for case in cases if not case.live], workers)
+    for case in live:
+        yield play_case(case)
+
+
+def _run_virtual(cases: Sequence[Case], workers: int) -> Iterator[Row]:
     if not cases:
         return
     workers = min(workers or multiprocessing.cpu_count(), len(cases))
@@ -199,7 +218,8 @@ def play_case(case: Case) -> Row:
     """Run one trial; what it raises is a problem, too."""
     began = time.perf_counter()
     try:
-        result = play(case, FAMILIES[case.family], _robot(case.robot))
+        trial = play_live if case.live else play
+        result = trial(case, FAMILIES[case.family], _robot(case.robot))
     except Exception as error:
         problem = f"the trial failed: {type(error).__name__}: {error}"
         result = Result("", problems=[problem])
