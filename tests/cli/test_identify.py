@@ -115,7 +115,7 @@ def test_an_interruption_says_how_to_go_on(recordings, tmp_path, capsys, monkeyp
     monkeypatch.setattr(identify, "identify", interrupt)
     assert call(tmp_path, recordings[0]) == INTERRUPTED
     error = capsys.readouterr().err
-    assert "--resume goes on in" in error
+    assert "the same command goes on in" in error
     assert "Traceback" not in error
 
 

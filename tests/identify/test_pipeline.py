@@ -97,11 +97,14 @@ def test_a_folder_keeps_its_run(tmp_path):
     chosen = options(search="cma")
     with pytest.raises(KeyboardInterrupt):
         identify([run()], LEG, options=chosen, folder=folder, report=interrupt)
-    with pytest.raises(UsageError, match="unfinished run; go on with --resume"):
-        identify([run()], LEG, options=chosen, folder=folder)
-    with pytest.raises(UsageError, match="began with another seed"):
-        identify([run()], LEG, options=chosen, folder=folder, resume=True, seed=1)
-    identify([run()], LEG, options=chosen, folder=folder, resume=True)
+    for resume in (False, True):
+        with pytest.raises(UsageError, match="began with another seed"):
+            identify([run()], LEG, options=chosen, folder=folder, resume=resume, seed=1)
+    begun = json.loads((folder / "search-cma-0.json").read_text())["state"]["costs"]
+    identify([run()], LEG, options=chosen, folder=folder)
+    ended = json.loads((folder / "search-cma-0.json").read_text())["state"]["costs"]
+    assert 0 < len(begun) < len(ended)
+    assert ended[: len(begun)] == begun
     identify([run()], LEG, options=chosen, folder=folder, seed=1)
     assert json.loads((folder / "result.json").read_text())["seed"] == 1
 

@@ -1,8 +1,8 @@
 """Identify a leg from recordings: a robot file, a JSON file and a report.
 
 The rig is recognised from a recording's header, sidecar or columns. Without --validate a quarter
-of each recording is held out and judges the fit. A run that was interrupted or killed goes on with
---resume.
+of each recording is held out and judges the fit. A run that was interrupted or killed goes on when
+the same command is called again.
 
 Examples:
   hop identify fixed-base.parquet moving-base.parquet --out my_leg.toml --report report.html
@@ -91,7 +91,8 @@ class Identify:
     folder: Path | None = None
     """For checkpoints and the result; default: runs/identify-NAME, after --out."""
     resume: bool = False
-    """Go on with the run in the folder; without one there, begin."""
+    """Go on with the run in the folder even if it is finished, instead of repeating it; an
+    unfinished one goes on anyway."""
 
 
 def run(args: Identify) -> None:
@@ -118,7 +119,10 @@ def run(args: Identify) -> None:
                 report=progress.update,
             )
     except KeyboardInterrupt:
-        print(f"Stopped; the same command with --resume goes on in {folder}.", file=sys.stderr)
+        print(
+            f"Stopped; the same command goes on in {folder}, with --resume or without.",
+            file=sys.stderr,
+        )
         raise
     save_robot(identified, args.out, origin)
     if args.json:

@@ -24,12 +24,14 @@ class RunFolder:
     def begin(self, *, resume: bool) -> None:
         """Prepare the folder.
 
+        The run in it goes on if it is the same one and unfinished.
+
         Args:
-            resume: Go on with the run in it, if there is one; else a finished one is replaced.
+            resume: Go on with a finished run, too, instead of replacing it.
 
         Raises:
-            UsageError: It holds an unfinished run and ``resume`` is off, another run, or
-                something else.
+            UsageError: It holds another run that is unfinished, or to be resumed, or something
+                else than a run.
         """
         config = self.path / _CONFIG
         checkpoints = list(self.path.glob("search-*.json"))
@@ -37,14 +39,9 @@ class RunFolder:
         if not config.exists():
             if self.path.exists() and (not self.path.is_dir() or any(self.path.iterdir())):
                 raise UsageError(f"{self.path} is not empty and holds no run; give another folder.")
-        elif resume and checkpoints:
+        elif checkpoints and (resume or not finished):
             self._check_same(config)
             return
-        elif checkpoints and not finished:
-            raise UsageError(
-                f"{self.path} holds an unfinished run; go on with --resume or give another"
-                " --folder."
-            )
         for file in (*checkpoints, self.path / _RESULT):
             file.unlink(missing_ok=True)
         _write(config, self._config)
@@ -62,7 +59,7 @@ class RunFolder:
         if differences:
             raise UsageError(
                 f"The run in {self.path} began with another {differences[0].replace('_', ' ')};"
-                " resume it with what it began with, or give another --folder."
+                " go on with what it began with, or give another --folder."
             )
 
 
