@@ -24,7 +24,7 @@ _RANGES = {
     "drive.delay": (0.0, 0.02),
     "drive.velocity_window": (0.0, 0.02),
     "drive.ramp": (0.0, 1.0),
-    "drive.stiffness": (0.0, 100.0),
+    "drive.stiffness": (0.0, 500.0),
     "drive.damping": (0.0, 10.0),
     "drive.integral": (0.0, 100.0),
     "drive.torque_limit": (0.5, 50.0),

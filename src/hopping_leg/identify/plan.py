@@ -11,6 +11,7 @@ from hopping_leg.identify.columns import JOINTS
 from hopping_leg.identify.cost import Scoring
 from hopping_leg.identify.parameters import ParameterSet, choose
 from hopping_leg.identify.recording import Recording
+from hopping_leg.identify.states import full_states
 from hopping_leg.identify.two_pass import INERTIAS, pass_names
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
@@ -24,6 +25,8 @@ _PAPER = ("two-pass", "one-pass")
 _TIMESTEP = 1e-3
 _GAINS = {"stiffness": 10.0, "damping": 0.5, "integral": 1.0}
 """Where a search for an unknown gain begins, in the gain's unit at the joint."""
+_OFTEN, _BEYOND = 0.8, 1.5
+"""Share of the time, and factor, that tell a torque limit from a spike."""
 _CLEARANCE = 5e-3
 """Height of the foot above the ground that only a hop reaches, m."""
 
@@ -105,6 +108,7 @@ def _names(recordings: Sequence[Recording], *, paper: bool) -> list[str]:
         names.remove("hip.armature")
         if all(r.setup.onboard == "torque" for r in recordings):
             names += [f"drive.{joint}.load_friction" for joint in JOINTS]
+        names += _limits(recordings)
     return [*names, *_open_gains(recordings)]
 
 
@@ -112,15 +116,43 @@ def _open_gains(recordings: Sequence[Recording]) -> list[str]:
     """Return gains of the on-board loop that a recording leaves open."""
     found = []
     for gain in ("stiffness", "damping", "integral"):
-        if any(
-            r.setup.onboard != "torque"
-            and not np.isfinite(r.array(gain) if gain != "integral" else np.nan).any()
-            and (getattr(r.setup, gain) is None or not r.setup.gains_exact)
-            and (gain != "integral" or not r.setup.gains_exact)
-            for r in recordings
-        ):
+        if any(r.setup.onboard != "torque" and _is_open(r, gain) for r in recordings):
             found += [f"drive.{joint}.{gain}" for joint in JOINTS]
     return found
+
+
+def _is_open(recording: Recording, gain: str) -> bool:
+    """Return whether a recording leaves a gain to the fit; an unnamed integral is none."""
+    stated = getattr(recording.setup, gain) is not None
+    if gain == "integral":
+        return stated and not recording.setup.gains_exact
+    rows = bool(np.isfinite(recording.array(gain)).any())
+    return not rows and not (stated and recording.setup.gains_exact)
+
+
+def _limits(recordings: Sequence[Recording]) -> list[str]:
+    """Return the torque-speed line of each joint that a recording drove into it.
+
+    There the on-board loop, with the gains as far as they are known, asked for far more torque
+    than was measured.
+    """
+    beyond = np.zeros(2, dtype=bool)
+    for recording in recordings:
+        setup, torque = recording.setup, recording.array("torque")
+        if setup.onboard != "continuous" or None in (setup.stiffness, setup.damping):
+            continue
+        if not np.isfinite(torque).any(axis=0).all():
+            continue
+        q, qd = full_states(recording)
+        spring = np.array(setup.stiffness) * (recording.array("position_command") - q)
+        damper = np.array(setup.damping) * (recording.array("velocity_command") - qd)
+        wanted = np.minimum(np.abs(spring), np.abs(spring + damper))
+        asked, given = (
+            np.nanquantile(values, _OFTEN, axis=0) for values in (wanted, np.abs(torque))
+        )
+        beyond |= asked > _BEYOND * given
+    lines = ("peak_torque", "no_load_speed")
+    return [f"{j}.motor.{n}" for j, far in zip(JOINTS, beyond, strict=True) if far for n in lines]
 
 
 def _start(recordings: Sequence[Recording], robot: Robot) -> Candidate:
@@ -131,6 +163,8 @@ def _start(recordings: Sequence[Recording], robot: Robot) -> Candidate:
         pairs = [getattr(r.setup, gain) for r in recordings]
         known = next((p for p in pairs if p is not None), None)
         values[name] = _GAINS[gain] if known is None else known[joint == "knee"]
+    if any(r.setup.onboard == "continuous" and r.has("velocity_command") for r in recordings):
+        values["drive.ramp"] = 1.0
     return Candidate(robot).replace(values)
 
 
@@ -140,6 +174,8 @@ def _scoring(recordings: Sequence[Recording], *, paper: bool) -> Scoring:
     if all(r.setup.onboard == "torque" for r in recordings):
         return Scoring(position=0.02, robust=2.0)
     torque = 0.2 if any(r.has("torque") for r in recordings) else None
+    if torque is not None and _open_gains(recordings):
+        return Scoring(position=0.003, torque=0.5, robust=1.0)
     rails = [r for r in recordings if r.setup.rig == "rail"]
     height = 0.002 if any(r.has_column("height_m") for r in rails) else None
     return Scoring(position=0.005, torque=torque, height=height, robust=3.0)
@@ -151,6 +187,8 @@ def _window(recordings: Sequence[Recording], robot: Robot) -> tuple[float, float
         return 0.25, 0.0
     if any(r.setup.onboard == "torque" for r in recordings):
         return 0.4, 0.0
+    if _open_gains(recordings):
+        return 2.0, 0.5
     return 4.0, 1.0
 
 
