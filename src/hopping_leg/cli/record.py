@@ -3,9 +3,13 @@
 The leg is simulated; one with a table [reality] plays the real one (see the shipped `twin`). The
 recordings do not give its parameters away: they are filed under the robot that it extends.
 
+With --transport it is the real leg, or `hop emulate`: its drives are checked as by `hop deploy`,
+the leg moves to the start of the excitation and plays it under the same joint PD.
+
 Examples:
   hop record fixed-base.parquet moving-base.parquet --robot twin --out recordings
   hop record fixed-base.parquet --robot my_twin.toml --believed legv2 --seed 3
+  hop record fixed-base.parquet --robot my_leg.toml --transport /dev/fdcanusb --out recordings
 """
 
 from dataclasses import dataclass
@@ -15,6 +19,7 @@ import tyro
 from rich.console import Console
 from rich.progress import Progress
 
+from hopping_leg.cli import record_motors
 from hopping_leg.control.joint_pd import JointGains
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.excitation import load_excitation
@@ -31,13 +36,17 @@ class Record:
 
     excitations: tyro.conf.Positional[tuple[Path, ...]]
     """Files from `hop excite`."""
-    robot: str = "twin"
-    """A shipped robot or a .toml file."""
+    robot: str | None = None
+    """A shipped robot or a .toml file; default twin, with --transport legv2."""
+    transport: str | None = None
+    """Record from motors: path of an fdcanusb, interface:channel of python-can, or pi3hat."""
+    yes: bool = False
+    """Arm motors without asking."""
     out: Path = Path("recordings")
     """Folder for the recordings, one Parquet file per excitation."""
     believed: str | None = None
     """Robot that the recordings are filed under, where identification begins; default: the one
-    that --robot extends, or --robot itself if it extends none."""
+    that --robot extends, or --robot itself if it extends none or the motors are real."""
     seed: int = 0
     """Of jitter and sensor noise."""
     stiffness: Pair = JointGains().stiffness
@@ -54,8 +63,10 @@ def run(args: Record) -> None:
         raise UsageError("No excitation was given; write one with `hop excite`.")
     if args.seed < 0:
         raise UsageError(f"A seed of {args.seed} has no meaning; give 0 or more.")
-    robot = load_robot(args.robot)
-    believed = args.believed or parent_robot(args.robot) or args.robot
+    name = args.robot or ("twin" if args.transport is None else "legv2")
+    robot = load_robot(name)
+    parent = parent_robot(name) if args.transport is None else None
+    believed = args.believed or parent or name
     load_robot(believed)
     gains = JointGains(args.stiffness, args.damping)
     loaded = [(path, load_excitation(path)) for path in args.excitations]
@@ -65,6 +76,17 @@ def run(args: Record) -> None:
         raise UsageError(
             f"Two excitations are called '{twice[0]}' and would share a recording; rename one."
         )
+    if args.transport is not None:
+        record_motors.record(
+            [(path.stem, excitation) for path, excitation in loaded],
+            robot,
+            transport=args.transport,
+            believed=believed,
+            gains=gains,
+            out=args.out,
+            yes=args.yes,
+        )
+        return
     console = Console()
     with Progress(console=Console(stderr=True)) as bar:
         for number, (path, excitation) in enumerate(loaded):

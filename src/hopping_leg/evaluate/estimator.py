@@ -64,7 +64,7 @@ def apex_errors(trace: Trace) -> Array:
     estimate = trace.column(APEX)
     rate = trace.column("height_rate_m_s")
     hops = find_hops(trace.column("height_m"), rate, trace.column("foot_clearance_m"))
-    ends = np.append(hops.tick[1:], len(estimate))
+    ends = np.append(hops.tick, len(estimate))[1:]
     settled = trace.column("time_s")[hops.tick] >= START_SECONDS
     errors = []
     for start, end, apex, counts in zip(hops.tick, ends, hops.apex, settled, strict=True):

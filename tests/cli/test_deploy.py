@@ -1,0 +1,142 @@
+"""The verbs that talk to motors, with emulated drives in lockstep behind them."""
+
+import contextlib
+
+import numpy as np
+import pytest
+
+from hopping_leg.cli import main, motors
+from hopping_leg.deploy import driver, session
+from hopping_leg.deploy.emulator.faults import Fault
+from hopping_leg.deploy.emulator.lockstep import Lockstep
+from hopping_leg.deploy.emulator.start import Start
+from hopping_leg.identify.excitation import Excitation
+from hopping_leg.identify.recording import load_recording
+from hopping_leg.robot import load_robot
+from hopping_leg.trace import Trace
+
+RUN = ["deploy", "energy-shaping", "--transport", "/dev/leg", "--seconds", "0.3"]
+
+
+@pytest.fixture
+def emulate(monkeypatch):
+    """Return a function that puts emulated drives behind every transport."""
+
+    def emulated(**start):
+        lockstep = Lockstep(Start(**{"robot": "legv2-paper", **start}).build())
+        monkeypatch.setattr(motors, "opener", lambda name: None)
+        monkeypatch.setattr(driver, "MoteusLink", lambda robot, opener: lockstep.link)
+        monkeypatch.setattr(session, "RealClock", lambda: lockstep)
+        quiet = contextlib.nullcontext(())
+        monkeypatch.setattr(session, "keeping_time", lambda **_: quiet)
+        return lockstep
+
+    return emulated
+
+
+def test_deploy_checks_runs_and_leaves_a_trace(emulate, tmp_path, capsys):
+    lockstep = emulate()
+    assert main([*RUN, "--schedule", "0.25:0.1,0.3:0.2", "--yes", "--out", str(tmp_path)]) == 0
+    (file,) = tmp_path.iterdir()
+    out = capsys.readouterr().out
+    assert "The sequence is over." in out
+    assert file.name in out
+    trace = Trace.load(file)
+    assert trace.header["drives"]["knee"]["homed"] == "yes"
+    assert set(np.unique(trace.column("command_m"))) == {0.25, 0.3}
+    assert [drive.machine.mode for drive in lockstep.robot.drives] == [0, 0]
+    assert main(["plot", str(file), "--out", str(tmp_path / "figures")]) == 0
+    assert list((tmp_path / "figures").glob("*.svg"))
+
+
+@pytest.mark.slow
+def test_a_fault_is_a_sentence_and_an_exit_code(emulate, tmp_path, capsys):
+    emulate(faults=(Fault("drive_fault", at=1.0, drive="hip", value=33),))
+    assert main([*RUN, "--yes", "--out", str(tmp_path)]) == 2
+    assert "hip: fault 33 (motor driver fault)" in capsys.readouterr().err
+    assert len(list(tmp_path.glob("*.parquet"))) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["fasst"], "Did you mean 'fast'"),
+        (["missing.onnx"], "Cannot read policy file"),
+        (["fast", "--command", "0.6"], "from 0.22 to 0.40 m"),
+        (["fast", "--robot", "legv2"], "was trained on robot 'legv2-paper'"),
+        (["energy-shaping", "--schedule", "0.3"], "is no step of a schedule"),
+        (["energy-shaping", "--schedule", "0.3:2", "--command", "0.3"], "exclude each other"),
+        (["energy-shaping", "--command", "1.0"], "outside of what"),
+        (["energy-shaping", "--seconds", "-1"], "--seconds is -1"),
+        (["energy-shaping", "--robot", "doublependulum"], "cannot hop"),
+        (["energy-shaping"], "add --yes"),
+    ],
+)
+def test_bad_input_is_refused_before_anything_is_armed(emulate, tmp_path, capsys, words, sentence):
+    lockstep = emulate()
+    out = tmp_path / "out"
+    assert main(["deploy", *words, "--transport", "/dev/leg", "--out", str(out)]) == 2
+    error = capsys.readouterr().err
+    assert sentence in error
+    assert "Traceback" not in error
+    assert lockstep.robot.held
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("transport", "sentence"),
+    [
+        ("/dev/none", "There is no serial port /dev/none"),
+        ("usb", "There is no transport 'usb'"),
+        ("socketcn:can0", "python-can has no interface 'socketcn'"),
+        ("pi3hat", "moteus-pi3hat"),
+        ("/dev/null", "Cannot open the adapter"),
+    ],
+)
+def test_a_transport_that_is_none_is_a_sentence(capsys, transport, sentence):
+    assert main(["doctor", "--transport", transport]) == 2
+    error = capsys.readouterr().err
+    assert sentence in error
+    assert "Traceback" not in error
+
+
+def test_doctor_says_what_is_wrong_and_puts_it_right(emulate, capsys):
+    emulate(configured=False, homed=False)
+    words = ["doctor", "--transport", "/dev/leg", "--yes"]
+    assert main(words) == 2
+    out = capsys.readouterr().out
+    assert "servo.timeout_mode is 12 but must be 15" in out
+    assert "not homed" in out
+    lockstep = emulate(configured=False, homed=False)
+    angles = [f"{angle:.3f}" for angle in lockstep.robot.leg.q]
+    assert main([*words, "--write", "--home", *angles]) == 0
+    assert "may be armed" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("rig", ["fixed-base", pytest.param("rail", marks=pytest.mark.slow)])
+def test_a_recording_from_motors_is_one_that_identification_takes(emulate, tmp_path, rig):
+    emulate(robot="legv2", faults=(Fault("drop_reply", at=3.0, drive="hip"),))
+    time = np.arange(400) / 200
+    bend = 0.2 * np.sin(2 * np.pi * time / 0.75)
+    position = np.stack([0.8 + bend, -1.6 - 2 * bend], axis=1)
+    file = tmp_path / "sine.parquet"
+    Excitation(time, position, 0 * position, rig, 200.0, "legv2", "a sine").save(file)
+    words = ["record", str(file), "--transport", "/dev/leg", "--yes", "--out", str(tmp_path / "r")]
+    assert main(words) == 0
+    recording = load_recording(tmp_path / "r" / "legv2-sine.parquet")
+    assert recording.setup.rig == rig
+    assert recording.setup.robot == "legv2"
+    assert recording.setup.onboard == "zoh"
+    assert len(recording) == 400
+    np.testing.assert_allclose(recording.array("position_command"), position)
+    measured = recording.array("position")
+    assert np.isnan(measured).sum() == 1
+    assert np.nanmax(np.abs(measured - position)) < 0.4
+    torque = recording.array("torque")
+    assert np.nanstd(torque) > 0.1
+    stiffness, damping = recording.setup.stiffness, recording.setup.damping
+    assert load_robot(recording.setup.robot).name == "legv2"
+    asked = np.array(stiffness) * (position - measured) - np.array(damping) * recording.array(
+        "velocity"
+    )
+    assert np.nanmedian(np.abs(torque[1:] - asked[:-1])) < 0.05
