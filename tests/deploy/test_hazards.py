@@ -1,0 +1,186 @@
+"""What the client library does wrong on a serial line, against a real terminal: never a hang."""
+
+import contextlib
+import os
+import threading
+import time
+import tty
+
+import pytest
+
+from hopping_leg.deploy.driver import MoteusLink
+from hopping_leg.deploy.emulator.frames import Frame
+from hopping_leg.deploy.emulator.line_protocol import LineProtocol, received_line
+from hopping_leg.deploy.emulator.start import Start
+from hopping_leg.deploy.observation import LIMP, STOP
+from hopping_leg.deploy.transport import opener
+from hopping_leg.robot import load_robot
+
+LEG = load_robot("legv2")
+WAIT = 0.5
+"""Longest wait for replies, s: generous, as machines that run tests are slow."""
+
+
+class Adapter:
+    """An fdcanusb with two drives at the other end of a terminal.
+
+    ``spoil(number, lines)`` may change the lines that answer the frame of that number.
+    """
+
+    def __init__(self):
+        self.master, self.slave = os.openpty()
+        for descriptor in (self.master, self.slave):
+            tty.setraw(descriptor)
+        self.path = os.ttyname(self.slave)
+        self.robot = Start(robot="legv2").build()
+        self.spoil = lambda number, lines: lines
+        self.reading = threading.Event()
+        self.reading.set()
+        self.frames = 0
+        self._begin = time.monotonic()
+        self._protocol = LineProtocol()
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
+
+    def pull_out(self):
+        os.close(self.slave)
+        os.close(self.master)
+
+    def say(self, line):
+        os.write(self.master, line + b"\r\n")
+
+    def _serve(self):
+        while True:
+            self.reading.wait()
+            try:
+                data = os.read(self.master, 4096)
+            except OSError:
+                return
+            for item in self._protocol.feed(data):
+                lines = [item] if isinstance(item, bytes) else self._answers(item)
+                with contextlib.suppress(OSError):
+                    os.write(self.master, b"".join(lines))
+
+    def _answers(self, frame: Frame):
+        self.robot.advance(time.monotonic() - self._begin)
+        self.robot.receive(frame)
+        replies = [i.frame for i in self.robot.outbox.take(self.robot.time)]
+        lines = [self._protocol.line(received_line(reply)) for reply in replies]
+        self.frames += 1
+        return self.spoil(self.frames, lines)
+
+
+@pytest.fixture
+def adapter():
+    return Adapter()
+
+
+@pytest.fixture(params=["like USB", "like UART"])
+def link(adapter, request):
+    """A link without the real adapter's safeguards, or with them."""
+    link = MoteusLink(LEG, opener(adapter.path))
+    if request.param == "like USB":
+        (device,) = link.transport.devices()
+        device._is_fdcanusb, device._checksum_active = True, False
+    yield link
+    link.close()
+
+
+def exchange(link, outgoing=STOP, wait=WAIT):
+    """Return an exchange of another tick; fail if it took much longer than it may."""
+    time.sleep(0.005)
+    start = time.monotonic()
+    result = link.exchange(outgoing, start + wait)
+    assert time.monotonic() - start < wait + 2.0
+    return result
+
+
+def whole(result):
+    return None not in result.replies
+
+
+def test_both_drives_answer_in_joint_units(link, adapter):
+    result = exchange(link)
+    assert [reply.mode for reply in result.replies] == [0, 0]
+    for joint, reply in enumerate(result.replies):
+        assert reply.position == pytest.approx(adapter.robot.leg.q[joint], abs=1e-3)
+
+
+def test_a_lost_reply_costs_that_reply_and_nothing_else(link, adapter):
+    assert whole(exchange(link))
+    adapter.spoil = lambda number, lines: [] if number == 4 else lines
+    result = exchange(link, wait=0.1)
+    assert [reply is None for reply in result.replies] == [False, True]
+    for _ in range(3):
+        assert whole(exchange(link))
+
+
+def test_garbage_on_the_line_is_skipped(link, adapter):
+    assert whole(exchange(link))
+    for line in (b"@#!%", b"rcv", b"rcv 100", b"rcv zz 2400 E", b"rcv 100 2 E", b"OK"):
+        adapter.say(line)
+        assert whole(exchange(link)), line
+
+
+def test_an_error_of_the_adapter_costs_one_tick_at_most(link, adapter):
+    assert whole(exchange(link))
+    adapter.say(b"ERR overrun")
+    exchange(link)
+    assert whole(exchange(link))
+
+
+def test_a_late_reply_is_not_taken_for_a_fresh_one(link, adapter):
+    held = []
+
+    def hold(number, lines):
+        if number == 4:
+            held.extend(lines)
+            return []
+        return [*held, *lines] if number == 5 else lines
+
+    assert whole(exchange(link))
+    adapter.spoil = hold
+    before = exchange(link, wait=0.1)
+    assert before.replies[1] is None
+    time.sleep(0.1)
+    asked = time.monotonic()
+    result = exchange(link)
+    assert [joint for joint, _ in result.late] == [1]
+    assert result.late[0][1].taken < asked - 0.05
+    assert all(reply.taken > asked - 0.05 for reply in result.replies if reply is not None)
+
+
+def test_a_pulled_adapter_is_silence_and_another_may_be_opened(adapter):
+    link = MoteusLink(LEG, opener(adapter.path))
+    assert whole(exchange(link))
+    adapter.pull_out()
+    for _ in range(3):
+        assert exchange(link, wait=0.05).replies == (None, None)
+    assert link.transport.devices()[0].gone
+    link.close()
+    again = Adapter()
+    link = MoteusLink(LEG, opener(again.path))
+    assert whole(exchange(link))
+    link.close()
+
+
+def test_a_port_may_be_closed_and_opened_again(adapter):
+    for _ in range(3):
+        link = MoteusLink(LEG, opener(adapter.path))
+        assert whole(exchange(link))
+        link.close()
+
+
+def test_an_adapter_that_reads_nothing_blocks_no_one(adapter):
+    link = MoteusLink(LEG, opener(adapter.path))
+    assert whole(exchange(link))
+    adapter.reading.clear()
+    start = time.monotonic()
+    for _ in range(200):
+        exchange(link, LIMP, wait=0.005)
+        link.send(LIMP)
+    assert time.monotonic() - start < 20
+    start = time.monotonic()
+    adapter.pull_out()
+    link.close()
+    assert time.monotonic() - start < 10
