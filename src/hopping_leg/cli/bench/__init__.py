@@ -6,15 +6,17 @@ Examples:
   hop bench inference fast --json inference.json
   hop bench training --training-seeds 0 1 2 --json training.json
   hop bench faults --json faults.json
+  hop bench deploy --json deploy.json
   hop bench energy-shaping --json energy_shaping.json
 """
 
 from hopping_leg.cli.bench.controllers import Ablation, EnergyShaping, Training
 from hopping_leg.cli.bench.faults import Faults
+from hopping_leg.cli.bench.hardware import Deploy
 from hopping_leg.cli.bench.simulation import Convergence, Env, Inference
 from hopping_leg.cli.output import write_json
 
-Benchmark = Env | Convergence | Inference | EnergyShaping | Training | Ablation | Faults
+Benchmark = Env | Convergence | Inference | EnergyShaping | Training | Ablation | Faults | Deploy
 
 
 def run(args: Benchmark) -> None:
