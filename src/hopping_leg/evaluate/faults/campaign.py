@@ -5,6 +5,8 @@ Finished trials are kept in a file, one JSON line each, and are not repeated.
 
 import json
 import multiprocessing
+import os
+import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -204,7 +206,7 @@ def _run_virtual(cases: Sequence[Case], workers: int) -> Iterator[Row]:
         return
     workers = min(workers or multiprocessing.cpu_count(), len(cases))
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, context) as pool:
+    with ProcessPoolExecutor(workers, context, _leave_with_parent, (os.getpid(),)) as pool:
         futures: list[Future[Row]] = [pool.submit(play_case, case) for case in cases]
         try:
             for future in as_completed(futures):
@@ -212,6 +214,17 @@ def _run_virtual(cases: Sequence[Case], workers: int) -> Iterator[Row]:
         finally:
             for future in futures:
                 future.cancel()
+
+
+def _leave_with_parent(parent: int) -> None:
+    """Let a worker end when its campaign was killed: nobody else would end it."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1.0)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def play_case(case: Case) -> Row:
