@@ -1,5 +1,6 @@
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -203,3 +204,9 @@ def test_recording_uses_the_mechanical_range_and_hopping_a_part_of_it():
     for index, joint in enumerate((LEG.hip, LEG.knee)):
         assert wide.lower[index] < LIMITS.lower[index] < joint.lower
         assert joint.upper < LIMITS.upper[index] < wide.upper[index]
+
+
+def test_the_manual_explains_every_message():
+    page = (Path(__file__).parents[2] / "docs" / "deploy.md").read_text(encoding="utf-8")
+    for reason in Reason:
+        assert f"| {reason.sentence} |" in page
