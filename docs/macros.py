@@ -1,14 +1,15 @@
 """Fills documentation pages with numbers from docs/results and from the package, at build time.
 
-A page may hold ``{{ table(...) }}``, ``{{ value(...) }}``, ``{{ robot(...) }}`` and
-``{{ usage(...) }}``; a missing file or entry stops the build, so no page can show a number that no
-longer exists.
+A page may hold ``{{ table(...) }}``, ``{{ value(...) }}``, ``{{ robot(...) }}``,
+``{{ usage(...) }}`` and the like; a missing file or entry stops the build, so no page can show a
+number that no longer exists.
 """
 
 import contextlib
 import dataclasses
 import io
 import json
+import math
 import os
 import re
 from pathlib import Path
@@ -19,6 +20,8 @@ from mkdocs.exceptions import PluginError
 
 from hopping_leg import cli
 from hopping_leg.cli.robots import derived, numbers
+from hopping_leg.deploy.emulator.faults import KINDS
+from hopping_leg.evaluate.faults.families import FAMILIES
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.files import load_tree
 from hopping_leg.sim.twins import TWIN_RANGES
@@ -188,6 +191,29 @@ def twin_ranges() -> str:
     return grid(["number", "from", "to", "unit", "scale", "source"], rows)
 
 
+def fault_kinds() -> str:
+    """Return what a fault script may name as a table."""
+    rows = []
+    for name, kind in KINDS.items():
+        value = f"{kind.value:g} {kind.unit}" if kind.unit else ""
+        if math.isnan(kind.duration):
+            lasts = "`count` replies"
+        else:
+            lasts = "on" if math.isinf(kind.duration) else f"{kind.duration:g} s"
+        rows.append([f"`{name}`", kind.text, value, lasts])
+    return grid(["kind", "what happens", "value by default", "lasts"], rows)
+
+
+def fault_families() -> str:
+    """Return the campaign's families and for which reasons a run may end as a table."""
+    rows = []
+    for name, family in FAMILIES.items():
+        reasons = ", ".join(sorted(reason.name for reason in family.reasons))
+        nothing = "not armed" if family.refused else "the drives brake"
+        rows.append([name, f"`{reasons}`" if reasons else nothing])
+    return grid(["family", "correct ends"], rows)
+
+
 def usage(*arguments: str) -> str:
     """Return the help text of a command."""
     os.environ |= {"COLUMNS": "100", "NO_COLOR": "1"}
@@ -213,6 +239,8 @@ MACROS = {
     "robot": robot,
     "usage": usage,
     "twin_ranges": twin_ranges,
+    "fault_kinds": fault_kinds,
+    "fault_families": fault_families,
     "example": example,
     "page": page,
     "commands": commands(),
