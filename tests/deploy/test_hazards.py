@@ -8,12 +8,16 @@ import tty
 
 import pytest
 
+from hopping_leg.deploy.bring_up import judge, require
 from hopping_leg.deploy.driver import MoteusLink
 from hopping_leg.deploy.emulator.frames import Frame
 from hopping_leg.deploy.emulator.line_protocol import LineProtocol, received_line
 from hopping_leg.deploy.emulator.start import Start
+from hopping_leg.deploy.envelope import hopping_envelope
+from hopping_leg.deploy.inspection import inspect
 from hopping_leg.deploy.observation import LIMP, STOP
 from hopping_leg.deploy.transport import opener
+from hopping_leg.errors import HardwareError
 from hopping_leg.robot import load_robot
 
 LEG = load_robot("legv2")
@@ -184,3 +188,14 @@ def test_an_adapter_that_reads_nothing_blocks_no_one(adapter):
     adapter.pull_out()
     link.close()
     assert time.monotonic() - start < 10
+
+
+def test_a_can_bus_without_drives_is_silence_and_named_so():
+    link = MoteusLink(LEG, opener("virtual:empty"))
+    for _ in range(3):
+        assert exchange(link, wait=0.05).replies == (None, None)
+    facts = inspect(link)
+    assert not any(drive.answers for drive in facts)
+    with pytest.raises(HardwareError, match=r"id 1\) does not answer"):
+        require(judge(LEG, hopping_envelope(LEG, 200.0), facts))
+    link.close()

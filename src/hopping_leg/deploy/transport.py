@@ -72,9 +72,9 @@ def _open_serial(path: str) -> Any:  # noqa: ANN401
 
 
 def _open_can(interface: str, channel: str) -> Any:  # noqa: ANN401
-    from moteus import PythonCan, Transport
+    from moteus import PythonCanDevice, Transport
 
-    return Transport([PythonCan(interface=interface, channel=channel, fd=True)])
+    return Transport([PythonCanDevice(interface=interface, channel=channel, fd=True)])
 
 
 def _open_pi3hat() -> Any:  # noqa: ANN401
