@@ -41,7 +41,7 @@ class Experiment:
     table-1, randomised, rail-only, fixed-base-only, two-pass, one-pass, truth."""
     seeds: tuple[int, ...] = (0,)
     """Of the trainings, one of each method and twin each."""
-    steps: int = 3_000_000
+    steps: int = Study.steps
     """Control steps of experience of a training."""
     seconds: float = 60.0
     """Of each recording; the paper's are 240 s."""

@@ -38,8 +38,8 @@ class Reproduce:
     """Of the trainings; the evaluation's seeds follow from another number."""
     twin: str | None = None
     """Robot file of the leg that plays the real one; default: one that is drawn."""
-    steps: int = Study.steps
-    """Control steps of experience of each training."""
+    steps: int = 4_000_000
+    """Control steps of experience of each training, fewer than the recipe's for the sake of time."""
     jobs: int = 2
     """Recordings, trainings or trials at the same time; take the number of cores."""
     quick: bool = False

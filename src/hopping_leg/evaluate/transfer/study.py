@@ -53,8 +53,8 @@ class Study:
     methods: tuple[Method, ...]
     seeds: tuple[int, ...] = (0,)
     """Of the trainings, one each."""
-    steps: int = 3_000_000
-    """Control steps of experience of a training."""
+    steps: int = 6_000_000
+    """Control steps of experience of a training; the recipe's own."""
     seconds: float = 60.0
     """Of each recording."""
     generations: int = 100
