@@ -37,18 +37,19 @@ def record(robot, targets, rig="fixed-base", rate=200.0, onboard="zoh", name="tw
     data.qpos[-2:] = targets[0]
     if rig != "fixed-base":
         data.qpos[0] = kinematics.stance_height(robot, targets[0])
-    rows = []
+    rows, before = [], np.zeros(2)
     for target in targets:
         q, qd = data.qpos[-2:].copy(), data.qvel[-2:].copy()
         height = data.qpos[0]
         torque = limit.clip(kp * (target - q) - kd * qd, qd)
-        rows.append((q, qd, torque, target, height))
+        rows.append((q, qd, before, torque, target, height))
+        before = torque
         data.ctrl[:] = torque
         for _ in range(round(1 / rate / STEP)):
             mujoco.mj_step(model, data)
-    q, qd, torque, target, height = (np.array(c) for c in zip(*rows, strict=True))
+    q, qd, measured, torque, target, height = (np.array(c) for c in zip(*rows, strict=True))
     columns = {"time_s": np.arange(len(q)) / rate}
-    quantities = {"position": q, "velocity": qd, "torque": torque, "torque_command": torque}
+    quantities = {"position": q, "velocity": qd, "torque": measured, "torque_command": torque}
     if onboard != "torque":
         del quantities["torque_command"]
         quantities |= {"position_command": target, "velocity_command": 0 * target}

@@ -96,16 +96,25 @@ def open_loop(
 
 
 def as_torque_driven(recording: Recording) -> Recording:
-    """Return the recording as if its torques had been commanded, without an on-board PD."""
+    """Return the recording as if its torques had been commanded, without an on-board PD.
+
+    A row's torque is the one before its command acts: what a ``zoh`` PD held until then, so the
+    next row's is this row's command; between rows of a ``continuous`` PD the mean of both acted.
+    """
     setup = dataclasses.replace(recording.setup, onboard="torque")
     if recording.setup.onboard == "torque":
         return dataclasses.replace(recording, setup=setup)
     table = recording.trace.table
     columns = {"hip_command_nm": "hip_torque_nm", "knee_command_nm": "knee_torque_nm"}
-    table = table.with_columns(
-        table[measured_].interpolate().fill_null(strategy="backward").alias(command)
+    acted = {
+        command: table[measured_].interpolate().fill_null(strategy="backward")
         for command, measured_ in columns.items()
         if measured_ in table.columns
+    }
+    share = 1.0 if recording.setup.onboard == "zoh" else 0.5
+    table = table.with_columns(
+        ((1 - share) * now + share * now.shift(-1).fill_null(strategy="forward")).alias(command)
+        for command, now in acted.items()
     )
     trace = dataclasses.replace(recording.trace, table=table)
     return dataclasses.replace(recording, trace=trace, setup=setup)

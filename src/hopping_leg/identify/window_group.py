@@ -38,9 +38,10 @@ class WindowGroup:
     """Windows that share rig, rate and on-board controller.
 
     The simulation advances by ticks of the recording's period, rounded to physics steps; recorded
-    rows may lie anywhere between ticks. Row n is the state before command n acts. A ``zoh`` PD is
-    computed once per tick from the simulated state; a ``continuous`` one is the actuators' own and
-    acts at every physics step, its target, integral and limits renewed at several ticks a period.
+    rows may lie anywhere between ticks. Row n holds state and torque before command n acts. A
+    ``zoh`` PD is computed once per tick from the simulated state; a ``continuous`` one is the
+    actuators' own and acts at every physics step, its target, integral and limits renewed at
+    several ticks a period.
 
     Args:
         recordings: All recordings.
@@ -209,8 +210,9 @@ class WindowGroup:
                 push = push - np.where(lagging, kd * seen.push(q, qd), 0.0)
             if self._zoh:
                 asked = push + kp * (target - q) + kd * (rate - qd)
-                ctrl[...] = gain * np.clip(line.push(asked), lower, upper)
                 torque = ctrl.copy()
+                ctrl[...] = gain * np.clip(line.push(asked), lower, upper)
+                torque = torque if tick else ctrl.copy()
             else:
                 asked = push + kp * target + kd * rate
                 kd = np.where(lagging, 0.0, kd)
@@ -223,7 +225,7 @@ class WindowGroup:
             positions[tick], velocities[tick], torques[tick] = q, qd, torque
             heights[tick] = base
             if load.any():
-                friction[...] = still + load * np.abs(torque)
+                friction[...] = still + load * np.abs(ctrl if self._zoh else torque)
             simulation.step(ids=alive, nstep=self._substeps)
             wild = ~(np.abs(qd) < _WILD).all(axis=1)
             if wild.any():
