@@ -39,7 +39,7 @@ class Reproduce:
     twin: str | None = None
     """Robot file of the leg that plays the real one; default: one that is drawn."""
     steps: int = 4_000_000
-    """Control steps of experience of each training, fewer than the recipe's for the sake of time."""
+    """Control steps of experience of each training, fewer than the recipe's to save time."""
     jobs: int = 2
     """Recordings, trainings or trials at the same time; take the number of cores."""
     quick: bool = False
