@@ -18,8 +18,11 @@ APEX = "estimated_apex_m"
 
 
 def has_estimate(trace: Trace) -> bool:
-    """Tell whether the controller of a run recorded an estimated height."""
-    return HEIGHT in trace.table.columns
+    """Tell whether a run has an estimated height and a true one to compare it with."""
+    if HEIGHT not in trace.table.columns:
+        return False
+    both = trace.column(HEIGHT) - trace.column("height_m")
+    return bool(np.isfinite(both).any())
 
 
 def judge_estimator(controller: str, traces: Sequence[Trace]) -> Estimator | None:

@@ -25,6 +25,7 @@ def summarise(
     apex = pooled_apexes(windows)
     low, high = median_interval([w.error for w in windows], seed)
     settled = sum(w.settled for w in windows)
+    per_second = 1 / settled if settled else float("nan")
     quartiles = np.percentile(apex, [25, 75]) if len(apex) else np.full(2, np.nan)
     peak = np.max([w.peak_torque for w in windows], axis=0)
     rms = np.sqrt(np.mean([np.square(w.rms_torque) for w in windows], axis=0))
@@ -41,8 +42,8 @@ def summarise(
         hops=len(apex),
         skipped_hops=sum(w.skipped for w in windows),
         stance_bounces=sum(w.bounces for w in windows),
-        hop_rate_hz=len(apex) / settled,
-        flight_fraction=sum(w.flight for w in windows) / settled,
+        hop_rate_hz=len(apex) * per_second,
+        flight_fraction=sum(w.flight for w in windows) * per_second,
         min_base_height_m=min(w.min_height for w in windows),
         max_sink_m=max(w.max_sink for w in windows),
         body_contacts=sum(w.base_contacts + w.knee_contacts for w in windows),

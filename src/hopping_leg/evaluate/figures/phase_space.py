@@ -24,11 +24,14 @@ def draw_phase_space(trace: Trace, title: str = "") -> Figure:
     Line: one example phase; circle: its start; diamond: its end.
 
     Args:
-        trace: A run at a constant command; 10 s after the start are drawn.
+        trace: A run at a constant command; 10 s after the start are drawn, or what there is of
+            a shorter one.
         title: Of the figure.
     """
     time = trace.column("time_s")
     chosen = (time >= START_SECONDS) & (time < START_SECONDS + SECONDS)
+    if not chosen.any():
+        chosen = time < SECONDS
     angle, speed, torque = (
         trace.column(f"knee_{name}")[chosen]
         for name in ("position_rad", "velocity_rad_s", "command_nm")
@@ -36,7 +39,7 @@ def draw_phase_space(trace: Trace, title: str = "") -> Figure:
     flight = trace.column("foot_clearance_m")[chosen] >= CLEAR
     figure = Figure(figsize=(WIDTH, 3.6), layout="constrained")
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
-    limit = float(np.abs(torque).max()) or 1.0
+    limit = float(np.nanmax(np.abs(torque), initial=0.0)) or 1.0
     for axes, name, phase in ((panels[0], "flight", flight), (panels[1], "stance", ~flight)):
         dots = axes.scatter(
             angle[phase],
