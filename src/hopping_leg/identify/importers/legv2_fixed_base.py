@@ -51,7 +51,7 @@ SETUP = RecordingSetup(
 def read(table: pl.DataFrame) -> tuple[pl.DataFrame, RecordingSetup]:
     """Return the recording's table and setup."""
     hip, knee = PAIRS["velocity_command"]
-    taken = take(table, NAMES).with_columns(
-        pl.col("exact_time") > 0, (-0.5 * pl.col(knee)).alias(hip)
-    )
+    taken = take(table, NAMES).with_columns(pl.col("exact_time") > 0)
+    if knee in taken.columns:
+        taken = taken.with_columns((-0.5 * pl.col(knee)).alias(hip))
     return taken, SETUP
