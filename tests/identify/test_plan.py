@@ -3,6 +3,7 @@ import pytest
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.plan import make_plan
 from hopping_leg.identify.recording import with_setup
+from hopping_leg.robot.model import TIMESTEP
 from tests.identify.twin import LEG, record, swing
 
 FIXED = record(LEG, swing(1.0))
@@ -54,3 +55,21 @@ def test_impossible_plans_get_a_sentence(options, sentence):
 def test_no_recording_no_plan():
     with pytest.raises(UsageError, match="at least one recording"):
         make_plan([], LEG)
+
+
+def test_held_commands_are_simulated_with_the_step_of_training():
+    assert make_plan([FIXED], LEG).timestep == TIMESTEP
+    assert make_plan([TORQUES], LEG).timestep > TIMESTEP
+
+
+def test_a_drive_at_its_limit_has_its_torque_speed_line_fitted():
+    weak = with_setup(FIXED, onboard="continuous", gains_exact=False)
+    strong = with_setup(weak, stiffness=(800.0, 800.0), damping=(0.0, 0.0))
+    lines = {"hip.motor.peak_torque", "knee.motor.no_load_speed"}
+    assert not lines & set(make_plan([weak], LEG).parameters.names)
+    assert lines <= set(make_plan([strong], LEG).parameters.names)
+
+
+def test_friction_that_grows_with_load_shows_where_torques_drive():
+    assert "drive.knee.load_friction" in make_plan([TORQUES], LEG).parameters.names
+    assert "drive.knee.load_friction" not in make_plan([FIXED], LEG).parameters.names

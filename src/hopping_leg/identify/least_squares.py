@@ -14,6 +14,9 @@ from hopping_leg.identify.parameters import ParameterSet
 Residuals = Callable[[Array], Array]
 """Search vectors (n, k) to residuals (n, m)."""
 
+_NOTHING = 1e-3
+"""A cost that is nothing, as residuals are in units of errors that matter."""
+
 _MARGIN = 1.0
 """Distance from its bounds at which a parameter starts, in units of its scale."""
 
@@ -150,6 +153,8 @@ def _inside(vector: Array, low: Array, high: Array) -> Array:
 
 
 def _settled(history: list[float], tolerance: float) -> bool:
+    if history and history[-1] < _NOTHING:
+        return True
     return len(history) > 1 and history[-2] - history[-1] <= tolerance * history[-2]
 
 
