@@ -66,6 +66,12 @@ def lock_memory() -> str | None:
     )
 
 
+def release_memory() -> None:
+    """Let the process be swapped again; nothing happens where memory was not locked."""
+    with contextlib.suppress(OSError, AttributeError):
+        ctypes.CDLL(None).munlockall()
+
+
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
     """Hold off garbage collection and hand the interpreter over to waiting threads quickly."""
@@ -97,3 +103,4 @@ def keeping_time(*, realtime: bool) -> Iterator[tuple[str, ...]]:
     finally:
         if realtime:
             prefer_nothing()
+            release_memory()
