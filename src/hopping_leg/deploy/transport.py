@@ -88,5 +88,5 @@ def _open_pi3hat() -> Any:  # noqa: ANN401
             return Transport(factory(parser.parse_args([])))
     raise HardwareError(
         "The pi3hat needs moteus-pi3hat, which exists for the Raspberry Pi alone:"
-        " pip install moteus-pi3hat."
+        " pip install 'hopping-leg[pi3hat]'."
     )
