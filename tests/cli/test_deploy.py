@@ -1,6 +1,7 @@
 """The verbs that talk to motors, with emulated drives in lockstep behind them."""
 
 import contextlib
+import sys
 
 import numpy as np
 import pytest
@@ -98,6 +99,13 @@ def test_a_transport_that_is_none_is_a_sentence(capsys, transport, sentence):
     error = capsys.readouterr().err
     assert sentence in error
     assert "Traceback" not in error
+
+
+@pytest.mark.parametrize("verb", [["deploy", "fast"], ["doctor"]])
+def test_without_the_client_library_the_extra_is_named(monkeypatch, capsys, verb):
+    monkeypatch.setitem(sys.modules, "moteus", None)
+    assert main([*verb, "--transport", "/dev/null"]) == 2
+    assert "hopping-leg[hardware]" in capsys.readouterr().err
 
 
 def test_doctor_says_what_is_wrong_and_puts_it_right(emulate, capsys):

@@ -1,0 +1,74 @@
+import math
+from dataclasses import replace
+
+import pytest
+
+from hopping_leg.deploy.bring_up import judge, require
+from hopping_leg.deploy.configuration import wanted
+from hopping_leg.deploy.envelope import hopping_envelope
+from hopping_leg.deploy.inspection import DriveFacts
+from hopping_leg.errors import HardwareError
+from hopping_leg.robot import load_robot
+from hopping_leg.robot.hardware import REGISTER_MAP, Servo
+
+LEG = load_robot("legv2")
+LIMITS = hopping_envelope(LEG, 200.0)
+
+
+def healthy(joint, **changes):
+    facts = DriveFacts(
+        answers=True,
+        firmware=0x10D,
+        register_map=REGISTER_MAP,
+        serial=f"{joint:024x}",
+        home=2,
+        position=(0.8, -1.6)[joint],
+        voltage=24.0,
+        temperature=30.0,
+        settings={setting.name: setting.value for setting in wanted(LEG, joint)},
+    )
+    return replace(facts, **changes)
+
+
+def complaints(knee, robot=LEG):
+    findings = judge(robot, LIMITS, (healthy(0), knee))
+    return [finding.complaint for finding in findings if finding.complaint]
+
+
+def test_healthy_drives_may_be_armed():
+    assert complaints(healthy(1)) == []
+    require(judge(LEG, LIMITS, (healthy(0), healthy(1))))
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"answers": False}, "(id 2) does not answer"),
+        ({"register_map": 4}, "register map 4 but this version speaks 5"),
+        ({"mode": 1, "fault": 35}, "reports fault 35 (encoder fault)"),
+        ({"voltage": 12.0}, "12.0 V but must lie between 18 and 42 V"),
+        ({"voltage": math.nan}, "nan V but must lie"),
+        ({"temperature": 70.0}, "has 70 deg C"),
+        ({"home": 1}, "is not homed"),
+        ({"position": 0.4}, "stands at 0.40 rad"),
+        ({"position": math.nan}, "stands at nan rad"),
+        ({"settings": {}}, "is nan but must be"),
+    ],
+)
+def test_each_mistake_has_its_sentence(changes, words):
+    found = complaints(healthy(1, **changes))
+    assert found
+    assert all("knee" in sentence for sentence in found)
+    assert any(words in sentence for sentence in found)
+
+
+def test_a_swapped_drive_is_noticed():
+    hardware = replace(LEG.hardware, knee=Servo(id=2, serial="f" * 24, lower=-2.7, upper=2.7))
+    (sentence,) = complaints(healthy(1), replace(LEG, hardware=hardware))
+    assert "swapped" in sentence
+
+
+def test_the_first_complaint_is_raised_and_the_others_counted():
+    findings = judge(LEG, LIMITS, (healthy(0), healthy(1, home=0, voltage=9.0)))
+    with pytest.raises(HardwareError, match=r"bus voltage .* 1 more: see `hop doctor`"):
+        require(findings)
