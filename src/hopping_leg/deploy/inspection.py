@@ -13,7 +13,7 @@ from hopping_leg.deploy.configuration import Setting, wanted
 from hopping_leg.deploy.driver import MoteusLink
 from hopping_leg.deploy.wire import JOINTS
 
-_ANSWER_SECONDS = 0.3
+_ANSWER_SECONDS = 1.0
 _TRIES = 3
 _TALK_SECONDS = 5.0
 _ALL_SECONDS = 60.0
@@ -115,9 +115,11 @@ async def _inspect_both(link: MoteusLink) -> list[DriveFacts]:
 async def _inspect(link: MoteusLink, joint: int) -> DriveFacts:
     controller = link.controllers[joint]
     state = await _asked(lambda: controller.custom_query(_STATE))
+    if state is None:
+        return DriveFacts(answers=False)
     identity = await _asked(lambda: controller.custom_query(_IDENTITY))
     serial = await _asked(lambda: controller.custom_query(_SERIAL))
-    if state is None or identity is None or serial is None:
+    if identity is None or serial is None:
         return DriveFacts(answers=False)
     state, identity = state.values, identity.values
     words = [int(serial.values.get(register, 0)) & 0xFFFFFFFF for register in _SERIAL]

@@ -1,0 +1,80 @@
+"""`hop deploy` as a process of its own against an emulator in real time: order, not speed.
+
+On a busy computer the supervisor may stop a run by itself; nothing here minds.
+"""
+
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from hopping_leg.cli import main
+from hopping_leg.deploy.black_box import recover
+from hopping_leg.deploy.emulator.process import EmulatorProcess
+from hopping_leg.deploy.emulator.start import Start
+from hopping_leg.deploy.observation import DriveMode
+from hopping_leg.deploy.supervisor import State
+from hopping_leg.errors import TraceError
+from hopping_leg.trace import Trace
+
+pytestmark = pytest.mark.slow
+BEGUN = 40
+"""Rows in the black box after which a run counts as begun."""
+
+
+@pytest.fixture
+def emulator():
+    with EmulatorProcess(Start(robot="legv2-paper")) as running:
+        yield running
+
+
+def deploy(emulator, folder):
+    words = ["deploy", "energy-shaping", "--transport", str(emulator.path), "--seconds", "20"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "hopping_leg.cli", *words, "--yes", "--out", str(folder)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        stdin=subprocess.DEVNULL,
+        text=True,
+    )
+    for _ in range(3000):
+        time.sleep(0.02)
+        assert process.poll() is None, process.communicate()
+        for box in folder.glob("*.blackbox"):
+            try:
+                if recover(box).table.height > BEGUN:
+                    return process, box
+            except TraceError:
+                continue
+    raise AssertionError("the run did not begin")
+
+
+def test_a_killed_host_leaves_its_record_and_drives_that_brake(emulator, tmp_path):
+    process, box = deploy(emulator, tmp_path)
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    time.sleep(0.5)
+    assert DriveMode.TORQUE not in emulator.state().modes
+    rows = recover(box).table.height
+    assert rows > BEGUN
+    assert main(["plot", str(box), "--out", str(tmp_path / "figures")]) == 0
+    assert Trace.load(box.with_suffix(".parquet")).table.height == rows
+
+
+def test_an_interrupted_host_brakes_stops_and_says_so(emulator, tmp_path):
+    process, box = deploy(emulator, tmp_path)
+    process.send_signal(signal.SIGINT)
+    out, error = process.communicate(timeout=60)
+    assert process.returncode in (0, 2)
+    assert "Traceback" not in error
+    assert "Wrote" in out
+    assert not box.exists()
+    trace = Trace.load(box.with_suffix(".parquet"))
+    states = trace.column("state")
+    assert (np.diff(states) >= 0).all()
+    assert states[-1] == State.STOPPED
+    time.sleep(0.2)
+    assert emulator.state().modes == (0, 0)
