@@ -16,6 +16,8 @@ import pytest
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.evaluate.transfer import fitting, hopping, tables
 from hopping_leg.evaluate.transfer.board import Board
+from hopping_leg.evaluate.transfer.effects import EFFECTS, HopWithout
+from hopping_leg.evaluate.transfer.hopping import Hop
 from hopping_leg.evaluate.transfer.methods import METHODS, choose_methods
 from hopping_leg.evaluate.transfer.ratio import compare
 from hopping_leg.evaluate.transfer.recording import Record
@@ -155,6 +157,32 @@ def test_order_is_of_the_apexes_and_a_leg_that_stands_has_none(tmp_path):
     for row in rows[-2:]:
         row["motionless"] = True
     assert tables._whole(method, rows, one)["ordered"] == 1
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_one_effect_is_taken_away_and_the_rest_stays(tmp_path, effect):
+    one = study(tmp_path, ("identified",))
+    twin, method = one.twins[0], one.methods[0]
+    whole, less = Hop(one, twin, method, 0), HopWithout(one, twin, method, 0, effect)
+    assert less.leg != whole.leg == twin.robot
+    assert not less.leg.reality.only_delays
+    assert less._file != whole._file
+    for other in set(EFFECTS) - {effect}:
+        assert EFFECTS[other](less.leg.reality) != less.leg.reality
+    assert EFFECTS[effect](less.leg.reality) == less.leg.reality
+
+
+def test_without_all_effects_nothing_is_left(tmp_path):
+    reality = study(tmp_path).twins[0].robot.reality
+    for take_away in EFFECTS.values():
+        reality = take_away(reality)
+    periods = reality.hip.ripple_periods, reality.knee.ripple_periods
+    assert dataclasses.replace(
+        reality,
+        hip=dataclasses.replace(reality.hip, ripple_periods=1.0),
+        knee=dataclasses.replace(reality.knee, ripple_periods=1.0),
+    ).neutral
+    assert periods != (1.0, 1.0)
 
 
 def test_a_twin_is_met_with_its_own_effects_alone():

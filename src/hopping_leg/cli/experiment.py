@@ -51,6 +51,9 @@ class Experiment:
     """Apex heights at which the twins are tried, m."""
     repeats: int = 3
     """Runs of 15 s at each command."""
+    effects: bool = False
+    """Let the first method's policies also meet the twins with one effect less at a time: what each
+    effect costs."""
     jobs: int = 1
     """Recordings, fits, trainings or trials at the same time, each in its own process."""
     threads: int = 1
@@ -77,6 +80,7 @@ def run(args: Experiment) -> None:
         generations=args.generations,
         commands=args.commands,
         repeats=args.repeats,
+        effects=args.effects,
         threads=args.threads,
     )
     result = transfer(study, args.jobs)
@@ -91,6 +95,9 @@ def command_line(args: Experiment) -> str:
     for field in dataclasses.fields(args)[1:]:
         value = getattr(args, field.name)
         if value == field.default or field.name in ("jobs", "threads", "folder"):
+            continue
+        if isinstance(value, bool):
+            words.append(f"--{field.name}")
             continue
         separator = "," if field.name == "commands" else " "
         text = separator.join(map(str, value)) if isinstance(value, tuple) else str(value)

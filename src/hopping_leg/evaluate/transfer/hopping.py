@@ -47,6 +47,16 @@ class Hop:
         return f"hop on {self.twin.name}, {self.method.name}, seed {self.seed}"
 
     @property
+    def leg(self) -> Robot:
+        """What the policy hops on."""
+        return self.twin.robot
+
+    @property
+    def suffix(self) -> str:
+        """Of the file with the result."""
+        return ""
+
+    @property
     def done(self) -> bool:
         """Whether the result is there.
 
@@ -64,7 +74,7 @@ class Hop:
 
     def run(self, *, quiet: bool) -> None:
         """Try the policy at every command and write what was measured."""
-        content = {"asked": self._asked(), "rows": hop(self._policy, self.twin.robot, self.study)}
+        content = {"asked": self._asked(), "rows": hop(self._policy, self.leg, self.study)}
         text = json.dumps(content, indent=1, allow_nan=False)
         write_atomically(self._file, f"{text}\n".encode())
 
@@ -80,7 +90,8 @@ class Hop:
 
     @property
     def _file(self) -> Path:
-        return self.study.trial(self.twin, self.method, self.seed)
+        path = self.study.trial(self.twin, self.method, self.seed)
+        return path.with_name(f"{path.stem}{self.suffix}.json")
 
     @property
     def _policy(self) -> bytes:
@@ -90,7 +101,7 @@ class Hop:
     def _asked(self) -> dict[str, Any]:
         return {
             "policy": hashlib.sha256(self._policy).hexdigest()[:16],
-            "twin": self.twin.robot.digest,
+            "twin": self.leg.digest,
             "commands": list(self.study.commands),
             "repeats": self.study.repeats,
         }

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from hopping_leg.evaluate.transfer.board import Board
+from hopping_leg.evaluate.transfer.effects import EFFECTS, HopWithout, effect_rows
 from hopping_leg.evaluate.transfer.fitting import Identify
 from hopping_leg.evaluate.transfer.hopping import Hop
 from hopping_leg.evaluate.transfer.methods import Method
@@ -27,12 +28,21 @@ def transfer(study: Study, at_once: int = 1) -> dict[str, Any]:
     Raises:
         UsageError: The folder holds results of other options.
     """
-    stages: Sequence[Sequence[Job]] = (records(study), fits(study), trainings(study), hops(study))
+    stages: Sequence[Sequence[Job]] = (
+        records(study),
+        fits(study),
+        trainings(study),
+        [*hops(study), *without(study)],
+    )
     total = sum(job.weight for stage in stages for job in stage)
     with Board(total, own_bars=at_once == 1) as board:
         for stage in stages:
             work(stage, at_once, board)
-    return tabulate(study, fits(study), trainings(study), hops(study))
+    result = tabulate(study, fits(study), trainings(study), hops(study))
+    if study.effects:
+        first = [job for job in hops(study) if job.method == study.methods[0]]
+        result["effects"] = effect_rows(first, without(study))
+    return result
 
 
 def records(study: Study) -> list[Record]:
@@ -55,6 +65,16 @@ def trainings(study: Study) -> list[Train]:
 def hops(study: Study) -> list[Hop]:
     """Return all trials."""
     return [Hop(study, t, m, s) for s, m, t in _all(study)]
+
+
+def without(study: Study) -> list[HopWithout]:
+    """Return the trials on twins that lack one effect, if they were asked for."""
+    return [
+        HopWithout(study, twin, study.methods[0], seed, effect)
+        for effect in (EFFECTS if study.effects else ())
+        for seed in study.seeds
+        for twin in study.twins
+    ]
 
 
 def _all(study: Study) -> Iterable[tuple[int, Method, TwinFile]]:

@@ -63,6 +63,8 @@ class Study:
     """Apex heights at which the twins are tried, m."""
     repeats: int = 3
     """Runs of 15 s at each command."""
+    effects: bool = False
+    """Whether the first method's policies also meet the twins with one effect less at a time."""
     threads: int = 1
     """Of a training or fit."""
 
