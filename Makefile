@@ -33,7 +33,7 @@ $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(PIP) install $$(grep '^torch==' constraints.txt)
 	$(PIP) install -c constraints.txt hatchling editables
-	$(PIP) install -c constraints.txt --no-build-isolation -e '.[train,cluster,hardware,docs,dev]'
+	$(PIP) install -c constraints.txt --no-build-isolation -e '.[train,cluster,hardware,bench,docs,dev]'
 	@touch $@
 
 reproduce: $(STAMP)
@@ -60,6 +60,7 @@ results: $(STAMP)
 	$(BIN)/hop excite multisine --robot legv2 --centre 0.7 -1.4 --amplitude 0.3 0.4 --out runs/results/multisine.parquet
 	$(BIN)/hop record runs/results/multisine.parquet --robot twin --believed legv2 --out runs/results
 	$(BIN)/hop identify runs/results/twin-multisine.parquet --out runs/results/identified.toml --json docs/results/identify.json
+	$(BIN)/hop bench identify --json docs/results/bench_identify.json
 
 check: lint types docs wheel
 

@@ -8,15 +8,19 @@ Examples:
   hop bench faults --json faults.json
   hop bench deploy --json deploy.json
   hop bench energy-shaping --json energy_shaping.json
+  hop bench identify --skip-paper-size --json identify.json
 """
 
 from hopping_leg.cli.bench.controllers import Ablation, EnergyShaping, Training
 from hopping_leg.cli.bench.faults import Faults
 from hopping_leg.cli.bench.hardware import Deploy
+from hopping_leg.cli.bench.identification import Identify
 from hopping_leg.cli.bench.simulation import Convergence, Env, Inference
 from hopping_leg.cli.output import write_json
 
-Benchmark = Env | Convergence | Inference | EnergyShaping | Training | Ablation | Faults | Deploy
+Benchmark = (
+    Env | Convergence | Inference | EnergyShaping | Training | Ablation | Faults | Deploy | Identify
+)
 
 
 def run(args: Benchmark) -> None:

@@ -1,0 +1,1 @@
+"""Benchmark of identification: known twins, throughput, the paper's size, others, real data."""

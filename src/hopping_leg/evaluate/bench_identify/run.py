@@ -1,0 +1,94 @@
+"""All parts of the benchmark in one run, each kept, and what they say about the project's bars."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from hopping_leg.errors import UsageError, unknown_name
+from hopping_leg.evaluate.bench_identify.bars import bars
+from hopping_leg.evaluate.bench_identify.mujoco_sysid import mujoco_sysid
+from hopping_leg.evaluate.bench_identify.paper_size import paper_size
+from hopping_leg.evaluate.bench_identify.real import real
+from hopping_leg.evaluate.bench_identify.study import Keeper, Study
+from hopping_leg.evaluate.bench_identify.synthetic import synthetic
+from hopping_leg.evaluate.bench_identify.throughput import throughput
+from hopping_leg.evaluate.timing import host
+from hopping_leg.identify.result import software_versions
+
+PARTS = ("synthetic", "throughput", "mujoco-sysid", "paper-size", "recordings")
+"""What can be measured, in order."""
+
+PAPER_METHODS = ("least-squares", "two-pass")
+"""Searches on recordings of the paper's size."""
+
+
+def bench_identify(
+    study: Study,
+    keeper: Keeper,
+    *,
+    parts: Sequence[str] = PARTS,
+    recordings: Path | None = None,
+    on_repeat: Callable[[int, int], None] = lambda done, total: None,
+) -> dict[str, Any]:
+    """Measure identification.
+
+    Args:
+        study: Sizes and efforts.
+        keeper: Keeps each result, so that a killed benchmark goes on.
+        parts: Which of ``PARTS``.
+        recordings: Folder with real recordings; None leaves them out.
+        on_repeat: Called with rounds of the timing, done and in all.
+
+    Returns:
+        An entry per part, and ``bars``: what was to be reached and what was.
+
+    Raises:
+        UsageError: There is no such part, or the folder holds no recordings.
+    """
+    for part in parts:
+        if part not in PARTS:
+            raise UsageError(unknown_name("part of the benchmark", part, PARTS))
+    result: dict[str, Any] = {"study": asdict(study), "host": host()}
+    if "synthetic" in parts or "mujoco-sysid" in parts:
+        result["synthetic"] = synthetic(study, keeper)
+    if "throughput" in parts:
+        result["throughput"] = keeper.keep(
+            "throughput",
+            "throughput: batch and plain loops in turn",
+            {"study": asdict(study)},
+            lambda: throughput(study, on_repeat),
+        )
+    if "mujoco-sysid" in parts:
+        result["mujoco_sysid"] = mujoco_sysid(study, keeper, result["synthetic"]["rows"])
+        result["mujoco_sysid"]["side_by_side"] = _beside(result)
+    if "paper-size" in parts:
+        result["paper_size"] = {
+            "rows": [
+                keeper.keep(
+                    f"paper-size-{method}",
+                    f"recordings of the paper's size: {method}",
+                    {"study": asdict(study)},
+                    lambda m=method: paper_size(study, keeper, m),  # type: ignore[misc]
+                )
+                for method in PAPER_METHODS
+            ]
+        }
+    if "recordings" in parts and recordings is not None:
+        result["recordings"] = real(study, keeper, recordings)
+    return {**result, "bars": bars(result), "versions": software_versions()}
+
+
+def _beside(result: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return our searches and mujoco.sysid's on the same data, in one list."""
+    others = result["mujoco_sysid"]["rows"]
+    cases = list(dict.fromkeys(row["case"] for row in others))
+    rows = [*result["synthetic"]["rows"], *others]
+    keys = ("case", "method", "fitted", "worst_error_percent", "wall_s", "cpu_s")
+    unseen = ("other_swings_rms_rad", "other_squats_rms_rad")
+    return [
+        {key: row.get(key) for key in (*keys, *unseen)}
+        for case in cases
+        for row in rows
+        if row["case"] == case
+    ]

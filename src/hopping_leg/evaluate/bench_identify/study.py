@@ -1,0 +1,89 @@
+"""What is measured, and results that are kept so that a killed benchmark goes on."""
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+from hopping_leg.identify.result import software_versions
+from hopping_leg.identify.searching import Report
+from hopping_leg.trace import write_atomically
+
+
+@dataclass(frozen=True)
+class Study:
+    """Sizes and efforts."""
+
+    seconds: float = 16.0
+    """Of each recording of the known twin."""
+    generations: int = 100
+    """Of CMA-ES, in each pass."""
+    population: int = 16
+    """Candidates of a generation, also where throughput is measured."""
+    repeats: int = 5
+    """Rounds of the throughput's timing."""
+    throughput_seconds: float = 60.0
+    """Of each of the two recordings on which throughput is measured."""
+    paper_seconds: float = 240.0
+    """Of each of the two recordings of the paper's size."""
+    threads: int = 2
+    """Worker threads of all fits."""
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Keeper:
+    """Runs work once: its result lies in a folder and is taken from there the next time.
+
+    Attributes:
+        folder: Where results lie.
+        on_begin: Told, in words, what begins.
+        report: Told how a fit goes.
+    """
+
+    folder: Path
+    on_begin: Callable[[str], None] = lambda words: None
+    report: Report = lambda stage, share, cost: None
+
+    def keep(
+        self, name: str, words: str, asked: dict[str, Any], work: Callable[[], dict[str, Any]]
+    ) -> dict[str, Any]:
+        """Return the kept result of the same work, or do it and keep its result.
+
+        Args:
+            name: Of the result's file.
+            words: What the work is, for whoever waits.
+            asked: All that the result depends on, as JSON values.
+            work: Returns JSON values.
+        """
+        file = self.folder / f"{name}.json"
+        asked = json.loads(json.dumps({**asked, "software": software_versions()}))
+        if file.exists():
+            kept: dict[str, Any] = json.loads(file.read_bytes())
+            if kept["asked"] == asked:
+                return dict(kept["result"])
+        self.on_begin(words)
+        result = work()
+        text = json.dumps({"asked": asked, "result": result}, indent=1)
+        write_atomically(file, f"{text}\n".encode())
+        return dict(json.loads(text)["result"])
+
+    def fit_folder(self, name: str) -> Path:
+        """Return the folder of a fit's checkpoints."""
+        return self.folder / "fits" / name
+
+
+class Clock:
+    """Wall and processor seconds since it was started, over all threads, as a context manager."""
+
+    def __enter__(self) -> Self:
+        """Start."""
+        self._wall, self._cpu = time.perf_counter(), time.process_time()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop."""
+        self.wall = time.perf_counter() - self._wall
+        self.cpu = time.process_time() - self._cpu

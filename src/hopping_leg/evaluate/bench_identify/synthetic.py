@@ -1,0 +1,89 @@
+"""Known twins identified: with a fixed base, on the ground, and hopping."""
+
+from dataclasses import asdict
+from typing import Any
+
+from hopping_leg.evaluate.bench_identify.fits import fit, unseen_errors
+from hopping_leg.evaluate.bench_identify.study import Keeper, Study
+from hopping_leg.evaluate.bench_identify.twin import AIR, GROUND, Motion, believed, record
+from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.recording import Recording
+
+Case = tuple[str, dict[str, float], tuple[Motion, ...], tuple[Motion, ...], tuple[str, ...]]
+
+FIXED = "fixed base"
+"""Name of the case with eight parameters."""
+
+RAIL = "fixed base and rail"
+"""Name of the case that keeps contact."""
+
+HOPPING = "fixed base, rail and hops"
+"""Name of the case that does not."""
+
+CASES: dict[str, Case] = {
+    FIXED: (
+        "fixed",
+        AIR,
+        ("swings",),
+        ("other swings",),
+        ("least-squares", "cma", "two-pass"),
+    ),
+    RAIL: (
+        "rail",
+        GROUND,
+        ("swings", "squats"),
+        ("other swings", "other squats"),
+        ("least-squares", "two-pass"),
+    ),
+    HOPPING: (
+        "hopping",
+        GROUND,
+        ("swings", "squats", "hops"),
+        ("other swings", "other squats", "other hops"),
+        ("least-squares", "two-pass"),
+    ),
+}
+"""Short name, truth, motions to fit to, motions to judge by, searches."""
+
+BEYOND_TABLE = ("thigh.com", "shank.com")
+"""What the paper's search fits beyond its Table I, as these twins differ in it."""
+
+
+def synthetic(study: Study, keeper: Keeper) -> dict[str, Any]:
+    """Identify each twin with each search.
+
+    Returns:
+        ``rows``, a record per case and search, and ``start``, the errors before any fit.
+    """
+    rows, start = [], []
+    for case, (short, truth, fitted, judged, methods) in CASES.items():
+        for method in methods:
+            name = f"synthetic-{short}-{method}"
+            asked = {"study": asdict(study), "truth": truth, "fitted": fitted, "judged": judged}
+            row = keeper.keep(
+                name,
+                f"known twin, {case}: {method}",
+                asked,
+                lambda c=case, m=method, n=name: _one(study, keeper, n, c, m),  # type: ignore[misc]
+            )
+            rows.append({"case": case, **row})
+        unseen: dict[str, Recording] = {
+            motion: record(truth, motion, study.seconds) for motion in judged
+        }
+        errors = unseen_errors(Candidate(believed()), unseen, study.threads)
+        start.append({"case": case, **errors})
+    return {"rows": rows, "start": start}
+
+
+def _one(study: Study, keeper: Keeper, name: str, case: str, method: str) -> dict[str, Any]:
+    _, truth, fitted, judged, _ = CASES[case]
+    recordings = [record(truth, motion, study.seconds) for motion in fitted]
+    unseen: dict[str, Recording] = {
+        motion: record(truth, motion, study.seconds) for motion in judged
+    }
+    parameters = BEYOND_TABLE if method == "two-pass" else _parameters(case)
+    return fit(study, keeper, name, method, recordings, unseen, truth, parameters)
+
+
+def _parameters(case: str) -> tuple[str, ...] | None:
+    return tuple(AIR) if case == FIXED else None
