@@ -140,6 +140,14 @@ def exists(file: str) -> bool:
     return (RESULTS / file).is_file()
 
 
+def has(file: str, path: str) -> bool:
+    """Tell whether a results file has been measured and holds something at a path."""
+    try:
+        return bool(pick(read(file), path))
+    except (OSError, LookupError):
+        return False
+
+
 def pictures() -> list[str]:
     """Return the names of all figures that ``hop plot`` left in docs/results/figures."""
     return sorted(path.name for path in (RESULTS / "figures").glob("*.svg"))
@@ -247,6 +255,7 @@ MACROS = {
     "bullets": bullets,
     "entries": entries,
     "exists": exists,
+    "has": has,
     "pictures": pictures,
     "verbs": list(cli.VERBS),
 }

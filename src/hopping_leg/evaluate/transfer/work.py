@@ -88,7 +88,8 @@ def _notes(running: dict[Future[None], Job]) -> list[str]:
 
 
 def _run(job: Job) -> None:
-    job.run(quiet=True)
+    if not job.done:
+        job.run(quiet=True)
 
 
 def _end_with(parent: int) -> None:
