@@ -38,8 +38,9 @@ class Envelope:
     """Ticks in a row with too much torque that are tolerated: one sample may be noise."""
     jump: float = 0.15
     """Error of a position predicted from the last one and the velocities, rad per period."""
-    missing_ticks: int = 2
-    """Ticks in a row without a reply that are tolerated."""
+    missing_ticks: int = 3
+    """Ticks in a row without a reply that are tolerated: as many as the drives' watchdog lets the
+    host miss."""
     overrun_ticks: int = 4
     """Ticks in a row that begin more than a period late and are tolerated."""
     stall: float = 0.02
