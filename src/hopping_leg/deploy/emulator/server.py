@@ -96,22 +96,29 @@ class Server:
         self.robot.advance(now)
 
 
-def serve(robot: EmulatedRobot, port: Port, *, ready: bool) -> None:
+def serve(robot: EmulatedRobot, port: Port, *, ready: bool) -> bool:
     """Hand over what is due between host and robot, and pull or push the plug.
 
     Args:
         robot: Behind the wire.
         port: Towards the host.
         ready: Whether the host may have sent something.
+
+    Returns:
+        Whether there is anything new for the host.
     """
     if ready and port.plugged:
         for frame in port.receive():
             robot.receive(frame)
-    for item in robot.outbox.take(robot.time):
+    items = robot.outbox.take(robot.time)
+    for item in items:
         if port.plugged:
             port.send(item)
     plugged = robot.misfortune.plugged
-    if plugged and not port.plugged:
+    if plugged == port.plugged:
+        return bool(items)
+    if plugged:
         port.plug_in()
-    elif port.plugged and not plugged:
+    else:
         port.unplug()
+    return True
