@@ -6,6 +6,7 @@ import moteus
 import pytest
 from moteus.fdcanusb_device import FdcanusbDevice
 
+from hopping_leg.deploy.emulator.faults import Fault
 from hopping_leg.deploy.emulator.process import EmulatorProcess
 from hopping_leg.deploy.emulator.start import Start
 from hopping_leg.errors import UsageError
@@ -98,3 +99,40 @@ def test_plain_lines_and_identity():
 def test_a_wrong_start_is_told_to_the_parent():
     with pytest.raises(UsageError, match="There is no pose 'handstand'"):
         EmulatorProcess(Start(pose="handstand"))
+
+
+def test_a_plug_comes_back_under_the_same_name(tmp_path):
+    async def ask(transport, drives):
+        return (await drives[0].query()).id
+
+    link = tmp_path / "leg"
+    with EmulatorProcess(Start(link=link)) as emulator:
+        assert emulator.path == link
+        assert talk(emulator, ask, checksums=True) == 1
+        emulator.inflict(Fault("unplug", duration=0.3))
+        until = time.monotonic() + 10
+        while link.exists() and time.monotonic() < until:
+            time.sleep(0.01)
+        assert not link.exists()
+        while not link.exists() and time.monotonic() < until:
+            time.sleep(0.01)
+        assert talk(emulator, ask, checksums=True) == 1
+        assert [fault.kind for _, fault in emulator.record().faults] == ["unplug"]
+    assert not link.is_symlink()
+
+
+def test_an_inflicted_fault_shows_on_the_wire(emulator):
+    async def power(transport, drives):
+        frames = [drive.make_position(**TORQUE, query=True) for drive in drives]
+        codes = set()
+        for _ in range(200):
+            results = await transport.cycle(frames)
+            codes |= {int(result.values[moteus.Register.FAULT]) for result in results}
+            if 33 in codes:
+                break
+            await asyncio.sleep(0.01)
+        await transport.cycle([drive.make_stop() for drive in drives])
+        return codes
+
+    emulator.inflict(Fault("drive_fault", since="powered", drive="hip", value=33))
+    assert 33 in talk(emulator, power, checksums=True)
