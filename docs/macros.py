@@ -55,7 +55,7 @@ def scaled(value: Any, factor: float | None) -> Any:  # noqa: ANN401
     """Return a number, or each of a list, times a factor."""
     if factor is None or value is None:
         return value
-    return [entry * factor for entry in value] if isinstance(value, list) else value * factor
+    return [scaled(entry, factor) for entry in value] if isinstance(value, list) else value * factor
 
 
 def number(value: Any) -> str:  # noqa: ANN401
@@ -135,9 +135,12 @@ def _is_nested(entry: Any) -> bool:  # noqa: ANN401
     return isinstance(entry, dict) or records
 
 
-def exists(file: str) -> bool:
-    """Tell whether a results file has been measured."""
-    return (RESULTS / file).is_file()
+def exists(file: str, path: str = "") -> bool:
+    """Tell whether a results file, and an entry that is not empty in it, has been measured."""
+    try:
+        return bool(pick(read(file), path))
+    except (OSError, LookupError):
+        return False
 
 
 def has(file: str, path: str) -> bool:

@@ -54,6 +54,26 @@ def test_work_is_done_once(tmp_path):
     assert len(begun) == 2
 
 
+def test_checkpoints_of_other_work_are_forgotten(tmp_path):
+    keeper = Keeper(tmp_path)
+    checkpoint = keeper.fit_folder("part") / "search.json"
+
+    def killed(size):
+        with pytest.raises(KeyboardInterrupt):
+            keeper.keep("part", "words", {"size": size}, interrupt)
+
+    def interrupt():
+        there.append(checkpoint.exists())
+        checkpoint.parent.mkdir(parents=True, exist_ok=True)
+        checkpoint.touch()
+        raise KeyboardInterrupt
+
+    there = []
+    for size in (1, 1, 2):
+        killed(size)
+    assert there == [False, True, False]
+
+
 def test_errors_are_relative_to_the_truth_and_claims_are_counted():
     rows = compare({"hip.friction": 0.111, "drive.delay": 1e-4}, {"hip.friction": 0.11}, ["x"])
     assert rows[0]["error_percent"] == pytest.approx(100 / 110)

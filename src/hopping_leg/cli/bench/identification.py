@@ -28,6 +28,8 @@ class Identify:
     """Of synthetic, throughput, mujoco-sysid, paper-size and recordings; default: all."""
     skip_paper_size: bool = False
     """Leave out the recordings of the paper's size, which take longest."""
+    searches: tuple[str, ...] = ("least-squares", "cma", "two-pass")
+    """Of known twins and of recordings of the paper's size."""
     recordings: Path | None = None
     """Folder with real recordings; default: the environment's HOPPING_LEG_RECORDINGS, if set."""
     seconds: float = 16.0
@@ -74,6 +76,7 @@ class Identify:
             self.paper_seconds,
             self.threads,
             self.seed,
+            self.searches,
         )
         left_out = {"paper-size"} if self.skip_paper_size else set()
         console = Console()

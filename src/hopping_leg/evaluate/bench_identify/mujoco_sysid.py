@@ -3,7 +3,6 @@
 import contextlib
 import io
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -60,7 +59,7 @@ def mujoco_sysid(study: Study, keeper: Keeper, fits: Sequence[dict[str, Any]]) -
             found = keeper.keep(
                 name,
                 f"mujoco.sysid, {row['case']}: {words}",
-                {"study": asdict(study), "bounds": bounds, "settings": settings},
+                {**study.asked("least-squares", study.seconds), "bounds": bounds, "way": way},
                 lambda c=row["case"], b=bounds, w=way, s=settings: _fit(  # type: ignore[misc]
                     study, keeper, c, b, w, s
                 ),

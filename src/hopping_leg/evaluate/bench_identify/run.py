@@ -7,6 +7,7 @@ from typing import Any
 
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.evaluate.bench_identify.bars import bars
+from hopping_leg.evaluate.bench_identify.fits import METHODS
 from hopping_leg.evaluate.bench_identify.mujoco_sysid import mujoco_sysid
 from hopping_leg.evaluate.bench_identify.paper_size import paper_size
 from hopping_leg.evaluate.bench_identify.real import real
@@ -44,11 +45,17 @@ def bench_identify(
         An entry per part, and ``bars``: what was to be reached and what was.
 
     Raises:
-        UsageError: There is no such part, or the folder holds no recordings.
+        UsageError: There is no such part or search, or the folder holds no recordings.
     """
-    for part in parts:
-        if part not in PARTS:
-            raise UsageError(unknown_name("part of the benchmark", part, PARTS))
+    for kind, given, known in (
+        ("part of the benchmark", parts, PARTS),
+        ("search", study.searches, tuple(METHODS)),
+    ):
+        for name in given:
+            if name not in known:
+                raise UsageError(unknown_name(kind, name, known))
+    if "least-squares" not in study.searches and {"synthetic", "mujoco-sysid"} & set(parts):
+        raise UsageError("Known twins are always identified by least squares, too; add it.")
     result: dict[str, Any] = {"study": asdict(study), "host": host()}
     if "synthetic" in parts or "mujoco-sysid" in parts:
         result["synthetic"] = synthetic(study, keeper)
@@ -56,7 +63,7 @@ def bench_identify(
         result["throughput"] = keeper.keep(
             "throughput",
             "throughput: batch and plain loops in turn",
-            {"study": asdict(study)},
+            {**study.asked("cma", study.throughput_seconds), "repeats": study.repeats},
             lambda: throughput(study, on_repeat),
         )
     if "mujoco-sysid" in parts:
@@ -68,10 +75,11 @@ def bench_identify(
                 keeper.keep(
                     f"paper-size-{method}",
                     f"recordings of the paper's size: {method}",
-                    {"study": asdict(study)},
+                    study.asked(method, study.paper_seconds),
                     lambda m=method: paper_size(study, keeper, m),  # type: ignore[misc]
                 )
                 for method in PAPER_METHODS
+                if method in study.searches
             ]
         }
     if "recordings" in parts and recordings is not None:

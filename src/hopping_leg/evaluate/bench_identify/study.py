@@ -1,6 +1,7 @@
 """What is measured, and results that are kept so that a killed benchmark goes on."""
 
 import json
+import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -31,6 +32,24 @@ class Study:
     threads: int = 2
     """Worker threads of all fits."""
     seed: int = 0
+    searches: tuple[str, ...] = ("least-squares", "cma", "two-pass")
+    """Of known twins and of recordings of the paper's size; those that a case has."""
+
+    def asked(self, search: str, seconds: float) -> dict[str, Any]:
+        """Return what a fit's result depends on.
+
+        Args:
+            search: How.
+            seconds: Of each recording.
+        """
+        effort = {"generations": self.generations, "population": self.population}
+        return {
+            "search": search,
+            "seconds": seconds,
+            "threads": self.threads,
+            "seed": self.seed,
+            **({} if search == "least-squares" else effort),
+        }
 
 
 @dataclass(frozen=True)
@@ -64,11 +83,19 @@ class Keeper:
             kept: dict[str, Any] = json.loads(file.read_bytes())
             if kept["asked"] == asked:
                 return dict(kept["result"])
+        self._begin(name, asked)
         self.on_begin(words)
         result = work()
         text = json.dumps({"asked": asked, "result": result}, indent=1)
         write_atomically(file, f"{text}\n".encode())
         return dict(json.loads(text)["result"])
+
+    def _begin(self, name: str, asked: dict[str, Any]) -> None:
+        """Note what is asked for, and forget checkpoints of anything else."""
+        file = self.folder / f"{name}.begun.json"
+        if not file.exists() or json.loads(file.read_bytes()) != asked:
+            shutil.rmtree(self.fit_folder(name), ignore_errors=True)
+        write_atomically(file, f"{json.dumps(asked, indent=1)}\n".encode())
 
     def fit_folder(self, name: str) -> Path:
         """Return the folder of a fit's checkpoints."""

@@ -1,6 +1,5 @@
 """Known twins identified: with a fixed base, on the ground, and hopping."""
 
-from dataclasses import asdict
 from typing import Any
 
 from hopping_leg.evaluate.bench_identify.fits import fit, unseen_errors
@@ -49,6 +48,9 @@ BEYOND_TABLE = ("thigh.com", "shank.com")
 """What the paper's search fits beyond its Table I, as these twins differ in it."""
 
 
+_NOT_JUDGED = {f"other_{motion}_rms_rad": None for motion in ("swings", "squats", "hops")}
+
+
 def synthetic(study: Study, keeper: Keeper) -> dict[str, Any]:
     """Identify each twin with each search.
 
@@ -57,21 +59,26 @@ def synthetic(study: Study, keeper: Keeper) -> dict[str, Any]:
     """
     rows, start = [], []
     for case, (short, truth, fitted, judged, methods) in CASES.items():
-        for method in methods:
+        for method in (m for m in methods if m in study.searches):
             name = f"synthetic-{short}-{method}"
-            asked = {"study": asdict(study), "truth": truth, "fitted": fitted, "judged": judged}
+            asked = {
+                **study.asked(method, study.seconds),
+                "truth": truth,
+                "fitted": fitted,
+                "judged": judged,
+            }
             row = keeper.keep(
                 name,
                 f"known twin, {case}: {method}",
                 asked,
                 lambda c=case, m=method, n=name: _one(study, keeper, n, c, m),  # type: ignore[misc]
             )
-            rows.append({"case": case, **row})
+            rows.append({"case": case, **_NOT_JUDGED, **row})
         unseen: dict[str, Recording] = {
             motion: record(truth, motion, study.seconds) for motion in judged
         }
         errors = unseen_errors(Candidate(believed()), unseen, study.threads)
-        start.append({"case": case, **errors})
+        start.append({"case": case, **_NOT_JUDGED, **errors})
     return {"rows": rows, "start": start}
 
 
