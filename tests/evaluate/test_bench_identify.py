@@ -12,7 +12,7 @@ from hopping_leg.evaluate.bench_identify.plain_loop import PlainLoop
 from hopping_leg.evaluate.bench_identify.real import real
 from hopping_leg.evaluate.bench_identify.run import bench_identify
 from hopping_leg.evaluate.bench_identify.study import Keeper, Study
-from hopping_leg.evaluate.bench_identify.synthetic import FIXED
+from hopping_leg.evaluate.bench_identify.synthetic import FIXED, identify_twin
 from hopping_leg.evaluate.bench_identify.twin import AIR, GROUND, record, twin
 from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.plan import make_plan
@@ -161,15 +161,15 @@ def test_the_command_measures_keeps_and_goes_on(tmp_path):
     assert speed["largest_difference_rad"] < 1e-6
     assert all(row["s_per_candidate"] > 0 for row in speed["rows"])
     assert [row["bar"] for row in first["bars"]] == [3.0, 3.0, 1.8]
+    assert "--throughput-seconds 12" in first["command"]
+    assert str(tmp_path) not in first["command"]
     assert main([*words, *sizes]) == 0
     assert json.loads(file.read_text())["throughput"] == speed
 
 
 @pytest.mark.slow
 def test_a_known_twin_is_found(tmp_path):
-    from hopping_leg.evaluate.bench_identify.synthetic import _one
-
-    row = _one(Study(threads=1), Keeper(tmp_path), "fit", FIXED, "least-squares")
+    row = identify_twin(Study(threads=1), Keeper(tmp_path), "fit", FIXED, "least-squares")
     assert row["worst_identifiable_error_percent"] < 0.5
     assert row["identifiable"] == 8
     assert row["other_swings_rms_rad"] < 1e-3

@@ -71,7 +71,7 @@ def synthetic(study: Study, keeper: Keeper) -> dict[str, Any]:
                 name,
                 f"known twin, {case}: {method}",
                 asked,
-                lambda c=case, m=method, n=name: _one(study, keeper, n, c, m),  # type: ignore[misc]
+                lambda c=case, m=method, n=name: identify_twin(study, keeper, n, c, m),  # type: ignore[misc]
             )
             rows.append({"case": case, **_NOT_JUDGED, **row})
         unseen: dict[str, Recording] = {
@@ -82,7 +82,10 @@ def synthetic(study: Study, keeper: Keeper) -> dict[str, Any]:
     return {"rows": rows, "start": start}
 
 
-def _one(study: Study, keeper: Keeper, name: str, case: str, method: str) -> dict[str, Any]:
+def identify_twin(
+    study: Study, keeper: Keeper, name: str, case: str, method: str
+) -> dict[str, Any]:
+    """Identify one of ``CASES`` with one search; as ``fits.fit``."""
     _, truth, fitted, judged, _ = CASES[case]
     recordings = [record(truth, motion, study.seconds) for motion in fitted]
     unseen: dict[str, Recording] = {
