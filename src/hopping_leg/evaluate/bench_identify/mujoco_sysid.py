@@ -1,6 +1,7 @@
 """The same data fitted with MuJoCo's own identification toolbox, mujoco.sysid."""
 
 import contextlib
+import functools
 import io
 from collections.abc import Sequence
 from typing import Any
@@ -60,9 +61,7 @@ def mujoco_sysid(study: Study, keeper: Keeper, fits: Sequence[dict[str, Any]]) -
                 name,
                 f"mujoco.sysid, {row['case']}: {words}",
                 {**study.asked("least-squares", study.seconds), "bounds": bounds, "way": way},
-                lambda c=row["case"], b=bounds, w=way, s=settings: _fit(  # type: ignore[misc]
-                    study, keeper, c, b, w, s
-                ),
+                functools.partial(_fit, study, keeper, row["case"], bounds, way, settings),
             )
             rows.append({"case": row["case"], "method": f"mujoco.sysid, {words}", **found})
     return {"rows": rows}

@@ -1,5 +1,6 @@
 """Real recordings: each in turn is held out while the others are fitted with the default plan."""
 
+import functools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -48,7 +49,7 @@ def real(study: Study, keeper: Keeper, folder: Path) -> dict[str, Any]:
                 short,
                 f"{rig}, judged by {held.name}",
                 asked,
-                lambda f=fitted, h=held, n=short: _split(study, keeper, n, f, h),  # type: ignore[misc]
+                functools.partial(_split, study, keeper, short, fitted, held),
             )
             rows.append({"rig": rig, "held_out": held.name, **row})
     if not rows:

@@ -1,5 +1,6 @@
 """All parts of the benchmark in one run, each kept, and what they say about the project's bars."""
 
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -76,7 +77,7 @@ def bench_identify(
                     f"paper-size-{method}",
                     f"recordings of the paper's size: {method}",
                     study.asked(method, study.paper_seconds),
-                    lambda m=method: paper_size(study, keeper, m),  # type: ignore[misc]
+                    functools.partial(paper_size, study, keeper, method),
                 )
                 for method in PAPER_METHODS
                 if method in study.searches

@@ -1,5 +1,6 @@
 """Known twins identified: with a fixed base, on the ground, and hopping."""
 
+import functools
 from typing import Any
 
 from hopping_leg.evaluate.bench_identify.fits import fit, unseen_errors
@@ -71,7 +72,7 @@ def synthetic(study: Study, keeper: Keeper) -> dict[str, Any]:
                 name,
                 f"known twin, {case}: {method}",
                 asked,
-                lambda c=case, m=method, n=name: identify_twin(study, keeper, n, c, m),  # type: ignore[misc]
+                functools.partial(identify_twin, study, keeper, name, case, method),
             )
             rows.append({"case": case, **_NOT_JUDGED, **row})
         unseen: dict[str, Recording] = {
