@@ -1,16 +1,18 @@
 """The verbs that talk to motors, with emulated drives in lockstep behind them."""
 
 import contextlib
+import functools
 import sys
 
 import numpy as np
 import pytest
 
-from hopping_leg.cli import main, motors
+from hopping_leg.cli import deploy, main, motors, record_motors
 from hopping_leg.deploy import driver, session
 from hopping_leg.deploy.emulator.faults import Fault
 from hopping_leg.deploy.emulator.lockstep import Lockstep
 from hopping_leg.deploy.emulator.start import Start
+from hopping_leg.deploy.sequence import Timing
 from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.robot import load_robot
@@ -28,6 +30,9 @@ def emulate(monkeypatch):
         monkeypatch.setattr(motors, "opener", lambda name: None)
         monkeypatch.setattr(driver, "MoteusLink", lambda robot, opener: lockstep.link)
         monkeypatch.setattr(session, "RealClock", lambda: lockstep)
+        quick = functools.partial(Timing, rise=0.4, settle=0.1, sink=0.5)
+        for verb in (deploy, record_motors):
+            monkeypatch.setattr(verb, "Timing", quick)
         quiet = contextlib.nullcontext(())
         monkeypatch.setattr(session, "keeping_time", lambda **_: quiet)
         return lockstep
@@ -52,7 +57,7 @@ def test_deploy_checks_runs_and_leaves_a_trace(emulate, tmp_path, capsys):
 
 @pytest.mark.slow
 def test_a_fault_is_a_sentence_and_an_exit_code(emulate, tmp_path, capsys):
-    emulate(faults=(Fault("drive_fault", at=1.0, drive="hip", value=33),))
+    emulate(faults=(Fault("drive_fault", at=0.6, drive="hip", value=33),))
     assert main([*RUN, "--yes", "--out", str(tmp_path)]) == 2
     assert "hip: fault 33 (motor driver fault)" in capsys.readouterr().err
     assert len(list(tmp_path.glob("*.parquet"))) == 1
@@ -123,7 +128,7 @@ def test_doctor_says_what_is_wrong_and_puts_it_right(emulate, capsys):
 
 @pytest.mark.parametrize("rig", ["fixed-base", pytest.param("rail", marks=pytest.mark.slow)])
 def test_a_recording_from_motors_is_one_that_identification_takes(emulate, tmp_path, rig):
-    emulate(robot="legv2", faults=(Fault("drop_reply", at=3.0, drive="hip"),))
+    emulate(robot="legv2", faults=(Fault("drop_reply", at=1.0, drive="hip"),))
     time = np.arange(400) / 200
     bend = 0.2 * np.sin(2 * np.pi * time / 0.75)
     position = np.stack([0.8 + bend, -1.6 - 2 * bend], axis=1)

@@ -6,6 +6,8 @@ import sys
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from hopping_leg.control.library import load_controller
 from hopping_leg.deploy import realtime
@@ -108,6 +110,14 @@ def test_the_parts_of_a_sequence_follow_each_other():
         *(Phase.RISE, Phase.RISE, Phase.SETTLE, Phase.SETTLE, Phase.HOP),
         *(Phase.HOP, Phase.SINK, Phase.SINK, Phase.DONE, Phase.DONE),
     ]
+
+
+@given(st.integers(1, 3000), st.floats(0, 1e6))
+def test_a_hop_of_some_ticks_lasts_so_many_wherever_time_began(ticks, began):
+    timing = Timing(hop=ticks / 200, rise=0.4, settle=0.1)
+    times = began + np.arange(ticks + 200) * 0.005 - began
+    parts = [timing.phase(time)[0] for time in times]
+    assert parts.count(Phase.HOP) == ticks
 
 
 @pytest.mark.parametrize("name", [n for n in shipped_robots() if load_robot(n).kind == "leg"])

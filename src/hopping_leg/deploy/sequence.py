@@ -19,6 +19,9 @@ from hopping_leg.robot import kinematics
 from hopping_leg.robot.limits import SoftLimiter
 from hopping_leg.robot.parameters import Robot
 
+_ROUNDING = 1e-6
+"""Of times of ticks, s; far less than a tick."""
+
 
 class Phase(IntEnum):
     """Part of the sequence."""
@@ -50,7 +53,7 @@ class Timing:
             (Phase.HOP, self.hop),
             (Phase.SINK, self.sink),
         ):
-            if elapsed < seconds:
+            if elapsed < seconds - _ROUNDING:
                 return phase, elapsed
             elapsed -= seconds
         return Phase.DONE, elapsed
