@@ -1,5 +1,7 @@
 """Cost, parameters and both searches on twins whose parameters are known."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -246,3 +248,43 @@ def test_the_height_of_the_base_tells_of_the_rail():
     assert at_truth < 0.01 * beside
     with pytest.raises(RecordingError, match="record height"):
         Cost(WindowSimulator([air], cut([air], 0.1), timestep=STEP), Scoring(None, height=1e-3))
+
+
+def test_a_recording_that_the_model_cannot_explain_hardly_moves_the_estimate():
+    weak = record(
+        CAD.replace({**TRUTH, "knee.motor.torque_limit": 0.3}).robot, swing(2.0, phase=1.0)
+    )
+    parameters = choose(CAD, list(TRUTH))
+
+    def errors(scoring):
+        goal = objective(parameters, scoring, [RUN, weak])
+        found = least_squares(goal.residuals, parameters, levels=goal.levels)
+        return np.abs(parameters.values(found.vector) / list(TRUTH.values()) - 1)
+
+    assert errors(SCORING).max() > 0.5
+    assert errors(dataclasses.replace(SCORING, unexplained=1.0)).max() < 0.02
+
+
+def test_a_window_counts_in_full_below_the_level_and_the_same_far_beyond():
+    simulator = WindowSimulator([RUN], cut([RUN], 0.5), timestep=STEP)
+    cost = Cost(simulator, Scoring(0.1, unexplained=0.5))
+    plain = cost.residuals([CAD])[0]
+    squares = np.square(plain).sum()
+    assert cost.levels.cost(1e-4 * plain) == pytest.approx(1e-8 * squares, rel=1e-3)
+    assert cost.levels.cost(1e5 * plain) == pytest.approx(0.5 * plain.size, rel=1e-3)
+    weighted = cost.levels.weights(plain) * plain
+    rest = cost.levels.rest(plain)
+    expected = np.square(plain.reshape(4, -1, 2)).mean(axis=1)
+    expected = (expected / (1 + expected / 0.5)).sum() * plain.size / 8
+    assert np.sum(weighted**2) + np.sum(rest**2) == pytest.approx(expected, rel=1e-12)
+
+
+def test_steps_follow_the_slope_of_the_levelled_cost():
+    goal = objective(TWO, dataclasses.replace(SCORING, unexplained=1.0))
+    vector, shift = np.array([0.5, -0.5]), 1e-4 * np.eye(2)
+    residuals = goal.residuals(vector[None])[0]
+    weights = goal.levels.weights(residuals)
+    assert weights.min() < 0.1
+    slopes = jacobian(goal.residuals, vector, TWO.bounds, 1e-4)
+    expected = (goal(vector + shift) - goal(vector - shift)) / 2e-4
+    np.testing.assert_allclose(2 * (weights**2 * residuals) @ slopes, expected, rtol=1e-3)

@@ -7,6 +7,7 @@ import numpy as np
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.errors import RecordingError, UsageError
 from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.levels import levels, total_costs
 from hopping_leg.identify.simulate import Simulated, WindowSimulator
 
 _QUANTITIES = ("position", "velocity", "torque", "height")
@@ -34,9 +35,12 @@ class Scoring:
     """Scale of errors of the base's height, where it was measured, m."""
     robust: float | None = None
     """Residuals well beyond this many scales count linearly instead of squared."""
+    unexplained: float | None = None
+    """Mean squared residual of a window, in one quantity of one joint, that halves what the window
+    counts; far beyond, what no parameters explain hardly moves them."""
 
     def __post_init__(self) -> None:
-        for name in (*_QUANTITIES, "robust"):
+        for name in (*_QUANTITIES, "robust", "unexplained"):
             value = getattr(self, name)
             if value is not None and not 0 < value < np.inf:
                 raise UsageError(f"The scoring's {name} is {value} but must be positive, or none.")
@@ -67,6 +71,9 @@ class Cost:
                 "The windows hold no measured sample of what the scoring counts; record"
                 f" {' or '.join(self._measured)}."
             )
+        level = self.scoring.unexplained
+        self.levels = None if level is None else levels(list(self._counts.values()), level)
+        """What windows that no parameters explain are worth; None counts every one in full."""
 
     def residuals(self, candidates: list[Candidate]) -> Array:
         """Return residuals in units of the scales, robust if so chosen, (candidates, size)."""
@@ -90,9 +97,8 @@ class Cost:
         return bounded
 
     def values(self, candidates: list[Candidate]) -> Array:
-        """Return the sum of squared residuals, the paper's J by default, (candidates,)."""
-        total: Array = np.square(self.residuals(candidates)).sum(axis=1)
-        return total
+        """Return the costs, by default sums of squared residuals, the paper's J, (candidates,)."""
+        return total_costs(self.residuals(candidates), self.levels)
 
     def _scale(self, name: str) -> float | None:
         scale: float | None = getattr(self.scoring, name)

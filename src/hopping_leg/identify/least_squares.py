@@ -9,6 +9,7 @@ from scipy import optimize
 
 from hopping_leg.arrays import Array
 from hopping_leg.identify.checkpoint import load_state, save_state
+from hopping_leg.identify.levels import Levels
 from hopping_leg.identify.parameters import ParameterSet
 
 Residuals = Callable[[Array], Array]
@@ -31,7 +32,7 @@ class LeastSquaresOptions:
     """Steps tried in a round."""
     step: float = 1e-3
     """Of finite differences, in units of the parameters' scales."""
-    tolerance: float = 1e-5
+    tolerance: float = 1e-4
     """A round that lowers the cost by a smaller share ends the search."""
 
 
@@ -41,7 +42,7 @@ class Found:
 
     Attributes:
         vector: In search coordinates, (k,).
-        cost: Sum of squared residuals.
+        cost: Sum of squared residuals, as the levels of unexplained ones weigh it.
         evaluations: Candidates simulated.
         history: Best cost after each round or generation.
     """
@@ -75,6 +76,7 @@ def least_squares(
     parameters: ParameterSet,
     options: LeastSquaresOptions | None = None,
     *,
+    levels: Levels | None = None,
     start: Array | None = None,
     about: Mapping[str, object] | None = None,
     checkpoint: Path | None = None,
@@ -86,6 +88,8 @@ def least_squares(
         residuals: Function of search vectors.
         parameters: Bounds and scales.
         options: How.
+        levels: Of residuals that no parameters explain; None counts every one in full, as the
+            first round does, after which it is known what parameters do explain.
         start: Search vector to start from, (k,); None takes the parameters' start.
         about: What else tells this search from others, e.g. the recordings' hashes.
         checkpoint: File for the state after each round.
@@ -110,17 +114,20 @@ def least_squares(
         vector, evaluations = np.array(saved["vector"]), int(saved["evaluations"])
         history = list(saved["history"])
     while len(history) < options.rounds and not _settled(history, options.tolerance):
-        counter = _Counter(residuals)
+        now = levels if history else None
+        problem = _Problem(residuals, (low, high), options.step, now)
         result = optimize.least_squares(
-            lambda x: counter(x[None])[0],  # noqa: B023
+            problem.values,
             vector,
-            jac=lambda x: jacobian(counter, x, (low, high), options.step),  # noqa: B023
+            jac=problem.slopes,
             bounds=(low, high),
             x_scale="jac",
             max_nfev=options.evaluations,
         )
         vector, cost = result.x, 2 * float(result.cost)
-        evaluations += counter.count
+        if levels is not None and now is None:
+            cost = levels.cost(result.fun)
+        evaluations += problem.count
         history.append(cost)
         state = {"vector": vector.tolist(), "evaluations": evaluations, "history": history}
         save_state(checkpoint, identity, state)
@@ -158,12 +165,37 @@ def _settled(history: list[float], tolerance: float) -> bool:
     return len(history) > 1 and history[-2] - history[-1] <= tolerance * history[-2]
 
 
-class _Counter:
-    """Counts candidates."""
+class _Problem:
+    """Residuals whose squares add up to the cost, and their slopes; counts candidates.
 
-    def __init__(self, residuals: Residuals) -> None:
-        self._residuals, self.count = residuals, 0
+    The slopes are those at the levels of the moment, which make the cost's own slope exact.
+    """
 
-    def __call__(self, vectors: Array) -> Array:
+    def __init__(
+        self, residuals: Residuals, bounds: tuple[Array, Array], step: float, levels: Levels | None
+    ) -> None:
+        self._residuals, self._bounds, self._step, self._levels = residuals, bounds, step, levels
+        self._at: Array = np.empty(0)
+        self.count = 0
+
+    def values(self, vector: Array) -> Array:
+        """Return residuals, (m,), and with levels what each group costs beside them."""
+        residuals: Array = self._counted(vector[None])[0]
+        if self._levels is None:
+            return residuals
+        weights, rest = self._levels.weights(residuals), self._levels.rest(residuals)
+        return np.concatenate([weights * residuals, rest])
+
+    def slopes(self, vector: Array) -> Array:
+        """Return the slopes of what ``values`` returns, (m, k)."""
+        slopes = jacobian(self._counted, vector, self._bounds, self._step)
+        if self._levels is None:
+            return slopes
+        still = np.zeros((len(self._levels.sizes), len(vector)))
+        return np.concatenate([self._levels.weights(self._at)[:, None] * slopes, still])
+
+    def _counted(self, vectors: Array) -> Array:
         self.count += len(vectors)
-        return self._residuals(vectors)
+        values = self._residuals(vectors)
+        self._at = values[0]
+        return values

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
 from hopping_leg.arrays import Array
 from hopping_leg.identify.cost import Cost, Scoring
+from hopping_leg.identify.levels import Levels, total_costs
 from hopping_leg.identify.parameters import ParameterSet
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.simulate import WindowSimulator
@@ -49,10 +48,14 @@ class Objective:
         """Return residuals of search vectors (n, k), (n, m)."""
         return self.cost.residuals(self.parameters.candidates(vectors))
 
+    @property
+    def levels(self) -> Levels | None:
+        """What windows that no parameters explain are worth; None counts every one in full."""
+        return self.cost.levels
+
     def __call__(self, vectors: Array) -> Array:
-        """Return the sums of squared residuals of search vectors (n, k), (n,)."""
-        total: Array = np.square(self.residuals(vectors)).sum(axis=1)
-        return total
+        """Return the costs of search vectors (n, k), (n,)."""
+        return total_costs(self.residuals(vectors), self.levels)
 
     def about(self) -> dict[str, Any]:
         """Return what tells this objective from others, for checkpoints."""

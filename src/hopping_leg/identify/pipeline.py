@@ -220,6 +220,9 @@ def _conclude(
     step = options.effort.least_squares.step
     residuals = objective.residuals(vector[None])[0]
     slopes = jacobian(objective.residuals, vector, last.parameters.bounds, step)
+    if objective.levels is not None:
+        weights = objective.levels.weights(residuals)
+        residuals, slopes = weights * residuals, weights[:, None] * slopes
     return candidate, identifiability(last.parameters, vector, residuals, slopes)
 
 

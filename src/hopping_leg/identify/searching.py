@@ -1,6 +1,6 @@
 """A plan's search carried out: every candidate with every window in one batch, on disk as it goes.
 
-Cost is the sum of squared residuals throughout.
+Cost is the sum of squared residuals throughout, as the objective's levels weigh it.
 """
 
 from collections.abc import Callable, Mapping
@@ -20,6 +20,7 @@ from hopping_leg.identify.least_squares import (
     least_squares,
     multi_start,
 )
+from hopping_leg.identify.levels import Levels, total_costs
 from hopping_leg.identify.objective import Objective
 from hopping_leg.identify.parameters import ParameterSet
 from hopping_leg.identify.plan import Plan
@@ -133,6 +134,7 @@ class Searcher:
         about = {**objective.about(), **self._about}
         starts = self._options.starts
         residuals: Residuals = objective.residuals
+        levels = objective.levels
         if self._ray is not None:
             residuals = Cluster(objective.residuals, self._ray)
 
@@ -142,7 +144,9 @@ class Searcher:
             def told(done: float, cost: float) -> None:
                 self._report(stage, begin + share * (number + done) / starts, cost)
 
-            return self._search(f"{name}-{number}", parameters, residuals, start, about, told)
+            return self._search(
+                f"{name}-{number}", parameters, residuals, levels, start, about, told
+            )
 
         ends = multi_start(search, parameters, starts, self._seed)
         return Pass(name, parameters, ends[0], tuple(end.cost for end in ends[1:]))
@@ -152,6 +156,7 @@ class Searcher:
         name: str,
         parameters: ParameterSet,
         residuals: Residuals,
+        levels: Levels | None,
         start: Array,
         about: Mapping[str, object],
         told: Callable[[float, float], None],
@@ -159,11 +164,12 @@ class Searcher:
         file = f"search-{name.replace(', ', '-')}.json"
         checkpoint = None if self._folder is None else self._folder / file
         if self._plan.search == "least-squares":
-            rounds = _Rounds(residuals, self._options.least_squares, told)
+            rounds = _Rounds(residuals, levels, self._options.least_squares, told)
             return least_squares(
                 rounds,
                 parameters,
                 self._options.least_squares,
+                levels=levels,
                 start=start,
                 about=about,
                 checkpoint=checkpoint,
@@ -171,7 +177,7 @@ class Searcher:
             )
         generations = self._options.cma.generations
         return cma_es(
-            lambda vectors: np.square(residuals(vectors)).sum(axis=1),
+            lambda vectors: total_costs(residuals(vectors), levels),
             parameters,
             self._options.cma,
             seed=self._seed,
@@ -188,16 +194,18 @@ class _Rounds:
     def __init__(
         self,
         residuals: Residuals,
+        levels: Levels | None,
         options: LeastSquaresOptions,
         told: Callable[[float, float], None],
     ) -> None:
-        self._residuals, self._options, self._told = residuals, options, told
+        self._residuals, self._levels = residuals, levels
+        self._options, self._told = options, told
         self._round, self._tried, self._least = 0, 0, np.inf
 
     def __call__(self, vectors: Array) -> Array:
         """Return residuals of search vectors (n, k), (n, m)."""
         values = self._residuals(vectors)
-        self._least = min(self._least, float(np.square(values).sum(axis=1).min()))
+        self._least = min(self._least, float(total_costs(values, self._levels).min()))
         self._tried += len(vectors) == 1
         self._tell()
         return values

@@ -1,0 +1,84 @@
+"""Errors that no parameters explain: each window's say depends on its own level of errors.
+
+A window whose mean squared residual m, in one quantity of one joint, is far beyond a level L
+counts L m / (L + m): nearly in full below the level, and far beyond it the same whatever is
+changed. So windows that the model cannot explain, as where a drive saturates, hardly move the
+parameters (Geman and McClure's loss, of windows instead of samples).
+
+Gauss-Newton steps on such a cost are those on residuals that are weighted by the levels of the
+moment; the rest of the cost beside their squares is residuals that no parameter moves.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hopping_leg.arrays import Array, BoolArray, IntArray
+
+
+@dataclass(frozen=True)
+class Levels:
+    """What residuals are worth beside others of their window.
+
+    Attributes:
+        groups: Number of each residual's group, (size,).
+        sizes: Residuals in each group, (groups,).
+        level: Mean squared residual of a group that halves what it counts.
+    """
+
+    groups: IntArray
+    sizes: IntArray
+    level: float
+
+    def weights(self, residuals: Array) -> Array:
+        """Return factors of one candidate's residuals at its own levels, (size,)."""
+        share: Array = (1 / (1 + self._squares(residuals)))[self.groups]
+        return share
+
+    def rest(self, residuals: Array) -> Array:
+        """Return the root of what each group costs beside its weighted residuals, (groups,)."""
+        squares = self._squares(residuals)
+        rest: Array = np.sqrt(self.sizes * self.level) * squares / (1 + squares)
+        return rest
+
+    def cost(self, residuals: Array) -> float:
+        """Return the cost of one candidate's residuals, (size,)."""
+        weighted = self.weights(residuals) * residuals
+        return float(np.sum(weighted**2) + np.sum(self.rest(residuals) ** 2))
+
+    def _squares(self, residuals: Array) -> Array:
+        """Return groups' mean squared residuals in units of the level, (groups,)."""
+        total = np.bincount(self.groups, np.square(residuals), len(self.sizes))
+        mean: Array = total / np.maximum(self.sizes, 1) / self.level
+        return mean
+
+
+def levels(counts: Sequence[BoolArray], level: float) -> Levels:
+    """Return levels of residuals whose groups are a window's, in one quantity of one joint.
+
+    Args:
+        counts: What counts of each quantity, (windows, rows, ...); residuals are in this order.
+        level: Mean squared residual of a group that halves what it counts.
+    """
+    parts, first = [], 0
+    for mask in counts:
+        columns = mask[0, 0].size
+        numbers = first + np.arange(len(mask) * columns).reshape(len(mask), 1, *mask.shape[2:])
+        parts.append(np.broadcast_to(numbers, mask.shape)[mask])
+        first += len(mask) * columns
+    groups = np.concatenate(parts)
+    return Levels(groups, np.bincount(groups, minlength=first), level)
+
+
+def total_costs(residuals: Array, levels: Levels | None) -> Array:
+    """Return the costs of candidates' residuals (n, size), (n,).
+
+    Args:
+        residuals: Of every candidate.
+        levels: None counts every residual in full.
+    """
+    if levels is None:
+        total: Array = np.square(residuals).sum(axis=1)
+        return total
+    return np.array([levels.cost(r) for r in residuals])
