@@ -49,6 +49,17 @@ def test_an_interrupted_campaign_goes_on_and_nothing_else_differs(tmp_path):
     assert trials(tmp_path / "cut") == trials(tmp_path / "whole")
 
 
+def test_an_interrupted_trial_is_no_result(monkeypatch):
+    def interrupted(self):
+        self.stop()
+        return run(self)
+
+    run = loop.ControlLoop.run
+    monkeypatch.setattr(loop.ControlLoop, "run", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        play_case(Case("limit notice", "energy-shaping", "legv2-paper", 0, 0))
+
+
 def test_trials_of_another_leg_are_not_mixed(tmp_path):
     run_campaign(dataclasses.replace(QUICK, repeats=1), tmp_path, workers=1)
     with pytest.raises(UsageError, match="holds trials of another leg"):

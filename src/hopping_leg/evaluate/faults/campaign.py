@@ -202,9 +202,10 @@ def _run(cases: Sequence[Case], workers: int) -> Iterator[Row]:
 
 
 def _run_virtual(cases: Sequence[Case], workers: int) -> Iterator[Row]:
-    if not cases:
-        return
     workers = min(workers or multiprocessing.cpu_count(), len(cases))
+    if workers <= 1:
+        yield from map(play_case, cases)
+        return
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, context, _leave_with_parent, (os.getpid(),)) as pool:
         futures: list[Future[Row]] = [pool.submit(play_case, case) for case in cases]

@@ -15,6 +15,7 @@ from hopping_leg.deploy.emulator.faults import Fault
 from hopping_leg.deploy.emulator.start import Start
 from hopping_leg.deploy.envelope import hopping_envelope
 from hopping_leg.deploy.inspection import inspect
+from hopping_leg.deploy.reasons import Reason
 from hopping_leg.deploy.schedule import Schedule
 from hopping_leg.deploy.sequence import Sequence, Timing, hopping_poses
 from hopping_leg.deploy.session import Performance, header_of, perform
@@ -128,6 +129,7 @@ class Scene:
 
         Raises:
             HardwareError: The drives may not be armed.
+            KeyboardInterrupt: A signal stopped the leg.
         """
         controller = load_controller(self.case.controller, self.robot)
         sequence = Sequence(
@@ -138,7 +140,7 @@ class Scene:
             dataclasses.replace(_TIMING, hop=_FIRST_HOP + self.mishap.at + _AFTERWARDS),
         )
         self.require_fitness(link)
-        return perform(
+        done = perform(
             link,
             sequence,
             self.envelope,
@@ -147,6 +149,10 @@ class Scene:
             clock=clock,
             realtime=realtime,
         )
+        memory = done.outcome.memory
+        if Reason.OPERATOR_STOP in (memory.cause.reason, memory.stop_cause.reason):
+            raise KeyboardInterrupt
+        return done
 
 
 def words(mishap: Mishap) -> str:

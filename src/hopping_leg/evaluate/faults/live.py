@@ -69,8 +69,6 @@ def _hop(scene: Scene, emulator: EmulatorProcess, folder: Path) -> Result:
         done = scene.perform(link, folder, None, realtime=True)
     finally:
         link.close()
-    if done.outcome.memory.stop_cause.reason is Reason.OPERATOR_STOP:
-        raise KeyboardInterrupt
     record = emulator.record()
     reason = done.outcome.memory.stop_cause.reason
     result.disturbed = not record.faults or (
