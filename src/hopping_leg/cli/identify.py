@@ -200,7 +200,7 @@ def _show_recordings(
                 markup=False,
             )
             for warning in r.warnings:
-                console.print(f"  {warning}", highlight=False, markup=False)
+                console.print(f"  {warning}", highlight=False, markup=False, soft_wrap=True)
 
 
 def _show(console: Console, identified: Identified) -> None:
