@@ -24,6 +24,8 @@ import math
 import signal
 import sys
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -99,12 +101,33 @@ def run(args: Emulate) -> None:
     )
     robot, port = start.build(), start.open()
     try:
-        _greet(console, robot, port)
-        if args.realtime and prefer_this_thread() is not None:
-            console.print("Without real-time priority the drives may answer late under load.")
-        _serve(robot, port, args.seconds)
+        with _ending_signals() as over:
+            _greet(console, robot, port)
+            if args.realtime and prefer_this_thread() is not None:
+                console.print("Without real-time priority the drives may answer late under load.")
+            _serve(robot, port, lambda: bool(over) or _is_over(robot, args.seconds))
     finally:
         port.close()
+
+
+def _is_over(robot: EmulatedRobot, seconds: float | None) -> bool:
+    return seconds is not None and robot.time >= seconds
+
+
+@contextmanager
+def _ending_signals() -> Iterator[list[int]]:
+    """Yield what fills with the signals that ask for the end: that is no error."""
+    over: list[int] = []
+
+    def end(number: int, frame: FrameType | None) -> None:
+        over.append(number)
+
+    before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield over
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _greet(console: Console, robot: EmulatedRobot, port: Port) -> None:
@@ -118,23 +141,15 @@ def _greet(console: Console, robot: EmulatedRobot, port: Port) -> None:
     sys.stdout.flush()
 
 
-def _serve(robot: EmulatedRobot, port: Port, seconds: float | None) -> None:
-    """Serve until a signal or the time is over; a signal ends it without an error."""
-    over: list[int] = []
-
-    def end(number: int, frame: FrameType | None) -> None:
-        over.append(number)
-
+def _serve(robot: EmulatedRobot, port: Port, is_over: Callable[[], bool]) -> None:
+    """Serve until it is over, and tell what happens."""
     display = _Display(robot)
     server = Server(robot, port)
     server.on_turn = lambda: display.renew(server.lost)
-    before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         with uninterrupted():
-            server.run(lambda: bool(over) or (seconds is not None and robot.time >= seconds))
+            server.run(is_over)
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
         display.end()
 
 
