@@ -271,11 +271,11 @@ def test_a_window_counts_in_full_below_the_level_and_the_same_far_beyond():
     plain = cost.residuals([CAD])[0]
     squares = np.square(plain).sum()
     assert cost.levels.cost(1e-4 * plain) == pytest.approx(1e-8 * squares, rel=1e-3)
-    assert cost.levels.cost(1e5 * plain) == pytest.approx(0.5 * plain.size, rel=1e-3)
+    assert cost.levels.cost(1e5 * plain) == pytest.approx(plain.size, rel=1e-3)
     weighted = cost.levels.weights(plain) * plain
     rest = cost.levels.rest(plain)
     expected = np.square(plain.reshape(4, -1, 2)).mean(axis=1)
-    expected = (expected / (1 + expected / 0.5)).sum() * plain.size / 8
+    expected = (1 - 1 / np.sqrt(1 + expected / 0.5)).sum() * plain.size / 8
     assert np.sum(weighted**2) + np.sum(rest**2) == pytest.approx(expected, rel=1e-12)
 
 

@@ -36,8 +36,8 @@ class Scoring:
     robust: float | None = None
     """Residuals well beyond this many scales count linearly instead of squared."""
     unexplained: float | None = None
-    """Mean squared residual of a window, in one quantity of one joint, that halves what the window
-    counts; far beyond, what no parameters explain hardly moves them."""
+    """Mean squared residual of a window, in one quantity of one joint, beyond which the
+    window counts ever less, so that what no parameters explain hardly moves them."""
 
     def __post_init__(self) -> None:
         for name in (*_QUANTITIES, "robust", "unexplained"):

@@ -88,8 +88,7 @@ def least_squares(
         residuals: Function of search vectors.
         parameters: Bounds and scales.
         options: How.
-        levels: Of residuals that no parameters explain; None counts every one in full, as the
-            first round does, after which it is known what parameters do explain.
+        levels: Of residuals that no parameters explain; None counts every one in full.
         start: Search vector to start from, (k,); None takes the parameters' start.
         about: What else tells this search from others, e.g. the recordings' hashes.
         checkpoint: File for the state after each round.
@@ -114,8 +113,7 @@ def least_squares(
         vector, evaluations = np.array(saved["vector"]), int(saved["evaluations"])
         history = list(saved["history"])
     while len(history) < options.rounds and not _settled(history, options.tolerance):
-        now = levels if history else None
-        problem = _Problem(residuals, (low, high), options.step, now)
+        problem = _Problem(residuals, (low, high), options.step, levels)
         result = optimize.least_squares(
             problem.values,
             vector,
@@ -125,8 +123,6 @@ def least_squares(
             max_nfev=options.evaluations,
         )
         vector, cost = result.x, 2 * float(result.cost)
-        if levels is not None and now is None:
-            cost = levels.cost(result.fun)
         evaluations += problem.count
         history.append(cost)
         state = {"vector": vector.tolist(), "evaluations": evaluations, "history": history}

@@ -1,9 +1,9 @@
 """Errors that no parameters explain: each window's say depends on its own level of errors.
 
-A window whose mean squared residual m, in one quantity of one joint, is far beyond a level L
-counts L m / (L + m): nearly in full below the level, and far beyond it the same whatever is
-changed. So windows that the model cannot explain, as where a drive saturates, hardly move the
-parameters (Geman and McClure's loss, of windows instead of samples).
+A window whose mean squared residual m, in one quantity of one joint, is beyond a level L counts
+2 L (1 - (1 + m / L)^-1/2): nearly m far below the level, and far beyond it nearly the same whatever
+is changed. So windows that the model cannot explain, as where a drive saturates, hardly move the
+parameters, while those that it explains in part keep some say.
 
 Gauss-Newton steps on such a cost are those on residuals that are weighted by the levels of the
 moment; the rest of the cost beside their squares is residuals that no parameter moves.
@@ -24,7 +24,7 @@ class Levels:
     Attributes:
         groups: Number of each residual's group, (size,).
         sizes: Residuals in each group, (groups,).
-        level: Mean squared residual of a group that halves what it counts.
+        level: Mean squared residual beyond which a group counts ever less.
     """
 
     groups: IntArray
@@ -33,13 +33,16 @@ class Levels:
 
     def weights(self, residuals: Array) -> Array:
         """Return factors of one candidate's residuals at its own levels, (size,)."""
-        share: Array = (1 / (1 + self._squares(residuals)))[self.groups]
+        share: Array = ((1 + self._squares(residuals)) ** -0.75)[self.groups]
         return share
 
     def rest(self, residuals: Array) -> Array:
         """Return the root of what each group costs beside its weighted residuals, (groups,)."""
         squares = self._squares(residuals)
-        rest: Array = np.sqrt(self.sizes * self.level) * squares / (1 + squares)
+        root = np.sqrt(1 + squares)
+        # 2 (1 - 1 / root) - squares / root**3 without the cancellation of small squares
+        share = (squares / (root + 1)) ** 2 * (2 * root + 1) / root**3
+        rest: Array = np.sqrt(self.sizes * self.level * share)
         return rest
 
     def cost(self, residuals: Array) -> float:
@@ -59,7 +62,7 @@ def levels(counts: Sequence[BoolArray], level: float) -> Levels:
 
     Args:
         counts: What counts of each quantity, (windows, rows, ...); residuals are in this order.
-        level: Mean squared residual of a group that halves what it counts.
+        level: Mean squared residual beyond which a group counts ever less.
     """
     parts, first = [], 0
     for mask in counts:

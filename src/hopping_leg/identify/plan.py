@@ -175,13 +175,13 @@ def _scoring(recordings: Sequence[Recording], *, paper: bool) -> Scoring:
     if paper:
         return Scoring()
     if all(r.setup.onboard == "torque" for r in recordings):
-        return Scoring(position=0.02, robust=2.0, unexplained=0.1)
+        return Scoring(position=0.02, robust=2.0, unexplained=0.4)
     torque = 0.2 if any(r.has("torque") for r in recordings) else None
     if torque is not None and _open_gains(recordings):
-        return Scoring(position=0.003, torque=0.5, robust=1.0, unexplained=0.1)
+        return Scoring(position=0.003, torque=0.5, robust=1.0, unexplained=0.4)
     rails = [r for r in recordings if r.setup.rig == "rail"]
     height = 0.002 if any(r.has_column("height_m") for r in rails) else None
-    return Scoring(position=0.005, torque=torque, height=height, robust=3.0, unexplained=0.1)
+    return Scoring(position=0.005, torque=torque, height=height, robust=3.0, unexplained=0.4)
 
 
 def _timestep(recordings: Sequence[Recording]) -> float:
