@@ -6,12 +6,14 @@ import json
 import numpy as np
 import pytest
 
-from hopping_leg.errors import PhysicsError, RecordingError, UsageError
+from hopping_leg.errors import PhysicsError, RecordingError, RobotError, UsageError
 from hopping_leg.identify import pipeline
+from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.pipeline import identify
 from hopping_leg.identify.result import as_json
 from hopping_leg.identify.searching import SearchOptions
 from hopping_leg.robot import load_robot
+from hopping_leg.robot.fields import check_physics
 from tests.identify.fitting import EFFORT, RATE, TRUTH, TWIN, identified, options, run
 from tests.identify.twin import LEG, record, swing
 
@@ -238,3 +240,13 @@ def test_data_without_meaning_get_a_sentence():
 
 def test_the_twin_is_another_than_where_the_fit_begins():
     assert TWIN.digest != LEG.digest
+
+
+@pytest.mark.parametrize("joint", ["hip", "knee"])
+def test_a_motor_is_never_found_weaker_than_its_own_limit(joint):
+    name = f"{joint}.motor.peak_torque"
+    least, most = pipeline._file_bounds(LEG)[name]
+    check_physics(Candidate(LEG).replace({name: least}).robot, "the weakest")
+    with pytest.raises(RobotError, match="must not exceed"):
+        check_physics(Candidate(LEG).replace({name: 0.99 * least}).robot, "weaker still")
+    assert least < Candidate(LEG).get(name) < most

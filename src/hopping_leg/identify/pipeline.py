@@ -96,7 +96,7 @@ def identify(
         recordings,
         robot,
         parameters=options.parameters,
-        bounds={**_link_bounds(robot), **options.bounds},
+        bounds={**_file_bounds(robot), **options.bounds},
         search=options.search,
     )
     _check_bounds(options.bounds, plan.parameters)
@@ -151,13 +151,20 @@ def _judge_rigs(
     return {rig: judge(group, candidate, timestep, threads) for rig, group in groups.items()}
 
 
-def _link_bounds(robot: Robot) -> dict[str, tuple[float, float]]:
-    """Return bounds that keep each link's centre of mass on the link, as robot files demand."""
+def _file_bounds(robot: Robot) -> dict[str, tuple[float, float]]:
+    """Return bounds that robot files demand: centres of mass on links, peaks above limits."""
     links = {"thigh": robot.thigh, "shank": robot.shank}
+    motors = {"hip": robot.hip.motor, "knee": robot.knee.motor}
     return {
         f"{name}.com": (0.25 * link.com, min(4 * link.com, (1 - 1e-9) * link.length))
         for name, link in links.items()
         if link.com < (1 - 1e-9) * link.length
+    } | {
+        f"{name}.motor.peak_torque": (
+            max(motor.torque_limit, motor.rated_torque),
+            4 * motor.peak_torque,
+        )
+        for name, motor in motors.items()
     }
 
 
