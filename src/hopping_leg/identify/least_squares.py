@@ -26,7 +26,7 @@ _MARGIN = 1.0
 class LeastSquaresOptions:
     """How to search."""
 
-    rounds: int = 8
+    rounds: int = 4
     """Restarts of the trust region; each is a checkpoint."""
     evaluations: int = 6
     """Steps tried in a round."""

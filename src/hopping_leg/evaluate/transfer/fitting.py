@@ -75,9 +75,7 @@ class Identify:
         identified = identify(
             [load_recording(path) for path in self._recordings],
             believed,
-            options=IdentifyOptions(
-                search=search, bounds=_bounds(believed), effort=effort, threads=study.threads
-            ),
+            options=IdentifyOptions(search=search, bounds=_bounds(believed), effort=effort),
             folder=file.with_suffix(""),
             resume=True,
         )

@@ -66,7 +66,7 @@ class Study:
     effects: bool = False
     """Whether the first method's policies also meet the twins with one effect less at a time."""
     threads: int = 1
-    """Of a training or fit."""
+    """Of a training or trial; a fit takes every core."""
 
     def __post_init__(self) -> None:
         for name in ("steps", "generations", "repeats", "threads"):
