@@ -38,7 +38,7 @@ class Reproduce:
     """Of the trainings; the evaluation's seeds follow from another number."""
     twin: str | None = None
     """Robot file of the leg that plays the real one; default: one that is drawn."""
-    steps: int = 4_000_000
+    steps: int = 3_000_000
     """Control steps of experience of each training, fewer than the recipe's to save time."""
     jobs: int = 2
     """Recordings, trainings or trials at the same time; take the number of cores."""
