@@ -11,7 +11,7 @@ ARGS ?=
 .PHONY: help install reproduce test test-fast check format lint types docs wheel results lock clean
 
 help:
-	@echo "make reproduce   install, train from scratch, evaluate, compare, report (about 10 minutes)"
+	@echo "make reproduce   install; record a leg, identify it, train, evaluate, transfer, report"
 	@echo "make test        install and run every test"
 	@echo "make test-fast   only the tests that take less than a few seconds"
 	@echo "make check       format, lint, types, documentation, wheel: all that CI wants besides tests"

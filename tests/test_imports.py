@@ -22,7 +22,7 @@ ORDER = [
     "evaluate",
     "cli",
 ]
-FOUNDATION = {"", "arrays", "errors", "hops", "trace"}
+FOUNDATION = {"", "arrays", "errors", "hops", "progress", "trace"}
 TRAINING = {"torch", "stable_baselines3", "onnx", "tensorboard"}
 BESIDE = {("evaluate", "learn")} | {
     ("deploy", room) for room in ("sim", "identify", "env", "learn")

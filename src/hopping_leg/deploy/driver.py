@@ -98,10 +98,6 @@ class MoteusLink:
         """
         return self._client.call(work, seconds)
 
-    def forget_clocks(self) -> None:
-        """Date replies anew, as after a drive restarted."""
-        self._clocks = (DriveClock(), DriveClock())
-
     def close(self) -> None:
         """Give the adapter back; another link may open it then."""
         try:

@@ -1,16 +1,11 @@
-"""Show how a training goes: a live bar on a terminal, a line a minute elsewhere."""
+"""Show how a training goes."""
 
-import time
-from types import TracebackType
-from typing import Self
+from rich.progress import TextColumn, TimeRemainingColumn
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
-_LINE_SECONDS = 60.0
+from hopping_leg.progress import LiveProgress
 
 
-class TrainingProgress:
+class TrainingProgress(LiveProgress):
     """Live numbers of a training, as a context manager.
 
     Args:
@@ -19,22 +14,8 @@ class TrainingProgress:
     """
 
     def __init__(self, title: str, *, quiet: bool = False) -> None:
-        self._console = Console(stderr=True, quiet=quiet)
+        super().__init__(title, columns=(TextColumn("left"), TimeRemainingColumn()), quiet=quiet)
         self._title = title
-        self._bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(bar_width=20),
-            TextColumn("{task.percentage:>3.0f} %"),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
-            TextColumn("{task.fields[note]}"),
-            console=self._console,
-            disable=not self._console.is_terminal,
-        )
-        self._task = self._bar.add_task(title, total=1.0, note="")
-        self._next_line = 0.0
-        self._began = time.monotonic()
         self._first_steps: int | None = None
 
     def update(self, share: float, steps: int, hops: int, error: float, best: str) -> None:
@@ -49,24 +30,7 @@ class TrainingProgress:
         """
         if self._first_steps is None:
             self._first_steps = steps
-        passed = max(time.monotonic() - self._began, 1e-9)
-        rate = (steps - self._first_steps) / passed
+        rate = (steps - self._first_steps) / max(self.passed, 1e-9)
         note = f"{hops} hops · apex error {1000 * error:.0f} mm · {rate:.0f} steps/s{best}"
         self._bar.update(self._task, completed=share, note=note)
-        if not self._console.is_terminal and passed >= self._next_line:
-            self._next_line = passed + _LINE_SECONDS
-            self._console.print(f"{self._title} {100 * share:.0f} % · {note}", soft_wrap=True)
-
-    def __enter__(self) -> Self:
-        """Start drawing."""
-        self._bar.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Stop drawing."""
-        self._bar.stop()
+        self._line_if_due(f"{self._title} {100 * share:.0f} % · {note}")

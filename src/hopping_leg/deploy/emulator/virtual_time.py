@@ -101,9 +101,6 @@ class SteppedClient:
         if until > self.loop.time():
             self.loop.run_until_complete(asyncio.sleep(until - self.loop.time()))
 
-    def prefer(self) -> None:
-        """Do nothing: there is no thread."""
-
     def close(self) -> None:
         """End all that is under way, and take the port away."""
         for task in asyncio.all_tasks(self.loop):

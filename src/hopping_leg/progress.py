@@ -1,0 +1,85 @@
+"""How long work goes: a live bar on a terminal, a line now and then elsewhere."""
+
+import time
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeElapsedColumn
+
+_LINE_SECONDS = 60.0
+
+
+class LiveProgress:
+    """A bar with a note beside it, as a context manager; its heirs say what is noted.
+
+    Args:
+        title: What is done.
+        total: When it is done.
+        columns: Shown between the time passed and the note.
+        quiet: Show nothing.
+        lines: Write lines instead of a bar; None does so where there is no terminal.
+        first_line: Time until the first line, s.
+    """
+
+    def __init__(
+        self,
+        title: str,
+        total: float = 1.0,
+        *,
+        columns: tuple[ProgressColumn, ...] = (),
+        quiet: bool = False,
+        lines: bool | None = None,
+        first_line: float = 0.0,
+    ) -> None:
+        self._console = Console(stderr=True, quiet=quiet)
+        self._lines = not self._console.is_terminal if lines is None else lines
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=20),
+            TextColumn("{task.percentage:>3.0f} %"),
+            TimeElapsedColumn(),
+            *columns,
+            TextColumn("{task.fields[note]}"),
+            console=self._console,
+            disable=self._lines,
+        )
+        self._task = self._bar.add_task(title, total=total, note="")
+        self._began = time.monotonic()
+        self._next_line = first_line
+
+    @property
+    def passed(self) -> float:
+        """Time since the work began, s."""
+        return time.monotonic() - self._began
+
+    def _line(self, text: str) -> None:
+        """Write a line now, where lines are written."""
+        if self._lines:
+            self._console.print(text, soft_wrap=True, highlight=False)
+
+    def _line_if_due(self, text: str) -> None:
+        """Write a line, where lines are written and the last one was long ago."""
+        if self._lines and self.passed >= self._next_line:
+            self._next_line = self.passed + _LINE_SECONDS
+            self._line(text)
+
+    def __enter__(self) -> Self:
+        """Start drawing."""
+        self._bar.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Stop drawing."""
+        self._bar.stop()
+
+
+def minutes(seconds: float) -> str:
+    """Return a duration as m:ss."""
+    whole = round(seconds)
+    return f"{whole // 60}:{whole % 60:02d}"

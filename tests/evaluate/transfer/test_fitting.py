@@ -1,0 +1,60 @@
+"""Fits belong to their recordings, and training has what they found."""
+
+import dataclasses
+
+import pytest
+
+from hopping_leg.errors import UsageError
+from hopping_leg.evaluate.transfer import fitting, tables
+from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.pipeline import IdentifyOptions, identify
+from hopping_leg.identify.recording import load_recording
+from hopping_leg.robot import load_robot
+from tests.evaluate.transfer.studies import study
+from tests.identify.twin import record, swing
+
+LEG = Candidate(load_robot("legv2"))
+
+
+@pytest.fixture(scope="module")
+def identified():
+    run = record(LEG.replace({"hip.friction": 0.12}).robot, swing(8.0))
+    options = IdentifyOptions(parameters=("hip.friction", "knee.friction"), threads=1)
+    found = identify([run], LEG.robot, options=options)
+    return dataclasses.replace(found, candidate=found.candidate.replace({"drive.delay": 0.003}))
+
+
+def test_a_delay_that_was_found_is_one_that_training_has(identified, tmp_path):
+    file = tmp_path / "found.toml"
+    file.write_text(fitting.robot_file(identified, "legv2", file))
+    robot = load_robot(file)
+    assert robot.reality.latency.command == pytest.approx(0.003)
+    assert robot.reality.only_delays
+    assert robot.hip.friction == pytest.approx(0.12, rel=0.02)
+    assert robot.rail == LEG.robot.rail
+
+
+def test_a_fit_belongs_to_its_recordings(identified, tmp_path, monkeypatch):
+    asked = []
+
+    def fake(recordings, robot, **options):
+        asked.append((recordings, robot.name))
+        return identified
+
+    monkeypatch.setattr(fitting, "identify", fake)
+    one = study(tmp_path, ("fixed-base-only",))
+    job = fitting.Identify(one, one.twins[0], one.methods[0])
+    assert not job.done
+    file = one.recording(one.twins[0], "fixed-base")
+    record(LEG.robot, swing(2.0)).save(file)
+    job.run(quiet=True)
+    [(recordings, believed)] = asked
+    assert believed == "legv2"
+    assert [r.digest for r in recordings] == [load_recording(file).digest]
+    assert job.done
+    row = tables._fit(job)
+    truth = {p["name"]: p["truth"] for p in row["parameters"]}
+    assert truth["hip.friction"] == one.twins[0].robot.hip.friction
+    record(LEG.robot, swing(3.0)).save(file)
+    with pytest.raises(UsageError, match="other recordings"):
+        assert job.done

@@ -1,0 +1,18 @@
+"""What policies are trained on."""
+
+from hopping_leg.evaluate.transfer.training import Train
+from hopping_leg.robot import load_robot
+from hopping_leg.sim.twins import IDENTIFIABLE
+from tests.evaluate.transfer.studies import study
+
+
+def test_no_method_trains_on_what_the_twin_alone_knows(tmp_path):
+    one = study(tmp_path, ("cad", "table-1", "randomised", "truth"))
+    twin = one.twins[0]
+    cad, paper, mixed, truth = (Train(one, twin, method, 0) for method in one.methods)
+    assert cad.robot == mixed.robot == load_robot("legv2")
+    assert paper.robot == load_robot("legv2-paper")
+    assert mixed._recipe().task.randomised == IDENTIFIABLE
+    assert truth.robot.reality.only_delays
+    assert truth.robot.rail == twin.robot.rail
+    assert truth.robot.reality.latency.command == twin.robot.reality.latency.command

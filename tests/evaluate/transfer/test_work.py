@@ -1,0 +1,87 @@
+"""Jobs are done once, and end with their study."""
+
+import dataclasses
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from hopping_leg.evaluate.transfer.board import Board
+from hopping_leg.evaluate.transfer.work import work
+
+
+@dataclasses.dataclass(frozen=True)
+class Note:
+    """A job that writes down which process did it."""
+
+    file: Path
+    seconds: float = 0.0
+    weight = 1.0
+
+    @property
+    def name(self):
+        return self.file.stem
+
+    @property
+    def done(self):
+        return self.file.exists()
+
+    def run(self, *, quiet):
+        time.sleep(self.seconds)
+        self.file.write_text(str(os.getpid()))
+
+    def progress(self):
+        return ""
+
+
+@pytest.mark.parametrize("at_once", [1, 2])
+def test_jobs_that_are_done_are_not_done_again(tmp_path, at_once, capsys):
+    jobs = [Note(tmp_path / f"{number}.txt") for number in range(3)]
+    jobs[1].file.write_text("earlier")
+    with Board(3.0, own_bars=at_once == 1) as board:
+        work(jobs, at_once, board)
+    assert jobs[1].file.read_text() == "earlier"
+    here = {job.file.read_text() for job in (jobs[0], jobs[2])} == {str(os.getpid())}
+    assert here == (at_once == 1)
+    assert "done: 2" in capsys.readouterr().err
+
+
+_KILLED = """
+import sys
+from pathlib import Path
+from hopping_leg.evaluate.transfer.board import Board
+from hopping_leg.evaluate.transfer.work import work
+from tests.evaluate.transfer.test_work import Note
+if __name__ == "__main__":
+    with Board(2.0) as board:
+        work([Note(Path(sys.argv[1]) / f"{n}.txt", 20.0) for n in range(2)], 2, board)
+"""
+
+
+@pytest.mark.slow
+def test_no_job_outlives_a_killed_study(tmp_path):
+    script = tmp_path / "study.py"
+    script.write_text(_KILLED)
+    process = subprocess.Popen(
+        [sys.executable, str(script), str(tmp_path)],
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])},
+        stderr=subprocess.DEVNULL,
+    )
+    time.sleep(15)
+    children = [
+        int(entry.name)
+        for entry in Path("/proc").iterdir()
+        if entry.name.isdigit()
+        and (entry / "stat").exists()
+        and (entry / "stat").read_text().rsplit(")", 1)[1].split()[1] == str(process.pid)
+    ]
+    assert len(children) >= 2
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    time.sleep(8)
+    assert not [child for child in children if Path(f"/proc/{child}/cmdline").exists()]
+    assert not list(tmp_path.glob("*.txt"))

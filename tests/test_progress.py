@@ -1,0 +1,56 @@
+import time
+
+import pytest
+
+from hopping_leg.cli.fit_progress import FitProgress
+from hopping_leg.evaluate.transfer.board import Board
+from hopping_leg.progress import LiveProgress, minutes
+
+
+def test_without_a_terminal_there_is_a_line_at_most_once_a_minute(capsys, monkeypatch):
+    now = 100.0
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    with LiveProgress("work") as progress:
+        progress._line_if_due("first")
+        now += 59.0
+        progress._line_if_due("too soon")
+        now += 1.0
+        progress._line_if_due("second")
+    assert capsys.readouterr().err == "first\nsecond\n"
+
+
+def test_quiet_work_shows_nothing(capsys):
+    with LiveProgress("work", quiet=True) as progress:
+        progress._line("a line")
+    assert capsys.readouterr().err == ""
+
+
+def test_a_bar_leaves_the_lines_out(capsys):
+    with LiveProgress("work", lines=False) as progress:
+        progress._line("a line")
+    assert "a line" not in capsys.readouterr().err
+
+
+def test_a_fit_tells_its_cost_and_how_long_it_may_take(capsys, monkeypatch):
+    now = 0.0
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    with FitProgress() as progress:
+        now = 90.0
+        progress.update("fixed base", 0.75, 12.5)
+    assert capsys.readouterr().err == "fixed base 75 % · cost 12.5 · at most 0:30 left\n"
+
+
+def test_a_study_counts_earlier_jobs_but_not_their_time(capsys, monkeypatch):
+    now = 0.0
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    with Board(4.0) as board:
+        board.finish("old", 2.0, new=False)
+        now = 60.0
+        board.finish("new", 1.0)
+        board.show(["last"])
+    assert capsys.readouterr().err == "75 % · done: new\n75 % · last · about 1:00 left\n"
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(0.4, "0:00"), (59.6, "1:00"), (3601, "60:01")])
+def test_durations_are_minutes_and_seconds(seconds, text):
+    assert minutes(seconds) == text
