@@ -2,7 +2,6 @@ import time
 
 import pytest
 
-from hopping_leg.cli.fit_progress import FitProgress
 from hopping_leg.evaluate.transfer.board import Board
 from hopping_leg.progress import LiveProgress, minutes
 
@@ -29,15 +28,6 @@ def test_a_bar_leaves_the_lines_out(capsys):
     with LiveProgress("work", lines=False) as progress:
         progress._line("a line")
     assert "a line" not in capsys.readouterr().err
-
-
-def test_a_fit_tells_its_cost_and_how_long_it_may_take(capsys, monkeypatch):
-    now = 0.0
-    monkeypatch.setattr(time, "monotonic", lambda: now)
-    with FitProgress() as progress:
-        now = 90.0
-        progress.update("fixed base", 0.75, 12.5)
-    assert capsys.readouterr().err == "fixed base 75 % · cost 12.5 · at most 0:30 left\n"
 
 
 def test_a_study_counts_earlier_jobs_but_not_their_time(capsys, monkeypatch):

@@ -1,10 +1,11 @@
-from hopping_leg.cli import fit_progress
+import time
+
 from hopping_leg.cli.fit_progress import FitProgress
 
 
 def test_without_a_terminal_there_is_a_line_a_minute(monkeypatch, capsys):
     clock = [0.0]
-    monkeypatch.setattr(fit_progress.time, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(time, "monotonic", lambda: clock[0])
     with FitProgress() as progress:
         for second in range(0, 181, 20):
             clock[0] = float(second)
