@@ -41,6 +41,15 @@ def test_a_study_counts_earlier_jobs_but_not_their_time(capsys, monkeypatch):
     assert capsys.readouterr().err == "75 % · done: new\n75 % · last · about 1:00 left\n"
 
 
+def test_what_is_done_of_a_job_counts_for_the_time_left(capsys, monkeypatch):
+    now = 0.0
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    with Board(4.0) as board:
+        now = 60.0
+        board.show(["running"], begun=2.0)
+    assert capsys.readouterr().err == "50 % · running · about 1:00 left\n"
+
+
 @pytest.mark.parametrize(("seconds", "text"), [(0.4, "0:00"), (59.6, "1:00"), (3601, "60:01")])
 def test_durations_are_minutes_and_seconds(seconds, text):
     assert minutes(seconds) == text

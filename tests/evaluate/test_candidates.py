@@ -53,6 +53,21 @@ def test_a_pattern_becomes_a_group_with_ranges_and_warnings(robot, folder):
     assert "was trained on robot 'other'" in found[0].notes[0]
 
 
+def test_a_file_can_be_given_a_label(robot, folder):
+    [found] = load_candidates([f"mine={folder / '1.onnx'}"], robot, 200.0)
+    assert found.label == "mine"
+    assert found.controller.card.seed == 1
+    assert found.notes[0].startswith("mine was trained")
+
+
+def test_a_path_may_hold_an_equals_sign(robot, folder):
+    (folder / "a=1").mkdir()
+    path = folder / "a=1" / "2.onnx"
+    path.touch()
+    [found] = load_candidates([str(path)], robot, 200.0)
+    assert found.label == str(path)
+
+
 def test_snapshots_of_one_training_are_no_group(robot, folder):
     (folder / "01.onnx").touch()
     found = load_candidates([str(folder / "*.onnx")], robot, 200.0)

@@ -46,19 +46,35 @@ def test_provenance_stands_above_the_numbers(tmp_path):
         assert part in text
 
 
-def test_what_belongs_to_the_rig_stays_out_of_the_robot(tmp_path):
+def found_of(name, unit, value):
+    """Return the identification as if its second parameter had been another."""
     found = identified()
-    told = dataclasses.replace(found.told, names=["hip.friction", "drive.delay"])
+    values = np.array([found.told.values[0], value])
+    told = dataclasses.replace(found.told, names=["hip.friction", name], values=values)
     start = found.passes[-1].parameters.parameters[0]
     parameters = dataclasses.replace(
         found.passes[-1].parameters,
-        parameters=(start, dataclasses.replace(start, name="drive.delay", unit="s")),
+        parameters=(start, dataclasses.replace(start, name=name, unit=unit)),
     )
     last = dataclasses.replace(found.passes[-1], parameters=parameters)
+    return dataclasses.replace(found, told=told, passes=(last,))
+
+
+def test_what_belongs_to_the_rig_stays_out_of_the_robot(tmp_path):
     path = tmp_path / "mine.toml"
-    save_robot(dataclasses.replace(found, told=told, passes=(last,)), path, "legv2")
+    save_robot(found_of("drive.hip.stiffness", "N m/rad", 9.0), path, "legv2")
     assert "drive" not in tomllib.loads(path.read_text())
-    assert "#   drive.delay = " in path.read_text()
+    assert "#   drive.hip.stiffness = 9 N m/rad" in path.read_text()
+
+
+@pytest.mark.parametrize(("delay", "latency"), [(0.003, 0.003), (0.0, 0.0)])
+def test_a_delay_that_was_found_is_one_that_training_has(tmp_path, delay, latency):
+    path = tmp_path / "mine.toml"
+    save_robot(found_of("drive.delay", "s", delay), path, "legv2")
+    robot = load_robot(path)
+    assert robot.reality.latency.command == latency
+    assert robot.reality.only_delays
+    assert ("reality" in tomllib.loads(path.read_text())) == (delay > 0)
 
 
 def test_an_impossible_robot_is_not_written(tmp_path):

@@ -41,7 +41,8 @@ class Evaluate:
     """What is judged, where and how often."""
 
     controllers: tyro.conf.Positional[tuple[str, ...]]
-    """Names (energy-shaping, paper, fast, ...), .onnx files, or a quoted pattern of them."""
+    """Names (energy-shaping, paper, fast, ...), .onnx files, or a quoted pattern of them;
+    LABEL=FILE chooses the name in all tables."""
     robot: str = "legv2-paper"
     """A shipped robot or a .toml file."""
     commands: Heights | None = None

@@ -3,7 +3,7 @@
 A twin plays the real leg. It is recorded, identified from the recordings, a controller is trained
 from scratch on what was identified, evaluated there beside the shipped controllers with the paper's
 trials, and hops on the twin without tuning, beside a controller that was trained on the CAD's
-robot. Takes about ten minutes on two cores. A run that was interrupted or killed goes on where it
+robot. Takes six to ten minutes on two cores. A run that was interrupted or killed goes on where it
 was when the same command is called again.
 
 Examples:
@@ -66,7 +66,7 @@ def run(args: Reproduce) -> None:
     robot = study.fitted(twin, method)
     evaluate.run(
         evaluate.Evaluate(
-            controllers=(str(policy), *shipped_policies(), ENERGY_SHAPING),
+            controllers=(f"{method.name}={policy}", *shipped_policies(), ENERGY_SHAPING),
             robot=str(robot),
             seeds=1 if args.quick else 5,
             out=args.out,

@@ -5,16 +5,12 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray, IntArray
+from hopping_leg.control.recent import Recent
 from hopping_leg.sim.disturbance import Measurement
 
 
 class DatedTrack:
     """Joint samples of n legs by tick, newest first; a measurement's ages tell their places.
-
-    Attributes:
-        known: Whether a tick's sample has arrived, (length, n).
-        q: Measured positions, rad, (length, n, 2); where unknown, what was there before.
-        qd: Measured velocities, rad/s, (length, n, 2); likewise.
 
     Args:
         length: Ticks to remember; older samples are ignored.
@@ -28,15 +24,31 @@ class DatedTrack:
     def reset(self, count: int) -> None:
         """Forget everything; ``count`` legs follow."""
         self._legs = np.arange(count)[:, None]
-        self.known: BoolArray = np.zeros((self.length, count), np.bool_)
-        self.q: Array = np.zeros((self.length, count, 2))
-        self.qd: Array = np.zeros((self.length, count, 2))
+        self._known = Recent(np.zeros((self.length, count), np.bool_))
+        self._q = Recent(np.zeros((self.length, count, 2)))
+        self._qd = Recent(np.zeros((self.length, count, 2)))
+
+    @property
+    def known(self) -> BoolArray:
+        """Whether a tick's sample has arrived, (length, n)."""
+        return self._known.frames
+
+    @property
+    def q(self) -> Array:
+        """Measured positions, rad, (length, n, 2); where unknown, what was there before."""
+        return self._q.frames
+
+    @property
+    def qd(self) -> Array:
+        """Measured velocities, rad/s, (length, n, 2); likewise."""
+        return self._qd.frames
 
     def shift(self) -> None:
         """Begin a tick, of which nothing is known yet."""
-        for history in (self.known, self.q, self.qd):
-            history[1:] = history[:-1].copy()
+        for history in (self._known, self._q, self._qd):
+            history.shift()
         self.known[0] = False
+        self.q[0], self.qd[0] = self.q[1], self.qd[1]
 
     def insert(self, measurement: Measurement) -> None:
         """Put this tick's three samples in their places."""
@@ -55,9 +67,10 @@ class DatedTrack:
 
     def hold(self, window: int) -> None:
         """Give unknown ticks among the newest ``window`` the last sample known before them."""
+        known_at, histories = self.known, (self.q, self.qd)
         for i in range(min(window, self.length - 1) - 1, -1, -1):
-            known = self.known[i, :, None]
-            for history in (self.q, self.qd):
+            known = known_at[i, :, None]
+            for history in histories:
                 np.copyto(history[i], history[i + 1], where=~known)
 
     def state(self) -> dict[str, Any]:

@@ -55,7 +55,7 @@ class DatedObserver:
             self._anchor = self._past[-2]
             self._track.shift()
         self._track.insert(measurement)
-        self._track.qd = velocity = self._fill()
+        self._track.qd[:] = velocity = self._fill()
         self._past = self._integrate(velocity)
         return JointState(self._past[0], velocity[0])
 

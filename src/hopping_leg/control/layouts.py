@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.control.dated_track import DatedTrack
+from hopping_leg.control.recent import Recent
 from hopping_leg.errors import PolicyError, unknown_name
 from hopping_leg.sim.disturbance import SAMPLES, Measurement
 
@@ -97,6 +98,18 @@ class ThreeSamples:
         """Do nothing."""
 
 
+def _dated_shapes(
+    lags: tuple[int, ...], torque_lags: tuple[int, ...]
+) -> dict[str, tuple[int, ...]]:
+    return {
+        "q": (len(lags), 2),
+        "qd": (len(lags), 2),
+        "age": (1,),
+        "past_torque": (len(torque_lags), 2),
+        "command": (1,),
+    }
+
+
 class Dated:
     """Samples at fixed times before now, however late they came, and the policy's own torques.
 
@@ -111,13 +124,7 @@ class Dated:
     """Ticks before now of the samples."""
     TORQUE_LAGS: ClassVar[tuple[int, ...]] = (0, 1, 2, 4, 6)
     """Ticks before the last action of the torques."""
-    shapes: ClassVar[dict[str, tuple[int, ...]]] = {
-        "q": (len(LAGS), 2),
-        "qd": (len(LAGS), 2),
-        "age": (1,),
-        "past_torque": (len(TORQUE_LAGS), 2),
-        "command": (1,),
-    }
+    shapes: ClassVar[dict[str, tuple[int, ...]]] = _dated_shapes(LAGS, TORQUE_LAGS)
 
     def __init__(self, period: float) -> None:
         self._track = DatedTrack(max(*self.LAGS, LATEST) + 1, period)
@@ -127,14 +134,14 @@ class Dated:
     def reset(self, count: int) -> None:
         """Forget everything."""
         self._track.reset(count)
-        self._torques = np.zeros((max(self.TORQUE_LAGS) + 1, count, 2))
+        self._torques = Recent(np.zeros((max(self.TORQUE_LAGS) + 1, count, 2)))
         self._command = np.zeros(count)
         self._fresh = True
 
     def restart(self, rows: IntArray, measurement: Measurement) -> None:
         """Let the newest sample stand for the past of some legs."""
         self._track.fill(rows, measurement)
-        self._torques[:, rows] = 0.0
+        self._torques.frames[:, rows] = 0.0
         self._fresh = False
         self._take(measurement)
 
@@ -145,8 +152,8 @@ class Dated:
             self._fresh = False
         else:
             self._track.shift()
-            self._torques[1:] = self._torques[:-1].copy()
-            self._torques[0] = last_torque
+            self._torques.shift()
+            self._torques.frames[0] = last_torque
         self._take(measurement)
 
     def _take(self, measurement: Measurement) -> None:
@@ -156,13 +163,13 @@ class Dated:
 
     def inputs(self) -> Inputs:
         """Return the chosen lags of the tracks."""
-        track = self._track
+        track, torques = self._track, self._torques.frames
         age = np.argmax(track.known[:LATEST], axis=0) * track.period
         return {
             "q": track.q[self._lags].swapaxes(0, 1).astype(np.float32),
             "qd": track.qd[self._lags].swapaxes(0, 1).astype(np.float32),
             "age": age[:, None].astype(np.float32),
-            "past_torque": self._torques[self._torque_lags].swapaxes(0, 1).astype(np.float32),
+            "past_torque": torques[self._torque_lags].swapaxes(0, 1).astype(np.float32),
             "command": self._command[:, None].astype(np.float32),
         }
 
@@ -170,15 +177,29 @@ class Dated:
         """Return samples, torques and command."""
         return {
             "track": self._track.state(),
-            "torques": self._torques.copy(),
+            "torques": self._torques.frames.copy(),
             "command": self._command.copy(),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go on from a ``state``."""
         self._track.restore(state["track"])
-        self._torques, self._command = np.array(state["torques"]), np.array(state["command"])
+        self._torques, self._command = Recent(state["torques"]), np.array(state["command"])
         self._fresh = False
+
+
+class DatedLong(Dated):
+    """The dated layout with a memory of 0.7 s, longer than a hop; the lags grow with age.
+
+    How long the last flight took, and what the last stance put into it, is in there.
+    """
+
+    name: ClassVar[str] = "dated-long"
+    LAGS: ClassVar[tuple[int, ...]] = (
+        0, 1, 2, 3, 4, 5, 6, 8, 10, 13, 16, 20, 25, 31, 38, 46, 55, 65, 77, 90, 105, 122, 140,
+    )  # fmt: skip
+    TORQUE_LAGS: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64)
+    shapes: ClassVar[dict[str, tuple[int, ...]]] = _dated_shapes(LAGS, TORQUE_LAGS)
 
 
 LATEST = 10
@@ -187,6 +208,7 @@ LATEST = 10
 LAYOUTS: dict[str, Any] = {
     ThreeSamples.name: lambda period: ThreeSamples(),
     Dated.name: Dated,
+    DatedLong.name: DatedLong,
 }
 """Layout names that policy files may carry, to their makers."""
 

@@ -12,7 +12,7 @@ from hopping_leg.sim.twins import Range
 
 Start = Literal["standing", "drop", "mixed", "hop"]
 
-See = Literal["three-samples", "dated"]
+See = Literal["three-samples", "dated", "dated-long"]
 
 
 @dataclass(frozen=True)

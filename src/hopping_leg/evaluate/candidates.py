@@ -3,6 +3,7 @@
 import glob
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from hopping_leg.control.library import load_controller
 from hopping_leg.control.policy import Policy
@@ -17,7 +18,8 @@ def load_candidates(names: Sequence[str], robot: Robot, rate: float) -> list[Can
     Policy files of one recipe that differ in their training seed become a group.
 
     Args:
-        names: Shipped names, ``.onnx`` files, or patterns of such, e.g. ``runs/*/policy.onnx``.
+        names: Shipped names, ``.onnx`` files, or patterns of such, e.g. ``runs/*/policy.onnx``;
+            ``LABEL=FILE`` gives a file another name in all tables.
         robot: The leg they shall drive.
         rate: Control rate, Hz.
 
@@ -40,8 +42,10 @@ def _expand(entry: str) -> list[str]:
     return found
 
 
-def _load(name: str, robot: Robot, rate: float) -> Candidate:
-    controller = load_controller(name, robot, rate=rate)
+def _load(entry: str, robot: Robot, rate: float) -> Candidate:
+    label, _, source = (entry, "", entry) if Path(entry).exists() else entry.rpartition("=")
+    controller = load_controller(source, robot, rate=rate)
+    name = label or source
     if not isinstance(controller, Policy):
         return Candidate(name, controller)
     card = controller.card

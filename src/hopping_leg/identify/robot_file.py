@@ -15,6 +15,8 @@ from hopping_leg.robot.files import load_tree, robot_from_tree
 from hopping_leg.robot.writing import robot_text
 from hopping_leg.trace import write_atomically
 
+_LATENCY = "reality.latency.command"
+
 
 def save_robot(identified: Identified, path: Path, origin: str | Path) -> None:
     """Write the robot file; it stands alone, and an existing file is replaced as a whole.
@@ -28,13 +30,15 @@ def save_robot(identified: Identified, path: Path, origin: str | Path) -> None:
         RobotError: The identified values make no valid robot; nothing is written.
         TraceError: The file cannot be written.
     """
-    tree = identified_tree(identified, load_tree(origin), path.stem)
+    tree = _identified_tree(identified, load_tree(origin), path.stem)
     robot_from_tree(tree, str(path))
-    write_atomically(path, robot_text(tree, comment(identified, str(origin))).encode())
+    write_atomically(path, robot_text(tree, _comment(identified, str(origin))).encode())
 
 
-def identified_tree(identified: Identified, tree: Tree, name: str) -> Tree:
+def _identified_tree(identified: Identified, tree: Tree, name: str) -> Tree:
     """Return a robot's tables with the identified values in place.
+
+    The delay of the recordings' loop becomes the robot's latency, with which training simulates it.
 
     Args:
         identified: What was found.
@@ -45,17 +49,22 @@ def identified_tree(identified: Identified, tree: Tree, name: str) -> Tree:
     tree["name"] = name
     tree["description"] = f"{identified.start.robot.name}, identified from recordings"
     for row in parameters_json(identified):
-        *path, last = row["name"].split(".")
-        if path and path[0] == "drive":
+        *path, last = _place(row["name"])
+        if path[0] == "drive" or (path[0] == "reality" and not row["value"] > 0):
             continue
         table = tree
         for part in path:
-            table = table[part]
+            table = table.setdefault(part, {})
         table[last] = {"value": row["value"], "unit": row["unit"], "source": _source(row)}
     return tree
 
 
-def comment(identified: Identified, origin: str) -> str:
+def _place(name: str) -> list[str]:
+    """Return where a fit's parameter stands in a robot file, table by table."""
+    return (_LATENCY if name == "drive.delay" else name).split(".")
+
+
+def _comment(identified: Identified, origin: str) -> str:
     """Return what stands above the tables: provenance, quality, and what stays unknown."""
     lines = [f"Identified by `hop identify` from {origin}; numbers without 'identified' are its."]
     for use, recordings in (("Fitted to", identified.fit), ("Judged by", identified.held)):
@@ -64,7 +73,8 @@ def comment(identified: Identified, origin: str) -> str:
     versions = software_versions().items()
     lines.append("Versions: " + ", ".join(f"{name} {value}" for name, value in versions) + ".")
     lines += _quality(identified)
-    drives = [row for row in parameters_json(identified) if row["name"].startswith("drive.")]
+    rows = parameters_json(identified)
+    drives = [row for row in rows if _place(row["name"])[0] == "drive"]
     if drives:
         lines.append("Of the recordings' drives, which are no part of the robot:")
         lines += [f"  {r['name']} = {r['value']:.6g} {r['unit']} ({_source(r)})" for r in drives]

@@ -35,7 +35,7 @@ class Note:
         self.file.write_text(str(os.getpid()))
 
     def progress(self):
-        return ""
+        return 0.5, ""
 
 
 @pytest.mark.parametrize("at_once", [1, 2])

@@ -15,7 +15,7 @@ class Board(LiveProgress):
 
     def __init__(self, total: float, *, own_bars: bool = False) -> None:
         super().__init__("transfer", total, lines=True if own_bars else None)
-        self._total, self._old, self._new = total, 0.0, 0.0
+        self._total, self._old, self._new, self._begun = total, 0.0, 0.0, 0.0
 
     def begin(self, name: str) -> None:
         """Say that a job begins in this process."""
@@ -23,25 +23,34 @@ class Board(LiveProgress):
 
     def finish(self, name: str, weight: float, *, new: bool = True) -> None:
         """Count a job; one that is not new was done by an earlier run."""
+        self._begun = 0.0
         if new:
             self._new += weight
             self._line(self._told(f"done: {name}"))
         else:
             self._old += weight
-        self._bar.update(self._task, completed=self._old + self._new)
+        self._bar.update(self._task, completed=self._done)
 
-    def show(self, notes: Sequence[str]) -> None:
-        """Show what runs now."""
+    def show(self, notes: Sequence[str], begun: float = 0.0) -> None:
+        """Show what runs now.
+
+        Args:
+            notes: One per running job.
+            begun: Weight of what is done of them.
+        """
+        self._begun = begun
+        self._bar.update(self._task, completed=self._done)
         note = " · ".join([*notes, self._time_left()])
         self._bar.update(self._task, note=note)
         self._line_if_due(self._told(note))
 
+    @property
+    def _done(self) -> float:
+        return self._old + self._new + self._begun
+
     def _time_left(self) -> str:
-        left = self._total - self._old - self._new
-        if not self._new or left <= 0:
-            return ""
-        return f"about {minutes(self.passed / self._new * left)} left"
+        new, left = self._new + self._begun, self._total - self._done
+        return f"about {minutes(self.passed / new * left)} left" if new and left > 0 else ""
 
     def _told(self, text: str) -> str:
-        share = 100 * (self._old + self._new) / max(self._total, 1e-9)
-        return f"{share:.0f} % · {text}"
+        return f"{100 * self._done / max(self._total, 1e-9):.0f} % · {text}"

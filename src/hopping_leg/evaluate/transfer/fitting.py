@@ -14,12 +14,10 @@ from hopping_leg.identify.least_squares import LeastSquaresOptions
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.identify.result import Identified, as_json
-from hopping_leg.identify.robot_file import comment, identified_tree
+from hopping_leg.identify.robot_file import save_robot
 from hopping_leg.identify.searching import SearchOptions
 from hopping_leg.robot import load_robot
-from hopping_leg.robot.files import load_tree, robot_from_tree
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.robot.writing import robot_text
 from hopping_leg.trace import write_atomically
 
 _TOLERANCE = 1e-3
@@ -37,7 +35,7 @@ class Identify:
     twin: TwinFile
     method: Method
 
-    weight = 3.0
+    weight = 0.5
 
     @property
     def name(self) -> str:
@@ -82,11 +80,11 @@ class Identify:
         content = {"asked": self._asked(), **as_json(identified), "truth": self._truth(identified)}
         text = json.dumps(content, indent=1, allow_nan=False)
         write_atomically(file.with_suffix(".json"), f"{text}\n".encode())
-        write_atomically(file, robot_file(identified, self.twin.believed, file).encode())
+        save_robot(identified, file, self.twin.believed)
 
-    def progress(self) -> str:
-        """Return what to show while it runs."""
-        return ""
+    def progress(self) -> tuple[float, str]:
+        """Return the share done and what to show while it runs."""
+        return 0.0, ""
 
     @property
     def _recordings(self) -> list[Path]:
@@ -115,24 +113,3 @@ class Identify:
 def _bounds(believed: Robot) -> dict[str, tuple[float, float]]:
     links = {"thigh.inertia": believed.thigh.inertia, "shank.inertia": believed.shank.inertia}
     return {name: (v / _INERTIA_FACTOR, v * _INERTIA_FACTOR) for name, v in links.items()}
-
-
-def robot_file(identified: Identified, origin: str, path: Path) -> str:
-    """Return the identified robot as a file; a delay that was found becomes the robot's latency.
-
-    Args:
-        identified: What was found.
-        origin: Robot that the fit began with.
-        path: Of the file.
-
-    Raises:
-        RobotError: The identified values make no valid robot.
-    """
-    tree = identified_tree(identified, load_tree(origin), path.stem)
-    delay = identified.candidate.drive.delay
-    if delay > 0 and "reality" not in tree:
-        source = "identified: the recordings' loop answered so late"
-        entry = {"value": delay, "unit": "s", "source": source}
-        tree["reality"] = {"latency": {"command": entry}}
-    robot_from_tree(tree, str(path))
-    return robot_text(tree, comment(identified, origin))

@@ -39,7 +39,7 @@ class Hop:
     method: Method
     seed: int
 
-    weight = 1.0
+    weight = 0.2
 
     @property
     def name(self) -> str:
@@ -78,9 +78,9 @@ class Hop:
         text = json.dumps(content, indent=1, allow_nan=False)
         write_atomically(self._file, f"{text}\n".encode())
 
-    def progress(self) -> str:
-        """Return what to show while it runs."""
-        return ""
+    def progress(self) -> tuple[float, str]:
+        """Return the share done and what to show while it runs."""
+        return 0.0, ""
 
     def rows(self) -> list[dict[str, Any]]:
         """Return what was measured, one row per command."""

@@ -24,7 +24,7 @@ class Record:
     twin: TwinFile
     rig: Rig
 
-    weight = 1.0
+    weight = 0.2
 
     @property
     def name(self) -> str:
@@ -62,9 +62,9 @@ class Record:
         recording.trace.header["seconds"] = template.duration
         recording.save(self._file)
 
-    def progress(self) -> str:
-        """Return what to show while it runs."""
-        return ""
+    def progress(self) -> tuple[float, str]:
+        """Return the share done and what to show while it runs."""
+        return 0.0, ""
 
     @property
     def _file(self) -> Path:

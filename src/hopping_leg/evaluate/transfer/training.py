@@ -59,10 +59,11 @@ class Train:
             quiet=quiet,
         )
 
-    def progress(self) -> str:
-        """Return what to show while it runs."""
+    def progress(self) -> tuple[float, str]:
+        """Return the share done and what to show while it runs."""
         snapshots = sorted((self._folder().path / "snapshots").glob("*.onnx"))
-        return f"{int(snapshots[-1].stem) / 1e6:.1f}M steps" if snapshots else "begun"
+        steps = int(snapshots[-1].stem) if snapshots else 0
+        return steps / self.study.steps, f"{steps / 1e6:.1f}M steps" if steps else "begun"
 
     @property
     def robot(self) -> Robot:

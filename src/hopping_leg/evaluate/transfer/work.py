@@ -38,8 +38,8 @@ class Job(Protocol):
         """Do it and store the result, whole or not at all."""
         ...
 
-    def progress(self) -> str:
-        """Return what to show while it runs in another process."""
+    def progress(self) -> tuple[float, str]:
+        """Return the share done and what to show while it runs in another process."""
         ...
 
 
@@ -77,14 +77,19 @@ def _share_out(jobs: Sequence[Job], at_once: int, board: Board) -> None:
                 job = running.pop(future)
                 future.result()
                 board.finish(job.name, job.weight)
-            board.show(_notes(running)[:at_once])
+            _show(running, at_once, board)
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _notes(running: dict[Future[None], Job]) -> list[str]:
+def _show(running: dict[Future[None], Job], at_once: int, board: Board) -> None:
     busy = [job for future, job in running.items() if future.running() and not job.done]
-    return [f"{job.name} {job.progress()}".strip() for job in busy]
+    notes, begun = [], 0.0
+    for job in busy[:at_once]:
+        share, note = job.progress()
+        notes.append(f"{job.name} {note}".strip())
+        begun += share * job.weight
+    board.show(notes, begun)
 
 
 def _run(job: Job) -> None:
