@@ -54,6 +54,8 @@ def build_rig_model(
     spec.option.gravity = [0, 0, -gravity]
     # A simulation that breaks down must not go on from a default state unnoticed.
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    # One leg is one island; to look for others takes a tenth of a step.
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
     fixed = rig == "fixed-base"
     if fixed:
         spec.delete(spec.joint("rail"))

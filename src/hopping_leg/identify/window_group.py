@@ -73,9 +73,14 @@ class WindowGroup:
         self._substeps = max(1, round(period / timestep / parts))
         self._tick = self._substeps * timestep
         self._zoh = self._setup.onboard == "zoh"
+        self._numbers = sorted({w.recording for w in windows})
+        self._of_window = np.array([self._numbers.index(w.recording) for w in windows])
         self._prepare_rows(recordings, windows)
-        self._prepare_commands(recordings, windows)
-        self._prepare_zeros(recordings, windows)
+        self._prepare_commands(recordings)
+        self._zeros = [
+            Zeros(recordings[n]) if has_own_zeros(recordings[n].setup) else None
+            for n in self._numbers
+        ]
         self._batches: dict[int, batch.Batch] = {}
 
     def run(self, candidates: Sequence[Candidate]) -> tuple[Array, Array, Array, Array]:
@@ -105,7 +110,7 @@ class WindowGroup:
         self._begin = np.empty(len(windows))
         times = np.zeros((len(windows), length))
         self._padding = np.ones((len(windows), length), dtype=bool)
-        states = {n: start_states(recordings[n]) for n in {w.recording for w in windows}}
+        states = {n: start_states(recordings[n]) for n in self._numbers}
         self._q0, self._qd0 = np.empty((len(windows), 2)), np.empty((len(windows), 2))
         self._height0, self._rate0 = np.full(len(windows), np.nan), np.zeros(len(windows))
         for i, w in enumerate(windows):
@@ -124,10 +129,9 @@ class WindowGroup:
         self._before = np.minimum(np.floor(place + 1e-9).astype(int), self._ticks - 2)
         self._share = np.clip(place - self._before, 0.0, 1.0)[..., None]
 
-    def _prepare_commands(self, recordings: Sequence[Recording], windows: Sequence[Window]) -> None:
+    def _prepare_commands(self, recordings: Sequence[Recording]) -> None:
         self._held, self._ramps, self._gains = [], [], []
-        for w in windows:
-            recording = recordings[w.recording]
+        for recording in (recordings[n] for n in self._numbers):
             columns = [
                 np.nan_to_num(recording.array(f"{name}_command"))
                 for name in ("position", "velocity", "torque")
@@ -137,14 +141,6 @@ class WindowGroup:
             self._ramps.append(Held(time, np.zeros_like(columns[1]), columns[1]))
             rows = [recorded_gains(recording, n) for n in ("stiffness", "damping", "integral")]
             self._gains.append(Held(time, np.concatenate(rows, axis=1)))
-
-    def _prepare_zeros(self, recordings: Sequence[Recording], windows: Sequence[Window]) -> None:
-        """Note which windows share their encoders' zeros."""
-        numbers = sorted({w.recording for w in windows})
-        self._of_window = [numbers.index(w.recording) for w in windows]
-        self._zeros = [
-            Zeros(recordings[n]) if has_own_zeros(recordings[n].setup) else None for n in numbers
-        ]
 
     def _start(self, candidates: Sequence[Candidate], zeros: Array) -> batch.Batch:
         """Return the batch with each simulation's model and initial state set."""
@@ -240,19 +236,26 @@ class WindowGroup:
     ) -> tuple[Array, Array]:
         """Return a block of ticks' commands, (ticks, n, 6), and gains, (ticks, 3, n, 2)."""
         windows, number = len(self._begin), len(candidates)
-        ticks = np.arange(tick, min(tick + _BLOCK, self._ticks)) * self._tick
+        ticks = np.arange(tick, min(tick + _BLOCK, self._ticks))[:, None, None] * self._tick
         late = np.zeros(number) if self._zoh else delay[::windows]
+        late = late[:1] if (late == late[0]).all() else late
         ramp = np.array([[c.drive.ramp] for c in candidates])
         commands = np.empty((len(ticks), number, windows, 6))
         gains = np.empty((len(ticks), 3, number, windows, 2))
-        fitted = [drive_values(candidates, n) for n in ("stiffness", "damping", "integral")]
-        for w in range(windows):
-            start = self._begin[w] + ticks[:, None] - late
-            commands[:, :, w] = self._held[w].average(start, self._tick)
+        fitted = np.array(
+            [drive_values(candidates, n) for n in ("stiffness", "damping", "integral")]
+        )[:, :, None]
+        for n in range(len(self._numbers)):
+            mine = self._of_window == n
+            start = self._begin[mine] + ticks - late[:, None]
+            held = self._held[n].average(start, self._tick)
             if ramp.any():
-                commands[:, :, w, :2] += ramp * self._ramps[w].average(start, self._tick)
-            rows = self._gains[w].at(start + 1e-9).reshape(len(ticks), number, 3, 2)
-            gains[:, :, :, w] = np.where(np.isnan(fitted), rows.swapaxes(1, 2), fitted)
+                held = np.repeat(held, number // len(late), axis=1)
+                held[..., :2] += ramp[:, None] * self._ramps[n].average(start, self._tick)
+            commands[:, :, mine] = held
+            rows = self._gains[n].at(start + 1e-9)
+            rows = np.moveaxis(rows.reshape(*start.shape, 3, 2), 3, 1)
+            gains[:, :, :, mine] = np.where(np.isnan(fitted), rows, fitted)
         if self._setup.onboard == "torque":
             gains[...] = 0.0
         for index, name in enumerate(("stiffness", "damping")):
