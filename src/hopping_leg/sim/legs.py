@@ -8,38 +8,21 @@ from mujoco import batch
 
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import kinematics
 from hopping_leg.robot.limits import MotorLimit
 from hopping_leg.robot.model import TIMESTEP, build_model
 from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim.any_legs import AnyLegs
 from hopping_leg.sim.reality import RealLegs
 
 CONTROL_RATE = 200.0
 """Control rate of the paper, Hz."""
 
 
-def _substeps(rate: float, timestep: float) -> int:
-    for name, value in (("control rate", rate), ("physics step", timestep)):
-        if not 0 < value < np.inf:
-            raise UsageError(f"The {name} is {value} but must be positive and finite.")
-    substeps = round(1 / (rate * timestep))
-    if substeps < 1 or abs(substeps * timestep * rate - 1) > 1e-9:
-        raise UsageError(
-            f"A physics step of {timestep} s does not divide the control period of"
-            f" {1 / rate} s; take e.g. {1 / (rate * max(substeps, 1)):g} s."
-        )
-    return substeps
+class Legs(AnyLegs):
+    """Legs in MuJoCo; results do not depend on the number of threads.
 
-
-class Legs:
-    """Simulations of one robot, advanced by one control period at a time.
-
-    ``state`` (n, 6) is a live view of the true state (x, q1, q2 and their rates), and so are its
-    parts ``height``, ``height_rate`` (n,), ``q`` and ``qd`` (n, 2), in m, m/s, rad and rad/s.
-    Results do not depend on the number of threads.
-
-    ``measured_q`` and ``measured_qd`` (n, 2) are what the joints' encoders report, live: the true
-    state, unless the robot's ``reality`` says otherwise.
+    ``measured_q`` and ``measured_qd`` are the true state, unless the robot's ``reality`` says
+    otherwise.
 
     Commands that are late by a constant time are all of a ``reality`` that is simulated here; the
     rest is left to ``RealLegs``, which is slower.
@@ -69,11 +52,7 @@ class Legs:
         clamped: bool = False,
         variants: Sequence[Robot] = (),
     ) -> None:
-        substeps = _substeps(rate, timestep)
-        self.robot, self.count, self.rate, self.timestep = robot, count, rate, timestep
-        self.period = 1 / rate
-        self.substeps = substeps
-        self.real: RealLegs | None = None
+        super().__init__(robot, count, rate, timestep)
         if robot.reality.only_delays and not clamped:
             self._take_model(threads, variants)
         elif variants:
@@ -83,14 +62,12 @@ class Legs:
             )
         else:
             self._take_reality(clamped, threads)
-        self.height, self.height_rate = self.state[:, 0], self.state[:, 3]
-        self.q, self.qd = self.state[:, 1:3], self.state[:, 4:6]
         sensors = self if self.real is None else self.real.sensors
         self.measured_q, self.measured_qd = sensors.q, sensors.qd
         self._motors = MotorLimit(robot, count)
         self._inverse_belt = np.tile(1 / robot.of_joints("belt_ratio"), (count, 1))
         self._applied = np.zeros((count, 2))
-        ticks, self._late = divmod(round(robot.reality.latency.command / timestep), substeps)
+        ticks, self._late = divmod(round(robot.reality.latency.command / timestep), self.substeps)
         self.waiting = np.zeros((ticks + 1, count, 2))
         """What the motors give until a late command arrives, and the commands under way, N m."""
 
@@ -103,7 +80,7 @@ class Legs:
             self.batch.set_models([build_model(v, self.timestep) for v in variants])
         self._ctrl = self.batch.bind("ctrl")
         first = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_TIME)
-        self.state = self.batch.state[:, first : first + 6]
+        self._show(self.batch.state[:, first : first + 6])
 
     def _take_reality(self, clamped: bool, threads: int) -> None:
         self.real = RealLegs(
@@ -114,7 +91,8 @@ class Legs:
             threads=threads,
             clamped=clamped,
         )
-        self.batch, self.state = self.real.batch, self.real.state
+        self.batch = self.real.batch
+        self._show(self.real.state)
 
     @property
     def measured_torque(self) -> Array:
@@ -138,10 +116,6 @@ class Legs:
         self.batch.reset(np.sort(rows), stage=0)
         self.height[ids] = height
         self.q[ids] = q
-
-    def stand(self, ids: IntArray | slice, q: Array, clearance: Array | float = 0.0) -> None:
-        """Put legs at rest in a posture with the foot ``clearance`` above the ground, m, (k,)."""
-        self.place(ids, kinematics.stance_height(self.robot, q) + clearance, q)
 
     def step(self, torque: Array) -> Array:
         """Hold joint torques for one control period; return what the motors gave, N m, (n, 2).
@@ -173,15 +147,3 @@ class Legs:
         self._applied = after + self._late / self.substeps * (before - after)
         self.waiting = np.stack([after, *under_way[1:]])
         return self._applied
-
-    def foot_clearance(self) -> Array:
-        """Return the gap between each foot and the ground, m, (n,)."""
-        return kinematics.foot_clearance(self.robot, self.height, self.q)
-
-    def knee_clearance(self) -> Array:
-        """Return the gap between each knee and the ground, m, (n,)."""
-        return kinematics.knee_clearance(self.robot, self.height, self.q)
-
-    def base_clearance(self) -> Array:
-        """Return the gap between each base and the ground, m, (n,)."""
-        return kinematics.base_clearance(self.robot, self.height)
