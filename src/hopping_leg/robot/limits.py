@@ -1,5 +1,6 @@
 """What the joints may do: the motors' torque-speed limit and the paper's soft position limits."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,17 +17,15 @@ class MotorLimit:
     speed; the software limit caps it; braking is limited by the software limit alone.
 
     Args:
-        robot: Whose motors.
+        robot: Whose motors; one robot per leg where legs differ, all inputs being (n, 2).
         count: Number of legs n if all inputs are (n, 2), which is faster; any shape if None.
     """
 
-    def __init__(self, robot: Robot, count: int | None = None) -> None:
-        belt = robot.of_joints("belt_ratio")
-        joints = (robot.hip, robot.knee)
-        peak = np.array([j.motor.peak_torque for j in joints]) * belt
-        self.limit = _per_leg(robot.of_joints("torque_limit"), count)
-        self.peak = _per_leg(peak, count)
-        self._slope = _per_leg(peak / robot.of_joints("no_load_speed"), count)
+    def __init__(self, robot: Robot | Sequence[Robot], count: int | None = None) -> None:
+        robots = [robot] if isinstance(robot, Robot) else robot
+        lines = np.stack([_torque_speed_line(one) for one in robots], axis=1)
+        limit, peak, slope = lines[:, 0] if isinstance(robot, Robot) else lines
+        self.limit, self.peak, self._slope = (_per_leg(x, count) for x in (limit, peak, slope))
         self._minus_limit, self._minus_peak = -self.limit, -self.peak
         self._zero = np.zeros_like(self.limit)
 
@@ -45,6 +44,15 @@ class MotorLimit:
         np.minimum(lower, self._zero, out=lower)
         np.maximum(lower, self._minus_limit, out=lower)
         return np.minimum(np.maximum(torque, lower), upper)
+
+
+def _torque_speed_line(robot: Robot) -> Array:
+    """Return software limit, peak torque and slope of both joints, (3, 2)."""
+    joints = (robot.hip, robot.knee)
+    peak = np.array([j.motor.peak_torque for j in joints]) * robot.of_joints("belt_ratio")
+    return np.stack(
+        [robot.of_joints("torque_limit"), peak, peak / robot.of_joints("no_load_speed")]
+    )
 
 
 @dataclass(frozen=True)

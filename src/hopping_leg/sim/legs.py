@@ -35,7 +35,9 @@ class Legs(AnyLegs):
         threads: Worker threads, 0 for one per core.
         clamped: Fix the base where it is placed, for fixed-base runs.
         variants: One robot per simulation, which may differ from ``robot`` in what ``sim.variants``
-            lets vary; none simulates ``robot`` n times.
+            lets vary and in ``reality``; none simulates ``robot`` n times.
+        detailed: Leave everything to ``RealLegs``, also what it is not needed for, so that legs may
+            ``become`` robots with any ``reality``.
 
     Raises:
         UsageError: The physics step does not divide the control period, or the variants do not fit.
@@ -51,17 +53,18 @@ class Legs(AnyLegs):
         threads: int = 0,
         clamped: bool = False,
         variants: Sequence[Robot] = (),
+        detailed: bool = False,
     ) -> None:
         super().__init__(robot, count, rate, timestep)
-        if robot.reality.only_delays and not clamped:
-            self._take_model(threads, variants)
-        elif variants:
+        if variants and (clamped or len(variants) != count):
             raise UsageError(
-                f"Variants of {robot.name} cannot be simulated: it is clamped or has effects in"
-                " [reality] beyond a delay; vary a robot without."
+                f"{len(variants)} variants were given for {count} legs"
+                f"{' that are clamped; variants hop' if clamped else '; give one for each'}."
             )
+        if self._is_plain(variants) and not clamped and not detailed:
+            self._take_model(threads, variants)
         else:
-            self._take_reality(clamped, threads)
+            self._take_reality(variants or [robot] * count, clamped, threads)
         sensors = self if self.real is None else self.real.sensors
         self.measured_q, self.measured_qd = sensors.q, sensors.qd
         self._motors = MotorLimit(robot, count)
@@ -75,17 +78,25 @@ class Legs(AnyLegs):
         model = build_model(self.robot, self.timestep)
         self.batch = batch.Batch(model, self.count, threads)
         if variants:
-            if len(variants) != self.count:
-                raise UsageError(f"{len(variants)} variants were given for {self.count} legs.")
-            self.batch.set_models([build_model(v, self.timestep) for v in variants])
+            self._set_models(variants)
         self._ctrl = self.batch.bind("ctrl")
         first = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_TIME)
         self._show(self.batch.state[:, first : first + 6])
 
-    def _take_reality(self, clamped: bool, threads: int) -> None:
+    def _set_models(self, variants: Sequence[Robot]) -> None:
+        """Build every robot's model, once where legs share a robot."""
+        distinct = {id(robot): robot for robot in variants}
+        models = {key: build_model(robot, self.timestep) for key, robot in distinct.items()}
+        self.batch.set_models([models[id(robot)] for robot in variants])
+
+    def _is_plain(self, variants: Sequence[Robot]) -> bool:
+        """Tell whether a constant delay, the same for all, is all that is beyond the model."""
+        reality = self.robot.reality
+        return reality.only_delays and all(v.reality == reality for v in variants)
+
+    def _take_reality(self, robots: Sequence[Robot], clamped: bool, threads: int) -> None:
         self.real = RealLegs(
-            self.robot,
-            self.count,
+            robots,
             timestep=self.timestep,
             substeps=self.substeps,
             threads=threads,
@@ -98,6 +109,30 @@ class Legs(AnyLegs):
     def measured_torque(self) -> Array:
         """What the motors' torque measurement reports now, N m at the joints, (n, 2)."""
         return self._applied if self.real is None else self.real.sensors.torque
+
+    def become(self, variants: Sequence[Robot]) -> None:
+        """Go on as other robots, one per leg, in the present state.
+
+        Raises:
+            UsageError: They have effects that these legs cannot take on while they move.
+        """
+        if self.real is not None:
+            self.real.adopt(variants)
+        elif self._is_plain(variants):
+            self._set_models(variants)
+        else:
+            raise UsageError(
+                f"Legs of {self.robot.name} cannot take on another [reality] while they move; make"
+                " them with 'detailed'."
+            )
+
+    def push(self, force: Array) -> None:
+        """Push the bases upward from now on, N, (n,); not for clamped ones."""
+        self.batch.bind("qfrc_applied")[:, 0] = force
+
+    def raise_ground(self, rise: Array) -> None:
+        """Raise the ground under each leg, m, (n,): the leg, whose height is above it, is lower."""
+        self.height -= rise
 
     def place(self, ids: IntArray | slice, height: Array | float, q: Array) -> None:
         """Put legs at rest at a height and posture.

@@ -8,11 +8,14 @@ and lag alone, but jitter draws each command's delay anew, and gain, ripple and 
 lag and need the motor's angle and speed.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.robot.limits import MotorLimit
-from hopping_leg.robot.reality import Reality
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim.real_model import real_parameters
 
 _REST = 0.1
 """Joint speed below which the gear's loss fades, as power has no direction at rest, rad/s."""
@@ -22,34 +25,46 @@ class RealDrive:
     """Both drives of n legs.
 
     Args:
-        reality: The effects.
-        limit: What software and battery allow.
-        count: Number of legs n.
+        robots: The legs, whose ``reality`` holds, n of them.
         timestep: Physics step, s; latency and jitter are rounded to it.
         substeps: Physics steps per control period.
     """
 
-    def __init__(
-        self, reality: Reality, limit: MotorLimit, count: int, timestep: float, substeps: int
-    ) -> None:
-        self._limit, self._substeps = limit, substeps
-        self._late = round(reality.latency.command / timestep)
-        self._jitter = round(reality.latency.jitter / timestep)
-        ahead = substeps + self._late + self._jitter
-        self._offset = np.arange(ahead)[:, None]
-        self._line = np.zeros((ahead, count, 2))
-        self._number = np.zeros((ahead, count))
+    def __init__(self, robots: Sequence[Robot], timestep: float, substeps: int) -> None:
+        count = len(robots)
+        self._timestep, self._substeps = timestep, substeps
+        self._line = np.zeros((substeps, count, 2))
+        self._number = np.zeros((substeps, count))
         self._taken, self._wanted = np.zeros(count), np.zeros((count, 2))
         self.motor_torque = np.zeros((count, 2))
         """What the motors give, N m at the joint, (n, 2); their current shows it."""
         self._command = 0.0
-        self._gain = reality.of_drives("torque_gain")
-        lag = reality.of_drives("torque_lag")
+        self.adopt(robots)
+
+    def adopt(self, robots: Sequence[Robot]) -> None:
+        """Go on as the drives of other robots; commands under way stay under way."""
+        realities = [robot.reality for robot in robots]
+        self._limit = MotorLimit([real_parameters(robot) for robot in robots])
+        latencies = [(r.latency.command, r.latency.jitter) for r in realities]
+        self._late, self._jitter = np.round(np.array(latencies).T / self._timestep)
+        self._look_ahead(self._substeps + int((self._late + self._jitter).max()))
+
+        def of_drives(attribute: str) -> Array:
+            return np.array([reality.of_drives(attribute) for reality in realities])
+
+        self._gain = of_drives("torque_gain")
+        lag = of_drives("torque_lag")
         self._lagging = bool(lag.any())
-        self._follow = -np.expm1(-timestep / np.maximum(lag, 1e-12))
-        self._ripple = reality.of_drives("ripple")
-        self._periods = reality.of_drives("ripple_periods")
-        self._efficiency = reality.of_drives("efficiency")
+        self._follow = -np.expm1(-self._timestep / np.maximum(lag, 1e-12))
+        self._ripple, self._periods = of_drives("ripple"), of_drives("ripple_periods")
+        self._efficiency = of_drives("efficiency")
+
+    def _look_ahead(self, steps: int) -> None:
+        """Make room for commands that arrive so many physics steps from now."""
+        more = max(0, steps - len(self._line))
+        self._line = np.concatenate([self._line, np.repeat(self._line[-1:], more, axis=0)])
+        self._number = np.concatenate([self._number, np.repeat(self._number[-1:], more, axis=0)])
+        self._offset = np.arange(len(self._line))[:, None]
 
     def forget(self, rows: IntArray) -> None:
         """Drop the commands under way of some legs; their motors give nothing."""

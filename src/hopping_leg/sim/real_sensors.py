@@ -5,6 +5,8 @@ value some physics steps ago, plus white noise, rounded to the sensor's step; it
 control period.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from hopping_leg.arrays import Array, IntArray
@@ -18,22 +20,30 @@ class RealSensors:
     """Sensors of n legs; ``q``, ``qd`` and ``torque`` (n, 2) are the latest readings, live.
 
     Args:
-        reality: The effects.
-        count: Number of legs n.
+        realities: The effects, one of each leg, n of them.
         timestep: Physics step, s; the measurement's latency is rounded to it.
     """
 
-    def __init__(self, reality: Reality, count: int, timestep: float) -> None:
-        late = round(reality.latency.measurement / timestep)
-        self._past = np.zeros((late + 1, count, DRAWS))
+    def __init__(self, realities: Sequence[Reality], timestep: float) -> None:
+        count = len(realities)
+        self._timestep, self._legs = timestep, np.arange(count)
+        self._past = np.zeros((1, count, DRAWS))
         self._newest = 0
-        kinds = ("position", "velocity", "torque")
-        self._noise = np.concatenate([reality.of_sensors(f"{kind}_noise") for kind in kinds])
-        step = np.concatenate([reality.of_sensors(f"{kind}_step") for kind in kinds])
-        self._rounded = np.flatnonzero(step)
-        self._step = step[self._rounded]
+        self.adopt(realities)
         self._reading = np.zeros((count, DRAWS))
         self.q, self.qd, self.torque = (self._reading[:, k : k + 2] for k in (0, 2, 4))
+
+    def adopt(self, realities: Sequence[Reality]) -> None:
+        """Go on as the sensors of other realities; a longer past begins with the oldest known."""
+        latency = np.array([reality.latency.measurement for reality in realities])
+        self._late = np.round(latency / self._timestep).astype(np.int64)
+        rising = np.roll(self._past, -self._newest - 1, axis=0)
+        more = max(0, int(self._late.max()) + 1 - len(rising))
+        self._past = np.concatenate([np.repeat(rising[:1], more, axis=0), rising])
+        self._newest = len(self._past) - 1
+        self._noise, step = (_of_sensors(realities, what) for what in ("noise", "step"))
+        self._rounded = np.flatnonzero(step.any(axis=0))
+        self._step = step[:, self._rounded]
 
     def watch(self, q: Array, qd: Array, torque: Array) -> None:
         """Take in the true state after a physics step.
@@ -49,9 +59,9 @@ class RealSensors:
 
     def read(self, draws: Array) -> None:
         """Renew the readings; ``draws`` are standard normal, (n, 6)."""
-        oldest = self._past[(self._newest + 1) % len(self._past)]
-        self._reading[:] = oldest + self._noise * draws
-        self._round(slice(None))
+        seen = self._past[(self._newest - self._late) % len(self._past), self._legs]
+        self._reading[:] = seen + self._noise * draws
+        self._round(self._legs)
 
     def forget(self, rows: IntArray, q: Array, qd: Array) -> None:
         """Read the present of some legs without noise, as if they had never moved otherwise."""
@@ -60,12 +70,12 @@ class RealSensors:
         self._reading[rows] = present
         self._round(rows)
 
-    def _round(self, rows: IntArray | slice) -> None:
+    def _round(self, rows: IntArray) -> None:
         if len(self._rounded):
-            reading = self._reading[rows]
-            steps = np.round(reading[:, self._rounded] / self._step)
-            reading[:, self._rounded] = steps * self._step
-            self._reading[rows] = reading
+            place = np.ix_(rows, self._rounded)
+            exact, step = self._reading[place], self._step[rows]
+            steps = np.round(np.divide(exact, step, out=np.zeros_like(exact), where=step > 0))
+            self._reading[place] = np.where(step > 0, steps * step, exact)
 
     def memory(self) -> dict[str, Array]:
         """Return everything needed to go on exactly from here."""
@@ -79,3 +89,11 @@ class RealSensors:
         """Go on from a ``memory``."""
         self._past[:], self._newest = memory["past"], int(memory["newest"])
         self._reading[:] = memory["reading"]
+
+
+def _of_sensors(realities: Sequence[Reality], what: str) -> Array:
+    """Return noise or step of position, velocity and torque of both joints, (n, 6)."""
+    kinds = ("position", "velocity", "torque")
+    return np.array(
+        [np.concatenate([r.of_sensors(f"{k}_{what}") for k in kinds]) for r in realities]
+    )

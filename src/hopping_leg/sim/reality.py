@@ -9,17 +9,18 @@ Motor, latency     numpy at each physics step, where order matters (``real_drive
 Encoders           numpy once per control period; the physics never sees them (``real_sensors``)
 """
 
+from collections.abc import Sequence
 from typing import Any
 
+import mujoco
 import numpy as np
 from mujoco import batch
 
 from hopping_leg.arrays import Array, IntArray
-from hopping_leg.robot.limits import MotorLimit
+from hopping_leg.errors import UsageError
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.robot.reality import Reality
 from hopping_leg.sim.real_drive import RealDrive
-from hopping_leg.sim.real_model import real_model, real_parameters
+from hopping_leg.sim.real_model import real_model
 from hopping_leg.sim.real_sensors import DRAWS, RealSensors
 
 
@@ -31,55 +32,88 @@ class RealLegs:
     alike before the next.
 
     Args:
-        robot: The leg.
-        count: Number of simulations n.
+        robots: The leg of each simulation, n of them; those that differ must agree in which joints
+            have backlash or a belt, and have no stiction.
         timestep: Physics step, s.
         substeps: Physics steps per control period.
         threads: Worker threads, 0 for one per core.
         clamped: Whether the base is fixed; it then stays at the height where it was placed.
+
+    Raises:
+        UsageError: The robots cannot be simulated side by side.
     """
 
     def __init__(
         self,
-        robot: Robot,
-        count: int,
+        robots: Sequence[Robot],
         *,
         timestep: float,
         substeps: int,
         threads: int,
         clamped: bool,
     ) -> None:
-        self.count, self.substeps, reality = count, substeps, robot.reality
-        real = real_model(robot, timestep, clamped=clamped)
-        self.batch = batch.Batch(real.model, count, threads)
+        self.count, self.substeps, self._timestep = len(robots), substeps, timestep
+        real = real_model(robots[0], timestep, clamped=clamped)
+        self.batch = batch.Batch(real.model, self.count, threads)
         self._ctrl = self.batch.bind("ctrl")
         self._q, self._qd = self.batch.bind("qpos"), self.batch.bind("qvel")
         self._motor, self._flexible, self._clamped = real.motor, real.flexible, clamped
-        self.state = np.zeros((count, 6))
-        self._shown = np.zeros((count, 6))
-        self.drive = RealDrive(
-            reality, MotorLimit(real_parameters(robot), count), count, timestep, substeps
-        )
-        self.sensors = RealSensors(reality, count, timestep)
-        self._find_dead_bands(reality)
-        self._inverse_belt = np.tile(1 / robot.of_joints("belt_ratio"), (count, 1))
-        self._coulomb = robot.of_joints("friction")
+        self.state = np.zeros((self.count, 6))
+        self._shown = np.zeros((self.count, 6))
+        self.drive = RealDrive(robots, timestep, substeps)
+        self.sensors = RealSensors([robot.reality for robot in robots], timestep)
+        self._inverse_belt = np.tile(1 / robots[0].of_joints("belt_ratio"), (self.count, 1))
+        self._layout = _layout(robots[0])
+        self._note(robots)
+        if _differ(robots):
+            self.batch.set_models(self._models(robots))
+        self.reseed(np.random.default_rng(0))
+
+    def adopt(self, robots: Sequence[Robot]) -> None:
+        """Go on as other robots, in the present state; commands under way stay under way.
+
+        Raises:
+            UsageError: They differ from the present ones in which joints have backlash or a belt,
+                or one of them has stiction.
+        """
+        self._note(robots)
+        self.batch.set_models(self._models(robots))
+        self.drive.adopt(robots)
+        self.sensors.adopt([robot.reality for robot in robots])
+
+    def _models(self, robots: Sequence[Robot]) -> list[mujoco.MjModel]:
+        """Build every robot's model, once where legs share a robot."""
+        distinct = {id(robot): robot for robot in robots}
+        if any(_layout(robot) != self._layout for robot in distinct.values()):
+            raise UsageError(
+                "Legs with backlash or a belt and legs without cannot be simulated side by side;"
+                " give all of them a small one."
+            )
+        if any((robot.reality.of_drives("stiction") > 1).any() for robot in distinct.values()):
+            raise UsageError(
+                "Legs with stiction cannot differ or become others; leave 'stiction' at 1."
+            )
+        models = {
+            key: real_model(robot, self._timestep, clamped=self._clamped).model
+            for key, robot in distinct.items()
+        }
+        return [models[id(robot)] for robot in robots]
+
+    def _note(self, robots: Sequence[Robot]) -> None:
+        """Note what is computed here at each physics step: stiction, springs with a dead band."""
+        reality = robots[0].reality
+        self._coulomb = robots[0].of_joints("friction")
         self._excess = self._coulomb * (reality.of_drives("stiction") - 1)
         self._stribeck = reality.of_drives("stiction_speed")
         if self._excess.any():
             self._friction = self.batch.expand("dof_frictionloss")
-        self.reseed(np.random.default_rng(0))
-
-    def _find_dead_bands(self, reality: Reality) -> None:
-        """Note the hinges whose spring has a dead band, which MuJoCo's has not."""
-        both = [
-            (place, drive)
-            for place, drive in zip(self._flexible, (reality.hip, reality.knee), strict=True)
-            if drive.backlash and drive.stiffness is not None
-        ]
-        self._slack = np.array([place for place, _ in both], np.int64)
-        self._half_band = np.array([drive.backlash / 2 for _, drive in both])
-        self._spring = np.array([drive.stiffness for _, drive in both], np.float64)
+        stiffness, backlash = (
+            np.array([robot.reality.of_drives(name) for robot in robots])
+            for name in ("stiffness", "backlash")
+        )
+        both = [joint for joint, (slack, belt) in enumerate(self._layout) if slack and belt]
+        self._slack = np.array([self._flexible[joint] for joint in both], np.int64)
+        self._half_band, self._spring = backlash[:, both] / 2, stiffness[:, both]
         if both:
             self._spring_torque = self.batch.bind("qfrc_applied")
 
@@ -165,3 +199,13 @@ class RealLegs:
             part.restore({k[len(prefix) :]: v for k, v in memory.items() if k.startswith(prefix)})
         self.rng.bit_generator.state = memory["reality_rng"]
         self._show()
+
+
+def _differ(robots: Sequence[Robot]) -> bool:
+    return any(robot is not robots[0] for robot in robots)
+
+
+def _layout(robot: Robot) -> list[tuple[bool, bool]]:
+    """Return whether hip and knee have backlash and a belt, which decides the coordinates."""
+    drives = (robot.reality.hip, robot.reality.knee)
+    return [(drive.backlash > 0, drive.stiffness is not None) for drive in drives]

@@ -51,14 +51,14 @@ def vary(
     for number in range(count):
         variant = robot
         for spread in ranges:
-            variant = _with(variant, spread.path.split("."), spread.draw(rng))
+            variant = with_value(variant, spread.path.split("."), spread.draw(rng))
         check_physics(variant, f"variant {number} of {robot.name}")
         variants.append(variant)
     return tuple(variants)
 
 
-def _with(part: Part, path: list[str], value: float) -> Part:
-    """Return a nested dataclass with one number replaced."""
+def with_value(part: Part, path: list[str], value: float) -> Part:
+    """Return a nested dataclass with the entry at a path replaced."""
     name, *rest = path
-    entry: Any = _with(getattr(part, name), rest, value) if rest else value
+    entry: Any = with_value(getattr(part, name), rest, value) if rest else value
     return dataclasses.replace(part, **{name: entry})  # type: ignore[type-var]
