@@ -72,6 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 _EXTRAS = {
     **dict.fromkeys(("torch", "stable_baselines3", "onnx", "tensorboard"), "train"),
     **dict.fromkeys(("moteus", "can", "serial", "msgpack"), "hardware"),
+    "pybullet": "bullet",
 }
 
 
