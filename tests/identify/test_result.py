@@ -43,3 +43,19 @@ def test_what_does_not_exist_is_null():
     tree = as_json(dataclasses.replace(identified(), told=told))
     assert tree["parameters"][0]["interval_high"] is None
     assert json.loads(json.dumps(tree, allow_nan=False)) == tree
+
+
+def test_without_a_closed_loop_its_pairs_are_null_and_nobody_tells_of_it():
+    nothing = (np.nan, np.nan)
+    told = {
+        when: dataclasses.replace(
+            getattr(identified(), when), closed_loop_position=nothing, closed_loop_torque=nothing
+        )
+        for when in ("validation", "start_validation")
+    }
+    tree = as_json(dataclasses.replace(identified(), **told))
+    assert tree["validation"]["closed_loop_position_rms_rad"] == [None, None]
+    assert tree["validation"]["closed_loop_torque_rms_nm"] == [None, None]
+    assert [row["error"] for row in tree["quality"]] == [
+        f"position, predicted {horizon} s ahead" for horizon in ("0.2", "0.5", "1")
+    ]

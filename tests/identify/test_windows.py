@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.errors import RecordingError, UsageError
-from hopping_leg.identify.windows import cut, split
+from hopping_leg.identify.windows import cut, deal, split
 from tests.identify.twin import LEG, record, swing
 
 RUN = record(LEG, swing(3.0))
@@ -35,3 +35,16 @@ def test_a_short_recording_gets_a_sentence():
 def test_a_split_needs_a_share(share):
     with pytest.raises(UsageError, match="between 0 and 1"):
         split(cut([RUN], 0.5), share, np.random.default_rng(0))
+
+
+def test_dealt_windows_are_all_there_and_every_share_is_spread_over_them():
+    windows = cut([RUN], 0.1)
+    shares = deal(windows, 4, np.random.default_rng(0))
+    assert sorted((w for share in shares for w in share), key=lambda w: w.start) == windows
+    for share in shares:
+        assert [w.start // 80 for w in share] == list(range(len(share)))
+        assert len({w.start % 80 for w in share}) > 1
+
+
+def test_no_share_is_empty():
+    assert [len(share) for share in deal(cut([RUN], 1.0), 9, np.random.default_rng(0))] == [1, 1, 1]

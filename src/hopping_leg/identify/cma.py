@@ -1,6 +1,6 @@
 """CMA-ES, the paper's search, on any cost: a generation is one batch, and a killed run resumes."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,7 +26,17 @@ class CmaOptions:
     spread: float = 1.0
     """First standard deviation, in units of the parameters' scales."""
     tolerance: float = 1e-9
-    """Range of costs, relative to the best, below which the search has converged."""
+    """Range of a generation's costs, relative to its best, below which the search has converged."""
+    seconds: float = 40.0
+    """Simulated for a candidate in each generation. Of more windows each generation is judged by
+    another share, and the end by all."""
+
+
+_RECENT = 4
+"""Generations whose best stand for election at the end of a search that is judged by shares."""
+
+_COLLAPSED = 1e-3
+"""Standard deviation, in units of the parameters' scales, below which such a search has ended."""
 
 
 def cma_es(
@@ -36,11 +46,16 @@ def cma_es(
     *,
     seed: int,
     start: Array | None = None,
+    shares: Sequence[Values] = (),
     about: Mapping[str, object] | None = None,
     checkpoint: Path | None = None,
     report: Callable[[int, float], None] = lambda index, cost: None,
 ) -> Found:
     """Search from one start.
+
+    Costs only rank the candidates of a generation, so a share of the data is enough to judge it
+    by. As shares take turns, the distribution's mean wanders about where all of them agree; its
+    averages and the last generations' best are judged by everything, and the best one counts.
 
     The checkpoint holds every generation's costs. A resumed run draws the same generations from
     the same seed and takes their costs from there, so it ends bit for bit as if never killed.
@@ -51,9 +66,11 @@ def cma_es(
         options: How.
         seed: Of all randomness.
         start: Search vector to start from, (k,); None takes the parameters' start.
+        shares: Functions whose sum is ``values``; each generation is judged by the next one in
+            turn, and what comes out by ``values``, which judges everything if there are none.
         about: What else tells this search from others, e.g. the recordings' hashes.
         checkpoint: File for the state after each generation.
-        report: Called with generation and best cost so far.
+        report: Called with generation and best cost so far, or what its share makes of it.
 
     Raises:
         UsageError: The checkpoint belongs to another search.
@@ -71,21 +88,36 @@ def cma_es(
     saved = load_state(checkpoint, identity) or {"costs": []}
     costs: list[list[float]] = saved["costs"]
     strategy = cma.CMAEvolutionStrategy(first, options.spread, _settings(options, low, high, seed))
-    best, least, history = first, np.inf, []
+    judges = [*shares] or [values]
+    bests: list[Array] = []
+    means: list[Array] = []
+    history: list[float] = []
     for generation in range(options.generations):
         vectors = np.array(strategy.ask())
         if generation == len(costs):
-            costs.append(np.asarray(values(vectors)).tolist())
+            judge = judges[generation % len(judges)]
+            costs.append(np.asarray(judge(vectors)).tolist())
             save_state(checkpoint, identity, {"costs": costs})
         found = np.array(costs[generation])
         strategy.tell(list(vectors), found.tolist())
-        if found.min() < least:
-            best, least = vectors[found.argmin()], float(found.min())
-        history.append(least)
-        report(generation + 1, least)
-        if np.ptp(found) <= options.tolerance * abs(least):
+        means.append(np.array(strategy.result.xfavorite))
+        least = len(judges) * float(found.min())
+        if shares or not history or least < history[-1]:
+            bests.append(vectors[found.argmin()])
+        history.append(least if shares or not history else min(least, history[-1]))
+        report(generation + 1, history[-1])
+        if np.ptp(found) <= options.tolerance * abs(found.min()):
             break
-    return Found(best, least, len(history) * options.population, history)
+        if shares and np.max(strategy.result.stds) < _COLLAPSED:
+            break
+    count = len(history) * options.population
+    if not shares:
+        return Found(bests[-1], history[-1], count, history)
+    spans = (1, len(shares), len(means) // 3 + 1)
+    elected = np.array([*bests[-_RECENT:], *(np.mean(means[-n:], axis=0) for n in spans)])
+    final = np.asarray(values(elected))
+    least = float(final.min())
+    return Found(elected[final.argmin()], least, count + len(elected), [*history, least])
 
 
 def _settings(options: CmaOptions, low: Array, high: Array, seed: int) -> dict[str, object]:

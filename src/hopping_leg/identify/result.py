@@ -111,7 +111,10 @@ def validation_json(validation: Validation) -> dict[str, Any]:
 
 
 def quality_json(identified: Identified) -> list[dict[str, Any]]:
-    """Return a record per kind of error on held-out data, rms before and after the fit, SI."""
+    """Return a record per kind of error on held-out data, rms before and after the fit, SI.
+
+    Errors of which these recordings tell nothing are left out.
+    """
     before, after = identified.start_validation, identified.validation
     rows = [
         ("position, closed loop", "rad", before.closed_loop_position, after.closed_loop_position),
@@ -130,6 +133,7 @@ def quality_json(identified: Identified) -> list[dict[str, Any]]:
             "knee_after": second[1],
         }
         for name, unit, first, second in rows
+        if any(map(math.isfinite, (*first, *second)))
     ]
 
 

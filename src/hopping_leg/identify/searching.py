@@ -3,6 +3,8 @@
 Cost is the sum of squared residuals throughout, as the objective's levels weigh it.
 """
 
+import dataclasses
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,6 +28,13 @@ from hopping_leg.identify.parameters import ParameterSet
 from hopping_leg.identify.plan import Plan
 from hopping_leg.identify.setup import Rig
 from hopping_leg.identify.two_pass import pass_names, two_pass
+from hopping_leg.identify.windows import deal
+
+Told = Callable[[float, float], None]
+"""Called with the share done (0 to 1) and the lowest cost so far."""
+
+Search = Callable[[Array, Path | None, Told], Found]
+"""From a start, the checkpoint and who is told, to where the search ended."""
 
 Report = Callable[[str, float, float], None]
 """Called with what is being done, its share done (0 to 1) and the lowest cost so far."""
@@ -45,6 +54,11 @@ class SearchOptions:
         if self.starts < 1 or self.cma.generations < 1 or self.cma.population < 4:
             raise UsageError(
                 "A search needs at least one start, one generation and four candidates in each."
+            )
+        if not self.cma.seconds > 0:
+            raise UsageError(
+                f"A generation is judged by {self.cma.seconds} s of windows but needs more than 0;"
+                " infinity takes all."
             )
 
 
@@ -133,59 +147,74 @@ class Searcher:
         )
         about = {**objective.about(), **self._about}
         starts = self._options.starts
-        residuals: Residuals = objective.residuals
-        levels = objective.levels
-        if self._ray is not None:
-            residuals = Cluster(objective.residuals, self._ray)
+        find = self._least_squares if self._plan.search == "least-squares" else self._cma
+        searched = find(objective, about)
 
         def search(number: int, start: Array) -> Found:
             stage = name if starts == 1 else f"{name}, start {number + 1} of {starts}"
+            file = f"search-{name.replace(', ', '-')}-{number}.json"
 
             def told(done: float, cost: float) -> None:
                 self._report(stage, begin + share * (number + done) / starts, cost)
 
-            return self._search(
-                f"{name}-{number}", parameters, residuals, levels, start, about, told
-            )
+            checkpoint = None if self._folder is None else self._folder / file
+            return searched(start, checkpoint, told)
 
         ends = multi_start(search, parameters, starts, self._seed)
         return Pass(name, parameters, ends[0], tuple(end.cost for end in ends[1:]))
 
-    def _search(
-        self,
-        name: str,
-        parameters: ParameterSet,
-        residuals: Residuals,
-        levels: Levels | None,
-        start: Array,
-        about: Mapping[str, object],
-        told: Callable[[float, float], None],
-    ) -> Found:
-        file = f"search-{name.replace(', ', '-')}.json"
-        checkpoint = None if self._folder is None else self._folder / file
-        if self._plan.search == "least-squares":
-            rounds = _Rounds(residuals, levels, self._options.least_squares, told)
+    def _least_squares(self, objective: Objective, about: Mapping[str, object]) -> Search:
+        residuals, levels = self._spread(objective.residuals), objective.levels
+        options = self._options.least_squares
+
+        def search(start: Array, checkpoint: Path | None, told: Told) -> Found:
+            rounds = _Rounds(residuals, levels, options, told)
             return least_squares(
                 rounds,
-                parameters,
-                self._options.least_squares,
+                objective.parameters,
+                options,
                 levels=levels,
                 start=start,
                 about=about,
                 checkpoint=checkpoint,
                 report=rounds.finished,
             )
-        generations = self._options.cma.generations
-        return cma_es(
-            lambda vectors: total_costs(residuals(vectors), levels),
-            parameters,
-            self._options.cma,
-            seed=self._seed,
-            start=start,
-            about=about,
-            checkpoint=checkpoint,
-            report=lambda index, cost: told(index / generations, cost),
-        )
+
+        return search
+
+    def _cma(self, objective: Objective, about: Mapping[str, object]) -> Search:
+        options = self._options.cma
+        values = self._spread(objective)
+        shares = [self._spread(share) for share in self._shares(objective)]
+
+        def search(start: Array, checkpoint: Path | None, told: Told) -> Found:
+            return cma_es(
+                values,
+                objective.parameters,
+                options,
+                seed=self._seed,
+                start=start,
+                shares=shares,
+                about=about,
+                checkpoint=checkpoint,
+                report=lambda index, cost: told(index / options.generations, cost),
+            )
+
+        return search
+
+    def _shares(self, objective: Objective) -> list[Objective]:
+        """Return what judges generations in turn; nothing if all windows can judge each."""
+        rates = [r.setup.rate_hz for r in objective.recordings]
+        simulated = sum(w.length / rates[w.recording] for w in objective.windows)
+        count = max(1, math.ceil(simulated / self._options.cma.seconds))
+        hands = deal(objective.windows, count, np.random.default_rng(self._seed))
+        if len(hands) < 2:
+            return []
+        return [dataclasses.replace(objective, windows=hand) for hand in hands]
+
+    def _spread(self, evaluate: Callable[[Array], Array]) -> Callable[[Array], Array]:
+        """Return a function of a population, on the cluster if there is one."""
+        return evaluate if self._ray is None else Cluster(evaluate, self._ray)
 
 
 class _Rounds:
@@ -196,7 +225,7 @@ class _Rounds:
         residuals: Residuals,
         levels: Levels | None,
         options: LeastSquaresOptions,
-        told: Callable[[float, float], None],
+        told: Told,
     ) -> None:
         self._residuals, self._levels = residuals, levels
         self._options, self._told = options, told

@@ -20,13 +20,17 @@ HORIZONS = (0.2, 0.5, 1.0)
 
 Pair = tuple[float, float]
 
+_NOTHING: Pair = (float("nan"), float("nan"))
+"""Where nothing counts."""
+
 
 @dataclass(frozen=True)
 class Validation:
     """Root mean square errors, (hip, knee), on exact samples only; NaN where nothing counts.
 
     Attributes:
-        closed_loop_position: Under the recording's own controller from its first row on, rad.
+        closed_loop_position: Under the recording's own controller from its first row on, rad;
+            recordings that command torques have none and do not count.
         closed_loop_torque: Likewise, N m.
         open_loop_position: By horizon in s: driven by the recorded torques alone, rad.
     """
@@ -58,18 +62,33 @@ def validate(
     Raises:
         RecordingError: A recording is too short.
     """
+    controlled = [r for r in recordings if r.setup.onboard != "torque"]
+    position, torque = _closed_loop(controlled, candidate, timestep, threads, unscored)
+    return Validation(
+        position,
+        torque,
+        {h: open_loop(recordings, candidate, h, timestep, threads) for h in horizons},
+    )
+
+
+def _closed_loop(
+    recordings: Sequence[Recording],
+    candidate: Candidate,
+    timestep: float,
+    threads: int,
+    unscored: float,
+) -> tuple[Pair, Pair]:
+    """Return the rms errors of position, rad, and torque, N m."""
+    if not recordings:
+        return _NOTHING, _NOTHING
     windows = cut(recordings, None, unscored=unscored)
     simulator = WindowSimulator(recordings, windows, timestep=timestep, threads=threads)
     simulated = simulator.run([candidate])
-    errors = {
-        name: getattr(simulated, name)[0] - measured(simulator, name)
+    position, torque = (
+        _rms(getattr(simulated, name)[0] - measured(simulator, name))
         for name in ("position", "torque")
-    }
-    return Validation(
-        _rms(errors["position"]),
-        _rms(errors["torque"]),
-        {h: open_loop(recordings, candidate, h, timestep, threads) for h in horizons},
     )
+    return position, torque
 
 
 def open_loop(
@@ -87,10 +106,10 @@ def open_loop(
     """
     driven = [d for d in map(as_torque_driven, recordings) if d.has("torque_command")]
     if not driven:
-        return (float("nan"), float("nan"))
+        return _NOTHING
     windows = [w for w in cut(driven, horizon, stride=horizon / 2) if _starts_known(driven, w)]
     if not windows:
-        return (float("nan"), float("nan"))
+        return _NOTHING
     simulator = WindowSimulator(driven, windows, timestep=timestep, threads=threads)
     return _rms(simulator.run([candidate]).position[0] - measured(simulator, "position"))
 

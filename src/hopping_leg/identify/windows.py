@@ -71,6 +71,27 @@ def cut(
     return windows
 
 
+def deal(
+    windows: Sequence[Window], shares: int, rng: np.random.Generator
+) -> list[tuple[Window, ...]]:
+    """Deal windows to shares of nearly equal size, each of which is spread over all of them.
+
+    Of so many windows in a row every share gets one, at random, lest a motion's period favour one.
+
+    Args:
+        windows: To deal, in order.
+        shares: How many; no share stays empty, so that there may be fewer.
+        rng: Source of randomness.
+    """
+    count = min(shares, len(windows))
+    rows = -(-len(windows) // count)
+    owners = np.concatenate([rng.permutation(count) for _ in range(rows)])
+    return [
+        tuple(w for w, owner in zip(windows, owners, strict=False) if owner == share)
+        for share in range(count)
+    ]
+
+
 def split(
     windows: Sequence[Window], held_out: float, rng: np.random.Generator
 ) -> tuple[list[Window], list[Window]]:
