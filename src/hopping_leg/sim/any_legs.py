@@ -1,6 +1,7 @@
 """What every physics engine offers: many legs of one robot, stepped at the control rate."""
 
 from abc import ABC, abstractmethod
+from typing import Literal
 
 import numpy as np
 
@@ -9,6 +10,13 @@ from hopping_leg.errors import UsageError
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.reality import RealLegs
+
+Engine = Literal["mujoco", "pybullet"]
+"""What computes the physics."""
+
+Ground = Literal["robot", "spring", "rigid"]
+"""What the foot stands on: the robot's ground; in PyBullet, where that comes as a force, also its
+spring and damper as the contact's, or PyBullet's own rigid contact."""
 
 
 class AnyLegs(ABC):

@@ -1,0 +1,194 @@
+"""One leg in one PyBullet world."""
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.errors import UsageError
+from hopping_leg.robot.model import GRAVITY
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim.bullet_urdf import ROTOR, bullet_urdf
+
+_ITERATIONS = 50
+"""Of the constraint solver, which is not let off before: the same work, the same bytes."""
+
+_NO_LIMIT = 1e6
+"""In place of PyBullet's own limits of speed and force."""
+
+Spring = tuple[float, float]
+"""Stiffness, N/m, and damping, N s/m, of the ground."""
+
+
+class BulletWorld:
+    """A leg, its ground and nothing else; coordinates are (rail height, hip, knee).
+
+    Coulomb friction is a motor that holds the joint's speed at zero with that much torque at most;
+    viscous damping is the URDF's. PyBullet's own damping of bodies (0.04 of their speed per second)
+    and its limit of joint speeds (100 rad/s) are off.
+
+    Args:
+        robot: The leg.
+        timestep: Physics step, s.
+        spring: The ground, or None for PyBullet's rigid one.
+        foot_collides: Whether PyBullet finds the foot's contact, or it comes as a push.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        timestep: float,
+        *,
+        spring: Spring | None = None,
+        foot_collides: bool = True,
+    ) -> None:
+        self._bullet = bullet = import_pybullet()
+        self._id = bullet.connect(bullet.DIRECT)
+        if self._id < 0:
+            raise UsageError(
+                "PyBullet has no world left for another leg; simulate fewer at once or in MuJoCo."
+            )
+        bullet.setGravity(0, 0, -GRAVITY, physicsClientId=self._id)
+        bullet.setPhysicsEngineParameter(
+            fixedTimeStep=timestep,
+            numSolverIterations=_ITERATIONS,
+            solverResidualThreshold=0,
+            physicsClientId=self._id,
+        )
+        self._leg = self._load(bullet_urdf(robot, foot_collides=foot_collides))
+        self._joints = self._find_joints()
+        self._make_free(robot)
+        self._add_ground(robot, spring)
+
+    def _load(self, urdf: str) -> int:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "leg.urdf"
+            path.write_text(urdf, encoding="utf-8")
+            leg: int = self._bullet.loadURDF(
+                str(path),
+                useFixedBase=True,
+                flags=self._bullet.URDF_USE_INERTIA_FROM_FILE,
+                physicsClientId=self._id,
+            )
+        return leg
+
+    def _find_joints(self) -> dict[str, int]:
+        count = self._bullet.getNumJoints(self._leg, physicsClientId=self._id)
+        infos = [
+            self._bullet.getJointInfo(self._leg, joint, physicsClientId=self._id)
+            for joint in range(count)
+        ]
+        return {info[1].decode(): info[0] for info in infos}
+
+    def _make_free(self, robot: Robot) -> None:
+        bullet, joints = self._bullet, self._joints
+        friction = {"rail": robot.rail.friction, ROTOR: 0.0}
+        friction |= {"hip": robot.hip.friction, "knee": robot.knee.friction}
+        for name, joint in joints.items():
+            bullet.changeDynamics(
+                self._leg,
+                joint,
+                linearDamping=0,
+                angularDamping=0,
+                maxJointVelocity=_NO_LIMIT,
+                lateralFriction=1,
+                physicsClientId=self._id,
+            )
+            bullet.setJointMotorControl2(
+                self._leg,
+                joint,
+                bullet.VELOCITY_CONTROL,
+                targetVelocity=0,
+                force=friction[name],
+                physicsClientId=self._id,
+            )
+        here = [0, 0, 0]
+        gear = bullet.createConstraint(
+            self._leg,
+            joints["knee"],
+            self._leg,
+            joints[ROTOR],
+            bullet.JOINT_GEAR,
+            [0, -1, 0],
+            here,
+            here,
+            physicsClientId=self._id,
+        )
+        bullet.changeConstraint(gear, gearRatio=-1, maxForce=_NO_LIMIT, physicsClientId=self._id)
+        self._coordinates = [joints[name] for name in ("rail", "hip", "knee")]
+        self._motors = [joints["hip"], joints["knee"]]
+
+    def _add_ground(self, robot: Robot, spring: Spring | None) -> None:
+        bullet = self._bullet
+        shape = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=self._id)
+        ground = bullet.createMultiBody(0, shape, physicsClientId=self._id)
+        surface: dict[str, float] = {"lateralFriction": robot.contact.friction}
+        if spring is not None:
+            surface |= {"contactStiffness": spring[0], "contactDamping": spring[1]}
+        bullet.changeDynamics(ground, -1, **surface, physicsClientId=self._id)
+
+    def put(self, state: Array) -> None:
+        """Give the leg a state (x, q1, q2 and their rates), (6,)."""
+        places = [*self._coordinates, self._joints[ROTOR]]
+        for joint, source in zip(places, (0, 1, 2, 2), strict=True):
+            self._bullet.resetJointState(
+                self._leg,
+                joint,
+                float(state[source]),
+                float(state[source + 3]),
+                physicsClientId=self._id,
+            )
+
+    def step(self, torque: Array, substeps: int) -> Array:
+        """Hold joint torques, N m, (2,), for some steps; return the state then, (6,)."""
+        bullet, forces = self._bullet, torque.tolist()
+        for _ in range(substeps):
+            bullet.setJointMotorControlArray(
+                self._leg,
+                self._motors,
+                bullet.TORQUE_CONTROL,
+                forces=forces,
+                physicsClientId=self._id,
+            )
+            bullet.stepSimulation(physicsClientId=self._id)
+        joints = bullet.getJointStates(self._leg, self._coordinates, physicsClientId=self._id)
+        return np.array([joint[0] for joint in joints] + [joint[1] for joint in joints])
+
+    def push(self, force: Array, place: Array) -> None:
+        """Push the shank during the next step.
+
+        Args:
+            force: Upward and forward, N, (2,).
+            place: Height above the ground and forward offset from the hip, m, (2,).
+        """
+        self._bullet.applyExternalForce(
+            self._leg,
+            self._joints["knee"],
+            [float(force[1]), 0.0, float(force[0])],
+            [float(place[1]), 0.0, float(place[0])],
+            self._bullet.WORLD_FRAME,
+            physicsClientId=self._id,
+        )
+
+    def close(self) -> None:
+        """Free the world; PyBullet has room for about a thousand."""
+        if self._id >= 0:
+            self._bullet.disconnect(physicsClientId=self._id)
+            self._id = -1
+
+
+def import_pybullet() -> Any:  # noqa: ANN401
+    """Import PyBullet where it is asked for.
+
+    Raises:
+        UsageError: It is not installed.
+    """
+    try:
+        import pybullet
+    except ModuleNotFoundError as error:
+        raise UsageError(
+            "This engine needs PyBullet; install it with `pip install 'hopping-leg[bullet]'`."
+        ) from error
+    return pybullet

@@ -1,0 +1,168 @@
+import dataclasses
+import sys
+
+import numpy as np
+import pytest
+
+from hopping_leg.errors import UsageError
+from hopping_leg.robot import dynamics, load_robot
+from hopping_leg.robot.kinematics import joint_angles
+from hopping_leg.robot.limits import SoftLimits
+from hopping_leg.robot.model import GRAVITY
+from hopping_leg.sim import Disturbance, Legs, Plant
+from hopping_leg.sim.bullet_legs import BulletLegs
+from tests.robot.legs import random_state
+
+pybullet = pytest.importorskip("pybullet", reason="needs the extra 'bullet'")
+
+PAPER = load_robot("legv2-paper")
+CAD = load_robot("legv2")
+CROUCH = np.array([0.7, -1.4])
+
+
+def frictionless(robot):
+    joints = {
+        name: dataclasses.replace(getattr(robot, name), friction=0.0, damping=0.0)
+        for name in ("rail", "hip", "knee")
+    }
+    return dataclasses.replace(robot, **joints)
+
+
+@pytest.mark.parametrize("robot", [PAPER, CAD], ids=lambda r: r.name)
+def test_torques_in_the_air_accelerate_as_the_closed_form_with_armature(robot):
+    robot, step = frictionless(robot), 1e-5
+    legs = BulletLegs(robot, 10, rate=1 / step, timestep=step)
+    rng = np.random.default_rng(0)
+    height, rate, q, qd = random_state(rng, 10)
+    qd *= 0.3  # within what the motors can drive at
+    legs.place(slice(None), height, q)
+    legs.height_rate[:], legs.qd[:] = rate, qd
+    torque = rng.uniform(-3, 3, (10, 2))
+    np.testing.assert_array_equal(legs.step(torque), torque)
+    force = -dynamics.bias_force(robot, q, qd)
+    force[:, 1:] += torque
+    expected = np.linalg.solve(dynamics.mass_matrix(robot, q), force[..., None])[..., 0]
+    gained = (legs.state[:, 3:] - np.column_stack([rate, qd])) / step
+    np.testing.assert_allclose(gained, expected, rtol=1e-5, atol=1e-3)
+
+
+def test_energy_is_conserved_without_friction():
+    robot, timestep = frictionless(CAD), 5e-4
+    legs = BulletLegs(robot, 4, timestep=timestep)
+    rng = np.random.default_rng(0)
+    legs.place(slice(None), 3.0, rng.uniform(-2, 2, (4, 2)))
+    legs.qd[:] = rng.normal(0, 5, (4, 2))
+
+    def energy():
+        kinetic = dynamics.kinetic_energy(robot, legs.q, legs.height_rate, legs.qd)
+        return kinetic + dynamics.potential_energy(robot, legs.height, legs.q)
+
+    before, posture = energy(), legs.q.copy()
+    for _ in range(60):
+        legs.step(np.zeros((4, 2)))
+    # The integrator is of first order, as MuJoCo's.
+    np.testing.assert_allclose(energy(), before, atol=60 * timestep)
+    assert np.abs(legs.q - posture).max() > 0.5
+
+
+def test_free_fall_follows_the_parabola():
+    legs = BulletLegs(frictionless(CAD), 1)
+    legs.place(slice(None), 3.0, np.array([0.4, -1.0]))
+    for _ in range(60):
+        legs.step(np.zeros((1, 2)))
+    time = 60 * legs.period
+    fall = GRAVITY * time * (time + legs.timestep) / 2
+    np.testing.assert_allclose(legs.height, 3.0 - fall, atol=1e-9)
+    np.testing.assert_allclose(legs.height_rate, -GRAVITY * time, atol=1e-9)
+
+
+def test_drop_on_the_rail_follows_friction_and_damping():
+    legs = BulletLegs(PAPER, 1)
+    legs.place(slice(None), 3.0, np.zeros(2))
+    damping, force = PAPER.rail.damping, PAPER.mass * GRAVITY - PAPER.rail.friction
+    for _ in range(60):
+        legs.step(np.zeros((1, 2)))
+    speed = force / damping * (1 - np.exp(-damping * 0.3 / PAPER.mass))
+    np.testing.assert_allclose(legs.height_rate, -speed, rtol=2e-3)
+
+
+@pytest.mark.parametrize(("share", "moves"), [(0.9, False), (1.2, True)])
+def test_coulomb_friction_holds_a_joint_against_smaller_torques(share, moves):
+    legs = BulletLegs(PAPER, 1)
+    legs.place(slice(None), 3.0, np.zeros(2))
+    for _ in range(20):
+        legs.step(np.array([[share * PAPER.hip.friction, 0.0]]))
+    assert (abs(legs.q[0, 0]) > 1e-3) == moves
+
+
+def sink_and_rest(legs):
+    """Drop a leg whose joints are held from 0.1 m; return the deepest sink and the last, m."""
+    legs.stand(slice(None), CROUCH, clearance=0.1)
+    depths = []
+    for _ in range(round(0.8 * legs.rate)):
+        legs.step(60 * (CROUCH - legs.q) - 0.3 * legs.qd)
+        depths.append(-legs.foot_clearance()[0])
+    return max(depths), depths[-1]
+
+
+@pytest.mark.slow
+def test_a_drop_sinks_into_the_robots_ground_as_in_mujoco():
+    deepest, last = sink_and_rest(Legs(PAPER, 1, rate=1000, threads=1))
+    in_bullet = sink_and_rest(BulletLegs(PAPER, 1, rate=1000))
+    assert in_bullet == pytest.approx((deepest, last), abs=2e-3)
+    assert deepest > 0.03
+
+
+def test_pybullets_own_ground_is_rigid():
+    legs = BulletLegs(PAPER, 1, rate=1000, ground="rigid")
+    assert sink_and_rest(legs)[0] < 1e-4
+
+
+def hop(count, ground):
+    legs = BulletLegs(PAPER, count, timestep=1e-3, ground=ground)
+    plant = Plant(legs, Disturbance(), SoftLimits(), np.random.default_rng(3))
+    legs.stand(slice(None), CROUCH, clearance=0.01)
+    command = np.full(count, 0.3)
+    plant.channel.restart(slice(None), legs.q, legs.qd, command)
+    for _ in range(20):
+        measurement = plant.sense(command)
+        plant.drive(20 * (CROUCH - measurement.q[:, 0]))
+    return legs.state.tobytes()
+
+
+@pytest.mark.parametrize("ground", ["robot", "spring", "rigid"])
+def test_same_seed_same_bytes(ground):
+    assert hop(2, ground) == hop(2, ground)
+
+
+def test_legs_do_not_meet_each_other():
+    together, alone = BulletLegs(PAPER, 3, ground="rigid"), BulletLegs(PAPER, 1, ground="rigid")
+    for legs in (together, alone):
+        legs.stand(slice(None), joint_angles(PAPER, np.array([0.2, 0.0])))
+        for _ in range(20):
+            legs.step(np.tile([0.5, 1.0], (legs.count, 1)))
+    np.testing.assert_array_equal(together.state, np.tile(alone.state, (3, 1)))
+
+
+def test_a_leg_with_a_reality_is_refused():
+    with pytest.raises(UsageError, match="only MuJoCo"):
+        BulletLegs(load_robot("twin"), 1)
+
+
+def test_worlds_are_freed_with_their_legs():
+    def next_world():
+        world = pybullet.connect(pybullet.DIRECT)
+        pybullet.disconnect(physicsClientId=world)
+        return world
+
+    before = next_world()
+    legs = BulletLegs(PAPER, 3, ground="rigid")
+    assert next_world() > before
+    del legs
+    assert next_world() == before
+
+
+def test_without_pybullet_there_is_a_sentence(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    with pytest.raises(UsageError, match=r"hopping-leg\[bullet\]"):
+        BulletLegs(PAPER, 1)
