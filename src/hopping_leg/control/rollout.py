@@ -14,7 +14,16 @@ from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.limits import SoftLimits
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim import CONTROL_RATE, Disturbance, Legs, Plant
+from hopping_leg.sim import (
+    CONTROL_RATE,
+    AnyLegs,
+    Disturbance,
+    Engine,
+    Ground,
+    Plant,
+    check_ground,
+    make_legs,
+)
 from hopping_leg.trace import Trace
 
 _START_SHARE = 0.2 / 0.29
@@ -57,9 +66,14 @@ class Setup:
     takes the paper leg's 0.2 m, scaled to the links."""
     threads: int = 0
     """Worker threads, 0 for one per core."""
+    engine: Engine = "mujoco"
+    """What computes the physics."""
+    ground: Ground = "robot"
+    """What the foot stands on."""
 
     def __post_init__(self) -> None:
         self.robot.require_leg()
+        check_ground(self.engine, self.ground)
         for name in ("rate", "timestep"):
             value = getattr(self, name)
             if not 0 < value < math.inf:
@@ -110,7 +124,7 @@ def roll_out(
     commands: Array,
     seed: int,
     on_tick: Callable[[int, int], None] | None = None,
-    on_legs: Callable[[Legs], None] | None = None,
+    on_legs: Callable[[AnyLegs], None] | None = None,
 ) -> Rollout:
     """Let a controller hop from a standing start.
 
@@ -130,7 +144,7 @@ def roll_out(
         torques during it.
     """
     ticks, count = commands.shape
-    legs = Legs(setup.robot, count, rate=setup.rate, timestep=setup.timestep, threads=setup.threads)
+    legs = _make_legs(setup, count)
     plant = Plant(legs, setup.disturbance, setup.soft_limits, np.random.default_rng(seed))
     legs.stand(slice(None), setup.start_posture)
     plant.channel.restart(slice(None), legs.q, legs.qd, commands[0])
@@ -156,9 +170,23 @@ def roll_out(
         "seed": seed,
         "rate_hz": setup.rate,
         "timestep_s": setup.timestep,
+        "engine": setup.engine,
+        "ground": setup.ground,
     }
     columns = {name: data[row] for name, row in _STACKED.items()}
     return Rollout(np.arange(ticks) / setup.rate, columns | internals, header)
+
+
+def _make_legs(setup: Setup, count: int) -> AnyLegs:
+    return make_legs(
+        setup.robot,
+        count,
+        engine=setup.engine,
+        ground=setup.ground,
+        rate=setup.rate,
+        timestep=setup.timestep,
+        threads=setup.threads,
+    )
 
 
 def _check_stable(data: Array, setup: Setup) -> None:
@@ -171,7 +199,7 @@ def _check_stable(data: Array, setup: Setup) -> None:
         )
 
 
-def _record_state(row: Array, legs: Legs, command: Array) -> None:
+def _record_state(row: Array, legs: AnyLegs, command: Array) -> None:
     row[0], row[1] = legs.height, legs.height_rate
     row[2:4], row[4:6] = legs.q.T, legs.qd.T
     row[10], row[11], row[12] = legs.foot_clearance(), legs.knee_clearance(), legs.base_clearance()

@@ -4,8 +4,8 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.robot.limits import SoftLimiter, SoftLimits
+from hopping_leg.sim.any_legs import AnyLegs
 from hopping_leg.sim.disturbance import Channel, Disturbance, Measurement
-from hopping_leg.sim.legs import Legs
 from hopping_leg.sim.real_channel import RealChannel
 
 
@@ -24,7 +24,7 @@ class Plant:
 
     def __init__(
         self,
-        legs: Legs,
+        legs: AnyLegs,
         disturbance: Disturbance,
         soft_limits: SoftLimits | None,
         rng: np.random.Generator,

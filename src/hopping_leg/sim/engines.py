@@ -1,0 +1,53 @@
+"""The same leg in either engine."""
+
+from hopping_leg.errors import UsageError
+from hopping_leg.robot.model import TIMESTEP
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim.any_legs import AnyLegs, Engine, Ground
+from hopping_leg.sim.legs import CONTROL_RATE, Legs
+
+
+def make_legs(
+    robot: Robot,
+    count: int,
+    *,
+    engine: Engine = "mujoco",
+    ground: Ground = "robot",
+    rate: float = CONTROL_RATE,
+    timestep: float = TIMESTEP,
+    threads: int = 0,
+) -> AnyLegs:
+    """Return legs in the engine asked for.
+
+    Args:
+        robot: The leg.
+        count: Number of simulations n.
+        engine: What computes the physics.
+        ground: What the foot stands on.
+        rate: Control rate, Hz.
+        timestep: Physics step, s; must divide the control period.
+        threads: MuJoCo's worker threads, 0 for one per core; PyBullet has one.
+
+    Raises:
+        UsageError: Engine and ground do not go together, or the engine refuses the robot.
+    """
+    check_ground(engine, ground)
+    if engine == "mujoco":
+        return Legs(robot, count, rate=rate, timestep=timestep, threads=threads)
+    # What runs on the robot shall not import what only PyBullet needs.
+    from hopping_leg.sim.bullet_legs import BulletLegs
+
+    return BulletLegs(robot, count, rate=rate, timestep=timestep, ground=ground)
+
+
+def check_ground(engine: Engine, ground: Ground) -> None:
+    """Refuse what MuJoCo has not.
+
+    Raises:
+        UsageError: Engine and ground do not go together.
+    """
+    if engine == "mujoco" and ground != "robot":
+        raise UsageError(
+            f"MuJoCo has no ground '{ground}', only 'robot'; take the engine pybullet, or a robot"
+            " with another contact."
+        )
