@@ -36,7 +36,9 @@ class ApexRewardOptions:
     apex: float = 60.0
     """Of the event: exp(-|apex - command| / width) (air / full_air)^2 (period / full_period)."""
     width: tuple[float, float] = (0.030, 0.010)
-    """Of the event's kernel at the start and from 70 % of the training on, m."""
+    """Of the event's kernel at the start and from ``sharp_from`` on, m."""
+    sharp_from: float = 0.7
+    """Share of the training after which the kernel narrows no more."""
     full_air: float = 0.1
     """Time in the air before the apex that earns the event's full weight, s."""
     full_period: float = 0.45
@@ -46,7 +48,9 @@ class ApexRewardOptions:
     effective_gravity: float = 10.4
     """Deceleration in flight that the prediction assumes, rail drag included, m/s2."""
     energy: float = 0.4
-    """Of v^2 anywhere, fading to zero over the first 35 % of the training."""
+    """Of v^2 anywhere, fading to zero until ``energy_until``."""
+    energy_until: float = 0.35
+    """Share of the training after which that gain is gone."""
     jerk: float = 0.15
     """Of the paper's Pj."""
     position: float = 0.02
@@ -85,8 +89,8 @@ class ApexReward:
     def anneal(self, share: float) -> None:
         """Narrow the kernel and fade the energy gain at a share of the training, 0 to 1."""
         wide, narrow = self.options.width
-        self._width = wide + (narrow - wide) * min(1.0, share / 0.7)
-        self._energy = self.options.energy * max(0.0, 1 - share / 0.35)
+        self._width = wide + (narrow - wide) * min(1.0, share / self.options.sharp_from)
+        self._energy = self.options.energy * max(0.0, 1 - share / self.options.energy_until)
 
     def state(self) -> dict[str, Any]:
         """Return every leg's time in the air and since its last apex."""

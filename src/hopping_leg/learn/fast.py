@@ -65,7 +65,9 @@ class FastRecipe(Recipe):
     noise_hold: int = 24
     """Ticks that gSDE keeps its noise, 0.12 s: about a push-off; 0 explores with white noise."""
     log_std: tuple[float, float] = (-2.0, -3.8)
-    """Log standard deviation of gSDE's weights at the start and from 60 % of the training on."""
+    """Log standard deviation of gSDE's weights at the start and from ``quiet_from`` on."""
+    quiet_from: float = 0.6
+    """Share of the training after which exploration quietens no more."""
 
     def make_reward(self, robot: Robot) -> ApexReward:
         """Build the apex reward."""
@@ -104,7 +106,7 @@ class FastRecipe(Recipe):
         reward.anneal(share)
         first, last = self.log_std
         with torch.no_grad():
-            model.policy.log_std.fill_(first + (last - first) * min(1.0, share / 0.6))
+            model.policy.log_std.fill_(first + (last - first) * min(1.0, share / self.quiet_from))
 
 
 def _cosine(left: float) -> float:
