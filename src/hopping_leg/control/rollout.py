@@ -20,10 +20,12 @@ from hopping_leg.sim import (
     Disturbance,
     Engine,
     Ground,
+    Legs,
     Plant,
     check_ground,
     make_legs,
 )
+from hopping_leg.sim.perturbation import Perturbation, Perturber
 from hopping_leg.trace import Trace
 
 _START_SHARE = 0.2 / 0.29
@@ -125,6 +127,7 @@ def roll_out(
     seed: int,
     on_tick: Callable[[int, int], None] | None = None,
     on_legs: Callable[[AnyLegs], None] | None = None,
+    perturbation: Perturbation | None = None,
 ) -> Rollout:
     """Let a controller hop from a standing start.
 
@@ -135,6 +138,8 @@ def roll_out(
         seed: Of noise and delay.
         on_tick: Called with (ticks done, ticks in all), for progress bars.
         on_legs: Called once with the legs, for controllers that are shown the truth.
+        perturbation: What befalls the legs that ``setup`` does not know; recorded heights are above
+            the ground of the moment, recorded commands are the controller's.
 
     Raises:
         PhysicsError: The simulation became unstable.
@@ -144,7 +149,8 @@ def roll_out(
         torques during it.
     """
     ticks, count = commands.shape
-    legs = _make_legs(setup, count)
+    perturber = _perturb(setup, perturbation) if perturbation else None
+    legs = perturber.legs if perturber else _make_legs(setup, count)
     plant = Plant(legs, setup.disturbance, setup.soft_limits, np.random.default_rng(seed))
     legs.stand(slice(None), setup.start_posture)
     plant.channel.restart(slice(None), legs.q, legs.qd, commands[0])
@@ -154,11 +160,15 @@ def roll_out(
     data = np.empty((len(_STACKED), ticks, count))
     internals: dict[str, Array] = {}
     for tick in range(ticks):
+        if perturber is not None:
+            perturber.act(tick)
         _record_state(data[:, tick], legs, commands[tick])
         torque = controller.act(plant.sense(commands[tick]))
         for name, values in controller.internals().items():
             internals.setdefault(name, np.empty((ticks, count)))[tick] = values
         data[6:8, tick] = torque.T
+        if perturbation is not None:
+            torque = torque + perturbation.torque[tick]
         data[8:10, tick] = plant.drive(torque).T
         if on_tick is not None:
             on_tick(tick + 1, ticks)
@@ -187,6 +197,22 @@ def _make_legs(setup: Setup, count: int) -> AnyLegs:
         timestep=setup.timestep,
         threads=setup.threads,
     )
+
+
+def _perturb(setup: Setup, perturbation: Perturbation) -> Perturber:
+    """Return what befalls newly made legs, which only MuJoCo's legs can suffer."""
+    if setup.engine != "mujoco":
+        raise UsageError(f"Perturbations need the engine mujoco, not {setup.engine}.")
+    legs = Legs(
+        setup.robot,
+        len(perturbation.robots),
+        rate=setup.rate,
+        timestep=setup.timestep,
+        threads=setup.threads,
+        variants=perturbation.robots,
+        detailed=bool(perturbation.later),
+    )
+    return Perturber(perturbation, legs)
 
 
 def _check_stable(data: Array, setup: Setup) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
+from hopping_leg.evaluate import keeper
 from hopping_leg.identify.result import software_versions
 from hopping_leg.identify.searching import Report
 from hopping_leg.trace import write_atomically
@@ -53,42 +54,20 @@ class Study:
 
 
 @dataclass(frozen=True)
-class Keeper:
-    """Runs work once: its result lies in a folder and is taken from there the next time.
+class Keeper(keeper.Keeper):
+    """Also keeps the checkpoints of a fit that was killed.
 
     Attributes:
-        folder: Where results lie.
-        on_begin: Told, in words, what begins.
         report: Told how a fit goes.
     """
 
-    folder: Path
-    on_begin: Callable[[str], None] = lambda words: None
     report: Report = lambda stage, share, cost: None
 
     def keep(
         self, name: str, words: str, asked: dict[str, Any], work: Callable[[], dict[str, Any]]
     ) -> dict[str, Any]:
-        """Return the kept result of the same work, or do it and keep its result.
-
-        Args:
-            name: Of the result's file.
-            words: What the work is, for whoever waits.
-            asked: All that the result depends on, as JSON values.
-            work: Returns JSON values.
-        """
-        file = self.folder / f"{name}.json"
-        asked = json.loads(json.dumps({**asked, "software": software_versions()}))
-        if file.exists():
-            kept: dict[str, Any] = json.loads(file.read_bytes())
-            if kept["asked"] == asked:
-                return dict(kept["result"])
-        self._begin(name, asked)
-        self.on_begin(words)
-        result = work()
-        text = json.dumps({"asked": asked, "result": result}, indent=1)
-        write_atomically(file, f"{text}\n".encode())
-        return dict(json.loads(text)["result"])
+        """Return the kept result of the same work by the same software, or do it and keep it."""
+        return super().keep(name, words, {**asked, "software": software_versions()}, work)
 
     def _begin(self, name: str, asked: dict[str, Any]) -> None:
         """Note what is asked for, and forget checkpoints of anything else."""

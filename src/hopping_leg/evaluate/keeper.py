@@ -1,0 +1,49 @@
+"""Results that are kept, so that a killed benchmark goes on."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hopping_leg.trace import write_atomically
+
+
+@dataclass(frozen=True)
+class Keeper:
+    """Runs work once: its result lies in a folder and is taken from there the next time.
+
+    Attributes:
+        folder: Where results lie.
+        on_begin: Told, in words, what begins.
+    """
+
+    folder: Path
+    on_begin: Callable[[str], None] = lambda words: None
+
+    def keep(
+        self, name: str, words: str, asked: dict[str, Any], work: Callable[[], dict[str, Any]]
+    ) -> dict[str, Any]:
+        """Return the kept result of the same work, or do it and keep its result.
+
+        Args:
+            name: Of the result's file.
+            words: What the work is, for whoever waits.
+            asked: All that the result depends on, as JSON values.
+            work: Returns JSON values.
+        """
+        file = self.folder / f"{name}.json"
+        asked = json.loads(json.dumps(asked))
+        if file.exists():
+            kept: dict[str, Any] = json.loads(file.read_bytes())
+            if kept["asked"] == asked:
+                return dict(kept["result"])
+        self._begin(name, asked)
+        self.on_begin(words)
+        result = work()
+        text = json.dumps({"asked": asked, "result": result}, indent=1)
+        write_atomically(file, f"{text}\n".encode())
+        return dict(json.loads(text)["result"])
+
+    def _begin(self, name: str, asked: dict[str, Any]) -> None:
+        """Prepare for work that is not kept yet."""

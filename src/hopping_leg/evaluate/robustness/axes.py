@@ -1,0 +1,254 @@
+"""The axes of the robustness benchmark: what is changed, and how far.
+
+Ranges were chosen so that the least levels harm no controller that hops at all and the greatest
+bring the baselines down; they were not measured on a leg.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from hopping_leg.errors import UsageError, unknown_name
+from hopping_leg.evaluate.robustness.case import Case, of_both_joints, times, with_numbers
+
+Alter = Callable[[Case, float], Case]
+"""Puts a level of an axis into a case."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One thing that may be other than the controller believes."""
+
+    name: str
+    meaning: str
+    """What a level's number says."""
+    unit: str
+    neutral: float
+    """Level that changes nothing."""
+    levels: tuple[float, ...]
+    moderate: tuple[float, float]
+    """Range in which the axis ``joint`` draws it."""
+    alter: Alter
+    leaderboard: str = ""
+    """Its name on RealAIGym's robustness leaderboard, if it is there."""
+
+
+def _payload(case: Case, share: float) -> Case:
+    mass = case.robot.base.mass + share * case.robot.mass
+    return replace(case, robot=with_numbers(case.robot, {"base.mass": mass}))
+
+
+def _damped_ground(case: Case, factor: float) -> Case:
+    """MuJoCo's k is 1 / (time constant x ratio)^2 and b is 2 / time constant: k stays."""
+    softer = times(case.robot, 1 / factor, "contact.time_constant")
+    return replace(case, robot=times(softer, factor, "contact.damping_ratio"))
+
+
+def _rubbing_joints(case: Case, torque: float) -> Case:
+    robot = case.robot
+    more = {f"{j}.friction": getattr(robot, j).friction + torque for j in ("hip", "knee")}
+    return replace(case, robot=with_numbers(robot, more))
+
+
+def _times(*paths: str) -> Alter:
+    return lambda case, factor: replace(case, robot=times(case.robot, factor, *paths))
+
+
+def _joints(path: str) -> Alter:
+    return lambda case, value: replace(case, robot=of_both_joints(case.robot, path, value))
+
+
+def _number(path: str) -> Alter:
+    return lambda case, value: replace(case, robot=with_numbers(case.robot, {path: value}))
+
+
+AXES = (
+    Axis(
+        "payload",
+        "mass added to the base, as a share of the whole leg's",
+        "1",
+        0.0,
+        (-0.4, -0.2, 0.2, 0.5, 1.0, 1.5),
+        (-0.15, 0.2),
+        _payload,
+        "model error",
+    ),
+    Axis(
+        "links",
+        "masses and inertias of thigh and shank, times",
+        "1",
+        1.0,
+        (0.3, 0.6, 1.5, 2.5, 4.0, 6.0),
+        (0.8, 1.25),
+        _times("thigh.mass", "thigh.inertia", "shank.mass", "shank.inertia"),
+        "model error",
+    ),
+    Axis(
+        "rail-friction",
+        "Coulomb friction and damping of the rail, times",
+        "1",
+        1.0,
+        (0.0, 2.0, 3.0, 5.0, 8.0, 12.0),
+        (0.5, 2.5),
+        _times("rail.friction", "rail.damping"),
+        "model error",
+    ),
+    Axis(
+        "joint-friction",
+        "Coulomb friction added to each joint",
+        "N m",
+        0.0,
+        (0.2, 0.5, 1.0, 1.5, 2.0, 3.0),
+        (0.0, 0.2),
+        _rubbing_joints,
+        "model error",
+    ),
+    Axis(
+        "ground-stiffness",
+        "time constant of the ground at the same damping ratio, times; below 1 is stiffer",
+        "1",
+        1.0,
+        (0.22, 0.4, 0.7, 1.5, 2.0, 3.0),
+        (0.6, 1.5),
+        _times("contact.time_constant"),
+    ),
+    Axis(
+        "ground-damping",
+        "damping of the ground at the same stiffness, times",
+        "1",
+        1.0,
+        (0.1, 0.25, 0.5, 2.0, 4.0, 8.0),
+        (0.75, 1.5),
+        _damped_ground,
+    ),
+    Axis(
+        "ground-steps",
+        "height by which the ground steps up, back, down and back, every second",
+        "m",
+        0.0,
+        (0.01, 0.02, 0.04, 0.06, 0.08, 0.1),
+        (0.0, 0.02),
+        lambda case, value: replace(case, ground=value),
+    ),
+    Axis(
+        "delay",
+        "latency of every torque command, on top of the paper's delay",
+        "s",
+        0.0,
+        (0.0025, 0.005, 0.0075, 0.01, 0.015, 0.02),
+        (0.0, 0.005),
+        _number("reality.latency.command"),
+        "delay",
+    ),
+    Axis(
+        "position-noise",
+        "standard deviation of white noise on the joint positions, on top of the paper's noise",
+        "rad",
+        0.0,
+        (0.01, 0.03, 0.1, 0.2, 0.3, 0.5),
+        (0.0, 0.01),
+        _joints("sensor.position_noise"),
+    ),
+    Axis(
+        "velocity-noise",
+        "standard deviation of white noise on the joint velocities, on top of the paper's noise",
+        "rad/s",
+        0.0,
+        (0.1, 0.3, 0.5, 1.0, 2.0, 4.0),
+        (0.0, 0.5),
+        _joints("sensor.velocity_noise"),
+        "velocity noise",
+    ),
+    Axis(
+        "torque-noise",
+        "standard deviation of white noise on the joint torques, on top of the paper's noise",
+        "N m",
+        0.0,
+        (0.1, 0.3, 0.6, 1.0, 1.5, 2.5),
+        (0.0, 0.5),
+        lambda case, value: replace(case, torque_noise=value),
+        "torque noise",
+    ),
+    Axis(
+        "torque-gain",
+        "torque that the motors give over the torque asked for",
+        "1",
+        1.0,
+        (0.3, 0.45, 0.6, 0.8, 1.25, 1.5),
+        (0.9, 1.1),
+        _joints("torque_gain"),
+    ),
+    Axis(
+        "torque-lag",
+        "time constant with which the motors' torque follows",
+        "s",
+        0.0,
+        (0.001, 0.0025, 0.005, 0.0075, 0.01, 0.02),
+        (0.0, 0.0025),
+        _joints("torque_lag"),
+        "torque response",
+    ),
+    Axis(
+        "voltage",
+        "battery over its nominal voltage, which moves the motors' torque-speed line",
+        "1",
+        1.0,
+        (0.9, 0.8, 0.7, 0.6, 0.5, 0.4),
+        (0.8, 1.0),
+        _number("reality.voltage"),
+    ),
+    Axis(
+        "backlash",
+        "dead band between motor and link of both joints",
+        "rad",
+        0.0,
+        (0.005, 0.01, 0.02, 0.05, 0.1, 0.2),
+        (0.0, 0.02),
+        _joints("backlash"),
+    ),
+    Axis(
+        "pushes",
+        "impulse on the base, up or down, at a random moment of every second",
+        "N s",
+        0.0,
+        (0.2, 0.5, 1.0, 1.5, 2.0, 3.0),
+        (0.0, 0.2),
+        lambda case, value: replace(case, push=value),
+        "perturbation",
+    ),
+    Axis(
+        "command-steps",
+        "height of the steps by which the command rises and falls, every 2.5 s",
+        "m",
+        0.0,
+        (0.02, 0.04, 0.06, 0.08, 0.1),
+        (0.0, 0.05),
+        lambda case, value: replace(case, command_step=value),
+    ),
+)
+"""Every axis that is changed on its own."""
+
+JOINT = "joint"
+"""The axis that changes all others at once."""
+
+JOINT_LEVELS = (0.25, 0.5, 0.75, 1.0)
+"""Shares of the moderate ranges."""
+
+NOMINAL = "nominal"
+"""Nothing is changed; stated beside the axes, part of no score."""
+
+
+def axis_names() -> list[str]:
+    """Return the names of all axes, ``joint`` last."""
+    return [*(axis.name for axis in AXES), JOINT]
+
+
+def axis_named(name: str) -> Axis:
+    """Return the axis of a name.
+
+    Raises:
+        UsageError: There is none.
+    """
+    for axis in AXES:
+        if axis.name == name:
+            return axis
+    raise UsageError(unknown_name("axis", name, axis_names()))

@@ -1,0 +1,178 @@
+"""What follows a change in the middle of a run that the controller is not told of.
+
+Also the answer to a step of the command, of which it is told.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.control import Controller, Setup, roll_out
+from hopping_leg.evaluate.metrics import START_SECONDS
+from hopping_leg.evaluate.robustness.axes import axis_named
+from hopping_leg.evaluate.robustness.case import Case, times, with_numbers
+from hopping_leg.hops import Hops, find_hops
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim.perturbation import Perturbation
+from hopping_leg.trace import Trace
+
+SECONDS, AT = 12.0, 5.0
+"""Of each run, and when it changes, s."""
+
+HOPS = 5
+"""Hops that are told one by one."""
+
+BACK = 0.01
+"""Distance from command or steady state at which a controller is back, m."""
+
+
+def _on_axis(name: str, level: float) -> Callable[[Robot], Robot]:
+    return lambda robot: axis_named(name).alter(Case(robot), level).robot
+
+
+CHANGES: dict[str, Callable[[Robot], Robot]] = {
+    "payload +20 %": _on_axis("payload", 0.2),
+    "payload -20 %": _on_axis("payload", -0.2),
+    "ground time constant 0.02 s": lambda robot: with_numbers(
+        robot, {"contact.time_constant": 0.02}
+    ),
+    "ground time constant x2": lambda robot: times(robot, 2.0, "contact.time_constant"),
+    "delay +5 ms": _on_axis("delay", 0.005),
+    "rail friction x3": lambda robot: times(robot, 3.0, "rail.friction"),
+}
+"""What a leg becomes."""
+
+
+@dataclass(frozen=True)
+class _Run:
+    """One leg: what it becomes, and its command before and after."""
+
+    change: str
+    before: float
+    after: float
+
+
+def study_changes(
+    controller: Controller,
+    setup: Setup,
+    commands: Sequence[float],
+    repeats: int,
+    seed: int,
+    on_tick: Callable[[int, int], None] | None = None,
+) -> dict[str, Any]:
+    """Let a controller meet all changes and steps, in one batch.
+
+    Args:
+        controller: Knows ``setup`` alone.
+        setup: What it believes, with the paper's noise and delay.
+        commands: Desired heights, m; steps go from the lowest to the highest and back.
+        repeats: Realisations of noise and delay.
+        seed: All randomness follows from it.
+        on_tick: Called with (ticks done, ticks in all).
+
+    Returns:
+        ``recovery``, a row per change and command, and ``steps``, a row per step.
+    """
+    runs = [_Run(change, command, command) for change in CHANGES for command in commands]
+    low, high = min(commands), max(commands)
+    runs += [_Run("", *pair) for pair in ((low, high), (high, low)) if low < high]
+    legs = [run for run in runs for _ in range(repeats)]
+    robots = {change: alter(setup.robot) for change, alter in CHANGES.items()} | {"": setup.robot}
+    ticks, change = round(SECONDS * setup.rate), round(AT * setup.rate)
+    late = np.arange(ticks)[:, None] >= change
+    asked = np.where(late, [run.after for run in legs], [run.before for run in legs])
+    nothing = np.zeros((ticks, len(legs)))
+    record = roll_out(
+        controller,
+        setup,
+        asked,
+        int(np.random.SeedSequence([seed, len(legs)]).generate_state(1)[0]),
+        on_tick,
+        perturbation=Perturbation(
+            (setup.robot,) * len(legs),
+            np.zeros((ticks, len(legs), 2)),
+            nothing,
+            nothing,
+            tuple(robots[run.change] for run in legs),
+            change,
+        ),
+    )
+    traces = [record.trace(leg) for leg in range(len(legs))]
+    groups = [traces[k * repeats : (k + 1) * repeats] for k in range(len(runs))]
+    told = list(zip(runs, groups, strict=True))
+    return {
+        "recovery": [_recovery(run, group, change) for run, group in told if run.change],
+        "steps": [_step(run, group, change) for run, group in told if not run.change],
+    }
+
+
+def hops_after(trace: Trace, tick: int) -> Array:
+    """Return the apexes whose flight began after a tick, in order, m, (hops,)."""
+    hops = _hops(trace)
+    grounded = np.flatnonzero(~hops.in_flight[tick:])
+    return hops.apex[hops.tick > tick + grounded[0]] if len(grounded) else np.empty(0)
+
+
+def _hops(trace: Trace) -> Hops:
+    columns = ("height_m", "height_rate_m_s", "foot_clearance_m")
+    return find_hops(*map(trace.column, columns))
+
+
+def _recovery(run: _Run, traces: Sequence[Trace], change: int) -> dict[str, Any]:
+    after = [hops_after(trace, change) - run.after for trace in traces]
+    sizes = [_median(np.abs(_kth(after, hop))) for hop in range(HOPS)]
+    later = np.concatenate([errors[HOPS:] for errors in after])
+    settled = _median(np.abs(later))
+    return {
+        "change": run.change,
+        "command_m": run.after,
+        "before_abs_error_m": _median(np.abs(_before(run, traces, change))),
+        "hop_abs_errors_m": sizes,
+        "later_abs_error_m": settled,
+        "later_error_m": _median(later),
+        "back_after_hops": _back([*sizes, settled]),
+    }
+
+
+def _before(run: _Run, traces: Sequence[Trace], change: int) -> Array:
+    start = round(START_SECONDS * change / AT)
+    found = [_hops(trace) for trace in traces]
+    apexes = [h.apex[(h.tick >= start) & (h.tick < change)] for h in found]
+    return np.concatenate(apexes) - run.before
+
+
+def _step(run: _Run, traces: Sequence[Trace], change: int) -> dict[str, Any]:
+    after = [hops_after(trace, change) for trace in traces]
+    steady = [np.median(apexes[HOPS:]) if len(apexes) > HOPS else np.nan for apexes in after]
+    distances = [np.abs(a - s) for a, s in zip(after, steady, strict=True)]
+    sizes = [_median(_kth(distances, hop)) for hop in range(HOPS)]
+    return {
+        "from_m": run.before,
+        "to_m": run.after,
+        "steady_error_m": _median(np.array(steady) - run.after),
+        "hop_distances_m": sizes,
+        "settled_after_hops": _back(sizes),
+    }
+
+
+def _kth(rows: Sequence[Array], hop: int) -> Array:
+    """Return the value of one hop in all runs that have it."""
+    return np.array([row[hop] for row in rows if len(row) > hop])
+
+
+def _median(values: Array) -> float | None:
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else None
+
+
+def _back(sizes: Sequence[float | None]) -> int | None:
+    """Return the number of hops after which all others are near; None if the last is not."""
+    near = [size is not None and size <= BACK for size in sizes]
+    return (
+        max((k + 1 for k, is_near in enumerate(near) if not is_near), default=0)
+        if near[-1]
+        else None
+    )

@@ -1,0 +1,209 @@
+"""All trials of one axis: their worlds, fixed by a seed before any controller has moved."""
+
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import qmc
+
+from hopping_leg.arrays import Array
+from hopping_leg.evaluate.robustness.axes import AXES, JOINT, JOINT_LEVELS, NOMINAL, axis_named
+from hopping_leg.evaluate.robustness.case import Case
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim.perturbation import Perturbation
+
+SECONDS = 10.0
+"""Of each trial."""
+
+JOINT_POINTS = 4
+"""Points of the hypercube per command and seed."""
+
+PUSH_SECONDS = 0.02
+"""Of each push."""
+
+GROUND_SECONDS, SWITCH_SECONDS = 1.0, 2.5
+"""Between two steps of the ground, and of the command."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One leg of an axis' batch.
+
+    Attributes:
+        level: Level of the axis.
+        command: Desired apex height, m.
+        repeat: Number of the realisation, from 0.
+        point: Number of the hypercube's point, 0 elsewhere.
+        case: What is simulated.
+    """
+
+    level: float
+    command: float
+    repeat: int
+    point: int
+    case: Case
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All trials of an axis, run as one batch.
+
+    Attributes:
+        axis: Its name.
+        trials: n of them.
+        commands: Desired heights, m, (ticks, n).
+        perturbation: What befalls the legs.
+        seed: Of noise and delay.
+    """
+
+    axis: str
+    trials: tuple[Trial, ...]
+    commands: Array
+    perturbation: Perturbation
+    seed: int
+
+
+def make_plan(
+    axis: str,
+    robot: Robot,
+    commands: Sequence[float],
+    repeats: int,
+    seed: int,
+    *,
+    rate: float,
+    levels: Sequence[float] | None = None,
+    seconds: float = SECONDS,
+) -> Plan:
+    """Lay down all trials of an axis.
+
+    Args:
+        axis: Its name.
+        robot: What controllers believe.
+        commands: Desired apex heights, m.
+        repeats: Realisations of each level and command.
+        seed: All randomness follows from it.
+        rate: Control rate, Hz.
+        levels: Instead of the axis' own.
+        seconds: Of each trial.
+
+    Raises:
+        UsageError: There is no such axis.
+    """
+    entropy = [seed, zlib.crc32(axis.encode())]
+    if axis == JOINT:
+        trials = _joint_trials(robot, commands, repeats, levels or JOINT_LEVELS, entropy)
+    else:
+        trials = _trials(axis, robot, commands, repeats, levels)
+    ticks, within = round(seconds * rate), (min(commands), max(commands))
+    events = [_Events(trial, seed, ticks, rate, within) for trial in trials]
+    return Plan(
+        axis,
+        tuple(trials),
+        np.stack([event.command for event in events], axis=1),
+        Perturbation(
+            tuple(trial.case.robot for trial in trials),
+            np.stack([event.torque for event in events], axis=1),
+            np.stack([event.force for event in events], axis=1),
+            np.stack([event.ground for event in events], axis=1),
+        ),
+        int(np.random.SeedSequence(entropy).generate_state(1)[0]),
+    )
+
+
+def _trials(
+    axis: str,
+    robot: Robot,
+    commands: Sequence[float],
+    repeats: int,
+    levels: Sequence[float] | None,
+) -> list[Trial]:
+    if axis == NOMINAL:
+        cases = {0.0: Case(robot)}
+    else:
+        found = axis_named(axis)
+        cases = {level: found.alter(Case(robot), level) for level in levels or found.levels}
+    return [
+        Trial(level, command, repeat, 0, case)
+        for level, case in cases.items()
+        for command in commands
+        for repeat in range(repeats)
+    ]
+
+
+def _joint_trials(
+    robot: Robot,
+    commands: Sequence[float],
+    repeats: int,
+    levels: Sequence[float],
+    entropy: Sequence[int],
+) -> list[Trial]:
+    """Draw a hypercube once; a level is a share of the way from neutral to its points."""
+    each = [
+        (command, repeat, point)
+        for command in commands
+        for repeat in range(repeats)
+        for point in range(JOINT_POINTS)
+    ]
+    cube = qmc.LatinHypercube(len(AXES), rng=np.random.default_rng(entropy)).random(len(each))
+    return [
+        Trial(level, command, repeat, point, _joint_case(robot, row, level))
+        for level in levels
+        for (command, repeat, point), row in zip(each, cube, strict=True)
+    ]
+
+
+def _joint_case(robot: Robot, row: Array, share: float) -> Case:
+    case = Case(robot)
+    for axis, place in zip(AXES, row, strict=True):
+        low, high = axis.moderate
+        value = low + place * (high - low)
+        case = axis.alter(case, float(axis.neutral + share * (value - axis.neutral)))
+    return case
+
+
+class _Events:
+    """What happens in one trial over time.
+
+    Draws depend on seed, command, repeat and point alone, so that levels differ in size only.
+
+    Args:
+        trial: Whose.
+        seed: Of the suite.
+        ticks: Control periods of the trial.
+        rate: Control rate, Hz.
+        within: Lowest and highest command of the suite, m.
+    """
+
+    def __init__(
+        self, trial: Trial, seed: int, ticks: int, rate: float, within: tuple[float, float]
+    ) -> None:
+        entropy = [seed, trial.repeat, trial.point, round(1e4 * trial.command)]
+        rng = np.random.default_rng(entropy)
+        case, time = trial.case, np.arange(ticks) / rate
+        self.torque = case.torque_noise * rng.standard_normal((ticks, 2))
+        self.force = case.push / PUSH_SECONDS * _pushes(rng, ticks, rate)
+        up = rng.choice((-1, 1))
+        at = np.floor(time / GROUND_SECONDS).astype(int)
+        self.ground = case.ground * up * np.array([0, 1, 0, -1])[at % 4]
+        self.command = _stepped(trial, within, time)
+
+
+def _pushes(rng: np.random.Generator, ticks: int, rate: float) -> Array:
+    """Return when is pushed, with the sign, (ticks,): once in each second but the first."""
+    pushes = np.zeros(ticks)
+    length = max(1, round(PUSH_SECONDS * rate))
+    for second in range(1, round(ticks / rate)):
+        start = round((second + rng.uniform(0, 1 - PUSH_SECONDS)) * rate)
+        pushes[start : start + length] = rng.choice((-1.0, 1.0))
+    return pushes
+
+
+def _stepped(trial: Trial, within: tuple[float, float], time: Array) -> Array:
+    """Return the command over time, m: away by a step and back, within the suite's heights."""
+    low, high = within
+    share = (trial.command - low) / (high - low) if high > low else 0.5
+    bottom = trial.command - share * trial.case.command_step
+    pair = (bottom, bottom + trial.case.command_step)
+    first, second = pair if share <= 0.5 else pair[::-1]
+    return np.where(np.floor(time / SWITCH_SECONDS) % 2 == 0, first, second)

@@ -1,0 +1,262 @@
+"""The whole benchmark: every controller on every axis, each result kept."""
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from hopping_leg.control import Controller, Setup
+from hopping_leg.control.energy_shaping import EnergyShaping
+from hopping_leg.control.policy import Policy
+from hopping_leg.errors import UsageError
+from hopping_leg.evaluate.keeper import Keeper
+from hopping_leg.evaluate.robustness import changes
+from hopping_leg.evaluate.robustness.axes import (
+    AXES,
+    JOINT,
+    JOINT_LEVELS,
+    NOMINAL,
+    Axis,
+    axis_named,
+    axis_names,
+)
+from hopping_leg.evaluate.robustness.outcome import TOLERANCE, Outcome, run_plan
+from hopping_leg.evaluate.robustness.plan import JOINT_POINTS, SECONDS, make_plan
+from hopping_leg.evaluate.robustness.score import level_rows, score_rows
+from hopping_leg.evaluate.runner import Candidate, software_versions
+from hopping_leg.evaluate.trials import COMMANDS, check_reach, scaled
+
+RECOVERY = "recovery"
+"""Part that follows changes in the middle of a run; no axis, part of no score."""
+
+SCHEMA = 1
+"""Version of the JSON, raised when a name changes its meaning."""
+
+
+@dataclass(frozen=True)
+class Suite:
+    """What is run."""
+
+    setup: Setup
+    """What controllers believe, with the paper's noise and delay."""
+    axes: tuple[str, ...]
+    """Names of axes."""
+    commands: tuple[float, ...]
+    """Desired apex heights, m."""
+    repeats: int
+    """Realisations of noise, delay and perturbation per level and command."""
+    seed: int
+    """All randomness follows from it."""
+    recovery: bool = True
+    """Whether changes in the middle of a run are studied, too."""
+    seconds: float = SECONDS
+    """Of each trial."""
+
+    def asked(self, controller: Controller, axis: str) -> dict[str, Any]:
+        """Return all that a result depends on, as JSON values."""
+        setup = self.setup
+        limits = setup.soft_limits
+        return {
+            "controller": fingerprint(controller),
+            "axes": [_described(one) for one in AXES if axis in (one.name, JOINT)],
+            "robot": setup.robot.digest,
+            "disturbance": asdict(setup.disturbance),
+            "soft_limits": asdict(limits) if limits else None,
+            "timestep_s": setup.timestep,
+            "rate_hz": setup.rate,
+            "start_length_m": setup.standing_length,
+            "commands_m": self.commands,
+            "seeds": self.repeats,
+            "seed": self.seed,
+            "seconds": self.seconds,
+            "versions": software_versions(),
+        }
+
+
+def make_suite(
+    setup: Setup,
+    *,
+    axes: Sequence[str] = (),
+    commands: Sequence[float] | None = None,
+    repeats: int = 5,
+    seed: int = 1000,
+    seconds: float = SECONDS,
+) -> Suite:
+    """Return a suite that can be run.
+
+    Args:
+        setup: What controllers believe.
+        axes: Names; none takes all, and the changes in the middle of a run.
+        commands: Desired heights, m; the paper's by default, scaled to the leg.
+        repeats: Realisations per level and command.
+        seed: All randomness follows from it.
+        seconds: Of each trial.
+
+    Raises:
+        UsageError: There is no such axis, or a command is out of reach.
+    """
+    for name in axes:
+        if name != JOINT:
+            axis_named(name)
+    if repeats < 1:
+        raise UsageError(f"{repeats} seeds are too few; give --seeds 1 or more.")
+    chosen = scaled(COMMANDS, setup.robot) if commands is None else tuple(sorted(set(commands)))
+    check_reach(setup.robot, chosen)
+    names = tuple(name for name in axis_names() if not axes or name in axes)
+    return Suite(setup, names, chosen, repeats, seed, recovery=not axes, seconds=seconds)
+
+
+def run_suite(
+    candidates: Sequence[Candidate],
+    suite: Suite,
+    keeper: Keeper,
+    on_progress: Callable[[str, float], None] = lambda label, share: None,
+) -> dict[str, Any]:
+    """Let every candidate meet every axis.
+
+    Args:
+        candidates: What is judged.
+        suite: What it meets.
+        keeper: Keeps the result of each candidate and axis.
+        on_progress: Called with a label and the share done of its axes.
+
+    Returns:
+        ``scores``, ``levels``, ``recovery``, ``steps``, ``axes``, ``conditions``, ``versions`` and
+        ``notes``, as JSON values.
+
+    Raises:
+        UsageError: A command is out of a candidate's range, or a name is taken twice.
+    """
+    _check(candidates, suite)
+    result: dict[str, Any] = {"schema": SCHEMA, "scores": [], "levels": []}
+    result |= {"recovery": [], "steps": []}
+    parts = [NOMINAL, *suite.axes, *([RECOVERY] if suite.recovery else [])]
+    for candidate in candidates:
+        outcomes: dict[str, list[Outcome]] = {}
+        for number, part in enumerate(parts):
+            tick = functools.partial(_report, on_progress, candidate.label, number, len(parts))
+            kept = keeper.keep(
+                f"{_safe(candidate.label)}-{part}",
+                f"{candidate.label}: {part}",
+                suite.asked(candidate.controller, part),
+                functools.partial(_run_part, candidate, suite, part, tick),
+            )
+            if part == RECOVERY:
+                for name in ("recovery", "steps"):
+                    result[name] += [{"controller": candidate.label, **r} for r in kept[name]]
+            else:
+                outcomes[part] = [Outcome(**row) for row in kept["outcomes"]]
+            on_progress(candidate.label, (number + 1) / len(parts))
+        for part, found in outcomes.items():
+            result["levels"] += level_rows(candidate.label, part, found)
+        del outcomes[NOMINAL]
+        result["scores"] += score_rows(candidate.label, outcomes, suite.seed)
+    return {
+        **result,
+        "axes": [_described(axis) for axis in AXES if axis.name in suite.axes] + _joint(suite),
+        "conditions": _conditions(suite),
+        "versions": software_versions(),
+        "notes": [note for candidate in candidates for note in candidate.notes],
+    }
+
+
+def _run_part(
+    candidate: Candidate, suite: Suite, part: str, on_tick: Callable[[int, int], None]
+) -> dict[str, Any]:
+    setup, controller = suite.setup, candidate.controller
+    if part == RECOVERY:
+        return changes.study_changes(
+            controller, setup, suite.commands, suite.repeats, suite.seed, on_tick
+        )
+    plan = make_plan(
+        part,
+        setup.robot,
+        suite.commands,
+        suite.repeats,
+        suite.seed,
+        rate=setup.rate,
+        seconds=suite.seconds,
+    )
+    return {"outcomes": [asdict(one) for one in run_plan(controller, setup, plan, on_tick)]}
+
+
+def _report(
+    on_progress: Callable[[str, float], None],
+    label: str,
+    number: int,
+    parts: int,
+    tick: int,
+    ticks: int,
+) -> None:
+    on_progress(label, (number + tick / ticks) / parts)
+
+
+def fingerprint(controller: Controller) -> str:
+    """Return what tells a controller from others of its name, as far as it can be told."""
+    if isinstance(controller, Policy):
+        return controller.digest
+    if isinstance(controller, EnergyShaping):
+        return repr((controller.gains, controller.options))
+    return f"{type(controller).__module__}.{type(controller).__qualname__}"
+
+
+def _check(candidates: Sequence[Candidate], suite: Suite) -> None:
+    labels = [candidate.label for candidate in candidates]
+    if not labels:
+        raise UsageError("No controller was named; try `hop evaluate energy-shaping`.")
+    for label in labels:
+        if labels.count(label) > 1:
+            raise UsageError(f"Controller '{label}' was named twice; name each one once.")
+    for candidate in candidates:
+        low, high = candidate.command_range or (-math.inf, math.inf)
+        outside = [c for c in suite.commands if not low - 1e-9 <= c <= high + 1e-9]
+        if outside:
+            raise UsageError(
+                f"'{candidate.label}' cannot be asked for {outside[0]:g} m: it was trained for"
+                f" {low:g} to {high:g} m; choose --commands within that range."
+            )
+
+
+def _described(axis: Axis) -> dict[str, Any]:
+    return {
+        field.name: getattr(axis, field.name)
+        for field in dataclasses.fields(axis)
+        if field.name != "alter"
+    }
+
+
+def _joint(suite: Suite) -> list[dict[str, Any]]:
+    if JOINT not in suite.axes:
+        return []
+    meaning = (
+        "all axes at once, this share of the way to a Latin hypercube of their moderate ranges"
+    )
+    about = {"unit": "1", "neutral": 0.0, "levels": JOINT_LEVELS, "moderate": (0.0, 1.0)}
+    return [{"name": JOINT, "meaning": meaning, **about, "leaderboard": ""}]
+
+
+def _conditions(suite: Suite) -> dict[str, Any]:
+    setup = suite.setup
+    return {
+        "robot": setup.robot.name,
+        "robot_digest": setup.robot.digest,
+        "disturbance": asdict(setup.disturbance),
+        "commands_m": suite.commands,
+        "seeds": suite.repeats,
+        "seed": suite.seed,
+        "seconds": suite.seconds,
+        "joint_points": JOINT_POINTS,
+        "tolerance_m": TOLERANCE,
+        "back_m": changes.BACK,
+        "change_at_s": changes.AT,
+        "changes": list(changes.CHANGES),
+        "timestep_s": setup.timestep,
+        "rate_hz": setup.rate,
+        "start_length_m": setup.standing_length,
+    }
+
+
+def _safe(label: str) -> str:
+    return "".join(c if c.isalnum() or c in "-_." else "_" for c in label)
