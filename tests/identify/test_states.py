@@ -1,8 +1,11 @@
+import mujoco
 import numpy as np
 
 from hopping_leg.identify.recording import make_recording
-from hopping_leg.identify.states import full_states, start_states
-from tests.identify.twin import LEG, record, swing
+from hopping_leg.identify.rig_model import build_rig_model
+from hopping_leg.identify.states import base_rate, full_states, start_states
+from hopping_leg.robot import kinematics
+from tests.identify.twin import LEG, STEP, record, swing
 
 RUN = record(LEG, swing(3.0))
 FAST = record(LEG, np.repeat(swing(2.0), 3, axis=0), rate=500.0)
@@ -36,3 +39,41 @@ def test_smoothing_comes_nearer_to_the_truth():
     error = np.std(velocity - FAST.array("velocity"), axis=0)
     assert (error < 0.05).all()
     assert np.abs(position - FAST.array("position")).max() < 1e-3
+
+
+def base_speed(run):
+    """Return the true speed of the base: the recording's torques on the leg that was recorded."""
+    model = build_rig_model(LEG, "rail", STEP)
+    data = mujoco.MjData(model)
+    data.qpos[:] = [run.trace.column("height_m")[0], *run.array("position")[0]]
+    speeds = []
+    for torque in run.array("torque_command"):
+        speeds.append(data.qvel[0])
+        data.ctrl[:] = torque
+        mujoco.mj_step(model, data, round(run.setup.period / STEP))
+    return np.array(speeds)
+
+
+def test_the_speed_of_a_base_that_stands_follows_from_its_joints():
+    run = record(LEG, swing(2.0, "rail"), "rail", onboard="torque")
+    true, height = base_speed(run), run.trace.column("height_m")
+    stands = kinematics.foot_clearance(LEG, height, run.array("position")) <= 0
+    plain, found = np.gradient(height, run.time) - true, base_rate(run, LEG) - true
+    inner = stands.copy()
+    inner[1:-1] &= stands[2:] & stands[:-2]
+    assert inner.mean() > 0.5
+    assert np.std(found[inner]) < 0.5 * np.std(plain[inner])
+    assert np.std(found) < 1.1 * np.std(plain)
+
+
+def test_no_difference_is_taken_across_a_touchdown():
+    run = record(LEG, swing(0.5, "rail"), "rail")
+    time = run.time
+    falling = 0.5 - 4.905 * time**2
+    standing = kinematics.stance_height(LEG, run.array("position")) - 1e-3
+    height = np.where(time < 0.2, falling, standing)
+    table = run.trace.table.with_columns(height_m=height)
+    rate = base_rate(make_recording(table, run.setup, "falls"), LEG)
+    np.testing.assert_allclose(rate[time < 0.2][2:], -9.81 * time[time < 0.2][2:], atol=1e-9)
+    legs = kinematics.foot_velocity(LEG, run.array("position"), run.array("velocity"))[:, 0]
+    np.testing.assert_allclose(rate[time >= 0.2], legs[time >= 0.2], atol=1e-9)

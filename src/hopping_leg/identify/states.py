@@ -10,6 +10,8 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RecordingError
 from hopping_leg.identify.recording import Recording
+from hopping_leg.robot import kinematics
+from hopping_leg.robot.parameters import Robot
 
 _REACH = 0.02
 """Time to either side of a row that its cubic spans, s."""
@@ -42,12 +44,32 @@ def start_states(recording: Recording) -> tuple[Array, Array]:
     return position, velocity
 
 
-def base_rate(recording: Recording) -> Array:
-    """Return the slope of the base's measured height at every row, m/s, (rows,).
+def base_rate(recording: Recording, robot: Robot) -> Array:
+    """Return the speed of the base at every row, m/s, (rows,), from its measured height.
 
-    Where both joints stand still to the last digit the leg has not begun to move.
+    A foot on the ground tells most of it: that much is known from the joints' velocities, and
+    only how far the ground gives is left to differences. Three rows from the same side of
+    touchdown and lift-off make a difference, where there are so many. Where both joints stand
+    still to the last digit the leg has not begun to move.
+
+    Args:
+        recording: With the base's height.
+        robot: Whose lengths say when the foot is on the ground.
     """
-    rate: Array = np.gradient(recording.trace.column("height_m"), recording.time)
+    time, height = recording.time, recording.trace.column("height_m")
+    position, velocity = full_states(recording)
+    clearance = kinematics.foot_clearance(robot, height, position)
+    stands = clearance <= 0
+    known = np.where(stands, kinematics.foot_velocity(robot, position, velocity)[:, 0], 0.0)
+    course = np.where(stands, clearance, height)
+    rate: Array = np.gradient(height, time)
+    slope, middle = np.diff(course) / np.diff(time), np.gradient(course, time)
+    alike = stands[1:] == stands[:-1]
+    inner = np.flatnonzero(alike[1:] & alike[:-1]) + 1
+    # a parabola's slope between two rows is the mean of its slopes there
+    rate[inner - 1] = known[inner - 1] + 2 * slope[inner - 1] - middle[inner]
+    rate[inner + 1] = known[inner + 1] + 2 * slope[inner] - middle[inner]
+    rate[inner] = known[inner] + middle[inner]
     rate[(recording.array("velocity") == 0).all(axis=1)] = 0.0
     return rate
 

@@ -23,6 +23,7 @@ from hopping_leg.identify.states import base_rate, start_states
 from hopping_leg.identify.windows import Window
 from hopping_leg.identify.zeros import Zeros, find_zeros, has_own_zeros
 from hopping_leg.robot import kinematics
+from hopping_leg.robot.parameters import Robot
 
 _BLOCK = 256
 """Ticks whose commands are prepared at once."""
@@ -76,11 +77,11 @@ class WindowGroup:
         self._numbers = sorted({w.recording for w in windows})
         self._of_window = np.array([self._numbers.index(w.recording) for w in windows])
         self._prepare_rows(recordings, windows)
-        self._prepare_commands(recordings)
-        self._zeros = [
-            Zeros(recordings[n]) if has_own_zeros(recordings[n].setup) else None
-            for n in self._numbers
-        ]
+        self._distinct = [recordings[n] for n in self._numbers]
+        self._start_rows = np.array([w.start for w in windows])
+        self._prepare_commands()
+        self._zeros = [Zeros(r) if has_own_zeros(r.setup) else None for r in self._distinct]
+        self._base_rates: dict[tuple[float, ...], Array] = {}
         self._batches: dict[int, batch.Batch] = {}
 
     def run(self, candidates: Sequence[Candidate]) -> tuple[Array, Array, Array, Array]:
@@ -112,7 +113,7 @@ class WindowGroup:
         self._padding = np.ones((len(windows), length), dtype=bool)
         states = {n: start_states(recordings[n]) for n in self._numbers}
         self._q0, self._qd0 = np.empty((len(windows), 2)), np.empty((len(windows), 2))
-        self._height0, self._rate0 = np.full(len(windows), np.nan), np.zeros(len(windows))
+        self._height0 = np.full(len(windows), np.nan)
         for i, w in enumerate(windows):
             recording = recordings[w.recording]
             stamps = recording.time[w.start : w.start + w.length]
@@ -123,15 +124,14 @@ class WindowGroup:
             self._q0[i], self._qd0[i] = (values[w.start] for values in states[w.recording])
             if recording.has_column("height_m"):
                 self._height0[i] = recording.trace.column("height_m")[w.start]
-                self._rate0[i] = base_rate(recording)[w.start]
         place = times / self._tick
         self._ticks = int(np.ceil(place.max() - 1e-6)) + 2
         self._before = np.minimum(np.floor(place + 1e-9).astype(int), self._ticks - 2)
         self._share = np.clip(place - self._before, 0.0, 1.0)[..., None]
 
-    def _prepare_commands(self, recordings: Sequence[Recording]) -> None:
+    def _prepare_commands(self) -> None:
         self._held, self._ramps, self._gains = [], [], []
-        for recording in (recordings[n] for n in self._numbers):
+        for recording in self._distinct:
             columns = [
                 np.nan_to_num(recording.array(f"{name}_command"))
                 for name in ("position", "velocity", "torque")
@@ -163,8 +163,21 @@ class WindowGroup:
         if setup.rig != "fixed-base":
             standing = [kinematics.stance_height(c.robot, self._q0) for c in candidates]
             height = np.where(np.isnan(self._height0), np.stack(standing), self._height0)
-            q[:, 0], qd[:, 0] = height.ravel(), np.tile(self._rate0, len(candidates))
+            q[:, 0] = height.ravel()
+            qd[:, 0] = np.concatenate([self._base_rate(c.robot) for c in candidates])
         return simulation
+
+    def _base_rate(self, robot: Robot) -> Array:
+        """Return the base's first speed in each window, m/s; zero if no height was measured."""
+        lengths = (robot.thigh.length, robot.shank.length, robot.foot.radius)
+        if lengths not in self._base_rates:
+            rates = np.zeros(len(self._begin))
+            for n, recording in enumerate(self._distinct):
+                if recording.has_column("height_m"):
+                    mine = self._of_window == n
+                    rates[mine] = base_rate(recording, robot)[self._start_rows[mine]]
+            self._base_rates[lengths] = rates
+        return self._base_rates[lengths]
 
     def _advance(
         self, simulation: batch.Batch, candidates: Sequence[Candidate]

@@ -13,6 +13,7 @@ from hopping_leg.identify.rig_model import build_rig_model
 from hopping_leg.identify.states import base_rate, start_states
 from hopping_leg.identify.windows import Window
 from hopping_leg.robot.limits import MotorLimit
+from hopping_leg.robot.parameters import Robot
 
 
 class PlainLoop:
@@ -31,7 +32,7 @@ class PlainLoop:
         self._setups = [recording.setup for recording in recordings]
         self._targets = [recording.array("position_command") for recording in recordings]
         self._states = [start_states(recording) for recording in recordings]
-        self._heights = [_heights(recording) for recording in recordings]
+        self._recordings = recordings
 
     def run(self, candidate: Candidate, *, whole_ticks: bool = False) -> list[Array]:
         """Return the joint positions of each window, rad, (rows, 2).
@@ -42,10 +43,19 @@ class PlainLoop:
         """
         limit = MotorLimit(candidate.robot)
         models = [build_rig_model(candidate.robot, s.rig, self._timestep) for s in self._setups]
-        return [self._window(w, models[w.recording], limit, whole_ticks) for w in self._windows]
+        heights = [_heights(recording, candidate.robot) for recording in self._recordings]
+        return [
+            self._window(w, models[w.recording], heights[w.recording], limit, whole_ticks)
+            for w in self._windows
+        ]
 
     def _window(
-        self, window: Window, model: mujoco.MjModel, limit: MotorLimit, whole_ticks: bool
+        self,
+        window: Window,
+        model: mujoco.MjModel,
+        heights: tuple[Array, Array],
+        limit: MotorLimit,
+        whole_ticks: bool,
     ) -> Array:
         setup, targets = self._setups[window.recording], self._targets[window.recording]
         stiffness, damping = (np.array(pair) for pair in (setup.stiffness, setup.damping))
@@ -56,7 +66,7 @@ class PlainLoop:
         position, velocity = self._states[window.recording]
         q[:], qd[:] = position[window.start], velocity[window.start]
         if setup.rig != "fixed-base":
-            height, rate = self._heights[window.recording]
+            height, rate = heights
             data.qpos[0], data.qvel[0] = height[window.start], rate[window.start]
         rows = np.empty((window.length, 2))
         for row in range(window.length):
@@ -68,7 +78,7 @@ class PlainLoop:
         return rows
 
 
-def _heights(recording: Recording) -> tuple[Array, Array]:
+def _heights(recording: Recording, robot: Robot) -> tuple[Array, Array]:
     """Return the base's height and its rate at every row, m and m/s, (rows,) each."""
     if recording.setup.rig == "fixed-base":
         return np.empty(0), np.empty(0)
@@ -76,4 +86,4 @@ def _heights(recording: Recording) -> tuple[Array, Array]:
         raise RecordingError(
             f"{recording.name} has no column 'height_m'; record the base's height."
         )
-    return recording.trace.column("height_m"), base_rate(recording)
+    return recording.trace.column("height_m"), base_rate(recording, robot)

@@ -76,7 +76,7 @@ def _states(recording: Recording) -> tuple[Array, Array]:
     if recording.setup.rig == "fixed-base":
         return q, qd
     height = recording.trace.column("height_m")
-    return np.column_stack([height, q]), np.column_stack([base_rate(recording), qd])
+    return np.column_stack([height, q]), np.column_stack([base_rate(recording, believed()), qd])
 
 
 def _control(recording: Recording, way: Way) -> Array:
