@@ -1,3 +1,7 @@
+import dataclasses
+
+import numpy as np
+import polars as pl
 import pytest
 
 from hopping_leg.errors import UsageError
@@ -68,6 +72,22 @@ def test_a_drive_at_its_limit_has_its_torque_speed_line_fitted():
     lines = {"hip.motor.peak_torque", "knee.motor.no_load_speed"}
     assert not lines & set(make_plan([weak], LEG).parameters.names)
     assert lines <= set(make_plan([strong], LEG).parameters.names)
+
+
+def test_a_motor_is_not_believed_slower_than_its_joint_was_seen():
+    name = "knee.motor.no_load_speed"
+
+    def low(factor):
+        table = FIXED.trace.table.with_columns(pl.col("knee_velocity_rad_s") * factor)
+        fast = dataclasses.replace(FIXED, trace=dataclasses.replace(FIXED.trace, table=table))
+        (parameter,) = make_plan([fast], LEG, parameters=(name,)).parameters.parameters
+        return parameter.low
+
+    seen = np.quantile(np.abs(FIXED.array("velocity")[:, 1]), 0.999)
+    known = LEG.knee.motor.no_load_speed
+    assert low(0.0) == known / 4
+    assert low(15 / seen) == pytest.approx(0.8 * 15 * LEG.knee.belt_ratio)
+    assert low(100 / seen) == known
 
 
 def test_friction_that_grows_with_load_shows_where_torques_drive():

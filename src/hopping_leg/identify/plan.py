@@ -30,6 +30,8 @@ _GAINS = {"stiffness": 10.0, "damping": 0.5, "integral": 1.0}
 """Where a search for an unknown gain begins, in the gain's unit at the joint."""
 _OFTEN, _BEYOND = 0.8, 1.5
 """Share of the time, and factor, that tell a torque limit from a spike."""
+_FASTEST, _REACHED = 0.999, 0.8
+"""Quantile that leaves spikes out, and share of it that a motor at least reaches by itself."""
 _CLEARANCE = 5e-3
 """Height of the foot above the ground that only a hop reaches, m."""
 
@@ -92,7 +94,9 @@ def make_plan(
     window, unscored = _window(recordings, robot)
     return Plan(
         start=start,
-        parameters=choose(start, names, bounds=bounds),
+        parameters=choose(
+            start, names, bounds={**_speed_bounds(recordings, robot), **(bounds or {})}
+        ),
         scoring=_scoring(recordings, paper=search in _PAPER),
         window=window,
         stride=window,
@@ -156,6 +160,19 @@ def _limits(recordings: Sequence[Recording]) -> list[str]:
         beyond |= asked > _BEYOND * given
     lines = ("peak_torque", "no_load_speed")
     return [f"{j}.motor.{n}" for j, far in zip(JOINTS, beyond, strict=True) if far for n in lines]
+
+
+def _speed_bounds(recordings: Sequence[Recording], robot: Robot) -> dict[str, tuple[float, float]]:
+    """Return bounds of the motors' no-load speeds: what a joint was seen to reach, it can."""
+    speeds = np.abs(np.concatenate([r.array("velocity") for r in recordings]))
+    found = {}
+    for index, name in enumerate(JOINTS):
+        joint = getattr(robot, name)
+        seen = speeds[np.isfinite(speeds[:, index]), index]
+        least = _REACHED * joint.belt_ratio * float(np.quantile(seen, _FASTEST)) if len(seen) else 0
+        known = joint.motor.no_load_speed
+        found[f"{name}.motor.no_load_speed"] = (max(0.25 * known, min(least, known)), 4 * known)
+    return found
 
 
 def _start(recordings: Sequence[Recording], robot: Robot) -> Candidate:
