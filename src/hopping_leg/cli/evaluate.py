@@ -8,7 +8,9 @@ Examples:
   hop evaluate fast energy-shaping
   hop evaluate fast energy-shaping --out runs/first
   hop evaluate 'runs/*/policy.onnx' --commands 0.25,0.30 --json result.json
+  hop evaluate mine=policy.onnx energy-shaping --suite robustness --json robustness.json
   hop evaluate energy-shaping --robot my_leg.toml --seeds 20 --floor stiff
+  hop evaluate fast --engine pybullet --floor soft --seeds 2
 """
 
 import dataclasses
@@ -23,16 +25,18 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from hopping_leg.cli.options import Heights
+from hopping_leg.cli.robustness import judge_robustness
 from hopping_leg.control import Setup
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Candidate, Judged, evaluate
 from hopping_leg.evaluate.candidates import load_candidates
 from hopping_leg.evaluate.report import render_videos, write_report
+from hopping_leg.evaluate.robustness.tables import print_robustness
 from hopping_leg.evaluate.runs import save_traces
 from hopping_leg.evaluate.terminal import print_tables
 from hopping_leg.evaluate.trials import KINDS
 from hopping_leg.robot import load_robot
-from hopping_leg.sim import CONTROL_RATE, NOTHING, Disturbance
+from hopping_leg.sim import CONTROL_RATE, NOTHING, Disturbance, Engine
 from hopping_leg.trace import write_atomically
 
 
@@ -43,6 +47,10 @@ class Evaluate:
     controllers: tyro.conf.Positional[tuple[str, ...]]
     """Names (energy-shaping, paper, fast, ...), .onnx files, or a quoted pattern of them;
     LABEL=FILE chooses the name in all tables."""
+    suite: Literal["paper", "robustness"] = "paper"
+    """The paper's trials, or how far the world may change before a controller fails."""
+    axes: tuple[str, ...] = ()
+    """Of the robustness suite: axes by name; default: all, and changes in the middle of a run."""
     robot: str = "legv2-paper"
     """A shipped robot or a .toml file."""
     commands: Heights | None = None
@@ -53,7 +61,8 @@ class Evaluate:
     seed: int = 1000
     """All of them follow from it; choose one that selected nothing."""
     out: Path | None = None
-    """Folder for evaluation.json, report.html and traces/, instead of naming each."""
+    """Folder for evaluation.json, report.html and traces/, instead of naming each; the robustness
+    suite leaves robustness.json, robustness.svg and all that a killed run goes on from."""
     json: Path | None = None
     """File for every number."""
     report: Path | None = None
@@ -61,8 +70,10 @@ class Evaluate:
     traces: Path | None = None
     """Folder for the runs as Parquet, for `hop plot` and your own tools."""
     floor: Literal["soft", "stiff", "both"] = "both"
-    """The robot's own contact (soft), MuJoCo's default (stiff), or all trials on the first and the
-    fixed ones on the second."""
+    """The robot's own contact (soft), the engine's default (stiff), or all trials on the first and
+    the fixed ones on the second."""
+    engine: Engine = "mujoco"
+    """What computes the physics; pybullet needs the extra `bullet` and is much slower."""
     noise: bool = True
     """The paper's sensor noise, torque noise and delay."""
     timestep: float = 5e-4
@@ -78,12 +89,25 @@ class Evaluate:
 def run(args: Evaluate) -> None:
     """Evaluate controllers, print the table, write what was asked for."""
     command = command_line(args)
-    args = _with_folder(args)
+    if args.suite == "paper":
+        args = _with_folder(args)
     _check(args)
     robot = load_robot(args.robot)
     disturbance = Disturbance() if args.noise else NOTHING
-    setup = Setup(robot, disturbance, rate=args.rate, timestep=args.timestep, threads=args.threads)
+    setup = Setup(
+        robot,
+        disturbance,
+        rate=args.rate,
+        timestep=args.timestep,
+        threads=args.threads,
+        engine=args.engine,
+    )
     candidates = load_candidates(args.controllers, robot, args.rate)
+    if args.suite == "robustness":
+        with progress_bar() as bar:
+            result = judge_robustness(args, candidates, setup, _bar_updater(bar), command)
+        print_robustness(Console(), result)
+        return
     judged = judge(candidates, setup, args)
     judged = replace(judged, evaluation=replace(judged.evaluation, command=command))
     if args.json:
@@ -102,6 +126,8 @@ def run(args: Evaluate) -> None:
 
 def _check(args: Evaluate) -> None:
     """Refuse what cannot work before anything is simulated."""
+    if args.axes and args.suite != "robustness":
+        raise UsageError("--axes belongs to --suite robustness; give that, too.")
     if args.seed < 0:
         raise UsageError(f"A seed of {args.seed} has no meaning; give 0 or more.")
     for path in (args.json, args.report):
@@ -132,6 +158,8 @@ def command_line(args: Evaluate) -> str:
             continue
         if isinstance(value, bool):
             words.append(f"--{'' if value else 'no-'}{field.name}")
+        elif field.name == "axes":
+            words.append(f"--axes {shlex.join(value)}")
         else:
             text = ",".join(f"{v:g}" for v in value) if isinstance(value, tuple) else str(value)
             words.append(f"--{field.name} {shlex.quote(text)}")
@@ -161,7 +189,7 @@ def _on_floor(
         seed=args.seed,
         floor=floor,
         kinds=KINDS if whole else ("fixed",),
-        on_progress=_bar_updater(bar, floor),
+        on_progress=_bar_updater(bar, f", {floor} floor"),
     )
 
 
@@ -177,12 +205,12 @@ def progress_bar() -> Progress:
     )
 
 
-def _bar_updater(bar: Progress, floor: str) -> Callable[[str, float], None]:
+def _bar_updater(bar: Progress, about: str = "") -> Callable[[str, float], None]:
     tasks: dict[str, tuple[int, float]] = {}
 
     def update(label: str, share: float) -> None:
         if label not in tasks:
-            tasks[label] = (bar.add_task(f"{label}, {floor} floor", total=1.0), -1.0)
+            tasks[label] = (bar.add_task(f"{label}{about}", total=1.0), -1.0)
         task, shown = tasks[label]
         if share - shown > 0.005 or share >= 1:
             bar.update(bar.tasks[task].id, completed=share)

@@ -11,11 +11,11 @@ from hopping_leg.control import Controller, Setup
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.pooling import pool_group
 from hopping_leg.evaluate.result import Evaluation, Group, Summary
-from hopping_leg.evaluate.runs import FLOORS, Run, floor_robot, run_trials
+from hopping_leg.evaluate.runs import FLOORS, Run, on_floor, run_trials
 from hopping_leg.evaluate.tables import tabulate
 from hopping_leg.evaluate.trials import KINDS, Trial, check_reach, paper_trials, within
 from hopping_leg.robot.model import TIMESTEP
-from hopping_leg.sim import NOTHING
+from hopping_leg.sim import NOTHING, Engine
 
 Bounds = tuple[float, float]
 
@@ -76,7 +76,7 @@ def evaluate(
     """
     _check(candidates, setup, commands, repeats)
     trials = [t for t in paper_trials(setup.robot, commands) if t.kind in kinds]
-    world = replace(setup, robot=floor_robot(setup.robot, floor))
+    world = on_floor(setup, floor)
     notes = _note_coarse(setup.timestep) + _note_twice(setup)
     runs: list[Run] = []
     for candidate in candidates:
@@ -98,7 +98,7 @@ def evaluate(
             measured,
             groups=_groups(candidates, measured.summary, seed),
             conditions=_conditions(world, setup, floor, repeats, seed),
-            versions=software_versions(),
+            versions=software_versions(setup.engine),
             notes=notes,
         ),
         runs,
@@ -181,7 +181,9 @@ def _conditions(world: Setup, setup: Setup, floor: str, repeats: int, seed: int)
         "robot": setup.robot.name,
         "robot_digest": setup.robot.digest,
         "floor": floor,
-        "floor_meaning": FLOORS[floor],
+        "floor_meaning": _FLOOR_MEANINGS.get(world.ground, FLOORS[floor]),
+        "engine": world.engine,
+        "ground": world.ground,
         "contact_time_constant_s": world.robot.contact.time_constant,
         "contact_damping_ratio": world.robot.contact.damping_ratio,
         "disturbance": asdict(setup.disturbance),
@@ -193,7 +195,14 @@ def _conditions(world: Setup, setup: Setup, floor: str, repeats: int, seed: int)
     }
 
 
-def software_versions() -> dict[str, str]:
+_FLOOR_MEANINGS = {
+    "spring": "the spring and damper of the robot's contact as PyBullet's",
+    "rigid": "PyBullet's own rigid contact",
+}
+
+
+def software_versions(engine: Engine = "mujoco") -> dict[str, str]:
     """Return the versions that the numbers may depend on."""
-    names = ("hopping-leg", "mujoco", "numpy", "scipy", "onnxruntime")
+    names = ["hopping-leg", "mujoco", "numpy", "scipy", "onnxruntime"]
+    names += ["pybullet"] if engine == "pybullet" else []
     return {"python": platform.python_version(), **{name: version(name) for name in names}}

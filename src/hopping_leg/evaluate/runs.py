@@ -16,7 +16,7 @@ from hopping_leg.robot.reality import Ground
 from hopping_leg.trace import Trace
 
 FLOORS = {"soft": "the robot's own contact", "stiff": "MuJoCo's default contact, solref 0.02 1"}
-"""Grounds to be judged on."""
+"""Grounds to be judged on; in PyBullet the stiff one is its own rigid contact."""
 
 Progress = Callable[[float], None]
 """Called with the share done, 0 to 1."""
@@ -57,6 +57,17 @@ def floor_robot(robot: Robot, floor: str) -> Robot:
         return robot
     reality = replace(robot.reality, ground=Ground())
     return replace(robot, contact=Contact(0.02, 1.0, robot.contact.friction), reality=reality)
+
+
+def on_floor(setup: Setup, floor: str) -> Setup:
+    """Return the world with another floor.
+
+    Raises:
+        UsageError: There is no such floor.
+    """
+    if floor == "stiff" and setup.engine == "pybullet":
+        return replace(setup, ground="rigid")
+    return replace(setup, robot=floor_robot(setup.robot, floor))
 
 
 def run_trials(

@@ -8,10 +8,12 @@ Examples:
   hop bench faults --json faults.json
   hop bench deploy --json deploy.json
   hop bench energy-shaping --json energy_shaping.json
+  hop bench engines --json bullet.json
   hop bench identify --skip-paper-size --json identify.json
 """
 
 from hopping_leg.cli.bench.controllers import Ablation, EnergyShaping, Training
+from hopping_leg.cli.bench.engines import Engines
 from hopping_leg.cli.bench.faults import Faults
 from hopping_leg.cli.bench.hardware import Deploy
 from hopping_leg.cli.bench.identification import Identify
@@ -19,7 +21,16 @@ from hopping_leg.cli.bench.simulation import Convergence, Env, Inference
 from hopping_leg.cli.output import write_json
 
 Benchmark = (
-    Env | Convergence | Inference | EnergyShaping | Training | Ablation | Faults | Deploy | Identify
+    Env
+    | Convergence
+    | Inference
+    | EnergyShaping
+    | Training
+    | Ablation
+    | Faults
+    | Deploy
+    | Identify
+    | Engines
 )
 
 
