@@ -60,7 +60,7 @@ class Suite:
         limits = setup.soft_limits
         return {
             "controller": fingerprint(controller),
-            "axes": [_described(one) for one in AXES if axis in (one.name, JOINT)],
+            "levels": _levels(axis),
             "robot": setup.robot.digest,
             "disturbance": asdict(setup.disturbance),
             "soft_limits": asdict(limits) if limits else None,
@@ -225,6 +225,13 @@ def _described(axis: Axis) -> dict[str, Any]:
         for field in dataclasses.fields(axis)
         if field.name != "alter"
     }
+
+
+def _levels(axis: str) -> Any:  # noqa: ANN401
+    """Return the numbers of an axis that its results depend on."""
+    if axis == JOINT:
+        return [JOINT_POINTS, JOINT_LEVELS, *((one.name, one.moderate) for one in AXES)]
+    return [one.levels for one in AXES if one.name == axis]
 
 
 def _joint(suite: Suite) -> list[dict[str, Any]]:

@@ -1,0 +1,55 @@
+import json
+
+import pytest
+
+from hopping_leg.cli import evaluate as verb
+from hopping_leg.cli import main
+from hopping_leg.evaluate import Candidate
+from tests.evaluate.conftest import Spring
+
+WORDS = ["evaluate", "spring", "--suite", "robustness", "--commands", "0.3", "--seeds", "2"]
+AXES = ["--axes", "pushes", "voltage"]
+
+
+@pytest.fixture
+def spring(monkeypatch):
+    def load(names, robot, rate):
+        return [Candidate(name, Spring(robot), (0.29, 0.31)) for name in names]
+
+    monkeypatch.setattr(verb, "load_candidates", load)
+
+
+def test_one_folder_receives_numbers_figure_and_what_goes_on(spring, tmp_path, capsys):
+    out, file = tmp_path / "kept", tmp_path / "robustness.json"
+    words = [*WORDS, *AXES, "--threads", "1", "--out", str(out)]
+    assert main([*words, "--json", str(file)]) == 0
+    data = json.loads(file.read_text())
+    assert [row["axis"] for row in data["scores"]] == ["voltage", "pushes", "overall"]
+    assert all(0 <= row["low"] <= row["score"] <= row["high"] <= 1 for row in data["scores"])
+    assert "--suite robustness" in data["command"]
+    assert "--axes pushes voltage" in data["command"]
+    assert (out / "robustness.svg").read_bytes().startswith(b"<?xml")
+    assert "overall" in capsys.readouterr().out
+    kept = {path.name: path.read_bytes() for path in out.glob("spring-*.json")}
+    assert len(kept) == 3
+    assert main(words) == 0
+    assert json.loads((out / "robustness.json").read_text())["scores"] == data["scores"]
+    assert {path.name: path.read_bytes() for path in out.glob("spring-*.json")} == kept
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ([*WORDS, "--axes", "wind"], "There is no axis 'wind'"),
+        ([*WORDS, "--report", "x.html"], "--report belongs to the paper's suite"),
+        ([*WORDS, "--floor", "stiff"], "leave --floor out"),
+        ([*WORDS, "--commands", "0.25"], "trained for 0.29 to 0.31 m"),
+        (["evaluate", "spring", "--axes", "pushes"], "--axes belongs to --suite robustness"),
+    ],
+)
+def test_bad_input_is_one_sentence(spring, capsys, tmp_path, monkeypatch, words, sentence):
+    monkeypatch.chdir(tmp_path)
+    assert main(words) == 2
+    error = capsys.readouterr().err
+    assert sentence in " ".join(error.split())
+    assert "Traceback" not in error

@@ -1,0 +1,75 @@
+"""Results are kept, say what they depend on, and repeat."""
+
+import dataclasses
+import json
+
+import pytest
+
+from hopping_leg.control.library import load_controller
+from hopping_leg.errors import UsageError
+from hopping_leg.evaluate import Candidate
+from hopping_leg.evaluate.figures import draw_robustness, to_svg
+from hopping_leg.evaluate.keeper import Keeper
+from hopping_leg.evaluate.robustness.suite import fingerprint, make_suite, run_suite
+
+AXES = ("torque-gain", "pushes")
+
+
+@pytest.fixture
+def tiny(setup):
+    return make_suite(setup, axes=AXES, commands=[0.28, 0.32], repeats=1, seconds=2.5)
+
+
+def test_a_suite_repeats_and_its_results_are_kept(tiny, spring, tmp_path):
+    begun, progress = [], []
+    judged = [Candidate("my spring", spring)]
+    first = run_suite(
+        judged, tiny, Keeper(tmp_path, begun.append), lambda label, share: progress.append(share)
+    )
+    assert begun == [f"my spring: {axis}" for axis in ("nominal", *sorted(AXES)[::-1])]
+    assert progress == sorted(progress)
+    assert progress[-1] == 1
+    again = run_suite(judged, tiny, Keeper(tmp_path, begun.append))
+    assert len(begun) == 3
+    elsewhere = run_suite(judged, tiny, Keeper(tmp_path / "elsewhere"))
+    assert json.dumps(first) == json.dumps(again) == json.dumps(elsewhere)
+    other = dataclasses.replace(tiny, seed=7, axes=("pushes",))
+    run_suite(judged, other, Keeper(tmp_path, begun.append))
+    assert len(begun) == 5
+    svg = to_svg(draw_robustness(first))
+    assert svg == to_svg(draw_robustness(first))
+    assert all(axis.encode() in svg for axis in AXES) or b"<path" in svg
+
+
+def test_rows_have_the_promised_names(tiny, spring, tmp_path):
+    result = run_suite([Candidate("spring", spring)], tiny, Keeper(tmp_path))
+    scores = {row["axis"]: row for row in result["scores"]}
+    assert list(scores) == ["torque-gain", "pushes", "overall"]
+    assert all({"controller", "score", "low", "high"} <= row.keys() for row in scores.values())
+    assert [axis["name"] for axis in result["axes"]] == ["torque-gain", "pushes"]
+    assert {row["axis"] for row in result["levels"]} == {"nominal", *AXES}
+    assert result["conditions"]["seed"] == 1000
+    json.dumps(result, allow_nan=False)
+
+
+def test_controllers_are_told_apart_by_what_they_do(robot, spring):
+    names = ("energy-shaping", "energy-shaping-literal", "fast", "paper")
+    prints = [fingerprint(load_controller(name, robot)) for name in names]
+    prints.append(fingerprint(spring))
+    assert len(set(prints)) == len(prints)
+    assert fingerprint(load_controller("energy-shaping", robot)) == prints[0]
+
+
+def test_bad_input_is_one_sentence(setup, spring, tiny, tmp_path):
+    with pytest.raises(UsageError, match=r"no axis 'wind'"):
+        make_suite(setup, axes=["wind"])
+    with pytest.raises(UsageError, match="0 seeds"):
+        make_suite(setup, repeats=0)
+    with pytest.raises(UsageError, match="out of reach"):
+        make_suite(setup, commands=[3.0])
+    with pytest.raises(UsageError, match=r"0\.32 m: it was trained for 0\.2 to 0\.3 m"):
+        run_suite([Candidate("low", spring, (0.2, 0.3))], tiny, Keeper(tmp_path))
+    with pytest.raises(UsageError, match="named twice"):
+        run_suite([Candidate("a", spring), Candidate("a", spring)], tiny, Keeper(tmp_path))
+    with pytest.raises(UsageError, match="No controller"):
+        run_suite([], tiny, Keeper(tmp_path))
