@@ -81,7 +81,7 @@ def test_rows_between_ticks_are_met():
 
 def test_friction_that_grows_with_load_slows_the_leg():
     run = record(LEG, swing(1.0), onboard="torque")
-    lossy = TRUE.replace({"drive.hip.load_friction": 0.3, "drive.knee.load_friction": 0.3})
+    lossy = TRUE.replace({"hip.load_friction": 0.3, "knee.load_friction": 0.3})
     speeds = np.abs(simulator([run]).run([TRUE, lossy]).velocity).mean(axis=(1, 2))
     assert (speeds[1] < speeds[0]).all()
 

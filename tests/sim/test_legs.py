@@ -90,6 +90,35 @@ def test_a_motor_never_drives_beyond_its_no_load_speed(sign):
     assert speed[1] * 0.8 < fastest < speed[1] * 1.5
 
 
+def with_gears(**changes):
+    hip = dataclasses.replace(CAD.hip, friction=0.2, damping=0.0, **changes)
+    return dataclasses.replace(CAD, hip=hip)
+
+
+@pytest.mark.parametrize("detailed", [False, True])
+def test_a_gear_under_load_takes_its_share_of_the_torque(detailed):
+    """1.2 N m against 0.2 + 0.3 x 1.2 N m of friction move the hip as 0.84 N m without load do."""
+    moved = []
+    for robot, torque in ((with_gears(load_friction=0.3), 1.2), (with_gears(), 0.84)):
+        legs = Legs(robot, 1, threads=1, detailed=detailed)
+        legs.place(slice(None), 3.0, np.zeros(2))
+        for _ in range(4):
+            legs.step(np.array([[torque, 0.0]]))
+        moved.append(float(legs.qd[0, 0]))
+    assert moved[0] > 0.5
+    assert moved[0] == pytest.approx(moved[1], rel=1e-6)
+
+
+def test_a_loaded_gear_holds_a_joint_that_would_move_without():
+    speeds = []
+    for robot in (with_gears(load_friction=0.9), with_gears()):
+        legs = Legs(robot, 1, threads=1)
+        legs.place(slice(None), 3.0, np.zeros(2))
+        legs.step(np.array([[1.0, 0.0]]))
+        speeds.append(abs(float(legs.qd[0, 0])))
+    assert speeds[0] < 0.1 < 0.4 < speeds[1]
+
+
 def run_plant(threads):
     legs = Legs(PAPER, 5, threads=threads)
     plant = Plant(legs, Disturbance(), SoftLimits(), np.random.default_rng(3))

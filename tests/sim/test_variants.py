@@ -41,6 +41,15 @@ def test_every_leg_moves_as_its_own_robot_does_alone():
     assert np.ptp(together[-1, :, 0]) > 1e-3
 
 
+def test_gears_that_rub_under_load_do_so_in_every_leg_as_alone():
+    loads = [Range("hip.load_friction", "1", v, v, "test") for v in (0.02, 0.1)]
+    robots = [vary(LEG, [load], 1, np.random.default_rng(0))[0] for load in loads]
+    together = states(Legs(LEG, 2, threads=1, variants=robots))
+    for index, robot in enumerate(robots):
+        alone = states(Legs(robot, 1, threads=1))
+        np.testing.assert_array_equal(together[:, index], alone[:, 0])
+
+
 @pytest.mark.parametrize("spread", IDENTIFIABLE, ids=lambda spread: spread.path)
 def test_every_range_of_the_twins_reaches_the_physics(spread):
     low, high = (dataclasses.replace(spread, low=v, high=v) for v in (spread.low, spread.high))

@@ -24,8 +24,6 @@ class Drive:
     """Measured torque without any true torque."""
     sensor_gain: float = field(default=1.0, metadata={"unit": "1"})
     """Measured torque per true torque."""
-    load_friction: float = field(default=0.0, metadata={"unit": "1"})
-    """Coulomb friction per torque that the gear transmits."""
 
 
 @dataclass(frozen=True)

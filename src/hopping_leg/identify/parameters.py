@@ -31,7 +31,7 @@ _RANGES = {
     "drive.torque_gain": (0.5, 1.5),
     "drive.torque_offset": (-1.0, 1.0),
     "drive.sensor_gain": (0.5, 1.5),
-    "drive.load_friction": (0.0, 0.5),
+    "load_friction": (0.0, 0.5),
 }
 """Widest bounds: by full name, else by the last part, prefixed by ``drive`` for drives."""
 

@@ -113,10 +113,19 @@ def _names(recordings: Sequence[Recording], *, paper: bool) -> list[str]:
     if not paper:
         names += ["thigh.com", "shank.com", *INERTIAS, "drive.delay"]
         names.remove("hip.armature")
-        if all(r.setup.onboard == "torque" for r in recordings):
-            names += [f"drive.{joint}.load_friction" for joint in JOINTS]
+        if all(_tells_load(r) for r in recordings):
+            names += [f"{joint}.load_friction" for joint in JOINTS]
         names += _limits(recordings)
     return [*names, *_open_gains(recordings)]
+
+
+def _tells_load(recording: Recording) -> bool:
+    """Return whether a recording tells friction that grows with torque from one that does not.
+
+    Its torques must be known: commanded as such, or measured beside a loop that was computed here.
+    """
+    onboard = recording.setup.onboard
+    return onboard == "torque" or (onboard == "zoh" and recording.has("torque"))
 
 
 def _open_gains(recordings: Sequence[Recording]) -> list[str]:

@@ -199,7 +199,7 @@ class WindowGroup:
         still = friction.copy()
         bounds = MotorBounds(candidates, self._recordings)
         gain = np.repeat(drive_values(candidates, "torque_gain"), windows, axis=0)
-        load = np.repeat(drive_values(candidates, "load_friction"), windows, axis=0)
+        load = np.repeat([c.robot.of_joints("load_friction") for c in candidates], windows, axis=0)
         delay = np.repeat([c.drive.delay for c in candidates], windows)
         line = DelayLine(delay / self._tick)
         window = np.repeat([c.drive.velocity_window for c in candidates], windows)

@@ -98,7 +98,7 @@ class Zeros:
         lever = robot.shank.mass * robot.shank.com * robot.thigh.length
         force = torque - self._gravity * dynamics.gravity_force(robot, q)[:, 1:]
         force[:, 1] -= lever * np.sin(q[:, 1]) * qd[:, 0] * (qd[:, 0] + qd[:, 1])
-        load = drive_values([candidate], "load_friction")[0] * np.abs(torque)
+        load = candidate.robot.of_joints("load_friction") * np.abs(torque)
         force -= (robot.of_joints("friction") + load) * np.tanh(qd / _DRAG)
         force -= robot.of_joints("damping") * qd
         impulse = np.cumsum(force, axis=0) * _GRID

@@ -68,6 +68,11 @@ def check_physics(robot: Robot, origin: str) -> None:
                 (f"{name}.motor.peak_torque", motor.peak_torque),
                 "N m",
             )
+        if joint.load_friction >= 1:
+            raise RobotError(
+                f"{origin}: '{name}.load_friction' is {joint.load_friction:g} but a gear that takes"
+                " all that it gets never turns; give less than 1."
+            )
     for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
         _at_most(origin, (f"{name}.com", link.com), (f"{name}.length", link.length), "m")
     if robot.kind not in KINDS:

@@ -99,6 +99,8 @@ class Joint:
     motor: Motor
     armature: float = field(default=float("nan"), metadata={"unit": "kg m2"})
     """Reflected inertia at the joint; a file without it gets what rotor, gear and belt give."""
+    load_friction: float = field(default=0.0, metadata={"unit": "1", "zero": True})
+    """Gear loss: further Coulomb friction per torque that the motor gives."""
 
     def __post_init__(self) -> None:
         if np.isnan(self.armature):
@@ -172,5 +174,8 @@ class Robot:
         del values["name"], values["description"], values["kind"], values["hardware"]
         if self.reality.neutral:
             del values["reality"]
+        for joint in ("hip", "knee"):
+            if not values[joint]["load_friction"]:
+                del values[joint]["load_friction"]
         text = json.dumps(values, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]

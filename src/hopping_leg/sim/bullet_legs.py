@@ -32,7 +32,7 @@ class BulletLegs(AnyLegs):
 
     Raises:
         UsageError: PyBullet is not installed, the physics step does not divide the control period,
-            or the robot has a ``reality``.
+            or the robot has a ``reality`` or gears that rub under load.
     """
 
     def __init__(
@@ -48,6 +48,11 @@ class BulletLegs(AnyLegs):
         if not robot.reality.neutral:
             raise UsageError(
                 f"{robot.name} has effects in [reality], which only MuJoCo simulates; choose the"
+                " engine mujoco, or a robot without, e.g. legv2-paper."
+            )
+        if robot.of_joints("load_friction").any():
+            raise UsageError(
+                f"{robot.name} has a 'load_friction', which only MuJoCo simulates; choose the"
                 " engine mujoco, or a robot without, e.g. legv2-paper."
             )
         law = GroundLaw(robot)

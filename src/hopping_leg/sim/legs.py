@@ -1,5 +1,6 @@
 """Many legs stepped at once on all cores."""
 
+import copy
 from collections.abc import Sequence
 
 import mujoco
@@ -12,10 +13,14 @@ from hopping_leg.robot.limits import MotorLimit
 from hopping_leg.robot.model import TIMESTEP, build_model
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.any_legs import AnyLegs
+from hopping_leg.sim.joint_friction import JointFriction, rubs_under_load
 from hopping_leg.sim.reality import RealLegs
 
 CONTROL_RATE = 200.0
 """Control rate of the paper, Hz."""
+
+_JOINTS = np.array([1, 2])
+"""Degrees of freedom of hip and knee; the base comes first."""
 
 
 class Legs(AnyLegs):
@@ -77,8 +82,12 @@ class Legs(AnyLegs):
     def _take_model(self, threads: int, variants: Sequence[Robot]) -> None:
         model = build_model(self.robot, self.timestep)
         self.batch = batch.Batch(model, self.count, threads)
+        self._friction: JointFriction | None = None
         if variants:
             self._set_models(variants)
+        elif rubs_under_load([self.robot]):
+            robots = [self.robot] * self.count
+            self._friction = JointFriction(robots, self.batch, _JOINTS, None)
         self._ctrl = self.batch.bind("ctrl")
         first = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_TIME)
         self._show(self.batch.state[:, first : first + 6])
@@ -87,7 +96,12 @@ class Legs(AnyLegs):
         """Build every robot's model, once where legs share a robot."""
         distinct = {id(robot): robot for robot in variants}
         models = {key: build_model(robot, self.timestep) for key, robot in distinct.items()}
-        self.batch.set_models([models[id(robot)] for robot in variants])
+        own = [models[id(robot)] for robot in variants]
+        self._friction = None
+        if rubs_under_load(variants):
+            own = [copy.copy(model) for model in own]
+            self._friction = JointFriction(variants, self.batch, _JOINTS, own)
+        self.batch.set_models(own)
 
     def _is_plain(self, variants: Sequence[Robot]) -> bool:
         """Tell whether a constant delay, the same for all, is all that is beyond the model."""
@@ -166,19 +180,23 @@ class Legs(AnyLegs):
         if self._late or len(self.waiting) > 1:
             return self._step_late(torque)
         self._applied = applied = self._motors.clip(torque, self.qd)
-        np.multiply(applied, self._inverse_belt, out=self._ctrl)
-        self.batch.step(nstep=self.substeps)
+        self._give(applied, self.substeps)
         return applied
+
+    def _give(self, torque: Array, substeps: int) -> None:
+        """Let the motors give joint torques, N m, (n, 2), for some physics steps."""
+        np.multiply(torque, self._inverse_belt, out=self._ctrl)
+        if self._friction is not None:
+            self._friction.set(torque)
+        self.batch.step(nstep=substeps)
 
     def _step_late(self, torque: Array) -> Array:
         """Go on with the torques of before until later ones arrive; return their mean."""
         before, under_way = self.waiting[0], [*self.waiting[1:], torque]
         if self._late:
-            np.multiply(before, self._inverse_belt, out=self._ctrl)
-            self.batch.step(nstep=self._late)
+            self._give(before, self._late)
         after = self._motors.clip(under_way[0], self.qd)
-        np.multiply(after, self._inverse_belt, out=self._ctrl)
-        self.batch.step(nstep=self.substeps - self._late)
+        self._give(after, self.substeps - self._late)
         self._applied = after + self._late / self.substeps * (before - after)
         self.waiting = np.stack([after, *under_way[1:]])
         return self._applied

@@ -3,12 +3,13 @@
 Backlash, belts    a further hinge with limit or spring (``real_model``); both together a spring
                    with a dead band, numpy at each physics step
 Masses, ground     other numbers of the same model
-Stiction           Stribeck's curve sets MuJoCo's friction loss at each physics step: its solver
-                   holds a joint at rest, which a torque computed in between cannot
+Friction           Stribeck's curve and the gears' load set MuJoCo's friction loss at each physics
+                   step: its solver holds a joint at rest, which a torque computed before cannot
 Motor, latency     numpy at each physics step, where order matters (``real_drive``)
 Encoders           numpy once per control period; the physics never sees them (``real_sensors``)
 """
 
+import copy
 from collections.abc import Sequence
 from typing import Any
 
@@ -19,6 +20,7 @@ from mujoco import batch
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import UsageError
 from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim.joint_friction import JointFriction, rubs_under_load
 from hopping_leg.sim.real_drive import RealDrive
 from hopping_leg.sim.real_model import real_model
 from hopping_leg.sim.real_sensors import DRAWS, RealSensors
@@ -65,8 +67,7 @@ class RealLegs:
         self._inverse_belt = np.tile(1 / robots[0].of_joints("belt_ratio"), (self.count, 1))
         self._layout = _layout(robots[0])
         self._note(robots)
-        if _differ(robots):
-            self.batch.set_models(self._models(robots))
+        self._take_models(robots, differ=_differ(robots))
         self.reseed(np.random.default_rng(0))
 
     def adopt(self, robots: Sequence[Robot]) -> None:
@@ -77,9 +78,19 @@ class RealLegs:
                 or one of them has stiction.
         """
         self._note(robots)
-        self.batch.set_models(self._models(robots))
+        self._take_models(robots, differ=True)
         self.drive.adopt(robots)
         self.sensors.adopt([robot.reality for robot in robots])
+
+    def _take_models(self, robots: Sequence[Robot], *, differ: bool) -> None:
+        """Take on the robots' models, if they differ, and their friction, if it changes."""
+        models = self._models(robots) if differ else None
+        self._friction: JointFriction | None = None
+        if self._excess.any() or rubs_under_load(robots):
+            models = models and [copy.copy(model) for model in models]
+            self._friction = JointFriction(robots, self.batch, self._motor, models)
+        if models:
+            self.batch.set_models(models)
 
     def _models(self, robots: Sequence[Robot]) -> list[mujoco.MjModel]:
         """Build every robot's model, once where legs share a robot."""
@@ -100,13 +111,11 @@ class RealLegs:
         return [models[id(robot)] for robot in robots]
 
     def _note(self, robots: Sequence[Robot]) -> None:
-        """Note what is computed here at each physics step: stiction, springs with a dead band."""
+        """Note what is computed here at each physics step: friction, springs with a dead band."""
         reality = robots[0].reality
-        self._coulomb = robots[0].of_joints("friction")
-        self._excess = self._coulomb * (reality.of_drives("stiction") - 1)
+        coulomb = robots[0].of_joints("friction")
+        self._excess = coulomb * (reality.of_drives("stiction") - 1)
         self._stribeck = reality.of_drives("stiction_speed")
-        if self._excess.any():
-            self._friction = self.batch.expand("dof_frictionloss")
         stiffness, backlash = (
             np.array([robot.reality.of_drives(name) for robot in robots])
             for name in ("stiffness", "backlash")
@@ -148,9 +157,9 @@ class RealLegs:
         for substep in range(self.substeps):
             q, qd = self._q[:, self._motor], self._qd[:, self._motor]
             given = self.drive.torque(substep, q, qd)
-            if self._excess.any():
+            if self._friction is not None:
                 at_rest = np.exp(-np.square(qd / self._stribeck))
-                self._friction[:, self._motor] = self._coulomb + self._excess * at_rest
+                self._friction.set(self.drive.motor_torque, self._excess * at_rest)
             if len(self._slack):
                 angle = self._q[:, self._slack]
                 beyond = angle - np.clip(angle, -self._half_band, self._half_band)

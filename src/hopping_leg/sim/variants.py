@@ -22,7 +22,11 @@ VARIABLE = (
     "rail.damping",
     *(f"{link}.{name}" for link in ("thigh", "shank") for name in ("mass", "com", "inertia")),
     *(f"contact.{name}" for name in ("time_constant", "damping_ratio", "friction")),
-    *(f"{joint}.{n}" for joint in ("hip", "knee") for n in ("friction", "damping", "armature")),
+    *(
+        f"{joint}.{name}"
+        for joint in ("hip", "knee")
+        for name in ("friction", "damping", "armature", "load_friction")
+    ),
 )
 """Numbers of a robot that may differ from leg to leg."""
 
