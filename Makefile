@@ -56,6 +56,7 @@ results: $(STAMP)
 	$(BIN)/hop bench env --json docs/results/env.json
 	$(BIN)/hop bench inference --json docs/results/inference.json
 	$(BIN)/hop bench convergence --json docs/results/convergence.json
+	$(BIN)/hop bench engines --json docs/results/bullet.json
 	$(BIN)/hop bench energy-shaping --json docs/results/energy_shaping.json
 	$(BIN)/hop bench training --json docs/results/training.json
 	$(BIN)/hop bench ablation --json docs/results/ablation.json
