@@ -53,6 +53,9 @@ results: $(STAMP)
 	$(BIN)/hop evaluate fast paper energy-shaping energy-shaping-literal --seeds 10 --no-video \
 	  --json docs/results/evaluation.json --traces runs/results/traces
 	$(BIN)/hop plot runs/results/traces/*.parquet --out docs/results/figures
+	$(BIN)/hop evaluate energy-shaping energy-shaping-literal fast paper --suite robustness --seeds 3 \
+	  --out runs/results/robustness --json docs/results/robustness.json
+	cp runs/results/robustness/robustness.svg docs/results
 	$(BIN)/hop bench env --json docs/results/env.json
 	$(BIN)/hop bench inference --json docs/results/inference.json
 	$(BIN)/hop bench convergence --json docs/results/convergence.json

@@ -22,6 +22,7 @@ from hopping_leg import cli
 from hopping_leg.cli.robots import derived, numbers
 from hopping_leg.deploy.emulator.faults import KINDS
 from hopping_leg.evaluate.faults.families import FAMILIES
+from hopping_leg.evaluate.robustness.axes import AXES
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.files import load_tree
 from hopping_leg.sim.twins import TWIN_RANGES
@@ -202,6 +203,39 @@ def twin_ranges() -> str:
     return grid(["number", "from", "to", "unit", "scale", "source"], rows)
 
 
+def robustness_axes() -> str:
+    """Return the axes of the robustness benchmark as a table."""
+    rows = [
+        [
+            f"`{axis.name}`",
+            axis.meaning,
+            "" if axis.unit == "1" else axis.unit,
+            ", ".join(f"{level:g}" for level in axis.levels),
+            axis.leaderboard,
+            "{:g} to {:g}".format(*axis.moderate),
+        ]
+        for axis in AXES
+    ]
+    return grid(["axis", "a level is", "unit", "levels", "R", "in `joint`"], rows)
+
+
+def leaderboard(file: str) -> str:
+    """Return the scores of a robustness file: a row per axis, a column per controller, in %."""
+    content = read(file)
+    controllers = list(dict.fromkeys(row["controller"] for row in content["scores"]))
+    cells = {(row["axis"], row["controller"]): _share(row) for row in content["scores"]}
+    rows = [
+        [f"`{axis}`", *(cells[axis, name] for name in controllers)]
+        for axis in dict.fromkeys(axis for axis, _ in cells)
+    ]
+    return grid(["axis", *controllers], rows) + origin(file, content)
+
+
+def _share(row: dict[str, Any]) -> str:
+    score, low, high = (f"{100 * row[key]:.0f}" for key in ("score", "low", "high"))
+    return f"{score} [{low}, {high}]"
+
+
 def fault_kinds() -> str:
     """Return what a fault script may name as a table."""
     rows = []
@@ -250,6 +284,8 @@ MACROS = {
     "robot": robot,
     "usage": usage,
     "twin_ranges": twin_ranges,
+    "robustness_axes": robustness_axes,
+    "leaderboard": leaderboard,
     "fault_kinds": fault_kinds,
     "fault_families": fault_families,
     "example": example,
