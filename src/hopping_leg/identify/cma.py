@@ -102,9 +102,10 @@ def cma_es(
         strategy.tell(list(vectors), found.tolist())
         means.append(np.array(strategy.result.xfavorite))
         least = len(judges) * float(found.min())
-        if shares or not history or least < history[-1]:
+        counts = bool(shares) or not history or least < history[-1]
+        if counts:
             bests.append(vectors[found.argmin()])
-        history.append(least if shares or not history else min(least, history[-1]))
+        history.append(least if counts else history[-1])
         report(generation + 1, history[-1])
         if np.ptp(found) <= options.tolerance * abs(found.min()):
             break
