@@ -90,14 +90,22 @@ def score_rows(
         seed: Of the bootstrap.
     """
     levels = {axis: successes(found) for axis, found in outcomes.items()}
-    rows = [(axis, [groups], len(outcomes[axis])) for axis, groups in levels.items()]
-    rows.append((OVERALL, list(levels.values()), sum(map(len, outcomes.values()))))
-    return [
-        dict(zip(("controller", "axis", "score", "low", "high"), values, strict=True))
-        | {"trials": trials}
-        for axis, groups, trials in rows
-        for values in [(controller, axis, *share(groups, seed))]
-    ]
+    rows = [_row(controller, axis, [groups], seed) for axis, groups in levels.items()]
+    return [*rows, _row(controller, OVERALL, list(levels.values()), seed)]
+
+
+def _row(
+    controller: str, axis: str, groups: Sequence[Sequence[Array]], seed: int
+) -> dict[str, Any]:
+    score, low, high = share(groups, seed)
+    return {
+        "controller": controller,
+        "axis": axis,
+        "score": score,
+        "low": low,
+        "high": high,
+        "trials": sum(len(level) for levels in groups for level in levels),
+    }
 
 
 def _median_size(errors: Sequence[float | None]) -> float | None:
