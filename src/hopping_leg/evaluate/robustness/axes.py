@@ -1,7 +1,8 @@
 """The axes of the robustness benchmark: what is changed, and how far.
 
-Ranges were chosen so that the least levels harm no controller that hops at all and the greatest
-bring the baselines down; they were not measured on a leg.
+Ranges were chosen so that the least levels harm no controller that hops well and the greatest bring
+down at least one, where the foot's clearance and the trained heights allow it; they were not
+measured on a leg.
 """
 
 from collections.abc import Callable
