@@ -7,6 +7,7 @@ from stable_baselines3.common.logger import configure
 
 from hopping_leg.learn.fast import FastRecipe
 from hopping_leg.learn.paper import PaperRecipe
+from hopping_leg.learn.precise import PreciseRecipe
 from hopping_leg.learn.resumable import ResumablePPO
 from hopping_leg.robot import load_robot
 
@@ -15,6 +16,10 @@ TINY = PaperRecipe(
     steps=1200, warmup=300, judge_every=10**9, hidden=(8, 8), legs=2, gradient_steps=4, batch=16
 )
 TINY_FAST = FastRecipe(steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8))
+TINY_PRECISE = PreciseRecipe(
+    steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8), student=(8, 8),
+    teaching=0.4, imitation_passes=2, imitation_batch=64,
+)  # fmt: skip
 
 
 @dataclasses.dataclass(frozen=True)

@@ -15,7 +15,7 @@ from hopping_leg.learn import judge
 from hopping_leg.learn import train as module
 from hopping_leg.learn.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
 from hopping_leg.learn.resumable import restore, state_of
-from tests.learn.learners import ROBOT, TINY, TINY_FAST, TinyPPO, learner
+from tests.learn.learners import ROBOT, TINY, TINY_FAST, TINY_PRECISE, TinyPPO, learner
 
 
 def disturb_all_generators():
@@ -23,7 +23,9 @@ def disturb_all_generators():
     np.random.rand(100)  # noqa: NPY002
 
 
-@pytest.mark.parametrize("recipe", [TINY, TinyPPO(), TINY_FAST], ids=["sac", "ppo", "fast"])
+@pytest.mark.parametrize(
+    "recipe", [TINY, TinyPPO(), TINY_FAST, TINY_PRECISE], ids=["sac", "ppo", "fast", "precise"]
+)
 def test_resuming_equals_never_having_stopped(recipe, tmp_path):
     straight = learner(recipe)
     trees = []

@@ -34,9 +34,11 @@ class ApexRewardOptions:
     scale: float = 0.05
     """Of the whole."""
     apex: float = 60.0
-    """Of the event: exp(-|apex - command| / width) (air / full_air)^2 (period / full_period)."""
+    """Of the event: kernel(|apex - command|) (air / full_air)^2 (period / full_period)."""
     width: tuple[float, float] = (0.030, 0.010)
-    """Of the event's kernel at the start and from ``sharp_from`` on, m."""
+    """Of the event's kernel exp(-|error| / width) at the start and from ``sharp_from`` on, m."""
+    tail: float = 0.0
+    """Share of the event's kernel that stays as wide as at the start, to lead back from afar."""
     sharp_from: float = 0.7
     """Share of the training after which the kernel narrows no more."""
     full_air: float = 0.1
@@ -139,7 +141,9 @@ class ApexReward:
         patience = np.minimum(1.0, self._since / self.options.full_period)
         self._since = np.where(t.apex, 0.0, self._since)
         error = np.abs(t.apex_height - t.command)
-        return np.where(t.apex, motion * patience * np.exp(-error / self._width), 0.0)
+        wide, tail = self.options.width[0], self.options.tail
+        kernel = (1 - tail) * np.exp(-error / self._width) + tail * np.exp(-error / wide)
+        return np.where(t.apex, motion * patience * kernel, 0.0)
 
     def _prediction(self, t: Transition, speed_squared: Array) -> Array:
         apex = t.height + speed_squared / (2 * self.options.effective_gravity)

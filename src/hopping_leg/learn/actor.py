@@ -1,5 +1,7 @@
 """Take the deterministic actor out of a stable-baselines3 model."""
 
+from collections.abc import Sequence
+
 import torch
 from stable_baselines3 import SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
@@ -24,12 +26,23 @@ def network_of(model: BaseAlgorithm, observation: Observation) -> Network:
         UsageError: The actor is no stack of dense layers.
     """
     if isinstance(model, SAC):
-        modules = _flatten(model.actor.latent_pi) + _flatten(model.actor.mu)
-        squash = "tanh"
-    else:
-        modules = _flatten(model.policy.mlp_extractor.policy_net)
-        modules += _flatten(model.policy.action_net)
-        squash = "clip"
+        return dense_network([model.actor.latent_pi, model.actor.mu], observation, "tanh")
+    policy = model.policy
+    return dense_network([policy.mlp_extractor.policy_net, policy.action_net], observation, "clip")
+
+
+def dense_network(parts: Sequence[nn.Module], observation: Observation, squash: str) -> Network:
+    """Return dense layers with the task's normalisation, for the observation's layout.
+
+    Args:
+        parts: Layers and activations in order, or modules of such.
+        observation: Of the task.
+        squash: How the output is brought to -1..1.
+
+    Raises:
+        UsageError: They are no stack of dense layers.
+    """
+    modules = [leaf for part in parts for leaf in _flatten(part)]
     bound = float("inf")
     if isinstance(modules[-1], nn.Hardtanh):
         bound = float(modules[-1].max_val)

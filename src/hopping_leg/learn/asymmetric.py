@@ -18,12 +18,18 @@ class _Split(nn.Module):
     """Separate networks for the two parts of an observation, as stable-baselines3 wants them."""
 
     def __init__(
-        self, actor: int, critic: int, sizes: dict[str, list[int]], activation: type[nn.Module]
+        self,
+        actor: slice | list[int],
+        critic: slice,
+        inputs: int,
+        sizes: dict[str, list[int]],
+        activation: type[nn.Module],
     ) -> None:
         super().__init__()
-        self._actor = actor
-        self.policy_net = _dense(actor, sizes["pi"], activation)
-        self.value_net = _dense(critic, sizes["vf"], activation)
+        self._actor, self._critic = actor, critic
+        of_actor, of_critic = (torch.empty(1, inputs)[:, part].shape[1] for part in (actor, critic))
+        self.policy_net = dense(of_actor, sizes["pi"], activation)
+        self.value_net = dense(of_critic, sizes["vf"], activation)
         self.latent_dim_pi, self.latent_dim_vf = sizes["pi"][-1], sizes["vf"][-1]
 
     def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
@@ -32,25 +38,42 @@ class _Split(nn.Module):
 
     def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
         """Return the actor's last hidden layer."""
-        hidden: torch.Tensor = self.policy_net(features[:, : self._actor])
+        hidden: torch.Tensor = self.policy_net(features[:, self._actor])
         return hidden
 
     def forward_critic(self, features: torch.Tensor) -> torch.Tensor:
         """Return the critic's last hidden layer."""
-        hidden: torch.Tensor = self.value_net(features[:, self._actor :])
+        hidden: torch.Tensor = self.value_net(features[:, self._critic])
         return hidden
 
 
 class AsymmetricPolicy(ActorCriticPolicy):  # type: ignore[misc]
-    """PPO policy whose actor sees the first ``actor_size`` entries and whose critic the others."""
+    """PPO policy whose actor sees the first ``actor_size`` entries and whose critic the others.
 
-    def __init__(self, *args: Any, actor_size: int, **kwargs: Any) -> None:  # noqa: ANN401
-        self._actor_size = actor_size
+    Args:
+        actor_size: Entries that are measured.
+        actor_sees: Entries that the actor sees instead.
+    """
+
+    def __init__(
+        self,
+        *args: Any,  # noqa: ANN401
+        actor_size: int,
+        actor_sees: list[int] | None = None,
+        **kwargs: Any,  # noqa: ANN401
+    ) -> None:
+        self._actor_sees = actor_sees or slice(actor_size)
+        self._critic_sees = slice(actor_size, None)
         super().__init__(*args, **kwargs)
 
     def _build_mlp_extractor(self) -> None:
-        critic = self.features_dim - self._actor_size
-        self.mlp_extractor = _Split(self._actor_size, critic, self.net_arch, self.activation_fn)
+        self.mlp_extractor = _Split(
+            self._actor_sees,
+            self._critic_sees,
+            self.features_dim,
+            self.net_arch,
+            self.activation_fn,
+        )
 
 
 class _Columns(BaseFeaturesExtractor):  # type: ignore[misc]
@@ -85,7 +108,8 @@ class AsymmetricSACPolicy(SACPolicy):  # type: ignore[misc]
         return super().make_critic(seen)
 
 
-def _dense(inputs: int, hidden: list[int], activation: type[nn.Module]) -> nn.Sequential:
+def dense(inputs: int, hidden: list[int], activation: type[nn.Module]) -> nn.Sequential:
+    """Return hidden layers, each with its activation."""
     layers: list[nn.Module] = []
     for size in hidden:
         layers += [nn.Linear(inputs, size), activation()]

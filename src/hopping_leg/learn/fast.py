@@ -75,29 +75,43 @@ class FastRecipe(Recipe):
 
     def make_model(self, env: TaskVecEnv, seed: int) -> ResumablePPO:
         """Build PPO with gSDE and an asymmetric critic."""
+        seen = {"actor_size": env.task.observation.size} if self.privileged_critic else {}
         return ResumablePPO(
             AsymmetricPolicy if self.privileged_critic else "MlpPolicy",
             env,
-            learning_rate=lambda left: self.learning_rate * _cosine(left),
-            n_steps=self.rollout,
-            batch_size=self.batch,
-            n_epochs=self.epochs,
-            gamma=self.gamma,
-            gae_lambda=self.gae_lambda,
-            ent_coef=0.0,
-            vf_coef=1.0,
-            max_grad_norm=1.0,
-            use_sde=self.noise_hold > 0,
-            sde_sample_freq=self.noise_hold or -1,
-            policy_kwargs={
-                "net_arch": {"pi": list(self.actor), "vf": list(self.critic)},
-                "activation_fn": nn.Tanh,
-                "log_std_init": self.log_std[0],
-                **({"actor_size": env.task.observation.size} if self.privileged_critic else {}),
-            },
-            seed=seed,
-            device="cpu",
+            **self.ppo_options(seed),
+            policy_kwargs={**self.network_options(), **seen},
         )
+
+    def ppo_options(self, seed: int) -> dict[str, Any]:
+        """Return what PPO is built with, the policy's options apart."""
+        return {
+            "learning_rate": self.rate,
+            "n_steps": self.rollout,
+            "batch_size": self.batch,
+            "n_epochs": self.epochs,
+            "gamma": self.gamma,
+            "gae_lambda": self.gae_lambda,
+            "ent_coef": 0.0,
+            "vf_coef": 1.0,
+            "max_grad_norm": 1.0,
+            "use_sde": self.noise_hold > 0,
+            "sde_sample_freq": self.noise_hold or -1,
+            "seed": seed,
+            "device": "cpu",
+        }
+
+    def network_options(self) -> dict[str, Any]:
+        """Return what actor and critic are built with."""
+        return {
+            "net_arch": {"pi": list(self.actor), "vf": list(self.critic)},
+            "activation_fn": nn.Tanh,
+            "log_std_init": self.log_std[0],
+        }
+
+    def rate(self, left: float) -> float:
+        """Return the learning rate where a share of the training is left, 1 to 0."""
+        return self.learning_rate * cosine(left)
 
     def anneal(self, model: Any, env: TaskVecEnv, share: float) -> None:  # noqa: ANN401
         """Sharpen the reward and quieten exploration."""
@@ -109,6 +123,6 @@ class FastRecipe(Recipe):
             model.policy.log_std.fill_(first + (last - first) * min(1.0, share / self.quiet_from))
 
 
-def _cosine(left: float) -> float:
+def cosine(left: float) -> float:
     """Fall from 1 to 0.02 as the share of the budget that is left falls from 1 to 0."""
     return 0.02 + 0.98 * (1 + math.cos(math.pi * (1 - left))) / 2

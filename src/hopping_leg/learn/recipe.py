@@ -31,6 +31,8 @@ class Recipe(ABC):
     """At the start of its schedule."""
     judge_every: int = 25_000
     """Control steps between two trials of the deterministic policy, for checkpoint selection."""
+    judge_from: float = 0.0
+    """Share of the training before which no snapshot is tried."""
     judge_commands: tuple[float, ...] = (0.25, 0.30, 0.35)
     """Heights of those trials, m."""
     log_every: int = 32

@@ -8,10 +8,13 @@ from typing import Any
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.learn.fast import FastRecipe
 from hopping_leg.learn.paper import PaperRecipe
+from hopping_leg.learn.precise import PreciseRecipe
 from hopping_leg.learn.recipe import Recipe
 from hopping_leg.sim.twins import IDENTIFIABLE, Range
 
-RECIPES: dict[str, type[Recipe]] = {recipe.name: recipe for recipe in (FastRecipe, PaperRecipe)}
+RECIPES: dict[str, type[Recipe]] = {
+    recipe.name: recipe for recipe in (FastRecipe, PaperRecipe, PreciseRecipe)
+}
 """Every recipe that ``hop train`` knows."""
 
 

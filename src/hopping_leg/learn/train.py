@@ -181,8 +181,9 @@ class Trainer:
         return self.elapsed < self._seconds
 
     def _at_boundary(self) -> None:
-        self.recipe.anneal(self.model, self.env, 1 - self.model._current_progress_remaining)
-        if self.model.num_timesteps >= self.selection.next_at:
+        share = 1 - self.model._current_progress_remaining
+        self.recipe.anneal(self.model, self.env, share)
+        if share >= self.recipe.judge_from and self.model.num_timesteps >= self.selection.next_at:
             self._judge()
         if time.monotonic() - self._saved >= self.recipe.checkpoint_seconds:
             self.checkpoint()

@@ -1,0 +1,104 @@
+"""The precise recipe: one network from 0.7 s of joint samples to torques, taught by the true state.
+
+A policy that knows the height hops within a millimetre or two; what it takes to know the height is
+in the joints' past, in how long the last flight took and how hard the last stance pushed. So a
+teacher learns on the true state by PPO, and the policy learns from it what to do on measurements.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+from torch import nn
+
+from hopping_leg.control.layouts import LAYOUTS
+from hopping_leg.env import ApexRewardOptions, TaskOptions
+from hopping_leg.env.task import PRIVILEGED
+from hopping_leg.learn.actor import dense_network
+from hopping_leg.learn.export import Network
+from hopping_leg.learn.fast import FastRecipe, cosine
+from hopping_leg.learn.taught import TaughtPolicy, TaughtPPO
+from hopping_leg.learn.vecenv import TaskVecEnv
+
+
+@dataclass(frozen=True)
+class PreciseRecipe(FastRecipe):
+    """PPO for a teacher on the true state, then imitation on long, dated joint samples."""
+
+    name: ClassVar[str] = "precise"
+
+    task: TaskOptions = field(
+        default_factory=lambda: TaskOptions(
+            observation="dated-long",
+            command_range=(0.20, 0.42),
+            command_hold=(1.0, 5.0),
+            start="hop",
+            stagger=True,
+            timestep=1e-3,
+        )
+    )
+    reward: ApexRewardOptions = field(
+        default_factory=lambda: ApexRewardOptions(width=(0.030, 0.006), tail=0.3)
+    )
+    """Apex reward of the teacher."""
+    steps: int = 9_000_000
+    """Control steps of experience in all, summed over the legs."""
+    judge_every: int = 500_000
+    """Control steps between two trials of the policy, for checkpoint selection."""
+    judge_from: float = 0.7
+    """Share of the training before which no snapshot is tried."""
+    judge_commands: tuple[float, ...] = (0.22, 0.25, 0.28, 0.31, 0.34, 0.37, 0.40)
+    """Heights of those trials, m."""
+    teaching: float = 0.55
+    """Share of the training in which the teacher learns; in the rest the policy does."""
+    student: tuple[int, ...] = (256, 128)
+    """Hidden layers of the policy, tanh; ``actor`` are the teacher's."""
+    imitation_passes: int = 8
+    """Passes over a rollout while the policy learns."""
+    imitation_batch: int = 2048
+    """Ticks per gradient step while the policy learns."""
+    guided: float = 0.15
+    """Share of the policy's learning over which the teacher acts ever less in its stead."""
+
+    def make_model(self, env: TaskVecEnv, seed: int) -> TaughtPPO:
+        """Build the teacher's PPO with the student beside it."""
+        measured = env.task.observation.size
+        state = range(measured, measured + PRIVILEGED)
+        return TaughtPPO(
+            TaughtPolicy,
+            env,
+            imitation=(self.imitation_passes, self.imitation_batch),
+            **self.ppo_options(seed),
+            policy_kwargs={
+                **self.network_options(),
+                "measured": measured,
+                "teacher_sees": [*state, *self._last_torque()],
+                "student": self.student,
+            },
+        )
+
+    def _last_torque(self) -> list[int]:
+        """Return where the torques of the last tick stand in an observation."""
+        shapes = LAYOUTS[self.task.observation].shapes
+        before = list(shapes)[: list(shapes).index("past_torque")]
+        first = sum(int(np.prod(shapes[name])) for name in before)
+        return [first, first + 1]
+
+    def rate(self, left: float) -> float:
+        """Return the learning rate; it falls along a cosine, for the teacher and again after."""
+        done = 1 - left
+        if done < self.teaching:
+            return self.learning_rate * cosine(1 - done / self.teaching)
+        return self.learning_rate * cosine(left / (1 - self.teaching))
+
+    def anneal(self, model: Any, env: TaskVecEnv, share: float) -> None:  # noqa: ANN401
+        """Sharpen the reward and quieten exploration for the teacher, then let the policy act."""
+        super().anneal(model, env, min(1.0, share / self.teaching))
+        taught = (share - self.teaching) / (1 - self.teaching)
+        model.policy.imitating = taught >= 0
+        model.policy.guidance = max(0.0, 1 - taught / self.guided)
+
+    def network(self, model: Any, env: TaskVecEnv) -> Network:  # noqa: ANN401
+        """Return the student as it stands."""
+        student: nn.Module = model.policy.mlp_extractor.student_net
+        return dense_network([student], env.task.observation, "clip")

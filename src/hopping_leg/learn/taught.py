@@ -1,0 +1,108 @@
+"""A teacher that sees the true state, and a student that learns to act like it on measurements.
+
+What a policy has to remember makes reinforcement learning slow; a teacher that sees the true state
+has nothing to remember and learns in a few minutes. Then the student hops while the teacher says at
+every tick what it would do (DAgger, Ross et al. 2011), which is regression and bears any memory.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+from torch import nn
+from torch.nn import functional
+
+from hopping_leg.learn.asymmetric import AsymmetricPolicy, dense
+from hopping_leg.learn.resumable import ResumablePPO
+
+
+class TaughtPolicy(AsymmetricPolicy):
+    """PPO policy whose actor is the teacher, with a student beside it.
+
+    Observations are what is measured, then the true state, which the critic sees.
+
+    Attributes:
+        imitating: Whether the student acts and learns, rather than the teacher.
+        guidance: Chance that the teacher acts for an imitating student, leg by leg and tick by
+            tick: at first the student would only show how to fall.
+
+    Args:
+        measured: Entries that the student sees, the first ones.
+        teacher_sees: Entries that the teacher sees.
+        student: Hidden layers of the student.
+    """
+
+    def __init__(
+        self,
+        *args: Any,  # noqa: ANN401
+        measured: int,
+        teacher_sees: Sequence[int],
+        student: Sequence[int],
+        **kwargs: Any,  # noqa: ANN401
+    ) -> None:
+        self.imitating, self.guidance = False, 0.0
+        self._measured, self._hidden = measured, list(student)
+        super().__init__(*args, actor_size=measured, actor_sees=list(teacher_sees), **kwargs)
+
+    def _build_mlp_extractor(self) -> None:
+        super()._build_mlp_extractor()
+        student = dense(self._measured, self._hidden, self.activation_fn)
+        student.append(nn.Linear(self._hidden[-1], self.action_space.shape[0]))
+        self.mlp_extractor.student_net = student
+
+    def student_action(self, observation: torch.Tensor) -> torch.Tensor:
+        """Return what the student would do, unbounded, (n, 2)."""
+        minds: Any = self.mlp_extractor
+        action: torch.Tensor = minds.student_net(observation[:, : self._measured])
+        return action
+
+    def teacher_action(self, observation: torch.Tensor) -> torch.Tensor:
+        """Return what the teacher would do, within -1 and 1, (n, 2)."""
+        action: torch.Tensor = self.action_net(self.mlp_extractor.forward_actor(observation))
+        return action.clamp(-1.0, 1.0)
+
+    def forward(
+        self, obs: torch.Tensor, deterministic: bool = False
+    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Return actions, values and log-likelihoods; the latter two are zero while imitating."""
+        if not self.imitating:
+            result: tuple[torch.Tensor, torch.Tensor, torch.Tensor] = super().forward(
+                obs, deterministic
+            )
+            return result
+        guided = torch.rand(len(obs), 1) < self.guidance
+        action = torch.where(guided, self.teacher_action(obs), self.student_action(obs))
+        nothing = torch.zeros(len(obs), 1)
+        return action.clamp(-1.0, 1.0), nothing, nothing[:, 0]
+
+
+class TaughtPPO(ResumablePPO):
+    """PPO while the teacher learns; regression on the teacher's actions while the student does.
+
+    Args:
+        imitation: Passes over a rollout and ticks per gradient step while imitating.
+    """
+
+    def __init__(self, *args: Any, imitation: tuple[int, int], **kwargs: Any) -> None:  # noqa: ANN401
+        self._passes, self._ticks = imitation
+        super().__init__(*args, **kwargs)
+
+    def train(self) -> None:
+        """Learn from the rollout."""
+        policy: TaughtPolicy = self.policy
+        if not policy.imitating:
+            super().train()
+            return
+        self._update_learning_rate(policy.optimizer)
+        losses = []
+        for _ in range(self._passes):
+            for batch in self.rollout_buffer.get(self._ticks):
+                with torch.no_grad():
+                    wanted = policy.teacher_action(batch.observations)
+                loss = functional.mse_loss(policy.student_action(batch.observations), wanted)
+                policy.optimizer.zero_grad()
+                loss.backward()  # type: ignore[no-untyped-call]
+                policy.optimizer.step()
+                losses.append(loss.item())
+        self._n_updates += self._passes
+        self.logger.record("train/imitation_loss", sum(losses) / len(losses))

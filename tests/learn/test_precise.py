@@ -1,0 +1,105 @@
+"""The precise recipe: a teacher on the true state, a student that comes to act like it."""
+
+import numpy as np
+import pytest
+import torch
+
+from hopping_leg.learn.precise import PreciseRecipe
+from tests.learn.learners import ROBOT, TINY_PRECISE, learner
+
+RECIPE = PreciseRecipe(legs=8)
+
+
+@pytest.fixture(scope="module")
+def model():
+    return learner(RECIPE)
+
+
+@pytest.fixture
+def seen(model):
+    return torch.as_tensor(model.env.reset())
+
+
+def test_the_student_depends_on_measurements_alone(model, seen):
+    size = model.env.task.observation.size
+    other = seen.clone()
+    other[:, size:] += 1
+    act = model.policy.student_action
+    torch.testing.assert_close(act(other), act(seen))
+    other[:, 0] += 1
+    assert not torch.equal(act(other), act(seen))
+
+
+def test_the_teacher_sees_the_true_state_and_its_own_last_torque(model, seen):
+    policy, task = model.policy, model.env.task
+    for _ in range(3):
+        model.env.step_async(np.full((8, 2), 0.25, np.float32))
+        seen = torch.as_tensor(model.env.step_wait()[0])
+    columns = list(policy.mlp_extractor._actor)
+    torch.testing.assert_close(
+        seen[:, columns[-2:]], torch.as_tensor(task._last, dtype=torch.float32)
+    )
+    torch.testing.assert_close(seen[:, columns[:-2]], torch.as_tensor(task.privileged()))
+    blind = seen.clone()
+    blind[:, [c for c in range(task.observation.size) if c not in columns]] += 1
+    torch.testing.assert_close(policy.teacher_action(blind), policy.teacher_action(seen))
+
+
+def test_the_teacher_learns_first_and_guides_the_student_ever_less(model):
+    policy = model.policy
+    shares = np.linspace(0, 1, 41)
+    guidance = []
+    for share in shares:
+        RECIPE.anneal(model, model.env, share)
+        assert policy.imitating == (share >= RECIPE.teaching)
+        guidance.append(policy.guidance)
+    taught = np.array(guidance)[shares >= RECIPE.teaching]
+    assert taught[0] > 0.8
+    assert (np.diff(taught) <= 0).all()
+    assert taught[-1] == 0
+
+
+def test_learning_rates_fall_for_the_teacher_and_again_for_the_student():
+    left = 1 - RECIPE.teaching
+    assert RECIPE.rate(1.0) == RECIPE.learning_rate
+    assert RECIPE.rate(left + 1e-6) < 0.03 * RECIPE.learning_rate
+    assert RECIPE.rate(left - 1e-6) > 0.9 * RECIPE.learning_rate
+    assert RECIPE.rate(0.0) < 0.03 * RECIPE.learning_rate
+
+
+def test_imitation_brings_the_student_to_its_teacher_and_leaves_the_teacher_alone():
+    student = learner(TINY_PRECISE)
+    policy = student.policy
+    student.on_boundary = lambda: setattr(policy, "imitating", True)
+    student.learn(128)
+    before = {k: v.clone() for k, v in policy.state_dict().items() if "student" not in k}
+    buffer = torch.as_tensor(student.rollout_buffer.observations.reshape(-1, policy.features_dim))
+
+    def distance():
+        with torch.no_grad():
+            gap = policy.student_action(buffer) - policy.teacher_action(buffer)
+        return float(gap.square().mean())
+
+    student._current_progress_remaining = 0.5
+    first = distance()
+    for _ in range(20):
+        student.train()
+    assert distance() < 0.5 * first
+    assert all(torch.equal(v, before[k]) for k, v in policy.state_dict().items() if k in before)
+
+
+def test_the_exported_network_is_the_student(model, seen):
+    network = RECIPE.network(model, model.env)
+    x = seen[:, : model.env.task.observation.size].double().numpy()
+    for weight, bias in network.layers[:-1]:
+        x = np.tanh(x @ weight.T + bias)
+    weight, bias = network.layers[-1]
+    with torch.no_grad():
+        wanted = model.policy.student_action(seen).numpy()
+    np.testing.assert_allclose(x @ weight.T + bias, wanted, atol=1e-5)
+
+
+def test_its_range_lies_within_what_the_leg_reaches():
+    low, high = RECIPE.task.command_bounds
+    assert low < min(RECIPE.judge_commands) < max(RECIPE.judge_commands) < high
+    assert ROBOT.straight_height > low
