@@ -96,3 +96,8 @@ def test_friction_that_grows_with_load_shows_where_torques_are_known():
     setup = dataclasses.replace(FIXED.setup, onboard="continuous")
     own_loop = dataclasses.replace(FIXED, setup=setup)
     assert "knee.load_friction" not in make_plan([own_loop], LEG).parameters.names
+
+
+def test_a_motors_gain_shows_where_its_torque_is_both_computed_and_measured():
+    assert "knee.torque_gain" in make_plan([FIXED], LEG).parameters.names
+    assert "knee.torque_gain" not in make_plan([TORQUES], LEG).parameters.names

@@ -106,7 +106,7 @@ def test_a_candidate_that_breaks_down_spoils_no_other():
     run = record(LEG, swing(0.5), onboard="torque")
     wild = TRUE.replace(
         {
-            "drive.hip.torque_gain": 1e9,
+            "hip.torque_gain": 1e9,
             "drive.hip.torque_limit": 1e12,
             "hip.motor.peak_torque": 1e12,
         }

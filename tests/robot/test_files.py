@@ -1,4 +1,5 @@
 import copy
+import dataclasses
 import math
 
 import pytest
@@ -155,3 +156,13 @@ def test_broken_files_get_a_sentence(tmp_path, content, sentence):
 def test_unknown_robots_are_told_the_valid_names(name):
     with pytest.raises(RobotError, match="legv2-paper"):
         load_robot(name)
+
+
+@pytest.mark.parametrize(("name", "value"), [("load_friction", 0.05), ("torque_gain", 0.9)])
+def test_what_a_drive_may_leave_out_changes_a_robot_only_where_it_is_stated(name, value):
+    robot = load_robot("legv2")
+    neutral = 0.0 if name == "load_friction" else 1.0
+    for stated, same in ((neutral, True), (value, False)):
+        hip = dataclasses.replace(robot.hip, **{name: stated})
+        assert (dataclasses.replace(robot, hip=hip).digest == robot.digest) == same
+    assert load_robot("legv2-paper").digest == "9634a0cc2dd452ea"

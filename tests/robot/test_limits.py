@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -30,6 +32,15 @@ def test_a_motor_cannot_drive_beyond_its_no_load_speed(torque, qd):
 @given(pairs, pairs)
 def test_the_motor_limit_has_no_direction(torque, qd):
     np.testing.assert_array_equal(MOTORS.clip(-torque, -qd), -MOTORS.clip(torque, qd))
+
+
+@given(pairs, pairs)
+def test_a_motors_gain_acts_on_what_its_limits_let_through(torque, qd):
+    knee = dataclasses.replace(ROBOT.knee, torque_gain=0.9)
+    weak = MotorLimit(dataclasses.replace(ROBOT, knee=knee))
+    within = MOTORS.clip(torque, qd)
+    np.testing.assert_array_equal(MOTORS.give(torque, qd), within)
+    np.testing.assert_array_equal(weak.give(torque, qd), within * [1.0, 0.9])
 
 
 def test_the_belt_doubles_torque_and_halves_speed():

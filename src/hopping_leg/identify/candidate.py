@@ -18,8 +18,6 @@ class Drive:
     damping: float = field(default=float("nan"), metadata={"unit": "N m s/rad"})
     integral: float = field(default=float("nan"), metadata={"unit": "N m/(rad s)"})
     torque_limit: float = field(default=float("nan"), metadata={"unit": "N m"})
-    torque_gain: float = field(default=1.0, metadata={"unit": "1"})
-    """Torque that the joint feels per torque that the drive aims at."""
     torque_offset: float = field(default=0.0, metadata={"unit": "N m"})
     """Measured torque without any true torque."""
     sensor_gain: float = field(default=1.0, metadata={"unit": "1"})

@@ -28,7 +28,7 @@ _RANGES = {
     "drive.damping": (0.0, 10.0),
     "drive.integral": (0.0, 100.0),
     "drive.torque_limit": (0.5, 50.0),
-    "drive.torque_gain": (0.5, 1.5),
+    "torque_gain": (0.5, 1.5),
     "drive.torque_offset": (-1.0, 1.0),
     "drive.sensor_gain": (0.5, 1.5),
     "load_friction": (0.0, 0.5),

@@ -115,6 +115,8 @@ def _names(recordings: Sequence[Recording], *, paper: bool) -> list[str]:
         names.remove("hip.armature")
         if all(_tells_load(r) for r in recordings):
             names += [f"{joint}.load_friction" for joint in JOINTS]
+        if all(_tells_gain(r) for r in recordings):
+            names += [f"{joint}.torque_gain" for joint in JOINTS]
         names += _limits(recordings)
     return [*names, *_open_gains(recordings)]
 
@@ -124,8 +126,12 @@ def _tells_load(recording: Recording) -> bool:
 
     Its torques must be known: commanded as such, or measured beside a loop that was computed here.
     """
-    onboard = recording.setup.onboard
-    return onboard == "torque" or (onboard == "zoh" and recording.has("torque"))
+    return recording.setup.onboard == "torque" or _tells_gain(recording)
+
+
+def _tells_gain(recording: Recording) -> bool:
+    """Return whether a recording shows what motors gave beside what they were asked for."""
+    return recording.setup.onboard == "zoh" and recording.has("torque")
 
 
 def _open_gains(recordings: Sequence[Recording]) -> list[str]:

@@ -198,7 +198,7 @@ class WindowGroup:
         friction = simulation.expand("dof_frictionloss")[:, -2:]
         still = friction.copy()
         bounds = MotorBounds(candidates, self._recordings)
-        gain = np.repeat(drive_values(candidates, "torque_gain"), windows, axis=0)
+        gain = np.repeat([c.robot.of_joints("torque_gain") for c in candidates], windows, axis=0)
         load = np.repeat([c.robot.of_joints("load_friction") for c in candidates], windows, axis=0)
         delay = np.repeat([c.drive.delay for c in candidates], windows)
         line = DelayLine(delay / self._tick)

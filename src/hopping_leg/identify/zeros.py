@@ -15,7 +15,6 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.identify.candidate import Candidate
-from hopping_leg.identify.drive_loop import drive_values
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.setup import RecordingSetup
 from hopping_leg.identify.states import start_states
@@ -86,9 +85,7 @@ class Zeros:
         """Return what the joints felt on the grid, N m, (n, 2)."""
         late = self._grid - candidate.drive.delay
         row = np.searchsorted(self._time, late, side="right") - 1
-        felt: Array = (
-            drive_values([candidate], "torque_gain")[0] * self._command[np.maximum(row, 0)]
-        )
+        felt: Array = candidate.robot.of_joints("torque_gain") * self._command[np.maximum(row, 0)]
         return felt
 
     def _imbalance(self, candidate: Candidate, zeros: Array, torque: Array) -> Array:

@@ -28,9 +28,22 @@ class MotorLimit:
         self.limit, self.peak, self._slope = (_per_leg(x, count) for x in (limit, peak, slope))
         self._minus_limit, self._minus_peak = -self.limit, -self.peak
         self._zero = np.zeros_like(self.limit)
+        gains = np.stack([one.of_joints("torque_gain") for one in robots])
+        gain = gains[0] if isinstance(robot, Robot) else gains
+        self._gain = _per_leg(gain, count) if (gains != 1).any() else None
+
+    def give(self, torque: Array, qd: Array) -> Array:
+        """Return the torque the motors give when asked for ``torque`` at speed ``qd``.
+
+        Args:
+            torque: At the joints, N m, (..., 2).
+            qd: Joint velocity, rad/s, (..., 2).
+        """
+        within = self.clip(torque, qd)
+        return within if self._gain is None else self._gain * within
 
     def clip(self, torque: Array, qd: Array) -> Array:
-        """Return the torque the motors give when asked for ``torque`` at speed ``qd``.
+        """Return ``torque`` within what the motors can do at speed ``qd``.
 
         Args:
             torque: At the joints, N m, (..., 2).

@@ -2,6 +2,7 @@
 
 import dataclasses
 import hashlib
+import itertools
 import json
 from dataclasses import dataclass, field
 
@@ -101,6 +102,8 @@ class Joint:
     """Reflected inertia at the joint; a file without it gets what rotor, gear and belt give."""
     load_friction: float = field(default=0.0, metadata={"unit": "1", "zero": True})
     """Gear loss: further Coulomb friction per torque that the motor gives."""
+    torque_gain: float = field(default=1.0, metadata={"unit": "1"})
+    """Torque that the motor gives per torque asked for, within its limits."""
 
     def __post_init__(self) -> None:
         if np.isnan(self.armature):
@@ -174,8 +177,8 @@ class Robot:
         del values["name"], values["description"], values["kind"], values["hardware"]
         if self.reality.neutral:
             del values["reality"]
-        for joint in ("hip", "knee"):
-            if not values[joint]["load_friction"]:
-                del values[joint]["load_friction"]
+        for joint, name in itertools.product(("hip", "knee"), ("load_friction", "torque_gain")):
+            if values[joint][name] == Joint.__dataclass_fields__[name].default:
+                del values[joint][name]
         text = json.dumps(values, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]

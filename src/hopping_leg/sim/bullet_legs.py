@@ -97,7 +97,7 @@ class BulletLegs(AnyLegs):
         Args:
             torque: Asked for at the joints, N m, (n, 2).
         """
-        self._applied = applied = self._motors.clip(torque, self.qd)
+        self._applied = applied = self._motors.give(torque, self.qd)
         for leg in np.flatnonzero((self.state != self._known).any(axis=1)):
             self._worlds[leg].put(self.state[leg])
         if self._law is None:

@@ -179,7 +179,7 @@ class Legs(AnyLegs):
             return self.real.step(torque)
         if self._late or len(self.waiting) > 1:
             return self._step_late(torque)
-        self._applied = applied = self._motors.clip(torque, self.qd)
+        self._applied = applied = self._motors.give(torque, self.qd)
         self._give(applied, self.substeps)
         return applied
 
@@ -195,7 +195,7 @@ class Legs(AnyLegs):
         before, under_way = self.waiting[0], [*self.waiting[1:], torque]
         if self._late:
             self._give(before, self._late)
-        after = self._motors.clip(under_way[0], self.qd)
+        after = self._motors.give(under_way[0], self.qd)
         self._give(after, self.substeps - self._late)
         self._applied = after + self._late / self.substeps * (before - after)
         self.waiting = np.stack([after, *under_way[1:]])

@@ -103,7 +103,7 @@ class RealDrive:
         arrived = self._number[substep] != self._taken
         if arrived.any():
             self._taken = self._number[substep].copy()
-            limited = self._limit.clip(self._line[substep], qd)
+            limited = self._limit.give(self._line[substep], qd)
             self._wanted = np.where(arrived[:, None], limited, self._wanted)
         target = self._gain * self._wanted
         if self._lagging:
