@@ -67,6 +67,9 @@ results: $(STAMP)
 	$(BIN)/hop record runs/results/multisine.parquet --robot twin --believed legv2 --out runs/results
 	$(BIN)/hop identify runs/results/twin-multisine.parquet --out runs/results/identified.toml --json docs/results/identify.json
 	$(BIN)/hop bench identify --json docs/results/bench_identify.json
+	$(BIN)/hop experiment transfer --json docs/results/transfer.json
+	$(BIN)/hop bench deploy --json docs/results/deploy.json
+	$(BIN)/hop bench faults --json docs/results/faults.json
 
 check: lint types docs wheel
 

@@ -259,6 +259,19 @@ def fault_families() -> str:
     return grid(["family", "correct ends"], rows)
 
 
+def percentiles(file: str, **titles: str) -> str:
+    """Return entries that hold percentiles as a table, a line each.
+
+    Args:
+        file: In docs/results.
+        titles: Entry to what is measured.
+    """
+    content = read(file)
+    names = list(content[next(iter(titles))])
+    rows = [[title, *(number(content[entry][n]) for n in names)] for entry, title in titles.items()]
+    return grid(["", *names], rows) + origin(file, content)
+
+
 def usage(*arguments: str) -> str:
     """Return the help text of a command."""
     os.environ |= {"COLUMNS": "100", "NO_COLOR": "1"}
@@ -286,6 +299,7 @@ MACROS = {
     "twin_ranges": twin_ranges,
     "robustness_axes": robustness_axes,
     "leaderboard": leaderboard,
+    "percentiles": percentiles,
     "fault_kinds": fault_kinds,
     "fault_families": fault_families,
     "example": example,
