@@ -11,7 +11,7 @@ from hopping_leg.robot import load_robot
 from hopping_leg.robot.reality import Latency, Reality
 from hopping_leg.sim import Legs
 from hopping_leg.sim.twins import IDENTIFIABLE, Range
-from hopping_leg.sim.variants import vary
+from hopping_leg.sim.variants import places, vary
 
 LEG = load_robot("legv2")
 POSTURE = np.array([0.7, -1.4])
@@ -58,6 +58,16 @@ def test_every_range_of_the_twins_reaches_the_physics(spread):
     assert np.abs(one - other).max() > 1e-6
 
 
+def test_places_tell_where_numbers_lie_in_their_ranges():
+    ranges = (Range("rail.friction", "N", 0.5, 1.5, "test"), IDENTIFIABLE[2])
+    robots = [vary(LEG, ranges, 1, np.random.default_rng(seed))[0] for seed in range(20)]
+    found = places(robots, ranges)
+    assert found.shape == (20, 2)
+    np.testing.assert_allclose(found[:, 0], 2 * (np.array([r.rail.friction for r in robots]) - 1))
+    assert (np.abs(found) <= 1).all()
+    assert np.ptp(found, axis=0).min() > 1
+
+
 def test_the_seed_fixes_the_draws_and_ranges_hold():
     assert drawn(5, seed=3) == drawn(5, seed=3)
     assert drawn(5, seed=3) != drawn(5, seed=4)
@@ -100,6 +110,17 @@ def test_a_randomised_task_repeats_with_its_seed_and_goes_on_exactly():
 def test_randomising_draws_nothing_from_the_task_itself():
     fixed = Range("rail.friction", "N", LEG.rail.friction, LEG.rail.friction, "as it is")
     np.testing.assert_array_equal(heights(task(0, [fixed])), heights(task(0, [])))
+
+
+def test_a_critic_may_see_in_which_leg_it_is():
+    one, plain = task(0), task(0, [])
+    seen = one.privileged()
+    assert seen.shape == (5, one.privileged_size)
+    assert one.privileged_size == plain.privileged_size + len(IDENTIFIABLE)
+    assert plain.privileged().shape == (5, plain.privileged_size)
+    numbers = seen[:, plain.privileged_size :]
+    assert (np.abs(numbers) <= 1).all()
+    assert len(np.unique(numbers, axis=0)) == 5
 
 
 def late(delay, **effects):

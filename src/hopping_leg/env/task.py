@@ -13,10 +13,10 @@ from hopping_leg.env.transition import Reward, Transition
 from hopping_leg.hops import CLEAR
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import Legs, Measurement, Plant
-from hopping_leg.sim.variants import vary
+from hopping_leg.sim.variants import places, vary
 
 PRIVILEGED = 10
-"""Entries of the true state that a critic may see."""
+"""Entries of the true state that a critic may see, where all legs are the same."""
 
 
 class Step(NamedTuple):
@@ -41,7 +41,7 @@ class Step(NamedTuple):
     final_observation: Array32 | None
     """Observations before the restart, (n, size), where any episode ended."""
     final_privileged: Array32 | None
-    """True states before the restart, (n, 10), where any episode ended."""
+    """True states before the restart, (n, privileged_size), where any episode ended."""
 
 
 class HoppingTask:
@@ -72,13 +72,16 @@ class HoppingTask:
         self.autoreset = autoreset
         self.robot, self.count, self.options, self.reward = robot, count, options, reward
         noise, self._rng, draws = rng.spawn(3)
+        ranges = options.randomised
+        variants = vary(robot, ranges, count, draws) if ranges else ()
+        self._numbers = places(variants, ranges)
         self.legs = Legs(
             robot,
             count,
             rate=options.rate,
             timestep=options.timestep,
             threads=threads,
-            variants=vary(robot, options.randomised, count, draws) if options.randomised else (),
+            variants=variants,
         )
         self.plant = Plant(self.legs, options.disturbance, options.soft_limits, noise)
         self.observation = make_observation(robot, options, count)
@@ -98,6 +101,11 @@ class HoppingTask:
         self._last = np.zeros((count, 2))
         self._rises = np.zeros(count, np.bool_)
         self.reset()
+
+    @property
+    def privileged_size(self) -> int:
+        """Entries of the true state that a critic may see."""
+        return PRIVILEGED + len(self.options.randomised)
 
     def reseed(self, rng: np.random.Generator) -> Array32:
         """Take all randomness from another source and begin anew; return what is seen."""
@@ -155,12 +163,13 @@ class HoppingTask:
         return apex, height, height - self.command
 
     def privileged(self) -> Array32:
-        """Return the normalised true state that a critic may see in training, (n, 10).
+        """Return the normalised true state that a critic may see in training, (n, size).
 
-        Base height and rate, q (2), qd (2), command, clearance of foot, knee and base.
+        Base height and rate, q (2), qd (2), command, clearance of foot, knee and base; then where
+        the leg's own numbers lie in their ranges, if legs differ.
         """
         legs, o = self.legs, self._scaling
-        result = np.empty((self.count, PRIVILEGED), np.float32)
+        result = np.empty((self.count, self.privileged_size), np.float32)
         result[:, 0] = (legs.height - o.offset[4]) * o.gain[4]
         result[:, 1] = legs.height_rate
         result[:, 2:4] = (legs.q - o.offset[:2]) * o.gain[:2]
@@ -169,6 +178,8 @@ class HoppingTask:
         result[:, 7] = legs.foot_clearance() * 10
         result[:, 8] = legs.knee_clearance() * 10
         result[:, 9] = legs.base_clearance() * 10
+        if self._numbers.size:
+            result[:, PRIVILEGED:] = self._numbers
         return result
 
     def state(self) -> dict[str, Any]:

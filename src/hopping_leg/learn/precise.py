@@ -13,7 +13,6 @@ from torch import nn
 
 from hopping_leg.control.layouts import LAYOUTS
 from hopping_leg.env import ApexRewardOptions, TaskOptions
-from hopping_leg.env.task import PRIVILEGED
 from hopping_leg.learn.actor import dense_network
 from hopping_leg.learn.export import Network
 from hopping_leg.learn.fast import FastRecipe, cosine
@@ -63,7 +62,7 @@ class PreciseRecipe(FastRecipe):
     def make_model(self, env: TaskVecEnv, seed: int) -> TaughtPPO:
         """Build the teacher's PPO with the student beside it."""
         measured = env.task.observation.size
-        state = range(measured, measured + PRIVILEGED)
+        state = range(measured, measured + env.task.privileged_size)
         return TaughtPPO(
             TaughtPolicy,
             env,

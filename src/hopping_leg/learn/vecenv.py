@@ -11,7 +11,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.env.observation import Array32
-from hopping_leg.env.task import PRIVILEGED, HoppingTask, Step
+from hopping_leg.env.task import HoppingTask, Step
 
 _RECENT_HOPS = 500
 """Hops that the live numbers look back over."""
@@ -20,7 +20,7 @@ _RECENT_HOPS = 500
 class TaskVecEnv(VecEnv):  # type: ignore[misc]
     """A ``HoppingTask`` for stable-baselines3.
 
-    Observations are (n, size); with ``privileged`` the true state, (n, 10), follows in the same
+    Observations are (n, size); with ``privileged`` the true state follows in the same
     rows, for critics that may see it in training.
 
     Attributes:
@@ -29,7 +29,7 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
 
     def __init__(self, task: HoppingTask, *, privileged: bool = False) -> None:
         self.task, self._privileged = task, privileged
-        size = task.observation.size + (PRIVILEGED if privileged else 0)
+        size = task.observation.size + (task.privileged_size if privileged else 0)
         space = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
         self.render_mode = None
         super().__init__(task.count, space, gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32))

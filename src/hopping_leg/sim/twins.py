@@ -52,6 +52,12 @@ class Range:
             return float(rng.uniform(self.low, self.high))
         return float(math.exp(rng.uniform(math.log(self.low), math.log(self.high))))
 
+    def place(self, value: float) -> float:
+        """Return where a value lies in the range, -1 at its lower and 1 at its upper bound."""
+        ends = (self.low, value, self.high)
+        low, at, high = ends if self.scale == "uniform" else map(math.log, ends)
+        return 2 * (at - low) / (high - low) - 1 if high > low else 0.0
+
 
 _TABLE = "[P] Table I"
 _LAB = "[V2] lab's least squares"

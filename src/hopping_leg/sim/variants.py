@@ -7,10 +7,12 @@ alone reads may vary: sizes, motors and joint limits may not.
 
 import dataclasses
 from collections.abc import Sequence
+from operator import attrgetter
 from typing import Any, TypeVar
 
 import numpy as np
 
+from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.robot.fields import check_physics
 from hopping_leg.robot.parameters import Robot
@@ -59,6 +61,12 @@ def vary(
         check_physics(variant, f"variant {number} of {robot.name}")
         variants.append(variant)
     return tuple(variants)
+
+
+def places(robots: Sequence[Robot], ranges: Sequence[Range]) -> Array:
+    """Return where the numbers of robots lie in their ranges, -1 to 1, (robots, ranges)."""
+    found = [[s.place(attrgetter(s.path)(robot)) for s in ranges] for robot in robots]
+    return np.array(found).reshape(len(robots), len(ranges))
 
 
 def with_value(part: Part, path: list[str], value: float) -> Part:
