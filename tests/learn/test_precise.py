@@ -7,7 +7,7 @@ import torch
 from hopping_leg.learn.precise import PreciseRecipe
 from tests.learn.learners import ROBOT, TINY_PRECISE, learner
 
-RECIPE = PreciseRecipe(legs=8)
+RECIPE = PreciseRecipe(legs=8, batch=512)
 
 
 @pytest.fixture(scope="module")
