@@ -51,10 +51,8 @@ def _speed(result: dict[str, Any]) -> list[Bar]:
     found: list[Bar] = []
     speed = result.get("throughput")
     if speed is not None:
-        one, two = speed["batch_one_thread_over_loop"], speed["batch_two_threads_over_loop"]
-        cores = speed["batch_two_threads_over_one"]
+        two, cores = speed["batch_two_threads_over_loop"], speed["batch_two_threads_over_one"]
         found = [
-            ("batch over a loop of mj_step, one thread", 3.0, "times", one, True),
             ("batch on two threads over a loop of mj_step", 3.0, "times", two, True),
             ("batch: two threads over one", 1.8, "times", cores, True),
         ]
