@@ -69,7 +69,7 @@ results: $(STAMP)
 	$(BIN)/hop bench identify --json docs/results/bench_identify.json
 	$(BIN)/hop experiment transfer --json docs/results/transfer.json
 	$(BIN)/hop bench deploy --json docs/results/deploy.json
-	$(BIN)/hop bench faults --json docs/results/faults.json
+	$(BIN)/hop bench faults --live 5 --json docs/results/faults.json
 
 check: lint types docs wheel
 

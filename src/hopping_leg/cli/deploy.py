@@ -12,10 +12,12 @@ Examples:
   hop deploy fast --transport /dev/fdcanusb --command 0.30 --seconds 20
   hop deploy energy-shaping --transport socketcan:can0 --schedule 0.25:5,0.30:5,0.35:5
   hop deploy runs/mine/policy.onnx --transport /dev/pts/5 --live --yes
+  hop deploy fast --transport /dev/fdcanusb --seconds 60 --web 8000
 """
 
 import contextlib
 import importlib
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,6 +31,7 @@ from hopping_leg.control.library import load_controller
 from hopping_leg.control.policy import Policy
 from hopping_leg.control.protocol import Controller
 from hopping_leg.deploy.envelope import hopping_envelope
+from hopping_leg.deploy.height_page import HeightPage
 from hopping_leg.deploy.keyboard import LiveHeight, keys
 from hopping_leg.deploy.reasons import Reason
 from hopping_leg.deploy.schedule import (
@@ -72,6 +75,9 @@ class Deploy:
     """Time to hop, s; default 10, or as long as schedule or trajectory."""
     live: bool = False
     """Change the height while the leg hops: + and -, or the arrows."""
+    web: int | None = None
+    """Serve a page with a slider for the height and a stop button at this port of this computer, 0
+    for any free one; implies --live."""
     soft_limits: bool = True
     """The paper's PD that pulls joints back into bounds."""
     other_robot: bool = False
@@ -137,7 +143,9 @@ def _schedule(args: Deploy, controller: Controller, valid: Range) -> Schedule:
 
 
 def _perform(args: Deploy, robot: Robot, plan: Plan) -> "Performance":
-    height = LiveHeight(plan.schedule.at(0.0), plan.valid) if args.live else None
+    live = args.live or args.web is not None
+    height = LiveHeight(plan.schedule.at(0.0), plan.valid) if live else None
+    page = None if args.web is None or height is None else HeightPage(height, args.web)
     poses = hopping_poses(robot)
     if isinstance(plan.controller, JointPD):
         poses = replace(poses, start=plan.controller.position[0])
@@ -150,9 +158,16 @@ def _perform(args: Deploy, robot: Robot, plan: Plan) -> "Performance":
     )
     envelope, console = hopping_envelope(robot, plan.rate), Console()
 
-    def beside(loop: "ControlLoop") -> contextlib.AbstractContextManager[None]:
-        return keys(height, loop.stop, console.print)
+    @contextlib.contextmanager
+    def beside(loop: "ControlLoop") -> Iterator[None]:
+        with contextlib.ExitStack() as operator:
+            operator.enter_context(keys(height, loop.stop, console.print))
+            if page is not None:
+                operator.enter_context(page.serve(loop.stop))
+            yield
 
+    if page is not None:
+        console.print(f"Height and stop: {page.address}", highlight=False)
     with connect(robot, args.transport) as link:
         found = check(link, robot, envelope)
         session: Any = importlib.import_module("hopping_leg.deploy.session")

@@ -1,6 +1,7 @@
 """The operator's keys: heights up and down, stop."""
 
 import contextlib
+import math
 import os
 import select
 import sys
@@ -23,23 +24,31 @@ _PATIENCE = 0.1
 class LiveHeight:
     """A height that the operator changes while the leg hops.
 
+    Attributes:
+        valid: Lowest and highest, m.
+
     Args:
         height: To begin with, m.
-        valid: Lowest and highest, m.
+        valid: As above.
     """
 
     def __init__(self, height: float, valid: Range) -> None:
-        self._height, self._valid = height, valid
+        self._height, self.valid = height, valid
 
     def at(self, elapsed: float) -> float:
         """Return the height commanded now, m."""
         return self._height
 
+    def aim(self, height: float) -> float:
+        """Command a height, brought into its range; return it, m. What is no number is left."""
+        low, high = self.valid
+        if not math.isnan(height):
+            self._height = round(min(max(height, low), high), 4)
+        return self._height
+
     def change(self, by: float) -> float:
         """Raise or lower the height, within its range; return it, m."""
-        low, high = self._valid
-        self._height = round(min(max(self._height + by, low), high), 4)
-        return self._height
+        return self.aim(self._height + by)
 
 
 def act_on(key: bytes, height: LiveHeight | None, stop: Callable[[], None]) -> str:

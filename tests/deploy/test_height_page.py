@@ -1,0 +1,81 @@
+"""The page's slider changes the height within its range; only its own page may."""
+
+import json
+import urllib.error
+import urllib.request
+
+import pytest
+
+from hopping_leg.deploy.height_page import HeightPage
+from hopping_leg.deploy.keyboard import LiveHeight
+from hopping_leg.errors import UsageError
+
+
+@pytest.fixture
+def running():
+    height, stops = LiveHeight(0.30, (0.22, 0.40)), []
+    page = HeightPage(height, 0)
+    with page.serve(lambda: stops.append("stop")):
+        yield page, height, stops
+
+
+def ask(page, path, body=None, **headers):
+    data = None if body is None else json.dumps(body).encode()
+    request = urllib.request.Request(page.address + path, data, headers)
+    with urllib.request.urlopen(request, timeout=5) as reply:
+        return reply.read()
+
+
+def test_the_page_is_there_and_tells_the_height(running):
+    page, _, _ = running
+    assert b"<input" in ask(page, "/")
+    state = json.loads(ask(page, "/height"))
+    assert state == {"height": 0.30, "low": 0.22, "high": 0.40, "stopping": False}
+
+
+@pytest.mark.parametrize(
+    ("asked", "given"), [(0.35, 0.35), (9, 0.40), (-1.0, 0.22), (float("nan"), 0.30)]
+)
+def test_the_slider_moves_the_height_within_its_range(running, asked, given):
+    page, height, _ = running
+    state = json.loads(ask(page, "/height", {"height": asked}))
+    assert state["height"] == given == height.at(0.0)
+
+
+def test_the_button_stops_the_leg(running):
+    page, _, stops = running
+    assert json.loads(ask(page, "/stop", {}))["stopping"]
+    assert stops == ["stop"]
+
+
+@pytest.mark.parametrize(
+    ("body", "headers", "status"),
+    [
+        ({"height": 0.35}, {"Origin": "http://elsewhere.example"}, 403),
+        ({"height": 0.35}, {"Host": "elsewhere.example"}, 403),
+        ({"height": "high"}, {}, 400),
+        ({"height": True}, {}, 400),
+        ([0.35], {}, 400),
+    ],
+)
+def test_others_and_nonsense_change_nothing(running, body, headers, status):
+    page, height, stops = running
+    with pytest.raises(urllib.error.HTTPError) as refusal:
+        ask(page, "/height", body, **headers)
+    assert refusal.value.code == status
+    assert height.at(0.0) == 0.30
+    assert not stops
+
+
+@pytest.mark.parametrize("path", ["/nothing", "/height.json"])
+def test_there_is_nothing_else(running, path):
+    with pytest.raises(urllib.error.HTTPError, match="404"):
+        ask(running[0], path)
+
+
+def test_a_port_that_is_taken_is_said_before_anything_moves(running):
+    page, height, _ = running
+    with pytest.raises(UsageError, match="give a free one"):
+        HeightPage(height, int(page.address.rsplit(":", 1)[1]))
+    with pytest.raises(UsageError, match="give a free one"):
+        HeightPage(height, 70000)
