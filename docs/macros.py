@@ -84,9 +84,10 @@ def pick(tree: Any, path: str) -> Any:  # noqa: ANN401
     return tree
 
 
-def value(file: str, path: str, factor: float | None = None) -> str:
-    """Return one number of a results file, times a factor."""
-    return number(scaled(pick(read(file), path), factor))
+def value(file: str, path: str, factor: float | None = None, digits: int | None = None) -> str:
+    """Return one number of a results file, times a factor, with so many digits after the point."""
+    found = scaled(pick(read(file), path), factor)
+    return number(found) if digits is None else f"{found:.{digits}f}"
 
 
 def table(file: str, path: str, *columns: str, **where: Any) -> str:  # noqa: ANN401
@@ -138,14 +139,6 @@ def _is_nested(entry: Any) -> bool:  # noqa: ANN401
 
 def exists(file: str, path: str = "") -> bool:
     """Tell whether a results file, and an entry that is not empty in it, has been measured."""
-    try:
-        return bool(pick(read(file), path))
-    except (OSError, LookupError):
-        return False
-
-
-def has(file: str, path: str) -> bool:
-    """Tell whether a results file has been measured and holds something at a path."""
     try:
         return bool(pick(read(file), path))
     except (OSError, LookupError):
@@ -308,7 +301,6 @@ MACROS = {
     "bullets": bullets,
     "entries": entries,
     "exists": exists,
-    "has": has,
     "pictures": pictures,
     "verbs": list(cli.VERBS),
 }
