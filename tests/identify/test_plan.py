@@ -90,12 +90,18 @@ def test_a_motor_is_not_believed_slower_than_its_joint_was_seen():
     assert low(100 / seen) == known
 
 
-def test_friction_that_grows_with_load_shows_where_torques_are_known():
-    assert "knee.load_friction" in make_plan([TORQUES], LEG).parameters.names
-    assert "knee.load_friction" in make_plan([FIXED], LEG).parameters.names
-    setup = dataclasses.replace(FIXED.setup, onboard="continuous")
-    own_loop = dataclasses.replace(FIXED, setup=setup)
-    assert "knee.load_friction" not in make_plan([own_loop], LEG).parameters.names
+def test_friction_that_grows_with_load_shows_where_torques_are_known_and_carry_weight():
+    def fitted(*recordings):
+        return "knee.load_friction" in make_plan(recordings, LEG).parameters.names
+
+    def on(rig, onboard):
+        setup = dataclasses.replace(FIXED.setup, rig=rig, onboard=onboard)
+        return dataclasses.replace(FIXED, setup=setup)
+
+    assert fitted(TORQUES)
+    assert not fitted(FIXED)
+    assert fitted(FIXED, on("rail", "zoh"))
+    assert not fitted(on("rail", "continuous"))
 
 
 def test_a_motors_gain_shows_where_its_torque_is_both_computed_and_measured():

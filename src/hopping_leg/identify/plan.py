@@ -113,7 +113,7 @@ def _names(recordings: Sequence[Recording], *, paper: bool) -> list[str]:
     if not paper:
         names += ["thigh.com", "shank.com", *INERTIAS, "drive.delay"]
         names.remove("hip.armature")
-        if all(_tells_load(r) for r in recordings):
+        if _tell_load(recordings):
             names += [f"{joint}.load_friction" for joint in JOINTS]
         if all(_tells_gain(r) for r in recordings):
             names += [f"{joint}.torque_gain" for joint in JOINTS]
@@ -121,12 +121,17 @@ def _names(recordings: Sequence[Recording], *, paper: bool) -> list[str]:
     return [*names, *_open_gains(recordings)]
 
 
-def _tells_load(recording: Recording) -> bool:
-    """Return whether a recording tells friction that grows with torque from one that does not.
+def _tell_load(recordings: Sequence[Recording]) -> bool:
+    """Return whether recordings tell friction that grows with torque from one that does not.
 
-    Its torques must be known: commanded as such, or measured beside a loop that was computed here.
+    Torques must be known: commanded as such, or measured beside a loop that was computed here. In
+    the air such a loop asks for torque where it meets damping, and the two cannot be told apart;
+    on the ground the leg's weight asks for it.
     """
-    return recording.setup.onboard == "torque" or _tells_gain(recording)
+    if all(r.setup.onboard == "torque" for r in recordings):
+        return True
+    grounded = any(r.setup.rig != "fixed-base" for r in recordings)
+    return grounded and all(_tells_gain(r) or r.setup.onboard == "torque" for r in recordings)
 
 
 def _tells_gain(recording: Recording) -> bool:
