@@ -3,8 +3,8 @@
 A twin plays the real leg. It is recorded, identified from the recordings, a controller is trained
 from scratch on what was identified, evaluated there beside the shipped controllers with the paper's
 trials, and hops on the twin without tuning, beside a controller that was trained on the CAD's
-robot. Takes six to ten minutes on two cores. A run that was interrupted or killed goes on where it
-was when the same command is called again.
+robot. Takes less than 15 minutes on two cores. A run that was interrupted or killed goes on where
+it was when the same command is called again.
 
 Examples:
   hop reproduce

@@ -122,8 +122,8 @@ class HeightPage:
 
             def do_POST(self) -> None:
                 """Act, unless another site sent the browser here."""
-                length = min(int(self.headers.get("Content-Length") or 0), _LONGEST)
-                body = self.rfile.read(length)
+                length = self.headers.get("Content-Length", "")
+                body = self.rfile.read(min(int(length), _LONGEST) if length.isdecimal() else 0)
                 own = self.headers.get("Host") == page.address.removeprefix("http://")
                 if not own or self.headers.get("Origin", page.address) != page.address:
                     self._answer(403, b"", "text/plain")

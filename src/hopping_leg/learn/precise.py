@@ -1,11 +1,11 @@
 """The precise recipe: one network from 0.7 s of joint samples to torques, taught by the true state.
 
-A policy that knows the height hops within a millimetre or two; what it takes to know the height is
-in the joints' past, in how long the last flight took and how hard the last stance pushed. So a
-teacher learns on the true state by PPO, and the policy learns from it what to do on measurements.
+What it takes to know the height is in the joints' past, in how long the last flight took and how
+hard the last stance pushed. A teacher that is told the height learns by PPO, with nothing to
+remember, and the policy learns from it what to do on measurements.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -27,13 +27,8 @@ class PreciseRecipe(FastRecipe):
     name: ClassVar[str] = "precise"
 
     task: TaskOptions = field(
-        default_factory=lambda: TaskOptions(
-            observation="dated-long",
-            command_range=(0.20, 0.42),
-            command_hold=(1.0, 5.0),
-            start="hop",
-            stagger=True,
-            timestep=1e-3,
+        default_factory=lambda: replace(
+            FastRecipe().task, observation="dated-long", command_range=(0.20, 0.42)
         )
     )
     reward: ApexRewardOptions = field(
