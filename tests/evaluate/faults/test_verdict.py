@@ -82,3 +82,8 @@ def test_no_reaction_is_infinite():
     assert (
         reaction(log(answered(1.0, Mode.FAULT), told(1.1)), LIMITS, 0.5, jumped=False) == math.inf
     )
+
+
+def test_an_answer_of_the_instant_at_which_a_jump_begins_knows_nothing_of_it():
+    entries = answered(0.5), answered(0.505), told(0.5055, Mode.BRAKE)
+    assert reaction(log(*entries), LIMITS, 0.5, jumped=True) == pytest.approx(0.0005)

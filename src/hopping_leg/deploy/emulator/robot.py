@@ -100,7 +100,7 @@ class EmulatedRobot:
             answer = bus.answer(message, drive, self.time, errors)
             self.log.told(self.time, joint, message, drive)
             if answer is not None:
-                self.log.answered(self.time, joint, drive)
+                self.log.answered(self.time, joint, answer)
                 self.misfortune.send(answer, joint, self.outbox)
 
     def _step(self) -> None:

@@ -9,13 +9,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from moteus.multiplex import RegisterSubframe, SubframeType
-from moteus.protocol import Register
+from moteus.protocol import Register, parse_reply
 
 from hopping_leg.deploy.emulator.codes import MODES, Mode
 
 if TYPE_CHECKING:
     from hopping_leg.deploy.emulator.bus import Message
     from hopping_leg.deploy.emulator.drive import Drive
+    from hopping_leg.deploy.emulator.frames import Frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +40,7 @@ class Told:
 
 @dataclass(frozen=True, slots=True)
 class Answered:
-    """A drive's answer when it left.
+    """The state that a drive's answer tells, rounded as it travels.
 
     Attributes:
         time: When it left, s.
@@ -73,6 +74,10 @@ class Changed:
     mode: Mode
 
 
+_TOLD = (Register.MODE, Register.FAULT, Register.VOLTAGE, Register.TEMPERATURE)
+_STATE = set(_TOLD)
+"""Registers of an answer that is noted."""
+
 _REMEMBERED = 100_000
 """Commands and answers each, about a minute's."""
 
@@ -101,14 +106,14 @@ class WireLog:
         if mode is not None:
             self.commands.append(Told(time, joint, mode, torque, most))
 
-    def answered(self, time: float, joint: int, drive: "Drive") -> None:
-        """Note a drive's answer."""
-        machine = drive.machine
-        self.answers.append(
-            Answered(
-                time, joint, machine.mode, int(machine.fault), drive.voltage, drive.temperature
+    def answered(self, time: float, joint: int, answer: "Frame") -> None:
+        """Note a drive's answer, if it tells the drive's state."""
+        values = parse_reply(answer.data)
+        if _STATE <= values.keys():
+            mode, fault, voltage, temperature = (values[register] for register in _TOLD)
+            self.answers.append(
+                Answered(time, joint, Mode(int(mode)), int(fault), voltage, temperature)
             )
-        )
 
     def stepped(self, time: float, joint: int, drive: "Drive") -> None:
         """Note a drive's mode after a step, if it is another."""

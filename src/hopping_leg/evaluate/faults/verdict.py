@@ -75,11 +75,11 @@ def reaction(log: WireLog, limits: Limits, since: float, *, jumped: bool) -> flo
     Args:
         log: Of the wire.
         limits: Which answers are good ones.
-        since: When the fault began, s.
-        jumped: Whether every answer since then is bad, as positions are wrong.
+        since: When the fault began, s; an answer that left at this very time knows nothing of it.
+        jumped: Whether every answer after that is bad, as positions are wrong.
     """
     safe = (told.time for told in log.commands if told.time >= since and told.mode in SAFE)
     done = next(safe, math.inf)
-    before = (answer for answer in log.answers if since <= answer.time < done)
+    before = (answer for answer in log.answers if since < answer.time < done)
     seen = next((answer.time for answer in before if jumped or limits.bad(answer)), None)
     return None if seen is None else done - seen
