@@ -73,6 +73,7 @@ _EXTRAS = {
     **dict.fromkeys(("torch", "stable_baselines3", "onnx", "tensorboard"), "train"),
     **dict.fromkeys(("moteus", "can", "serial", "msgpack"), "hardware"),
     "pybullet": "bullet",
+    "viser": "view",
 }
 
 
