@@ -26,6 +26,7 @@ from hopping_leg.evaluate.robustness.axes import AXES
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.files import load_tree
 from hopping_leg.sim.twins import TWIN_RANGES
+from hopping_leg.trace import COLUMNS
 
 RESULTS = Path(__file__).parent / "results"
 MAKEFILE = Path(__file__).parent.parent / "Makefile"
@@ -188,6 +189,16 @@ def robot(name: str) -> str:
     return grid(["number", "value", "unit", "source"], rows)
 
 
+def trace_columns() -> str:
+    """Return the columns that every trace has as a table; units are the ends of their names."""
+    units = {"_m_s": "m/s", "_rad_s": "rad/s", "_rad": "rad", "_nm": "N m", "_s": "s", "_m": "m"}
+    rows = [
+        [f"`{name}`", next(unit for end, unit in units.items() if name.endswith(end)), meaning]
+        for name, meaning in COLUMNS.items()
+    ]
+    return grid(["column", "unit", "meaning"], rows)
+
+
 def twin_ranges() -> str:
     """Return the distribution of twins as a table."""
     rows = [
@@ -289,6 +300,7 @@ MACROS = {
     "value": value,
     "robot": robot,
     "usage": usage,
+    "trace_columns": trace_columns,
     "twin_ranges": twin_ranges,
     "robustness_axes": robustness_axes,
     "leaderboard": leaderboard,

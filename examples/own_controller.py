@@ -13,8 +13,8 @@ class Spring:
 
     name = "spring"
 
-    def __init__(self, robot: Robot, stiffness: float = 400.0, damping: float = 10.0) -> None:
-        self.robot, self.stiffness, self.damping = robot, stiffness, damping
+    def __init__(self, robot: Robot, rate: float = 200.0) -> None:
+        self.robot, self.stiffness, self.damping = robot, 400.0, 10.0
 
     def reset(self, count: int) -> None:
         """Start anew; a spring has no memory."""
@@ -32,8 +32,9 @@ class Spring:
         return {}
 
 
-robot = load_robot("legv2-paper")
-run = roll_out(Spring(robot), Setup(robot), np.full((600, 4), 0.30), seed=0)
-height, clearance = run.data["height_m"][200:], run.data["foot_clearance_m"][200:]
-print(f"base between {height.min():.3f} and {height.max():.3f} m")
-print(f"foot off the ground {100 * (clearance > 0.003).mean():.0f} % of the time")
+if __name__ == "__main__":
+    robot = load_robot("legv2-paper")
+    run = roll_out(Spring(robot), Setup(robot), np.full((600, 4), 0.30), seed=0)
+    height, clearance = run.data["height_m"][200:], run.data["foot_clearance_m"][200:]
+    print(f"base between {height.min():.3f} and {height.max():.3f} m")
+    print(f"foot off the ground {100 * (clearance > 0.003).mean():.0f} % of the time")

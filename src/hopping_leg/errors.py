@@ -20,6 +20,10 @@ class PolicyError(HoppingLegError):
     """A policy file is unreadable, foreign, or does not fit the robot or command."""
 
 
+class ControllerError(HoppingLegError):
+    """Someone's controller cannot be loaded, fails, or answers something else than torques."""
+
+
 class UsageError(HoppingLegError):
     """An argument has no meaning here; the message names the valid ones."""
 

@@ -56,6 +56,26 @@ def test_deploy_checks_runs_and_leaves_a_trace(emulate, tmp_path, capsys):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("answer", "says"), [("[[0.0, 0.0]]", None), ("[[float('nan'), 0.0]]", "mine.py:Mine")]
+)
+def test_a_python_class_is_deployed_and_stopped_by_name(emulate, tmp_path, capsys, answer, says):
+    emulate()
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "class Mine:\n    def __init__(self, robot, rate): pass\n    def reset(self, count): pass\n"
+        f"    def act(self, measurement): return {answer}\n"
+    )
+    words = [RUN[0], f"{file}:Mine", *RUN[2:], "--yes", "--out", str(tmp_path / "run")]
+    assert main(words) == (2 if says else 0)
+    error = capsys.readouterr().err
+    assert says is None or says in error
+    assert "Traceback" not in error
+    (trace,) = (tmp_path / "run").glob("*.parquet")
+    assert Trace.load(trace).header["controller"] == "Mine"
+
+
+@pytest.mark.slow
 def test_a_fault_is_a_sentence_and_an_exit_code(emulate, tmp_path, capsys):
     emulate(faults=(Fault("drive_fault", at=0.6, drive="hip", value=33),))
     assert main([*RUN, "--yes", "--out", str(tmp_path)]) == 2

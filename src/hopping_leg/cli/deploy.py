@@ -5,8 +5,9 @@ start pose, hops, sinks down and stops. Space, Enter, q, Ctrl-C and SIGTERM stop
 stop stays until you call this again. Everything is recorded, also when the process is killed:
 `hop plot` reads the trace, or the black box that a killed run leaves behind.
 
-CONTROLLER is a name (fast, paper, energy-shaping), a policy (.onnx), a gain file (.toml), or a
-joint trajectory from `hop excite` (.parquet), which a joint PD tracks.
+CONTROLLER is a name (fast, paper, energy-shaping), a policy (.onnx), a gain file (.toml), a Python
+class (path/to/file.py:Class), or a joint trajectory from `hop excite` (.parquet), which a joint PD
+tracks.
 
 Examples:
   hop deploy fast --transport /dev/fdcanusb --command 0.30 --seconds 20
@@ -62,7 +63,7 @@ class Deploy:
     """What runs, on which leg, for how long."""
 
     controller: tyro.conf.Positional[str]
-    """A name, or a file: .onnx, .toml, .parquet."""
+    """A name, a file (.onnx, .toml, .parquet), or a Python class as FILE.py:CLASS."""
     transport: str
     """Path of an fdcanusb, interface:channel of python-can, or pi3hat."""
     robot: str = "legv2-paper"
@@ -111,7 +112,8 @@ def run(args: Deploy) -> None:
     console.print(f"{cause} {done.outcome.ticks} ticks, {done.outcome.skipped} left out.")
     console.print(f"Wrote {done.path}", highlight=False, soft_wrap=True)
     if cause.reason not in _WILLED:
-        raise HardwareError(f"The leg was stopped: {cause}")
+        errors = [event.get("controller_error", "") for event in done.trace.header["events"]]
+        raise HardwareError(" ".join([f"The leg was stopped: {cause}", *filter(None, errors)]))
 
 
 def _plan(args: Deploy, robot: Robot) -> Plan:

@@ -45,8 +45,8 @@ class Evaluate:
     """What is judged, where and how often."""
 
     controllers: tyro.conf.Positional[tuple[str, ...]]
-    """Names (energy-shaping, paper, fast, ...), .onnx files, or a quoted pattern of them;
-    LABEL=FILE chooses the name in all tables."""
+    """Names (energy-shaping, paper, fast, ...), .onnx files, a quoted pattern of them, or Python
+    classes as FILE.py:CLASS; LABEL=FILE chooses the name in all tables."""
     suite: Literal["paper", "robustness"] = "paper"
     """The paper's trials, or how far the world may change before a controller fails."""
     axes: tuple[str, ...] = ()

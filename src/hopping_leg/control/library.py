@@ -1,10 +1,11 @@
-"""Controllers by name: energy shaping, the shipped policies, or a user's policy or gain file."""
+"""Controllers by name: energy shaping, shipped policies, a user's policy, gain file or class."""
 
 from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 
 from hopping_leg.control.baselines import paper_energy_shaping, tuned_energy_shaping
+from hopping_leg.control.plug_in import is_plug_in, load_plug_in
 from hopping_leg.control.policy import Policy
 from hopping_leg.control.protocol import Controller
 from hopping_leg.errors import PolicyError, UsageError, unknown_name
@@ -51,7 +52,8 @@ def load_policy(name_or_path: str | Path) -> Policy:
     if Path(name).exists():
         raise PolicyError(f"{name} is not a policy file; those end in .onnx.")
     raise UsageError(
-        unknown_name("controller", name, controller_names()) + " Or give an .onnx file."
+        unknown_name("controller", name, controller_names())
+        + " Or give an .onnx file, or a Python class as path/to/file.py:CLASS."
     )
 
 
@@ -61,14 +63,15 @@ def load_controller(
     """Load a controller for a robot.
 
     Args:
-        name_or_path: One of ``controller_names()``, or the path of an ``.onnx`` file or of a gain
-            file (``.toml``) for energy shaping.
+        name_or_path: One of ``controller_names()``, the path of an ``.onnx`` file or of a gain
+            file (``.toml``) for energy shaping, or a Python class, see ``plug_in``.
         robot: The leg it shall drive.
         rate: Control rate, Hz.
         strict: Refuse a policy that was trained on another robot instead of logging a warning.
 
     Raises:
         PolicyError: The file is missing, truncated or foreign, or does not fit the robot or rate.
+        ControllerError: A Python class cannot be loaded or is no controller.
         UsageError: There is no such controller.
     """
     factory = _FACTORIES.get(str(name_or_path))
@@ -76,6 +79,8 @@ def load_controller(
         return factory(robot, rate=rate)
     if str(name_or_path).endswith(".toml"):
         return tuned_energy_shaping(robot, rate=rate, gains=str(name_or_path))
+    if is_plug_in(str(name_or_path)):
+        return load_plug_in(str(name_or_path), robot, rate)
     policy = load_policy(name_or_path)
     policy.check_robot(robot, rate, strict=strict)
     return policy
