@@ -22,13 +22,17 @@ import polars as pl
 from hopping_leg.errors import TraceError
 from hopping_leg.trace import Trace
 
+HEADER, ROW, EVENT = range(3)
+"""Kinds of frames."""
+
 SUFFIX = ".blackbox"
 """Of the files."""
 
-_MAGIC = b"HOPBOX1\n"
+MAGIC = b"HOPBOX1\n"
+"""What every file begins with."""
+
 _FRAME = struct.Struct("<BI")
 _CRC = struct.Struct("<I")
-_HEADER, _ROW, _EVENT = range(3)
 _SYNC_SECONDS = 1.0
 _LARGEST = 1 << 24
 """Content that no frame exceeds, bytes; a length beyond it is damage."""
@@ -56,18 +60,18 @@ class BlackBox:
         except OSError as error:
             raise TraceError(f"Cannot create {path}: {error.strerror}.") from error
         first = json.dumps({"columns": self.columns, "header": header}).encode()
-        os.write(self._file, _MAGIC + _frame(_HEADER, first))
+        os.write(self._file, MAGIC + _frame(HEADER, first))
         self._queue: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._write, name="black-box", daemon=True)
         self._thread.start()
 
     def row(self, values: Sequence[float]) -> None:
         """Record a tick; ``values`` are in the order of ``columns``."""
-        self._queue.put(_frame(_ROW, self._row.pack(*values)))
+        self._queue.put(_frame(ROW, self._row.pack(*values)))
 
     def event(self, **facts: Any) -> None:  # noqa: ANN401
         """Record what happened beside the ticks, e.g. a transition with its reason."""
-        self._queue.put(_frame(_EVENT, json.dumps(facts).encode()))
+        self._queue.put(_frame(EVENT, json.dumps(facts).encode()))
 
     def close(self) -> None:
         """Write what is left and close the file."""
@@ -134,20 +138,20 @@ def read_box(path: Path) -> Contents:
         content = path.read_bytes()
     except OSError as error:
         raise TraceError(f"Cannot read {path}: {error.strerror}.") from error
-    if not content.startswith(_MAGIC):
+    if not content.startswith(MAGIC):
         raise TraceError(f"{path} is no black box of `hop deploy`.")
-    frames = list(_frames(content))
-    if not frames or frames[0][0] != _HEADER:
+    found = list(frames(content, len(MAGIC)))
+    if not found or found[0][0] != HEADER:
         raise TraceError(f"{path} ends before its header; the run had not begun.")
-    first = json.loads(frames[0][1])
+    first = json.loads(found[0][1])
     columns = tuple(first["columns"])
-    body = b"".join(data for kind, data, _ in frames if kind == _ROW)
+    body = b"".join(data for kind, data, _ in found if kind == ROW)
     return Contents(
         columns=columns,
         header=first["header"],
         rows=np.frombuffer(body, "<f8").reshape(-1, len(columns)),
-        events=[json.loads(data) for kind, data, _ in frames if kind == _EVENT],
-        whole=frames[-1][2] == len(content),
+        events=[json.loads(data) for kind, data, _ in found if kind == EVENT],
+        whole=found[-1][2] == len(content),
     )
 
 
@@ -174,9 +178,8 @@ def _frame(kind: int, content: bytes) -> bytes:
     return head + content + _CRC.pack(zlib.crc32(content, zlib.crc32(head)))
 
 
-def _frames(content: bytes) -> Iterator[tuple[int, bytes, int]]:
-    """Yield kind, content and end of every whole frame up to the first that is not."""
-    at = len(_MAGIC)
+def frames(content: bytes, at: int) -> Iterator[tuple[int, bytes, int]]:
+    """Yield kind, content and end of every whole frame from ``at`` to the first that is not."""
     while at + _FRAME.size <= len(content):
         kind, length = _FRAME.unpack_from(content, at)
         end = at + _FRAME.size + length + _CRC.size

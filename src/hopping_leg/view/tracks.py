@@ -1,0 +1,194 @@
+"""What is shown of one leg, whatever it comes from: rows over time.
+
+A live simulation appends rows as it goes, a replay has them all, a run on the real leg grows from
+outside; scene and plots know nothing but tracks.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.errors import TraceError
+from hopping_leg.hops import CLEAR, find_hops
+from hopping_leg.robot import kinematics
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.trace import Trace
+
+FIELDS = (
+    "command_m",
+    "height_m",
+    "height_rate_m_s",
+    "hip_position_rad",
+    "knee_position_rad",
+    "hip_torque_nm",
+    "knee_torque_nm",
+    "foot_clearance_m",
+    "phase",
+)
+"""What a row holds beside its time; names are those of traces. ``phase`` is the controller's."""
+
+_PLACE = {name: row for row, name in enumerate(FIELDS)}
+_ESTIMATE = "estimated_height_m"
+_FIRST_ROOM = 4096
+
+
+class Track:
+    """One leg's rows, in order of time.
+
+    Args:
+        name: Of who controls the leg.
+        robot: The leg.
+        note: What the reader should know of where the rows come from.
+        depth: Rows that are kept at least; older ones are forgotten. None keeps all.
+    """
+
+    def __init__(
+        self, name: str, robot: Robot, *, note: str = "", depth: int | None = None
+    ) -> None:
+        self.name, self.robot, self.note = name, robot, note
+        self._depth = depth
+        self._rows = np.empty((1 + len(FIELDS), 2 * depth if depth else _FIRST_ROOM))
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    @property
+    def time(self) -> Array:
+        """Time of each row, s, (rows,)."""
+        return self._rows[0, : self._count]
+
+    def field(self, name: str) -> Array:
+        """Return one of ``FIELDS``, (rows,)."""
+        return self._rows[1 + _PLACE[name], : self._count]
+
+    def append(self, time: float, values: Sequence[float] | Array) -> None:
+        """Add a row that is later than all others; ``values`` are in the order of ``FIELDS``."""
+        self.extend(np.array([time]), np.asarray(values, dtype=np.float64)[:, None])
+
+    def extend(self, time: Array, values: Array) -> None:
+        """Add rows: times (rows,) and values (fields, rows)."""
+        new = len(time)
+        self._make_room(new)
+        into = slice(self._count, self._count + new)
+        self._rows[0, into] = time
+        self._rows[1:, into] = values
+        self._count += new
+
+    def clear(self) -> None:
+        """Forget all rows."""
+        self._count = 0
+
+    def moment(self, time: float) -> tuple[float, Array]:
+        """Return base height, m, and joint angles, rad, (2,), at a time, between rows if need be.
+
+        Raises:
+            TraceError: There is no row.
+        """
+        if not self._count:
+            raise TraceError(f"{self.name} has no rows yet.")
+        names = ("height_m", "hip_position_rad", "knee_position_rad")
+        height, hip, knee = (self._at(name, time) for name in names)
+        return height, np.array([hip, knee])
+
+    def sample(self, grid: Array) -> dict[str, Array]:
+        """Return every field at rising times, NaN where there is no row, (times,) each."""
+        time = self.time
+        if not len(time):
+            return {name: np.full(len(grid), np.nan) for name in FIELDS}
+        near = np.clip(np.searchsorted(time, grid + 1e-9, side="right") - 1, 0, None)
+        outside = (grid < time[0] - 1e-9) | (grid > time[-1] + 1e-9)
+        taken = self._rows[1:, near]
+        taken[:, outside] = np.nan
+        return dict(zip(FIELDS, taken, strict=True))
+
+    def apexes(self, until: float, seconds: float) -> tuple[Array, Array]:
+        """Return time, s, and height, m, of the apexes in the ``seconds`` up to a time."""
+        first, last = np.searchsorted(self.time, [until - seconds, until + 1e-9])
+        part = slice(int(first), int(last))
+        names = ("height_m", "height_rate_m_s", "foot_clearance_m")
+        height, rate, clearance = (self.field(name)[part] for name in names)
+        if len(height) < 2:
+            return np.zeros(0), np.zeros(0)
+        hops = find_hops(height, rate, clearance)
+        return self.time[part][hops.tick], hops.apex
+
+    def _at(self, name: str, time: float) -> float:
+        return float(np.interp(time, self.time, self.field(name)))
+
+    def _make_room(self, new: int) -> None:
+        room = self._rows.shape[1]
+        if self._count + new <= room:
+            return
+        keep = self._count if self._depth is None else min(self._count, self._depth)
+        grown = np.empty((len(self._rows), max(room, 2 * (keep + new))))
+        grown[:, :keep] = self._rows[:, self._count - keep : self._count]
+        self._rows, self._count = grown, keep
+
+
+def trace_rows(
+    trace: Trace, robot: Robot, before: tuple[float, float] | None = None
+) -> tuple[Array, Array, str]:
+    """Return times (rows,), values (fields, rows) and a note on the height of a trace.
+
+    Hardware does not measure the base height. The controller's own estimate stands in where it
+    recorded one; else the leg is shown standing, at the height its joints give a foot on the
+    ground, which is right in stance and too low in flight. The clearance stays unknown.
+
+    Args:
+        trace: At least one tick.
+        robot: The leg.
+        before: Joint angles that stand in where measurements are missing at the beginning, rad.
+    """
+    columns = {
+        name: trace.column(name)
+        if name in trace.table.columns
+        else np.full(len(trace.table), np.nan)
+        for name in FIELDS
+    }
+    for joint, name in enumerate(("hip_position_rad", "knee_position_rad")):
+        columns[name] = _filled(columns[name], before[joint] if before else None)
+    note = ""
+    if not np.isfinite(columns["height_m"]).any():
+        q = np.stack([columns["hip_position_rad"], columns["knee_position_rad"]], axis=-1)
+        columns["height_m"] = kinematics.stance_height(robot, q)
+        note = "The height was not measured: the leg is shown standing."
+        if _ESTIMATE in trace.table.columns:
+            estimate = trace.column(_ESTIMATE)
+            columns["height_m"] = np.where(np.isfinite(estimate), estimate, columns["height_m"])
+            note = "The height was not measured: it is the controller's estimate."
+    return trace.column("time_s"), np.stack([columns[name] for name in FIELDS]), note
+
+
+def load_track(path: Path, robot: Robot) -> Track:
+    """Return the track of a stored trace.
+
+    Raises:
+        TraceError: It cannot be read, lacks a column or holds no tick.
+    """
+    trace = Trace.load(path)
+    if not len(trace.table):
+        raise TraceError(f"{path} holds no tick; there is nothing to show.")
+    time, values, note = trace_rows(trace, robot)
+    track = Track(str(trace.header.get("controller", path.stem)), robot, note=note)
+    track.extend(time, values)
+    return track
+
+
+def in_flight(clearance: Array) -> Array:
+    """Return 1 where the foot is in the air, 0 where it is not, NaN where that is unknown."""
+    return np.where(np.isfinite(clearance), (clearance >= CLEAR).astype(np.float64), np.nan)
+
+
+def _filled(values: Array, before: float | None) -> Array:
+    """Return values with each gap filled by what came before it."""
+    known = np.isfinite(values)
+    if known.all():
+        return values
+    last = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
+    if before is None:
+        before = float(values[known][0]) if known.any() else 0.0
+    filled: Array = np.where(last < 0, before, values[last])
+    return filled
