@@ -30,6 +30,7 @@ VERBS = {
     "record": "play an excitation on a leg and record it",
     "identify": "fit a leg to recordings and write its robot file",
     "deploy": "run a controller on the real leg, or on emulated drives",
+    "view": "watch the leg in the browser: live, a trace, or the real one",
     "doctor": "check the drives of a leg, configure and home them",
     "emulate": "stand in for the real leg: two drives behind a real wire",
     "experiment": "run the paper's sim-to-real experiment on twins",

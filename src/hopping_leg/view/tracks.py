@@ -93,6 +93,11 @@ class Track:
         height, hip, knee = (self._at(name, time) for name in names)
         return height, np.array([hip, knee])
 
+    def latest(self, name: str, time: float) -> float:
+        """Return a field of the last row up to a time, NaN if there is none."""
+        row = int(np.searchsorted(self.time, time + 1e-9, side="right")) - 1
+        return float(self.field(name)[row]) if row >= 0 else float("nan")
+
     def sample(self, grid: Array) -> dict[str, Array]:
         """Return every field at rising times, NaN where there is no row, (times,) each."""
         time = self.time

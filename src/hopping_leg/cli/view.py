@@ -1,0 +1,98 @@
+"""Watch the leg hop in the browser, and interfere.
+
+Without further words a live simulation: change height, controller, robot, payload, ground and
+delay while it hops, push it, pause, step, go slow; a second controller hops beside the first. With
+--trace it replays traces, simulated or from hardware; with --box it shows the real leg while
+`hop deploy` runs. It needs no screen on this computer: open the printed address anywhere it can be
+reached from, e.g. through `ssh -L 8080:localhost:8080`.
+
+Examples:
+  hop view
+  hop view fast energy-shaping --height 0.32
+  hop view runs/mine/policy.onnx --robot examples/my_leg.toml
+  hop view --trace runs/deploy/fast-20260101-120000.parquet
+  hop view --box runs/deploy
+"""
+
+import os
+import sys
+import webbrowser
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+from rich.console import Console
+
+from hopping_leg.errors import UsageError
+
+if TYPE_CHECKING:
+    from hopping_leg.view.source import Source
+
+_ROBOT = "legv2-paper"
+
+
+@dataclass(frozen=True)
+class View:
+    """What is shown, and where the page is."""
+
+    controllers: Annotated[tuple[str, ...], tyro.conf.Positional] = ("fast",)
+    """One, or two side by side: names, .onnx or gain files."""
+    robot: str | None = None
+    """A shipped robot or a .toml file; default legv2-paper, or the one that a trace names."""
+    height: float = 0.30
+    """Commanded first, m."""
+    seed: int = 0
+    """Of noise and random delay."""
+    trace: tuple[Path, ...] = ()
+    """Replay these instead, one or two side by side."""
+    box: Path | None = None
+    """Follow a black box instead, or whichever is newest in a folder."""
+    host: str = "127.0.0.1"
+    """Address of this computer to serve at; 0.0.0.0 lets everyone in the network look and steer."""
+    port: int = 8080
+    """To serve at; a taken one gives the next that is free."""
+    browser: bool = True
+    """Open the page, where there is a screen."""
+    seconds: float = float("inf")
+    """Stop after this time."""
+
+
+def run(args: View) -> None:
+    """Serve the page until Ctrl-C."""
+    source = _source(args)
+    from hopping_leg.view.viewer import Viewer
+
+    viewer = Viewer(source, args.robot or _ROBOT, host=args.host, port=args.port)
+    console = Console()
+    console.print(f"Open {viewer.address} in a browser; Ctrl-C stops.", highlight=False)
+    if args.browser and _has_screen():
+        webbrowser.open(viewer.address)
+    try:
+        viewer.run(args.seconds)
+    except KeyboardInterrupt:
+        console.print("Stopped.")
+    finally:
+        viewer.close()
+
+
+def _source(args: View) -> "Source":
+    """Return what is to be shown; whatever can be wrong with it is found here."""
+    from hopping_leg.view.follow import Follow
+    from hopping_leg.view.live import Live
+    from hopping_leg.view.replay import Replay
+
+    if args.trace and args.box is not None:
+        raise UsageError("--trace and --box exclude each other; give one of them.")
+    if args.trace:
+        return Replay(args.trace, args.robot)
+    if args.box is not None:
+        return Follow(args.box, args.robot)
+    return Live(args.controllers, args.robot or _ROBOT, args.height, args.seed)
+
+
+def _has_screen() -> bool:
+    """Tell whether a browser that is opened here would be seen."""
+    if sys.platform in ("win32", "darwin"):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

@@ -1,0 +1,27 @@
+"""Input of a replay: which time is shown."""
+
+import viser
+
+from hopping_leg.view.inbox import Inbox, put_value
+from hopping_leg.view.replay import Replay
+
+
+class ReplayPanel:
+    """A slider for the time, which follows the replay as it plays.
+
+    Args:
+        server: Of the page.
+        inbox: For what is asked.
+        replay: To be steered.
+    """
+
+    def __init__(self, server: viser.ViserServer, inbox: Inbox, replay: Replay) -> None:
+        self._replay = replay
+        self._time = server.gui.add_slider(
+            "Time, s", min=0.0, max=replay.length, step=0.01, initial_value=0.0
+        )
+        self._time.on_update(inbox.from_page(lambda: replay.seek(self._time.value)))
+
+    def show(self) -> None:
+        """Bring the slider in line with the replay."""
+        put_value(self._time, round(self._replay.now, 2))
