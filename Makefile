@@ -56,6 +56,7 @@ results: $(STAMP)
 	$(BIN)/hop evaluate energy-shaping energy-shaping-literal fast paper --suite robustness --seeds 3 \
 	  --out runs/results/robustness --json docs/results/robustness.json
 	cp runs/results/robustness/robustness.svg docs/results
+	$(BIN)/hop evaluate fast paper energy-shaping --suite skills --json docs/results/skills.json
 	$(BIN)/hop bench env --json docs/results/env.json
 	$(BIN)/hop bench inference --json docs/results/inference.json
 	$(BIN)/hop bench convergence --json docs/results/convergence.json

@@ -9,6 +9,7 @@ Examples:
   hop evaluate fast energy-shaping --out runs/first
   hop evaluate 'runs/*/policy.onnx' --commands 0.25,0.30 --json result.json
   hop evaluate mine=policy.onnx energy-shaping --suite robustness --json robustness.json
+  hop evaluate fast energy-shaping --suite skills --json skills.json
   hop evaluate energy-shaping --robot my_leg.toml --seeds 20 --floor stiff
   hop evaluate fast --engine pybullet --floor soft --seeds 2
 """
@@ -26,6 +27,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 
 from hopping_leg.cli.options import Heights
 from hopping_leg.cli.robustness import judge_robustness
+from hopping_leg.cli.skills import judge_skills, print_skills
 from hopping_leg.control import Setup
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Candidate, Judged, evaluate
@@ -47,8 +49,9 @@ class Evaluate:
     controllers: tyro.conf.Positional[tuple[str, ...]]
     """Names (energy-shaping, paper, fast, ...), .onnx files, a quoted pattern of them, or Python
     classes as FILE.py:CLASS; LABEL=FILE chooses the name in all tables."""
-    suite: Literal["paper", "robustness"] = "paper"
-    """The paper's trials, or how far the world may change before a controller fails."""
+    suite: Literal["paper", "robustness", "skills"] = "paper"
+    """The paper's trials; how far the world may change before a controller fails; or skills beyond
+    the paper: so many hops and stop, stairs, soft landings."""
     axes: tuple[str, ...] = ()
     """Of the robustness suite: axes by name; default: all, and changes in the middle of a run."""
     robot: str = "legv2-paper"
@@ -62,7 +65,8 @@ class Evaluate:
     """All of them follow from it; choose one that selected nothing."""
     out: Path | None = None
     """Folder for evaluation.json, report.html and traces/, instead of naming each; the robustness
-    suite leaves robustness.json, robustness.svg and all that a killed run goes on from."""
+    suite leaves robustness.json, robustness.svg and all that a killed run goes on from, the skills
+    suite skills.json."""
     json: Path | None = None
     """File for every number."""
     report: Path | None = None
@@ -107,6 +111,11 @@ def run(args: Evaluate) -> None:
         with progress_bar() as bar:
             result = judge_robustness(args, candidates, setup, _bar_updater(bar), command)
         print_robustness(Console(), result)
+        return
+    if args.suite == "skills":
+        with progress_bar() as bar:
+            result = judge_skills(args, candidates, setup, _bar_updater(bar), command)
+        print_skills(Console(), result)
         return
     judged = judge(candidates, setup, args)
     judged = replace(judged, evaluation=replace(judged.evaluation, command=command))

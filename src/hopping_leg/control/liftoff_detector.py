@@ -1,0 +1,61 @@
+"""Lift-off from the joints alone, under any hopping controller.
+
+Whoever hops presses the leg apart, fast and with force, and then stops: the leg is in the air.
+"""
+
+import numpy as np
+
+from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.control.leg_view import LegView
+from hopping_leg.robot.model import GRAVITY
+from hopping_leg.robot.parameters import Robot
+
+_SMOOTHING = 0.25
+"""Share of the newest force in the pressing force."""
+
+_LEAST_PRESS = 1 / 3
+"""Pressing force that begins a push, weights."""
+
+_BEGIN, _END, _LEAST = 0.2, 0.06, 0.3
+"""Leg rate that begins a push, ends it, and must have been reached, sqrt(gravity x height)."""
+
+_BLIND = 0.9
+"""Share of the ballistic flight in which no push is believed."""
+
+
+class LiftoffDetector:
+    """Tells when n legs leave the ground.
+
+    Args:
+        robot: The leg.
+        period: Control period, s.
+        count: Number of legs n.
+    """
+
+    def __init__(self, robot: Robot, period: float, count: int) -> None:
+        self._period, self._weight = period, robot.mass * GRAVITY
+        self._speed = float(np.sqrt(GRAVITY * robot.straight_height))
+        self._press, self._fastest = np.zeros(count), np.zeros(count)
+        self._pushing = np.zeros(count, np.bool_)
+        self._blind = np.zeros(count)
+
+    def update(self, leg: LegView, force: Array) -> BoolArray:
+        """Return which legs have just left the ground, (n,).
+
+        Args:
+            leg: State of the legs.
+            force: Along the leg, that the joints' torques press with, N, (n,).
+        """
+        bounded = np.clip(force, -4 * self._weight, 8 * self._weight)
+        self._press += _SMOOTHING * (bounded - self._press)
+        self._blind = np.maximum(self._blind - self._period, 0.0)
+        begins = (self._press > _LEAST_PRESS * self._weight) & (leg.rate > _BEGIN * self._speed)
+        begins &= ~self._pushing & (self._blind == 0)
+        self._fastest = np.where(begins, 0.0, self._fastest)
+        self._pushing |= begins
+        self._fastest = np.maximum(self._fastest, leg.rate)
+        over = self._pushing & ((leg.rate < _END * self._speed) | (self._press < 0))
+        self._pushing &= ~over
+        left: BoolArray = over & (self._fastest > _LEAST * self._speed)
+        self._blind = np.where(left, _BLIND * 2 * self._fastest / GRAVITY, self._blind)
+        return left

@@ -1,0 +1,111 @@
+"""Dropped from a height: landing with spring and damper, against a joint PD that only holds on."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.control import Controller, Setup, roll_out
+from hopping_leg.control.joint_pd import JointPD
+from hopping_leg.control.landing import landing_posture
+from hopping_leg.control.supervised import Supervised
+from hopping_leg.evaluate.metrics import measure
+from hopping_leg.evaluate.skills.impact import peak_force, rebound
+from hopping_leg.robot import kinematics
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.trace import Trace
+
+DROP = 0.10
+"""Clearance of the foot at the beginning, m, for a leg of the paper's size."""
+
+_SECONDS = 3.0
+
+
+@dataclass(frozen=True)
+class Landed:
+    """One way to land, on one floor; medians over runs."""
+
+    controller: str
+    floor: str
+    drop_m: float
+    """Clearance of the foot at the beginning."""
+    peak_force: float
+    """Of the ground, weights of the leg."""
+    worst_force: float
+    """Its largest value of any run."""
+    peak_hip_torque_nm: float
+    """Magnitude that the motors gave from touchdown on."""
+    peak_knee_torque_nm: float
+    rebound_m: float
+    """Rise of the base above where it comes to rest, after its lowest point."""
+    foot_rebound_m: float
+    """Clearance of the foot after touchdown."""
+    lowest_base_m: float
+    body_contacts: int
+    runs: int
+
+
+def land(
+    setup: Setup, *, drop: float, repeats: int, seed: int, floor: str = "soft"
+) -> list[Landed]:
+    """Drop legs in the landing posture.
+
+    Args:
+        setup: The world.
+        drop: Clearance of the foot, m.
+        repeats: Realisations of noise and delay.
+        seed: All of them follow from it.
+        floor: Its name, for the rows.
+    """
+    robot = setup.robot
+    posture = landing_posture(robot)
+    landing = Supervised(None, robot, 0, rate=setup.rate, dropped=True)
+    ways: list[Controller] = [landing, JointPD(posture[None])]
+    return [
+        _row(robot, drop, floor, _drop(way, setup, posture, drop, repeats, seed)) for way in ways
+    ]
+
+
+def _drop(
+    way: Controller, setup: Setup, posture: Array, drop: float, repeats: int, seed: int
+) -> list[Trace]:
+    robot = setup.robot
+    length = float(kinematics.foot_position(robot, posture)[0])
+    height = float(kinematics.stance_height(robot, posture)) + drop
+    run = roll_out(
+        way,
+        replace(setup, start_length=length),
+        np.full((round(_SECONDS * setup.rate), repeats), height),
+        seed,
+        on_legs=lambda legs: legs.place(slice(None), height, posture),
+    )
+    return [run.trace(leg) for leg in range(repeats)]
+
+
+def _row(robot: Robot, drop: float, floor: str, traces: list[Trace]) -> Landed:
+    first = [int((trace.column("foot_clearance_m") <= 0).argmax()) for trace in traces]
+    pairs = list(zip(traces, first, strict=True))
+    forces = [peak_force(robot, trace, start) for trace, start in pairs]
+    bounces = [rebound(trace, start) for trace, start in pairs]
+    windows = [window for trace in traces for window in measure(trace)]
+
+    def torque(joint: str) -> float:
+        name = f"{joint}_torque_nm"
+        return float(
+            np.median([np.abs(trace.column(name)[start:]).max() for trace, start in pairs])
+        )
+
+    return Landed(
+        controller=str(traces[0].header["controller"]),
+        floor=floor,
+        drop_m=drop,
+        peak_force=float(np.median(forces)),
+        worst_force=max(forces),
+        peak_hip_torque_nm=torque("hip"),
+        peak_knee_torque_nm=torque("knee"),
+        rebound_m=float(np.median([over for over, _ in bounces])),
+        foot_rebound_m=float(np.median([foot for _, foot in bounces])),
+        lowest_base_m=float(min(w.min_height for w in windows)),
+        body_contacts=sum(w.base_contacts + w.knee_contacts for w in windows),
+        runs=len(traces),
+    )

@@ -1,0 +1,165 @@
+"""Hopping on a ground that rises and falls in steps of which no one is told."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.control import Controller, Setup, roll_out
+from hopping_leg.evaluate.metrics import START_SECONDS, measure, skipped_in_run
+from hopping_leg.hops import find_hops
+from hopping_leg.sim.perturbation import Perturbation
+from hopping_leg.trace import Trace
+
+STAIRS = (0.0, 0.01, 0.02, 0.03, 0.02, 0.01, 0.0)
+"""Height of the ground, m, for a leg of the paper's size."""
+
+_SECONDS = 3.0
+"""On each step."""
+
+
+@dataclass(frozen=True)
+class Stair:
+    """One controller on one step; heights are above the ground of the moment."""
+
+    controller: str
+    floor: str
+    command_m: float
+    step: int
+    """Number of the step."""
+    ground_m: float
+    """Above where the leg began."""
+    first_error_m: float
+    """Apex minus command of the first hop on it, median over runs; after the start's own settling
+    on the first step."""
+    median_error_m: float
+    """Of all later hops on it."""
+    hops: int
+    runs: int
+
+
+@dataclass(frozen=True)
+class Stairs:
+    """One controller at one command, the whole way up and down."""
+
+    controller: str
+    floor: str
+    command_m: float
+    worst_first_error_m: float
+    """Of all steps, the largest ``first_error_m`` by magnitude."""
+    worst_error_m: float
+    """Of all steps, the largest ``median_error_m`` by magnitude."""
+    skipped_hops: int
+    body_contacts: int
+    runs: int
+
+
+def climb(
+    label: str,
+    controller: Controller,
+    setup: Setup,
+    commands: Sequence[float],
+    *,
+    stairs: Sequence[float],
+    repeats: int,
+    seed: int,
+    floor: str = "soft",
+) -> tuple[list[Stair], list[Stairs]]:
+    """Let a controller hop over stairs.
+
+    Args:
+        label: The controller's name in tables.
+        controller: Hops.
+        setup: The world; its engine is MuJoCo.
+        commands: Desired apex heights, m.
+        stairs: Height of the ground on each step, m.
+        repeats: Realisations of noise and delay.
+        seed: All of them follow from it.
+        floor: Its name, for the rows.
+    """
+    each = np.repeat(np.asarray(commands, float), repeats)
+    ticks, count = round(_SECONDS * setup.rate), len(each)
+    ground = np.repeat(np.asarray(stairs, float), ticks)
+    calm = np.zeros((len(ground), count))
+    perturbation = Perturbation(
+        (setup.robot,) * count,
+        np.zeros((*calm.shape, 2)),
+        calm,
+        np.repeat(ground[:, None], count, axis=1),
+    )
+    run = roll_out(
+        controller, setup, np.tile(each, (len(ground), 1)), seed, perturbation=perturbation
+    )
+    traces = [run.trace(leg) for leg in range(count)]
+    rows: list[Stair] = []
+    wholes: list[Stairs] = []
+    for k, command in enumerate(commands):
+        own = traces[k * repeats : (k + 1) * repeats]
+        for step, level in enumerate(stairs):
+            begin = step * ticks if step else round(START_SECONDS * setup.rate)
+            rise = level - stairs[step - 1] if step else 0.0
+            errors = [_errors(trace, range(begin, (step + 1) * ticks), rise) for trace in own]
+            rows.append(_row(label, floor, command, step, level, errors))
+        wholes.append(_whole(rows[-len(stairs) :], own))
+    return rows, wholes
+
+
+def _whole(steps: Sequence[Stair], traces: Sequence[Trace]) -> Stairs:
+    windows = [window for trace in traces for window in measure(trace)]
+    return Stairs(
+        controller=steps[0].controller,
+        floor=steps[0].floor,
+        command_m=steps[0].command_m,
+        worst_first_error_m=_worst([step.first_error_m for step in steps]),
+        worst_error_m=_worst([step.median_error_m for step in steps]),
+        skipped_hops=sum(skipped_in_run(trace) for trace in traces),
+        body_contacts=sum(w.base_contacts + w.knee_contacts for w in windows),
+        runs=len(traces),
+    )
+
+
+def _worst(errors: Sequence[float]) -> float:
+    """Return the largest by magnitude of what exists, m; NaN if nothing does."""
+    return max((e for e in errors if np.isfinite(e)), key=abs, default=float("nan"))
+
+
+def _row(
+    label: str, floor: str, command: float, step: int, level: float, errors: list[Array]
+) -> Stair:
+    first = np.array([e[0] for e in errors if len(e)])
+    later = np.concatenate([e[1:] for e in errors])
+    return Stair(
+        controller=label,
+        floor=floor,
+        command_m=command,
+        step=step,
+        ground_m=level,
+        first_error_m=float(np.median(first)) if len(first) else float("nan"),
+        median_error_m=float(np.median(later)) if len(later) else float("nan"),
+        hops=sum(len(e) for e in errors),
+        runs=len(errors),
+    )
+
+
+def _errors(trace: Trace, steps: range, rise: float) -> Array:
+    """Return apex minus command of the hops that began on a step, m.
+
+    Args:
+        trace: Whose ground moves in flight, once the foot is clear.
+        steps: Ticks in which the ground is asked to be that of the step.
+        rise: Of the ground at the beginning of the step, m.
+    """
+    height, rate = trace.column("height_m"), trace.column("height_rate_m_s")
+    hops = find_hops(height, rate, trace.column("foot_clearance_m"))
+    period = np.diff(trace.column("time_s")).mean()
+    jump = np.diff(height) - period * (rate[1:] + rate[:-1]) / 2
+    moved = np.flatnonzero(np.abs(jump) > abs(rise) / 2) if rise else np.array([steps.start])
+    moved = moved[(moved >= steps.start - 1) & (moved < steps.stop)]
+    landed = np.flatnonzero(~hops.in_flight)
+    landed = landed[landed > moved[0]] if len(moved) else landed[:0]
+    if not len(landed):
+        return np.empty(0)
+    counted = (hops.tick > landed[0]) & (hops.tick < steps.stop)
+    errors: Array = hops.apex[counted] - trace.column("command_m")[0]
+    return errors

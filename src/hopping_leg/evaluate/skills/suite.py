@@ -1,0 +1,120 @@
+"""All skills of all candidates, as JSON values."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from hopping_leg.control import Setup
+from hopping_leg.errors import UsageError
+from hopping_leg.evaluate.runner import Candidate, software_versions
+from hopping_leg.evaluate.runs import on_floor
+from hopping_leg.evaluate.skills.counted import COUNTS, count_hops
+from hopping_leg.evaluate.skills.landings import DROP, land
+from hopping_leg.evaluate.skills.stairs import STAIRS, climb
+from hopping_leg.evaluate.trials import COMMANDS, PAPER_HEIGHT, check_reach, scaled
+
+SCHEMA = 1
+"""Version of the JSON, raised when a name changes its meaning."""
+
+
+def run_skills(
+    candidates: Sequence[Candidate],
+    setup: Setup,
+    *,
+    floors: Sequence[str] = ("soft", "stiff"),
+    commands: Sequence[float] | None = None,
+    repeats: int = 5,
+    seed: int = 1000,
+    on_progress: Callable[[str, float], None] = lambda _label, _share: None,
+) -> dict[str, Any]:
+    """Let every candidate hop so many times and stop, and over stairs; drop a leg.
+
+    Args:
+        candidates: What is judged.
+        setup: The world, with the paper's noise and delay.
+        floors: Names of floors, see ``evaluate.runs.FLOORS``.
+        commands: Desired apex heights, m; the paper's by default, scaled to the leg.
+        repeats: Realisations of noise and delay.
+        seed: All randomness follows from it.
+        on_progress: Called with a label and the share done.
+
+    Returns:
+        ``counted``, ``stairs``, ``climbs``, ``landings``, ``conditions``, ``versions``, ``notes``.
+
+    Raises:
+        UsageError: A command is out of reach or of a candidate's range, or the engine is not
+            MuJoCo.
+    """
+    if setup.engine != "mujoco":
+        raise UsageError("Stairs and drops need the engine mujoco; leave --engine out.")
+    if repeats < 1:
+        raise UsageError(f"{repeats} seeds are too few; give --seeds 1 or more.")
+    chosen = scaled(COMMANDS, setup.robot) if commands is None else tuple(sorted(set(commands)))
+    check_reach(setup.robot, chosen)
+    _check(candidates, chosen)
+    size = setup.robot.straight_height / PAPER_HEIGHT
+    stairs, drop = [size * level for level in STAIRS], size * DROP
+    rows: dict[str, list[Any]] = {"counted": [], "stairs": [], "climbs": [], "landings": []}
+    for candidate in candidates:
+        for number, floor in enumerate(floors):
+            world = on_floor(setup, floor)
+            label, controller = candidate.label, candidate.controller
+            rows["counted"] += count_hops(
+                label, controller, world, chosen, repeats=repeats, seed=seed, floor=floor
+            )
+            on_progress(label, (number + 0.5) / len(floors))
+            steps, wholes = climb(
+                label,
+                controller,
+                world,
+                chosen,
+                stairs=stairs,
+                repeats=repeats,
+                seed=seed,
+                floor=floor,
+            )
+            rows["stairs"] += steps
+            rows["climbs"] += wholes
+            on_progress(label, (number + 1) / len(floors))
+    for floor in floors:
+        world = on_floor(setup, floor)
+        rows["landings"] += land(world, drop=drop, repeats=repeats, seed=seed, floor=floor)
+    return {
+        "schema": SCHEMA,
+        **{name: [asdict(row) for row in found] for name, found in rows.items()},
+        "conditions": {
+            "robot": setup.robot.name,
+            "robot_digest": setup.robot.digest,
+            "disturbance": asdict(setup.disturbance),
+            "commands_m": chosen,
+            "counts": COUNTS,
+            "stairs_m": stairs,
+            "drop_m": drop,
+            "floors": list(floors),
+            "seeds": repeats,
+            "seed": seed,
+            "timestep_s": setup.timestep,
+            "rate_hz": setup.rate,
+        },
+        "versions": software_versions(),
+        "notes": [note for candidate in candidates for note in candidate.notes],
+    }
+
+
+def _check(candidates: Sequence[Candidate], commands: Sequence[float]) -> None:
+    labels = [candidate.label for candidate in candidates]
+    if not labels:
+        raise UsageError("No controller was named; try `hop evaluate energy-shaping`.")
+    for label in labels:
+        if labels.count(label) > 1:
+            raise UsageError(f"Controller '{label}' was named twice; name each one once.")
+    for candidate in candidates:
+        if candidate.command_range is None:
+            continue
+        low, high = candidate.command_range
+        outside = [c for c in commands if not low - 1e-9 <= c <= high + 1e-9]
+        if outside:
+            raise UsageError(
+                f"'{candidate.label}' cannot be asked for {outside[0]:g} m: it was trained for"
+                f" {low:g} to {high:g} m; choose --commands within that range."
+            )
