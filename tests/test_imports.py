@@ -20,15 +20,16 @@ ORDER = [
     "learn",
     "deploy",
     "evaluate",
+    "view",
     "cli",
 ]
 FOUNDATION = {"", "arrays", "errors", "hops", "progress", "trace"}
 TRAINING = {"torch", "stable_baselines3", "onnx", "tensorboard"}
-BESIDE = {("evaluate", "learn")} | {
+BESIDE = {("evaluate", "learn"), ("view", "learn")} | {
     ("deploy", room) for room in ("sim", "identify", "env", "learn")
 }
-"""Later rooms that still must not use these earlier ones: neither evaluation nor the robot needs
-torch, and what drives the robot knows nothing of a simulation."""
+"""Later rooms that still must not use these earlier ones: neither evaluation, viewer nor robot
+needs torch, and what drives the robot knows nothing of a simulation."""
 
 PLAYS = "deploy/emulator/"
 """Exception, which simulates the leg behind the wire."""

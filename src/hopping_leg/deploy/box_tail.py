@@ -64,7 +64,7 @@ class BoxTail:
             elif kind == ROW:
                 found.append(data)
         self._rest = content[at:]
-        return np.frombuffer(b"".join(found), "<f8").reshape(-1, len(self.columns))
+        return np.frombuffer(b"".join(found), "<f8").reshape(len(found), len(self.columns))
 
     def close(self) -> None:
         """Close the file."""

@@ -18,6 +18,9 @@ from hopping_leg.sim.variants import places, vary
 PRIVILEGED = 10
 """Entries of the true state that a critic may see, where all legs are the same."""
 
+PRIVILEGED_COMMAND = 6
+"""Which of them is the command."""
+
 
 class Step(NamedTuple):
     """Outcome of one tick of n legs; legs whose episode ended have already begun the next."""
@@ -174,7 +177,7 @@ class HoppingTask:
         result[:, 1] = legs.height_rate
         result[:, 2:4] = (legs.q - o.offset[:2]) * o.gain[:2]
         result[:, 4:6] = legs.qd * o.gain[2:4]
-        result[:, 6] = (self.command - o.offset[4]) * o.gain[4]
+        result[:, PRIVILEGED_COMMAND] = (self.command - o.offset[4]) * o.gain[4]
         result[:, 7] = legs.foot_clearance() * 10
         result[:, 8] = legs.knee_clearance() * 10
         result[:, 9] = legs.base_clearance() * 10

@@ -16,6 +16,7 @@ from hopping_leg.env import ApexRewardOptions, TaskOptions
 from hopping_leg.learn.actor import dense_network
 from hopping_leg.learn.export import Network
 from hopping_leg.learn.fast import FastRecipe, cosine
+from hopping_leg.learn.imitation import Imitation
 from hopping_leg.learn.taught import TaughtPolicy, TaughtPPO
 from hopping_leg.learn.vecenv import TaskVecEnv
 
@@ -47,10 +48,8 @@ class PreciseRecipe(FastRecipe):
     """Share of the training in which the teacher learns; in the rest the policy does."""
     student: tuple[int, ...] = (256, 128)
     """Hidden layers of the policy, tanh; ``actor`` are the teacher's."""
-    imitation_passes: int = 8
-    """Passes over a rollout while the policy learns."""
-    imitation_batch: int = 2048
-    """Ticks per gradient step while the policy learns."""
+    imitation: Imitation = field(default_factory=Imitation)
+    """How the policy learns from the teacher."""
     guided: float = 0.15
     """Share of the policy's learning over which the teacher acts ever less in its stead."""
 
@@ -61,7 +60,7 @@ class PreciseRecipe(FastRecipe):
         return TaughtPPO(
             TaughtPolicy,
             env,
-            imitation=(self.imitation_passes, self.imitation_batch),
+            imitation=self.imitation,
             **self.ppo_options(seed),
             policy_kwargs={
                 **self.network_options(),

@@ -40,6 +40,13 @@ class AtBoundary:
             self.on_boundary()
         return super().collect_rollouts(*args, **kwargs)  # type: ignore[misc]
 
+    def own_state(self) -> Tree:
+        """Return what an algorithm of this project's own remembers beside the library's."""
+        return {}
+
+    def restore_own(self, state: Tree) -> None:
+        """Go on from an ``own_state``."""
+
     def _update_current_progress_remaining(self, steps: int, total: int) -> None:
         super()._update_current_progress_remaining(steps, total)  # type: ignore[misc]
         if self.remaining is not None:
@@ -67,6 +74,7 @@ def state_of(model: BaseAlgorithm) -> Tree:
         "last_episode_starts": model._last_episode_starts,
         "episodes": [{"r": e["r"], "l": e["l"], "t": e["t"]} for e in model.ep_info_buffer],
         "random": _random_state(model),
+        "own": model.own_state(),
     }
     if isinstance(model, SAC):
         if model.log_ent_coef is not None:
@@ -95,6 +103,7 @@ def restore(model: BaseAlgorithm, tree: Tree) -> None:
     model.ep_success_buffer = deque(maxlen=model._stats_window_size)
     if "replay" in tree:
         _restore_replay(model.replay_buffer, tree["replay"])
+    model.restore_own(tree["own"])
     _restore_random(model, tree["random"])
 
 

@@ -12,7 +12,10 @@ import torch
 from torch import nn
 from torch.nn import functional
 
+from hopping_leg.env.task import PRIVILEGED_COMMAND
 from hopping_leg.learn.asymmetric import AsymmetricPolicy, dense
+from hopping_leg.learn.checkpoint import Tree
+from hopping_leg.learn.imitation import Aim, Imitation, Lessons
 from hopping_leg.learn.resumable import ResumablePPO
 
 
@@ -41,19 +44,19 @@ class TaughtPolicy(AsymmetricPolicy):
         **kwargs: Any,  # noqa: ANN401
     ) -> None:
         self.imitating, self.guidance = False, 0.0
-        self._measured, self._hidden = measured, list(student)
+        self.measured, self._hidden = measured, list(student)
         super().__init__(*args, actor_size=measured, actor_sees=list(teacher_sees), **kwargs)
 
     def _build_mlp_extractor(self) -> None:
         super()._build_mlp_extractor()
-        student = dense(self._measured, self._hidden, self.activation_fn)
+        student = dense(self.measured, self._hidden, self.activation_fn)
         student.append(nn.Linear(self._hidden[-1], self.action_space.shape[0]))
         self.mlp_extractor.student_net = student
 
     def student_action(self, observation: torch.Tensor) -> torch.Tensor:
         """Return what the student would do, unbounded, (n, 2)."""
         minds: Any = self.mlp_extractor
-        action: torch.Tensor = minds.student_net(observation[:, : self._measured])
+        action: torch.Tensor = minds.student_net(observation[:, : self.measured])
         return action
 
     def teacher_action(self, observation: torch.Tensor) -> torch.Tensor:
@@ -80,12 +83,17 @@ class TaughtPPO(ResumablePPO):
     """PPO while the teacher learns; regression on the teacher's actions while the student does.
 
     Args:
-        imitation: Passes over a rollout and ticks per gradient step while imitating.
+        imitation: How the student learns.
     """
 
-    def __init__(self, *args: Any, imitation: tuple[int, int], **kwargs: Any) -> None:  # noqa: ANN401
-        self._passes, self._ticks = imitation
+    def __init__(self, *args: Any, imitation: Imitation, **kwargs: Any) -> None:  # noqa: ANN401
+        self._imitation = imitation
         super().__init__(*args, **kwargs)
+        task = self.env.task
+        scaling = task.observation.scaling
+        self._told = task.observation.size + PRIVILEGED_COMMAND
+        self._aim = Aim(scaling.offset[-1], scaling.gain[-1], imitation.knots)
+        self._lessons = Lessons(imitation.memory, self.observation_space.shape[0])
 
     def train(self) -> None:
         """Learn from the rollout."""
@@ -94,15 +102,30 @@ class TaughtPPO(ResumablePPO):
             super().train()
             return
         self._update_learning_rate(policy.optimizer)
-        losses = []
-        for _ in range(self._passes):
-            for batch in self.rollout_buffer.get(self._ticks):
-                with torch.no_grad():
-                    wanted = policy.teacher_action(batch.observations)
-                loss = functional.mse_loss(policy.student_action(batch.observations), wanted)
-                policy.optimizer.zero_grad()
-                loss.backward()  # type: ignore[no-untyped-call]
-                policy.optimizer.step()
-                losses.append(loss.item())
-        self._n_updates += self._passes
+        self._aim.correct(*self.env.recent_hops, self._imitation.aiming)
+        self._lessons.add(self.rollout_buffer.observations)
+        losses = [self._imitate(policy) for _ in range(self._imitation.updates)]
+        self._n_updates += self._imitation.updates
         self.logger.record("train/imitation_loss", sum(losses) / len(losses))
+
+    def _imitate(self, policy: TaughtPolicy) -> float:
+        """Take one step towards what the teacher would do; return the loss."""
+        seen = self._lessons.draw(self._imitation.batch)
+        told = seen.clone()
+        told[:, self._told] = self._aim(seen[:, self._told])
+        with torch.no_grad():
+            wanted = policy.teacher_action(told)
+        loss = functional.mse_loss(policy.student_action(seen), wanted)
+        policy.optimizer.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        policy.optimizer.step()
+        return loss.item()
+
+    def own_state(self) -> Tree:
+        """Return what the student learns from, and where the teacher aims."""
+        return {"lessons": self._lessons.state(), "aim": self._aim.values.numpy().copy()}
+
+    def restore_own(self, state: Tree) -> None:
+        """Go on from an ``own_state``."""
+        self._lessons.restore(state["lessons"])
+        self._aim.values = torch.from_numpy(state["aim"])

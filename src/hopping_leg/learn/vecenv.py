@@ -34,7 +34,7 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
         self.render_mode = None
         super().__init__(task.count, space, gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32))
         self.hops = 0
-        self._errors: deque[float] = deque(maxlen=_RECENT_HOPS)
+        self._recent: deque[tuple[float, float]] = deque(maxlen=_RECENT_HOPS)
         self._return = np.zeros(task.count)
         self._length = np.zeros(task.count, np.int64)
         self._started = time.monotonic()
@@ -44,7 +44,14 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
     @property
     def apex_error(self) -> float:
         """Mean |apex - command| over the latest hops of all legs, m; NaN before the first."""
-        return float(np.mean(np.abs(self._errors))) if self._errors else float("nan")
+        _, errors = self.recent_hops
+        return float(np.mean(np.abs(errors))) if len(errors) else float("nan")
+
+    @property
+    def recent_hops(self) -> tuple[Array, Array]:
+        """Commands of the latest hops of all legs and apex minus command, m, (hops,) each."""
+        commands, errors = np.array(self._recent).reshape(-1, 2).T
+        return commands, errors
 
     def reset(self) -> Array32:
         """Begin new episodes of all legs."""
@@ -57,13 +64,14 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
 
     def step_wait(self) -> tuple[Array32, Array, BoolArray, list[dict[str, Any]]]:
         """Step all legs; legs whose episode ended have begun the next."""
+        command = self.task.command.copy()
         step = self.task.step(self._action)
         self._return += step.reward
         self._length += 1
         if step.apex_error is not None:
-            errors = step.apex_error[~np.isnan(step.apex_error)]
-            self.hops += len(errors)
-            self._errors.extend(errors.tolist())
+            (legs,) = np.nonzero(~np.isnan(step.apex_error))
+            self.hops += len(legs)
+            self._recent.extend(zip(command[legs], step.apex_error[legs], strict=True))
         done = step.terminated | step.truncated
         infos = self._end_episodes(step, done) if done.any() else self._nothing
         return self._observation(step.observation), step.reward, done, infos
@@ -98,7 +106,7 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
         return {
             "task": self.task.state(),
             "hops": self.hops,
-            "errors": np.array(self._errors),
+            "recent": np.array(self._recent).reshape(-1, 2),
             "return": self._return.copy(),
             "length": self._length.copy(),
         }
@@ -107,7 +115,7 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
         """Go on from a ``state``."""
         self.task.restore(state["task"])
         self.hops = state["hops"]
-        self._errors = deque(state["errors"].tolist(), maxlen=_RECENT_HOPS)
+        self._recent = deque(map(tuple, state["recent"].tolist()), maxlen=_RECENT_HOPS)
         self._return[:], self._length[:] = state["return"], state["length"]
 
     def close(self) -> None:

@@ -9,6 +9,7 @@ Examples:
   hop bench deploy --json deploy.json
   hop bench energy-shaping --json energy_shaping.json
   hop bench engines --json bullet.json
+  hop bench probe fast paper --json probe.json --figure probe.svg
   hop bench identify --skip-paper-size --json identify.json
 """
 
@@ -17,6 +18,7 @@ from hopping_leg.cli.bench.engines import Engines
 from hopping_leg.cli.bench.faults import Faults
 from hopping_leg.cli.bench.hardware import Deploy
 from hopping_leg.cli.bench.identification import Identify
+from hopping_leg.cli.bench.probe import Probe
 from hopping_leg.cli.bench.simulation import Convergence, Env, Inference
 from hopping_leg.cli.output import write_json
 
@@ -31,6 +33,7 @@ Benchmark = (
     | Deploy
     | Identify
     | Engines
+    | Probe
 )
 
 
