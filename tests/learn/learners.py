@@ -6,6 +6,7 @@ import torch
 from stable_baselines3.common.logger import configure
 
 from hopping_leg.learn.fast import FastRecipe
+from hopping_leg.learn.imitation import Imitation
 from hopping_leg.learn.paper import PaperRecipe
 from hopping_leg.learn.precise import PreciseRecipe
 from hopping_leg.learn.resumable import ResumablePPO
@@ -18,7 +19,7 @@ TINY = PaperRecipe(
 TINY_FAST = FastRecipe(steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8))
 TINY_PRECISE = PreciseRecipe(
     steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8), student=(8, 8),
-    teaching=0.4, imitation_passes=2, imitation_batch=64,
+    teaching=0.4, imitation=Imitation(memory=200, updates=4, batch=64),
 )  # fmt: skip
 
 

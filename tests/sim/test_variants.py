@@ -50,6 +50,17 @@ def test_gears_that_rub_under_load_do_so_in_every_leg_as_alone():
         np.testing.assert_array_equal(together[:, index], alone[:, 0])
 
 
+def test_motors_that_give_less_do_so_in_every_leg_as_alone():
+    gains = [Range("knee.torque_gain", "1", v, v, "test") for v in (0.7, 1.2)]
+    robots = [vary(LEG, [gain], 1, np.random.default_rng(0))[0] for gain in gains]
+    legs = Legs(LEG, 2, threads=1, variants=robots[::-1])
+    legs.become(robots)
+    for together in (states(Legs(LEG, 2, threads=1, variants=robots)), states(legs)):
+        for index, robot in enumerate(robots):
+            alone = states(Legs(robot, 1, threads=1))
+            np.testing.assert_array_equal(together[:, index], alone[:, 0])
+
+
 @pytest.mark.parametrize("spread", IDENTIFIABLE, ids=lambda spread: spread.path)
 def test_every_range_of_the_twins_reaches_the_physics(spread):
     low, high = (dataclasses.replace(spread, low=v, high=v) for v in (spread.low, spread.high))
@@ -61,11 +72,20 @@ def test_every_range_of_the_twins_reaches_the_physics(spread):
 def test_places_tell_where_numbers_lie_in_their_ranges():
     ranges = (Range("rail.friction", "N", 0.5, 1.5, "test"), IDENTIFIABLE[2])
     robots = [vary(LEG, ranges, 1, np.random.default_rng(seed))[0] for seed in range(20)]
-    found = places(robots, ranges)
+    found = places(LEG, robots, ranges)
     assert found.shape == (20, 2)
     np.testing.assert_allclose(found[:, 0], 2 * (np.array([r.rail.friction for r in robots]) - 1))
     assert (np.abs(found) <= 1).all()
     assert np.ptp(found, axis=0).min() > 1
+
+
+def test_a_relative_range_is_of_what_the_robot_has():
+    spread = Range("base.mass", "1", 0.5, 2.0, "test", "logarithmic", relative=True)
+    robots = vary(LEG, [spread], 200, np.random.default_rng(0))
+    shares = np.array([robot.base.mass for robot in robots]) / LEG.base.mass
+    assert 0.5 <= shares.min() < 0.55
+    assert 1.8 < shares.max() <= 2.0
+    np.testing.assert_allclose(places(LEG, robots, [spread])[:, 0], np.log2(shares), atol=1e-9)
 
 
 def test_the_seed_fixes_the_draws_and_ranges_hold():

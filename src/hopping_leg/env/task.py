@@ -77,7 +77,7 @@ class HoppingTask:
         noise, self._rng, draws = rng.spawn(3)
         ranges = options.randomised
         variants = vary(robot, ranges, count, draws) if ranges else ()
-        self._numbers = places(variants, ranges)
+        self._numbers = places(robot, variants, ranges)
         self.legs = Legs(
             robot,
             count,

@@ -102,7 +102,8 @@ class TaughtPPO(ResumablePPO):
             super().train()
             return
         self._update_learning_rate(policy.optimizer)
-        self._aim.correct(*self.env.recent_hops, self._imitation.aiming)
+        commands, errors = self.env.recent_hops
+        self._aim.correct(commands, errors, self._imitation.aiming)
         self._lessons.add(self.rollout_buffer.observations)
         losses = [self._imitate(policy) for _ in range(self._imitation.updates)]
         self._n_updates += self._imitation.updates

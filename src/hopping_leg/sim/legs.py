@@ -72,7 +72,7 @@ class Legs(AnyLegs):
             self._take_reality(variants or [robot] * count, clamped, threads)
         sensors = self if self.real is None else self.real.sensors
         self.measured_q, self.measured_qd = sensors.q, sensors.qd
-        self._motors = MotorLimit(robot, count)
+        self._motors = MotorLimit(variants or robot, count)
         self._inverse_belt = np.tile(1 / robot.of_joints("belt_ratio"), (count, 1))
         self._applied = np.zeros((count, 2))
         ticks, self._late = divmod(round(robot.reality.latency.command / timestep), self.substeps)
@@ -134,6 +134,7 @@ class Legs(AnyLegs):
             self.real.adopt(variants)
         elif self._is_plain(variants):
             self._set_models(variants)
+            self._motors = MotorLimit(variants, self.count)
         else:
             raise UsageError(
                 f"Legs of {self.robot.name} cannot take on another [reality] while they move; make"

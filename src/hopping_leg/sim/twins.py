@@ -37,6 +37,8 @@ class Range:
     source: str
     """Why these bounds."""
     scale: Literal["uniform", "logarithmic"] = "uniform"
+    relative: bool = False
+    """Whether the bounds are multiples of the number that a robot itself has."""
 
     def __post_init__(self) -> None:
         least = 0.0 if self.scale == "logarithmic" else -math.inf

@@ -2,7 +2,7 @@
 
 The paper fits one simulation to the robot and rejects the alternative, training on many; this is
 that alternative. Controllers and rewards go on believing the robot itself, so only what the physics
-alone reads may vary: sizes, motors and joint limits may not.
+alone reads may vary: sizes, motors' speeds and joint limits may not.
 """
 
 import dataclasses
@@ -27,7 +27,7 @@ VARIABLE = (
     *(
         f"{joint}.{name}"
         for joint in ("hip", "knee")
-        for name in ("friction", "damping", "armature", "load_friction")
+        for name in ("friction", "damping", "armature", "load_friction", "torque_gain")
     ),
 )
 """Numbers of a robot that may differ from leg to leg."""
@@ -57,16 +57,21 @@ def vary(
     for number in range(count):
         variant = robot
         for spread in ranges:
-            variant = with_value(variant, spread.path.split("."), spread.draw(rng))
+            unit = attrgetter(spread.path)(robot) if spread.relative else 1.0
+            variant = with_value(variant, spread.path.split("."), unit * spread.draw(rng))
         check_physics(variant, f"variant {number} of {robot.name}")
         variants.append(variant)
     return tuple(variants)
 
 
-def places(robots: Sequence[Robot], ranges: Sequence[Range]) -> Array:
-    """Return where the numbers of robots lie in their ranges, -1 to 1, (robots, ranges)."""
-    found = [[s.place(attrgetter(s.path)(robot)) for s in ranges] for robot in robots]
-    return np.array(found).reshape(len(robots), len(ranges))
+def places(robot: Robot, variants: Sequence[Robot], ranges: Sequence[Range]) -> Array:
+    """Return where the numbers of a robot's variants lie in their ranges, -1 to 1, (n, ranges)."""
+    found = np.empty((len(variants), len(ranges)))
+    for column, spread in enumerate(ranges):
+        number = attrgetter(spread.path)
+        unit = number(robot) if spread.relative else 1.0
+        found[:, column] = [spread.place(number(variant) / unit) for variant in variants]
+    return found
 
 
 def with_value(part: Part, path: list[str], value: float) -> Part:

@@ -1,0 +1,107 @@
+"""How a student learns from a teacher: what it has seen, and where the teacher aims."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import torch
+
+from hopping_leg.arrays import Array
+from hopping_leg.learn.checkpoint import Tree
+
+_FARTHEST = 0.2
+"""Largest correction of the aim, of half the range of commands: where hops cannot be as low or high
+as the command, no aim helps."""
+
+
+@dataclass(frozen=True)
+class Imitation:
+    """Numbers of the student's learning."""
+
+    memory: int = 600_000
+    """Ticks of its past from which it learns, the newest."""
+    updates: int = 128
+    """Gradient steps after every rollout."""
+    batch: int = 2048
+    """Ticks per gradient step."""
+    knots: int = 8
+    """Heights at which the teacher's aim is corrected."""
+    aiming: float = 0.1
+    """Share of the recent hops' mean error by which a rollout corrects the aim."""
+
+
+class Lessons:
+    """The newest observations, in half precision: far finer than the noise in them.
+
+    Args:
+        room: How many are kept.
+        size: Entries of an observation.
+    """
+
+    def __init__(self, room: int, size: int) -> None:
+        self._seen = torch.zeros((room, size), dtype=torch.float16)
+        self._next = self._count = 0
+
+    def add(self, observations: npt.NDArray[np.float32]) -> None:
+        """Keep observations, (..., size), in the place of the oldest."""
+        rows = torch.from_numpy(observations).reshape(-1, self._seen.shape[1])
+        places = (self._next + torch.arange(len(rows))) % len(self._seen)
+        self._seen[places] = rows.half()
+        self._next = int(places[-1]) + 1
+        self._count = min(self._count + len(rows), len(self._seen))
+
+    def draw(self, count: int) -> torch.Tensor:
+        """Return some of them at random, (count, size)."""
+        return self._seen[torch.randint(self._count, (count,))].float()
+
+    def state(self) -> Tree:
+        """Return everything that is kept."""
+        return {"seen": self._seen[: self._count].numpy(), "next": self._next}
+
+    def restore(self, state: Tree) -> None:
+        """Go on from a ``state``."""
+        self._next, self._count = state["next"], len(state["seen"])
+        self._seen[: self._count] = torch.from_numpy(state["seen"])
+
+
+class Aim:
+    """How much higher than the command the teacher is told, so that the student's hops come true.
+
+    A student sees less than its teacher and hops lower or higher on average; what it is off at a
+    height is added up there, as an integral controller does.
+
+    Args:
+        offset: Command that an observation shows as 0, m.
+        gain: Its scale, 1/m.
+        knots: Heights at which it is known, from -1 to 1 of an observation; linear in between.
+    """
+
+    def __init__(self, offset: float, gain: float, knots: int) -> None:
+        self._offset, self._gain = offset, gain
+        self._knots = torch.linspace(-1, 1, knots)
+        self.values = torch.zeros(knots)
+
+    def correct(self, commands: Array, errors: Array, rate: float) -> None:
+        """Aim lower where hops were too high.
+
+        Args:
+            commands: Of recent hops, m.
+            errors: Apex minus command, m.
+            rate: Share of the mean error that is corrected.
+        """
+        if not len(errors):
+            return
+        shares = self._shares(torch.from_numpy((commands - self._offset) * self._gain).float())
+        off = torch.from_numpy(errors * self._gain).float()
+        self.values -= rate * (shares.T @ off) / shares.sum(dim=0).clamp(min=1.0)
+        self.values.clamp_(-_FARTHEST, _FARTHEST)
+
+    def __call__(self, command: torch.Tensor) -> torch.Tensor:
+        """Return what the teacher is told at commands as observed, (n,)."""
+        return command + self._shares(command) @ self.values
+
+    def _shares(self, command: torch.Tensor) -> torch.Tensor:
+        """Return the weights of the knots at commands, (n, knots); they add up to 1."""
+        spacing = self._knots[1] - self._knots[0]
+        distance = (command.clamp(-1, 1)[:, None] - self._knots).abs()
+        return (1 - distance / spacing).clamp(min=0.0)
