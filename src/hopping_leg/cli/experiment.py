@@ -41,6 +41,8 @@ class Experiment:
     table-1, randomised, rail-only, fixed-base-only, two-pass, one-pass, truth."""
     seeds: tuple[int, ...] = (0,)
     """Of the trainings, one of each method and twin each."""
+    recipe: str = Study.recipe
+    """By which policies are trained: fast, precise or paper."""
     steps: int = Study.steps
     """Control steps of experience of a training."""
     seconds: float = 60.0
@@ -75,6 +77,7 @@ def run(args: Experiment) -> None:
         find_twins(args.twins, args.folder / "twins"),
         tuple(choose_methods(args.methods)),
         seeds=args.seeds,
+        recipe=args.recipe,
         steps=args.steps,
         seconds=args.seconds,
         generations=args.generations,

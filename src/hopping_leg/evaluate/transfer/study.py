@@ -53,8 +53,10 @@ class Study:
     methods: tuple[Method, ...]
     seeds: tuple[int, ...] = (0,)
     """Of the trainings, one each."""
+    recipe: str = "fast"
+    """By which policies are trained."""
     steps: int = 6_000_000
-    """Control steps of experience of a training; the recipe's own."""
+    """Control steps of experience of a training."""
     seconds: float = 60.0
     """Of each recording."""
     generations: int = 100

@@ -55,6 +55,7 @@ def tabulate(
             for twin in study.twins
         ],
         "training_seeds": list(study.seeds),
+        "recipe": study.recipe,
         "training_steps": study.steps,
         "recording_seconds": study.seconds,
         "evaluation_seed": FIRST_SEED,

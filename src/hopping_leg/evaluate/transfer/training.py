@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Train:
-    """A training of the recipe `fast`."""
+    """A training."""
 
     study: Study
     twin: TwinFile
@@ -76,10 +76,9 @@ class Train:
         return dataclasses.replace(load_robot(method.robot or self.twin.believed), reality=NEUTRAL)
 
     def _recipe(self) -> "Recipe":
-        from hopping_leg.learn.fast import FastRecipe
-        from hopping_leg.learn.recipes import randomised
+        from hopping_leg.learn.recipes import change, get_recipe, randomised
 
-        recipe = FastRecipe(steps=self.study.steps)
+        recipe = change(get_recipe(self.study.recipe), [f"steps={self.study.steps}"])
         return randomised(recipe) if self.method.randomised else recipe
 
     def _folder(self) -> "RunFolder":
