@@ -57,6 +57,7 @@ results: $(STAMP)
 	  --out runs/results/robustness --json docs/results/robustness.json
 	cp runs/results/robustness/robustness.svg docs/results
 	$(BIN)/hop evaluate fast paper energy-shaping --suite skills --json docs/results/skills.json
+	$(BIN)/hop bench probe fast paper --figure docs/results/probe.svg --json docs/results/probe.json
 	$(BIN)/hop bench env --json docs/results/env.json
 	$(BIN)/hop bench inference --json docs/results/inference.json
 	$(BIN)/hop bench convergence --json docs/results/convergence.json

@@ -199,6 +199,24 @@ def trace_columns() -> str:
     return grid(["column", "unit", "meaning"], rows)
 
 
+def probe_scores(file: str, controller: str) -> str:
+    """Return a policy's probes: a row per set of features, a column per target."""
+    content = read(file)
+    own = [row for row in content["rows"] if row["controller"] == controller]
+    targets = list(dict.fromkeys(row["target"] for row in own))
+    cells = {(row["features"], row["target"]): _scored(row) for row in own}
+    rows = [
+        [features, *(cells[features, target] for target in targets)]
+        for features in dict.fromkeys(row["features"] for row in own)
+    ]
+    return grid(["read off", *targets], rows) + origin(file, content)
+
+
+def _scored(row: dict[str, Any]) -> str:
+    error = "" if row["rms"] is None else f", {row['rms']:.2g} {row['unit']}"
+    return f"{row['score']:.2f} [{row['low']:.2f}, {row['high']:.2f}]{error}"
+
+
 def twin_ranges() -> str:
     """Return the distribution of twins as a table."""
     rows = [
@@ -301,6 +319,7 @@ MACROS = {
     "robot": robot,
     "usage": usage,
     "trace_columns": trace_columns,
+    "probe_scores": probe_scores,
     "twin_ranges": twin_ranges,
     "robustness_axes": robustness_axes,
     "leaderboard": leaderboard,

@@ -1,0 +1,57 @@
+"""Hidden layers come out as they are computed; shuffling leaves nothing but their size."""
+
+import numpy as np
+import onnxruntime
+import pytest
+
+from hopping_leg.control.library import load_policy
+from hopping_leg.errors import PolicyError
+from hopping_leg.learn.export import Network, build_policy
+from hopping_leg.learn.hidden import expose_hidden
+
+POLICY = load_policy("fast")
+
+
+def outputs(graph, feeds):
+    session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
+    names = [output.name for output in session.get_outputs()]
+    return dict(zip(names, session.run(names, feeds), strict=True))
+
+
+@pytest.fixture(scope="module")
+def feeds():
+    rng = np.random.default_rng(0)
+    return {
+        name: rng.normal(size=(6, *shape)).astype(np.float32)
+        for name, shape in POLICY.inputs.items()
+    }
+
+
+def test_hidden_layers_follow_the_torque(feeds):
+    plain, extended = outputs(POLICY.content, feeds), outputs(expose_hidden(POLICY.content), feeds)
+    assert next(iter(extended)) == "torque"
+    hidden = list(extended)[1:]
+    assert hidden == [f"hidden_{i}" for i in range(len(hidden))]
+    assert len(hidden) >= 2
+    np.testing.assert_array_equal(plain["torque"], extended["torque"])
+    assert all(np.abs(extended[name]).max() < 1.001 for name in hidden)
+
+
+def test_shuffled_layers_keep_their_size_and_forget_their_function(feeds):
+    own = outputs(expose_hidden(POLICY.content), feeds)
+    mixed = outputs(expose_hidden(POLICY.content, 1), feeds)
+    assert {name: value.shape for name, value in own.items()} == {
+        name: value.shape for name, value in mixed.items()
+    }
+    assert np.abs(own["hidden_1"] - mixed["hidden_1"]).max() > 0.1
+    assert expose_hidden(POLICY.content, 1) == expose_hidden(POLICY.content, 1)
+    assert expose_hidden(POLICY.content, 1) != expose_hidden(POLICY.content, 2)
+
+
+def test_a_network_without_hidden_layers_is_refused():
+    size = sum(int(np.prod(shape)) for shape in POLICY.inputs.values())
+    network = Network(
+        np.zeros(size), np.ones(size), [(np.zeros((2, size)), np.zeros(2))], "tanh", "tanh"
+    )
+    with pytest.raises(PolicyError, match="no hidden layer"):
+        expose_hidden(build_policy(network, POLICY.card))
