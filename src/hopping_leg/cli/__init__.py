@@ -75,6 +75,7 @@ _EXTRAS = {
     **dict.fromkeys(("moteus", "can", "serial", "msgpack"), "hardware"),
     "pybullet": "bullet",
     "viser": "view",
+    "playwright": "dev",
 }
 
 

@@ -11,6 +11,7 @@ Examples:
   hop bench engines --json bullet.json
   hop bench probe fast paper --json probe.json --figure probe.svg
   hop bench identify --skip-paper-size --json identify.json
+  hop bench view --json view.json
 """
 
 from hopping_leg.cli.bench.controllers import Ablation, EnergyShaping, Training
@@ -20,6 +21,7 @@ from hopping_leg.cli.bench.hardware import Deploy
 from hopping_leg.cli.bench.identification import Identify
 from hopping_leg.cli.bench.probe import Probe
 from hopping_leg.cli.bench.simulation import Convergence, Env, Inference
+from hopping_leg.cli.bench.view import View
 from hopping_leg.cli.output import write_json
 
 Benchmark = (
@@ -33,6 +35,7 @@ Benchmark = (
     | Deploy
     | Identify
     | Engines
+    | View
     | Probe
 )
 
