@@ -18,7 +18,7 @@ HEIGHT_STEP = 0.005
 """Of the slider, m."""
 
 KEY_STEP = 0.01
-"""Of the arrow keys, m."""
+"""Of the keys K and J, m; arrows are the slider's own once it has the focus."""
 
 
 class LivePanel:
@@ -41,7 +41,7 @@ class LivePanel:
             max=high,
             step=HEIGHT_STEP,
             initial_value=live.height,
-            hint="Commanded apex; arrows up, down",
+            hint="Commanded apex; keys K and J",
         )
         self._height.on_update(inbox.from_page(lambda: self._aim(self._height.value)))
         names = (*controller_names(), *(n for n in live.names if n not in controller_names()))
@@ -65,8 +65,8 @@ class LivePanel:
         up.on_click(inbox.from_page(lambda: live.push(force.value)))
         down.on_click(inbox.from_page(lambda: live.push(-force.value)))
         keys = (
-            ("Higher", "arrowup", lambda: self._change(KEY_STEP)),
-            ("Lower", "arrowdown", lambda: self._change(-KEY_STEP)),
+            ("Higher", "K", lambda: self._change(KEY_STEP)),
+            ("Lower", "J", lambda: self._change(-KEY_STEP)),
             ("Push up", "P", lambda: live.push(force.value)),
             ("Push down", "O", lambda: live.push(-force.value)),
             ("Stand up", "R", live.stand),

@@ -38,6 +38,7 @@ class Viewer:
     Attributes:
         address: Of the page.
         pace: How fast time passes.
+        pictures: Shown so far.
 
     Args:
         source: What is shown.
@@ -75,12 +76,13 @@ class Viewer:
         panel.dock_right()
         panel.set_width(390)
         self._scene = Scene(self._server)
-        self._pictures = 0
+        self.pictures = 0
+        self._stopped = False
 
     def run(self, seconds: float = math.inf) -> None:
-        """Simulate and show until the time is over or Ctrl-C."""
+        """Simulate and show until the time is over, ``stop`` or Ctrl-C."""
         begun = last = time.monotonic()
-        while last - begun < seconds:
+        while last - begun < seconds and not self._stopped:
             self._notify(self._inbox.work())
             now = time.monotonic()
             self._source.advance(self.pace.due(now - last))
@@ -92,7 +94,7 @@ class Viewer:
         """Show what is now; plots and text every few pictures."""
         source = self._source
         self._scene.show(source.tracks, source.now)
-        if self._pictures % _SLOW == 0:
+        if self.pictures % _SLOW == 0:
             self._scene.mark(source.now)
             self._charts.show(source.tracks, source.now)
             self._status.content = self._text()
@@ -100,7 +102,11 @@ class Viewer:
                 self._replay_panel.show()
             self._notify(source.notices)
             source.notices.clear()
-        self._pictures += 1
+        self.pictures += 1
+
+    def stop(self) -> None:
+        """End ``run`` after the present picture; any thread may."""
+        self._stopped = True
 
     def close(self) -> None:
         """Serve no more."""
