@@ -4,6 +4,7 @@ A real server and a real Chromium without a screen, which draws in software wher
 what is measured is the whole way, on all of this computer's cores together.
 """
 
+import io
 import json
 import subprocess
 import sys
@@ -11,13 +12,16 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from PIL import Image
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import PhysicsError
 from hopping_leg.evaluate.timing import host
+from hopping_leg.trace import write_atomically
 from hopping_leg.view.browser import SIZE, chromium, new_page, running, wait_for_leg
 from hopping_leg.view.live import Live
 from hopping_leg.view.viewer import PICTURES, Viewer
@@ -27,6 +31,7 @@ if TYPE_CHECKING:
 
 _SETTLE_SECONDS = 3.0
 _PATIENCE = 5.0
+_COLOURS = 128
 
 _COUNT = """() => {
   window.drawn = [];
@@ -51,6 +56,8 @@ class ViewBenchmark:
     """Of watching."""
     commands: int = 40
     """Changes of the height by the slider."""
+    picture: Path | None = None
+    """Where to leave a picture of the page."""
 
 
 class _Noting(Live):
@@ -92,6 +99,8 @@ def bench_view(
             time.sleep(_SETTLE_SECONDS)
             tell(f"watching for {benchmark.seconds:g} s")
             watched = _watch(page, viewer, live, received, benchmark.seconds)
+            if benchmark.picture is not None:
+                _picture(page, benchmark.picture)
             tell(f"moving the slider {benchmark.commands} times")
             latency = _latencies(page, live, benchmark.commands)
         name = f"{browser.browser_type.name} {browser.version}"
@@ -155,6 +164,16 @@ def _watch(
         "messages_received_per_s": float(messages / wall),
         "real_time": float(shown / wall),
     }
+
+
+def _picture(page: "Page", path: Path) -> None:
+    """Leave a picture of the page without its notices, in few colours, which makes it small."""
+    for close in page.locator(".mantine-Notification-closeButton").all():
+        close.click()
+    page.wait_for_timeout(1000)
+    picture, small = Image.open(io.BytesIO(page.screenshot())), io.BytesIO()
+    picture.convert("RGB").quantize(_COLOURS).save(small, "PNG", optimize=True)
+    write_atomically(path, small.getvalue())
 
 
 def _latencies(page: "Page", live: _Noting, count: int) -> Array:

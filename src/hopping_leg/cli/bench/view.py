@@ -23,6 +23,8 @@ class View:
     """Of watching."""
     commands: int = 40
     """Changes of the height by the slider."""
+    picture: Path | None = None
+    """Write a picture of the page to this file (.png)."""
     json: Path | None = None
     """Write every number to this file."""
 
@@ -34,7 +36,9 @@ class View:
         if not 1 <= self.seconds <= 600:
             raise UsageError(f"--seconds is {self.seconds:g} but must lie between 1 and 600.")
         console = Console()
-        benchmark = ViewBenchmark(self.controllers, self.robot, self.seconds, self.commands)
+        benchmark = ViewBenchmark(
+            self.controllers, self.robot, self.seconds, self.commands, self.picture
+        )
         result = bench_view(benchmark, lambda words: console.print(f"{words} ..."))
         table = Table("measured", "value")
         table.add_row("frames per second in the browser", f"{result['frames_per_s']:.1f}")
