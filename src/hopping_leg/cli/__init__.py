@@ -23,7 +23,7 @@ VERBS = {
     "evaluate": "run the paper's trials for controllers and write the report",
     "plot": "draw the figures of stored traces again",
     "train": "train a controller from scratch, or go on after an interruption",
-    "tune": "search the gains of energy shaping",
+    "tune": "search the gains of energy shaping, or a recipe's numbers",
     "bench": "measure speed, convergence and accuracy",
     "excite": "write the trajectory that a leg is identified with",
     "export": "write a leg as URDF, inspect a policy file",
@@ -73,6 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 _EXTRAS = {
     **dict.fromkeys(("torch", "stable_baselines3", "onnx", "tensorboard"), "train"),
     **dict.fromkeys(("moteus", "can", "serial", "msgpack"), "hardware"),
+    **dict.fromkeys(("optuna", "sqlalchemy"), "tune"),
     "pybullet": "bullet",
     "viser": "view",
     "playwright": "dev",

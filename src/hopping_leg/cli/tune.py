@@ -1,36 +1,41 @@
-"""Search the gains of energy shaping with CMA-ES and write them as a gain file.
+"""Search the gains of energy shaping, or the numbers and networks of a training recipe.
 
-All candidates hop at once, each at five heights and from three first gains, with the paper's noise
-and delay. An interrupted search goes on where it was: call it again with the same options.
+energy-shaping: CMA-ES over the gains, written as a gain file. All candidates hop at once, each at
+five heights and from three first gains, with the paper's noise and delay. An interrupted search
+goes on where it was: call it again with the same options.
+
+fast, paper, precise: Optuna over the recipe's numbers (extra `tune`). Each trial is a training; its
+score is that by which `hop train` selects. Trainings that lag behind are given up. The study is a
+database: call it again, here or elsewhere, and it goes on; call it in several places at once, and
+they share the work.
 
 Examples:
   hop tune energy-shaping
   hop tune energy-shaping --robot my_leg.toml --out runs/my_leg
+  hop tune fast --trials 60 --steps 1000000 --workers 2
+  hop tune paper --study postgresql://host/tuning --trials 100
 """
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import tyro
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
+from hopping_leg.cli.bench.shared import at_least
 from hopping_leg.cli.output import write_json
-from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.tune_energy_shaping import Search, Tuned, tune
 from hopping_leg.robot import load_robot
-
-CONTROLLERS = ("energy-shaping",)
+from hopping_leg.trace import write_atomically
 
 
 @dataclass(frozen=True)
-class TuneArgs:
-    """What to search, and how long."""
+class EnergyShaping:
+    """Search the gains of energy shaping with CMA-ES."""
 
-    controller: tyro.conf.Positional[str] = "energy-shaping"
-    """What is tuned; only energy-shaping has gains."""
     robot: str = "legv2-paper"
     """A shipped name or the path of a .toml file."""
     start: str = "by-hand"
@@ -43,27 +48,128 @@ class TuneArgs:
     json: Path | None = None
     """Write every number to this file."""
 
+    def search_all(self) -> None:
+        """Search, print what came out, write the gains."""
+        robot = load_robot(self.robot)
+        with Progress() as progress:
+            task = progress.add_task("searching", total=self.search.generations)
 
-def run(args: TuneArgs) -> None:
-    """Search, print what came out, write the gains."""
-    if args.controller not in CONTROLLERS:
-        raise UsageError(
-            f"Controller '{args.controller}' has no gains to tune; valid: {', '.join(CONTROLLERS)}."
+            def report(done: int, lowest: float) -> None:
+                progress.update(task, completed=done, description=f"lowest cost {lowest:.2f} mm")
+
+            tuned = tune(robot, self.robot, self.start, self.search, self.seed, self.out, report)
+        Console().print(_table(tuned))
+        Console().print(
+            f"Gains: {self.out / 'gains.toml'}; use: hop evaluate {self.out / 'gains.toml'}"
         )
-    robot = load_robot(args.robot)
-    with Progress() as progress:
-        task = progress.add_task("searching", total=args.search.generations)
+        if self.json is not None:
+            write_json(self.json, tuned.record())
 
-        def report(done: int, lowest: float) -> None:
-            progress.update(task, completed=done, description=f"lowest cost {lowest:.2f} mm")
 
-        tuned = tune(robot, args.robot, args.start, args.search, args.seed, args.out, report)
-    Console().print(_table(tuned))
-    Console().print(
-        f"Gains: {args.out / 'gains.toml'}; use: hop evaluate {args.out / 'gains.toml'}"
-    )
-    if args.json is not None:
-        write_json(args.json, tuned.record())
+@dataclass(frozen=True)
+class _Recipe:
+    recipe: ClassVar[str]
+
+    robot: str = "legv2-paper"
+    """A shipped name or the path of a .toml file."""
+    trials: int = 50
+    """Trials in the study when it is over, of all processes together."""
+    steps: int = 1_000_000
+    """Control steps of each training, all legs together."""
+    study: str | None = None
+    """SQLite file, or URL of another database, e.g. postgresql://...; default:
+    runs/tune/RECIPE.db."""
+    workers: int = 1
+    """Processes on this machine; more machines: the same command with the same --study."""
+    snapshots: int = 5
+    """Times that a training is tried before it ends, and may be given up."""
+    startup: int = 10
+    """Finished trials before any is given up, and before the search learns from them."""
+    seed: int = 0
+    """Of the trainings, and of the search."""
+    set: tuple[str, ...] = ()
+    """Numbers of the recipe that every trial takes, e.g. `--set legs=256`."""
+    out: Path | None = None
+    """Folder of the trainings, trials.json and the figures; default: runs/tune/RECIPE."""
+    json: Path | None = None
+    """Write all trials to this file, too."""
+
+    def search_all(self) -> None:
+        """Search, print the best, write all trials and the figures."""
+        from hopping_leg.evaluate.figures import to_svg
+        from hopping_leg.evaluate.figures.tuning import FIGURES
+        from hopping_leg.learn.tuning import Tuning
+        from hopping_leg.learn.tuning import tune as tune_recipe
+
+        at_least(1, workers=self.workers)
+        out = self.out or Path("runs/tune") / self.recipe
+        tuning = Tuning(
+            self.recipe,
+            _storage(self.study or f"runs/tune/{self.recipe}.db"),
+            out,
+            self.robot,
+            self.trials,
+            self.steps,
+            self.snapshots,
+            self.startup,
+            self.seed,
+            self.set,
+        )
+        result = tune_recipe(tuning, self.workers)
+        for file in filter(None, (out / "trials.json", self.json)):
+            write_json(file, result)
+        for name, draw in FIGURES.items():
+            write_atomically(out / f"{name}.svg", to_svg(draw(result)))
+        _print(result, out)
+
+
+@dataclass(frozen=True)
+class Fast(_Recipe):
+    """Search the numbers of recipe fast with Optuna."""
+
+    recipe: ClassVar[str] = "fast"
+
+
+@dataclass(frozen=True)
+class Paper(_Recipe):
+    """Search the numbers of recipe paper with Optuna."""
+
+    recipe: ClassVar[str] = "paper"
+
+
+@dataclass(frozen=True)
+class Precise(_Recipe):
+    """Search the numbers of recipe precise with Optuna."""
+
+    recipe: ClassVar[str] = "precise"
+
+
+def run(args: EnergyShaping | Fast | Paper | Precise) -> None:
+    """Search."""
+    args.search_all()
+
+
+def _storage(study: str) -> str:
+    """Return the URL of a study's database; the folder of a file is made."""
+    if "://" in study:
+        return study
+    Path(study).parent.mkdir(parents=True, exist_ok=True)
+    return f"sqlite:///{study}"
+
+
+def _print(result: dict[str, Any], out: Path) -> None:
+    best, trials = result["best"], result["trials"]
+    states = [trial["state"] for trial in trials]
+    counts = ", ".join(f"{states.count(state)} {state}" for state in dict.fromkeys(states))
+    Console().print(f"{len(trials)} trials: {counts}.")
+    if best is not None:
+        table = Table(
+            "number", "best", title=f"trial {best['number']}: {1e3 * best['score_m']:.1f} mm"
+        )
+        for name, value in best["params"].items():
+            table.add_row(name, f"{value:.4g}" if isinstance(value, float) else str(value))
+        Console().print(table)
+    Console().print(f"Wrote {out}/trials.json and the figures beside it.", highlight=False)
 
 
 def _table(tuned: Tuned) -> Table:

@@ -1,6 +1,7 @@
 """Train a recipe: learn, checkpoint, try snapshots, choose the best, write the policy."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -57,6 +58,7 @@ def train(
     minutes: float | None = None,
     threads: int = 1,
     quiet: bool = False,
+    on_snapshot: Callable[[int, float], None] = lambda _steps, _score: None,
 ) -> Trained:
     """Train a controller and leave its policy, card and history in ``out``.
 
@@ -74,6 +76,8 @@ def train(
         minutes: Stop after so much wall-clock time, pauses excluded, or at the recipe's steps.
         threads: Of torch and physics; torch's is set for the whole process.
         quiet: Show no progress.
+        on_snapshot: Called with the steps and the score, m, of every snapshot that was tried; what
+            it raises ends the training.
 
     Raises:
         UsageError: ``out`` holds a run that cannot be continued like this.
@@ -87,6 +91,7 @@ def train(
     folder = RunFolder(out, recipe, robot, seed, minutes, source)
     tree = folder.begin(resume=resume)
     trainer = Trainer(recipe, robot, seed, folder, minutes, threads)
+    trainer.on_snapshot = on_snapshot
     if tree is not None:
         trainer.restore(tree)
     with TrainingProgress(f"{recipe.name} seed {seed}", quiet=quiet) as progress:
@@ -130,6 +135,7 @@ class Trainer:
         self._saved = self._began
         self._shown = 0.0
         self._progress: TrainingProgress | None = None
+        self.on_snapshot: Callable[[int, float], None] = lambda _steps, _score: None
 
     @property
     def elapsed(self) -> float:
@@ -230,6 +236,7 @@ class Trainer:
                 if trial[name] is not None:
                     logger.record(f"{at}/{name}", trial[name])
         logger.dump(steps)
+        self.on_snapshot(steps, row["score_m"])
 
     def _show(self, *, force: bool = False) -> None:
         now = time.monotonic()

@@ -1,0 +1,284 @@
+"""Search a recipe's numbers with Optuna: each trial is a training, its score that of `hop train`.
+
+The study lives in a database, a SQLite file unless another is named. Every process that is given
+the same study takes part in it, and a killed one leaves its trial to the next, which goes on from
+the training's checkpoint where it can reach it.
+"""
+
+import dataclasses
+import multiprocessing
+import shutil
+import warnings
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import optuna
+from optuna.exceptions import ExperimentalWarning
+from optuna.importance import get_param_importances
+from optuna.pruners import MedianPruner
+from optuna.samplers import TPESampler
+from optuna.storages import RDBStorage
+from optuna.study import Study
+from optuna.trial import FrozenTrial, Trial, TrialState
+from sqlalchemy.exc import SQLAlchemyError
+
+from hopping_leg.errors import PhysicsError, UsageError
+from hopping_leg.learn.judge import FINAL_SEEDS, FIRST_SEED
+from hopping_leg.learn.recipe import Recipe
+from hopping_leg.learn.recipes import change, get_recipe
+from hopping_leg.learn.run_folder import read_result
+from hopping_leg.learn.search_space import SPACES, defaults, dimensions, suggest
+from hopping_leg.learn.train import train
+from hopping_leg.robot import load_robot
+
+_FOLDER, _ERROR = "folder", "error"
+"""Attributes of a trial: number of the trial whose folder it goes on in; why it failed."""
+
+_FAILURES = (PhysicsError, ValueError, FloatingPointError)
+"""What a training with bad numbers may end in; the study goes on."""
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """What is searched, and where it is kept."""
+
+    recipe: str
+    """Name of the recipe."""
+    storage: str
+    """URL of the study's database."""
+    out: Path
+    """Folder of the trainings."""
+    robot: str = "legv2-paper"
+    """A shipped name or the path of a .toml file."""
+    trials: int = 50
+    """Trials in the study when it is over, of all processes together."""
+    steps: int = 1_000_000
+    """Control steps of each training."""
+    snapshots: int = 5
+    """Times that a training is tried before it ends, and may be given up."""
+    startup: int = 10
+    """Finished trials before any is given up, and before the search learns from them."""
+    seed: int = 0
+    """Of the trainings, and of the search."""
+    fixed: tuple[str, ...] = ()
+    """Numbers of the recipe that every trial takes, each ``name=number``."""
+    heartbeat: int = 15
+    """Time between two signs of life of a trial, s; after three without one it is given to the
+    next process."""
+
+    def __post_init__(self) -> None:
+        for name in ("trials", "steps", "snapshots", "startup", "heartbeat"):
+            if getattr(self, name) < 1:
+                raise UsageError(f"--{name} is {getattr(self, name)} but must be 1 or more.")
+        if self.seed < 0:
+            raise UsageError(f"--seed is {self.seed} but must be 0 or more.")
+
+    @property
+    def conditions(self) -> dict[str, Any]:
+        """What all trials of a study share, as JSON values."""
+        return {
+            "recipe": self.recipe,
+            "robot_digest": load_robot(self.robot).digest,
+            "steps": self.steps,
+            "snapshots": self.snapshots,
+            "training_seed": self.seed,
+            "selection_seeds": [FIRST_SEED, *FINAL_SEEDS],
+            "fixed": list(self.fixed),
+            "space": {n: dataclasses.asdict(d) for n, d in _searched(self).items()},
+        }
+
+
+def tune(tuning: Tuning, workers: int = 1) -> dict[str, Any]:
+    """Search until the study has all its trials; return them, see ``record``.
+
+    Args:
+        tuning: What is searched.
+        workers: Processes on this machine.
+
+    Raises:
+        UsageError: The database cannot be used, or holds a study of something else.
+    """
+    study = open_study(tuning)
+    if workers == 1:
+        work(tuning)
+    else:
+        context = multiprocessing.get_context("spawn")
+        crew = [context.Process(target=work, args=(tuning, k)) for k in range(workers)]
+        for process in crew:
+            process.start()
+        for process in crew:
+            process.join()
+        if any(process.exitcode for process in crew):
+            raise UsageError("A worker ended early; what it began is taken up by the next call.")
+    return record(study, tuning)
+
+
+def work(tuning: Tuning, worker: int = 0) -> None:
+    """Take trials of a study until it has all of them; any process on any machine may."""
+    study = open_study(tuning, worker)
+    if not _over(study, tuning):
+        study.optimize(
+            lambda trial: _run_trial(trial, tuning),
+            catch=_FAILURES,
+            callbacks=[lambda study, _: study.stop() if _over(study, tuning) else None],
+        )
+
+
+def open_study(tuning: Tuning, worker: int = 0) -> Study:
+    """Return the study, new or as it stands.
+
+    Raises:
+        UsageError: The database cannot be used, or holds a study of something else.
+    """
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    conditions = tuning.conditions
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ExperimentalWarning)
+            storage = RDBStorage(
+                tuning.storage,
+                heartbeat_interval=tuning.heartbeat,
+                grace_period=3 * tuning.heartbeat,
+                heartbeat_stale_trial_callback=_take_up,
+            )
+            study = optuna.create_study(
+                storage=storage,
+                study_name=tuning.recipe,
+                direction="minimize",
+                load_if_exists=True,
+                pruner=MedianPruner(n_startup_trials=tuning.startup),
+            )
+    except (SQLAlchemyError, ImportError) as error:
+        raise UsageError(
+            f"Cannot use the database {tuning.storage}: {str(error).splitlines()[0]}."
+        ) from error
+    for name, wanted in conditions.items():
+        stored = study.user_attrs.get(name)
+        if stored is None:
+            study.set_user_attr(name, wanted)
+        elif stored != _plain(wanted):
+            raise UsageError(
+                f"The study in {tuning.storage} was begun with another '{name}'; go on with the"
+                " options that it began with, or name another --study."
+            )
+    # Each call draws anew: with the same seed a resumed search would repeat its first trials.
+    begun = len(study.get_trials(deepcopy=False))
+    study.sampler = TPESampler(
+        n_startup_trials=tuning.startup,
+        constant_liar=True,
+        seed=10_007 * begun + 97 * worker + tuning.seed,
+    )
+    if not begun:
+        study.enqueue_trial(defaults(_recipe(tuning), SPACES[tuning.recipe]), skip_if_exists=True)
+    return study
+
+
+def record(study: Study, tuning: Tuning) -> dict[str, Any]:
+    """Return all trials, the best, and each number's importance, as JSON values."""
+    trials = study.get_trials(deepcopy=False)
+    done = [t for t in trials if t.state is TrialState.COMPLETE]
+    best = min(done, key=lambda t: float(t.value or 0.0)) if done else None
+    return {
+        **tuning.conditions,
+        "robot": tuning.robot,
+        "trials": [_row(trial) for trial in trials],
+        "best": None if best is None else _row(best),
+        "importance": _importance(study, done),
+        "versions": {name: version(name) for name in ("hopping-leg", "optuna", "torch", "mujoco")},
+    }
+
+
+def _run_trial(trial: Trial, tuning: Tuning) -> float:
+    """Train with a trial's numbers; return the score of the policy it selects, m."""
+    space = SPACES[tuning.recipe]
+    recipe = dataclasses.replace(_recipe(tuning), **suggest(trial, space))
+    folder = tuning.out / f"trial-{trial.user_attrs.get(_FOLDER, trial.number):04d}"
+    if (folder / "policy.onnx").exists():
+        return float(read_result(folder)["selected"]["score_m"])
+
+    def watch(steps: int, score: float) -> None:
+        trial.report(score, steps * tuning.snapshots // tuning.steps)
+        if steps < tuning.steps and trial.should_prune():
+            raise optuna.TrialPruned
+
+    try:
+        train(
+            recipe,
+            load_robot(tuning.robot),
+            tuning.seed,
+            folder,
+            resume=True,
+            quiet=True,
+            on_snapshot=watch,
+        )
+    except KeyboardInterrupt:
+        _take_up(trial.study, trial)
+        raise
+    except optuna.TrialPruned:
+        shutil.rmtree(folder / "checkpoints", ignore_errors=True)
+        raise
+    except _FAILURES as error:
+        trial.set_user_attr(_ERROR, f"{type(error).__name__}: {error}")
+        raise
+    return float(read_result(folder)["selected"]["score_m"])
+
+
+def _take_up(study: Study, trial: FrozenTrial | Trial) -> None:
+    """Let the next process go on with a trial that was cut off."""
+    folder = trial.user_attrs.get(_FOLDER, trial.number)
+    study.enqueue_trial(trial.params, user_attrs={_FOLDER: folder})
+
+
+def _over(study: Study, tuning: Tuning) -> bool:
+    """Tell whether a study has all its trials; those that were cut off do not count."""
+    trials = study.get_trials(deepcopy=False)
+    ended = (TrialState.COMPLETE, TrialState.PRUNED)
+    return sum(t.state in ended or _ERROR in t.user_attrs for t in trials) >= tuning.trials
+
+
+def _recipe(tuning: Tuning) -> Recipe:
+    """Return the recipe with what all trials share."""
+    recipe = dataclasses.replace(
+        get_recipe(tuning.recipe),
+        steps=tuning.steps,
+        judge_every=max(tuning.steps // tuning.snapshots, 1),
+    )
+    return change(recipe, tuning.fixed)
+
+
+def _searched(tuning: Tuning) -> dict[str, Any]:
+    if tuning.recipe not in SPACES:
+        raise UsageError(
+            f"Recipe '{tuning.recipe}' has no search space; valid: {', '.join(SPACES)}."
+        )
+    return dict(dimensions(SPACES[tuning.recipe]))
+
+
+def _importance(study: Study, done: list[FrozenTrial]) -> dict[str, float]:
+    """Return how much each number matters (PED-ANOVA), empty where too few trials tell."""
+    if len(done) < 4 or len({trial.value for trial in done}) < 2:
+        return {}
+    return {name: float(share) for name, share in get_param_importances(study).items()}
+
+
+def _row(trial: FrozenTrial) -> dict[str, Any]:
+    began, ended = trial.datetime_start, trial.datetime_complete or None
+    return {
+        "number": trial.number,
+        "state": trial.state.name.lower(),
+        "score_m": trial.value if trial.state is TrialState.COMPLETE else None,
+        "snapshots_m": [trial.intermediate_values[k] for k in sorted(trial.intermediate_values)],
+        "params": trial.params,
+        "minutes": (ended - began).total_seconds() / 60 if began and ended else None,
+        "goes_on_from": trial.user_attrs.get(_FOLDER),
+        "error": trial.user_attrs.get(_ERROR),
+    }
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401
+    """Return a value as the database gives it back: tuples are lists."""
+    if isinstance(value, dict):
+        return {key: _plain(entry) for key, entry in value.items()}
+    return [_plain(entry) for entry in value] if isinstance(value, list | tuple) else value
