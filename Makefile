@@ -98,6 +98,8 @@ wheel: $(STAMP)
 	cd build/wheel && venv/bin/python -c 'import hopping_leg, sys; assert "torch" not in sys.modules'
 	cd build/wheel && venv/bin/hop robots list && venv/bin/hop export urdf --out leg.urdf
 	cd build/wheel && venv/bin/hop evaluate energy-shaping --commands 0.3 --seeds 1 --floor soft --out report
+	build/wheel/venv/bin/python -m pip --disable-pip-version-check install -q -c constraints.txt "$$(echo build/wheel/*.whl)[view]"
+	cd build/wheel && venv/bin/hop view --no-browser --port 0 --seconds 1
 
 lock: $(STAMP)
 	@{ head -n 1 constraints.txt; $(PIP) freeze --all --exclude-editable --exclude pip | sed 's/+[^ ]*$$//' | sort -f; } > constraints.new

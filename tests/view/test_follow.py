@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
 
+from hopping_leg.control.library import load_controller
 from hopping_leg.deploy.black_box import SUFFIX, BlackBox
 from hopping_leg.deploy.box_tail import BoxTail
+from hopping_leg.deploy.rows import columns
 from hopping_leg.errors import RobotError, TraceError, UsageError
 from hopping_leg.robot import kinematics, load_robot
 from hopping_leg.view.follow import Follow
@@ -65,6 +67,28 @@ def test_a_run_is_shown_as_it_grows_until_it_is_over(tmp_path):
     follow.advance(1.0)
     assert follow.notices[-1].startswith("The run is over")
     assert len(track) == 7
+
+
+def test_what_hop_deploy_records_is_shown_with_the_estimate_of_the_controller(tmp_path):
+    robot = load_robot("legv2-paper")
+    names = columns(load_controller("energy-shaping", robot))
+    writer = BlackBox(tmp_path / f"es-1{SUFFIX}", names, {"robot": robot.name, "controller": "es"})
+    row = dict.fromkeys(names, 0.0) | {
+        "hip_position_rad": 0.7,
+        "knee_position_rad": -1.4,
+        "knee_torque_nm": 3.0,
+        "estimated_height_m": 0.33,
+        "phase": 1.0,
+    }
+    writer.row(list(row.values()))
+    writer.close()
+    follow = Follow(tmp_path)
+    follow.advance(1.0)
+    (track,) = follow.tracks
+    assert track.moment(follow.now)[0] == 0.33
+    assert track.latest("knee_torque_nm", follow.now) == 3.0
+    assert track.latest("phase", follow.now) == 1.0
+    assert "estimate" in track.note
 
 
 def test_joints_without_a_reply_stay_as_they_were(tmp_path):

@@ -4,6 +4,7 @@ import contextlib
 import html
 import io
 import math
+import socket
 import time
 
 import viser
@@ -55,7 +56,8 @@ class Viewer:
     ) -> None:
         self._source = source
         self._server = _serve(host, port)
-        self.address = f"http://{host}:{self._server.get_port()}"
+        reached_at = "localhost" if host == "0.0.0.0" else host
+        self.address = f"http://{reached_at}:{self._server.get_port()}"
         self.pace = Pace(1 / CONTROL_RATE)
         self._inbox = Inbox()
         gui = self._server.gui
@@ -141,5 +143,13 @@ class Viewer:
 def _serve(host: str, port: int) -> viser.ViserServer:
     if not 0 <= port < 65536:
         raise UsageError(f"--port is {port} but must lie between 0 and 65535.")
+    try:
+        # viser itself would try other ports without end.
+        socket.create_server((host, 0)).close()
+    except OSError as error:
+        raise UsageError(
+            f"The page cannot be served at {host} ({error}); --host must be an address of this"
+            " computer, e.g. 127.0.0.1."
+        ) from error
     with contextlib.redirect_stdout(io.StringIO()):
         return viser.ViserServer(host=host, port=port, verbose=False)
