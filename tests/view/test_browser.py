@@ -77,7 +77,7 @@ def shown_apex(page, leg=0):
 
 
 def choose(page, label, option):
-    page.get_by_role("textbox", name=label).first.click()
+    page.get_by_role("combobox", name=label, exact=True).click()
     page.get_by_role("option", name=option, exact=True).click()
 
 
