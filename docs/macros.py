@@ -199,6 +199,22 @@ def trace_columns() -> str:
     return grid(["column", "unit", "meaning"], rows)
 
 
+def search_space(recipe: str) -> str:
+    """Return what `hop tune` searches of a recipe as a table."""
+    from hopping_leg.learn.recipes import get_recipe
+    from hopping_leg.learn.search_space import SPACES, OneOf, dimensions
+
+    rows, shipped = [], get_recipe(recipe)
+    for name, found in dimensions(SPACES[recipe]).items():
+        if isinstance(found, OneOf):
+            where = ", ".join(str(found.stored(choice)) for choice in found.choices)
+        else:
+            values = dataclasses.asdict(found)  # type: ignore[call-overload]
+            where = "{low:g} to {high:g}".format(**values) + (", log" if values["log"] else "")
+        rows.append([f"`{name}`", where, str(found.stored(getattr(shipped, name)))])
+    return grid(["number", "searched", "recipe"], rows)
+
+
 def probe_scores(file: str, controller: str) -> str:
     """Return a policy's probes: a row per set of features, a column per target."""
     content = read(file)
@@ -320,6 +336,7 @@ MACROS = {
     "usage": usage,
     "trace_columns": trace_columns,
     "probe_scores": probe_scores,
+    "search_space": search_space,
     "twin_ranges": twin_ranges,
     "robustness_axes": robustness_axes,
     "leaderboard": leaderboard,

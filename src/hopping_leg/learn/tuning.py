@@ -105,7 +105,7 @@ def tune(tuning: Tuning, workers: int = 1) -> dict[str, Any]:
         work(tuning)
     else:
         context = multiprocessing.get_context("spawn")
-        crew = [context.Process(target=work, args=(tuning, k)) for k in range(workers)]
+        crew = [context.Process(target=_work_beside, args=(tuning, k)) for k in range(workers)]
         for process in crew:
             process.start()
         for process in crew:
@@ -124,6 +124,14 @@ def work(tuning: Tuning, worker: int = 0) -> None:
             catch=_FAILURES,
             callbacks=[lambda study, _: study.stop() if _over(study, tuning) else None],
         )
+
+
+def _work_beside(tuning: Tuning, worker: int) -> None:
+    """Work in a process of its own, which an interruption ends without a word."""
+    try:
+        work(tuning, worker)
+    except KeyboardInterrupt:
+        raise SystemExit(1) from None
 
 
 def open_study(tuning: Tuning, worker: int = 0) -> Study:
