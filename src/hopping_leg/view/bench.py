@@ -6,6 +6,7 @@ what is measured is the whole way, on all of this computer's cores together.
 
 import io
 import json
+import re
 import subprocess
 import sys
 import time
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 _SETTLE_SECONDS = 3.0
 _PATIENCE = 5.0
 _COLOURS = 128
+_HEIGHT = re.compile(r"\d m")
 
 _COUNT = """() => {
   window.drawn = [];
@@ -84,7 +86,7 @@ def bench_view(
         tell: Called with what is done next.
 
     Raises:
-        UsageError: There is no Chromium.
+        UsageError: There is no Chromium, or its page did not answer in time.
     """
     with chromium() as browser:
         tell("starting `hop view` as a user does")
@@ -137,7 +139,7 @@ def _start_seconds(browser: "Browser", benchmark: ViewBenchmark) -> float:
             address = next(word for word in process.stdout.readline().split() if "://" in word)
             page = new_page(browser)
             page.goto(address)
-            page.locator(".apex", has_text=" m").first.wait_for()
+            page.locator(".apex").filter(has_text=_HEIGHT).first.wait_for()
             taken = time.monotonic() - begun
             page.close()
             return taken

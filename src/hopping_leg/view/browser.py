@@ -56,8 +56,9 @@ def chromium() -> Iterator["Browser"]:
     """Start a browser with an empty profile.
 
     Raises:
-        UsageError: There is no Chromium.
+        UsageError: There is no Chromium, or the page in it did not answer in time.
     """
+    from playwright.sync_api import TimeoutError as TooLate
     from playwright.sync_api import sync_playwright
 
     path = find_chromium()
@@ -71,6 +72,12 @@ def chromium() -> Iterator["Browser"]:
         )
         try:
             yield browser
+        except TooLate as error:
+            waited_for = error.message.splitlines()[-1].strip(" -")
+            raise UsageError(
+                f"The page did not answer within {1e-3 * PATIENCE:g} s ({waited_for}); try again"
+                " when the computer is less busy."
+            ) from error
         finally:
             browser.close()
 

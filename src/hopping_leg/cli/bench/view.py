@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import tyro
 from rich.console import Console
 from rich.table import Table
 
@@ -15,7 +16,7 @@ from hopping_leg.errors import UsageError
 class View:
     """Drive the viewer's page in a Chromium without a screen; needs extra `view`, playwright."""
 
-    controllers: tuple[str, ...] = ("fast",)
+    controllers: Annotated[tuple[str, ...], tyro.conf.Positional] = ("fast",)
     """One, or two side by side: names, .onnx or gain files."""
     robot: str = "legv2-paper"
     """A shipped name or the path of a .toml file."""
