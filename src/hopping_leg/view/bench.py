@@ -20,7 +20,7 @@ import numpy as np
 from PIL import Image
 
 from hopping_leg.arrays import Array
-from hopping_leg.errors import PhysicsError
+from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.timing import host
 from hopping_leg.trace import write_atomically
 from hopping_leg.view.browser import SIZE, chromium, new_page, running, wait_for_leg
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 _SETTLE_SECONDS = 3.0
-_PATIENCE = 5.0
+_PATIENCE = 60.0
 _COLOURS = 128
 _HEIGHT = re.compile(r"\d m")
 
@@ -189,7 +189,7 @@ def _latencies(page: "Page", live: _Noting, count: int) -> Array:
         end = time.monotonic() + _PATIENCE
         while live.reached is before:
             if time.monotonic() > end:
-                raise PhysicsError(f"The slider's change {number + 1} never reached the leg.")
+                raise UsageError(f"The slider's change {number + 1} never reached the leg.")
             page.wait_for_timeout(5)
         taken[number] = 1e3 * live.reached[1] - page.evaluate("window.pressed")
         page.wait_for_timeout(150)
