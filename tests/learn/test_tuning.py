@@ -2,6 +2,8 @@
 
 import dataclasses
 import json
+import subprocess
+import sys
 import time
 
 import pytest
@@ -164,14 +166,24 @@ def test_command_line_trains_and_leaves_everything(tmp_path, capsys, monkeypatch
     assert "legz" in capsys.readouterr().err
 
 
+SHARED = """
+from hopping_leg.cli import main
+from hopping_leg.learn import judge
+
+judge._SECONDS = 0.5
+if __name__ == "__main__":
+    raise SystemExit(main({words!r}))
+"""
+
+
 @pytest.mark.slow
-def test_two_processes_share_a_study(tmp_path, capsys):
-    out = tmp_path / "out"
+def test_two_processes_share_a_study(tmp_path):
+    out, script = tmp_path / "out", tmp_path / "script.py"
     words = [
         "tune",
         "fast",
         "--trials",
-        "2",
+        "3",
         "--steps",
         "128",
         "--snapshots",
@@ -180,6 +192,10 @@ def test_two_processes_share_a_study(tmp_path, capsys):
         "2",
     ]
     words += ["--set", "legs=2", "--study", str(tmp_path / "study.db"), "--out", str(out)]
-    assert main(words) == 0
+    script.write_text(SHARED.format(words=words))
+    result = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=900)
+    assert result.returncode == 0, result.stderr
     trials = json.loads((out / "trials.json").read_text())["trials"]
-    assert sum(trial["state"] == "complete" for trial in trials) >= 2
+    assert sum(trial["state"] == "complete" for trial in trials) >= 3
+    folders = {path.name for path in out.glob("trial-*")}
+    assert folders == {f"trial-{trial['number']:04d}" for trial in trials}
