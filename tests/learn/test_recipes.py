@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hopping_leg.errors import UsageError
-from hopping_leg.learn.recipes import RECIPES, change, changes_of, get_recipe, randomised
+from hopping_leg.learn.recipes import RECIPES, change, changes_of, get_recipe, randomise
 from hopping_leg.learn.run_folder import RunFolder
 from hopping_leg.robot import load_robot
 
@@ -44,7 +44,7 @@ def test_changes_without_meaning_get_a_sentence(entry, named):
 def test_a_randomised_recipe_trains_legs_that_differ():
     recipe = dataclasses.replace(get_recipe("fast"), legs=3)
     robot = load_robot("legv2")
-    plain, mixed = recipe.make_env(robot, 0), randomised(recipe).make_env(robot, 0)
+    plain, mixed = recipe.make_env(robot, 0), randomise(recipe, "twins").make_env(robot, 0)
     for env in (plain, mixed):
         env.task.legs.stand(slice(None), [0.7, -1.4], 0.05)
         for _ in range(40):
@@ -57,9 +57,14 @@ def test_a_run_says_how_it_was_randomised_and_older_ones_were_not(tmp_path):
     recipe, robot = get_recipe("fast"), load_robot("legv2")
     folder = RunFolder(tmp_path, recipe, robot, 0, None)
     assert "--randomise" not in folder.command
-    assert "--randomise" in RunFolder(tmp_path, randomised(recipe), robot, 0, None).command
+    command = RunFolder(tmp_path, randomise(recipe, "twins"), robot, 0, None).command
+    assert "--randomise twins" in command
+    precise = get_recipe("precise")
+    assert "--randomise" not in RunFolder(tmp_path, precise, robot, 0, None).command
+    plain = RunFolder(tmp_path, randomise(precise, "none"), robot, 0, None)
+    assert "--randomise none" in plain.command
     del folder.config["options"]["task"]["randomised"]
     folder.write("config.json", folder.config)
     RunFolder(tmp_path, recipe, robot, 0, None).check_same()
     with pytest.raises(UsageError, match="another options"):
-        RunFolder(tmp_path, randomised(recipe), robot, 0, None).check_same()
+        RunFolder(tmp_path, randomise(recipe, "twins"), robot, 0, None).check_same()

@@ -15,6 +15,7 @@ import dataclasses
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from hopping_leg.cli.output import write_json
 from hopping_leg.errors import UsageError
@@ -26,7 +27,8 @@ class Options:
     """What to train and where to keep it."""
 
     recipe: str = "fast"
-    """How to train: `fast` for accurate hopping soon, `paper` for the paper's method."""
+    """How to train: `fast` for accurate hopping soon, `precise` for more accurate hopping later,
+    `paper` for the paper's method."""
     robot: str = "legv2-paper"
     """A shipped robot or the path of a .toml file."""
     seed: int = 0
@@ -39,8 +41,9 @@ class Options:
     """Begin from the newest checkpoint of this folder's run instead of from scratch."""
     set: tuple[str, ...] = ()
     """Numbers of the recipe to change, e.g. `--set learning_rate=3e-4 gamma=0.98`."""
-    randomise: bool = False
-    """Let each leg draw friction, inertia and ground from the ranges that twins are drawn from."""
+    randomise: Literal["recipe", "none", "twins"] = "recipe"
+    """What each leg in training draws for itself: what the recipe says, nothing, or friction,
+    inertia and ground from the ranges that twins are drawn from."""
     minutes: float | None = None
     """Stop after so much wall-clock time; default: when the recipe's steps are done."""
     steps: int | None = None
@@ -53,7 +56,7 @@ class Options:
 
 def run(args: Options) -> None:
     """Train a controller."""
-    from hopping_leg.learn.recipes import change, get_recipe, randomised
+    from hopping_leg.learn.recipes import change, get_recipe, randomise
     from hopping_leg.learn.run_folder import read_result
     from hopping_leg.learn.train import train
 
@@ -65,8 +68,7 @@ def run(args: Options) -> None:
             raise UsageError(f"--steps is {args.steps} but must be at least 1.")
         recipe = dataclasses.replace(recipe, steps=args.steps)
     recipe = change(recipe, args.set)
-    if args.randomise:
-        recipe = randomised(recipe)
+    recipe = randomise(recipe, args.randomise)
     out = args.out or Path("runs") / f"{args.recipe}-seed{args.seed}"
     try:
         trained = train(

@@ -55,6 +55,8 @@ class ApexRewardOptions:
     """Share of the training after which that gain is gone."""
     jerk: float = 0.15
     """Of the paper's Pj."""
+    effort: float = 0.0
+    """Of the actions' squares in flight, where they move nothing but the leg itself."""
     position: float = 0.02
     """Of the paper's Pjp."""
     velocity: float = 0.005
@@ -107,13 +109,14 @@ class ApexReward:
         "predicted",
         "energy",
         "jerk",
+        "effort",
         "position",
         "velocity",
         "clearance",
     )
 
     def __call__(self, transition: Transition) -> tuple[Array, Array]:
-        """Return the reward, (n,), and its weighted parts before scaling, (n, 7)."""
+        """Return the reward, (n,), and its weighted parts before scaling, (n, 8)."""
         t, o = transition, self.options
         flying = t.foot_clearance >= CLEAR
         if len(self._air) != len(flying):
@@ -128,6 +131,7 @@ class ApexReward:
                 np.where(flying, o.predicted * self._prediction(t, speed_squared), 0.0),
                 self._energy * np.minimum(speed_squared, _FASTEST_SQUARED),
                 -o.jerk * np.sum(np.square(t.action - t.last_action), axis=1),
+                -o.effort * np.where(flying, np.sum(np.square(t.action), axis=1), 0.0),
                 -o.position * self._position(t.q),
                 -o.velocity * np.sum(over_speed, axis=1),
                 -self._closeness(t),

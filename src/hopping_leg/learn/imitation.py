@@ -9,6 +9,9 @@ import torch
 from hopping_leg.arrays import Array
 from hopping_leg.learn.checkpoint import Tree
 
+_OUTLIER = 0.01
+"""Error beyond which a hop counts no more, m: those after a new command miss by far."""
+
 _FARTHEST = 0.2
 """Largest correction of the aim, of half the range of commands: where hops cannot be as low or high
 as the command, no aim helps."""
@@ -20,9 +23,9 @@ class Imitation:
 
     memory: int = 600_000
     """Ticks of its past from which it learns, the newest."""
-    updates: int = 128
+    updates: int = 256
     """Gradient steps after every rollout."""
-    batch: int = 2048
+    batch: int = 1024
     """Ticks per gradient step."""
     knots: int = 8
     """Heights at which the teacher's aim is corrected."""
@@ -92,7 +95,7 @@ class Aim:
         if not len(errors):
             return
         shares = self._shares(torch.from_numpy((commands - self._offset) * self._gain).float())
-        off = torch.from_numpy(errors * self._gain).float()
+        off = torch.from_numpy(errors.clip(-_OUTLIER, _OUTLIER) * self._gain).float()
         self.values -= rate * (shares.T @ off) / shares.sum(dim=0).clamp(min=1.0)
         self.values.clamp_(-_FARTHEST, _FARTHEST)
 

@@ -3,20 +3,24 @@
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.learn.fast import FastRecipe
 from hopping_leg.learn.paper import PaperRecipe
 from hopping_leg.learn.precise import PreciseRecipe
 from hopping_leg.learn.recipe import Recipe
-from hopping_leg.sim.twins import IDENTIFIABLE, Range
+from hopping_leg.sim.twins import IDENTIFIABLE
 
 RECIPES: dict[str, type[Recipe]] = {
     recipe.name: recipe for recipe in (FastRecipe, PaperRecipe, PreciseRecipe)
 }
 """Every recipe that ``hop train`` knows."""
 
+
+Randomise = Literal["recipe", "none", "twins"]
+"""Ranges from which each leg in training draws its own numbers: the recipe's own, none, or those of
+twins."""
 
 _SWITCH = {"true": True, "1": True, "false": False, "0": False}
 _KINDS = {bool: "true or false", int: "a whole number", float: "a number"}
@@ -62,11 +66,25 @@ def change(recipe: Recipe, changes: Sequence[str]) -> Recipe:
     return dataclasses.replace(recipe, **values)
 
 
-def randomised(recipe: Recipe, ranges: Sequence[Range] = IDENTIFIABLE) -> Recipe:
-    """Return the recipe on legs that each draw their own numbers, from the twins' by default."""
-    return dataclasses.replace(
-        recipe, task=dataclasses.replace(recipe.task, randomised=tuple(ranges))
-    )
+def randomise(recipe: Recipe, ranges: Randomise) -> Recipe:
+    """Return the recipe on legs that each draw their own numbers from other ranges."""
+    if ranges == "recipe":
+        return recipe
+    drawn = IDENTIFIABLE if ranges == "twins" else ()
+    return dataclasses.replace(recipe, task=dataclasses.replace(recipe.task, randomised=drawn))
+
+
+def randomised_by(recipe: str, options: dict[str, Any]) -> Randomise:
+    """Return from which ranges the legs of a run drew their numbers.
+
+    Args:
+        recipe: Name of the recipe.
+        options: As in a run's ``config.json``.
+    """
+    ranges = options["task"]["randomised"]
+    if recipe not in RECIPES or len(ranges) == len(RECIPES[recipe]().task.randomised):
+        return "recipe"
+    return "twins" if ranges else "none"
 
 
 def numbers_of(recipe: Recipe) -> dict[str, int | float]:

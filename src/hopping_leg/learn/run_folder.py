@@ -9,7 +9,7 @@ from typing import Any
 from hopping_leg.errors import UsageError
 from hopping_leg.learn.checkpoint import Tree, list_checkpoints, read_checkpoint
 from hopping_leg.learn.recipe import Recipe
-from hopping_leg.learn.recipes import changes_of
+from hopping_leg.learn.recipes import changes_of, randomised_by
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import write_atomically
 
@@ -69,8 +69,9 @@ class RunFolder:
             words += ["--source", config["source"]]
         if config["minutes_budget"] is not None:
             words += ["--minutes", f"{config['minutes_budget']:g}"]
-        if config["options"]["task"]["randomised"]:
-            words += ["--randomise"]
+        ranges = randomised_by(config["recipe"], config["options"])
+        if ranges != "recipe":
+            words += ["--randomise", ranges]
         changes = changes_of(config["recipe"], config["options"])
         return " ".join([*words, "--set", *changes] if changes else words)
 

@@ -109,7 +109,7 @@ class WireLog:
     def answered(self, time: float, joint: int, answer: "Frame") -> None:
         """Note a drive's answer, if it tells the drive's state."""
         values = parse_reply(answer.data)
-        if _STATE <= values.keys():
+        if values.keys() >= _STATE:
             mode, fault, voltage, temperature = (values[register] for register in _TOLD)
             self.answers.append(
                 Answered(time, joint, Mode(int(mode)), int(fault), voltage, temperature)

@@ -76,10 +76,10 @@ class Train:
         return dataclasses.replace(load_robot(method.robot or self.twin.believed), reality=NEUTRAL)
 
     def _recipe(self) -> "Recipe":
-        from hopping_leg.learn.recipes import change, get_recipe, randomised
+        from hopping_leg.learn.recipes import change, get_recipe, randomise
 
         recipe = change(get_recipe(self.study.recipe), [f"steps={self.study.steps}"])
-        return randomised(recipe) if self.method.randomised else recipe
+        return randomise(recipe, "twins" if self.method.randomised else "recipe")
 
     def _folder(self) -> "RunFolder":
         from hopping_leg.learn.run_folder import RunFolder
