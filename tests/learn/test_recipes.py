@@ -57,12 +57,9 @@ def test_a_run_says_how_it_was_randomised_and_older_ones_were_not(tmp_path):
     recipe, robot = get_recipe("fast"), load_robot("legv2")
     folder = RunFolder(tmp_path, recipe, robot, 0, None)
     assert "--randomise" not in folder.command
-    command = RunFolder(tmp_path, randomise(recipe, "twins"), robot, 0, None).command
-    assert "--randomise twins" in command
-    precise = get_recipe("precise")
-    assert "--randomise" not in RunFolder(tmp_path, precise, robot, 0, None).command
-    plain = RunFolder(tmp_path, randomise(precise, "none"), robot, 0, None)
-    assert "--randomise none" in plain.command
+    for ranges in ("twins", "surprises"):
+        command = RunFolder(tmp_path, randomise(recipe, ranges), robot, 0, None).command
+        assert f"--randomise {ranges}" in command
     del folder.config["options"]["task"]["randomised"]
     folder.write("config.json", folder.config)
     RunFolder(tmp_path, recipe, robot, 0, None).check_same()

@@ -21,6 +21,7 @@ from hopping_leg.errors import HoppingLegError, UsageError, unknown_name
 VERBS = {
     "robots": "list the legs, show every number with its source, check your own",
     "evaluate": "run the paper's trials for controllers and write the report",
+    "compare": "set stored evaluations and trainings beside each other on a page",
     "plot": "draw the figures of stored traces again",
     "train": "train a controller from scratch, or go on after an interruption",
     "tune": "search the gains of energy shaping, or a recipe's numbers",

@@ -41,9 +41,9 @@ class Options:
     """Begin from the newest checkpoint of this folder's run instead of from scratch."""
     set: tuple[str, ...] = ()
     """Numbers of the recipe to change, e.g. `--set learning_rate=3e-4 gamma=0.98`."""
-    randomise: Literal["recipe", "none", "twins"] = "recipe"
-    """What each leg in training draws for itself: what the recipe says, nothing, or friction,
-    inertia and ground from the ranges that twins are drawn from."""
+    randomise: Literal["none", "twins", "surprises"] = "none"
+    """What each leg in training draws for itself: nothing; friction, inertia and ground from the
+    twins' ranges; or payload, rail, ground and motor gains around the robot's."""
     minutes: float | None = None
     """Stop after so much wall-clock time; default: when the recipe's steps are done."""
     steps: int | None = None

@@ -19,23 +19,6 @@ from hopping_leg.learn.fast import FastRecipe, cosine
 from hopping_leg.learn.imitation import Imitation
 from hopping_leg.learn.taught import TaughtPolicy, TaughtPPO
 from hopping_leg.learn.vecenv import TaskVecEnv
-from hopping_leg.sim.twins import Range
-
-
-def _times(path: str, low: float, high: float) -> Range:
-    return Range(path, "1", low, high, "[C]", "logarithmic", relative=True)
-
-
-SURPRISES = (
-    _times("base.mass", 0.8, 1.3),
-    _times("rail.friction", 0.3, 3.0),
-    _times("rail.damping", 0.3, 3.0),
-    _times("contact.time_constant", 0.22, 2.0),
-    _times("hip.torque_gain", 0.85, 1.15),
-    _times("knee.torque_gain", 0.85, 1.15),
-)
-"""What every leg in training draws for itself, over what the robot has: a payload, a worn or dry
-rail, hard and soft ground, motors that give less or more than they should."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +33,6 @@ class PreciseRecipe(FastRecipe):
             observation="dated-long",
             command_range=(0.20, 0.42),
             timestep=5e-4,
-            randomised=SURPRISES,
         )
     )
     reward: ApexRewardOptions = field(

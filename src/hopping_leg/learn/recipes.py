@@ -10,7 +10,8 @@ from hopping_leg.learn.fast import FastRecipe
 from hopping_leg.learn.paper import PaperRecipe
 from hopping_leg.learn.precise import PreciseRecipe
 from hopping_leg.learn.recipe import Recipe
-from hopping_leg.sim.twins import IDENTIFIABLE
+from hopping_leg.sim.twins import IDENTIFIABLE, Range
+from hopping_leg.sim.variants import SURPRISES
 
 RECIPES: dict[str, type[Recipe]] = {
     recipe.name: recipe for recipe in (FastRecipe, PaperRecipe, PreciseRecipe)
@@ -18,9 +19,14 @@ RECIPES: dict[str, type[Recipe]] = {
 """Every recipe that ``hop train`` knows."""
 
 
-Randomise = Literal["recipe", "none", "twins"]
-"""Ranges from which each leg in training draws its own numbers: the recipe's own, none, or those of
-twins."""
+Randomise = Literal["none", "twins", "surprises"]
+"""Ranges from which each leg in training draws its own numbers."""
+
+_RANGES: dict[Randomise, tuple[Range, ...]] = {
+    "none": (),
+    "twins": IDENTIFIABLE,
+    "surprises": SURPRISES,
+}
 
 _SWITCH = {"true": True, "1": True, "false": False, "0": False}
 _KINDS = {bool: "true or false", int: "a whole number", float: "a number"}
@@ -67,24 +73,20 @@ def change(recipe: Recipe, changes: Sequence[str]) -> Recipe:
 
 
 def randomise(recipe: Recipe, ranges: Randomise) -> Recipe:
-    """Return the recipe on legs that each draw their own numbers from other ranges."""
-    if ranges == "recipe":
-        return recipe
-    drawn = IDENTIFIABLE if ranges == "twins" else ()
-    return dataclasses.replace(recipe, task=dataclasses.replace(recipe.task, randomised=drawn))
+    """Return the recipe on legs that each draw their own numbers from ranges."""
+    return dataclasses.replace(
+        recipe, task=dataclasses.replace(recipe.task, randomised=_RANGES[ranges])
+    )
 
 
-def randomised_by(recipe: str, options: dict[str, Any]) -> Randomise:
+def randomised_by(options: dict[str, Any]) -> Randomise:
     """Return from which ranges the legs of a run drew their numbers.
 
     Args:
-        recipe: Name of the recipe.
         options: As in a run's ``config.json``.
     """
-    ranges = options["task"]["randomised"]
-    if recipe not in RECIPES or len(ranges) == len(RECIPES[recipe]().task.randomised):
-        return "recipe"
-    return "twins" if ranges else "none"
+    paths = [spread["path"] for spread in options["task"]["randomised"]]
+    return next(name for name, drawn in _RANGES.items() if paths == [s.path for s in drawn])
 
 
 def numbers_of(recipe: Recipe) -> dict[str, int | float]:

@@ -69,8 +69,8 @@ class RunFolder:
             words += ["--source", config["source"]]
         if config["minutes_budget"] is not None:
             words += ["--minutes", f"{config['minutes_budget']:g}"]
-        ranges = randomised_by(config["recipe"], config["options"])
-        if ranges != "recipe":
+        ranges = randomised_by(config["options"])
+        if ranges != "none":
             words += ["--randomise", ranges]
         changes = changes_of(config["recipe"], config["options"])
         return " ".join([*words, "--set", *changes] if changes else words)

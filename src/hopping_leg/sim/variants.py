@@ -32,6 +32,22 @@ VARIABLE = (
 )
 """Numbers of a robot that may differ from leg to leg."""
 
+
+def _times(path: str, low: float, high: float) -> Range:
+    return Range(path, "1", low, high, "[C]", "logarithmic", relative=True)
+
+
+SURPRISES = (
+    _times("base.mass", 0.8, 1.3),
+    _times("rail.friction", 0.3, 3.0),
+    _times("rail.damping", 0.3, 3.0),
+    _times("contact.time_constant", 0.22, 2.0),
+    _times("hip.torque_gain", 0.85, 1.15),
+    _times("knee.torque_gain", 0.85, 1.15),
+)
+"""What may surprise any leg, over what its robot has: a payload, a worn or dry rail, hard and soft
+ground, motors that give less or more than they should."""
+
 Part = TypeVar("Part")
 
 
