@@ -1,0 +1,218 @@
+"""Several stored runs set beside each other: one evaluation of all, and where they differ."""
+
+import dataclasses
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from hopping_leg.errors import UsageError
+from hopping_leg.evaluate.gallery import run_of
+from hopping_leg.evaluate.result import Evaluation
+from hopping_leg.evaluate.runs import Run
+from hopping_leg.evaluate.stored import Stored
+
+_DRAWN = ("sequence", "staircase")
+"""Trials whose heights are drawn, of one run each."""
+
+_OF_CONTROLLERS = ("summary", "sequence", "ladder", "staircase", "neighbours", "estimators")
+"""Tables of an evaluation whose rows belong to a controller."""
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Runs beside each other."""
+
+    runs: tuple[Stored, ...]
+    """As named, in that order."""
+    evaluation: Evaluation
+    """All evaluations as one; empty if there are trainings alone."""
+    differences: list[dict[str, str]]
+    """Conditions that are not the same in all evaluations: ``name`` and a text per run."""
+    trainings: dict[str, dict[str, Any]]
+    """Results of trainings by label."""
+    notes: list[str]
+    """What makes the comparison less than fair."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain values; numbers that do not exist are NaN."""
+        return {
+            "runs": [
+                {"label": run.label, "path": str(run.path), "command": command_of(run)}
+                for run in self.runs
+            ],
+            "notes": self.notes,
+            "differences": self.differences,
+            "evaluation": self.evaluation.to_json(),
+            "trainings": [training_row(label, t) for label, t in self.trainings.items()],
+        }
+
+
+def set_beside(runs: Sequence[Stored]) -> Compared:
+    """Compare runs.
+
+    Args:
+        runs: Two or more.
+
+    Raises:
+        UsageError: They are too few or have nothing in common.
+    """
+    if len(runs) < 2:
+        raise UsageError("One run has nothing beside it; name two or more.")
+    judged = [run for run in runs if run.evaluation is not None]
+    trainings = {run.label: run.training for run in runs if run.training is not None}
+    if len(judged) < 2 and len(trainings) < 2:
+        raise UsageError(
+            f"{runs[0].label} and {runs[1].label} have nothing in common: one is an evaluation, the"
+            " other a training; judge the training's policy with `hop evaluate` first."
+        )
+    evaluations = {run.label: run.evaluation for run in judged if run.evaluation is not None}
+    _check_commands(evaluations)
+    differences = _differences({label: e.conditions for label, e in evaluations.items()})
+    notes = _robot_notes(runs) + _condition_notes(differences) + _lonely_notes(runs)
+    return Compared(tuple(runs), _merge(evaluations), differences, trainings, notes)
+
+
+def traces_of(compared: Compared) -> list[Run]:
+    """Load the first sequence and staircase of every controller, where traces were kept."""
+    found = []
+    for stored in compared.runs:
+        evaluation = stored.evaluation
+        if evaluation is None or stored.traces is None:
+            continue
+        name = _namer(compared, stored.label)
+        for kind in _DRAWN:
+            runs = [run_of(path) for path in sorted(stored.traces.glob(f"*-{kind}-0.parquet"))]
+            known = [run for run in runs if run.controller in evaluation.controllers]
+            found += [dataclasses.replace(r, controller=name(r.controller)) for r in known]
+    return found
+
+
+def command_of(run: Stored) -> str:
+    """Return the commands that make a run again."""
+    evaluated = run.evaluation.command if run.evaluation else ""
+    trained = str((run.training or {}).get("command", ""))
+    return "\n".join(filter(None, (trained, evaluated)))
+
+
+def training_row(label: str, result: dict[str, Any]) -> dict[str, Any]:
+    """Return the main numbers of a training and its learning curve."""
+    selected = result["selected"]
+    return {
+        "label": label,
+        "recipe": result["recipe"],
+        "robot": result["robot"],
+        "seed": result["seed"],
+        "minutes": result["minutes"],
+        "steps": result["steps"],
+        "selected_steps": selected["steps"],
+        "selected_score_m": selected["score_m"],
+        "curve": [
+            {k: row[k] for k in ("steps", "minutes", "score_m")} for row in result["history"]
+        ],
+    }
+
+
+def _check_commands(evaluations: dict[str, Evaluation]) -> None:
+    commands = {
+        label: {row.command_m for row in (*e.summary, *e.ladder)}
+        for label, e in evaluations.items()
+    }
+    for label, own in commands.items():
+        others = set().union(*(theirs for name, theirs in commands.items() if name != label))
+        if len(commands) > 1 and not own & others:
+            raise UsageError(
+                f"{label} has no command in common with the others (it has {_heights(own)}, they"
+                f" {_heights(others)}); evaluate it with the same --commands."
+            )
+
+
+def _heights(commands: set[float]) -> str:
+    return ", ".join(f"{c:g}" for c in sorted(commands)) + " m" if commands else "none"
+
+
+def _merge(evaluations: dict[str, Evaluation]) -> Evaluation:
+    named = [_renamed(e, _name(evaluations, label)) for label, e in evaluations.items()]
+    fields: dict[str, Any] = {
+        field: list(itertools.chain.from_iterable(getattr(e, field) for e in named))
+        for field in (*_OF_CONTROLLERS, "distributions")
+    }
+    fields["notes"] = list(dict.fromkeys(note for e in named for note in e.notes))
+    return Evaluation(**fields)
+
+
+def _renamed(evaluation: Evaluation, name: Callable[[str], str]) -> Evaluation:
+    fields: dict[str, Any] = {
+        field: [
+            dataclasses.replace(row, controller=name(row.controller))
+            for row in getattr(evaluation, field)
+        ]
+        for field in _OF_CONTROLLERS
+    }
+    fields["distributions"] = [
+        {**entry, "controller": name(entry["controller"])} for entry in evaluation.distributions
+    ]
+    return dataclasses.replace(evaluation, **fields)
+
+
+def _namer(compared: Compared, label: str) -> Callable[[str], str]:
+    return _name({r.label: r.evaluation for r in compared.runs if r.evaluation}, label)
+
+
+def _name(evaluations: dict[str, Evaluation], label: str) -> Callable[[str], str]:
+    """Return how a run's controllers are called: with its label where another has the same."""
+    others = {c for name, e in evaluations.items() if name != label for c in e.controllers}
+    return lambda controller: f"{label}: {controller}" if controller in others else controller
+
+
+def _differences(conditions: dict[str, dict[str, Any]]) -> list[dict[str, str]]:
+    flat = {label: _flat(entries) for label, entries in conditions.items()}
+    names = dict.fromkeys(name for entries in flat.values() for name in entries)
+    rows = []
+    for name in names:
+        texts = {label: entries.get(name, "-") for label, entries in flat.items()}
+        if len(set(texts.values())) > 1:
+            rows.append({"name": name, **{f"in {label}": text for label, text in texts.items()}})
+    return rows
+
+
+def _flat(entries: dict[str, Any]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for name, value in entries.items():
+        inner = value if isinstance(value, dict) else {"": value}
+        for key, entry in inner.items():
+            text = f"{entry:g}" if isinstance(entry, float) else str(entry)
+            found[f"{name} {key}".strip().replace("_", " ")] = text
+    return found
+
+
+def _robot_notes(runs: Sequence[Stored]) -> list[str]:
+    robots: dict[tuple[str, str], list[str]] = {}
+    for run in runs:
+        for source in (run.evaluation.conditions if run.evaluation else None, run.training):
+            if source:
+                key = (str(source.get("robot", "?")), str(source.get("robot_digest", "?")))
+                robots.setdefault(key, []).append(run.label)
+    if len(robots) < 2:
+        return []
+    told = "; ".join(
+        f"{robot} ({digest}) in {', '.join(dict.fromkeys(labels))}"
+        for (robot, digest), labels in robots.items()
+    )
+    return [f"The robots differ: {told}. Numbers of different legs are not the same task."]
+
+
+def _condition_notes(differences: list[dict[str, str]]) -> list[str]:
+    names = [row["name"] for row in differences if not row["name"].startswith("robot")]
+    return [f"The conditions differ: {', '.join(names)}; see the table."] if names else []
+
+
+def _lonely_notes(runs: Sequence[Stored]) -> list[str]:
+    """Say what is shown without anything of its kind beside it."""
+    judged = [run.label for run in runs if run.evaluation is not None]
+    trained = [run.label for run in runs if run.training is not None]
+    return [
+        f"{labels[0]} is the only {kind} here; nothing of its kind stands beside it."
+        for labels, kind in ((judged, "evaluation"), (trained, "training"))
+        if len(labels) == 1
+    ]

@@ -1,0 +1,168 @@
+"""Runs read back from what `hop evaluate` and `hop train` have left on the disk."""
+
+import dataclasses
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from hopping_leg.errors import UsageError
+from hopping_leg.evaluate.result import (
+    SCHEMA,
+    Comparison,
+    Estimator,
+    Evaluation,
+    Group,
+    Staircase,
+    Summary,
+)
+from hopping_leg.evaluate.statistics import Neighbours
+
+_EVALUATION, _TRAINING = "evaluation.json", "result.json"
+_WHAT = (
+    "name a folder or JSON file of `hop evaluate` (the paper's suite) or a folder of `hop train`"
+)
+
+Record = TypeVar("Record")
+
+
+@dataclass(frozen=True)
+class Stored:
+    """One run to be compared."""
+
+    label: str
+    """Its name in all tables and figures."""
+    path: Path
+    """As it was named."""
+    evaluation: Evaluation | None = None
+    """What `hop evaluate` measured."""
+    training: dict[str, Any] | None = None
+    """``result.json`` of a training."""
+    traces: Path | None = None
+    """Folder of the evaluation's traces, if it was kept."""
+
+
+def read_runs(names: Sequence[str]) -> list[Stored]:
+    """Read runs; each is named by the part of its path that tells it from the others.
+
+    Args:
+        names: Paths, each perhaps as ``LABEL=PATH``.
+
+    Raises:
+        UsageError: A path is no run, or two have the same name.
+    """
+    asked = [_split(name) for name in names]
+    paths = [path for _, path in asked]
+    shortest = _labels(paths)
+    labels = [label or short for (label, _), short in zip(asked, shortest, strict=True)]
+    for label in labels:
+        if labels.count(label) > 1:
+            raise UsageError(f"Two runs are called '{label}'; tell them apart with LABEL=PATH.")
+    return [_read(label, path) for label, path in zip(labels, paths, strict=True)]
+
+
+def _split(name: str) -> tuple[str, Path]:
+    label, equals, path = name.partition("=")
+    named = equals and not Path(name).exists()
+    return (label, Path(path)) if named else ("", Path(name))
+
+
+def _labels(paths: Sequence[Path]) -> list[str]:
+    """Return the last parts of each path, as many as it takes to tell all apart."""
+    parts = [_parts(path) for path in paths]
+    for depth in range(1, max((len(p) for p in parts), default=1) + 1):
+        labels = ["/".join(p[-depth:]) for p in parts]
+        if len(set(labels)) == len(labels):
+            return labels
+    return ["/".join(p) for p in parts]
+
+
+def _parts(path: Path) -> tuple[str, ...]:
+    """Return a path's parts without the file name that every evaluation has."""
+    whole = path.resolve()
+    if whole.name in (_EVALUATION, _TRAINING):
+        whole = whole.parent
+    return whole.with_suffix("").parts if whole.suffix == ".json" else whole.parts
+
+
+def _read(label: str, path: Path) -> Stored:
+    if path.is_dir():
+        return _read_folder(label, path)
+    if not path.exists():
+        raise UsageError(f"There is no {path}; {_WHAT}.")
+    content = _load(path)
+    if "history" in content and "recipe" in content:
+        return Stored(label, path, training=content)
+    return Stored(label, path, evaluation=_evaluation(content, path))
+
+
+def _read_folder(label: str, path: Path) -> Stored:
+    evaluation, training, traces = path / _EVALUATION, path / _TRAINING, path / "traces"
+    measured = _evaluation(_load(evaluation), evaluation) if evaluation.exists() else None
+    trained = _load(training) if training.exists() else None
+    if trained is not None and "history" not in trained:
+        raise UsageError(f"{training} is not of a training; {_WHAT}.")
+    if measured is None and trained is None:
+        if (path / "config.json").exists():
+            raise UsageError(
+                f"The training in {path} is not finished; go on with `hop train --resume`."
+            )
+        raise UsageError(f"{path} is not a run: it holds neither {_EVALUATION} nor {_TRAINING}.")
+    return Stored(label, path, measured, trained, traces if measured and traces.is_dir() else None)
+
+
+def _load(path: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise UsageError(f"{path} is not readable as JSON; {_WHAT}.") from error
+    if not isinstance(content, dict):
+        raise UsageError(f"{path} is not a run; {_WHAT}.")
+    return content
+
+
+def _evaluation(content: dict[str, Any], path: Path) -> Evaluation:
+    if "summary" not in content or "distributions" not in content:
+        raise UsageError(f"{path} is not an evaluation by the paper's trials; {_WHAT}.")
+    if content.get("schema") != SCHEMA:
+        raise UsageError(
+            f"{path} has schema {content.get('schema')} but this version reads {SCHEMA};"
+            " evaluate again."
+        )
+    try:
+        return evaluation_from(content)
+    except (TypeError, KeyError, AttributeError) as error:
+        raise UsageError(f"{path} is damaged or of another version; evaluate again.") from error
+
+
+def evaluation_from(content: dict[str, Any]) -> Evaluation:
+    """Return the evaluation that ``Evaluation.to_json`` wrote; numbers that are null are NaN."""
+    kinds = {
+        "summary": Summary,
+        "sequence": Summary,
+        "ladder": Summary,
+        "staircase": Staircase,
+        "estimators": Estimator,
+        "groups": Group,
+    }
+    fields: dict[str, Any] = {name: _records(kind, content[name]) for name, kind in kinds.items()}
+    for name in ("distributions", "conditions", "versions", "notes", "command"):
+        fields[name] = content[name]
+    fields["neighbours"] = [
+        Comparison(c["controller"], _records(Neighbours, c["neighbours"]))
+        for c in content["neighbours"]
+    ]
+    secondary = content["secondary"]
+    return Evaluation(**fields, secondary=secondary and evaluation_from(secondary))
+
+
+def _records(kind: type[Record], rows: list[dict[str, Any]]) -> list[Record]:
+    numbers = {f.name for f in dataclasses.fields(kind) if f.type is float}  # type: ignore[arg-type]
+    return [kind(**{key: _known(key in numbers, v) for key, v in row.items()}) for row in rows]
+
+
+def _known(number: bool, value: Any) -> Any:  # noqa: ANN401
+    if isinstance(value, list):
+        return [float("nan") if entry is None else entry for entry in value]
+    return float("nan") if number and value is None else value

@@ -1,0 +1,26 @@
+import json
+
+from hopping_leg.cli import main
+from tests.evaluate.test_compare import TRAINING
+
+
+def test_trainings_beside_each_other(tmp_path, capsys):
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "result.json").write_text(json.dumps(TRAINING))
+    page, numbers = tmp_path / "page.html", tmp_path / "numbers.json"
+    runs = [str(tmp_path / "one"), str(tmp_path / "two")]
+    assert main(["compare", *runs, "--out", str(page), "--json", str(numbers)]) == 0
+    assert "Learning curves" in page.read_text()
+    found = json.loads(numbers.read_text())
+    assert [row["label"] for row in found["trainings"]] == ["one", "two"]
+    assert found["trainings"][0]["curve"][1]["score_m"] == 0.005
+    assert str(page) in capsys.readouterr().out
+
+
+def test_bad_input_is_one_sentence(tmp_path, capsys):
+    for words in ([], ["none", "nothing"], ["a", "b", "--out", str(tmp_path)]):
+        assert main(["compare", *words]) == 2
+        error = capsys.readouterr().err
+        assert error.startswith("hop: ")
+        assert "Traceback" not in error

@@ -1,0 +1,113 @@
+import dataclasses
+import json
+import re
+
+import pytest
+
+from hopping_leg.errors import UsageError
+from hopping_leg.evaluate.compare import set_beside, traces_of
+from hopping_leg.evaluate.compare_report import write_comparison
+from hopping_leg.evaluate.runs import save_traces
+from hopping_leg.evaluate.stored import evaluation_from, read_runs
+
+TRAINING = {
+    "recipe": "fast",
+    "robot": "legv2-paper",
+    "robot_digest": "abc",
+    "seed": 0,
+    "minutes": 5.0,
+    "steps": 200,
+    "selected": {"steps": 200, "score_m": 0.004},
+    "history": [
+        {"steps": 100, "minutes": 2.0, "score_m": 0.02},
+        {"steps": 200, "minutes": 4.0, "score_m": 0.005},
+    ],
+    "command": "hop train --recipe fast",
+}
+
+
+@pytest.fixture(scope="module")
+def folders(judged, tmp_path_factory):
+    """Two folders of the same evaluation, the second on another leg; and two trainings."""
+    root = tmp_path_factory.mktemp("runs")
+    evaluation = judged.evaluation
+    other = {**evaluation.conditions, "robot": "long-leg", "robot_digest": "xyz", "seeds": 9}
+    for name, changed in (("a", evaluation.conditions), ("b", other)):
+        content = dataclasses.replace(
+            evaluation, conditions=changed, command=f"hop evaluate {name}"
+        )
+        (root / name).mkdir()
+        (root / name / "evaluation.json").write_bytes(content.dumps())
+    save_traces(judged.runs, root / "a" / "traces")
+    for name in ("t0", "t1"):
+        (root / name).mkdir()
+        (root / name / "result.json").write_text(json.dumps(TRAINING))
+    return root
+
+
+def test_an_evaluation_survives_the_disk(judged):
+    text = judged.evaluation.dumps()
+    assert evaluation_from(json.loads(text)).dumps() == text
+
+
+def test_controllers_of_the_same_name_are_told_apart_and_numbers_stay(folders, judged):
+    compared = set_beside(read_runs([str(folders / "a"), str(folders / "b")]))
+    assert compared.evaluation.controllers == ["a: spring", "b: spring"]
+    errors = [row.median_error_m for row in compared.evaluation.rows("b: spring")]
+    assert errors == pytest.approx([row.median_error_m for row in judged.evaluation.summary])
+
+
+def test_differing_robots_and_conditions_are_said(folders):
+    compared = set_beside(read_runs([str(folders / "a"), str(folders / "b")]))
+    assert "robots differ: legv2-paper" in compared.notes[0]
+    assert "long-leg (xyz) in b" in compared.notes[0]
+    assert {"name": "seeds", "in a": "2", "in b": "9"} in compared.differences
+    assert not set_beside(read_runs([f"x={folders / 'a'}", f"y={folders / 'a'}"])).differences
+
+
+def test_heights_come_from_the_traces_that_were_kept(folders):
+    compared = set_beside(read_runs([str(folders / "a"), str(folders / "b")]))
+    drawn = {(run.controller, run.trial.kind) for run in traces_of(compared)}
+    assert drawn == {("a: spring", "sequence"), ("a: spring", "staircase")}
+
+
+def test_the_page_holds_everything_and_needs_nothing(folders):
+    names = [str(folders / name) for name in ("a", "b", "t0", "t1")]
+    page = write_comparison(set_beside(read_runs(names)), "hop compare a b").decode()
+    sources = re.findall(r'(?:src|href)="([^"]*)"', page)
+    assert len(sources) == 4  # sequence, staircase, distributions, learning curves
+    assert all(source.startswith("data:") for source in sources)
+    for text in (">a: spring<", "hop evaluate b", "hop train --recipe fast", ">4.0<"):
+        assert text in page
+
+
+def test_runs_are_named_by_what_tells_them_apart(folders, tmp_path):
+    runs = read_runs([str(folders / "t0" / "result.json"), f"mine={folders / 't1'}"])
+    assert [run.label for run in runs] == ["t0", "mine"]
+
+
+def test_what_cannot_be_compared_is_one_sentence(folders, tmp_path, judged):
+    a, t0 = str(folders / "a"), str(folders / "t0")
+    skills = tmp_path / "skills.json"
+    skills.write_text('{"counted": []}')
+    broken = tmp_path / "broken.json"
+    broken.write_text("{")
+    unfinished = tmp_path / "unfinished"
+    unfinished.mkdir()
+    (unfinished / "config.json").write_text("{}")
+    higher = [dataclasses.replace(row, command_m=0.5) for row in judged.evaluation.summary]
+    lonely = tmp_path / "lonely.json"
+    lonely.write_bytes(dataclasses.replace(judged.evaluation, summary=higher).dumps())
+    for names, sentence in (
+        ([a], "name two or more"),
+        ([a, t0], "nothing in common"),
+        ([a, a], "tell them apart with LABEL=PATH"),
+        ([a, str(tmp_path / "none")], "There is no"),
+        ([a, str(tmp_path)], "is not a run"),
+        ([a, str(skills)], "not an evaluation by the paper's trials"),
+        ([a, str(broken)], "not readable as JSON"),
+        ([t0, str(unfinished)], "not finished; go on with `hop train --resume`"),
+        ([a, str(lonely)], "no command in common"),
+    ):
+        with pytest.raises(UsageError, match=re.escape(sentence)):
+            set_beside(read_runs(names))
