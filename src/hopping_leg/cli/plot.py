@@ -7,18 +7,18 @@ Examples:
   hop plot runs/first/traces/*.parquet --out runs/first/figures
   hop plot runs/first/traces/fast-staircase-0.parquet
   hop plot runs/first/traces/*-fixed-*.parquet --format png
+  hop plot runs/first/traces/*.parquet --format pdf --width column
 """
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import tyro
 from rich.console import Console
 
 from hopping_leg.deploy.black_box import SUFFIX, recover
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.figures import to_png, to_svg
+from hopping_leg.evaluate.figures.paper import Format, Width, encode
 from hopping_leg.evaluate.gallery import draw_gallery, run_of
 from hopping_leg.evaluate.tables import tabulate
 from hopping_leg.trace import write_atomically
@@ -33,8 +33,10 @@ class Plot:
     killed `hop deploy` leaves, whose trace is then written beside it."""
     out: Path = Path("figures")
     """Folder for the figures."""
-    format: Literal["svg", "png"] = "svg"
+    format: Format = "svg"
     """Kind of file."""
+    width: Width = "screen"
+    """What a figure shall fill: a screen, or a column (3.5 in) or page (7.16 in) of a paper."""
 
 
 def run(args: Plot) -> None:
@@ -44,11 +46,10 @@ def run(args: Plot) -> None:
     runs = [run_of(_trace(path)) for path in args.traces]
     controllers = list(dict.fromkeys(run.controller for run in runs))
     evaluation = tabulate(runs, controllers, seed=0)
-    encode = to_png if args.format == "png" else to_svg
     console = Console()
     for picture in draw_gallery(evaluation, runs):
         path = args.out / f"{picture.name}.{args.format}"
-        write_atomically(path, encode(picture.figure))
+        write_atomically(path, encode(picture.figure, args.format, args.width))
         console.print(f"{picture.title}: {path}", highlight=False)
 
 

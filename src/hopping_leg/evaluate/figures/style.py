@@ -76,8 +76,8 @@ def to_svg(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def to_png(figure: Figure) -> bytes:
-    """Return a figure as PNG."""
+def to_png(figure: Figure, dpi: float = 130) -> bytes:
+    """Return a figure as PNG of so many dots per inch."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=130)
+    figure.savefig(buffer, format="png", dpi=dpi)
     return buffer.getvalue()
