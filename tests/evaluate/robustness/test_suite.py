@@ -53,7 +53,7 @@ def test_rows_have_the_promised_names(tiny, spring, tmp_path):
 
 
 def test_controllers_are_told_apart_by_what_they_do(robot, spring):
-    names = ("energy-shaping", "energy-shaping-literal", "fast", "paper")
+    names = ("energy-shaping", "energy-shaping-literal", "fast", "paper", "precise")
     prints = [fingerprint(load_controller(name, robot)) for name in names]
     prints.append(fingerprint(spring))
     assert len(set(prints)) == len(prints)
