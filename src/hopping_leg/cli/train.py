@@ -8,6 +8,7 @@ Examples:
   hop train --recipe fast --minutes 5
   hop train --recipe paper --seed 1 --out runs/mine
   hop train --recipe paper --seed 1 --out runs/mine --resume
+  hop train --recipe fast --out runs/shared --log wandb
   hop evaluate runs/mine/policy.onnx
 """
 
@@ -50,6 +51,8 @@ class Options:
     """Control steps of experience, all legs together, instead of the recipe's."""
     threads: int = 1
     """Threads of the networks and the physics."""
+    log: Literal["tensorboard", "wandb", "trackio"] = "tensorboard"
+    """Who gets the curves besides TensorBoard; wandb and trackio are packages of their own."""
     json: Path | None = None
     """Write the results to this file as JSON."""
 
@@ -80,6 +83,7 @@ def run(args: Options) -> None:
             source=args.source,
             minutes=args.minutes,
             threads=args.threads,
+            log=args.log,
         )
     except KeyboardInterrupt:
         print(f"Stopped; the same command with --resume goes on in {out}.", file=sys.stderr)

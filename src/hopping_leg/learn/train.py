@@ -8,12 +8,12 @@ from typing import Any
 
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import configure
 
 from hopping_leg.control.policy import Card
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.learn import resumable
 from hopping_leg.learn.checkpoint import write_checkpoint
+from hopping_leg.learn.dashboards import Log, check_log, make_logger
 from hopping_leg.learn.export import build_policy
 from hopping_leg.learn.model_card import write_card
 from hopping_leg.learn.progress import TrainingProgress
@@ -58,6 +58,7 @@ def train(
     minutes: float | None = None,
     threads: int = 1,
     quiet: bool = False,
+    log: Log = "tensorboard",
     on_snapshot: Callable[[int, float], None] = lambda _steps, _score: None,
 ) -> Trained:
     """Train a controller and leave its policy, card and history in ``out``.
@@ -76,14 +77,17 @@ def train(
         minutes: Stop after so much wall-clock time, pauses excluded, or at the recipe's steps.
         threads: Of torch and physics; torch's is set for the whole process.
         quiet: Show no progress.
+        log: Who gets the curves besides TensorBoard.
         on_snapshot: Called with the steps and the score, m, of every snapshot that was tried; what
             it raises ends the training.
 
     Raises:
-        UsageError: ``out`` holds a run that cannot be continued like this.
+        UsageError: ``out`` holds a run that cannot be continued like this, or what ``log`` needs
+            is not installed.
         RobotError: The robot has effects that training does not simulate.
     """
     _refuse_reality(robot)
+    check_log(log)
     if minutes is not None and not 0 < minutes < float("inf"):
         raise UsageError(f"--minutes is {minutes:g} but must be positive.")
     torch.set_num_threads(max(threads, 1))
@@ -91,6 +95,7 @@ def train(
     folder = RunFolder(out, recipe, robot, seed, minutes, source)
     tree = folder.begin(resume=resume)
     trainer = Trainer(recipe, robot, seed, folder, minutes, threads)
+    trainer.model.set_logger(make_logger(folder.path, log, folder.config))
     trainer.on_snapshot = on_snapshot
     if tree is not None:
         trainer.restore(tree)
@@ -124,7 +129,6 @@ class Trainer:
         self._budget = None if minutes is None else 60 * minutes
         self.env = recipe.make_env(robot, seed, threads)
         self.model = recipe.make_model(self.env, seed)
-        self.model.set_logger(configure(str(folder.path / "tensorboard"), ["tensorboard"]))
         self.model.on_boundary = self._at_boundary
         if self._budget is not None:
             self.model.remaining = lambda: max(0.0, 1 - self.elapsed / self._seconds)
@@ -166,6 +170,7 @@ class Trainer:
                 reset_num_timesteps=not self._restored,
             )
         self._judge()
+        model.logger.close()
         minutes, steps = self.elapsed / 60, int(model.num_timesteps)
         self._show(force=True)
         content, results = self.selection.choose()

@@ -47,7 +47,7 @@ def fit_width(figure: Figure, width: Literal["column", "page"]) -> None:
         _fold_legends(figure)
     shrink = _SMALLER[width]
     for text in figure.findobj(Text):
-        text.set_fontsize(shrink * text.get_fontsize())
+        text.set_fontsize(shrink * float(text.get_fontsize()))
     for axes in figure.axes:
         for line in axes.lines:
             line.set_linewidth(shrink * line.get_linewidth())

@@ -1,0 +1,104 @@
+"""Where a training's curves go: TensorBoard always, Weights & Biases or Trackio if asked for."""
+
+import importlib
+import uuid
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from stable_baselines3.common.logger import KVWriter, Logger, configure
+
+from hopping_leg.errors import UsageError
+from hopping_leg.trace import write_atomically
+
+Log = Literal["tensorboard", "wandb", "trackio"]
+
+PROJECT = "hopping-leg"
+"""Under which runs are filed there."""
+
+
+def check_log(log: Log) -> None:
+    """Check that what a log needs is installed.
+
+    Raises:
+        UsageError: It is not; the message names the command.
+    """
+    if log != "tensorboard" and not _installed(log):
+        raise UsageError(
+            f"--log {log} needs the package {log}, which is not installed: pip install {log}."
+        )
+
+
+def make_logger(folder: Path, log: Log, config: Mapping[str, Any]) -> Logger:
+    """Return the logger of a training.
+
+    Args:
+        folder: The run's; its name is the run's name.
+        log: Who gets the curves besides TensorBoard.
+        config: What the run was asked for, shown beside its curves.
+
+    Raises:
+        UsageError: The package is missing or does not start.
+    """
+    check_log(log)
+    logger = configure(str(folder / "tensorboard"), ["tensorboard"])
+    if log != "tensorboard":
+        logger.output_formats.append(Dashboard(log, folder, config))
+    return logger
+
+
+class Dashboard(KVWriter):  # type: ignore[misc]
+    """Curves for a package with ``init``, ``log`` and ``finish``; a resumed run goes on there."""
+
+    def __init__(self, package: str, folder: Path, config: Mapping[str, Any]) -> None:
+        self._module: Any = importlib.import_module(package)
+        # Trackio knows a run again by its name, Weights & Biases by an identity.
+        identity = {"id": _identity(folder)} if package == "wandb" else {}
+        try:
+            self._module.init(
+                project=PROJECT,
+                name=folder.resolve().name,
+                config=dict(config),
+                resume="allow",
+                **identity,
+            )
+        except Exception as error:
+            reason = (str(error) or type(error).__name__).splitlines()[0]
+            raise UsageError(
+                f"{package} did not start: {reason}; set it up or leave --log out."
+            ) from error
+
+    def write(
+        self,
+        key_values: dict[str, Any],
+        key_excluded: dict[str, tuple[str, ...]],
+        step: int = 0,
+    ) -> None:
+        """Send the numbers of one step; texts and pictures are TensorBoard's alone."""
+        numbers = {
+            key: float(value)
+            for key, value in key_values.items()
+            if isinstance(value, int | float | np.number)
+        }
+        self._module.log(numbers, step=step)
+
+    def close(self) -> None:
+        """Finish the run."""
+        self._module.finish()
+
+
+def _installed(package: str) -> bool:
+    try:
+        importlib.import_module(package)
+    except ImportError:
+        return False
+    return True
+
+
+def _identity(folder: Path) -> str:
+    """Return the run's identity, the same after every resumption."""
+    file = folder / "wandb-id"
+    if not file.exists():
+        write_atomically(file, uuid.uuid4().hex[:8].encode())
+    return file.read_text(encoding="utf-8")
