@@ -16,6 +16,7 @@ _LONGEST = 1000
 
 _PAGE = """<!doctype html>
 <html lang="en"><meta charset="utf-8"><title>Hopping leg</title>
+<link rel="icon" href="data:,">
 <style>
 body { font: 1.2rem system-ui; max-width: 30rem; margin: 3rem auto; padding: 0 1rem }
 input, button { width: 100%; margin: 1rem 0; font: inherit }
