@@ -32,9 +32,10 @@ VERBS = {
     "identify": "fit a leg to recordings and write its robot file",
     "deploy": "run a controller on the real leg, or on emulated drives",
     "view": "watch the leg in the browser: live, a trace, or the real one",
-    "doctor": "check the drives of a leg, configure and home them",
+    "doctor": "say what is missing here; check, configure and home a leg's drives",
     "emulate": "stand in for the real leg: two drives behind a real wire",
     "experiment": "run the paper's sim-to-real experiment on twins",
+    "completion": "print a script that completes `hop` in your shell",
     "reproduce": "the main job: train, evaluate, compare and report",
 }
 """Every verb with its line in the overview."""

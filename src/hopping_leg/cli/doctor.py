@@ -1,6 +1,9 @@
 """Check the drives of a leg without moving it; write their configuration, tell them where they are.
 
+Without a transport it says which extras of the package are missing, and the command for each.
+
 Examples:
+  hop doctor                                               # what is installed, what is not
   hop doctor --transport /dev/fdcanusb --robot legv2
   hop doctor --transport /dev/fdcanusb --robot my_leg.toml --write
   hop doctor --transport socketcan:can0 --home 0.0 0.0     # the leg hangs straight down
@@ -12,12 +15,13 @@ from typing import Any
 
 from rich.console import Console
 
+from hopping_leg.cli.extras import show_extras, survey
 from hopping_leg.cli.motors import ask, connect, find, show
 from hopping_leg.deploy.bring_up import Finding
 from hopping_leg.deploy.configuration import wanted
 from hopping_leg.deploy.envelope import hopping_envelope
 from hopping_leg.deploy.wire import JOINTS
-from hopping_leg.errors import HardwareError
+from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import CONTROL_RATE
@@ -27,8 +31,9 @@ from hopping_leg.sim import CONTROL_RATE
 class Doctor:
     """Which drives, and what may be changed."""
 
-    transport: str
-    """Path of an fdcanusb, interface:channel of python-can, or pi3hat."""
+    transport: str | None = None
+    """Path of an fdcanusb, interface:channel of python-can, or pi3hat; without one only the
+    installation is looked at."""
     robot: str = "legv2-paper"
     """A shipped robot or a .toml file; its table [hardware] says how the drives are wired."""
     write: bool = False
@@ -41,6 +46,11 @@ class Doctor:
 
 def run(args: Doctor) -> None:
     """Check, change what was asked for, check again."""
+    if args.transport is None:
+        if args.write or args.home is not None:
+            raise UsageError("--write and --home need the drives; name their --transport.")
+        show_extras(Console(), survey())
+        return
     robot, console = load_robot(args.robot), Console()
     envelope = hopping_envelope(robot, CONTROL_RATE)
     with connect(robot, args.transport) as link:
