@@ -52,4 +52,4 @@ def run(args: Compare) -> None:
         console.print(note, highlight=False)
     for path in (args.out, args.json):
         if path:
-            console.print(f"Wrote {path}", highlight=False)
+            console.print(f"Wrote {path}", highlight=False, soft_wrap=True)

@@ -130,7 +130,7 @@ def run(args: Evaluate) -> None:
         write_atomically(args.report, write_report(judged, videos))
     for path in (args.json, args.report, args.traces):
         if path:
-            console.print(f"Wrote {path}", highlight=False)
+            console.print(f"Wrote {path}", highlight=False, soft_wrap=True)
 
 
 def _check(args: Evaluate) -> None:

@@ -102,6 +102,6 @@ def run(args: Record) -> None:
             )
             file = args.out / f"{robot.name}-{path.stem}.parquet"
             recording.save(file)
-            console.print(f"Wrote {file}", highlight=False)
+            console.print(f"Wrote {file}", highlight=False, soft_wrap=True)
             for warning in recording.warnings:
                 console.print(f"  {warning}", highlight=False)

@@ -169,7 +169,9 @@ def _print(result: dict[str, Any], out: Path) -> None:
         for name, value in best["params"].items():
             table.add_row(name, f"{value:.4g}" if isinstance(value, float) else str(value))
         Console().print(table)
-    Console().print(f"Wrote {out}/trials.json and the figures beside it.", highlight=False)
+    Console().print(
+        f"Wrote {out}/trials.json and the figures beside it.", highlight=False, soft_wrap=True
+    )
 
 
 def _table(tuned: Tuned) -> Table:
