@@ -18,7 +18,7 @@ from hopping_leg.robot.model import TIMESTEP
 class Engines:
     """Let controllers hop in PyBullet as well, without retraining; needs the extra `bullet`."""
 
-    controllers: tuple[str, ...] = ("energy-shaping", "fast", "paper")
+    controllers: tuple[str, ...] = ("energy-shaping", "fast", "precise", "paper")
     """Names or .onnx files."""
     robot: str = "legv2-paper"
     """A shipped name or the path of a .toml file."""
