@@ -11,6 +11,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.learn.recipes import RECIPES, change, changes_of, get_recipe, randomise
 from hopping_leg.learn.run_folder import RunFolder
 from hopping_leg.robot import load_robot
+from hopping_leg.sim.twins import Range
 
 
 @given(
@@ -65,3 +66,12 @@ def test_a_run_says_how_it_was_randomised_and_older_ones_were_not(tmp_path):
     RunFolder(tmp_path, recipe, robot, 0, None).check_same()
     with pytest.raises(UsageError, match="another options"):
         RunFolder(tmp_path, randomise(recipe, "twins"), robot, 0, None).check_same()
+
+
+def test_a_run_on_ranges_of_ones_own_still_says_how_it_was_made(tmp_path):
+    own = Range("base.mass", "kg", 0.3, 0.5, "scales")
+    task = dataclasses.replace(get_recipe("fast").task, randomised=(own,))
+    recipe = dataclasses.replace(get_recipe("fast"), task=task)
+    folder = RunFolder(tmp_path, recipe, load_robot("legv2"), 0, None)
+    assert folder.command.startswith("hop train --recipe fast")
+    assert "--randomise" not in folder.command

@@ -137,6 +137,9 @@ def _check(args: Evaluate) -> None:
     """Refuse what cannot work before anything is simulated."""
     if args.axes and args.suite != "robustness":
         raise UsageError("--axes belongs to --suite robustness; give that, too.")
+    for name, given in (("report", args.report), ("traces", args.traces)):
+        if given and args.suite != "paper":
+            raise UsageError(f"--{name} belongs to the paper's suite; leave it out.")
     if args.seed < 0:
         raise UsageError(f"A seed of {args.seed} has no meaning; give 0 or more.")
     for path in (args.json, args.report):

@@ -40,9 +40,6 @@ def judge_robustness(
     Raises:
         UsageError: An option has no meaning here.
     """
-    for name, given in (("report", args.report), ("traces", args.traces)):
-        if given:
-            raise UsageError(f"--{name} belongs to the paper's suite; leave it out.")
     if args.engine != "mujoco":
         raise UsageError("The robustness suite needs MuJoCo; leave --engine out.")
     if args.floor != "both":

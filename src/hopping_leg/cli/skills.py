@@ -8,7 +8,6 @@ from rich.table import Table
 
 from hopping_leg.cli.bench.shared import mm
 from hopping_leg.cli.output import write_json
-from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.skills.suite import run_skills
 
 if TYPE_CHECKING:
@@ -38,9 +37,6 @@ def judge_skills(
     Raises:
         UsageError: An option has no meaning here.
     """
-    for name, given in (("report", args.report), ("traces", args.traces)):
-        if given:
-            raise UsageError(f"--{name} belongs to the paper's suite; leave it out.")
     floors = ("soft", "stiff") if args.floor == "both" else (args.floor,)
     result = run_skills(
         candidates,

@@ -13,7 +13,8 @@ import numpy as np
 
 from hopping_leg.control import Setup
 from hopping_leg.control.policy import Policy
-from hopping_leg.evaluate.runner import Candidate, evaluate, software_versions
+from hopping_leg.evaluate.candidates import Candidate
+from hopping_leg.evaluate.runner import evaluate, software_versions
 from hopping_leg.learn.recipe import Recipe
 from hopping_leg.learn.train import train
 from hopping_leg.robot.parameters import Robot

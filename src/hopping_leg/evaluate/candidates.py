@@ -1,15 +1,35 @@
-"""Names, policy files and patterns of the command line turned into what is judged."""
+"""What is judged, and how names, files and patterns of the command line become that."""
 
 import glob
+import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from hopping_leg.control import Controller
 from hopping_leg.control.library import load_controller
 from hopping_leg.control.policy import Policy
-from hopping_leg.errors import PolicyError
-from hopping_leg.evaluate.runner import Candidate
+from hopping_leg.errors import PolicyError, UsageError
 from hopping_leg.robot.parameters import Robot
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A controller to be judged.
+
+    Attributes:
+        label: Its name in all tables.
+        controller: What is run.
+        command_range: Heights it was made for, m, or None for any.
+        group: Name shared by policies of one recipe that differ in the training seed.
+        notes: What a reader of the results must know about it.
+    """
+
+    label: str
+    controller: Controller
+    command_range: tuple[float, float] | None = None
+    group: str | None = None
+    notes: tuple[str, ...] = ()
 
 
 def load_candidates(names: Sequence[str], robot: Robot, rate: float) -> list[Candidate]:
@@ -29,6 +49,35 @@ def load_candidates(names: Sequence[str], robot: Robot, rate: float) -> list[Can
     """
     expanded = [name for entry in names for name in _expand(entry)]
     return _grouped([_load(name, robot, rate) for name in dict.fromkeys(expanded)])
+
+
+def check_labels(candidates: Sequence[Candidate]) -> None:
+    """Check that there is something to judge, under names that differ.
+
+    Raises:
+        UsageError: There is not.
+    """
+    labels = [candidate.label for candidate in candidates]
+    if not labels:
+        raise UsageError("No controller was named; try `hop evaluate energy-shaping`.")
+    for label in labels:
+        if labels.count(label) > 1:
+            raise UsageError(f"Controller '{label}' was named twice; name each one once.")
+
+
+def check_range(candidate: Candidate, commands: Sequence[float]) -> None:
+    """Check that a candidate may be asked for heights, m.
+
+    Raises:
+        UsageError: One is outside of the range that it was trained for.
+    """
+    low, high = candidate.command_range or (-math.inf, math.inf)
+    outside = [c for c in commands if not low - 1e-9 <= c <= high + 1e-9]
+    if outside:
+        raise UsageError(
+            f"'{candidate.label}' cannot be asked for {outside[0]:g} m: it was trained for"
+            f" {low:g} to {high:g} m; choose --commands within that range."
+        )
 
 
 def _expand(entry: str) -> list[str]:

@@ -7,8 +7,9 @@ from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from typing import Any
 
-from hopping_leg.control import Controller, Setup
+from hopping_leg.control import Setup
 from hopping_leg.errors import UsageError
+from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range
 from hopping_leg.evaluate.pooling import pool_group
 from hopping_leg.evaluate.result import Evaluation, Group, Summary
 from hopping_leg.evaluate.runs import FLOORS, Run, on_floor, run_trials
@@ -16,27 +17,6 @@ from hopping_leg.evaluate.tables import tabulate
 from hopping_leg.evaluate.trials import KINDS, Trial, check_reach, paper_trials, within
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.sim import NOTHING, Engine
-
-Bounds = tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A controller to be judged.
-
-    Attributes:
-        label: Its name in all tables.
-        controller: What is run.
-        command_range: Heights it was made for, m, or None for any.
-        group: Name shared by policies of one recipe that differ in the training seed.
-        notes: What a reader of the results must know about it.
-    """
-
-    label: str
-    controller: Controller
-    command_range: Bounds | None = None
-    group: str | None = None
-    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -108,12 +88,7 @@ def evaluate(
 def _check(
     candidates: Sequence[Candidate], setup: Setup, commands: Sequence[float] | None, repeats: int
 ) -> None:
-    labels = [c.label for c in candidates]
-    if not labels:
-        raise UsageError("No controller was named; try `hop evaluate energy-shaping`.")
-    twice = sorted({label for label in labels if labels.count(label) > 1})
-    if twice:
-        raise UsageError(f"Controller '{twice[0]}' was named twice; name each one once.")
+    check_labels(candidates)
     if repeats < 1:
         raise UsageError(f"{repeats} seeds are too few; give --seeds 1 or more.")
     if commands is not None:
@@ -125,13 +100,9 @@ def _check(
 
 def _check_range(candidate: Candidate, fixed: Sequence[Trial], *, asked: bool) -> None:
     """Refuse commands that were asked for by name, or a range that leaves none."""
-    bounds = candidate.command_range
-    outside = [trial.steps[0][0] for trial in fixed if not within(trial, bounds)]
-    if bounds is not None and outside and (asked or len(outside) == len(fixed)):
-        raise UsageError(
-            f"'{candidate.label}' cannot be asked for {outside[0]:g} m: it was trained for"
-            f" {bounds[0]:g} to {bounds[1]:g} m; choose --commands within that range."
-        )
+    outside = [trial for trial in fixed if not within(trial, candidate.command_range)]
+    if asked or len(outside) == len(fixed):
+        check_range(candidate, [height for trial in outside for height, _ in trial.steps])
 
 
 def _note_coarse(timestep: float) -> list[str]:

@@ -79,14 +79,17 @@ def randomise(recipe: Recipe, ranges: Randomise) -> Recipe:
     )
 
 
-def randomised_by(options: dict[str, Any]) -> Randomise:
-    """Return from which ranges the legs of a run drew their numbers.
+def randomised_by(options: dict[str, Any]) -> Randomise | None:
+    """Return from which ranges the legs of a run drew their numbers, None if from a user's own.
 
     Args:
         options: As in a run's ``config.json``.
     """
-    paths = [spread["path"] for spread in options["task"]["randomised"]]
-    return next(name for name, drawn in _RANGES.items() if paths == [s.path for s in drawn])
+    stored = [[s["path"], s["low"], s["high"]] for s in options["task"]["randomised"]]
+    for name, drawn in _RANGES.items():
+        if stored == [[s.path, s.low, s.high] for s in drawn]:
+            return name
+    return None
 
 
 def numbers_of(recipe: Recipe) -> dict[str, int | float]:

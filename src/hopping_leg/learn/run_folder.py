@@ -70,7 +70,7 @@ class RunFolder:
         if config["minutes_budget"] is not None:
             words += ["--minutes", f"{config['minutes_budget']:g}"]
         ranges = randomised_by(config["options"])
-        if ranges != "none":
+        if ranges not in ("none", None):
             words += ["--randomise", ranges]
         changes = changes_of(config["recipe"], config["options"])
         return " ".join([*words, "--set", *changes] if changes else words)

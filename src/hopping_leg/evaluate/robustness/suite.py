@@ -2,7 +2,6 @@
 
 import dataclasses
 import functools
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -11,6 +10,7 @@ from hopping_leg.control import Controller, Setup
 from hopping_leg.control.energy_shaping import EnergyShaping
 from hopping_leg.control.policy import Policy
 from hopping_leg.errors import UsageError
+from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range
 from hopping_leg.evaluate.keeper import Keeper
 from hopping_leg.evaluate.robustness import changes
 from hopping_leg.evaluate.robustness.axes import (
@@ -25,7 +25,7 @@ from hopping_leg.evaluate.robustness.axes import (
 from hopping_leg.evaluate.robustness.outcome import TOLERANCE, Outcome, run_plan
 from hopping_leg.evaluate.robustness.plan import JOINT_POINTS, SECONDS, make_plan
 from hopping_leg.evaluate.robustness.score import level_rows, score_rows
-from hopping_leg.evaluate.runner import Candidate, software_versions
+from hopping_leg.evaluate.runner import software_versions
 from hopping_leg.evaluate.trials import COMMANDS, check_reach, scaled
 
 RECOVERY = "recovery"
@@ -129,7 +129,9 @@ def run_suite(
     Raises:
         UsageError: A command is out of a candidate's range, or a name is taken twice.
     """
-    _check(candidates, suite)
+    check_labels(candidates)
+    for candidate in candidates:
+        check_range(candidate, suite.commands)
     result: dict[str, Any] = {"schema": SCHEMA, "scores": [], "levels": []}
     result |= {"recovery": [], "steps": []}
     parts = [NOMINAL, *suite.axes, *([RECOVERY] if suite.recovery else [])]
@@ -200,23 +202,6 @@ def fingerprint(controller: Controller) -> str:
     if isinstance(controller, EnergyShaping):
         return repr((controller.gains, controller.options))
     return f"{type(controller).__module__}.{type(controller).__qualname__}"
-
-
-def _check(candidates: Sequence[Candidate], suite: Suite) -> None:
-    labels = [candidate.label for candidate in candidates]
-    if not labels:
-        raise UsageError("No controller was named; try `hop evaluate energy-shaping`.")
-    for label in labels:
-        if labels.count(label) > 1:
-            raise UsageError(f"Controller '{label}' was named twice; name each one once.")
-    for candidate in candidates:
-        low, high = candidate.command_range or (-math.inf, math.inf)
-        outside = [c for c in suite.commands if not low - 1e-9 <= c <= high + 1e-9]
-        if outside:
-            raise UsageError(
-                f"'{candidate.label}' cannot be asked for {outside[0]:g} m: it was trained for"
-                f" {low:g} to {high:g} m; choose --commands within that range."
-            )
 
 
 def _described(axis: Axis) -> dict[str, Any]:

@@ -6,7 +6,8 @@ from typing import Any
 
 from hopping_leg.control import Setup
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.runner import Candidate, software_versions
+from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range
+from hopping_leg.evaluate.runner import software_versions
 from hopping_leg.evaluate.runs import on_floor
 from hopping_leg.evaluate.skills.counted import COUNTS, count_hops
 from hopping_leg.evaluate.skills.landings import DROP, land
@@ -51,7 +52,9 @@ def run_skills(
         raise UsageError(f"{repeats} seeds are too few; give --seeds 1 or more.")
     chosen = scaled(COMMANDS, setup.robot) if commands is None else tuple(sorted(set(commands)))
     check_reach(setup.robot, chosen)
-    _check(candidates, chosen)
+    check_labels(candidates)
+    for candidate in candidates:
+        check_range(candidate, chosen)
     size = setup.robot.straight_height / PAPER_HEIGHT
     stairs, drop = [size * level for level in STAIRS], size * DROP
     rows: dict[str, list[Any]] = {"counted": [], "stairs": [], "climbs": [], "landings": []}
@@ -99,22 +102,3 @@ def run_skills(
         "versions": software_versions(),
         "notes": [note for candidate in candidates for note in candidate.notes],
     }
-
-
-def _check(candidates: Sequence[Candidate], commands: Sequence[float]) -> None:
-    labels = [candidate.label for candidate in candidates]
-    if not labels:
-        raise UsageError("No controller was named; try `hop evaluate energy-shaping`.")
-    for label in labels:
-        if labels.count(label) > 1:
-            raise UsageError(f"Controller '{label}' was named twice; name each one once.")
-    for candidate in candidates:
-        if candidate.command_range is None:
-            continue
-        low, high = candidate.command_range
-        outside = [c for c in commands if not low - 1e-9 <= c <= high + 1e-9]
-        if outside:
-            raise UsageError(
-                f"'{candidate.label}' cannot be asked for {outside[0]:g} m: it was trained for"
-                f" {low:g} to {high:g} m; choose --commands within that range."
-            )

@@ -15,8 +15,9 @@ import numpy as np
 from hopping_leg.control import Setup
 from hopping_leg.control.policy import Policy
 from hopping_leg.errors import UsageError
+from hopping_leg.evaluate.candidates import Candidate
 from hopping_leg.evaluate.result import Evaluation
-from hopping_leg.evaluate.runner import Candidate, evaluate
+from hopping_leg.evaluate.runner import evaluate
 from hopping_leg.evaluate.transfer.methods import Method
 from hopping_leg.evaluate.transfer.study import Study, TwinFile
 from hopping_leg.robot.parameters import Robot
