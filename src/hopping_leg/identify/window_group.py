@@ -19,6 +19,7 @@ from hopping_leg.identify.drive_loop import (
 from hopping_leg.identify.held import Held
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.rig_model import FIELDS, build_rig_model, model_field
+from hopping_leg.identify.row_places import RowPlaces
 from hopping_leg.identify.states import base_rate, start_states
 from hopping_leg.identify.windows import Window
 from hopping_leg.identify.zeros import Zeros, find_zeros, has_own_zeros
@@ -93,24 +94,22 @@ class WindowGroup:
         zeros = find_zeros(self._zeros, candidates)[:, self._of_window]
         simulation = self._start(candidates, zeros)
         *history, heights = self._advance(simulation, candidates)
-        shape = (self._ticks, len(candidates), -1, 2)
+        shape = (self._rows.ticks, len(candidates), -1, 2)
         q, qd, torque = (values.reshape(shape) for values in history)
-        height = self._linear(heights.reshape(*shape[:3], 1))[..., 0]
-        position, velocity = self._between_ticks(q, qd)
+        height = self._rows.linear(heights.reshape(*shape[:3], 1))[..., 0]
+        position, velocity = self._rows.cubic(q, qd)
         position += zeros[:, :, None]
         gain = drive_values(candidates, "sensor_gain")[:, None, None]
         offset = drive_values(candidates, "torque_offset")[:, None, None]
-        measured = gain * self._linear(torque) + offset
+        measured = gain * self._rows.linear(torque) + offset
         for values in (position, velocity, measured, height):
-            values[:, self._padding] = np.nan
+            values[:, self._rows.padding] = np.nan
         return position, velocity, measured, height
 
     def _prepare_rows(self, recordings: Sequence[Recording], windows: Sequence[Window]) -> None:
         """Place every window's rows among the ticks and collect initial states."""
-        length = max(w.length for w in windows)
+        times = []
         self._begin = np.empty(len(windows))
-        times = np.zeros((len(windows), length))
-        self._padding = np.ones((len(windows), length), dtype=bool)
         states = {n: start_states(recordings[n]) for n in self._numbers}
         self._q0, self._qd0 = np.empty((len(windows), 2)), np.empty((len(windows), 2))
         self._height0 = np.full(len(windows), np.nan)
@@ -118,16 +117,12 @@ class WindowGroup:
             recording = recordings[w.recording]
             stamps = recording.time[w.start : w.start + w.length]
             self._begin[i] = stamps[0]
-            rows = np.arange(w.length) * self._tick if self._zoh else stamps - stamps[0]
-            times[i, : w.length], times[i, w.length :] = rows, rows[-1]
-            self._padding[i, : w.length] = False
+            even = self._tick * np.arange(w.length, dtype=float)
+            times.append(even if self._zoh else stamps - stamps[0])
             self._q0[i], self._qd0[i] = (values[w.start] for values in states[w.recording])
             if recording.has_column("height_m"):
                 self._height0[i] = recording.trace.column("height_m")[w.start]
-        place = times / self._tick
-        self._ticks = int(np.ceil(place.max() - 1e-6)) + 2
-        self._before = np.minimum(np.floor(place + 1e-9).astype(int), self._ticks - 2)
-        self._share = np.clip(place - self._before, 0.0, 1.0)[..., None]
+        self._rows = RowPlaces(times, self._tick)
 
     def _prepare_commands(self) -> None:
         self._held, self._ramps, self._gains = [], [], []
@@ -187,9 +182,9 @@ class WindowGroup:
         Of shape (ticks, n, 2) the first three, (ticks, n) the last.
         """
         windows, count = len(self._begin), simulation.nsim
-        history = tuple(np.full((self._ticks, count, 2), np.nan) for _ in range(3))
+        history = tuple(np.full((self._rows.ticks, count, 2), np.nan) for _ in range(3))
         positions, velocities, torques = history
-        heights = np.full((self._ticks, count), np.nan)
+        heights = np.full((self._rows.ticks, count), np.nan)
         q, qd = simulation.bind("qpos")[:, -2:], simulation.bind("qvel")[:, -2:]
         base = simulation.bind("qpos")[:, 0] if self._setup.rig != "fixed-base" else np.nan
         ctrl = simulation.bind("ctrl")
@@ -208,7 +203,7 @@ class WindowGroup:
         seen = VelocityWindow(window, self._tick, q, qd)
         integral, last = np.zeros((count, 2)), np.zeros((count, 2))
         alive = np.arange(count)
-        for tick in range(self._ticks):
+        for tick in range(self._rows.ticks):
             if tick % _BLOCK == 0:
                 commands, gains = self._block(tick, delay, candidates)
             target, rate, feed = np.split(commands[tick % _BLOCK], 3, axis=-1)
@@ -249,7 +244,7 @@ class WindowGroup:
     ) -> tuple[Array, Array]:
         """Return a block of ticks' commands, (ticks, n, 6), and gains, (ticks, 3, n, 2)."""
         windows, number = len(self._begin), len(candidates)
-        ticks = np.arange(tick, min(tick + _BLOCK, self._ticks))[:, None, None] * self._tick
+        ticks = np.arange(tick, min(tick + _BLOCK, self._rows.ticks))[:, None, None] * self._tick
         late = np.zeros(number) if self._zoh else delay[::windows]
         late = late[:1] if (late == late[0]).all() else late
         ramp = np.array([[c.drive.ramp] for c in candidates])
@@ -274,29 +269,3 @@ class WindowGroup:
         for index, name in enumerate(("stiffness", "damping")):
             require_gains(gains[:, index], name, self._recordings[0])
         return commands.reshape(len(ticks), -1, 6), gains.reshape(len(ticks), 3, -1, 2)
-
-    def _between_ticks(self, q: Array, qd: Array) -> tuple[Array, Array]:
-        """Return position and velocity at the rows by cubic interpolation of the ticks.
-
-        Args:
-            q: Joint positions, rad, (ticks, candidates, windows, 2).
-            qd: Joint velocities, rad/s, likewise.
-        """
-        q0, q1 = self._ends(q)
-        v0, v1 = (self._tick * v for v in self._ends(qd))
-        s, jump = self._share, q1 - q0
-        square, cube = 3 * jump - 2 * v0 - v1, v0 + v1 - 2 * jump
-        position = q0 + s * (v0 + s * (square + s * cube))
-        velocity = (v0 + s * (2 * square + s * 3 * cube)) / self._tick
-        return position, velocity
-
-    def _linear(self, values: Array) -> Array:
-        before, after = self._ends(values)
-        between: Array = before + self._share * (after - before)
-        return between
-
-    def _ends(self, values: Array) -> tuple[Array, Array]:
-        """Return what stands at the ticks around each row, (candidates, windows, rows, 2)."""
-        windows = np.arange(len(self._begin))[:, None]
-        moved = np.moveaxis(values, 0, 2)
-        return moved[:, windows, self._before], moved[:, windows, self._before + 1]

@@ -1,0 +1,94 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from hopping_leg.errors import UsageError
+from hopping_leg.identify.least_squares import (
+    Found,
+    LeastSquaresOptions,
+    jacobian,
+    least_squares,
+    multi_start,
+)
+from hopping_leg.identify.parameters import choose
+from tests.identify.searches import CAD, RUN, SCORING, TRUTH, TWO, bowl, killed, objective
+from tests.identify.twin import record, swing
+
+
+def test_least_squares_finds_the_twin():
+    parameters = choose(CAD, list(TRUTH))
+    found = least_squares(objective(parameters).residuals, parameters)
+    values = parameters.values(found.vector)
+    np.testing.assert_allclose(values, list(TRUTH.values()), rtol=2e-3)
+
+
+def test_a_killed_least_squares_resumes_exactly(tmp_path):
+    def curved(vectors):
+        return np.concatenate([bowl(vectors), 0.5 * np.sin(3 * vectors)], axis=1)
+
+    options = LeastSquaresOptions(rounds=5, evaluations=2, tolerance=-1.0)
+    whole = least_squares(curved, TWO, options)
+    file = tmp_path / "state.json"
+    with pytest.raises(KeyboardInterrupt):
+        least_squares(killed(curved, 7), TWO, options, checkpoint=file)
+    assert file.exists()
+    resumed = least_squares(curved, TWO, options, checkpoint=file)
+    np.testing.assert_array_equal(resumed.vector, whole.vector)
+    assert resumed.history == whole.history
+
+
+def test_a_foreign_checkpoint_is_refused(tmp_path):
+    file = tmp_path / "state.json"
+    file.write_text("[]")
+    with pytest.raises(UsageError, match="no checkpoint"):
+        least_squares(bowl, TWO, checkpoint=file)
+    assert file.read_text() == "[]"
+
+
+def test_many_starts_return_the_best_first():
+    low, high = TWO.bounds
+    seen = []
+
+    def search(number, start):
+        seen.append(start)
+        return Found(start, float(np.sum(start**2)), 1, [])
+
+    found = multi_start(search, TWO, 5, seed=0)
+    assert [f.cost for f in found] == sorted(f.cost for f in found)
+    assert all((low <= s).all() and (s <= high).all() for s in seen)
+    np.testing.assert_array_equal(seen[0], [0.0, 0.0])
+
+
+def test_differences_stay_inside_the_bounds():
+    low, high = TWO.bounds
+    seen = []
+    slopes = jacobian(lambda v: seen.append(v) or bowl(v), low, (low, high), 1e-3)
+    assert (np.concatenate(seen) >= low).all()
+    np.testing.assert_allclose(slopes, np.array([[2.0, 0.3], [0.1, 1.0]]).T, rtol=1e-6)
+
+
+def test_a_recording_that_the_model_cannot_explain_hardly_moves_the_estimate():
+    weak = record(
+        CAD.replace({**TRUTH, "knee.motor.torque_limit": 0.3}).robot, swing(2.0, phase=1.0)
+    )
+    parameters = choose(CAD, list(TRUTH))
+
+    def errors(scoring):
+        goal = objective(parameters, scoring, [RUN, weak])
+        found = least_squares(goal.residuals, parameters, levels=goal.levels)
+        return np.abs(parameters.values(found.vector) / list(TRUTH.values()) - 1)
+
+    assert errors(SCORING).max() > 0.5
+    assert errors(dataclasses.replace(SCORING, unexplained=1.0)).max() < 0.02
+
+
+def test_steps_follow_the_slope_of_the_levelled_cost():
+    goal = objective(TWO, dataclasses.replace(SCORING, unexplained=1.0))
+    vector, shift = np.array([0.5, -0.5]), 1e-4 * np.eye(2)
+    residuals = goal.residuals(vector[None])[0]
+    weights = goal.levels.weights(residuals)
+    assert weights.min() < 0.1
+    slopes = jacobian(goal.residuals, vector, TWO.bounds, 1e-4)
+    expected = (goal(vector + shift) - goal(vector - shift)) / 2e-4
+    np.testing.assert_allclose(2 * (weights**2 * residuals) @ slopes, expected, rtol=1e-3)
