@@ -1,0 +1,110 @@
+"""Tables of what the package itself knows: robots, ranges, axes, faults."""
+
+import dataclasses
+import math
+
+from macros_results import grid, number
+
+from hopping_leg.cli.robots import derived, numbers
+from hopping_leg.deploy.emulator.faults import KINDS
+from hopping_leg.evaluate.faults.families import FAMILIES
+from hopping_leg.evaluate.robustness.axes import AXES
+from hopping_leg.robot import load_robot
+from hopping_leg.robot.files import load_tree
+from hopping_leg.sim.twins import TWIN_RANGES
+from hopping_leg.trace import COLUMNS
+
+
+def robot(name: str) -> str:
+    """Return every number of a shipped robot as a table."""
+    leg = load_robot(name)
+    rows = [
+        [f"`{path}`", f"{entry['value']:g}", entry["unit"], entry["source"]]
+        for path, entry in numbers(load_tree(name))
+    ]
+    rows += [[f"`{path}`", number(entry), "", "computed"] for path, entry in derived(leg).items()]
+    return grid(["number", "value", "unit", "source"], rows)
+
+
+def trace_columns() -> str:
+    """Return the columns that every trace has as a table; units are the ends of their names."""
+    units = {"_m_s": "m/s", "_rad_s": "rad/s", "_rad": "rad", "_nm": "N m", "_s": "s", "_m": "m"}
+    rows = [
+        [f"`{name}`", next(unit for end, unit in units.items() if name.endswith(end)), meaning]
+        for name, meaning in COLUMNS.items()
+    ]
+    return grid(["column", "unit", "meaning"], rows)
+
+
+def search_space(recipe: str) -> str:
+    """Return what `hop tune` searches of a recipe as a table."""
+    from hopping_leg.learn.recipes import get_recipe
+    from hopping_leg.learn.search_space import SPACES, OneOf, dimensions
+
+    rows, shipped = [], get_recipe(recipe)
+    for name, found in dimensions(SPACES[recipe]).items():
+        if isinstance(found, OneOf):
+            where = ", ".join(str(found.stored(choice)) for choice in found.choices)
+        else:
+            values = dataclasses.asdict(found)  # type: ignore[call-overload]
+            where = "{low:g} to {high:g}".format(**values) + (", log" if values["log"] else "")
+        rows.append([f"`{name}`", where, str(found.stored(getattr(shipped, name)))])
+    return grid(["number", "searched", "recipe"], rows)
+
+
+def twin_ranges() -> str:
+    """Return the distribution of twins as a table."""
+    rows = [
+        [f"`{r.path}`", f"{r.low:g}", f"{r.high:g}", r.unit, r.scale, r.source] for r in TWIN_RANGES
+    ]
+    return grid(["number", "from", "to", "unit", "scale", "source"], rows)
+
+
+def robustness_axes() -> str:
+    """Return the axes of the robustness benchmark as a table."""
+    rows = [
+        [
+            f"`{axis.name}`",
+            axis.meaning,
+            "" if axis.unit == "1" else axis.unit,
+            ", ".join(f"{level:g}" for level in axis.levels),
+            axis.leaderboard,
+            "{:g} to {:g}".format(*axis.moderate),
+        ]
+        for axis in AXES
+    ]
+    return grid(["axis", "a level is", "unit", "levels", "R", "in `joint`"], rows)
+
+
+def fault_kinds() -> str:
+    """Return what a fault script may name as a table."""
+    rows = []
+    for name, kind in KINDS.items():
+        value = f"{kind.value:g} {kind.unit}" if kind.unit else ""
+        if math.isnan(kind.duration):
+            lasts = "`count` replies"
+        else:
+            lasts = "on" if math.isinf(kind.duration) else f"{kind.duration:g} s"
+        rows.append([f"`{name}`", kind.text, value, lasts])
+    return grid(["kind", "what happens", "value by default", "lasts"], rows)
+
+
+def fault_families() -> str:
+    """Return the campaign's families and for which reasons a run may end as a table."""
+    rows = []
+    for name, family in FAMILIES.items():
+        reasons = ", ".join(sorted(reason.name for reason in family.reasons))
+        nothing = "not armed" if family.refused else "the drives brake"
+        rows.append([name, f"`{reasons}`" if reasons else nothing])
+    return grid(["family", "correct ends"], rows)
+
+
+MACROS = {
+    "fault_families": fault_families,
+    "fault_kinds": fault_kinds,
+    "robot": robot,
+    "robustness_axes": robustness_axes,
+    "search_space": search_space,
+    "trace_columns": trace_columns,
+    "twin_ranges": twin_ranges,
+}
