@@ -42,7 +42,10 @@ class QuietRecipe(FastRecipe):
 
 
 steps = int(sys.argv[1]) if len(sys.argv) > 1 else 200_000
-folder = Path("runs/quiet")
+folder = Path(f"runs/quiet-{steps}")
 recipe = QuietRecipe(steps=steps, rollout=32, judge_from=0.0)
-trained = train(recipe, load_robot("legv2-paper"), 0, folder, resume=folder.exists())
-print(f"{trained.steps} steps in {trained.minutes:.1f} minutes: {trained.policy}")
+if (folder / "policy.onnx").exists():
+    print(f"{folder} holds a finished training; delete it to train again.")
+else:
+    trained = train(recipe, load_robot("legv2-paper"), 0, folder, resume=folder.exists())
+    print(f"{trained.steps} steps in {trained.minutes:.1f} minutes: {trained.policy}")

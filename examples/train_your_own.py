@@ -1,7 +1,8 @@
 """Train a controller for a leg of your own, then let it hop.
 
 Run it as ``python examples/train_your_own.py [STEPS]``; the recipe's own number of steps gives a
-controller that hops well, the default here is only enough to see every part work.
+controller that hops well, the default here is only enough to see every part work. Killed, it goes
+on when it is run again; finished, its policy hops again.
 """
 
 import dataclasses
@@ -19,11 +20,15 @@ from hopping_leg.robot import load_robot
 steps = int(sys.argv[1]) if len(sys.argv) > 1 else 200_000
 leg = load_robot(str(Path(__file__).parent / "my_leg.toml"))
 recipe = dataclasses.replace(FastRecipe(), steps=steps, rollout=32, judge_from=0.0)
-folder = Path("runs/my_leg")
-trained = train(recipe, leg, 0, folder, resume=folder.exists())
-print(f"{trained.steps} steps in {trained.minutes:.1f} minutes: {trained.policy}")
+folder = Path(f"runs/my_leg-{steps}")
+file = folder / "policy.onnx"
+if file.exists():
+    print(f"{folder} holds a finished training; {file} is used.")
+else:
+    trained = train(recipe, leg, 0, folder, resume=folder.exists())
+    print(f"{trained.steps} steps in {trained.minutes:.1f} minutes: {file}")
 
-policy = load_controller(str(trained.policy), leg)
+policy = load_controller(str(file), leg)
 run = roll_out(policy, Setup(leg), np.full((1000, 4), recipe.task.commands[1]), seed=0)
 height = run.data["height_m"][400:]
 print(f"base between {height.min():.3f} and {height.max():.3f} m")
