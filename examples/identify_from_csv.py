@@ -1,7 +1,7 @@
 """Identify a leg from a CSV file and a sidecar that says how it was recorded.
 
 Run it as ``python examples/identify_from_csv.py [RUN.csv]``, with RUN.toml beside your file.
-Without one, the shipped twin plays a lab's leg and leaves both files in runs/. The identified leg is
+Without one, the shipped twin plays a lab's leg and leaves both files in runs/. What is found is
 runs/lab-leg.toml.
 """
 
