@@ -9,6 +9,7 @@ from hopping_leg.learn.fast import FastRecipe
 from hopping_leg.learn.imitation import Imitation
 from hopping_leg.learn.paper import PaperRecipe
 from hopping_leg.learn.precise import PreciseRecipe
+from hopping_leg.learn.recurrent import RecurrentRecipe
 from hopping_leg.learn.resumable import ResumablePPO
 from hopping_leg.robot import load_robot
 
@@ -19,6 +20,12 @@ TINY = PaperRecipe(
 TINY_FAST = FastRecipe(steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8))
 TINY_PRECISE = PreciseRecipe(
     steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8), student=(8, 8),
+    teaching=0.4, imitation=Imitation(memory=200, updates=4, batch=64),
+)  # fmt: skip
+
+
+TINY_RECURRENT = RecurrentRecipe(
+    steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8), memory=8,
     teaching=0.4, imitation=Imitation(memory=200, updates=4, batch=64),
 )  # fmt: skip
 

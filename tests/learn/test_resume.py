@@ -15,7 +15,15 @@ from hopping_leg.learn import judge
 from hopping_leg.learn import train as module
 from hopping_leg.learn.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
 from hopping_leg.learn.resumable import restore, state_of
-from tests.learn.learners import ROBOT, TINY, TINY_FAST, TINY_PRECISE, TinyPPO, learner
+from tests.learn.learners import (
+    ROBOT,
+    TINY,
+    TINY_FAST,
+    TINY_PRECISE,
+    TINY_RECURRENT,
+    TinyPPO,
+    learner,
+)  # fmt: skip
 
 
 def disturb_all_generators():
@@ -24,7 +32,9 @@ def disturb_all_generators():
 
 
 @pytest.mark.parametrize(
-    "recipe", [TINY, TinyPPO(), TINY_FAST, TINY_PRECISE], ids=["sac", "ppo", "fast", "precise"]
+    "recipe",
+    [TINY, TinyPPO(), TINY_FAST, TINY_PRECISE, TINY_RECURRENT],
+    ids=["sac", "ppo", "fast", "precise", "recurrent"],
 )
 def test_resuming_equals_never_having_stopped(recipe, tmp_path):
     straight = learner(recipe)

@@ -16,6 +16,7 @@ from hopping_leg.learn import judge, tuning
 from hopping_leg.learn.recipes import RECIPES
 from hopping_leg.learn.search_space import SPACES, defaults, dimensions
 from hopping_leg.learn.tuning import Tuning, open_study, tune
+from tests.clusters import local
 
 
 @pytest.fixture
@@ -199,3 +200,37 @@ def test_two_processes_share_a_study(tmp_path):
     assert sum(trial["state"] == "complete" for trial in trials) >= 3
     folders = {path.name for path in out.glob("trial-*")}
     assert folders == {f"trial-{trial['number']:04d}" for trial in trials}
+
+
+def judge_briefly():
+    judge._SECONDS = 0.5
+
+
+@pytest.mark.slow
+def test_a_ray_cluster_works_on_a_study(tmp_path, monkeypatch):
+    pytest.importorskip("ray", reason="Ray is not installed (extra 'cluster')")
+    monkeypatch.chdir(tmp_path)
+    words = ["tune", "fast", "--trials", "3", "--steps", "128", "--snapshots", "1"]
+    words += ["--set", "legs=2", "--study", "study.db", "--out", "out", "--ray", "local"]
+    with local(runtime_env={"worker_process_setup_hook": judge_briefly}):
+        assert main(words) == 0
+    out = tmp_path / "out"
+    result = json.loads((out / "trials.json").read_text())
+    complete = [trial for trial in result["trials"] if trial["state"] == "complete"]
+    assert len(complete) >= 3
+    assert all((out / f"trial-{t['number']:04d}" / "policy.onnx").exists() for t in complete)
+    first, second = sorted(complete, key=lambda trial: trial["number"])[:2]
+    assert first["params"] != second["params"]
+
+
+def test_a_file_is_no_database_for_machines_elsewhere(small, monkeypatch):
+    class Cluster:
+        elsewhere = ("node-2", "node-3")
+
+        def __init__(self, address):
+            assert address == "10.0.0.1:6379"
+
+    monkeypatch.setattr(tuning, "RayCluster", Cluster)
+    with pytest.raises(UsageError, match=r"node-2, node-3 cannot share .* postgresql"):
+        tune(small, ray="10.0.0.1:6379")
+    assert not (small.out.parent / "study.db").exists()

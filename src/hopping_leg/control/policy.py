@@ -26,6 +26,10 @@ SCHEMA = 1
 METADATA_KEY = "hopping_leg"
 """Entry of the ONNX metadata that holds a ``Card`` as JSON."""
 
+MEMORY, NEXT_MEMORY = "memory", "next_memory"
+"""Input and output of a graph that remembers: what it gave at a tick is what it gets at the next,
+and zeros at first."""
+
 _log = logging.getLogger(__name__)
 _ROUNDING = 1e-9
 
@@ -113,8 +117,8 @@ class Policy:
             )
         self.card = Card.from_json(text, origin)
         self._layout: Layout = make_layout(self.card.layout, 1 / self.card.rate)
-        _check_signature(self._session, self._layout, origin)
-        self._torque = np.zeros((0, 2))
+        self._memory_size = _check_signature(self._session, self._layout, origin)
+        self.reset(0)
 
     @staticmethod
     def load(path: Path, name: str | None = None) -> "Policy":
@@ -168,6 +172,7 @@ class Policy:
         """Forget everything; the next measurement has ``count`` rows."""
         self._layout.reset(count)
         self._torque = np.zeros((count, 2))
+        self._memory = np.zeros((count, self._memory_size), np.float32)
 
     def act(self, measurement: Measurement) -> Array:
         """Return joint torques, N m, (n, 2).
@@ -178,7 +183,12 @@ class Policy:
         self._check_command(measurement.command)
         self._layout.update(measurement, self._torque)
         feeds = self._layout.inputs()
-        self._torque = self._session.run(None, feeds)[0].astype(np.float64)
+        if self._memory_size:
+            feeds[MEMORY] = self._memory
+        torque, *memory = self._session.run(None, feeds)
+        if memory:
+            (self._memory,) = memory
+        self._torque = torque.astype(np.float64)
         return self._torque
 
     def internals(self) -> dict[str, Array]:
@@ -212,11 +222,14 @@ def _open(content: bytes, origin: str) -> Any:  # noqa: ANN401
         ) from error
 
 
-def _check_signature(session: Any, layout: Layout, origin: str) -> None:  # noqa: ANN401
+def _check_signature(session: Any, layout: Layout, origin: str) -> int:  # noqa: ANN401
+    """Check a graph's inputs and outputs; return the entries of its memory, 0 if it has none."""
     found = {i.name: tuple(i.shape[1:]) for i in session.get_inputs()}
     outputs = [tuple(o.shape[1:]) for o in session.get_outputs()]
-    if found != layout.shapes or outputs != [(2,)]:
+    memory = found.pop(MEMORY, ())
+    if found != layout.shapes or outputs != ([(2,), memory] if memory else [(2,)]):
         raise PolicyError(
             f"{origin} takes {found} and gives {outputs}, but layout '{layout.name}' takes"
             f" {layout.shapes} and gives one array of two torques."
         )
+    return memory[0] if memory else 0

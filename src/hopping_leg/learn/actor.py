@@ -10,7 +10,7 @@ from torch import nn
 from hopping_leg.arrays import Array
 from hopping_leg.env.observation import Observation
 from hopping_leg.errors import UsageError
-from hopping_leg.learn.export import Network
+from hopping_leg.learn.export import Network, RecurrentUnit
 
 _NAMES = {nn.ReLU: "relu", nn.Tanh: "tanh", nn.ELU: "elu"}
 
@@ -57,6 +57,20 @@ def dense_network(parts: Sequence[nn.Module], observation: Observation, squash: 
     layers[0] = (layers[0][0][:, observation.order], layers[0][1])
     scaling = observation.scaling
     return Network(scaling.offset, scaling.gain, layers, _NAMES[kinds.pop()], squash, bound)
+
+
+def recurrent_network(
+    unit: nn.GRU, parts: Sequence[nn.Module], observation: Observation, squash: str
+) -> Network:
+    """Return dense layers behind a gated recurrent unit, as ``dense_network`` does."""
+    with torch.no_grad():
+        weights = [w.double().numpy().copy() for w in unit.all_weights[0]]
+    scaling = observation.scaling
+    weights[0] = weights[0][:, observation.order]
+    layers = [_weights(m) for part in parts for m in _flatten(part) if isinstance(m, nn.Linear)]
+    return Network(
+        scaling.offset, scaling.gain, layers, "tanh", squash, unit=RecurrentUnit(*weights)
+    )
 
 
 def _flatten(module: nn.Module) -> list[nn.Module]:

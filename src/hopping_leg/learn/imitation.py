@@ -1,13 +1,10 @@
-"""How a student learns from a teacher: what it has seen, and where the teacher aims."""
+"""How a student learns from a teacher, and where the teacher aims."""
 
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
 import torch
 
 from hopping_leg.arrays import Array
-from hopping_leg.learn.checkpoint import Tree
 
 _OUTLIER = 0.01
 """Error beyond which a hop counts no more, m: those after a new command miss by far."""
@@ -31,40 +28,6 @@ class Imitation:
     """Heights at which the teacher's aim is corrected."""
     aiming: float = 0.1
     """Share of the recent hops' mean error by which a rollout corrects the aim."""
-
-
-class Lessons:
-    """The newest observations, in half precision: far finer than the noise in them.
-
-    Args:
-        room: How many are kept.
-        size: Entries of an observation.
-    """
-
-    def __init__(self, room: int, size: int) -> None:
-        self._seen = torch.zeros((room, size), dtype=torch.float16)
-        self._next = self._count = 0
-
-    def add(self, observations: npt.NDArray[np.float32]) -> None:
-        """Keep observations, (..., size), in the place of the oldest."""
-        rows = torch.from_numpy(observations).reshape(-1, self._seen.shape[1])
-        places = (self._next + torch.arange(len(rows))) % len(self._seen)
-        self._seen[places] = rows.half()
-        self._next = int(places[-1]) + 1
-        self._count = min(self._count + len(rows), len(self._seen))
-
-    def draw(self, count: int) -> torch.Tensor:
-        """Return some of them at random, (count, size)."""
-        return self._seen[torch.randint(self._count, (count,))].float()
-
-    def state(self) -> Tree:
-        """Return everything that is kept."""
-        return {"seen": self._seen[: self._count].numpy(), "next": self._next}
-
-    def restore(self, state: Tree) -> None:
-        """Go on from a ``state``."""
-        self._next, self._count = state["next"], len(state["seen"])
-        self._seen[: self._count] = torch.from_numpy(state["seen"])
 
 
 class Aim:

@@ -17,6 +17,7 @@ from hopping_leg.learn.actor import dense_network
 from hopping_leg.learn.export import Network
 from hopping_leg.learn.fast import FastRecipe, cosine
 from hopping_leg.learn.imitation import Imitation
+from hopping_leg.learn.students import WindowStudent
 from hopping_leg.learn.taught import TaughtPolicy, TaughtPPO
 from hopping_leg.learn.vecenv import TaskVecEnv
 
@@ -69,8 +70,15 @@ class PreciseRecipe(FastRecipe):
                 **self.network_options(),
                 "measured": measured,
                 "teacher_sees": [*state, *self._last_torque()],
-                "student": self.student,
+                "student": lambda: self.make_student(env),
             },
+        )
+
+    def make_student(self, env: TaskVecEnv) -> nn.Module:
+        """Build the untrained student."""
+        (size,) = env.observation_space.shape
+        return WindowStudent(
+            env.task.observation.size, size, list(self.student), self.imitation.memory, nn.Tanh
         )
 
     def _last_torque(self) -> list[int]:
@@ -96,5 +104,5 @@ class PreciseRecipe(FastRecipe):
 
     def network(self, model: Any, env: TaskVecEnv) -> Network:  # noqa: ANN401
         """Return the student as it stands."""
-        student: nn.Module = model.policy.mlp_extractor.student_net
-        return dense_network([student], env.task.observation, "clip")
+        student: WindowStudent = model.policy.student
+        return dense_network([student.layers], env.task.observation, "clip")

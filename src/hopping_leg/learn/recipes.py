@@ -10,11 +10,12 @@ from hopping_leg.learn.fast import FastRecipe
 from hopping_leg.learn.paper import PaperRecipe
 from hopping_leg.learn.precise import PreciseRecipe
 from hopping_leg.learn.recipe import Recipe
+from hopping_leg.learn.recurrent import RecurrentRecipe
 from hopping_leg.sim.twins import IDENTIFIABLE, Range
 from hopping_leg.sim.variants import SURPRISES
 
 RECIPES: dict[str, type[Recipe]] = {
-    recipe.name: recipe for recipe in (FastRecipe, PaperRecipe, PreciseRecipe)
+    recipe.name: recipe for recipe in (FastRecipe, PaperRecipe, PreciseRecipe, RecurrentRecipe)
 }
 """Every recipe that ``hop train`` knows."""
 

@@ -5,18 +5,19 @@ has nothing to remember and learns in a few minutes. Then the student hops while
 every tick what it would do (DAgger, Ross et al. 2011), which is regression and bears any memory.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 import torch
-from torch import nn
-from torch.nn import functional
 
 from hopping_leg.env.task import PRIVILEGED_COMMAND
-from hopping_leg.learn.asymmetric import AsymmetricPolicy, dense
+from hopping_leg.learn.asymmetric import AsymmetricPolicy
 from hopping_leg.learn.checkpoint import Tree
-from hopping_leg.learn.imitation import Aim, Imitation, Lessons
+from hopping_leg.learn.imitation import Aim, Imitation
 from hopping_leg.learn.resumable import ResumablePPO
+from hopping_leg.learn.students import Student
 
 
 class TaughtPolicy(AsymmetricPolicy):
@@ -28,11 +29,12 @@ class TaughtPolicy(AsymmetricPolicy):
         imitating: Whether the student acts and learns, rather than the teacher.
         guidance: Chance that the teacher acts for an imitating student, leg by leg and tick by
             tick: at first the student would only show how to fall.
+        begun: Tells whose episode began with this tick, (n,).
 
     Args:
         measured: Entries that the student sees, the first ones.
         teacher_sees: Entries that the teacher sees.
-        student: Hidden layers of the student.
+        student: Builds it, a module.
     """
 
     def __init__(
@@ -40,24 +42,28 @@ class TaughtPolicy(AsymmetricPolicy):
         *args: Any,  # noqa: ANN401
         measured: int,
         teacher_sees: Sequence[int],
-        student: Sequence[int],
+        student: Callable[[], Any],
         **kwargs: Any,  # noqa: ANN401
     ) -> None:
         self.imitating, self.guidance = False, 0.0
-        self.measured, self._hidden = measured, list(student)
+        self.measured, self._make_student = measured, student
+        self.begun: Callable[[], npt.NDArray[np.bool_]] = lambda: np.ones((), np.bool_)
         super().__init__(*args, actor_size=measured, actor_sees=list(teacher_sees), **kwargs)
 
     def _build_mlp_extractor(self) -> None:
         super()._build_mlp_extractor()
-        student = dense(self.measured, self._hidden, self.activation_fn)
-        student.append(nn.Linear(self._hidden[-1], self.action_space.shape[0]))
-        self.mlp_extractor.student_net = student
+        self.mlp_extractor.student = self._make_student()
+
+    @property
+    def student(self) -> Student:
+        """What learns from the teacher."""
+        minds: Any = self.mlp_extractor
+        student: Student = minds.student
+        return student
 
     def student_action(self, observation: torch.Tensor) -> torch.Tensor:
         """Return what the student would do, unbounded, (n, 2)."""
-        minds: Any = self.mlp_extractor
-        action: torch.Tensor = minds.student_net(observation[:, : self.measured])
-        return action
+        return self.student.act(observation[:, : self.measured], self.begun())
 
     def teacher_action(self, observation: torch.Tensor) -> torch.Tensor:
         """Return what the teacher would do, within -1 and 1, (n, 2)."""
@@ -93,7 +99,7 @@ class TaughtPPO(ResumablePPO):
         scaling = task.observation.scaling
         self._told = task.observation.size + PRIVILEGED_COMMAND
         self._aim = Aim(scaling.offset[-1], scaling.gain[-1], imitation.knots)
-        self._lessons = Lessons(imitation.memory, self.observation_space.shape[0])
+        self.policy.begun = lambda: self._last_episode_starts
 
     def train(self) -> None:
         """Learn from the rollout."""
@@ -104,29 +110,35 @@ class TaughtPPO(ResumablePPO):
         self._update_learning_rate(policy.optimizer)
         commands, errors = self.env.recent_hops
         self._aim.correct(commands, errors, self._imitation.aiming)
-        self._lessons.add(self.rollout_buffer.observations)
+        buffer = self.rollout_buffer
+        policy.student.take_in(buffer.observations, buffer.episode_starts.astype(np.bool_))
         losses = [self._imitate(policy) for _ in range(self._imitation.updates)]
         self._n_updates += self._imitation.updates
         self.logger.record("train/imitation_loss", sum(losses) / len(losses))
 
     def _imitate(self, policy: TaughtPolicy) -> float:
         """Take one step towards what the teacher would do; return the loss."""
-        seen = self._lessons.draw(self._imitation.batch)
-        told = seen.clone()
-        told[:, self._told] = self._aim(seen[:, self._told])
-        with torch.no_grad():
-            wanted = policy.teacher_action(told)
-        loss = functional.mse_loss(policy.student_action(seen), wanted)
+        loss = policy.student.loss(self._imitation.batch, self._wanted)
         policy.optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         policy.optimizer.step()
         return loss.item()
 
+    def _wanted(self, seen: torch.Tensor) -> torch.Tensor:
+        """Return what the teacher would do where it is told what it should aim at, (n, 2)."""
+        told = seen.clone()
+        told[:, self._told] = self._aim(seen[:, self._told])
+        policy: TaughtPolicy = self.policy
+        with torch.no_grad():
+            return policy.teacher_action(told)
+
     def own_state(self) -> Tree:
         """Return what the student learns from, and where the teacher aims."""
-        return {"lessons": self._lessons.state(), "aim": self._aim.values.numpy().copy()}
+        policy: TaughtPolicy = self.policy
+        return {"student": policy.student.state(), "aim": self._aim.values.numpy().copy()}
 
     def restore_own(self, state: Tree) -> None:
         """Go on from an ``own_state``."""
-        self._lessons.restore(state["lessons"])
+        policy: TaughtPolicy = self.policy
+        policy.student.restore(state["student"])
         self._aim.values = torch.from_numpy(state["aim"])

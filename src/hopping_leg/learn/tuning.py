@@ -6,17 +6,15 @@ the training's checkpoint where it can reach it.
 """
 
 import dataclasses
-import multiprocessing
+import functools
 import shutil
 import warnings
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import optuna
 from optuna.exceptions import ExperimentalWarning
-from optuna.importance import get_param_importances
 from optuna.pruners import MedianPruner
 from optuna.samplers import TPESampler
 from optuna.storages import RDBStorage
@@ -24,17 +22,17 @@ from optuna.study import Study
 from optuna.trial import FrozenTrial, Trial, TrialState
 from sqlalchemy.exc import SQLAlchemyError
 
+from hopping_leg.cluster import RayCluster
 from hopping_leg.errors import PhysicsError, UsageError
+from hopping_leg.learn.crew import work_here, work_on
 from hopping_leg.learn.judge import FINAL_SEEDS, FIRST_SEED
 from hopping_leg.learn.recipe import Recipe
 from hopping_leg.learn.recipes import change, get_recipe
 from hopping_leg.learn.run_folder import read_result
 from hopping_leg.learn.search_space import SPACES, defaults, dimensions, suggest
 from hopping_leg.learn.train import train
+from hopping_leg.learn.trial_record import ERROR, FOLDER, record
 from hopping_leg.robot import load_robot
-
-_FOLDER, _ERROR = "folder", "error"
-"""Attributes of a trial: number of the trial whose folder it goes on in; why it failed."""
 
 _FAILURES = (PhysicsError, ValueError, FloatingPointError)
 """What a training with bad numbers may end in; the study goes on."""
@@ -90,29 +88,26 @@ class Tuning:
         }
 
 
-def tune(tuning: Tuning, workers: int = 1) -> dict[str, Any]:
+def tune(tuning: Tuning, workers: int | None = None, ray: str | None = None) -> dict[str, Any]:
     """Search until the study has all its trials; return them, see ``record``.
 
     Args:
         tuning: What is searched.
-        workers: Processes on this machine.
+        workers: Processes on this machine, one by default; tasks of the cluster, by default one
+            per CPU.
+        ray: Address of a Ray cluster that works, ``local`` for one on this machine.
 
     Raises:
-        UsageError: The database cannot be used, or holds a study of something else.
+        UsageError: The database cannot be used, or holds a study of something else; there is no
+            such cluster, or some of it cannot reach the database.
     """
+    cluster = None if ray is None else _reach(tuning, ray)
     study = open_study(tuning)
-    if workers == 1:
-        work(tuning)
+    if cluster is None:
+        work_here(functools.partial(work, tuning), workers or 1)
     else:
-        context = multiprocessing.get_context("spawn")
-        crew = [context.Process(target=_work_beside, args=(tuning, k)) for k in range(workers)]
-        for process in crew:
-            process.start()
-        for process in crew:
-            process.join()
-        if any(process.exitcode for process in crew):
-            raise UsageError("A worker ended early; what it began is taken up by the next call.")
-    return record(study, tuning)
+        work_on(cluster, functools.partial(work, _anywhere(tuning)), workers)
+    return {**tuning.conditions, "robot": tuning.robot, **record(study)}
 
 
 def work(tuning: Tuning, worker: int = 0) -> None:
@@ -124,14 +119,6 @@ def work(tuning: Tuning, worker: int = 0) -> None:
             catch=_FAILURES,
             callbacks=[lambda study, _: study.stop() if _over(study, tuning) else None],
         )
-
-
-def _work_beside(tuning: Tuning, worker: int) -> None:
-    """Work in a process of its own, which an interruption ends without a word."""
-    try:
-        work(tuning, worker)
-    except KeyboardInterrupt:
-        raise SystemExit(1) from None
 
 
 def open_study(tuning: Tuning, worker: int = 0) -> Study:
@@ -183,26 +170,11 @@ def open_study(tuning: Tuning, worker: int = 0) -> Study:
     return study
 
 
-def record(study: Study, tuning: Tuning) -> dict[str, Any]:
-    """Return all trials, the best, and each number's importance, as JSON values."""
-    trials = study.get_trials(deepcopy=False)
-    done = [t for t in trials if t.state is TrialState.COMPLETE]
-    best = min(done, key=lambda t: float(t.value or 0.0)) if done else None
-    return {
-        **tuning.conditions,
-        "robot": tuning.robot,
-        "trials": [_row(trial) for trial in trials],
-        "best": None if best is None else _row(best),
-        "importance": _importance(study, done),
-        "versions": {name: version(name) for name in ("hopping-leg", "optuna", "torch", "mujoco")},
-    }
-
-
 def _run_trial(trial: Trial, tuning: Tuning) -> float:
     """Train with a trial's numbers; return the score of the policy it selects, m."""
     space = SPACES[tuning.recipe]
     recipe = dataclasses.replace(_recipe(tuning), **suggest(trial, space))
-    folder = tuning.out / f"trial-{trial.user_attrs.get(_FOLDER, trial.number):04d}"
+    folder = tuning.out / f"trial-{trial.user_attrs.get(FOLDER, trial.number):04d}"
     if (folder / "policy.onnx").exists():
         return float(read_result(folder)["selected"]["score_m"])
 
@@ -228,22 +200,42 @@ def _run_trial(trial: Trial, tuning: Tuning) -> float:
         shutil.rmtree(folder / "checkpoints", ignore_errors=True)
         raise
     except _FAILURES as error:
-        trial.set_user_attr(_ERROR, f"{type(error).__name__}: {error}")
+        trial.set_user_attr(ERROR, f"{type(error).__name__}: {error}")
         raise
     return float(read_result(folder)["selected"]["score_m"])
 
 
+def _reach(tuning: Tuning, address: str) -> RayCluster:
+    """Return the cluster; refuse a file as database where others than this machine would work."""
+    cluster = RayCluster(address)
+    if tuning.storage.startswith("sqlite") and cluster.elsewhere:
+        raise UsageError(
+            f"{', '.join(cluster.elsewhere)} cannot share the study in {tuning.storage}: SQLite is"
+            " for one machine; name a database that all reach, e.g. --study"
+            " postgresql://host/tuning."
+        )
+    return cluster
+
+
+def _anywhere(tuning: Tuning) -> Tuning:
+    """Return the same search, from whichever folder a worker starts."""
+    robot = tuning.robot
+    if robot.endswith(".toml"):
+        robot = str(Path(robot).resolve())
+    return dataclasses.replace(tuning, out=tuning.out.resolve(), robot=robot)
+
+
 def _take_up(study: Study, trial: FrozenTrial | Trial) -> None:
     """Let the next process go on with a trial that was cut off."""
-    folder = trial.user_attrs.get(_FOLDER, trial.number)
-    study.enqueue_trial(trial.params, user_attrs={_FOLDER: folder})
+    folder = trial.user_attrs.get(FOLDER, trial.number)
+    study.enqueue_trial(trial.params, user_attrs={FOLDER: folder})
 
 
 def _over(study: Study, tuning: Tuning) -> bool:
     """Tell whether a study has all its trials; those that were cut off do not count."""
     trials = study.get_trials(deepcopy=False)
     ended = (TrialState.COMPLETE, TrialState.PRUNED)
-    return sum(t.state in ended or _ERROR in t.user_attrs for t in trials) >= tuning.trials
+    return sum(t.state in ended or ERROR in t.user_attrs for t in trials) >= tuning.trials
 
 
 def _recipe(tuning: Tuning) -> Recipe:
@@ -262,27 +254,6 @@ def _searched(tuning: Tuning) -> dict[str, Any]:
             f"Recipe '{tuning.recipe}' has no search space; valid: {', '.join(SPACES)}."
         )
     return dict(dimensions(SPACES[tuning.recipe]))
-
-
-def _importance(study: Study, done: list[FrozenTrial]) -> dict[str, float]:
-    """Return how much each number matters (PED-ANOVA), empty where too few trials tell."""
-    if len(done) < 4 or len({trial.value for trial in done}) < 2:
-        return {}
-    return {name: float(share) for name, share in get_param_importances(study).items()}
-
-
-def _row(trial: FrozenTrial) -> dict[str, Any]:
-    began, ended = trial.datetime_start, trial.datetime_complete or None
-    return {
-        "number": trial.number,
-        "state": trial.state.name.lower(),
-        "score_m": trial.value if trial.state is TrialState.COMPLETE else None,
-        "snapshots_m": [trial.intermediate_values[k] for k in sorted(trial.intermediate_values)],
-        "params": trial.params,
-        "minutes": (ended - began).total_seconds() / 60 if began and ended else None,
-        "goes_on_from": trial.user_attrs.get(_FOLDER),
-        "error": trial.user_attrs.get(_ERROR),
-    }
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401

@@ -1,0 +1,48 @@
+"""Several workers at once: processes on this machine, or tasks of a Ray cluster."""
+
+import multiprocessing
+from collections.abc import Callable
+
+from hopping_leg.cluster import RayCluster
+from hopping_leg.errors import UsageError
+
+Work = Callable[[int], None]
+"""Works until nothing is left, given the worker's number; it can be sent elsewhere."""
+
+
+def work_here(work: Work, workers: int) -> None:
+    """Work in this process, or in so many of this machine's.
+
+    Raises:
+        UsageError: One of several ended early.
+    """
+    if workers == 1:
+        work(0)
+        return
+    context = multiprocessing.get_context("spawn")
+    crew = [context.Process(target=_work_beside, args=(work, k)) for k in range(workers)]
+    for process in crew:
+        process.start()
+    for process in crew:
+        process.join()
+    if any(process.exitcode for process in crew):
+        raise UsageError("A worker ended early; what it began is taken up by the next call.")
+
+
+def work_on(cluster: RayCluster, work: Work, workers: int | None = None) -> None:
+    """Work in tasks of a Ray cluster, each of which takes one CPU.
+
+    Args:
+        cluster: Starts a task that dies again, on another machine if its own is gone.
+        work: Done by each task.
+        workers: How many tasks; None takes one per CPU.
+    """
+    cluster.map(work, ((k,) for k in range(workers or cluster.cores)))
+
+
+def _work_beside(work: Work, worker: int) -> None:
+    """Work in a process of its own, which an interruption ends without a word."""
+    try:
+        work(worker)
+    except KeyboardInterrupt:
+        raise SystemExit(1) from None
