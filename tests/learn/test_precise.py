@@ -1,5 +1,7 @@
 """The precise recipe: a teacher on the true state, a student that comes to act like it."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import torch
@@ -103,3 +105,12 @@ def test_its_range_lies_within_what_the_leg_reaches():
     low, high = RECIPE.task.command_bounds
     assert low < min(RECIPE.judge_commands) < max(RECIPE.judge_commands) < high
     assert ROBOT.straight_height > low
+
+
+def test_the_papers_observation_can_be_taught_too():
+    task = dataclasses.replace(TINY_PRECISE.task, observation="three-samples")
+    model = learner(dataclasses.replace(TINY_PRECISE, task=task))
+    model.on_boundary = lambda: setattr(model.policy, "imitating", True)
+    model.learn(128)
+    assert model.policy.measured == 15
+    assert np.isfinite(model.logger.name_to_value["train/imitation_loss"])

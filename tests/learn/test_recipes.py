@@ -75,3 +75,12 @@ def test_a_run_on_ranges_of_ones_own_still_says_how_it_was_made(tmp_path):
     folder = RunFolder(tmp_path, recipe, load_robot("legv2"), 0, None)
     assert folder.command.startswith("hop train --recipe fast")
     assert "--randomise" not in folder.command
+
+
+def test_a_run_says_what_its_policy_saw_where_that_is_not_the_recipes(tmp_path):
+    recipe, robot = get_recipe("precise"), load_robot("legv2")
+    assert "--observation" not in RunFolder(tmp_path, recipe, robot, 0, None).command
+    task = dataclasses.replace(recipe.task, observation="three-samples")
+    bare = dataclasses.replace(recipe, task=task)
+    command = RunFolder(tmp_path, bare, robot, 0, None).command
+    assert "--observation three-samples" in command

@@ -29,7 +29,7 @@ class Options:
 
     recipe: str = "fast"
     """How to train: `fast` for accurate hopping soon, `precise` for more accurate hopping later,
-    `paper` for the paper's method."""
+    `recurrent` for the same with a memory in the network, `paper` for the paper's method."""
     robot: str = "legv2-paper"
     """A shipped robot or the path of a .toml file."""
     seed: int = 0
@@ -45,6 +45,8 @@ class Options:
     randomise: Literal["none", "twins", "surprises"] = "none"
     """What each leg in training draws for itself: nothing; friction, inertia and ground from the
     twins' ranges; or payload, rail, ground and motor gains around the robot's."""
+    observation: Literal["three-samples", "dated", "dated-long"] | None = None
+    """What the policy sees instead of what the recipe shows it; three-samples is the paper's."""
     minutes: float | None = None
     """Stop after so much wall-clock time; default: when the recipe's steps are done."""
     steps: int | None = None
@@ -72,6 +74,9 @@ def run(args: Options) -> None:
         recipe = dataclasses.replace(recipe, steps=args.steps)
     recipe = change(recipe, args.set)
     recipe = randomise(recipe, args.randomise)
+    if args.observation is not None:
+        task = dataclasses.replace(recipe.task, observation=args.observation)
+        recipe = dataclasses.replace(recipe, task=task)
     out = args.out or Path("runs") / f"{args.recipe}-seed{args.seed}"
     try:
         trained = train(

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from torch import nn
 
-from hopping_leg.control.layouts import LAYOUTS
+from hopping_leg.control.layouts import make_layout
 from hopping_leg.env import ApexRewardOptions, TaskOptions
 from hopping_leg.learn.actor import dense_network
 from hopping_leg.learn.export import Network
@@ -82,8 +82,10 @@ class PreciseRecipe(FastRecipe):
         )
 
     def _last_torque(self) -> list[int]:
-        """Return where the torques of the last tick stand in an observation."""
-        shapes = LAYOUTS[self.task.observation].shapes
+        """Return where the torques of the last tick stand in an observation, if they do."""
+        shapes = make_layout(self.task.observation, 1 / self.task.rate).shapes
+        if "past_torque" not in shapes:
+            return []
         before = list(shapes)[: list(shapes).index("past_torque")]
         first = sum(int(np.prod(shapes[name])) for name in before)
         return [first, first + 1]

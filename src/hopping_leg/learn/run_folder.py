@@ -9,7 +9,7 @@ from typing import Any
 from hopping_leg.errors import UsageError
 from hopping_leg.learn.checkpoint import Tree, list_checkpoints, read_checkpoint
 from hopping_leg.learn.recipe import Recipe
-from hopping_leg.learn.recipes import changes_of, randomised_by
+from hopping_leg.learn.recipes import RECIPES, changes_of, randomised_by
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import write_atomically
 
@@ -72,6 +72,9 @@ class RunFolder:
         ranges = randomised_by(config["options"])
         if ranges not in ("none", None):
             words += ["--randomise", ranges]
+        seen = config["options"]["task"]["observation"]
+        if config["recipe"] in RECIPES and seen != RECIPES[config["recipe"]]().task.observation:
+            words += ["--observation", seen]
         changes = changes_of(config["recipe"], config["options"])
         return " ".join([*words, "--set", *changes] if changes else words)
 
