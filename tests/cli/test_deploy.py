@@ -1,22 +1,18 @@
 """The verbs that talk to motors, with emulated drives in lockstep behind them."""
 
-import contextlib
 import functools
 import sys
 
 import numpy as np
 import pytest
 
-from hopping_leg.cli import deploy, main, motors, record_motors
-from hopping_leg.deploy import driver, session
+from hopping_leg.cli import main
 from hopping_leg.deploy.emulator.faults import Fault
-from hopping_leg.deploy.emulator.lockstep import Lockstep
-from hopping_leg.deploy.emulator.start import Start
-from hopping_leg.deploy.sequence import Timing
 from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.robot import load_robot
 from hopping_leg.trace import Trace
+from tests.cli.emulated import put_behind
 
 RUN = ["deploy", "energy-shaping", "--transport", "/dev/leg", "--seconds", "0.3"]
 
@@ -25,19 +21,7 @@ RUN = ["deploy", "energy-shaping", "--transport", "/dev/leg", "--seconds", "0.3"
 def emulate(monkeypatch):
     """Return a function that puts emulated drives behind every transport."""
 
-    def emulated(**start):
-        lockstep = Lockstep(Start(**{"robot": "legv2-paper", **start}).build())
-        monkeypatch.setattr(motors, "opener", lambda name: None)
-        monkeypatch.setattr(driver, "MoteusLink", lambda robot, opener: lockstep.link)
-        monkeypatch.setattr(session, "RealClock", lambda: lockstep)
-        quick = functools.partial(Timing, rise=0.4, settle=0.1, sink=0.5)
-        for verb in (deploy, record_motors):
-            monkeypatch.setattr(verb, "Timing", quick)
-        quiet = contextlib.nullcontext(())
-        monkeypatch.setattr(session, "keeping_time", lambda **_: quiet)
-        return lockstep
-
-    return emulated
+    return functools.partial(put_behind, monkeypatch)
 
 
 def test_deploy_checks_runs_and_leaves_a_trace(emulate, tmp_path, capsys):

@@ -1,0 +1,24 @@
+"""Emulated drives in virtual time behind every transport of the command line."""
+
+import contextlib
+import functools
+
+from hopping_leg.cli import deploy, motors, record_motors
+from hopping_leg.deploy import driver, session
+from hopping_leg.deploy.emulator.lockstep import Lockstep
+from hopping_leg.deploy.emulator.start import Start
+from hopping_leg.deploy.sequence import Timing
+
+
+def put_behind(monkeypatch, **start):
+    """Put drives behind every transport that is opened from now on; return them and their clock."""
+    lockstep = Lockstep(Start(**{"robot": "legv2-paper", **start}).build())
+    monkeypatch.setattr(motors, "opener", lambda name: None)
+    monkeypatch.setattr(driver, "MoteusLink", lambda robot, opener: lockstep.link)
+    monkeypatch.setattr(session, "RealClock", lambda: lockstep)
+    quick = functools.partial(Timing, rise=0.4, settle=0.1, sink=0.5)
+    for verb in (deploy, record_motors):
+        monkeypatch.setattr(verb, "Timing", quick)
+    quiet = contextlib.nullcontext(())
+    monkeypatch.setattr(session, "keeping_time", lambda **_: quiet)
+    return lockstep
