@@ -156,6 +156,36 @@ def test_a_constant_delay_is_the_one_that_twins_have(delay):
     assert np.abs(states(fast) - states(Legs(LEG, 3, threads=1))).max() > 1e-3
 
 
+@pytest.mark.parametrize("rest", [0.0, 2e-3])
+def test_every_leg_is_as_late_as_alone(rest):
+    robots = [late(rest + ticks * 5e-3) for ticks in (2, 0, 3)]
+    legs = Legs(LEG, 3, threads=1, variants=robots)
+    assert legs.real is None
+    together = states(legs)
+    for index, robot in enumerate(robots):
+        alone = states(Legs(robot, 1, threads=1))
+        np.testing.assert_array_equal(together[:, index], alone[:, 0])
+
+
+def test_delays_that_differ_by_parts_of_a_tick_are_left_to_the_twins_physics():
+    robots = [late(5e-3), late(7e-3)]
+    assert Legs(LEG, 2, threads=1, variants=robots).real is not None
+
+
+def test_legs_in_motion_do_not_become_later():
+    legs = Legs(LEG, 2, threads=1)
+    legs.become([LEG, LEG])
+    with pytest.raises(UsageError, match="while they move"):
+        legs.become([late(5e-3), late(5e-3)])
+
+
+def test_a_range_with_steps_draws_whole_multiples():
+    delay = Range("reality.latency.command", "s", 0.0, 0.02, "test", step=5e-3)
+    robots = drawn(60, ranges=[delay])
+    ticks = {round(r.reality.latency.command / 5e-3, 6) for r in robots}
+    assert ticks == {0, 1, 2, 3, 4}
+
+
 @pytest.mark.parametrize("delay", [2e-3, 7e-3])
 def test_a_late_task_goes_on_exactly(delay):
     def begin():

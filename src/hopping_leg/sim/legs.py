@@ -29,8 +29,9 @@ class Legs(AnyLegs):
     ``measured_q`` and ``measured_qd`` are the true state, unless the robot's ``reality`` says
     otherwise.
 
-    Commands that are late by a constant time are all of a ``reality`` that is simulated here; the
-    rest is left to ``RealLegs``, which is slower.
+    Commands that are late by a constant time are all of a ``reality`` that is simulated here, and
+    if legs differ in it, by whole control periods; the rest is left to ``RealLegs``, which is
+    slower.
 
     Args:
         robot: The leg.
@@ -75,8 +76,11 @@ class Legs(AnyLegs):
         self._motors = MotorLimit(variants or robot, count)
         self._inverse_belt = np.tile(1 / robot.of_joints("belt_ratio"), (count, 1))
         self._applied = np.zeros((count, 2))
-        ticks, self._late = divmod(round(robot.reality.latency.command / timestep), self.substeps)
-        self.waiting = np.zeros((ticks + 1, count, 2))
+        late = self._lateness(variants or [robot] * count)
+        self._ticks, self._rows = late // self.substeps, np.arange(count)
+        self._late = int(late[0]) % self.substeps
+        """Physics steps by which every command is late, on top of the ticks of each leg."""
+        self.waiting = np.zeros((int(self._ticks.max()) + 1, count, 2))
         """What the motors give until a late command arrives, and the commands under way, N m."""
 
     def _take_model(self, threads: int, variants: Sequence[Robot]) -> None:
@@ -104,9 +108,14 @@ class Legs(AnyLegs):
         self.batch.set_models(own)
 
     def _is_plain(self, variants: Sequence[Robot]) -> bool:
-        """Tell whether a constant delay, the same for all, is all that is beyond the model."""
-        reality = self.robot.reality
-        return reality.only_delays and all(v.reality == reality for v in variants)
+        """Tell whether delays are all that is beyond the model, if they differ by whole ticks."""
+        robots = variants or [self.robot]
+        rests = self._lateness(robots) % self.substeps
+        return not np.ptp(rests) and all(r.reality.only_delays for r in robots)
+
+    def _lateness(self, robots: Sequence[Robot]) -> IntArray:
+        """Return by how many physics steps robots' commands are late, (n,)."""
+        return np.array([round(r.reality.latency.command / self.timestep) for r in robots])
 
     def _take_reality(self, robots: Sequence[Robot], clamped: bool, threads: int) -> None:
         self.real = RealLegs(
@@ -132,7 +141,7 @@ class Legs(AnyLegs):
         """
         if self.real is not None:
             self.real.adopt(variants)
-        elif self._is_plain(variants):
+        elif self._is_plain(variants) and self._are_as_late(variants):
             self._set_models(variants)
             self._motors = MotorLimit(variants, self.count)
         else:
@@ -140,6 +149,10 @@ class Legs(AnyLegs):
                 f"Legs of {self.robot.name} cannot take on another [reality] while they move; make"
                 " them with 'detailed'."
             )
+
+    def _are_as_late(self, variants: Sequence[Robot]) -> bool:
+        late = self._ticks * self.substeps + self._late
+        return np.array_equal(self._lateness(variants), late)
 
     def push(self, force: Array) -> None:
         """Push the bases upward from now on, N, (n,); not for clamped ones."""
@@ -193,11 +206,13 @@ class Legs(AnyLegs):
 
     def _step_late(self, torque: Array) -> Array:
         """Go on with the torques of before until later ones arrive; return their mean."""
-        before, under_way = self.waiting[0], [*self.waiting[1:], torque]
+        before = self.waiting[0]
+        under_way = np.concatenate([self.waiting[1:], np.zeros((1, self.count, 2))])
+        under_way[self._ticks, self._rows] = torque
         if self._late:
             self._give(before, self._late)
         after = self._motors.give(under_way[0], self.qd)
         self._give(after, self.substeps - self._late)
         self._applied = after + self._late / self.substeps * (before - after)
-        self.waiting = np.stack([after, *under_way[1:]])
+        self.waiting = np.concatenate([after[None], under_way[1:]])
         return self._applied

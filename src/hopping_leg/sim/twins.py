@@ -39,6 +39,8 @@ class Range:
     scale: Literal["uniform", "logarithmic"] = "uniform"
     relative: bool = False
     """Whether the bounds are multiples of the number that a robot itself has."""
+    step: float = 0.0
+    """Only whole multiples of this are drawn, 0 for any number."""
 
     def __post_init__(self) -> None:
         least = 0.0 if self.scale == "logarithmic" else -math.inf
@@ -51,8 +53,10 @@ class Range:
     def draw(self, rng: np.random.Generator) -> float:
         """Return one value."""
         if self.scale == "uniform":
-            return float(rng.uniform(self.low, self.high))
-        return float(math.exp(rng.uniform(math.log(self.low), math.log(self.high))))
+            drawn = float(rng.uniform(self.low, self.high))
+        else:
+            drawn = float(math.exp(rng.uniform(math.log(self.low), math.log(self.high))))
+        return round(drawn / self.step) * self.step if self.step else drawn
 
     def place(self, value: float) -> float:
         """Return where a value lies in the range, -1 at its lower and 1 at its upper bound."""

@@ -29,8 +29,9 @@ VARIABLE = (
         for joint in ("hip", "knee")
         for name in ("friction", "damping", "armature", "load_friction", "torque_gain")
     ),
+    "reality.latency.command",
 )
-"""Numbers of a robot that may differ from leg to leg."""
+"""Numbers of a robot that may differ from leg to leg; the latency by whole control periods."""
 
 
 def _times(path: str, low: float, high: float) -> Range:
