@@ -1,16 +1,15 @@
-import builtins
 import pickle
 
 import numpy as np
 import pytest
 
-from hopping_leg.errors import UsageError
 from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.cluster import Cluster, split_population
 from hopping_leg.identify.cost import Scoring
 from hopping_leg.identify.objective import Objective
 from hopping_leg.identify.parameters import choose
 from hopping_leg.identify.windows import cut
+from tests.clusters import two_machines
 from tests.identify.twin import LEG, STEP, record, swing
 
 RUN = record(LEG, swing(0.5))
@@ -36,28 +35,13 @@ def test_an_objective_that_was_used_can_be_sent():
     np.testing.assert_array_equal(there(VECTORS), costs)
 
 
-def test_a_cluster_gives_the_same_bits():
+@pytest.mark.slow
+def test_machines_of_a_cluster_give_the_same_bits():
     pytest.importorskip("ray", reason="Ray is not installed (extra 'cluster')")
     goal = objective()
-    np.testing.assert_array_equal(Cluster(goal, workers=2)(VECTORS), goal(VECTORS))
-
-
-def test_where_no_cluster_answers_there_is_a_sentence_at_once():
-    ray = pytest.importorskip("ray", reason="Ray is not installed (extra 'cluster')")
-    if ray.is_initialized():
-        ray.shutdown()
-    with pytest.raises(UsageError, match=r"no Ray cluster at 127\.0\.0\.1:1: .*; start one"):
-        Cluster(objective(), address="127.0.0.1:1")
-
-
-def test_without_ray_there_is_a_sentence(monkeypatch):
-    real = builtins.__import__
-
-    def refuse(name, *rest, **more):
-        if name == "ray":
-            raise ModuleNotFoundError(name)
-        return real(name, *rest, **more)
-
-    monkeypatch.setattr(builtins, "__import__", refuse)
-    with pytest.raises(UsageError, match=r"hopping-leg\[cluster\]"):
-        Cluster(objective())
+    with two_machines() as address:
+        spread = Cluster(goal, address)
+        assert spread.workers == 2
+        np.testing.assert_array_equal(spread(VECTORS), goal(VECTORS))
+        residuals = Cluster(goal.residuals, address)
+        np.testing.assert_array_equal(residuals(VECTORS), goal.residuals(VECTORS))

@@ -202,13 +202,15 @@ def test_two_processes_share_a_study(tmp_path):
     assert folders == {f"trial-{trial['number']:04d}" for trial in trials}
 
 
-def judge_briefly():
-    judge._SECONDS = 0.5
-
-
 @pytest.mark.slow
 def test_a_ray_cluster_works_on_a_study(tmp_path, monkeypatch):
     pytest.importorskip("ray", reason="Ray is not installed (extra 'cluster')")
+
+    def judge_briefly():
+        from hopping_leg.learn import judge
+
+        judge._SECONDS = 0.5
+
     monkeypatch.chdir(tmp_path)
     words = ["tune", "fast", "--trials", "3", "--steps", "128", "--snapshots", "1"]
     words += ["--set", "legs=2", "--study", "study.db", "--out", "out", "--ray", "local"]

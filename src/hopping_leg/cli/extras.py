@@ -17,7 +17,7 @@ PURPOSES = {
     "pi3hat": "talk to the drives from a Raspberry Pi with a pi3hat",
     "bullet": "the leg in PyBullet (hop evaluate --engine pybullet)",
     "bench": "mujoco.sysid beside our fits (hop bench identify)",
-    "cluster": "identify on a Ray cluster (hop identify --ray)",
+    "cluster": "identify or tune on a Ray cluster (--ray)",
 }
 """Every extra that a user may want, with what it is for."""
 

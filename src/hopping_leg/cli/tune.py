@@ -7,13 +7,14 @@ goes on where it was: call it again with the same options.
 fast, paper, precise: Optuna over the recipe's numbers (extra `tune`). Each trial is a training; its
 score is that by which `hop train` selects. Trainings that lag behind are given up. The study is a
 database: call it again, here or elsewhere, and it goes on; call it in several places at once, and
-they share the work.
+they share the work, or let a Ray cluster do so.
 
 Examples:
   hop tune energy-shaping
   hop tune energy-shaping --robot my_leg.toml --out runs/my_leg
   hop tune fast --trials 60 --steps 1000000 --workers 2
   hop tune paper --study postgresql://host/tuning --trials 100
+  hop tune paper --study postgresql://host/tuning --trials 100 --ray auto
 """
 
 from dataclasses import dataclass, field
@@ -79,8 +80,12 @@ class _Recipe:
     study: str | None = None
     """SQLite file, or URL of another database, e.g. postgresql://...; default:
     runs/tune/RECIPE.db."""
-    workers: int = 1
-    """Processes on this machine; more machines: the same command with the same --study."""
+    workers: int | None = None
+    """Processes on this machine, one by default; more machines: the same command with the same
+    --study, or --ray, where it counts the cluster's workers, by default one per CPU."""
+    ray: str | None = None
+    """Let the Ray cluster at this address work, each worker on one CPU; `local` starts one on this
+    machine, `auto` finds the one that it belongs to."""
     snapshots: int = 5
     """Times that a training is tried before it ends, and may be given up."""
     startup: int = 10
@@ -101,7 +106,7 @@ class _Recipe:
         from hopping_leg.learn.tuning import Tuning
         from hopping_leg.learn.tuning import tune as tune_recipe
 
-        at_least(1, workers=self.workers)
+        at_least(1, workers=1 if self.workers is None else self.workers)
         out = self.out or Path("runs/tune") / self.recipe
         tuning = Tuning(
             self.recipe,
@@ -115,7 +120,7 @@ class _Recipe:
             self.seed,
             self.set,
         )
-        result = tune_recipe(tuning, self.workers)
+        result = tune_recipe(tuning, self.workers, self.ray)
         for file in filter(None, (out / "trials.json", self.json)):
             write_json(file, result)
         for name, draw in FIGURES.items():
@@ -153,8 +158,9 @@ def _storage(study: str) -> str:
     """Return the URL of a study's database; the folder of a file is made."""
     if "://" in study:
         return study
-    Path(study).parent.mkdir(parents=True, exist_ok=True)
-    return f"sqlite:///{study}"
+    file = Path(study).resolve()
+    file.parent.mkdir(parents=True, exist_ok=True)
+    return f"sqlite:///{file}"
 
 
 def _print(result: dict[str, Any], out: Path) -> None:
