@@ -1,0 +1,58 @@
+"""The README and the pages of docs/: their blocks of code, and the commands in them."""
+
+import re
+import shlex
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+PAGES = {path.stem: path for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))}
+
+_BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+_INLINE = re.compile(r"(?<!`)`(hop [^`]+)`(?!`)")
+_INDENTED = re.compile(r"^ {4,}(hop|python|make|pip) .*$", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block of a page."""
+
+    language: str
+    text: str
+    where: str
+    """Page and line, for messages."""
+
+    @property
+    def is_example(self) -> bool:
+        """Whether it shows a file of examples/, which has a test of its own."""
+        return bool(re.fullmatch(r"\{\{ *example\(.*\) *\}\}\s*", self.text))
+
+    def commands(self) -> list[list[str]]:
+        """Return its commands, split into words as a shell does, without comments."""
+        lines = self.text.replace("\\\n", " ").splitlines()
+        return [words for line in lines if (words := shlex.split(line, comments=True))]
+
+
+def blocks(page: str) -> list[Block]:
+    """Return a page's fenced blocks in order."""
+    text, name = PAGES[page].read_text(encoding="utf-8"), PAGES[page].name
+    return [
+        Block(found[1], found[2], f"{name}:{text.count(chr(10), 0, found.start()) + 1}")
+        for found in _BLOCK.finditer(text)
+    ]
+
+
+def inline_commands(page: str) -> list[list[str]]:
+    """Return what stands in running text as `hop ...`; files and values may be left open there."""
+    return [words.split() for words in _INLINE.findall(PAGES[page].read_text(encoding="utf-8"))]
+
+
+def indented_commands(page: str) -> list[str]:
+    """Return commands in indented blocks, whose language nobody knows."""
+    return [found[0].strip() for found in _INDENTED.finditer(PAGES[page].read_text("utf-8"))]
+
+
+def with_files(words: list[str]) -> list[str]:
+    """Return a command with its patterns replaced by the files that they match here."""
+    found = [sorted(map(str, Path().glob(word))) if "*" in word else [word] for word in words]
+    return [name for names in found for name in names]
