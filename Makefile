@@ -14,7 +14,7 @@ help:
 	@echo "make reproduce   install; record a leg, identify it, train, evaluate, transfer, report"
 	@echo "make test        install and run every test"
 	@echo "make test-fast   only the tests that take less than a few seconds"
-	@echo "make check       format, lint, types, documentation, wheel: all that CI wants besides tests"
+	@echo "make check       format, lint, types, documentation, packages: all that CI wants besides tests"
 	@echo "make docs        build the documentation into site/"
 	@echo "make install     only set up $(VENV)"
 
@@ -91,10 +91,12 @@ types: $(STAMP)
 docs: $(STAMP)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
-# The wheel must work without the training extra, so it gets an environment of its own.
+# The wheel must work without the training extra, so it gets an environment of its own. It is built
+# from the source archive, and that must install by itself, too.
 wheel: $(STAMP)
+	$(BIN)/pytest -q tests/test_package.py
 	rm -rf build/wheel
-	$(BIN)/python -m build --wheel --no-isolation --outdir build/wheel
+	$(BIN)/python -m build --no-isolation --outdir build/wheel
 	$(PYTHON) -m venv build/wheel/venv
 	build/wheel/venv/bin/python -m pip --disable-pip-version-check install -q -c constraints.txt build/wheel/*.whl
 	cd build/wheel && venv/bin/python -c 'import hopping_leg, sys; assert "torch" not in sys.modules'
@@ -102,6 +104,8 @@ wheel: $(STAMP)
 	cd build/wheel && venv/bin/hop evaluate energy-shaping --commands 0.3 --seeds 1 --floor soft --out report
 	build/wheel/venv/bin/python -m pip --disable-pip-version-check install -q -c constraints.txt "$$(echo build/wheel/*.whl)[view]"
 	cd build/wheel && venv/bin/hop view --no-browser --port 0 --seconds 1
+	build/wheel/venv/bin/python -m pip --disable-pip-version-check install -q --force-reinstall --no-deps build/wheel/*.tar.gz
+	cd build/wheel && venv/bin/hop robots check legv2 && venv/bin/hop doctor
 
 lock: $(STAMP)
 	@{ head -n 1 constraints.txt; $(PIP) freeze --all --exclude-editable --exclude pip | sed 's/+[^ ]*$$//' | sort -f; } > constraints.new

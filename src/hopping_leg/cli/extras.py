@@ -18,8 +18,10 @@ PURPOSES = {
     "bullet": "the leg in PyBullet (hop evaluate --engine pybullet)",
     "bench": "mujoco.sysid beside our fits (hop bench identify)",
     "cluster": "identify or tune on a Ray cluster (--ray)",
+    "docs": "build the documentation (make docs)",
+    "dev": "test and check a clone (make test, make check)",
 }
-"""Every extra that a user may want, with what it is for."""
+"""Every extra, with what it is for."""
 
 
 @dataclass(frozen=True)

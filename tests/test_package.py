@@ -1,0 +1,78 @@
+"""What is handed out is whole: source archive, metadata, citation."""
+
+import importlib.metadata
+import subprocess
+import sys
+import tarfile
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import hopping_leg
+from hopping_leg.cli.extras import PURPOSES
+
+ROOT = Path(__file__).parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+LARGEST = 1_000_000
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory):
+    """Size of every file in the source archive, by path."""
+    folder = tmp_path_factory.mktemp("sdist")
+    command = [sys.executable, "-m", "build", "--sdist", "--no-isolation", "--outdir", folder, ROOT]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    (file,) = folder.iterdir()
+    with tarfile.open(file) as content:
+        return {m.name.partition("/")[2]: m.size for m in content.getmembers() if m.isfile()}
+
+
+@pytest.mark.slow
+def test_the_source_archive_holds_what_is_installed_and_what_is_to_be_read(archive):
+    package = Path(hopping_leg.__file__).parent
+    inside = {
+        f"src/hopping_leg/{path.relative_to(package)}"
+        for path in package.rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    assert {Path(name).suffix for name in inside} >= {".py", ".toml", ".xml", ".onnx", ".j2"}
+    read = {"README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md", "constraints.txt", "Makefile"}
+    examples = {f"examples/{path.name}" for path in (ROOT / "examples").glob("*.*")}
+    assert not (inside | read | examples) - set(archive)
+
+
+@pytest.mark.slow
+def test_the_source_archive_holds_nothing_large_and_no_run(archive):
+    assert not {name: size for name, size in archive.items() if size > LARGEST}
+    top = {name.partition("/")[0] for name in archive}
+    assert not top & {"runs", "build", "site", ".venv", "MUJOCO_LOG.TXT"}
+
+
+def test_types_and_licence_are_handed_out():
+    assert (Path(hopping_leg.__file__).parent / "py.typed").is_file()
+    assert PROJECT["license"] == "BSD-3-Clause"
+    assert all((ROOT / name).is_file() for name in PROJECT["license-files"])
+
+
+def test_doctor_knows_every_extra():
+    assert set(PURPOSES) == set(PROJECT["optional-dependencies"])
+
+
+def test_the_installed_version_is_the_projects_and_is_in_the_changelog():
+    assert importlib.metadata.version("hopping-leg") == PROJECT["version"]
+    assert f"## {PROJECT['version']}" in (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_the_citation_is_complete_and_of_this_version():
+    yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert citation["cff-version"] == "1.2.0"
+    assert citation["version"] == PROJECT["version"]
+    assert citation["license"] == PROJECT["license"]
+    assert {"title", "message", "authors"} <= citation.keys()
+    paper = citation["preferred-citation"]
+    assert {"type", "title", "authors", "year", "doi"} <= paper.keys()
+    assert all({"given-names", "family-names"} <= author.keys() for author in paper["authors"])
+    assert paper["doi"] in (ROOT / "README.md").read_text()
