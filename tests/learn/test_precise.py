@@ -7,6 +7,8 @@ import pytest
 import torch
 
 from hopping_leg.learn.precise import PreciseRecipe
+from hopping_leg.learn.taught import foresee
+from hopping_leg.sim.variants import SURPRISES
 from tests.learn.learners import ROBOT, TINY_PRECISE, learner
 
 RECIPE = PreciseRecipe(legs=8, batch=512)
@@ -114,3 +116,34 @@ def test_the_papers_observation_can_be_taught_too():
     model.learn(128)
     assert model.policy.measured == 15
     assert np.isfinite(model.logger.name_to_value["train/imitation_loss"])
+
+
+def test_legs_differ_for_the_policy_but_not_for_its_teacher():
+    task = dataclasses.replace(TINY_PRECISE.task, randomised=SURPRISES)
+    recipe = dataclasses.replace(TINY_PRECISE, task=task)
+    model = learner(recipe)
+    apart = []
+    for share in (0.0, recipe.teaching):
+        recipe.anneal(model, model.env, share)
+        legs = model.env.task.legs
+        legs.stand(slice(None), [0.7, -1.4], 0.05)
+        for _ in range(40):
+            legs.step(np.full((4, 2), [1.0, -3.0]))
+        apart.append(np.ptp(legs.height))
+    assert apart[0] == 0
+    assert apart[1] > 1e-3
+
+
+def test_the_teacher_is_asked_where_a_late_legs_action_arrives():
+    ticks, first = 6, 1
+    seen = np.zeros((ticks, 3, 2), np.float32)
+    seen[..., 0] = seen[..., 1] = np.arange(ticks)[:, None]
+    begun = np.zeros((ticks, 3), bool)
+    begun[3, 2] = True
+    shown, known = foresee(seen, begun, np.array([0, 2, 2]), first)
+    np.testing.assert_array_equal(shown[..., 0], seen[..., 0])
+    np.testing.assert_array_equal(shown[:, 0], seen[:, 0])
+    assert known[:, 0].all()
+    np.testing.assert_array_equal(known[:, 1], [1, 1, 1, 1, 0, 0])
+    np.testing.assert_array_equal(known[:, 2], [1, 0, 0, 1, 0, 0])
+    np.testing.assert_array_equal(shown[:, 1, 1][known[:, 1]], [2, 3, 4, 5])

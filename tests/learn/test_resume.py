@@ -14,6 +14,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.learn import judge
 from hopping_leg.learn import train as module
 from hopping_leg.learn.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
+from hopping_leg.learn.recipes import randomise
 from hopping_leg.learn.resumable import restore, state_of
 from tests.learn.learners import (
     ROBOT,
@@ -33,8 +34,15 @@ def disturb_all_generators():
 
 @pytest.mark.parametrize(
     "recipe",
-    [TINY, TinyPPO(), TINY_FAST, TINY_PRECISE, TINY_RECURRENT],
-    ids=["sac", "ppo", "fast", "precise", "recurrent"],
+    [
+        TINY,
+        TinyPPO(),
+        TINY_FAST,
+        TINY_PRECISE,
+        randomise(TINY_PRECISE, "surprises"),
+        TINY_RECURRENT,
+    ],
+    ids=["sac", "ppo", "fast", "precise", "surprised", "recurrent"],
 )
 def test_resuming_equals_never_having_stopped(recipe, tmp_path):
     straight = learner(recipe)

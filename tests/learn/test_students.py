@@ -44,10 +44,10 @@ def test_learning_sees_what_acting_saw():
         acted = torch.stack(
             [student.act(torch.from_numpy(s[:, :2]), b) for s, b in zip(seen, begun, strict=True)]
         )
-        student.take_in(seen, begun)
+        student.take_in(seen, begun, np.ones_like(begun))
     student._lessons._rollouts.popleft()
 
-    def wanted(rows):
+    def wanted(rows, _legs):
         places = [np.argwhere((seen == row.numpy()).all(axis=-1))[0] for row in rows]
         return torch.stack([acted[tick, leg] for tick, leg in places]).detach()
 
@@ -64,8 +64,8 @@ def test_a_recurrent_student_learns_to_repeat_what_is_no_longer_seen():
         seen[0, :, 0] = seen[..., 2] = rng.choice([-1.0, 1.0], LEGS)
         begun = np.zeros((6, LEGS), bool)
         begun[0] = True
-        student.take_in(seen, begun)
-        loss = student.loss(6 * LEGS, lambda rows: rows[:, 2:].expand(-1, 2))
+        student.take_in(seen, begun, np.ones_like(begun))
+        loss = student.loss(6 * LEGS, lambda rows, _legs: rows[:, 2:].expand(-1, 2))
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
@@ -79,11 +79,12 @@ def test_a_window_student_learns_what_it_is_shown_and_sees_measurements_alone():
     student.take_in(
         np.random.default_rng(0).uniform(-1, 1, (10, 100, SIZE)).astype(np.float32),
         np.zeros((10, 100), bool),
+        np.ones((10, 100), bool),
     )
     losses = {}
     for column in (0, 2):
         for _ in range(200):
-            loss = student.loss(64, lambda rows, c=column: rows[:, c : c + 1].expand(-1, 2))
+            loss = student.loss(64, lambda rows, _legs, c=column: rows[:, c : c + 1].expand(-1, 2))
             optimizer.zero_grad()
             loss.backward()
             optimizer.step()

@@ -172,11 +172,16 @@ def test_delays_that_differ_by_parts_of_a_tick_are_left_to_the_twins_physics():
     assert Legs(LEG, 2, threads=1, variants=robots).real is not None
 
 
-def test_legs_in_motion_do_not_become_later():
-    legs = Legs(LEG, 2, threads=1)
-    legs.become([LEG, LEG])
-    with pytest.raises(UsageError, match="while they move"):
-        legs.become([late(5e-3), late(5e-3)])
+def test_legs_in_motion_become_later_without_losing_a_command():
+    legs, same = Legs(LEG, 2, threads=1), Legs(LEG, 2, threads=1)
+    for one in (legs, same):
+        one.stand(slice(None), POSTURE, 0.05)
+        one.step(np.full((2, 2), 2.0))
+    legs.become([LEG, late(1e-2)])
+    given = np.stack([legs.step(np.full((2, 2), float(k))) for k in range(4)])
+    same.step(np.zeros((2, 2)))
+    np.testing.assert_allclose(given[:, 0, 0], [0, 1, 2, 3])
+    np.testing.assert_allclose(given[:, 1, 0], [0, 0, 0, 1])
 
 
 def test_a_range_with_steps_draws_whole_multiples():

@@ -59,6 +59,8 @@ class TaskOptions:
     """Noise and delay; the paper trains with them."""
     randomised: tuple[Range, ...] = ()
     """Where each leg draws its own numbers, once, instead of the robot's; none by default."""
+    alike_at_first: bool = False
+    """Let every leg be the robot itself until ``HoppingTask.diverge``."""
     soft_limits: SoftLimits | None = field(default_factory=SoftLimits)
     """PD at the joint limits, added to the action's torque."""
 

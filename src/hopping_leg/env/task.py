@@ -76,15 +76,16 @@ class HoppingTask:
         self.robot, self.count, self.options, self.reward = robot, count, options, reward
         noise, self._rng, draws = rng.spawn(3)
         ranges = options.randomised
-        variants = vary(robot, ranges, count, draws) if ranges else ()
-        self._numbers = places(robot, variants, ranges)
+        self._variants = vary(robot, ranges, count, draws) if ranges else ()
+        self._numbers = np.zeros((count, len(ranges)))
+        self._diverged = not options.alike_at_first
         self.legs = Legs(
             robot,
             count,
             rate=options.rate,
             timestep=options.timestep,
             threads=threads,
-            variants=variants,
+            variants=() if options.alike_at_first else self._variants,
         )
         self.plant = Plant(self.legs, options.disturbance, options.soft_limits, noise)
         self.observation = make_observation(robot, options, count)
@@ -103,7 +104,16 @@ class HoppingTask:
         self._switch = np.full(count, np.iinfo(np.int64).max)
         self._last = np.zeros((count, 2))
         self._rises = np.zeros(count, np.bool_)
+        if self._diverged:
+            self._numbers = places(robot, self._variants, ranges)
         self.reset()
+
+    def diverge(self) -> None:
+        """Let legs that were alike at first go on with the numbers that each has drawn."""
+        if self._variants and not self._diverged:
+            self.legs.become(self._variants)
+            self._numbers = places(self.robot, self._variants, self.options.randomised)
+            self._diverged = True
 
     @property
     def privileged_size(self) -> int:
@@ -169,7 +179,7 @@ class HoppingTask:
         """Return the normalised true state that a critic may see in training, (n, size).
 
         Base height and rate, q (2), qd (2), command, clearance of foot, knee and base; then where
-        the leg's own numbers lie in their ranges, if legs differ.
+        the leg's own numbers lie in their ranges, if legs may differ; 0 while they are alike.
         """
         legs, o = self.legs, self._scaling
         result = np.empty((self.count, self.privileged_size), np.float32)
@@ -205,7 +215,8 @@ class HoppingTask:
     def restore(self, state: dict[str, Any]) -> Array32:
         """Go on from a ``state``; return the observations, (n, size)."""
         self.legs.batch.state[:] = state["physics"]
-        self.legs.waiting[:] = state.get("waiting", 0.0)
+        if "waiting" in state:
+            self.legs.waiting = state["waiting"].copy()
         self.plant.channel.restore(state["channel"])
         self.command[:] = state["command"]
         self._tick = int(state["tick"])

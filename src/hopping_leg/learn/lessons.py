@@ -1,6 +1,7 @@
 """What a student has seen lately, in half precision: far finer than the noise in it."""
 
 from collections import deque
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,28 +20,59 @@ class Lessons:
 
     def __init__(self, room: int, size: int) -> None:
         self._seen = torch.zeros((room, size), dtype=torch.float16)
+        self._legs = torch.zeros(room, dtype=torch.int16)
         self._next = self._count = 0
 
-    def add(self, observations: npt.NDArray[np.float32]) -> None:
-        """Keep observations, (..., size), in the place of the oldest."""
-        rows = torch.from_numpy(observations).reshape(-1, self._seen.shape[1])
+    def add(
+        self, observations: npt.NDArray[np.float32], known: npt.NDArray[np.bool_] | None = None
+    ) -> None:
+        """Keep a rollout's observations in the place of the oldest.
+
+        Args:
+            observations: (ticks, n, size).
+            known: For which it is known what to do, (ticks, n); None for all.
+        """
+        ticks, legs, size = observations.shape
+        chosen = slice(None) if known is None else torch.from_numpy(known.reshape(-1))
+        rows = torch.from_numpy(observations).reshape(-1, size)[chosen]
         places = (self._next + torch.arange(len(rows))) % len(self._seen)
         self._seen[places] = rows.half()
+        self._legs[places] = torch.arange(legs, dtype=torch.int16).repeat(ticks)[chosen]
         self._next = int(places[-1]) + 1
         self._count = min(self._count + len(rows), len(self._seen))
 
-    def draw(self, count: int) -> torch.Tensor:
-        """Return some of them at random, (count, size)."""
-        return self._seen[torch.randint(self._count, (count,))].float()
+    def draw(self, count: int) -> tuple[torch.Tensor, torch.Tensor]:
+        """Return some of them at random, (count, size), and whose they are, (count,)."""
+        chosen = torch.randint(self._count, (count,))
+        return self._seen[chosen].float(), self._legs[chosen].long()
 
     def state(self) -> Tree:
         """Return everything that is kept."""
-        return {"seen": self._seen[: self._count].numpy(), "next": self._next}
+        kept = slice(self._count)
+        return {
+            "seen": self._seen[kept].numpy(),
+            "legs": self._legs[kept].numpy(),
+            "next": self._next,
+        }
 
     def restore(self, state: Tree) -> None:
         """Go on from a ``state``."""
         self._next, self._count = state["next"], len(state["seen"])
         self._seen[: self._count] = torch.from_numpy(state["seen"])
+        self._legs[: self._count] = torch.from_numpy(state["legs"])
+
+
+class Drawn(NamedTuple):
+    """Sequences of some legs out of a rollout."""
+
+    seen: torch.Tensor
+    """Observations, (ticks, b, size)."""
+    counts: torch.Tensor
+    """Which of them are before the first new episode and have a known answer, (ticks, b)."""
+    memory: torch.Tensor
+    """What was remembered before the first tick, (b, k)."""
+    legs: torch.Tensor
+    """Whose they are, (b,)."""
 
 
 class Sequences:
@@ -58,6 +90,7 @@ class Sequences:
         self,
         observations: npt.NDArray[np.float32],
         begun: npt.NDArray[np.bool_],
+        known: npt.NDArray[np.bool_],
         memory: torch.Tensor,
     ) -> None:
         """Keep a rollout and forget those for which there is no more room.
@@ -65,31 +98,25 @@ class Sequences:
         Args:
             observations: (ticks, n, size).
             begun: Whose episode began with a tick, (ticks, n).
+            known: For which it is known what to do, (ticks, n).
             memory: What was remembered before the first tick, (n, k).
         """
-        self._rollouts.append(
-            (
-                torch.from_numpy(observations).half(),
-                torch.from_numpy(begun.astype(np.bool_)),
-                memory.clone(),
-            )
-        )
+        seen = torch.from_numpy(observations).half()
+        later = begun.copy()
+        later[0] = False
+        counts = known & ~np.logical_or.accumulate(later)
+        fresh = torch.from_numpy(begun[0])[:, None]
+        self._rollouts.append((seen, torch.from_numpy(counts), memory * ~fresh))
         most = max(1, self._room // begun.size)
         while len(self._rollouts) > most:
             self._rollouts.popleft()
 
-    def draw(self, count: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """Return about so many ticks of a rollout at random, as sequences of some of its legs.
-
-        Returns:
-            Observations, (ticks, b, size), whose episodes began, (ticks, b), and memories before
-            the first tick, (b, k), zero where an episode began with that.
-        """
-        seen, begun, memory = self._rollouts[int(torch.randint(len(self._rollouts), ()))]
-        ticks, legs = begun.shape
+    def draw(self, count: int) -> Drawn:
+        """Return about so many ticks of a rollout at random."""
+        seen, counts, memory = self._rollouts[int(torch.randint(len(self._rollouts), ()))]
+        ticks, legs = counts.shape
         chosen = torch.randperm(legs)[: max(1, count // ticks)]
-        kept = memory[chosen] * ~begun[0, chosen, None]
-        return seen[:, chosen].float(), begun[:, chosen], kept
+        return Drawn(seen[:, chosen].float(), counts[:, chosen], memory[chosen], chosen)
 
     def state(self) -> Tree:
         """Return everything that is kept."""
@@ -98,6 +125,6 @@ class Sequences:
     def restore(self, state: Tree) -> None:
         """Go on from a ``state``."""
         self._rollouts = deque(
-            (torch.from_numpy(seen), torch.from_numpy(begun), torch.from_numpy(memory))
-            for seen, begun, memory in state["rollouts"]
+            (torch.from_numpy(seen), torch.from_numpy(counts), torch.from_numpy(memory))
+            for seen, counts, memory in state["rollouts"]
         )

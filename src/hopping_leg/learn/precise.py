@@ -13,6 +13,7 @@ from torch import nn
 
 from hopping_leg.control.layouts import make_layout
 from hopping_leg.env import ApexRewardOptions, TaskOptions
+from hopping_leg.env.task import PRIVILEGED
 from hopping_leg.learn.actor import dense_network
 from hopping_leg.learn.export import Network
 from hopping_leg.learn.fast import FastRecipe, cosine
@@ -34,6 +35,7 @@ class PreciseRecipe(FastRecipe):
             observation="dated-long",
             command_range=(0.20, 0.42),
             timestep=5e-4,
+            alike_at_first=True,
         )
     )
     reward: ApexRewardOptions = field(
@@ -60,7 +62,7 @@ class PreciseRecipe(FastRecipe):
     def make_model(self, env: TaskVecEnv, seed: int) -> TaughtPPO:
         """Build the teacher's PPO with the student beside it."""
         measured = env.task.observation.size
-        state = range(measured, measured + env.task.privileged_size)
+        state = range(measured, measured + PRIVILEGED)
         return TaughtPPO(
             TaughtPolicy,
             env,
@@ -98,10 +100,16 @@ class PreciseRecipe(FastRecipe):
         return self.learning_rate * cosine(left / (1 - self.teaching))
 
     def anneal(self, model: Any, env: TaskVecEnv, share: float) -> None:  # noqa: ANN401
-        """Sharpen the reward and quieten exploration for the teacher, then let the policy act."""
+        """Sharpen the reward and quieten exploration for the teacher, then let the policy act.
+
+        Where legs differ, they do so for the policy: a teacher that feels the true state is hardly
+        the worse for not having met them, and easier to imitate than one that is told.
+        """
         super().anneal(model, env, min(1.0, share / self.teaching))
         taught = (share - self.teaching) / (1 - self.teaching)
         model.policy.imitating = taught >= 0
+        if taught >= 0:
+            env.task.diverge()
         model.policy.guidance = max(0.0, 1 - taught / self.guided)
 
     def network(self, model: Any, env: TaskVecEnv) -> Network:  # noqa: ANN401

@@ -16,14 +16,16 @@ from hopping_leg.learn.asymmetric import dense
 from hopping_leg.learn.checkpoint import Tree
 from hopping_leg.learn.lessons import Lessons, Sequences
 
-Wanted = Callable[[torch.Tensor], torch.Tensor]
-"""From observations, (n, size), to what the teacher would do, (n, 2)."""
+Bools = npt.NDArray[np.bool_]
+
+Wanted = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
+"""From observations, (n, size), and whose they are, (n,), to what the teacher would do, (n, 2)."""
 
 
 class Student(Protocol):
     """What a policy's student can do."""
 
-    def act(self, seen: torch.Tensor, begun: npt.NDArray[np.bool_]) -> torch.Tensor:
+    def act(self, seen: torch.Tensor, begun: Bools) -> torch.Tensor:
         """Return what to do in a tick, unbounded, (n, 2).
 
         Args:
@@ -32,8 +34,14 @@ class Student(Protocol):
         """
         ...
 
-    def take_in(self, observations: npt.NDArray[np.float32], begun: npt.NDArray[np.bool_]) -> None:
-        """Keep a rollout's observations, (ticks, n, size), and whose episodes began, (ticks, n)."""
+    def take_in(self, observations: npt.NDArray[np.float32], begun: Bools, known: Bools) -> None:
+        """Keep a rollout.
+
+        Args:
+            observations: (ticks, n, size).
+            begun: Whose episode began with a tick, (ticks, n).
+            known: For which it is known what the teacher would do, (ticks, n).
+        """
         ...
 
     def loss(self, count: int, wanted: Wanted) -> torch.Tensor:
@@ -69,19 +77,19 @@ class WindowStudent(nn.Module):
         self.layers.append(nn.Linear(hidden[-1], 2))
         self._lessons = Lessons(room, size)
 
-    def act(self, seen: torch.Tensor, begun: npt.NDArray[np.bool_]) -> torch.Tensor:
+    def act(self, seen: torch.Tensor, begun: Bools) -> torch.Tensor:
         """Return what to do in a tick; no tick depends on another."""
         action: torch.Tensor = self.layers(seen)
         return action
 
-    def take_in(self, observations: npt.NDArray[np.float32], begun: npt.NDArray[np.bool_]) -> None:
+    def take_in(self, observations: npt.NDArray[np.float32], begun: Bools, known: Bools) -> None:
         """Keep a rollout, tick by tick."""
-        self._lessons.add(observations)
+        self._lessons.add(observations, None if known.all() else known)
 
     def loss(self, count: int, wanted: Wanted) -> torch.Tensor:
         """Return the loss over ticks drawn at random."""
-        seen = self._lessons.draw(count)
-        return functional.mse_loss(self.layers(seen[:, : self._measured]), wanted(seen))
+        seen, legs = self._lessons.draw(count)
+        return functional.mse_loss(self.layers(seen[:, : self._measured]), wanted(seen, legs))
 
     def state(self) -> Tree:
         """Return the lessons."""
@@ -113,7 +121,7 @@ class RecurrentStudent(nn.Module):
         self._before = self._memory.clone()
         self._lessons = Sequences(room)
 
-    def act(self, seen: torch.Tensor, begun: npt.NDArray[np.bool_]) -> torch.Tensor:
+    def act(self, seen: torch.Tensor, begun: Bools) -> torch.Tensor:
         """Return what to do in a tick and remember it."""
         self._memory[torch.as_tensor(begun, dtype=torch.bool)] = 0.0
         with torch.no_grad():
@@ -122,19 +130,17 @@ class RecurrentStudent(nn.Module):
         action: torch.Tensor = self.readout(self._memory)
         return action
 
-    def take_in(self, observations: npt.NDArray[np.float32], begun: npt.NDArray[np.bool_]) -> None:
+    def take_in(self, observations: npt.NDArray[np.float32], begun: Bools, known: Bools) -> None:
         """Keep a rollout with what was remembered when it began."""
-        self._lessons.add(observations, begun, self._before)
+        self._lessons.add(observations, begun, known, self._before)
         self._before = self._memory.clone()
 
     def loss(self, count: int, wanted: Wanted) -> torch.Tensor:
         """Return the loss over some legs' sequences, each up to its first new episode."""
-        seen, begun, memory = self._lessons.draw(count)
+        seen, counts, memory, legs = self._lessons.draw(count)
         remembered, _ = self.unit(seen[..., : self._measured], memory[None])
-        counts = begun[1:].cumsum(dim=0) == 0
-        counts = torch.cat([torch.ones_like(counts[:1]), counts])
         acted = self.readout(remembered[counts])
-        return functional.mse_loss(acted, wanted(seen[counts]))
+        return functional.mse_loss(acted, wanted(seen[counts], legs.expand_as(counts)[counts]))
 
     def state(self) -> Tree:
         """Return memory and lessons."""

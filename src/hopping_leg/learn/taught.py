@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import torch
 
+from hopping_leg.arrays import IntArray
 from hopping_leg.env.task import PRIVILEGED_COMMAND
 from hopping_leg.learn.asymmetric import AsymmetricPolicy
 from hopping_leg.learn.checkpoint import Tree
@@ -98,7 +99,9 @@ class TaughtPPO(ResumablePPO):
         task = self.env.task
         scaling = task.observation.scaling
         self._told = task.observation.size + PRIVILEGED_COMMAND
-        self._aim = Aim(scaling.offset[-1], scaling.gain[-1], imitation.knots)
+        differ = task.count if task.options.randomised else 0
+        self._aim = Aim(scaling.offset[-1], scaling.gain[-1], imitation.knots, differ)
+        self._hops = 0
         self.policy.begun = lambda: self._last_episode_starts
 
     def train(self) -> None:
@@ -108,10 +111,13 @@ class TaughtPPO(ResumablePPO):
             super().train()
             return
         self._update_learning_rate(policy.optimizer)
-        commands, errors = self.env.recent_hops
-        self._aim.correct(commands, errors, self._imitation.aiming)
+        self._correct_aim()
         buffer = self.rollout_buffer
-        policy.student.take_in(buffer.observations, buffer.episode_starts.astype(np.bool_))
+        begun = buffer.episode_starts.astype(np.bool_)
+        seen, known = foresee(
+            buffer.observations, begun, self.env.task.legs.late_ticks, policy.measured
+        )
+        policy.student.take_in(seen, begun, known)
         losses = [self._imitate(policy) for _ in range(self._imitation.updates)]
         self._n_updates += self._imitation.updates
         self.logger.record("train/imitation_loss", sum(losses) / len(losses))
@@ -124,10 +130,20 @@ class TaughtPPO(ResumablePPO):
         policy.optimizer.step()
         return loss.item()
 
-    def _wanted(self, seen: torch.Tensor) -> torch.Tensor:
+    def _correct_aim(self) -> None:
+        """Let the hops of the rollout tell where the teacher should aim."""
+        env, imitation = self.env, self._imitation
+        legs, commands, errors = env.recent_hops
+        self._aim.correct(commands, errors, imitation.aiming)
+        if len(self._aim.own):
+            fresh = slice(max(0, len(errors) - (env.hops - self._hops)), None)
+            self._aim.correct_own(legs[fresh], commands[fresh], errors[fresh], imitation.aiming_own)
+        self._hops = env.hops
+
+    def _wanted(self, seen: torch.Tensor, legs: torch.Tensor) -> torch.Tensor:
         """Return what the teacher would do where it is told what it should aim at, (n, 2)."""
         told = seen.clone()
-        told[:, self._told] = self._aim(seen[:, self._told])
+        told[:, self._told] = self._aim(seen[:, self._told], legs)
         policy: TaughtPolicy = self.policy
         with torch.no_grad():
             return policy.teacher_action(told)
@@ -135,10 +151,43 @@ class TaughtPPO(ResumablePPO):
     def own_state(self) -> Tree:
         """Return what the student learns from, and where the teacher aims."""
         policy: TaughtPolicy = self.policy
-        return {"student": policy.student.state(), "aim": self._aim.values.numpy().copy()}
+        return {
+            "student": policy.student.state(),
+            "aim": self._aim.state(),
+            "hops": self._hops,
+        }
 
     def restore_own(self, state: Tree) -> None:
         """Go on from an ``own_state``."""
         policy: TaughtPolicy = self.policy
         policy.student.restore(state["student"])
-        self._aim.values = torch.from_numpy(state["aim"])
+        self._aim.restore(state["aim"])
+        self._hops = state["hops"]
+
+
+def foresee(
+    observations: npt.NDArray[np.float32], begun: npt.NDArray[np.bool_], late: IntArray, first: int
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.bool_]]:
+    """Show the teacher the state in which a late leg's action will have its effect.
+
+    Seen in hindsight: what it would do there is what the student has to ask for before.
+
+    Args:
+        observations: Of a rollout, (ticks, n, size).
+        begun: Whose episode began with a tick, (ticks, n).
+        late: Ticks until an action arrives, (n,).
+        first: Entry with which the true state begins.
+
+    Returns:
+        Observations with later true states, and whether those are known: not at the end of the
+        rollout nor of an episode, (ticks, n).
+    """
+    if not late.any():
+        return observations, np.ones(begun.shape, np.bool_)
+    ticks, rows = np.arange(len(begun))[:, None], np.arange(len(late))
+    then = np.minimum(ticks + late, len(begun) - 1)
+    episode = begun.cumsum(axis=0)
+    known = (ticks + late < len(begun)) & (episode[then, rows] == episode)
+    shown = observations.copy()
+    shown[..., first:] = observations[then, rows, first:]
+    return shown, known

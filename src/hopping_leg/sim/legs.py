@@ -76,12 +76,10 @@ class Legs(AnyLegs):
         self._motors = MotorLimit(variants or robot, count)
         self._inverse_belt = np.tile(1 / robot.of_joints("belt_ratio"), (count, 1))
         self._applied = np.zeros((count, 2))
-        late = self._lateness(variants or [robot] * count)
-        self._ticks, self._rows = late // self.substeps, np.arange(count)
-        self._late = int(late[0]) % self.substeps
-        """Physics steps by which every command is late, on top of the ticks of each leg."""
-        self.waiting = np.zeros((int(self._ticks.max()) + 1, count, 2))
+        self._rows = np.arange(count)
+        self.waiting = np.zeros((1, count, 2))
         """What the motors give until a late command arrives, and the commands under way, N m."""
+        self._come_late(variants or [robot] * count)
 
     def _take_model(self, threads: int, variants: Sequence[Robot]) -> None:
         model = build_model(self.robot, self.timestep)
@@ -141,18 +139,31 @@ class Legs(AnyLegs):
         """
         if self.real is not None:
             self.real.adopt(variants)
-        elif self._is_plain(variants) and self._are_as_late(variants):
+        elif self._is_plain(variants):
             self._set_models(variants)
             self._motors = MotorLimit(variants, self.count)
+            self._come_late(variants)
         else:
             raise UsageError(
                 f"Legs of {self.robot.name} cannot take on another [reality] while they move; make"
                 " them with 'detailed'."
             )
 
-    def _are_as_late(self, variants: Sequence[Robot]) -> bool:
-        late = self._ticks * self.substeps + self._late
-        return np.array_equal(self._lateness(variants), late)
+    def _come_late(self, robots: Sequence[Robot]) -> None:
+        """Let each leg's commands arrive as late as its robot's; none that is under way is lost."""
+        late = self._lateness(robots)
+        self._late = int(late[0]) % self.substeps
+        """Physics steps by which every command is late, on top of the ticks of each leg."""
+        self._ticks = late // self.substeps
+        """Control periods by which each leg's are, (n,)."""
+        missing = int(self._ticks.max()) + 1 - len(self.waiting)
+        if missing > 0:
+            self.waiting = np.concatenate([self.waiting, np.zeros((missing, self.count, 2))])
+
+    @property
+    def late_ticks(self) -> IntArray:
+        """Whole control periods by which each leg's commands are late, (n,)."""
+        return self._ticks
 
     def push(self, force: Array) -> None:
         """Push the bases upward from now on, N, (n,); not for clamped ones."""

@@ -45,9 +45,10 @@ SURPRISES = (
     _times("contact.time_constant", 0.22, 2.0),
     _times("hip.torque_gain", 0.85, 1.15),
     _times("knee.torque_gain", 0.85, 1.15),
+    Range("reality.latency.command", "s", 0.0, 0.0149, "[C]", step=5e-3),
 )
 """What may surprise any leg, over what its robot has: a payload, a worn or dry rail, hard and soft
-ground, motors that give less or more than they should."""
+ground, motors that give less or more than they should, late commands."""
 
 Part = TypeVar("Part")
 
