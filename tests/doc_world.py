@@ -1,0 +1,175 @@
+"""What stands around the commands of the documentation: what makes them short, and their files."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import polars.selectors as cs
+
+from hopping_leg import cli
+from hopping_leg.control import Setup, roll_out
+from hopping_leg.control.library import load_controller
+from hopping_leg.deploy.black_box import BlackBox
+from hopping_leg.robot import load_robot
+from hopping_leg.sim.twins import draw_twin
+from hopping_leg.trace import Trace
+from tests.doc_pages import ROOT, blocks
+
+SHORTER = {
+    "hop bench engines": {
+        "--controllers": "energy-shaping", "--commands": "0.3", "--seeds": "1", "--workers": "1",
+    },
+    "hop bench faults": {
+        "--controllers": "energy-shaping", "--families": "encoder jump", "--repeats": "1",
+        "--live": "0", "--workers": "1",
+    },
+    "hop bench probe": {"--commands": "0.3", "--legs": "2", "--seconds": "4"},
+    "hop deploy": {"--seconds": "0.3", "--yes": None},
+    "hop doctor --home": {"--yes": None},
+    "hop doctor --write": {"--yes": None},
+    "hop emulate": {"--seconds": "0.3"},
+    "hop evaluate": {
+        "--seeds": "1", "--commands": "0.3", "--floor": "soft", "--no-video": None,
+    },
+    "hop evaluate --suite robustness": {
+        "--seeds": "1", "--commands": "0.3", "--axes": "payload",
+    },
+    "hop evaluate --suite skills": {"--seeds": "1", "--commands": "0.3", "--floor": "soft"},
+    "hop excite fixed-base": {
+        "--amplitudes": "0.05", "--periods": "0.5", "--swings": "10", "--duration": "10",
+    },
+    "hop excite moving-base": {"--amplitudes": "0.05", "--periods": "0.5", "--duration": "10"},
+    "hop excite multisine": {"--duration": "10"},
+    "hop identify": {"--parameters": "hip.friction,knee.friction"},
+    "hop record --transport": {"--yes": None},
+    "hop train": {"--steps": "1"},
+    "hop tune": {"--trials": "1", "--steps": "1", "--workers": "1", "--snapshots": "1"},
+    "hop tune energy-shaping": {"--generations": "1", "--population": "4", "--seconds": "3"},
+    "hop view": {"--no-browser": None, "--port": "0", "--seconds": "0.5"},
+}  # fmt: skip
+"""Options that replace or join those of every command with these words; of several entries the one
+with the most words counts."""
+
+SECONDS = {
+    "hopping_leg.evaluate.trials.FIXED_SECONDS": 3.0,
+    "hopping_leg.evaluate.trials.STEP_SECONDS": 2.0,
+    "hopping_leg.learn.judge._SECONDS": 0.5,
+}
+"""Lengths of the paper's trials and of those that select a policy, which have no option."""
+
+ELSEWHERE = {
+    "hop experiment transfer": "minutes even when small: tests/cli/test_experiment.py",
+    "hop reproduce": "minutes even with --quick: tests/cli/test_reproduce.py",
+}
+"""Commands that are not run here, and why; their options must parse all the same."""
+
+INTERRUPTED = {"hop train --recipe paper --seed 0 --out runs/mine": cli.INTERRUPTED}
+"""Commands that are interrupted here, as their page goes on with them, and their exit code."""
+
+REFUSED = {
+    "hop doctor --transport /dev/fdcanusb --robot my_leg.toml --home 0.0 0.0": cli.FAILED,
+}
+"""Commands that do their work and then refuse, as their page says: a straight leg is not armed."""
+
+BEFORE = {
+    "own-controller": "class TheirController:\n    def __init__(self, mass, dt): pass",
+    "emulator": "from hopping_leg.deploy.emulator.faults import Fault\n"
+    "from hopping_leg.deploy.emulator.process import EmulatorProcess\n"
+    "from hopping_leg.deploy.emulator.start import Start\n"
+    "def drive(path): assert path.exists()",
+}
+"""Python that a page takes for granted."""
+
+TRIAL = "runs/deploy/Bouncer-20260101-120000.parquet"
+KILLED = "runs/deploy/fast-20260501-101500.blackbox"
+TRAINED = {
+    "recipe": "fast",
+    "robot": "legv2-paper",
+    "robot_digest": "abc",
+    "minutes": 5.0,
+    "steps": 200,
+    "selected": {"steps": 200, "score_m": 0.004},
+    "history": [{"steps": n, "minutes": n / 40, "score_m": 1 / n} for n in (100, 200)],
+    "command": "hop train --recipe fast",
+}
+
+
+def shorten(words: list[str]) -> list[str]:
+    """Return a command with the options that make it short."""
+    fitting = [key for key in SHORTER if set(key.split()) <= set(words)]
+    if not fitting:
+        return words
+    for flag, value in SHORTER[max(fitting, key=lambda key: len(key.split()))].items():
+        words = [*_without(words, flag), flag, *([] if value is None else [value])]
+    return words
+
+
+def _without(words: list[str], flag: str) -> list[str]:
+    """Return a command without an option and its values."""
+    if flag not in words:
+        return words
+    first = last = words.index(flag)
+    while last + 1 < len(words) and not words[last + 1].startswith("--"):
+        last += 1
+    return [*words[:first], *words[last + 1 :]]
+
+
+def furnish(page: str) -> None:
+    """Put the files that a page takes for granted into the current folder."""
+    shutil.copytree(ROOT / "examples", "examples")
+    shutil.copy("examples/my_leg.toml", "my_leg.toml")
+    Path("runs/deploy").mkdir(parents=True)
+    make = {
+        "deploy": _wired_leg_and_killed_run,
+        "evaluation": _stored_runs,
+        "own-controller": lambda: _trial().save(Path(TRIAL)),
+        "robustness": _trained_policy,
+        "transfer": lambda: draw_twin(0).save(Path("my_twin.toml")),
+        "viewer": _trial_and_killed_run,
+    }
+    make.get(page, lambda: None)()
+
+
+def _trained_policy() -> None:
+    Path("runs/mine").mkdir()
+    shutil.copy(ROOT / "src/hopping_leg/policies/fast.onnx", "runs/mine/policy.onnx")
+
+
+def _wired_leg_and_killed_run() -> None:
+    """Write the page's table into the robot file, for drives whose serial number nobody knows."""
+    (table,) = [b.text for b in blocks("deploy") if b.text.startswith("[hardware]")]
+    table = "".join(line for line in table.splitlines(True) if not line.startswith("serial"))
+    with Path("my_leg.toml").open("a") as file:
+        file.write(f"\n{table}")
+    _killed_run()
+
+
+def _trial_and_killed_run() -> None:
+    _trial().save(Path("run.parquet"))
+    _killed_run()
+
+
+def _trial() -> Trace:
+    leg = load_robot("legv2-paper")
+    commands = np.full((600, 1), 0.3)
+    return roll_out(load_controller("energy-shaping", leg), Setup(leg), commands, seed=0).trace(0)
+
+
+def _killed_run() -> None:
+    """Leave what `hop deploy` leaves when it is killed."""
+    trace = _trial()
+    table = trace.table.select(cs.exclude("height_m", "height_rate_m_s", cs.contains("clearance")))
+    box = BlackBox(Path(KILLED), tuple(table.columns), trace.header)
+    for row in table.iter_rows():
+        box.row(row)
+    box.close()
+
+
+def _stored_runs() -> None:
+    for name, source in (("first", "evaluation"), ("second", "precise")):
+        Path(f"runs/{name}").mkdir()
+        shutil.copy(ROOT / f"docs/results/{source}.json", f"runs/{name}/evaluation.json")
+    for seed in (0, 1):
+        Path(f"runs/fast-seed{seed}").mkdir()
+        Path(f"runs/fast-seed{seed}/result.json").write_text(json.dumps({**TRAINED, "seed": seed}))

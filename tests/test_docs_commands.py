@@ -1,0 +1,162 @@
+"""Every command and every snippet of the README and the documentation works as it stands there.
+
+Each page is one sequence in a folder of its own, since later commands use files of earlier ones.
+What makes commands short, and which are tested elsewhere, stands in ``doc_world``; behind every
+--transport stand drives in virtual time.
+"""
+
+import contextlib
+import functools
+import importlib
+import io
+import re
+import runpy
+import signal
+import subprocess
+import sys
+import tomllib
+from importlib.util import find_spec
+
+import pytest
+
+from hopping_leg.cli import VERBS, main
+from tests.cli.emulated import put_behind
+from tests.doc_pages import PAGES, ROOT, blocks, indented_commands, inline_commands, with_files
+from tests.doc_world import BEFORE, ELSEWHERE, INTERRUPTED, REFUSED, SECONDS, furnish, shorten
+
+for extra in ("moteus", "optuna", "torch", "viser"):
+    pytest.importorskip(extra)
+
+LIMIT = 120
+"""What a command may take, s; a longer one wants an entry in ``doc_world.SHORTER``."""
+
+RUNNABLE = [page for page in PAGES if any(b.language in ("bash", "python") for b in blocks(page))]
+
+
+WITH_KINDS = ("bench", "excite", "export", "robots", "tune")
+"""Verbs whose options depend on the next word."""
+
+
+class TooLongError(Exception):
+    """A command went over its limit."""
+
+
+@pytest.fixture(autouse=True)
+def _limited():
+    """End what takes too long."""
+
+    def end(number, frame):
+        raise TooLongError(f"more than {LIMIT} s")
+
+    before = signal.signal(signal.SIGALRM, end)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+def test_no_command_hides_in_an_indented_block():
+    assert {page: found for page in PAGES if (found := indented_commands(page))} == {}
+
+
+def test_blocks_of_toml_are_toml():
+    texts = [b.text for page in PAGES for b in blocks(page) if b.language == "toml"]
+    for text in (text for text in texts if "{{" not in text):
+        assert tomllib.loads(text)
+
+
+@functools.cache
+def help_of(*words):
+    """Return the help of a verb, or of a kind of it where it has kinds."""
+    text = io.StringIO()
+    with contextlib.redirect_stdout(text), pytest.raises(SystemExit) as ended:
+        main([*words, "--help"])
+    assert ended.value.code == 0, words
+    return text.getvalue()
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_options_in_running_text_exist(page):
+    for _, verb, *words in inline_commands(page):
+        if verb == "VERB" or verb.startswith("-"):
+            continue
+        assert verb in VERBS, words
+        kinds = words[:1] if verb in WITH_KINDS else []
+        for flag in {word for word in words if word.startswith("--") and word != "--help"}:
+            assert re.search(rf"{flag}\b", help_of(verb, *kinds)), (verb, *words)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", RUNNABLE)
+def test_commands_and_snippets_work_in_their_order(page, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    for name, seconds in SECONDS.items():
+        monkeypatch.setattr(name, seconds)
+    furnish(page)
+    names = {"__name__": page}
+    exec(BEFORE.get(page, ""), names)
+    for block in blocks(page):
+        if block.language == "python" and not block.is_example:
+            exec(compile(block.text, block.where, "exec"), names)
+        for words in block.commands() if block.language == "bash" else ():
+            signal.alarm(LIMIT)
+            try:
+                run(words, monkeypatch)
+            except (AssertionError, SystemExit, TooLongError) as error:
+                said = capsys.readouterr()
+                text = f"{' '.join(words)}: {error!r}\n{said.out[-2000:]}{said.err[-2000:]}"
+                pytest.fail(f"{block.where}: {text}", pytrace=False)
+            signal.alarm(0)
+
+
+def run(words, monkeypatch):
+    """Run a command, or check what of it can be checked; what nobody knows fails."""
+    program = words[0]
+    if program == "hop":
+        run_hop(words, monkeypatch)
+    elif program == "python":
+        monkeypatch.setattr(sys, "argv", words[1:])
+        runpy.run_path(words[1], run_name="__main__")
+    elif program == "make":  # installs, or runs this test among others: its recipe must exist
+        subprocess.run([*words, "--dry-run"], cwd=ROOT, check=True, capture_output=True)
+    elif words[:2] == ["pip", "install"]:  # needs the network: its extra must exist
+        extra = re.search(r"\[(.*)\]", words[-1])
+        known = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+        assert extra is None or extra[1] in known["optional-dependencies"]
+    else:
+        assert words == [".", ".venv/bin/activate"]  # the shell's own
+
+
+def run_hop(words, monkeypatch):
+    command = " ".join(words)
+    if any(command.startswith(known) for known in ELSEWHERE):
+        parse(words, monkeypatch)
+        return
+    if {"pybullet", "engines"} & set(words) and find_spec("pybullet") is None:
+        return
+    with monkeypatch.context() as patch:
+        if "--transport" in words:
+            robot = words[words.index("--robot") + 1] if "--robot" in words else "legv2-paper"
+            put_behind(patch, robot=robot, pose="zero" if "--home" in words else "stand")
+        if command in INTERRUPTED:
+            patch.setattr("hopping_leg.learn.train.Trainer.tick", interrupt)
+        code = main(with_files(shorten(words)[1:]))
+    assert code == {**INTERRUPTED, **REFUSED}.get(command, 0), f"exit code {code}"
+
+
+def interrupt(trainer):
+    raise KeyboardInterrupt
+
+
+def parse(words, monkeypatch):
+    """Check a command's options without running it."""
+    module, seen = importlib.import_module(f"hopping_leg.cli.{words[1]}"), []
+
+    @functools.wraps(module.run)
+    def note(args):
+        seen.append(args)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "run", note)
+        assert main(words[1:]) == 0
+    assert len(seen) == 1
