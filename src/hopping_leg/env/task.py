@@ -1,7 +1,7 @@
 """The learning problem for many legs at once: observation, reward, commands, episodes."""
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from hopping_leg.arrays import Array, BoolArray, IntArray
 from hopping_leg.env.observation import Array32, make_observation, sample_scaling
 from hopping_leg.env.options import TaskOptions
 from hopping_leg.env.start import Starts
+from hopping_leg.env.step import Step
 from hopping_leg.env.transition import Reward, Transition
 from hopping_leg.hops import CLEAR
 from hopping_leg.robot.parameters import Robot
@@ -20,31 +21,6 @@ PRIVILEGED = 10
 
 PRIVILEGED_COMMAND = 6
 """Which of them is the command."""
-
-
-class Step(NamedTuple):
-    """Outcome of one tick of n legs; legs whose episode ended have already begun the next."""
-
-    observation: Array32
-    """Seen after the tick, (n, size)."""
-    reward: Array
-    """(n,)."""
-    terminated: BoolArray
-    """Episode over because the leg fell; never by default, (n,)."""
-    truncated: BoolArray
-    """Episode over because its time was up, (n,)."""
-    apex_error: Array
-    """Apex height minus command where a leg just passed an in-flight apex, else NaN, m, (n,)."""
-    apex_height: Array
-    """Height of that apex, else NaN, m, (n,)."""
-    height: Array
-    """Base height at the end of the tick, before any restart, m, (n,)."""
-    terms: Array
-    """Reward terms in the order of the reward's ``names``, (n, k)."""
-    final_observation: Array32 | None
-    """Observations before the restart, (n, size), where any episode ended."""
-    final_privileged: Array32 | None
-    """True states before the restart, (n, privileged_size), where any episode ended."""
 
 
 class HoppingTask:

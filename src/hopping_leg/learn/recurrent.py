@@ -1,7 +1,7 @@
 """The recurrent recipe: a network with a memory of its own, taught as the precise one is.
 
-The paper finds that recurrent networks bring no advantage (Sec. II-C, "Network architecture"). Here the same teacher
-teaches a gated recurrent unit that sees the last 50 ms, beside ``precise`` that sees 0.7 s.
+The paper finds that recurrent networks bring no advantage (Sec. II-C, "Network architecture"). Here
+the same teacher teaches a gated recurrent unit that sees 50 ms, beside ``precise`` that sees 0.7 s.
 """
 
 from dataclasses import dataclass, field, replace

@@ -11,7 +11,8 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from hopping_leg.arrays import Array, BoolArray, IntArray
 from hopping_leg.env.observation import Array32
-from hopping_leg.env.task import HoppingTask, Step
+from hopping_leg.env.step import Step
+from hopping_leg.env.task import HoppingTask
 
 _RECENT_HOPS = 500
 """Hops that the live numbers look back over."""
