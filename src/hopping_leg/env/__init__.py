@@ -5,7 +5,8 @@ from hopping_leg.env.options import TaskOptions
 from hopping_leg.env.registration import ENV_ID, register_envs
 from hopping_leg.env.reward import PaperReward, PaperRewardOptions
 from hopping_leg.env.single import HoppingEnv
-from hopping_leg.env.task import HoppingTask, Step
+from hopping_leg.env.step import Step
+from hopping_leg.env.task import HoppingTask
 from hopping_leg.env.transition import Reward, Transition
 from hopping_leg.env.vector import HoppingVectorEnv
 

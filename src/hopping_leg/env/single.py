@@ -11,7 +11,8 @@ from hopping_leg.env.observation import Array32
 from hopping_leg.env.options import TaskOptions
 from hopping_leg.env.render import Camera, Image
 from hopping_leg.env.reward import PaperReward
-from hopping_leg.env.task import HoppingTask, Step
+from hopping_leg.env.step import Step
+from hopping_leg.env.task import HoppingTask
 from hopping_leg.env.transition import Reward
 from hopping_leg.robot import Robot, load_robot
 
