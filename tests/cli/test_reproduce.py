@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from hopping_leg.cli import evaluate, main
+from hopping_leg.cli.reproduce import NOTHING_MEANT
 
 pytest.importorskip("torch")
 from hopping_leg.evaluate.transfer import run as transfer_run
@@ -25,7 +26,7 @@ def calls(monkeypatch):
         return NUMBERS
 
     monkeypatch.setattr(transfer_run, "transfer", fake_transfer)
-    monkeypatch.setattr(evaluate, "run", found["evaluate"].append)
+    monkeypatch.setattr(evaluate, "run", lambda args, notes: found["evaluate"].append(args))
     return found
 
 
@@ -42,7 +43,7 @@ def test_it_goes_from_a_twin_to_a_judged_policy(calls, tmp_path, capsys):
     assert judged.robot.endswith("identified.toml")
     assert judged.out == tmp_path
     assert judged.seed != 3
-    assert json.loads((tmp_path / "transfer.json").read_text()) == NUMBERS
+    assert json.loads((tmp_path / "transfer.json").read_text()) == {**NUMBERS, "notes": []}
     assert "report.html" in capsys.readouterr().out
 
 
@@ -59,6 +60,24 @@ def test_a_twin_of_your_own_plays_the_real_leg(calls, tmp_path):
     [(study, _)] = calls["transfer"]
     assert [(twin.name, twin.believed) for twin in study.twins] == [("twin", "legv2-paper")]
     assert calls["evaluate"][0].seeds == 1
+
+
+def test_sizes_have_folders_of_their_own(calls, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for words in ([], ["--quick"], ["--full"]):
+        assert main(["reproduce", *words]) == 0
+    folders = [study.folder.parent for study, _ in calls["transfer"]]
+    assert folders == [Path("runs") / name for name in ("reproduce", "quick", "full")]
+
+
+@pytest.mark.parametrize(("first", "then"), [([], ["--quick"]), (["--quick"], [])])
+def test_a_folder_never_mixes_sizes(calls, tmp_path, capsys, first, then):
+    words = ["reproduce", "--out", str(tmp_path)]
+    assert main([*words, *first]) == 0
+    assert main([*words, *then]) == 2
+    assert "give another --out" in capsys.readouterr().err
+    assert len(calls["transfer"]) == 1
+    assert main([*words, *first]) == 0
 
 
 @pytest.mark.parametrize(
@@ -78,11 +97,12 @@ def test_meaningless_options_are_refused_before_anything_runs(calls, tmp_path, w
 
 
 @pytest.mark.slow
-def test_a_killed_run_goes_on_when_called_again(tmp_path):
+def test_a_killed_quick_run_goes_on_and_says_that_its_numbers_mean_nothing(tmp_path):
     command = [sys.executable, "-m", "hopping_leg.cli", "reproduce", "--quick"]
-    command += ["--out", str(tmp_path)]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    recordings = tmp_path / "transfer" / "recordings"
+    quiet = subprocess.DEVNULL
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=quiet, stderr=quiet)
+    folder = tmp_path / "runs" / "quick"
+    recordings = folder / "transfer" / "recordings"
     deadline = time.monotonic() + 240
     while len(list(recordings.glob("*.parquet"))) < 2 and time.monotonic() < deadline:
         time.sleep(0.2)
@@ -91,14 +111,16 @@ def test_a_killed_run_goes_on_when_called_again(tmp_path):
     process.wait()
     recorded = {path: path.stat().st_mtime_ns for path in recordings.glob("*.parquet")}
     assert len(recorded) == 2
-    assert not (tmp_path / "report.html").exists()
+    assert not (folder / "report.html").exists()
     time.sleep(2)
-    again = subprocess.run(command, capture_output=True, text=True, timeout=900)
+    again = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=900)
     assert again.returncode == 0, again.stderr
     assert "Report:" in again.stdout
+    assert NOTHING_MEANT in again.stdout
     assert {path: path.stat().st_mtime_ns for path in recorded} == recorded
-    summary = json.loads((tmp_path / "evaluation.json").read_text())["summary"]
-    assert {row["controller"] for row in summary} >= {"energy-shaping"}
-    trials = json.loads((tmp_path / "transfer.json").read_text())["trials"]
-    assert {row["method"] for row in trials} == {"identified", "cad"}
-    assert (tmp_path / "report.html").stat().st_size > 10_000
+    evaluation = json.loads((folder / "evaluation.json").read_text())
+    assert {row["controller"] for row in evaluation["summary"]} >= {"energy-shaping"}
+    transfer = json.loads((folder / "transfer.json").read_text())
+    assert {row["method"] for row in transfer["trials"]} == {"identified", "cad"}
+    assert evaluation["notes"][0] == transfer["notes"][0] == NOTHING_MEANT
+    assert NOTHING_MEANT in (folder / "report.html").read_text()

@@ -16,7 +16,7 @@ Examples:
 
 import dataclasses
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -90,8 +90,13 @@ class Evaluate:
     """Put a short video of each controller into the report, where OpenGL is to be had."""
 
 
-def run(args: Evaluate) -> None:
-    """Evaluate controllers, print the table, write what was asked for."""
+def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
+    """Evaluate controllers, print the table, write what was asked for.
+
+    Args:
+        args: Options.
+        notes: Sentences for table and report of the paper's trials, before those that arise.
+    """
     command = command_line(args)
     if args.suite == "paper":
         args = _with_folder(args)
@@ -118,7 +123,8 @@ def run(args: Evaluate) -> None:
         print_skills(Console(), result)
         return
     judged = judge(candidates, setup, args)
-    judged = replace(judged, evaluation=replace(judged.evaluation, command=command))
+    notes = [*notes, *judged.evaluation.notes]
+    judged = replace(judged, evaluation=replace(judged.evaluation, command=command, notes=notes))
     if args.json:
         write_atomically(args.json, judged.evaluation.dumps())
     console = Console()

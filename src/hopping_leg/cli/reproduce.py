@@ -7,10 +7,10 @@ robot. Takes less than 15 minutes on two cores. A run that was interrupted or ki
 it was when the same command is called again.
 
 Examples:
+  hop reproduce --quick                         # does everything work here?
   hop reproduce
-  hop reproduce --quick --out runs/look
   hop reproduce --seed 1 --out runs/second
-  hop reproduce --full --out runs/full
+  hop reproduce --full
 """
 
 import time
@@ -22,18 +22,28 @@ from hopping_leg.cli.output import write_json
 from hopping_leg.control.library import ENERGY_SHAPING, shipped_policies
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.transfer.methods import DEFAULT, choose_methods
-from hopping_leg.evaluate.transfer.study import SHORTEST, Study, find_twins
+from hopping_leg.evaluate.transfer.study import SHORTEST, USUAL_FIT, Study, find_twins
+from hopping_leg.identify.least_squares import LeastSquaresOptions
+from hopping_leg.trace import write_atomically
 
 _MINIATURE = ("identified", "cad")
+_GLANCE = LeastSquaresOptions(rounds=1, evaluations=2)
+_MARK = "size.txt"
+
+NOTHING_MEANT = (
+    "This was a quick run: fit, training and trials were cut so short that its numbers mean"
+    " nothing. It shows only that every step works; leave out --quick for numbers."
+)
+"""What a quick run says of itself wherever its numbers stand."""
 
 
 @dataclass(frozen=True)
 class Reproduce:
     """What to reproduce and where to keep it."""
 
-    out: Path = Path("runs/reproduce")
+    out: Path | None = None
     """Folder for report.html, evaluation.json, transfer.json, traces/ and, in transfer/,
-    recordings, robots, trainings and trials."""
+    recordings, robots, trainings and trials; default: runs/reproduce, runs/quick or runs/full."""
     seed: int = 0
     """Of the trainings; the evaluation's seeds follow from another number."""
     twin: str | None = None
@@ -43,13 +53,29 @@ class Reproduce:
     jobs: int = 2
     """Recordings, trainings or trials at the same time; take the number of cores."""
     quick: bool = False
-    """A look at the whole chain in a few minutes: short trainings, which will not hop well, and one
-    evaluation seed."""
+    """The shortest run that takes every step, to see that all of it works here; its numbers mean
+    nothing."""
     full: bool = False
     """The paper's sizes instead: 240 s per recording, five twins, all alternatives and ablations,
     trainings of the recipe's full length. Takes hours."""
     json: Path | None = None
     """File for every number of the evaluation, besides evaluation.json."""
+
+    @property
+    def size(self) -> str:
+        """Which of the three sizes."""
+        return "quick" if self.quick else "full" if self.full else "usual"
+
+    @property
+    def folder(self) -> Path:
+        """Where everything is kept."""
+        usual = "reproduce" if self.size == "usual" else self.size
+        return self.out or Path("runs") / usual
+
+    @property
+    def notes(self) -> list[str]:
+        """What has to be said beside every number."""
+        return [NOTHING_MEANT] if self.quick else []
 
 
 def run(args: Reproduce) -> None:
@@ -59,29 +85,37 @@ def run(args: Reproduce) -> None:
     from hopping_leg.evaluate.transfer.run import transfer
 
     study = make_study(args)
+    write_atomically(args.folder / _MARK, f"{args.size}\n".encode())
     result = transfer(study, args.jobs)
-    write_json(args.out / "transfer.json", result)
+    write_json(args.folder / "transfer.json", {**result, "notes": args.notes})
     twin, method = study.twins[0], study.methods[0]
     policy = study.training(twin, method, args.seed) / "policy.onnx"
     robot = study.fitted(twin, method)
+    others = ("fast",) if args.quick else shipped_policies()
     evaluate.run(
         evaluate.Evaluate(
-            controllers=(f"{method.name}={policy}", *shipped_policies(), ENERGY_SHAPING),
+            controllers=(f"{method.name}={policy}", *others, ENERGY_SHAPING),
             robot=str(robot),
             seeds=1 if args.quick else 5,
-            out=args.out,
+            out=args.folder,
             json=args.json,
             floor="soft" if args.quick else "both",
             video=not args.quick,
-        )
+        ),
+        args.notes,
     )
     experiment.show(result)
     print(
-        f"Done in {(time.monotonic() - start) / 60:.1f} minutes.\n"
-        f"Report: {(args.out / 'report.html').resolve()}\n"
-        f"Transfer: {args.out / 'transfer.json'}\n"
-        f"Identified robot: {robot}\n"
-        f"Policy: {policy} (its model card lies beside it)"
+        "\n".join(
+            [
+                *args.notes,
+                f"Done in {(time.monotonic() - start) / 60:.1f} minutes.",
+                f"Report: {(args.folder / 'report.html').resolve()}",
+                f"Transfer: {args.folder / 'transfer.json'}",
+                f"Identified robot: {robot}",
+                f"Policy: {policy} (its model card lies beside it)",
+            ]
+        )
     )
 
 
@@ -89,7 +123,7 @@ def make_study(args: Reproduce) -> Study:
     """Return what is done with how many twins."""
     from hopping_leg.learn.fast import FastRecipe
 
-    folder = args.out / "transfer"
+    folder = args.folder / "transfer"
     count = "5" if args.full else "1"
     twins = find_twins([args.twin or count], folder / "twins")
     steps = 1 if args.quick else args.steps
@@ -100,6 +134,7 @@ def make_study(args: Reproduce) -> Study:
         seeds=(args.seed,),
         steps=FastRecipe.steps if args.full else steps,
         seconds=240.0 if args.full else SHORTEST,
+        least_squares=_GLANCE if args.quick else USUAL_FIT,
         repeats=1 if args.quick else 3,
     )
 
@@ -109,3 +144,12 @@ def _check(args: Reproduce) -> None:
         raise UsageError("--seed must not be negative, --jobs and --steps must be at least 1.")
     if args.quick and args.full:
         raise UsageError("--quick and --full exclude each other; give one of them.")
+    mark = args.folder / _MARK
+    size = (
+        mark.read_text(encoding="utf-8", errors="replace").strip() if mark.exists() else args.size
+    )
+    if size != args.size:
+        raise UsageError(
+            f"{args.folder} holds a run of the {size} size, not of the {args.size} one; give"
+            " another --out."
+        )

@@ -1,5 +1,6 @@
 """Second stage: identify the twin from its recordings, knowing only the robot that it extends."""
 
+import dataclasses
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,10 +8,9 @@ from typing import Any
 
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.transfer.methods import Method
-from hopping_leg.evaluate.transfer.study import Study, TwinFile
+from hopping_leg.evaluate.transfer.study import USUAL_FIT, Study, TwinFile
 from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.cma import CmaOptions
-from hopping_leg.identify.least_squares import LeastSquaresOptions
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.identify.result import Identified, as_json
@@ -19,9 +19,6 @@ from hopping_leg.identify.searching import SearchOptions
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import write_atomically
-
-_TOLERANCE = 1e-3
-"""A round of least squares that lowers the cost by a smaller share ends the search."""
 
 _INERTIA_FACTOR = 10.0
 """How far off the CAD's link inertias may be: the paper's Table I has nine times the shank's."""
@@ -68,7 +65,7 @@ class Identify:
         believed = load_robot(self.twin.believed)
         effort = SearchOptions(
             cma=CmaOptions(generations=study.generations),
-            least_squares=LeastSquaresOptions(tolerance=_TOLERANCE),
+            least_squares=study.least_squares,
         )
         identified = identify(
             [load_recording(path) for path in self._recordings],
@@ -94,10 +91,12 @@ class Identify:
     def _asked(self) -> dict[str, Any]:
         assert self.method.fit is not None
         search = self.method.fit.search
+        effort = self.study.least_squares
         return {
             "recordings": [load_recording(path).digest for path in self._recordings],
             "search": search,
             "generations": None if search == "least-squares" else self.study.generations,
+            **({} if effort == USUAL_FIT else {"least_squares": dataclasses.asdict(effort)}),
         }
 
     def _truth(self, identified: Identified) -> dict[str, float]:

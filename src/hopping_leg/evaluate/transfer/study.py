@@ -7,6 +7,7 @@ from pathlib import Path
 
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.transfer.methods import Method
+from hopping_leg.identify.least_squares import LeastSquaresOptions
 from hopping_leg.robot.files import load_robot, parent_robot, shipped_robots
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.robot.reality import NEUTRAL, Latency
@@ -14,6 +15,9 @@ from hopping_leg.sim.twins import draw_twin
 
 SHORTEST = 30.0
 """Of a recording, s: one swing of the leg per amplitude."""
+
+USUAL_FIT = LeastSquaresOptions(tolerance=1e-3)
+"""A round that lowers the cost by a smaller share ends the search."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,8 @@ class Study:
     """Of each recording."""
     generations: int = 100
     """Of CMA-ES in each pass, for the methods that use it."""
+    least_squares: LeastSquaresOptions = USUAL_FIT
+    """How far the methods that use it search."""
     commands: tuple[float, ...] = (0.25, 0.27, 0.29, 0.31, 0.33, 0.35)
     """Apex heights at which the twins are tried, m."""
     repeats: int = 3
