@@ -1,8 +1,10 @@
+import math
 import time
 
 import pytest
 
 from hopping_leg.evaluate.transfer.board import Board
+from hopping_leg.learn.progress import TrainingProgress
 from hopping_leg.progress import LiveProgress, minutes
 
 
@@ -28,6 +30,19 @@ def test_a_bar_leaves_the_lines_out(capsys):
     with LiveProgress("work", lines=False) as progress:
         progress._line("a line")
     assert "a line" not in capsys.readouterr().err
+
+
+def test_a_training_tells_only_what_it_knows(capsys, monkeypatch):
+    now = 0.0
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    with TrainingProgress("fast seed 0") as progress:
+        progress.update(0.0, 0, 0, math.nan, "")
+        now = 60.0
+        progress.update(0.5, 1200, 7, 0.012, " · best snapshot 9 mm")
+    assert capsys.readouterr().err == (
+        "fast seed 0 0 % · 0 hops\n"
+        "fast seed 0 50 % · 7 hops · apex error 12 mm · 20 steps/s · best snapshot 9 mm\n"
+    )
 
 
 def test_a_study_counts_earlier_jobs_but_not_their_time(capsys, monkeypatch):

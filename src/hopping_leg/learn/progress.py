@@ -1,5 +1,7 @@
 """Show how a training goes."""
 
+import math
+
 from rich.progress import TextColumn, TimeRemainingColumn
 
 from hopping_leg.progress import LiveProgress
@@ -25,12 +27,16 @@ class TrainingProgress(LiveProgress):
             share: Of the budget that is used, 0 to 1.
             steps: Control steps so far.
             hops: Hops so far.
-            error: Mean |apex - command| of the latest hops, m.
+            error: Mean |apex - command| of the latest hops, m; NaN before the first.
             best: About the best snapshot.
         """
         if self._first_steps is None:
             self._first_steps = steps
-        rate = (steps - self._first_steps) / max(self.passed, 1e-9)
-        note = f"{hops} hops · apex error {1000 * error:.0f} mm · {rate:.0f} steps/s{best}"
+        note = f"{hops} hops"
+        if math.isfinite(error):
+            note += f" · apex error {1000 * error:.0f} mm"
+        if steps > self._first_steps:
+            note += f" · {(steps - self._first_steps) / max(self.passed, 1e-9):.0f} steps/s"
+        note += best
         self._bar.update(self._task, completed=share, note=note)
         self._line_if_due(f"{self._title} {100 * share:.0f} % · {note}")
