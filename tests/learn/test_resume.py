@@ -14,8 +14,9 @@ from hopping_leg.errors import UsageError
 from hopping_leg.learn import judge
 from hopping_leg.learn import train as module
 from hopping_leg.learn.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
-from hopping_leg.learn.recipes import randomise
 from hopping_leg.learn.resumable import restore, state_of
+from hopping_leg.sim.twins import Range
+from hopping_leg.sim.variants import SURPRISES
 from tests.learn.learners import (
     ROBOT,
     TINY,
@@ -25,6 +26,11 @@ from tests.learn.learners import (
     TinyPPO,
     learner,
 )  # fmt: skip
+
+LATE = Range("reality.latency.command", "s", 0.0, 0.015, "test", step=5e-3)
+SURPRISED = dataclasses.replace(
+    TINY_PRECISE, task=dataclasses.replace(TINY_PRECISE.task, randomised=(*SURPRISES, LATE))
+)
 
 
 def disturb_all_generators():
@@ -39,7 +45,7 @@ def disturb_all_generators():
         TinyPPO(),
         TINY_FAST,
         TINY_PRECISE,
-        randomise(TINY_PRECISE, "surprises"),
+        SURPRISED,
         TINY_RECURRENT,
     ],
     ids=["sac", "ppo", "fast", "precise", "surprised", "recurrent"],

@@ -29,7 +29,8 @@ class Options:
 
     recipe: str = "fast"
     """How to train: `fast` for accurate hopping soon, `precise` for more accurate hopping later,
-    `recurrent` for the same with a memory in the network, `paper` for the paper's method."""
+    `adaptive` for the same on legs that differ, `recurrent` for the same with a memory in the
+    network, `paper` for the paper's method."""
     robot: str = "legv2-paper"
     """A shipped robot or the path of a .toml file."""
     seed: int = 0
@@ -42,9 +43,9 @@ class Options:
     """Begin from the newest checkpoint of this folder's run instead of from scratch."""
     set: tuple[str, ...] = ()
     """Numbers of the recipe to change, e.g. `--set learning_rate=3e-4 gamma=0.98`."""
-    randomise: Literal["none", "twins", "surprises"] = "none"
-    """What each leg in training draws for itself: nothing; friction, inertia and ground from the
-    twins' ranges; or payload, rail, ground and motor gains around the robot's."""
+    randomise: Literal["none", "twins", "surprises"] | None = None
+    """What each leg in training draws for itself instead of the recipe's: nothing; friction,
+    inertia and ground from the twins' ranges; or payload, rail and ground around the robot's."""
     observation: Literal["three-samples", "dated", "dated-long"] | None = None
     """What the policy sees instead of what the recipe shows it; three-samples is the paper's."""
     minutes: float | None = None
@@ -73,7 +74,8 @@ def run(args: Options) -> None:
             raise UsageError(f"--steps is {args.steps} but must be at least 1.")
         recipe = dataclasses.replace(recipe, steps=args.steps)
     recipe = change(recipe, args.set)
-    recipe = randomise(recipe, args.randomise)
+    if args.randomise is not None:
+        recipe = randomise(recipe, args.randomise)
     if args.observation is not None:
         task = dataclasses.replace(recipe.task, observation=args.observation)
         recipe = dataclasses.replace(recipe, task=task)

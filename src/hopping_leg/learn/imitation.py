@@ -15,8 +15,8 @@ _FARTHEST = 0.2
 as the command, no aim helps."""
 
 
-_FARTHEST_OWN = 0.5
-"""The same of a leg's own."""
+_FARTHEST_OWN = 0.1
+"""The same of a leg's own. What the policy cannot tell apart must not add up."""
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any, Literal
 
 from hopping_leg.errors import UsageError, unknown_name
+from hopping_leg.learn.adaptive import AdaptiveRecipe
 from hopping_leg.learn.fast import FastRecipe
 from hopping_leg.learn.paper import PaperRecipe
 from hopping_leg.learn.precise import PreciseRecipe
@@ -15,7 +16,8 @@ from hopping_leg.sim.twins import IDENTIFIABLE, Range
 from hopping_leg.sim.variants import SURPRISES
 
 RECIPES: dict[str, type[Recipe]] = {
-    recipe.name: recipe for recipe in (FastRecipe, PaperRecipe, PreciseRecipe, RecurrentRecipe)
+    recipe.name: recipe
+    for recipe in (FastRecipe, PaperRecipe, PreciseRecipe, AdaptiveRecipe, RecurrentRecipe)
 }
 """Every recipe that ``hop train`` knows."""
 
@@ -110,3 +112,22 @@ def changes_of(recipe: str, options: dict[str, Any]) -> list[str]:
         return []
     defaults = numbers_of(RECIPES[recipe]())
     return [f"{n}={options[n]}" for n, v in defaults.items() if options.get(n, v) != v]
+
+
+def words_of(recipe: str, options: dict[str, Any]) -> list[str]:
+    """Return the options of ``hop train`` that make a recipe of its defaults.
+
+    Args:
+        recipe: Name of the recipe; one that is not known here has no defaults.
+        options: As in a run's ``config.json``.
+    """
+    if recipe not in RECIPES:
+        return []
+    usual, words = dataclasses.asdict(RECIPES[recipe]()), list[str]()
+    ranges, seen = randomised_by(options), options["task"]["observation"]
+    if ranges not in (None, randomised_by(usual)):
+        words += ["--randomise", ranges]
+    if seen != usual["task"]["observation"]:
+        words += ["--observation", seen]
+    changes = changes_of(recipe, options)
+    return [*words, "--set", *changes] if changes else words

@@ -9,7 +9,7 @@ from typing import Any
 from hopping_leg.errors import UsageError
 from hopping_leg.learn.checkpoint import Tree, list_checkpoints, read_checkpoint
 from hopping_leg.learn.recipe import Recipe
-from hopping_leg.learn.recipes import RECIPES, changes_of, randomised_by
+from hopping_leg.learn.recipes import words_of
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import write_atomically
 
@@ -69,14 +69,7 @@ class RunFolder:
             words += ["--source", config["source"]]
         if config["minutes_budget"] is not None:
             words += ["--minutes", f"{config['minutes_budget']:g}"]
-        ranges = randomised_by(config["options"])
-        if ranges not in ("none", None):
-            words += ["--randomise", ranges]
-        seen = config["options"]["task"]["observation"]
-        if config["recipe"] in RECIPES and seen != RECIPES[config["recipe"]]().task.observation:
-            words += ["--observation", seen]
-        changes = changes_of(config["recipe"], config["options"])
-        return " ".join([*words, "--set", *changes] if changes else words)
+        return " ".join([*words, *words_of(config["recipe"], config["options"])])
 
     def snapshot(self, steps: int) -> Path:
         """Return the file of the policy as it was after so many steps."""
