@@ -1,12 +1,14 @@
 """Hidden layers come out as they are computed; shuffling leaves nothing but their size."""
 
+import dataclasses
+
 import numpy as np
 import onnxruntime
 import pytest
 
 from hopping_leg.control.library import load_policy
 from hopping_leg.errors import PolicyError
-from hopping_leg.learn.export import Network, build_policy
+from hopping_leg.learn.export import Network, RecurrentUnit, build_policy
 from hopping_leg.learn.hidden import expose_hidden
 
 POLICY = load_policy("fast")
@@ -55,3 +57,13 @@ def test_a_network_without_hidden_layers_is_refused():
     )
     with pytest.raises(PolicyError, match="no hidden layer"):
         expose_hidden(build_policy(network, POLICY.card))
+
+
+def test_a_policy_that_remembers_is_refused():
+    card = dataclasses.replace(POLICY.card, layout="three-samples")
+    rng = np.random.default_rng(0)
+    unit = RecurrentUnit(*(rng.normal(size=shape) for shape in ((12, 15), (12, 4), 12, 12)))
+    layers = [(rng.normal(size=(2, 4)), np.zeros(2))]
+    network = Network(np.zeros(15), np.ones(15), layers, "tanh", "clip", unit=unit)
+    with pytest.raises(PolicyError, match="without a memory"):
+        expose_hidden(build_policy(network, card))

@@ -4,6 +4,7 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
+from hopping_leg.control.policy import MEMORY
 from hopping_leg.errors import PolicyError
 
 PREFIX = "hidden_"
@@ -19,10 +20,15 @@ def expose_hidden(content: bytes, shuffle: int | None = None) -> bytes:
             places: a network of the same size and sizes of weights that has learnt nothing.
 
     Raises:
-        PolicyError: The graph names no hidden layer.
+        PolicyError: The graph names no hidden layer, or remembers.
     """
     model = onnx.load_from_string(content)
     graph = model.graph
+    if MEMORY in (given.name for given in graph.input):
+        raise PolicyError(
+            "The hidden layers of a recurrent policy depend on more than a tick's measurements and"
+            " cannot be read out one by one; name a policy without a memory."
+        )
     names = [name for node in graph.node for name in node.output if name.startswith(PREFIX)]
     if not names:
         raise PolicyError("The policy's graph names no hidden layer; export it with `hop train`.")
