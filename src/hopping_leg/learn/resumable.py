@@ -66,10 +66,8 @@ def state_of(model: BaseAlgorithm) -> Tree:
     """Return everything needed to continue a model exactly, its environment included."""
     env: TaskVecEnv = model.env
     tree: Tree = {
+        **learner_state(model),
         "env": env.state(),
-        "policy": _to_numpy(model.policy.state_dict()),
-        "optimizers": [_to_numpy(o.state_dict()) for o in _optimizers(model)],
-        "counters": {name: getattr(model, name) for name in _COUNTERS},
         "last_observation": model._last_obs,
         "last_episode_starts": model._last_episode_starts,
         "episodes": [{"r": e["r"], "l": e["l"], "t": e["t"]} for e in model.ep_info_buffer],
@@ -77,9 +75,19 @@ def state_of(model: BaseAlgorithm) -> Tree:
         "own": model.own_state(),
     }
     if isinstance(model, SAC):
-        if model.log_ent_coef is not None:
-            tree["log_ent_coef"] = model.log_ent_coef.detach().numpy().copy()
         tree["replay"] = _replay_state(model.replay_buffer)
+    return tree
+
+
+def learner_state(model: BaseAlgorithm) -> Tree:
+    """Return networks, optimisers and counters alone: no environment, experience or randomness."""
+    tree: Tree = {
+        "policy": _to_numpy(model.policy.state_dict()),
+        "optimizers": [_to_numpy(o.state_dict()) for o in _optimizers(model)],
+        "counters": {name: getattr(model, name) for name in _COUNTERS},
+    }
+    if isinstance(model, SAC) and model.log_ent_coef is not None:
+        tree["log_ent_coef"] = model.log_ent_coef.detach().numpy().copy()
     return tree
 
 
@@ -89,14 +97,7 @@ def restore(model: BaseAlgorithm, tree: Tree) -> None:
     Call ``learn`` with ``reset_num_timesteps=False`` afterwards.
     """
     model.env.restore(tree["env"])
-    model.policy.load_state_dict(_to_torch(tree["policy"]))
-    if "log_ent_coef" in tree:
-        model.log_ent_coef.data.copy_(torch.from_numpy(tree["log_ent_coef"]))
-    for optimizer, state in zip(_optimizers(model), tree["optimizers"], strict=True):
-        state["state"] = {int(key): _to_torch(value) for key, value in state["state"].items()}
-        optimizer.load_state_dict(state)
-    for name, value in tree["counters"].items():
-        setattr(model, name, value)
+    restore_learner(model, tree)
     model._last_obs = tree["last_observation"]
     model._last_episode_starts = tree["last_episode_starts"]
     model.ep_info_buffer = deque(tree["episodes"], maxlen=model._stats_window_size)
@@ -105,6 +106,18 @@ def restore(model: BaseAlgorithm, tree: Tree) -> None:
         _restore_replay(model.replay_buffer, tree["replay"])
     model.restore_own(tree["own"])
     _restore_random(model, tree["random"])
+
+
+def restore_learner(model: BaseAlgorithm, tree: Tree) -> None:
+    """Bring a model to a ``learner_state``."""
+    model.policy.load_state_dict(_to_torch(tree["policy"]))
+    if "log_ent_coef" in tree:
+        model.log_ent_coef.data.copy_(torch.from_numpy(tree["log_ent_coef"]))
+    for optimizer, state in zip(_optimizers(model), tree["optimizers"], strict=True):
+        state["state"] = {int(key): _to_torch(value) for key, value in state["state"].items()}
+        optimizer.load_state_dict(state)
+    for name, value in tree["counters"].items():
+        setattr(model, name, value)
 
 
 def _optimizers(model: BaseAlgorithm) -> list[torch.optim.Optimizer]:

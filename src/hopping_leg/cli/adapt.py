@@ -1,0 +1,179 @@
+"""Continue a policy's training on the real leg, or on a twin that plays it.
+
+The robot is reached through outings of some seconds alone, and nothing is known of it but what its
+joints measure: heights are reckoned from the time in the air. First a correction of the commanded
+height is learnt, two numbers, then the network's weights go on by soft actor-critic, beside the
+believed robot's experience. A policy that became worse is thrown back to the best; the run stops
+when hops are accurate, when nothing improves, or when the minutes of robot time are used up. A
+killed run goes on with --resume.
+
+Examples:
+  hop adapt fast --on twin --minutes 3 --method aim
+  hop adapt fast --on my_twin.toml --seed 1 --out runs/adapted --json adapted.json
+  hop adapt fast --robot my_leg.toml --transport /dev/fdcanusb --minutes 5
+"""
+
+import importlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import tyro
+from rich.console import Console
+
+from hopping_leg.cli.motors import ask, check, connect
+from hopping_leg.cli.options import Heights
+from hopping_leg.cli.output import write_json
+from hopping_leg.control.library import load_policy
+from hopping_leg.deploy.envelope import hopping_envelope
+from hopping_leg.errors import RobotError, UsageError
+from hopping_leg.robot import load_robot
+from hopping_leg.robot.parameters import Robot
+
+if TYPE_CHECKING:
+    from hopping_leg.control.outing import Outings
+    from hopping_leg.control.policy import Policy
+    from hopping_leg.learn.adapt.simulated import Guard
+
+
+@dataclass(frozen=True)
+class Adapt:
+    """What goes on learning, on which robot, for how long."""
+
+    policy: tyro.conf.Positional[str]
+    """A shipped policy or an .onnx file."""
+    on: str | None = None
+    """The twin that plays the real leg: a shipped robot or a .toml file."""
+    transport: str | None = None
+    """The drives of the real leg instead, as for `hop deploy`."""
+    robot: str = "legv2-paper"
+    """What is believed of the leg: the robot that the policy was trained on."""
+    method: Literal["aim", "sac", "both"] = "both"
+    """What is learnt: the command that the network is told, its weights, or the one, then the
+    other."""
+    minutes: float = 10.0
+    """Robot time at most."""
+    commands: Heights = (0.25, 0.30, 0.35)
+    """Heights of the checks, m; explorations hop between the lowest and the highest."""
+    outing: float = 15.0
+    """Length of an outing, s."""
+    tolerance: float = 0.004
+    """Error that is good enough, on two checks in a row, m."""
+    seed: int = 0
+    """Of exploration, commands, batches and a twin's noise."""
+    out: Path = Path("runs/adapt")
+    """The run's folder."""
+    resume: bool = False
+    """Go on with the run in the folder; without one there, begin."""
+    yes: bool = False
+    """Arm the drives without asking before every outing."""
+    json: Path | None = None
+    """Write the numbers to this file as well."""
+
+
+def run(args: Adapt) -> None:
+    """Continue the training, say how it went."""
+    from hopping_leg.learn.adapt.options import AdaptOptions
+    from hopping_leg.learn.adapt.prepared import Task
+    from hopping_leg.learn.adapt.rules import Rules
+    from hopping_leg.learn.adapt.running import POLICY, adapt
+
+    policy, robot = load_policy(args.policy), load_robot(args.robot)
+    _refuse(args, policy, robot)
+    rules = Rules(minutes=args.minutes, tolerance=args.tolerance)
+    options = AdaptOptions(
+        method=args.method, commands=tuple(sorted(args.commands)), outing=args.outing, rules=rules
+    )
+    span = (min(args.commands), max(args.commands))
+    console = Console()
+    result = adapt(
+        Task(policy, robot, span, args.seed),
+        _outings(args, robot, policy),
+        options,
+        args.out,
+        resume=args.resume,
+        on_outing=lambda row: console.print(line(row), highlight=False, soft_wrap=True),
+    )
+    if args.json is not None:
+        write_json(args.json, result)
+    console.print(f"{result['why_it_ended']} Policy: {args.out / POLICY}", soft_wrap=True)
+
+
+def line(row: dict[str, Any]) -> str:
+    """Return what to show of an outing."""
+    true = f", in truth {1e3 * row['true_error_m']:.1f} mm" if "true_error_m" in row else ""
+    notes = [row["complaint"], "Thrown back to the best." if row["thrown_back"] else ""]
+    return " ".join(
+        [
+            f"{row['minutes']:.2f} min, {row['kind']}: error {1e3 * row['error_m']:.1f} mm{true},"
+            f" {row['hops']} hops.",
+            *filter(None, notes),
+        ]
+    )
+
+
+def guard_of(robot: Robot, rate: float) -> "Guard":
+    """Return the supervisor's limits of measured joints, for a simulated leg."""
+    import numpy as np
+
+    from hopping_leg.learn.adapt.simulated import Guard
+
+    limits = hopping_envelope(robot, rate)
+    return Guard(*(np.array(pair) for pair in (limits.lower, limits.upper, limits.speed)))
+
+
+def _refuse(args: Adapt, policy: "Policy", robot: Robot) -> None:
+    """Refuse what cannot be done, before anything moves.
+
+    Raises:
+        UsageError: An option has no meaning.
+        RobotError: The believed robot is a twin.
+    """
+    if (args.on is None) == (args.transport is None):
+        raise UsageError("Give either --on, a twin that plays the leg, or --transport, its drives.")
+    if args.seed < 0:
+        raise UsageError(f"--seed is {args.seed} but must not be negative.")
+    robot.require_leg()
+    if not robot.reality.only_delays:
+        raise RobotError(
+            f"{robot.name} has effects in [reality] that nobody can believe in; name what plays the"
+            " leg with --on, and the robot that its file extends with --robot."
+        )
+    policy.check_robot(robot)
+    low, high = policy.card.command_low, policy.card.command_high
+    for command in args.commands:
+        if not low <= command <= high:
+            raise UsageError(
+                f"A command of {command:g} m is outside of the policy's training; give heights from"
+                f" {low:g} to {high:g} m."
+            )
+
+
+def _outings(args: Adapt, robot: Robot, policy: "Policy") -> "Outings":
+    if args.on is not None:
+        from hopping_leg.learn.adapt.simulated import Simulated
+
+        return Simulated(load_robot(args.on), guard_of(robot, policy.card.rate))
+    assert args.transport is not None
+    return _deployed(args, robot, policy.card.rate, args.transport)
+
+
+def _deployed(args: Adapt, robot: Robot, rate: float, transport: str) -> "Outings":
+    envelope = hopping_envelope(robot, rate)
+    deployed: Any = importlib.import_module("hopping_leg.deploy.outings")
+
+    def ready(seconds: float) -> None:
+        ask(
+            f"{robot.name} will move and hop for {seconds:g} s; keep a hand on the switch.",
+            yes=args.yes,
+        )
+
+    outings: Outings = deployed.Deployed(
+        robot,
+        rate,
+        args.out / "traces",
+        lambda: connect(robot, transport),
+        lambda link: check(link, robot, envelope),
+        ready,
+    )
+    return outings

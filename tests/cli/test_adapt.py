@@ -1,0 +1,70 @@
+"""`hop adapt` on the command line."""
+
+import json
+
+import pytest
+
+from hopping_leg.cli import main
+from hopping_leg.cli.adapt import guard_of, line
+from hopping_leg.robot import load_robot
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["fast"], "either --on"),
+        (["fast", "--on", "twin", "--transport", "x"], "either --on"),
+        (["fast", "--on", "twin", "--seed", "-1"], "--seed"),
+        (["fast", "--on", "twin", "--robot", "twin"], "believe"),
+        (["fast", "--on", "twin", "--commands", "0.3"], "at least two"),
+        (["fast", "--on", "twin", "--commands", "0.25,0.9"], "0.9 m"),
+        (["fast", "--on", "twin", "--minutes", "0"], "minutes"),
+        (["fast", "--on", "twin", "--outing", "600"], "outing of 600"),
+        (["fast", "--on", "nobody"], "nobody"),
+        (["energy-shaping", "--on", "twin"], "energy-shaping"),
+    ],
+)
+def test_what_has_no_meaning_is_refused_in_a_sentence(words, sentence, capsys, tmp_path):
+    assert main(["adapt", *words, "--out", str(tmp_path / "run")]) == 2
+    error = capsys.readouterr().err
+    assert sentence in error
+    assert "Traceback" not in error
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_guard_is_the_supervisors():
+    robot = load_robot("legv2-paper")
+    guard = guard_of(robot, 200.0)
+    assert (guard.lower < robot.of_joints("lower")).all()
+    assert (guard.speed > robot.of_joints("no_load_speed")).all()
+
+
+def test_an_outings_line_says_what_happened():
+    row = {"minutes": 1.0, "kind": "check", "error_m": 0.02, "true_error_m": 0.018, "hops": 9,
+           "complaint": "A joint left its range.", "thrown_back": True}  # fmt: skip
+    said = line(row)
+    assert "20.0 mm" in said
+    assert "18.0 mm" in said
+    assert said.endswith("A joint left its range. Thrown back to the best.")
+
+
+@pytest.mark.slow
+def test_a_run_leaves_policy_card_and_numbers(tmp_path, monkeypatch, capsys):
+    from hopping_leg.learn.adapt import adapting
+    from hopping_leg.learn.adapt.contact import ContactOptions
+    from hopping_leg.learn.adapt.prepared import prepare
+
+    few = ContactOptions(legs=4, seconds=3.0, steps=50, hidden=(8,))
+    monkeypatch.setattr(adapting, "prepare", lambda task, _, folder: prepare(task, few, folder))
+    out, numbers = tmp_path / "run", tmp_path / "adapt.json"
+    words = ["adapt", "fast", "--on", "twin", "--method", "aim", "--minutes", "0.4", "--outing",
+             "10", "--out", str(out), "--json", str(numbers)]  # fmt: skip
+    assert main(words) == 0
+    result = json.loads(numbers.read_text())
+    assert result["policy"] == "fast"
+    assert len(result["outings"]) == 2
+    assert result["outings"][1]["aim_m"] != [0.0, 0.0]
+    assert "used up" in capsys.readouterr().out
+    assert "fast" in (out / "model_card.md").read_text()
+    assert main(["export", "policy", str(out / "policy.onnx")]) == 0
+    assert main([*words, "--resume"]) == 2
