@@ -28,7 +28,7 @@ SHORTER = {
     "hop deploy": {"--seconds": "0.3", "--yes": None},
     "hop doctor --home": {"--yes": None},
     "hop doctor --write": {"--yes": None},
-    "hop emulate": {"--seconds": "0.3"},
+    "hop emulate": {"--seconds": "0.3", "--no-realtime": None},
     "hop evaluate": {
         "--seeds": "1", "--commands": "0.3", "--floor": "soft", "--no-video": None,
     },
