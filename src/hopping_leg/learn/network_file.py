@@ -29,7 +29,5 @@ def read_network(content: bytes) -> Network:
         (stored[f"weight_{i}"].T.copy(), stored[f"bias_{i}"]) for i in range(count)
     ]
     squash = "tanh" if graph.node[-2].op_type == "Tanh" else "clip"
-    bound = float(stored["most"]) if "most" in stored else float("inf")
-    return Network(
-        stored["offset"], stored["gain"], layers, names[hidden.pop()], squash, bound
-    )
+    bound = stored["most"].item() if "most" in stored else float("inf")
+    return Network(stored["offset"], stored["gain"], layers, names[hidden.pop()], squash, bound)
