@@ -12,8 +12,10 @@ Examples:
   hop bench probe fast paper --json probe.json --figure probe.svg
   hop bench identify --skip-paper-size --json identify.json
   hop bench view --json view.json
+  hop bench adapt --json adapt.json --figure adapt.svg
 """
 
+from hopping_leg.cli.bench.adaptation import Adapt
 from hopping_leg.cli.bench.controllers import Ablation, EnergyShaping, Training
 from hopping_leg.cli.bench.engines import Engines
 from hopping_leg.cli.bench.faults import Faults
@@ -37,6 +39,7 @@ Benchmark = (
     | Engines
     | View
     | Probe
+    | Adapt
 )
 
 
