@@ -1,3 +1,6 @@
+import subprocess
+import sys
+
 from hopping_leg.cli import main
 from hopping_leg.cli.extras import PURPOSES, survey
 
@@ -29,3 +32,21 @@ def test_doctor_without_a_transport_looks_at_the_installation(monkeypatch, capsy
 def test_drives_cannot_be_changed_without_a_transport(capsys):
     assert main(["doctor", "--write"]) == 2
     assert "name their --transport" in capsys.readouterr().err
+
+
+WITHOUT_EXTRAS = """
+import sys
+class Block:
+    def find_spec(self, name, *_):
+        if name.split(".")[0] in ("moteus", "can", "serial", "msgpack", "torch", "viser", "ray"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+sys.meta_path.insert(0, Block())
+from hopping_leg.cli import main
+raise SystemExit(main(["doctor"]))
+"""
+
+
+def test_doctor_needs_no_extra_itself():
+    done = subprocess.run([sys.executable, "-c", WITHOUT_EXTRAS], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "hardware: " in done.stdout

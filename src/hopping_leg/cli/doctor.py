@@ -11,13 +11,11 @@ Examples:
 
 import importlib
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
 from hopping_leg.cli.extras import show_extras, survey
-from hopping_leg.cli.motors import ask, connect, find, show
-from hopping_leg.deploy.bring_up import Finding
 from hopping_leg.deploy.configuration import wanted
 from hopping_leg.deploy.envelope import hopping_envelope
 from hopping_leg.deploy.wire import JOINTS
@@ -25,6 +23,9 @@ from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import CONTROL_RATE
+
+if TYPE_CHECKING:
+    from hopping_leg.deploy.bring_up import Finding
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,8 @@ def run(args: Doctor) -> None:
             raise UsageError("--write and --home need the drives; name their --transport.")
         show_extras(Console(), survey())
         return
+    from hopping_leg.cli.motors import connect, find, show
+
     robot, console = load_robot(args.robot), Console()
     envelope = hopping_envelope(robot, CONTROL_RATE)
     with connect(robot, args.transport) as link:
@@ -70,12 +73,14 @@ def run(args: Doctor) -> None:
 def _write(
     link: Any,  # noqa: ANN401
     robot: Robot,
-    findings: list[Finding],
+    findings: "list[Finding]",
     console: Console,
     *,
     yes: bool,
 ) -> None:
     """Write the settings that were found wrong."""
+    from hopping_leg.cli.motors import ask
+
     inspection: Any = importlib.import_module("hopping_leg.deploy.inspection")
     for joint, name in enumerate(JOINTS):
         wrong = {f.setting for f in findings if f.joint == joint and f.setting}
@@ -89,6 +94,8 @@ def _write(
 
 
 def _home(link: Any, angles: tuple[float, float], *, yes: bool) -> None:  # noqa: ANN401
+    from hopping_leg.cli.motors import ask
+
     hip, knee = angles
     ask(f"The drives will take the hip for {hip:g} and the knee for {knee:g} rad.", yes=yes)
     inspection: Any = importlib.import_module("hopping_leg.deploy.inspection")
