@@ -38,6 +38,14 @@ def test_integration_ends_where_a_leg_with_offset_and_slope_hops_true():
     np.testing.assert_allclose(0.08 + 0.85 * aim.told(command), command, atol=0.002)
 
 
+def test_hops_that_fail_do_not_move_the_aim_of_those_that_do_not():
+    command = np.repeat([0.25, 0.30, 0.35], 9)
+    error = np.full(27, 0.01)
+    error[::9] = -0.2
+    aim = Aim(0.25, 0.35).corrected(command, error, AimOptions(rate=1.0))
+    np.testing.assert_allclose(aim.shift, [-0.01, 0.0], atol=1e-3)
+
+
 def test_the_aim_never_strays_far_and_stays_without_hops():
     options = AimOptions(farthest=0.03)
     aim = Aim(0.25, 0.35)

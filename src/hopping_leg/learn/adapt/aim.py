@@ -14,6 +14,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.control.layouts import make_layout
 from hopping_leg.control.policy import Card
+from hopping_leg.learn.adapt.lines import robust_line
 from hopping_leg.learn.export import Network
 
 
@@ -23,8 +24,6 @@ class AimOptions:
 
     rate: float = 0.6
     """Share of an outing's error that is corrected."""
-    outlier: float = 0.08
-    """Largest error of a hop that counts in full, m."""
     ridge: float = 2.0
     """Hops' worth of doubt that the errors depend on the command at all."""
     farthest: float = 0.1
@@ -60,10 +59,7 @@ class Aim:
         """
         if not len(error):
             return self
-        lean = self._lean(command)
-        doubt = np.diag([0.0, options.ridge])
-        bounded = np.clip(error, -options.outlier, options.outlier)
-        line = np.linalg.solve(lean.T @ lean + doubt + 1e-9 * np.eye(2), lean.T @ bounded)
+        line = robust_line(self._lean(command)[:, 1], error, options.ridge)
         a, b = np.array(self.shift) - options.rate * line
         most = options.farthest
         a = float(np.clip(a, -most, most))

@@ -16,6 +16,7 @@ from hopping_leg.control.rollout import Rollout
 from hopping_leg.hops import find_hops
 from hopping_leg.learn.adapt.contact import Contact
 from hopping_leg.learn.adapt.heard import Heard
+from hopping_leg.learn.adapt.lines import robust_line
 from hopping_leg.learn.adapt.simulated import traces_of
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
@@ -91,7 +92,7 @@ class Reckoning:
             same = np.abs(found[nearest, 0] - hops.tick) <= near
             pairs.append(np.stack([found[nearest, 1], hops.apex], axis=1)[same])
         reckoned, true = np.concatenate(pairs).T
-        self.drag = self.drag + _robust_line(reckoned, reckoned - true)
+        self.drag = self.drag + robust_line(reckoned, reckoned - true)
 
     def _fly(
         self, height: Array, rate: Array, flying: BoolArray, begin: float, end: float, period: float
@@ -131,14 +132,3 @@ def _flights(air: Array, period: float) -> list[tuple[float, float]]:
 def _crossing(air: Array, tick: int) -> float:
     """Return where a line between a tick and the next is zero, ticks."""
     return float(tick + air[tick] / (air[tick] - air[tick + 1]))
-
-
-def _robust_line(x: Array, y: Array) -> Array:
-    """Return constant and slope of the line through points, by least absolute errors, (2,)."""
-    columns = np.stack([np.ones_like(x), x], axis=1)
-    weight = np.ones_like(y)
-    for _ in range(20):
-        root = np.sqrt(weight)
-        line = np.linalg.lstsq(columns * root[:, None], y * root, rcond=None)[0]
-        weight = 1 / np.maximum(np.abs(y - columns @ line), 1e-4)
-    return np.asarray(line)
