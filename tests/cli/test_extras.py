@@ -15,6 +15,15 @@ def test_what_is_missing_or_too_old_is_named_with_its_command():
     assert found["view"].command == "pip install 'hopping-leg[view]'"
 
 
+def test_an_extra_of_another_package_counts(monkeypatch):
+    theirs = {"numpy": ["no-such-package; extra == 'fast'", "scipy; extra == 'good'"]}
+    monkeypatch.setattr("hopping_leg.cli.extras.requires", theirs.get)
+    lines = ["numpy[fast]>=1; extra == 'bench'", "numpy[good]; extra == 'view'"]
+    found = {extra.name: extra for extra in survey(lines)}
+    assert found["bench"].missing == ("numpy[fast]>=1",)
+    assert found["view"].missing == ()
+
+
 def test_a_package_for_another_platform_is_not_missing():
     line = "no-such-package; platform_machine == 'pdp11' and extra == 'pi3hat'"
     assert all(not extra.missing for extra in survey([line]))

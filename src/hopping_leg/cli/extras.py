@@ -68,7 +68,8 @@ def show_extras(console: Console, extras: Sequence[Extra]) -> None:
 
 def str_of(requirement: Requirement) -> str:
     """Return a requirement without its condition."""
-    return f"{requirement.name}{requirement.specifier}"
+    extras = f"[{','.join(sorted(requirement.extras))}]" if requirement.extras else ""
+    return f"{requirement.name}{extras}{requirement.specifier}"
 
 
 def _of(requirement: Requirement, extra: str) -> bool:
@@ -81,8 +82,12 @@ def _of(requirement: Requirement, extra: str) -> bool:
 
 
 def _met(requirement: Requirement) -> bool:
+    """Tell whether a requirement is installed, with the extras that it asks for."""
     try:
         found = version(requirement.name)
     except PackageNotFoundError:
         return False
-    return requirement.specifier.contains(found, prereleases=True)
+    brought = [Requirement(line) for line in requires(requirement.name) or []]
+    return requirement.specifier.contains(found, prereleases=True) and all(
+        _met(other) for extra in requirement.extras for other in brought if _of(other, extra)
+    )
