@@ -2,16 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from hopping_leg.deploy.configuration import wanted
 from hopping_leg.deploy.envelope import Envelope
-from hopping_leg.deploy.inspection import DriveFacts
 from hopping_leg.deploy.observation import DriveMode
 from hopping_leg.deploy.reasons import fault_text
 from hopping_leg.deploy.wire import JOINTS, wires
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot.hardware import REGISTER_MAP
 from hopping_leg.robot.parameters import Robot
+
+if TYPE_CHECKING:
+    from hopping_leg.deploy.inspection import DriveFacts
 
 HOMED = 2
 """Home state of a drive that knows where its output is (register 0x00c)."""
@@ -36,7 +39,7 @@ class Finding:
     setting: str = ""
 
 
-def judge(robot: Robot, envelope: Envelope, drives: Sequence[DriveFacts]) -> list[Finding]:
+def judge(robot: Robot, envelope: Envelope, drives: "Sequence[DriveFacts]") -> list[Finding]:
     """Return all checks of both drives.
 
     Args:
@@ -62,7 +65,7 @@ def require(findings: Sequence[Finding]) -> None:
         raise HardwareError(f"Not armed: {complaints[0]}{more}")
 
 
-def _of_drive(robot: Robot, envelope: Envelope, joint: int, facts: DriveFacts) -> list[Finding]:
+def _of_drive(robot: Robot, envelope: Envelope, joint: int, facts: "DriveFacts") -> list[Finding]:
     name, address = JOINTS[joint], wires(robot)[joint].id
     if not facts.answers:
         complaint = (
@@ -79,7 +82,7 @@ def _of_drive(robot: Robot, envelope: Envelope, joint: int, facts: DriveFacts) -
     ]
 
 
-def _of_identity(robot: Robot, joint: int, facts: DriveFacts) -> list[Finding]:
+def _of_identity(robot: Robot, joint: int, facts: "DriveFacts") -> list[Finding]:
     name, servo, address = JOINTS[joint], robot.hardware.servos[joint], wires(robot)[joint].id
     serial = (
         f"the drive with id {address} has serial number {facts.serial} but the robot's file"
@@ -101,7 +104,7 @@ def _of_identity(robot: Robot, joint: int, facts: DriveFacts) -> list[Finding]:
     ]
 
 
-def _of_power(envelope: Envelope, joint: int, facts: DriveFacts) -> list[Finding]:
+def _of_power(envelope: Envelope, joint: int, facts: "DriveFacts") -> list[Finding]:
     name, low, high = JOINTS[joint], envelope.voltage_low, envelope.voltage_high
     volts, heat = f"{facts.voltage:.1f} V", f"{facts.temperature:.0f} deg C"
     supply = (
@@ -115,7 +118,7 @@ def _of_power(envelope: Envelope, joint: int, facts: DriveFacts) -> list[Finding
     ]
 
 
-def _of_pose(envelope: Envelope, joint: int, facts: DriveFacts) -> list[Finding]:
+def _of_pose(envelope: Envelope, joint: int, facts: "DriveFacts") -> list[Finding]:
     name, low, high = JOINTS[joint], envelope.lower[joint], envelope.upper[joint]
     homed = facts.home == HOMED
     lost = (
@@ -133,7 +136,7 @@ def _of_pose(envelope: Envelope, joint: int, facts: DriveFacts) -> list[Finding]
     ]
 
 
-def _of_configuration(robot: Robot, joint: int, facts: DriveFacts) -> list[Finding]:
+def _of_configuration(robot: Robot, joint: int, facts: "DriveFacts") -> list[Finding]:
     findings = []
     for setting in wanted(robot, joint):
         found = facts.settings.get(setting.name, float("nan"))
