@@ -1,6 +1,8 @@
 import subprocess
 import sys
 
+import pytest
+
 from hopping_leg.cli import main
 from hopping_leg.cli.extras import PURPOSES, survey
 
@@ -43,19 +45,41 @@ def test_drives_cannot_be_changed_without_a_transport(capsys):
     assert "name their --transport" in capsys.readouterr().err
 
 
+OPTIONAL = [
+    *("torch", "stable_baselines3", "onnx", "tensorboard", "optuna", "sqlalchemy", "ray"),
+    *("moteus", "can", "serial", "msgpack", "pybullet", "viser", "playwright"),
+]
 WITHOUT_EXTRAS = """
 import sys
 class Block:
     def find_spec(self, name, *_):
-        if name.split(".")[0] in ("moteus", "can", "serial", "msgpack", "torch", "viser", "ray"):
-            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+        if name.split(".")[0] in {0!r}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
 sys.meta_path.insert(0, Block())
 from hopping_leg.cli import main
-raise SystemExit(main(["doctor"]))
+raise SystemExit(main({1!r}))
 """
 
 
-def test_doctor_needs_no_extra_itself():
-    done = subprocess.run([sys.executable, "-c", WITHOUT_EXTRAS], capture_output=True, text=True)
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["doctor"], "hardware: "),
+        (["completion", "bash"], "emulate"),
+        (["emulate", "--kinds"], "late_reply"),
+    ],
+    ids=" ".join,
+)
+def test_the_core_can_say_what_there_is(words, said):
+    code = WITHOUT_EXTRAS.format(OPTIONAL, words)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert "hardware: " in done.stdout
+    assert said in done.stdout
+
+
+def test_a_verb_without_its_extra_names_it():
+    code = WITHOUT_EXTRAS.format(OPTIONAL, ["emulate"])
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "pip install 'hopping-leg[hardware]'" in done.stderr
+    assert "Traceback" not in done.stderr
