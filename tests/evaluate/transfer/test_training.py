@@ -16,3 +16,13 @@ def test_no_method_trains_on_what_the_twin_alone_knows(tmp_path):
     assert truth.robot.reality.only_delays
     assert truth.robot.rail == twin.robot.rail
     assert truth.robot.reality.latency.command == twin.robot.reality.latency.command
+
+
+def test_a_training_that_goes_beyond_its_steps_is_done_once(tmp_path):
+    one = study(tmp_path, ["cad"], steps=1)
+    train = Train(one, one.twins[0], one.methods[0], 0)
+    assert train.progress() == (0.0, "begun")
+    snapshots = one.training(one.twins[0], one.methods[0], 0) / "snapshots"
+    snapshots.mkdir(parents=True)
+    (snapshots / "000000032768.onnx").touch()
+    assert train.progress()[0] == 1.0

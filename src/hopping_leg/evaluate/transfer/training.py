@@ -63,7 +63,8 @@ class Train:
         """Return the share done and what to show while it runs."""
         snapshots = sorted((self._folder().path / "snapshots").glob("*.onnx"))
         steps = int(snapshots[-1].stem) if snapshots else 0
-        return steps / self.study.steps, f"{steps / 1e6:.1f}M steps" if steps else "begun"
+        share = min(steps / self.study.steps, 1.0)
+        return share, f"{steps / 1e6:.1f}M steps" if steps else "begun"
 
     @property
     def robot(self) -> Robot:
