@@ -53,9 +53,9 @@ results: $(STAMP)
 	$(BIN)/hop evaluate fast paper energy-shaping energy-shaping-literal --seeds 10 --no-video \
 	  --json docs/results/evaluation.json --traces runs/results/traces
 	$(BIN)/hop plot runs/results/traces/*.parquet --out docs/results/figures
-	$(BIN)/hop evaluate precise energy-shaping --seeds 5 --floor soft --no-video --json docs/results/precise.json \
+	$(BIN)/hop evaluate precise adaptive energy-shaping --seeds 5 --floor soft --no-video --json docs/results/precise.json \
 	  --commands 0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40
-	$(BIN)/hop evaluate energy-shaping energy-shaping-literal fast precise paper --suite robustness --seeds 3 \
+	$(BIN)/hop evaluate energy-shaping energy-shaping-literal fast precise adaptive paper --suite robustness --seeds 3 \
 	  --out runs/results/robustness --json docs/results/robustness.json
 	cp runs/results/robustness/robustness.svg docs/results
 	$(BIN)/hop evaluate fast paper energy-shaping --suite skills --json docs/results/skills.json
