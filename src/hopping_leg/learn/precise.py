@@ -103,7 +103,7 @@ class PreciseRecipe(FastRecipe):
         """Sharpen the reward and quieten exploration for the teacher, then let the policy act.
 
         Where legs differ, they do so for the policy: a teacher that feels the true state is hardly
-        the worse for not having met them, and easier to imitate than one that is told.
+        the worse for not having met them.
         """
         super().anneal(model, env, min(1.0, share / self.teaching))
         taught = (share - self.teaching) / (1 - self.teaching)
