@@ -55,13 +55,15 @@ class HoppingTask:
         self._variants = vary(robot, ranges, count, draws) if ranges else ()
         self._numbers = np.zeros((count, len(ranges)))
         self._diverged = not options.alike_at_first
+        if self._diverged:
+            self._numbers = places(robot, self._variants, ranges)
         self.legs = Legs(
             robot,
             count,
             rate=options.rate,
             timestep=options.timestep,
             threads=threads,
-            variants=() if options.alike_at_first else self._variants,
+            variants=self._variants if self._diverged else (),
         )
         self.plant = Plant(self.legs, options.disturbance, options.soft_limits, noise)
         self.observation = make_observation(robot, options, count)
@@ -80,8 +82,6 @@ class HoppingTask:
         self._switch = np.full(count, np.iinfo(np.int64).max)
         self._last = np.zeros((count, 2))
         self._rises = np.zeros(count, np.bool_)
-        if self._diverged:
-            self._numbers = places(robot, self._variants, ranges)
         self.reset()
 
     def diverge(self) -> None:
