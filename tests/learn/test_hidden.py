@@ -8,8 +8,9 @@ import pytest
 
 from hopping_leg.control.library import load_policy
 from hopping_leg.errors import PolicyError
-from hopping_leg.learn.export import Network, RecurrentUnit, build_policy
+from hopping_leg.learn.export import Network, build_policy
 from hopping_leg.learn.hidden import expose_hidden
+from hopping_leg.learn.memories import RecurrentUnit
 
 POLICY = load_policy("fast")
 
@@ -64,6 +65,6 @@ def test_a_policy_that_remembers_is_refused():
     rng = np.random.default_rng(0)
     unit = RecurrentUnit(*(rng.normal(size=shape) for shape in ((12, 15), (12, 4), 12, 12)))
     layers = [(rng.normal(size=(2, 4)), np.zeros(2))]
-    network = Network(np.zeros(15), np.ones(15), layers, "tanh", "clip", unit=unit)
+    network = Network(np.zeros(15), np.ones(15), layers, "tanh", "clip", memory=unit)
     with pytest.raises(PolicyError, match="without a memory"):
         expose_hidden(build_policy(network, card))

@@ -18,7 +18,10 @@ def test_everything_is_measured_through_the_real_page(tmp_path):
     result = bench_view(ViewBenchmark(seconds=2.0, commands=3, picture=picture))
     latency = result["latency_ms"]
     assert 0 < latency["median"] <= latency["p95"] <= latency["most"]
-    assert 0 < result["frames_per_s"] < 1000
+    for watched in (result, result["small_window"]):
+        assert 0 < watched["frames_per_s"] < 1000
+        assert min(watched["canvas"]) > 0
+    assert result["window"] > result["small_window"]["window"]
     assert 0 < result["pictures_sent_per_s"] < 1.2 * result["setup"]["intended_pictures_per_s"]
     assert 0 < result["real_time"] < 1.1
     assert result["start_s"] > 0

@@ -10,7 +10,8 @@ from torch import nn
 from hopping_leg.arrays import Array
 from hopping_leg.env.observation import Observation
 from hopping_leg.errors import UsageError
-from hopping_leg.learn.export import Network, RecurrentUnit
+from hopping_leg.learn.export import Network
+from hopping_leg.learn.memories import RecurrentUnit
 
 _NAMES = {nn.ReLU: "relu", nn.Tanh: "tanh", nn.ELU: "elu"}
 
@@ -69,7 +70,7 @@ def recurrent_network(
     weights[0] = weights[0][:, observation.order]
     layers = [_weights(m) for part in parts for m in _flatten(part) if isinstance(m, nn.Linear)]
     return Network(
-        scaling.offset, scaling.gain, layers, "tanh", squash, unit=RecurrentUnit(*weights)
+        scaling.offset, scaling.gain, layers, "tanh", squash, memory=RecurrentUnit(*weights)
     )
 
 

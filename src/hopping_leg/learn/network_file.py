@@ -5,8 +5,10 @@ import onnx
 from onnx import numpy_helper
 
 from hopping_leg.arrays import Array
+from hopping_leg.control.policy import MEMORY
 from hopping_leg.errors import PolicyError
-from hopping_leg.learn.export import ACTIVATIONS, Network
+from hopping_leg.learn.export import Network
+from hopping_leg.learn.graph import ACTIVATIONS
 
 
 def read_network(content: bytes) -> Network:
@@ -16,9 +18,11 @@ def read_network(content: bytes) -> Network:
         content: As ``export`` wrote it.
 
     Raises:
-        PolicyError: The graph was made elsewhere.
+        PolicyError: The graph was made elsewhere, or remembers.
     """
     graph = onnx.load_from_string(content).graph
+    if MEMORY in (given.name for given in graph.input):
+        raise PolicyError("The policy remembers; only weights of one that does not can be read.")
     stored = {w.name: numpy_helper.to_array(w).astype(np.float64) for w in graph.initializer}
     hidden = {node.op_type for node in graph.node if node.output[0].startswith("hidden_")}
     names = {operator: name for name, operator in ACTIVATIONS.items()}

@@ -25,11 +25,11 @@ Wanted = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
 class Student(Protocol):
     """What a policy's student can do."""
 
-    def act(self, seen: torch.Tensor, begun: Bools) -> torch.Tensor:
+    def act(self, observation: torch.Tensor, begun: Bools) -> torch.Tensor:
         """Return what to do in a tick, unbounded, (n, 2).
 
         Args:
-            seen: What is measured, (n, measured).
+            observation: (n, size); only what learns may look beyond what is measured.
             begun: Whose episode began with this tick, (n,).
         """
         ...
@@ -77,9 +77,9 @@ class WindowStudent(nn.Module):
         self.layers.append(nn.Linear(hidden[-1], 2))
         self._lessons = Lessons(room, size)
 
-    def act(self, seen: torch.Tensor, begun: Bools) -> torch.Tensor:
+    def act(self, observation: torch.Tensor, begun: Bools) -> torch.Tensor:
         """Return what to do in a tick; no tick depends on another."""
-        action: torch.Tensor = self.layers(seen)
+        action: torch.Tensor = self.layers(observation[:, : self._measured])
         return action
 
     def take_in(self, observations: npt.NDArray[np.float32], begun: Bools, known: Bools) -> None:
@@ -121,11 +121,11 @@ class RecurrentStudent(nn.Module):
         self._before = self._memory.clone()
         self._lessons = Sequences(room)
 
-    def act(self, seen: torch.Tensor, begun: Bools) -> torch.Tensor:
+    def act(self, observation: torch.Tensor, begun: Bools) -> torch.Tensor:
         """Return what to do in a tick and remember it."""
         self._memory[torch.as_tensor(begun, dtype=torch.bool)] = 0.0
         with torch.no_grad():
-            _, memory = self.unit(seen[None], self._memory[None])
+            _, memory = self.unit(observation[None, :, : self._measured], self._memory[None])
         self._memory = memory[0]
         action: torch.Tensor = self.readout(self._memory)
         return action

@@ -64,7 +64,7 @@ class TaughtPolicy(AsymmetricPolicy):
 
     def student_action(self, observation: torch.Tensor) -> torch.Tensor:
         """Return what the student would do, unbounded, (n, 2)."""
-        return self.student.act(observation[:, : self.measured], self.begun())
+        return self.student.act(observation, self.begun())
 
     def teacher_action(self, observation: torch.Tensor) -> torch.Tensor:
         """Return what the teacher would do, within -1 and 1, (n, 2)."""

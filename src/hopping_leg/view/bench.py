@@ -4,6 +4,7 @@ A real server and a real Chromium without a screen, which draws in software wher
 what is measured is the whole way, on all of this computer's cores together.
 """
 
+import functools
 import io
 import json
 import re
@@ -23,7 +24,14 @@ from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.timing import host
 from hopping_leg.trace import write_atomically
-from hopping_leg.view.browser import SIZE, chromium, new_page, running, wait_for_leg
+from hopping_leg.view.browser import (
+    SIZE,
+    SMALL_SIZE,
+    chromium,
+    new_page,
+    running,
+    wait_for_leg,
+)
 from hopping_leg.view.live import Live
 from hopping_leg.view.viewer import PICTURES, Viewer
 
@@ -41,6 +49,15 @@ _COUNT = """() => {
   requestAnimationFrame(draw);
 }"""
 """Notes when the browser draws."""
+
+_CANVAS = """() => {
+  const canvas = document.querySelector("canvas[data-engine]");
+  const gl = canvas.getContext("webgl2");
+  const about = gl && gl.getExtension("WEBGL_debug_renderer_info");
+  const name = about ? gl.getParameter(about.UNMASKED_RENDERER_WEBGL) : "unknown";
+  return JSON.stringify([[canvas.width, canvas.height], name]);
+}"""
+"""Size of the picture, pixels, and what draws it."""
 
 _NOTE_KEY = """() => addEventListener("keydown", () => {
   window.pressed = performance.timeOrigin + performance.now();
@@ -98,9 +115,12 @@ def bench_view(
             received: list[float] = []
             page.on("websocket", lambda s: s.on("framereceived", lambda _: received.append(1.0)))
             wait_for_leg(page, viewer)
-            time.sleep(_SETTLE_SECONDS)
             tell(f"watching for {benchmark.seconds:g} s")
-            watched = _watch(page, viewer, live, received, benchmark.seconds)
+            measure = functools.partial(_watch, page, viewer, live, received, benchmark.seconds)
+            watched = measure(SIZE)
+            tell(f"watching a smaller window for {benchmark.seconds:g} s")
+            small = measure(SMALL_SIZE)
+            _resize(page, SIZE)
             if benchmark.picture is not None:
                 _picture(page, benchmark.picture)
             tell(f"moving the slider {benchmark.commands} times")
@@ -109,6 +129,7 @@ def bench_view(
     return {
         "start_s": start,
         **watched,
+        "small_window": small,
         "latency_ms": {
             "median": float(np.median(latency)),
             "p95": float(np.percentile(latency, 95)),
@@ -119,7 +140,6 @@ def bench_view(
             "robot": benchmark.robot,
             "seconds": benchmark.seconds,
             "commands": benchmark.commands,
-            "window": list(SIZE),
             "intended_pictures_per_s": PICTURES,
             "browser": name,
             "viser": version("viser"),
@@ -147,10 +167,21 @@ def _start_seconds(browser: "Browser", benchmark: ViewBenchmark) -> float:
             process.terminate()
 
 
+def _resize(page: "Page", window: tuple[int, int]) -> None:
+    page.set_viewport_size({"width": window[0], "height": window[1]})
+    time.sleep(_SETTLE_SECONDS)
+
+
 def _watch(
-    page: "Page", viewer: Viewer, live: Live, received: list[float], seconds: float
+    page: "Page",
+    viewer: Viewer,
+    live: Live,
+    received: list[float],
+    seconds: float,
+    window: tuple[int, int],
 ) -> dict[str, Any]:
-    """Return what passes while nobody interferes."""
+    """Return what passes in a window of a size, pixels, while nobody interferes."""
+    _resize(page, window)
     page.evaluate(_COUNT)
     page.wait_for_timeout(100)
     first = (time.monotonic(), live.now, viewer.pictures, len(received))
@@ -158,8 +189,12 @@ def _watch(
     page.wait_for_timeout(1e3 * seconds)
     drawn = np.array(json.loads(page.evaluate("JSON.stringify(window.drawn)")))
     last = (time.monotonic(), live.now, viewer.pictures, len(received))
+    size, renderer = json.loads(page.evaluate(_CANVAS))
     wall, shown, pictures, messages = np.subtract(last, first)
     return {
+        "window": list(window),
+        "canvas": size,
+        "renderer": renderer,
         "frames_per_s": float((len(drawn) - 1) / (1e-3 * (drawn[-1] - drawn[0]))),
         "longest_frame_ms": float(np.diff(drawn).max()),
         "pictures_sent_per_s": float(pictures / wall),

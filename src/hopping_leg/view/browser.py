@@ -32,6 +32,9 @@ PATIENCE = 120_000.0
 SIZE = (1280, 800)
 """Of the window, pixels."""
 
+SMALL_SIZE = (900, 600)
+"""Of a window in which a software renderer has few pixels to draw."""
+
 
 def find_chromium() -> str | None:
     """Return the path of a Chromium, None if there is none."""

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -12,6 +13,9 @@ from hopping_leg.robot.model import build_model
 from hopping_leg.robot.parameters import Robot
 
 Colour = tuple[int, int, int]
+
+PLAIN: Any = {"material": "toon3", "cast_shadow": False, "receive_shadow": False}
+"""Of every shape: the shading that costs least where a browser draws in software."""
 
 _HOUSINGS = ("base", "knee_cap")
 """Spheres of the contact model that stand for motors; drawn as cylinders of the same outline."""
@@ -83,7 +87,7 @@ def _add_shape(
     scene = server.scene
     if name in _HOUSINGS:
         width = 1.1 * size[0] if name == "base" else 1.8 * size[0]
-        scene.add_cylinder(path, size[0], width, colour, wxyz=_ACROSS, position=at)
+        scene.add_cylinder(path, size[0], width, colour, wxyz=_ACROSS, position=at, **PLAIN)
         scene.add_cylinder(
             f"{path}_axle",
             0.35 * size[0],
@@ -91,13 +95,14 @@ def _add_shape(
             (235, 238, 242),
             wxyz=_ACROSS,
             position=at,
+            **PLAIN,
         )
     elif kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-        scene.add_icosphere(path, size[0], rgb, position=at)
+        scene.add_icosphere(path, size[0], rgb, position=at, **PLAIN)
     elif kind == mujoco.mjtGeom.mjGEOM_BOX:
-        scene.add_box(path, rgb, tuple(2 * size), position=at, wxyz=turned)
+        scene.add_box(path, rgb, tuple(2 * size), position=at, wxyz=turned, **PLAIN)
     elif kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-        scene.add_cylinder(path, size[0], 2 * size[1], rgb, position=at, wxyz=turned)
+        scene.add_cylinder(path, size[0], 2 * size[1], rgb, position=at, wxyz=turned, **PLAIN)
 
 
 def _turned(angle: float) -> Array:

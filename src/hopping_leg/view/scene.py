@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
-from hopping_leg.view.leg_mesh import Colour, LegMesh, add_leg
+from hopping_leg.view.leg_mesh import PLAIN, Colour, LegMesh, add_leg
 from hopping_leg.view.tracks import Track
 
 COLOURS: tuple[Colour, ...] = ((28, 113, 216), (230, 97, 0))
@@ -105,6 +105,7 @@ class Scene:
                 (90, 96, 104),
                 (0.016 if long else 0.008, 0.002, 0.0016),
                 position=(-0.086 if long else -0.082, 0.027, 0.05 * tick),
+                **PLAIN,
             )
         return _Drawn(
             mesh,
@@ -113,7 +114,9 @@ class Scene:
         )
 
     def _bar(self, name: str, colour: Colour, thick: float) -> viser.BoxHandle:
-        return self._server.scene.add_box(name, colour, (0.26, 0.002, thick), visible=False)
+        return self._server.scene.add_box(
+            name, colour, (0.26, 0.002, thick), visible=False, **PLAIN
+        )
 
 
 def _put(bar: viser.BoxHandle, height: float) -> None:
@@ -138,7 +141,11 @@ def _add_floor(scene: viser.SceneApi) -> None:
     """Lay out a floor with lines every 0.1 m."""
     (x, y), thick = _FLOOR, 0.02
     scene.add_box(
-        "/floor/slab", (226, 230, 235), (2 * x, 2 * y, thick), position=(0.0, 0.0, -thick / 2)
+        "/floor/slab",
+        (226, 230, 235),
+        (2 * x, 2 * y, thick),
+        position=(0.0, 0.0, -thick / 2),
+        **PLAIN,
     )
     lines = [((at, -y, 0.0), (at, y, 0.0)) for at in np.arange(-x, x + 0.05, 0.1)]
     lines += [((-x, at, 0.0), (x, at, 0.0)) for at in np.arange(-y, y + 0.05, 0.1)]

@@ -83,14 +83,15 @@ class Viewer:
 
     def run(self, seconds: float = math.inf) -> None:
         """Simulate and show until the time is over, ``stop`` or Ctrl-C."""
-        begun = last = time.monotonic()
+        begun = last = next_at = time.monotonic()
         while last - begun < seconds and not self._stopped:
             self._notify(self._inbox.work())
             now = time.monotonic()
             self._source.advance(self.pace.due(now - last))
             last = now
             self.picture()
-            time.sleep(max(now + 1 / PICTURES - time.monotonic(), 0.0))
+            next_at = max(next_at + 1 / PICTURES, time.monotonic())
+            time.sleep(max(next_at - time.monotonic(), 0.0))
 
     def picture(self) -> None:
         """Show what is now; plots and text every few pictures."""

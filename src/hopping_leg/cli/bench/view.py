@@ -42,7 +42,12 @@ class View:
         )
         result = bench_view(benchmark, lambda words: console.print(f"{words} ..."))
         table = Table("measured", "value")
-        table.add_row("frames per second in the browser", f"{result['frames_per_s']:.1f}")
+        for watched in (result, result["small_window"]):
+            width, height = watched["window"]
+            table.add_row(
+                f"frames per second, window of {width} x {height}",
+                f"{watched['frames_per_s']:.1f}",
+            )
         table.add_row("poses sent per second", f"{result['pictures_sent_per_s']:.1f}")
         table.add_row("simulated over real time", f"{result['real_time']:.3f}")
         latency = result["latency_ms"]
