@@ -5,6 +5,7 @@ import dataclasses
 import torch
 from stable_baselines3.common.logger import configure
 
+from hopping_leg.learn.adaptive import AdaptiveRecipe
 from hopping_leg.learn.fast import FastRecipe
 from hopping_leg.learn.imitation import Imitation
 from hopping_leg.learn.paper import PaperRecipe
@@ -27,6 +28,12 @@ TINY_PRECISE = PreciseRecipe(
 TINY_RECURRENT = RecurrentRecipe(
     steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8), memory=8,
     teaching=0.4, imitation=Imitation(memory=200, updates=4, batch=64),
+)  # fmt: skip
+
+
+TINY_ADAPTIVE = AdaptiveRecipe(
+    steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8), student=(8, 8),
+    feeling=(8, 8), teaching=0.4, imitation=Imitation(memory=200, updates=4, batch=64),
 )  # fmt: skip
 
 

@@ -20,6 +20,7 @@ from hopping_leg.sim.variants import SURPRISES
 from tests.learn.learners import (
     ROBOT,
     TINY,
+    TINY_ADAPTIVE,
     TINY_FAST,
     TINY_PRECISE,
     TINY_RECURRENT,
@@ -47,8 +48,9 @@ def disturb_all_generators():
         TINY_PRECISE,
         SURPRISED,
         TINY_RECURRENT,
+        TINY_ADAPTIVE,
     ],
-    ids=["sac", "ppo", "fast", "precise", "surprised", "recurrent"],
+    ids=["sac", "ppo", "fast", "precise", "surprised", "recurrent", "adaptive"],
 )
 def test_resuming_equals_never_having_stopped(recipe, tmp_path):
     straight = learner(recipe)

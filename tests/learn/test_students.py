@@ -47,7 +47,7 @@ def test_learning_sees_what_acting_saw():
         student.take_in(seen, begun, np.ones_like(begun))
     student._lessons._rollouts.popleft()
 
-    def wanted(rows, _legs):
+    def wanted(rows):
         places = [np.argwhere((seen == row.numpy()).all(axis=-1))[0] for row in rows]
         return torch.stack([acted[tick, leg] for tick, leg in places]).detach()
 
@@ -65,7 +65,7 @@ def test_a_recurrent_student_learns_to_repeat_what_is_no_longer_seen():
         begun = np.zeros((6, LEGS), bool)
         begun[0] = True
         student.take_in(seen, begun, np.ones_like(begun))
-        loss = student.loss(6 * LEGS, lambda rows, _legs: rows[:, 2:].expand(-1, 2))
+        loss = student.loss(6 * LEGS, lambda rows: rows[:, 2:].expand(-1, 2))
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
@@ -84,7 +84,7 @@ def test_a_window_student_learns_what_it_is_shown_and_sees_measurements_alone():
     losses = {}
     for column in (0, 2):
         for _ in range(200):
-            loss = student.loss(64, lambda rows, _legs, c=column: rows[:, c : c + 1].expand(-1, 2))
+            loss = student.loss(64, lambda rows, c=column: rows[:, c : c + 1].expand(-1, 2))
             optimizer.zero_grad()
             loss.backward()
             optimizer.step()

@@ -19,8 +19,8 @@ from hopping_leg.sim.variants import places, vary
 PRIVILEGED = 10
 """Entries of the true state that a critic may see, where all legs are the same."""
 
-PRIVILEGED_COMMAND = 6
-"""Which of them is the command."""
+PRIVILEGED_HEIGHT, PRIVILEGED_COMMAND, PRIVILEGED_CLEARANCE = 0, 6, 7
+"""Where the base's height, the command and the foot's clearance stand among them."""
 
 
 class HoppingTask:
@@ -159,12 +159,12 @@ class HoppingTask:
         """
         legs, o = self.legs, self._scaling
         result = np.empty((self.count, self.privileged_size), np.float32)
-        result[:, 0] = (legs.height - o.offset[4]) * o.gain[4]
+        result[:, PRIVILEGED_HEIGHT] = (legs.height - o.offset[4]) * o.gain[4]
         result[:, 1] = legs.height_rate
         result[:, 2:4] = (legs.q - o.offset[:2]) * o.gain[:2]
         result[:, 4:6] = legs.qd * o.gain[2:4]
         result[:, PRIVILEGED_COMMAND] = (self.command - o.offset[4]) * o.gain[4]
-        result[:, 7] = legs.foot_clearance() * 10
+        result[:, PRIVILEGED_CLEARANCE] = legs.foot_clearance() * 10
         result[:, 8] = legs.knee_clearance() * 10
         result[:, 9] = legs.base_clearance() * 10
         if self._numbers.size:

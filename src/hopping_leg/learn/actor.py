@@ -1,7 +1,9 @@
 """Take the deterministic actor out of a stable-baselines3 model."""
 
+import dataclasses
 from collections.abc import Sequence
 
+import numpy as np
 import torch
 from stable_baselines3 import SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
@@ -10,8 +12,9 @@ from torch import nn
 from hopping_leg.arrays import Array
 from hopping_leg.env.observation import Observation
 from hopping_leg.errors import UsageError
+from hopping_leg.learn.aiming import AimingStudent
 from hopping_leg.learn.export import Network
-from hopping_leg.learn.memories import RecurrentUnit
+from hopping_leg.learn.memories import OwnAim, RecurrentUnit
 
 _NAMES = {nn.ReLU: "relu", nn.Tanh: "tanh", nn.ELU: "elu"}
 
@@ -72,6 +75,24 @@ def recurrent_network(
     return Network(
         scaling.offset, scaling.gain, layers, "tanh", squash, memory=RecurrentUnit(*weights)
     )
+
+
+def aiming_network(student: AimingStudent, observation: Observation, squash: str) -> Network:
+    """Return a student that remembers where to aim, as ``dense_network`` does."""
+    network = dense_network([student.layers], observation, squash)
+    layers = [_weights(m) for m in _flatten(student.feeling) if isinstance(m, nn.Linear)]
+    order = np.append(observation.order, observation.size)
+    layers[0] = (layers[0][0][:, order], layers[0][1])
+    aiming = student.aiming
+    aim = OwnAim(
+        layers,
+        rate=student.rate * aiming.scale,
+        most=aiming.most,
+        farthest=aiming.farthest,
+        beyond=aiming.beyond,
+        follow=student.follow,
+    )
+    return dataclasses.replace(network, memory=aim)
 
 
 def _flatten(module: nn.Module) -> list[nn.Module]:

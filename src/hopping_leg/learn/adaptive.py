@@ -1,31 +1,79 @@
-"""The adaptive recipe: the precise one on legs that differ, for a leg that may be another one.
+"""The adaptive recipe: the precise one on legs that differ, with a memory of where to aim.
 
 What it costs in precision on the very leg that was believed, and what it gains on others, is on the
 documentation's page about robustness.
 """
 
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
+from torch import nn
+
+from hopping_leg.control.layouts import make_layout
 from hopping_leg.env import TaskOptions
+from hopping_leg.env.task import PRIVILEGED_CLEARANCE, PRIVILEGED_COMMAND, PRIVILEGED_HEIGHT
+from hopping_leg.errors import UsageError
+from hopping_leg.learn.actor import aiming_network
+from hopping_leg.learn.aiming import Aiming, AimingStudent, Places
+from hopping_leg.learn.export import Network
 from hopping_leg.learn.precise import PreciseRecipe
+from hopping_leg.learn.vecenv import TaskVecEnv
 from hopping_leg.sim.variants import SURPRISES
 
 
 @dataclass(frozen=True)
 class AdaptiveRecipe(PreciseRecipe):
-    """The precise recipe, longer, for a larger policy that meets many different legs."""
+    """The precise recipe for a policy that feels its errors and meets many different legs."""
 
     name: ClassVar[str] = "adaptive"
 
     task: TaskOptions = field(
         default_factory=lambda: replace(PreciseRecipe().task, randomised=SURPRISES)
     )
-    steps: int = 18_000_000
-    """Control steps of experience in all, summed over the legs."""
-    judge_every: int = 1_000_000
-    """Control steps between two trials of the policy, for checkpoint selection."""
-    teaching: float = 0.3
-    """Share of the training in which the teacher learns; in the rest the policy does."""
-    student: tuple[int, ...] = (384, 192)
-    """Hidden layers of the policy, tanh; ``actor`` are the teacher's."""
+    aiming: Aiming = field(default_factory=Aiming)
+    """Numbers of the memory."""
+    feeling: tuple[int, ...] = (128, 64)
+    """Hidden layers of the network that feels how far the last hop was off, tanh."""
+    trusting: tuple[float, float] = (0.2, 0.6)
+    """Shares of the policy's learning between which ever more legs' aims follow what is felt rather
+    than the truth."""
+
+    def make_student(self, env: TaskVecEnv) -> nn.Module:
+        """Build the untrained student.
+
+        Raises:
+            UsageError: The observation shows more than one command.
+        """
+        seen = self.task.observation
+        if make_layout(seen, 1 / self.task.rate).shapes["command"] != (1,):
+            raise UsageError(
+                f"Recipe '{self.name}' tells its network another command than the one it is given"
+                f" and needs an observation with a single one, not '{seen}'; choose"
+                " --observation dated-long."
+            )
+        (size,) = env.observation_space.shape
+        measured = env.task.observation.size
+        places = Places(
+            measured=measured,
+            size=size,
+            command=measured - 1,
+            true_height=measured + PRIVILEGED_HEIGHT,
+            true_command=measured + PRIVILEGED_COMMAND,
+            true_clearance=measured + PRIVILEGED_CLEARANCE,
+        )
+        return AimingStudent(
+            places, list(self.student), list(self.feeling), self.imitation.memory, env.num_envs,
+            1 / self.task.rate, self.aiming,
+        )  # fmt: skip
+
+    def anneal(self, model: Any, env: TaskVecEnv, share: float) -> None:  # noqa: ANN401
+        """Let the aims of ever more legs follow what the policy feels."""
+        super().anneal(model, env, share)
+        taught = (share - self.teaching) / (1 - self.teaching)
+        first, last = self.trusting
+        model.policy.student.trust = min(1.0, max(0.0, (taught - first) / (last - first)))
+
+    def network(self, model: Any, env: TaskVecEnv) -> Network:  # noqa: ANN401
+        """Return the student as it stands."""
+        student: AimingStudent = model.policy.student
+        return aiming_network(student, env.task.observation, "clip")

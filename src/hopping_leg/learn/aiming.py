@@ -3,8 +3,8 @@
 Its memory is an aim, added to the command that its network is told, at both ends of the range of
 commands, and the command of late. A second network feels from the joints' past, while the foot
 stands, how far the last hop was off; the aim adds up a share of that, as an integral controller
-does. The network that feels is taught by what the true heights were, the other one by a teacher that
-is told the same aim.
+does. The network that feels is taught by what the true heights were, the other one by a teacher
+that is told the same aim.
 """
 
 import math
@@ -46,6 +46,24 @@ class Aiming:
     """Largest error that it shows."""
 
 
+@dataclass(frozen=True)
+class Places:
+    """Where things stand in an observation."""
+
+    measured: int
+    """Entries that the student sees, the first ones."""
+    size: int
+    """All entries."""
+    command: int
+    """The measured command."""
+    true_height: int
+    """The base's height, normalised as the command is."""
+    true_command: int
+    """The command again."""
+    true_clearance: int
+    """The gap under the foot."""
+
+
 class AimingStudent(nn.Module):
     """Acts on what is measured and on where it remembers to aim.
 
@@ -54,10 +72,7 @@ class AimingStudent(nn.Module):
             truth.
 
     Args:
-        measured: Entries of an observation that it sees, the first ones.
-        size: Entries of an observation.
-        command: Where the measured command stands in one.
-        truth: Where height, command and foot clearance of the true state stand in one.
+        places: Where things stand in an observation.
         hidden: Layers of the network that acts.
         feeling: Layers of the one that feels.
         room: Ticks from which it learns, the newest.
@@ -68,10 +83,7 @@ class AimingStudent(nn.Module):
 
     def __init__(
         self,
-        measured: int,
-        size: int,
-        command: int,
-        truth: tuple[int, int, int],
+        places: Places,
         hidden: list[int],
         feeling: list[int],
         room: int,
@@ -80,10 +92,10 @@ class AimingStudent(nn.Module):
         aiming: Aiming,
     ) -> None:
         super().__init__()
-        self.aiming, self._measured, self._command, self._truth = aiming, measured, command, truth
-        self.layers = dense(measured, hidden, nn.Tanh)
+        self.aiming, self._places = aiming, places
+        self.layers = dense(places.measured, hidden, nn.Tanh)
         self.layers.append(nn.Linear(hidden[-1], 2))
-        self.feeling = dense(measured + 1, feeling, nn.Tanh)
+        self.feeling = dense(places.measured + 1, feeling, nn.Tanh)
         self.feeling.append(nn.Linear(feeling[-1], 1))
         self.rate = aiming.share / (UNTIL - FROM)
         """Share of what is felt in a tick by which the aim moves."""
@@ -93,15 +105,15 @@ class AimingStudent(nn.Module):
         self._memory = torch.zeros(legs, 3)
         self._watch = HopWatch(legs)
         self._notes: list[torch.Tensor] = []
-        self._lessons = Lessons(room, size + _NOTES)
+        self._lessons = Lessons(room, places.size + _NOTES)
 
     def act(self, observation: torch.Tensor, begun: Bools) -> torch.Tensor:
         """Return what to do in a tick, and remember where to aim next."""
-        seen, memory, aiming = observation[:, : self._measured], self._memory, self.aiming
+        seen, memory, aiming = observation[:, : self._places.measured], self._memory, self.aiming
         fresh = torch.as_tensor(np.broadcast_to(begun, len(seen)).copy(), dtype=torch.bool)
         memory[fresh] = 0.0
         memory[fresh, :2] = aiming.start * (2 * torch.rand(int(fresh.sum()), 2) - 1)
-        command = seen[:, self._command]
+        command = seen[:, self._places.command]
         shares = torch.stack([(1 - command) / 2, (1 + command) / 2], dim=1).clamp(0, 1)
         told = command + (shares * memory[:, :2]).sum(dim=1)
         aim = told.clamp(-1 - aiming.beyond, 1 + aiming.beyond) - command
@@ -120,7 +132,9 @@ class AimingStudent(nn.Module):
 
     def _tell(self, observation: torch.Tensor, begun: Bools) -> torch.Tensor:
         """Return by how much the last hops were off, in the ticks that tell it, (n,)."""
-        height, command, clearance = (observation[:, at].numpy() for at in self._truth)
+        p = self._places
+        columns = [p.true_height, p.true_clearance, p.true_command]
+        height, clearance, command = observation[:, columns].double().numpy().T
         begun = np.broadcast_to(begun, len(observation))
         told = self._watch.see(height, clearance, command, begun)
         return torch.from_numpy(told).float()
@@ -131,7 +145,7 @@ class AimingStudent(nn.Module):
 
     def _told(self, seen: torch.Tensor, aim: torch.Tensor) -> torch.Tensor:
         told = seen.clone()
-        told[:, self._command] += aim
+        told[:, self._places.command] += aim
         return told
 
     def take_in(self, observations: npt.NDArray[np.float32], begun: Bools, known: Bools) -> None:
@@ -143,11 +157,11 @@ class AimingStudent(nn.Module):
 
     def loss(self, count: int, wanted: Wanted) -> torch.Tensor:
         """Return the loss of both networks over ticks drawn at random."""
-        rows, legs = self._lessons.draw(count)
+        rows = self._lessons.draw(count)
         observation, (aim, late, error) = rows[:, :-_NOTES], rows[:, -_NOTES:].T
-        seen = observation[:, : self._measured]
-        observation[:, self._truth[1]] += aim
-        target = wanted(observation, legs)
+        seen = observation[:, : self._places.measured]
+        observation[:, self._places.true_command] += aim
+        target = wanted(observation)
         acted = functional.mse_loss(self.layers(self._told(seen, aim)), target)
         most = self.aiming.most
         felt = self.feeling(torch.cat([seen, late[:, None]], dim=1))[:, 0]

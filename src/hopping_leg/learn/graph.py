@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from onnx import TensorProto, helper, numpy_helper
 
 from hopping_leg.arrays import Array
@@ -27,7 +28,7 @@ class Graph:
         self.nodes: list[Any] = []
         self.weights: list[Any] = []
 
-    def constant(self, name: str, value: Array | Sequence[float] | float) -> str:
+    def constant(self, name: str, value: npt.ArrayLike) -> str:
         """Store numbers, in single precision unless they are integers; return their name."""
         array = np.asarray(value)
         kind = array.dtype if array.dtype == np.int64 else np.float32

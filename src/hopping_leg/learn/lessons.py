@@ -20,7 +20,6 @@ class Lessons:
 
     def __init__(self, room: int, size: int) -> None:
         self._seen = torch.zeros((room, size), dtype=torch.float16)
-        self._legs = torch.zeros(room, dtype=torch.int16)
         self._next = self._count = 0
 
     def add(
@@ -32,34 +31,26 @@ class Lessons:
             observations: (ticks, n, size).
             known: For which it is known what to do, (ticks, n); None for all.
         """
-        ticks, legs, size = observations.shape
+        size = observations.shape[2]
         chosen = slice(None) if known is None else torch.from_numpy(known.reshape(-1))
         rows = torch.from_numpy(observations).reshape(-1, size)[chosen]
         places = (self._next + torch.arange(len(rows))) % len(self._seen)
         self._seen[places] = rows.half()
-        self._legs[places] = torch.arange(legs, dtype=torch.int16).repeat(ticks)[chosen]
         self._next = int(places[-1]) + 1
         self._count = min(self._count + len(rows), len(self._seen))
 
-    def draw(self, count: int) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return some of them at random, (count, size), and whose they are, (count,)."""
-        chosen = torch.randint(self._count, (count,))
-        return self._seen[chosen].float(), self._legs[chosen].long()
+    def draw(self, count: int) -> torch.Tensor:
+        """Return some of them at random, (count, size)."""
+        return self._seen[torch.randint(self._count, (count,))].float()
 
     def state(self) -> Tree:
         """Return everything that is kept."""
-        kept = slice(self._count)
-        return {
-            "seen": self._seen[kept].numpy(),
-            "legs": self._legs[kept].numpy(),
-            "next": self._next,
-        }
+        return {"seen": self._seen[: self._count].numpy(), "next": self._next}
 
     def restore(self, state: Tree) -> None:
         """Go on from a ``state``."""
         self._next, self._count = state["next"], len(state["seen"])
         self._seen[: self._count] = torch.from_numpy(state["seen"])
-        self._legs[: self._count] = torch.from_numpy(state["legs"])
 
 
 class Drawn(NamedTuple):
@@ -71,8 +62,6 @@ class Drawn(NamedTuple):
     """Which of them are before the first new episode and have a known answer, (ticks, b)."""
     memory: torch.Tensor
     """What was remembered before the first tick, (b, k)."""
-    legs: torch.Tensor
-    """Whose they are, (b,)."""
 
 
 class Sequences:
@@ -116,7 +105,7 @@ class Sequences:
         seen, counts, memory = self._rollouts[int(torch.randint(len(self._rollouts), ()))]
         ticks, legs = counts.shape
         chosen = torch.randperm(legs)[: max(1, count // ticks)]
-        return Drawn(seen[:, chosen].float(), counts[:, chosen], memory[chosen], chosen)
+        return Drawn(seen[:, chosen].float(), counts[:, chosen], memory[chosen])
 
     def state(self) -> Tree:
         """Return everything that is kept."""

@@ -18,8 +18,8 @@ from hopping_leg.learn.lessons import Lessons, Sequences
 
 Bools = npt.NDArray[np.bool_]
 
-Wanted = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
-"""From observations, (n, size), and whose they are, (n,), to what the teacher would do, (n, 2)."""
+Wanted = Callable[[torch.Tensor], torch.Tensor]
+"""From observations, (n, size), to what the teacher would do, (n, 2)."""
 
 
 class Student(Protocol):
@@ -88,8 +88,8 @@ class WindowStudent(nn.Module):
 
     def loss(self, count: int, wanted: Wanted) -> torch.Tensor:
         """Return the loss over ticks drawn at random."""
-        seen, legs = self._lessons.draw(count)
-        return functional.mse_loss(self.layers(seen[:, : self._measured]), wanted(seen, legs))
+        seen = self._lessons.draw(count)
+        return functional.mse_loss(self.layers(seen[:, : self._measured]), wanted(seen))
 
     def state(self) -> Tree:
         """Return the lessons."""
@@ -137,10 +137,10 @@ class RecurrentStudent(nn.Module):
 
     def loss(self, count: int, wanted: Wanted) -> torch.Tensor:
         """Return the loss over some legs' sequences, each up to its first new episode."""
-        seen, counts, memory, legs = self._lessons.draw(count)
+        seen, counts, memory = self._lessons.draw(count)
         remembered, _ = self.unit(seen[..., : self._measured], memory[None])
         acted = self.readout(remembered[counts])
-        return functional.mse_loss(acted, wanted(seen[counts], legs.expand_as(counts)[counts]))
+        return functional.mse_loss(acted, wanted(seen[counts]))
 
     def state(self) -> Tree:
         """Return memory and lessons."""

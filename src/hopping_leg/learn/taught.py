@@ -99,9 +99,7 @@ class TaughtPPO(ResumablePPO):
         task = self.env.task
         scaling = task.observation.scaling
         self._told = task.observation.size + PRIVILEGED_COMMAND
-        differ = task.count if task.options.randomised else 0
-        self._aim = Aim(scaling.offset[-1], scaling.gain[-1], imitation.knots, differ)
-        self._hops = 0
+        self._aim = Aim(scaling.offset[-1], scaling.gain[-1], imitation.knots)
         self.policy.begun = lambda: self._last_episode_starts
 
     def train(self) -> None:
@@ -132,18 +130,13 @@ class TaughtPPO(ResumablePPO):
 
     def _correct_aim(self) -> None:
         """Let the hops of the rollout tell where the teacher should aim."""
-        env, imitation = self.env, self._imitation
-        legs, commands, errors = env.recent_hops
-        self._aim.correct(commands, errors, imitation.aiming)
-        if len(self._aim.own):
-            fresh = slice(max(0, len(errors) - (env.hops - self._hops)), None)
-            self._aim.correct_own(legs[fresh], commands[fresh], errors[fresh], imitation.aiming_own)
-        self._hops = env.hops
+        commands, errors = self.env.recent_hops
+        self._aim.correct(commands, errors, self._imitation.aiming)
 
-    def _wanted(self, seen: torch.Tensor, legs: torch.Tensor) -> torch.Tensor:
+    def _wanted(self, seen: torch.Tensor) -> torch.Tensor:
         """Return what the teacher would do where it is told what it should aim at, (n, 2)."""
         told = seen.clone()
-        told[:, self._told] = self._aim(seen[:, self._told], legs)
+        told[:, self._told] = self._aim(seen[:, self._told])
         policy: TaughtPolicy = self.policy
         with torch.no_grad():
             return policy.teacher_action(told)
@@ -154,7 +147,6 @@ class TaughtPPO(ResumablePPO):
         return {
             "student": policy.student.state(),
             "aim": self._aim.state(),
-            "hops": self._hops,
         }
 
     def restore_own(self, state: Tree) -> None:
@@ -162,7 +154,6 @@ class TaughtPPO(ResumablePPO):
         policy: TaughtPolicy = self.policy
         policy.student.restore(state["student"])
         self._aim.restore(state["aim"])
-        self._hops = state["hops"]
 
 
 def foresee(

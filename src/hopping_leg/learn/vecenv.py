@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 
-from hopping_leg.arrays import Array, BoolArray, IntArray
+from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.env.observation import Array32
 from hopping_leg.env.step import Step
 from hopping_leg.env.task import HoppingTask
@@ -35,7 +35,7 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
         self.render_mode = None
         super().__init__(task.count, space, gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32))
         self.hops = 0
-        self._recent: deque[tuple[int, float, float]] = deque(maxlen=_RECENT_HOPS)
+        self._recent: deque[tuple[float, float]] = deque(maxlen=_RECENT_HOPS)
         self._return = np.zeros(task.count)
         self._length = np.zeros(task.count, np.int64)
         self._started = time.monotonic()
@@ -45,14 +45,14 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
     @property
     def apex_error(self) -> float:
         """Mean |apex - command| over the latest hops of all legs, m; NaN before the first."""
-        _, _, errors = self.recent_hops
+        _, errors = self.recent_hops
         return float(np.mean(np.abs(errors))) if len(errors) else float("nan")
 
     @property
-    def recent_hops(self) -> tuple[IntArray, Array, Array]:
-        """Whose the latest hops were, commands and apex minus command, m, (hops,) each."""
-        legs, commands, errors = np.array(self._recent).reshape(-1, 3).T
-        return legs.astype(np.int64), commands, errors
+    def recent_hops(self) -> tuple[Array, Array]:
+        """Commands of the latest hops and apex minus command, m, (hops,) each."""
+        commands, errors = np.array(self._recent).reshape(-1, 2).T
+        return commands, errors
 
     def reset(self) -> Array32:
         """Begin new episodes of all legs."""
@@ -72,7 +72,7 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
         if step.apex_error is not None:
             (legs,) = np.nonzero(~np.isnan(step.apex_error))
             self.hops += len(legs)
-            self._recent.extend(zip(legs, command[legs], step.apex_error[legs], strict=True))
+            self._recent.extend(zip(command[legs], step.apex_error[legs], strict=True))
         done = step.terminated | step.truncated
         infos = self._end_episodes(step, done) if done.any() else self._nothing
         return self._observation(step.observation), step.reward, done, infos
@@ -107,7 +107,7 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
         return {
             "task": self.task.state(),
             "hops": self.hops,
-            "recent": np.array(self._recent).reshape(-1, 3),
+            "recent": np.array(self._recent).reshape(-1, 2),
             "return": self._return.copy(),
             "length": self._length.copy(),
         }
