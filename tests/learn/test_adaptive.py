@@ -28,7 +28,7 @@ def test_the_policy_file_acts_as_the_student_and_aims_as_it_does():
         task=dataclasses.replace(TINY_ADAPTIVE.task, start="standing", stagger=False),
     )
     model = learner(recipe)
-    recipe.anneal(model, model.env, 1.0)
+    model.policy.student.trust = 1.0
     task, student = model.env.task, model.policy.student
     policy = policy_of(recipe, model)
     for _ in range(2):

@@ -15,7 +15,6 @@ from hopping_leg.learn import judge
 from hopping_leg.learn import train as module
 from hopping_leg.learn.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
 from hopping_leg.learn.resumable import restore, state_of
-from hopping_leg.sim.twins import Range
 from hopping_leg.sim.variants import SURPRISES
 from tests.learn.learners import (
     ROBOT,
@@ -28,9 +27,8 @@ from tests.learn.learners import (
     learner,
 )  # fmt: skip
 
-LATE = Range("reality.latency.command", "s", 0.0, 0.015, "test", step=5e-3)
 SURPRISED = dataclasses.replace(
-    TINY_PRECISE, task=dataclasses.replace(TINY_PRECISE.task, randomised=(*SURPRISES, LATE))
+    TINY_PRECISE, task=dataclasses.replace(TINY_PRECISE.task, randomised=SURPRISES)
 )
 
 

@@ -61,6 +61,8 @@ class TaskOptions:
     """Where each leg draws its own numbers, once, instead of the robot's; none by default."""
     alike_at_first: bool = False
     """Let every leg be the robot itself until ``HoppingTask.diverge``."""
+    unchanged: float = 0.0
+    """Share of the legs that are the robot itself also where the others differ."""
     soft_limits: SoftLimits | None = field(default_factory=SoftLimits)
     """PD at the joint limits, added to the action's torque."""
 
@@ -88,6 +90,8 @@ def _check(options: TaskOptions) -> None:
         value = getattr(options, name)
         if not 0 < value < math.inf:
             raise UsageError(f"'{name}' is {value} but must be positive and finite.")
+    if not 0 <= options.unchanged <= 1:
+        raise UsageError(f"'unchanged' is {options.unchanged} but must lie between 0 and 1.")
     if not all(0 < t < math.inf for t in options.action_torque):
         raise UsageError(
             f"'action_torque' is {options.action_torque} but both torques must be positive, N m."

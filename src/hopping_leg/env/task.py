@@ -51,20 +51,17 @@ class HoppingTask:
         self.autoreset = autoreset
         self.robot, self.count, self.options, self.reward = robot, count, options, reward
         noise, self._rng, draws = rng.spawn(3)
-        ranges = options.randomised
-        self._variants = vary(robot, ranges, count, draws) if ranges else ()
-        self._numbers = np.zeros((count, len(ranges)))
-        self._diverged = not options.alike_at_first
-        if self._diverged:
-            self._numbers = places(robot, self._variants, ranges)
+        self._draws, self._draw = int(draws.integers(2**62)), 0
+        self._numbers = np.zeros((count, len(options.randomised)))
         self.legs = Legs(
             robot,
             count,
             rate=options.rate,
             timestep=options.timestep,
             threads=threads,
-            variants=self._variants if self._diverged else (),
         )
+        if not options.alike_at_first:
+            self.diverge()
         self.plant = Plant(self.legs, options.disturbance, options.soft_limits, noise)
         self.observation = make_observation(robot, options, count)
         self._scaling = sample_scaling(robot, options)
@@ -84,12 +81,21 @@ class HoppingTask:
         self._rises = np.zeros(count, np.bool_)
         self.reset()
 
-    def diverge(self) -> None:
-        """Let legs that were alike at first go on with the numbers that each has drawn."""
-        if self._variants and not self._diverged:
-            self.legs.become(self._variants)
-            self._numbers = places(self.robot, self._variants, self.options.randomised)
-            self._diverged = True
+    def diverge(self, draw: int = 1) -> None:
+        """Let every leg go on with numbers of its own, if the task's options let legs differ.
+
+        Args:
+            draw: Each gives other numbers, always the same; those of the present one stay.
+        """
+        ranges = self.options.randomised
+        if not ranges or draw == self._draw:
+            return
+        rng = np.random.default_rng([self._draws, draw])
+        drawn = vary(self.robot, ranges, self.count, rng)
+        same = np.diff(np.floor(self.options.unchanged * np.arange(self.count + 1))) > 0
+        variants = [self.robot if s else d for s, d in zip(same, drawn, strict=True)]
+        self.legs.become(variants)
+        self._numbers, self._draw = places(self.robot, variants, ranges), draw
 
     @property
     def privileged_size(self) -> int:

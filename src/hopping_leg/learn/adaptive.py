@@ -28,15 +28,23 @@ class AdaptiveRecipe(PreciseRecipe):
     name: ClassVar[str] = "adaptive"
 
     task: TaskOptions = field(
-        default_factory=lambda: replace(PreciseRecipe().task, randomised=SURPRISES)
+        default_factory=lambda: replace(PreciseRecipe().task, randomised=SURPRISES, unchanged=0.5)
     )
     aiming: Aiming = field(default_factory=Aiming)
     """Numbers of the memory."""
-    feeling: tuple[int, ...] = (128, 64)
+    feeling: tuple[int, ...] = (256, 128)
     """Hidden layers of the network that feels how far the last hop was off, tanh."""
+    steps: int = 12_000_000
+    """Control steps of experience in all, summed over the legs."""
+    teaching: float = 0.4
+    """Share of the training in which the teacher learns; in the rest the policy does."""
+    alike: float = 0.35
+    """Share of the policy's learning in which legs are alike."""
+    draws: int = 40
+    """How often legs change into others in the rest."""
     trusting: tuple[float, float] = (0.2, 0.6)
-    """Shares of the policy's learning between which ever more legs' aims follow what is felt rather
-    than the truth."""
+    """Shares of that rest between which ever more legs' aims follow what is felt rather than the
+    truth."""
 
     def make_student(self, env: TaskVecEnv) -> nn.Module:
         """Build the untrained student.
@@ -67,11 +75,19 @@ class AdaptiveRecipe(PreciseRecipe):
         )  # fmt: skip
 
     def anneal(self, model: Any, env: TaskVecEnv, share: float) -> None:  # noqa: ANN401
-        """Let the aims of ever more legs follow what the policy feels."""
+        """Let legs differ once the policy can act, and their aims follow what it feels."""
         super().anneal(model, env, share)
-        taught = (share - self.teaching) / (1 - self.teaching)
+        apart = self._apart((share - self.teaching) / (1 - self.teaching))
         first, last = self.trusting
-        model.policy.student.trust = min(1.0, max(0.0, (taught - first) / (last - first)))
+        model.policy.student.trust = min(1.0, max(0.0, (apart - first) / (last - first)))
+
+    def draw(self, taught: float) -> int:
+        """Return which draw of differing legs hops, 0 for legs that are alike."""
+        return 1 + int(self.draws * self._apart(taught)) if taught >= self.alike else 0
+
+    def _apart(self, taught: float) -> float:
+        """Return the share of the learning on differing legs that is done, negative before it."""
+        return (taught - self.alike) / (1 - self.alike)
 
     def network(self, model: Any, env: TaskVecEnv) -> Network:  # noqa: ANN401
         """Return the student as it stands."""

@@ -160,11 +160,10 @@ class AimingStudent(nn.Module):
         rows = self._lessons.draw(count)
         observation, (aim, late, error) = rows[:, :-_NOTES], rows[:, -_NOTES:].T
         seen = observation[:, : self._places.measured]
-        observation[:, self._places.true_command] += aim
-        target = wanted(observation)
-        acted = functional.mse_loss(self.layers(self._told(seen, aim)), target)
         most = self.aiming.most
         felt = self.feeling(torch.cat([seen, late[:, None]], dim=1))[:, 0]
+        observation[:, self._places.true_command] += aim
+        acted = functional.mse_loss(self.layers(self._told(seen, aim)), wanted(observation))
         return acted + functional.mse_loss(felt, error.clamp(-most, most))
 
     def state(self) -> Tree:

@@ -108,9 +108,17 @@ class PreciseRecipe(FastRecipe):
         super().anneal(model, env, min(1.0, share / self.teaching))
         taught = (share - self.teaching) / (1 - self.teaching)
         model.policy.imitating = taught >= 0
-        if taught >= 0:
-            env.task.diverge()
+        if draw := self.draw(taught):
+            env.task.diverge(draw)
         model.policy.guidance = max(0.0, 1 - taught / self.guided)
+
+    def draw(self, taught: float) -> int:
+        """Return which draw of differing legs hops, 0 for legs that are alike.
+
+        Args:
+            taught: Share of the policy's learning that is done, negative before it.
+        """
+        return int(taught >= 0)
 
     def network(self, model: Any, env: TaskVecEnv) -> Network:  # noqa: ANN401
         """Return the student as it stands."""

@@ -6,6 +6,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from hopping_leg.env import TaskOptions
 from hopping_leg.errors import UsageError
 from hopping_leg.learn.checkpoint import Tree, list_checkpoints, read_checkpoint
 from hopping_leg.learn.recipe import Recipe
@@ -34,19 +35,17 @@ class RunFolder:
         source: Path | None = None,
     ) -> None:
         self.path, self._source = path, source
-        self.config = json.loads(
-            json.dumps(
-                {
-                    "recipe": recipe.name,
-                    "options": asdict(recipe),
-                    "robot": robot.name,
-                    "robot_digest": robot.digest,
-                    "seed": seed,
-                    "minutes_budget": minutes,
-                    "source": str(source) if source else None,
-                    "versions": library_versions(),
-                }
-            )
+        self.config = _as_stored(
+            {
+                "recipe": recipe.name,
+                "options": asdict(recipe),
+                "robot": robot.name,
+                "robot_digest": robot.digest,
+                "seed": seed,
+                "minutes_budget": minutes,
+                "source": str(source) if source else None,
+                "versions": library_versions(),
+            }
         )
 
     @property
@@ -122,8 +121,10 @@ class RunFolder:
             UsageError: It was not; the message names the first difference.
         """
         stored = json.loads(self._config_file.read_text(encoding="utf-8"))
-        # A run from before the option existed was asked for what is now its default.
-        stored.get("options", {}).get("task", {}).setdefault("randomised", [])
+        # A run from before an option existed was asked for what is now its default.
+        task = stored.get("options", {}).get("task", {})
+        for name, value in _as_stored(asdict(TaskOptions())).items():
+            task.setdefault(name, value)
         for key in ("recipe", "robot_digest", "seed", "minutes_budget", "source", "options"):
             if stored.get(key) != self.config[key]:
                 raise UsageError(
@@ -131,6 +132,12 @@ class RunFolder:
                     f" ({_short(stored.get(key))} instead of {_short(self.config[key])});"
                     " resume it with the options that it began with."
                 )
+
+
+def _as_stored(values: dict[str, Any]) -> dict[str, Any]:
+    """Return values as JSON gives them back."""
+    stored: dict[str, Any] = json.loads(json.dumps(values))
+    return stored
 
 
 def read_result(path: Path) -> dict[str, Any]:

@@ -38,16 +38,23 @@ def _times(path: str, low: float, high: float) -> Range:
     return Range(path, "1", low, high, "[C]", "logarithmic", relative=True)
 
 
+def _both(name: str, unit: str, low: float, high: float) -> tuple[Range, ...]:
+    return tuple(Range(f"{joint}.{name}", unit, low, high, "[C]") for joint in ("hip", "knee"))
+
+
 SURPRISES = (
-    _times("base.mass", 0.8, 1.25),
-    _times("rail.friction", 0.5, 3.0),
-    _times("rail.damping", 0.5, 2.0),
-    _times("contact.time_constant", 0.22, 2.0),
-    _times("hip.torque_gain", 0.95, 1.05),
-    _times("knee.torque_gain", 0.95, 1.05),
+    _times("base.mass", 0.75, 1.4),
+    _times("rail.friction", 0.4, 4.0),
+    _times("rail.damping", 0.4, 4.0),
+    _times("contact.time_constant", 0.22, 2.2),
+    _times("contact.damping_ratio", 0.5, 2.0),
+    _times("hip.torque_gain", 1 / 1.15, 1.15),
+    _times("knee.torque_gain", 1 / 1.15, 1.15),
+    *_both("friction", "N m", 0.0, 0.8),
+    Range("reality.latency.command", "s", 0.0, 0.0149, "[C]", step=5e-3),
 )
-"""What may surprise any leg, over what its robot has: a payload, a worn or dry rail, hard and soft
-ground, motors that give a little less or more than they should."""
+"""What may surprise any leg: a payload, a worn or dry rail, hard and soft ground, motors that give
+less or more than they should, joints that rub, commands that come late."""
 
 Part = TypeVar("Part")
 
