@@ -59,6 +59,8 @@ class TaskOptions:
     """Noise and delay; the paper trains with them."""
     randomised: tuple[Range, ...] = ()
     """Where each leg draws its own numbers, once, instead of the robot's; none by default."""
+    chance: float = 1.0
+    """That a leg draws one of those numbers rather than has the robot's."""
     alike_at_first: bool = False
     """Let every leg be the robot itself until ``HoppingTask.diverge``."""
     unchanged: float = 0.0
@@ -90,8 +92,9 @@ def _check(options: TaskOptions) -> None:
         value = getattr(options, name)
         if not 0 < value < math.inf:
             raise UsageError(f"'{name}' is {value} but must be positive and finite.")
-    if not 0 <= options.unchanged <= 1:
-        raise UsageError(f"'unchanged' is {options.unchanged} but must lie between 0 and 1.")
+    for name in ("chance", "unchanged"):
+        if not 0 <= getattr(options, name) <= 1:
+            raise UsageError(f"'{name}' is {getattr(options, name)} but must lie between 0 and 1.")
     if not all(0 < t < math.inf for t in options.action_torque):
         raise UsageError(
             f"'action_torque' is {options.action_torque} but both torques must be positive, N m."

@@ -91,7 +91,7 @@ class HoppingTask:
         if not ranges or draw == self._draw:
             return
         rng = np.random.default_rng([self._draws, draw])
-        drawn = vary(self.robot, ranges, self.count, rng)
+        drawn = vary(self.robot, ranges, self.count, rng, self.options.chance)
         same = np.diff(np.floor(self.options.unchanged * np.arange(self.count + 1))) > 0
         variants = [self.robot if s else d for s, d in zip(same, drawn, strict=True)]
         self.legs.become(variants)

@@ -43,24 +43,29 @@ def _both(name: str, unit: str, low: float, high: float) -> tuple[Range, ...]:
 
 
 SURPRISES = (
-    _times("base.mass", 0.75, 1.4),
-    _times("rail.friction", 0.4, 4.0),
-    _times("rail.damping", 0.4, 4.0),
-    _times("contact.time_constant", 0.22, 2.2),
-    _times("contact.damping_ratio", 0.5, 2.0),
-    _times("hip.torque_gain", 1 / 1.15, 1.15),
-    _times("knee.torque_gain", 1 / 1.15, 1.15),
-    *_both("friction", "N m", 0.0, 0.8),
-    Range("reality.latency.command", "s", 0.0, 0.0149, "[C]", step=5e-3),
+    _times("base.mass", 0.7, 1.6),
+    *(_times(f"{link}.{n}", 0.6, 2.0) for link in ("thigh", "shank") for n in ("mass", "inertia")),
+    _times("rail.friction", 0.3, 6.0),
+    _times("rail.damping", 0.3, 6.0),
+    _times("contact.time_constant", 0.22, 2.8),
+    _times("contact.damping_ratio", 0.4, 2.5),
+    _times("hip.torque_gain", 1 / 1.3, 1.3),
+    _times("knee.torque_gain", 1 / 1.3, 1.3),
+    *_both("friction", "N m", 0.0, 1.4),
+    Range("reality.latency.command", "s", 0.0, 0.0199, "[C]", step=5e-3),
 )
-"""What may surprise any leg: a payload, a worn or dry rail, hard and soft ground, motors that give
-less or more than they should, joints that rub, commands that come late."""
+"""What may surprise any leg: a payload, heavy links, a worn or dry rail, hard and soft ground,
+motors that give less or more than they should, joints that rub, commands that come late."""
 
 Part = TypeVar("Part")
 
 
 def vary(
-    robot: Robot, ranges: Sequence[Range], count: int, rng: np.random.Generator
+    robot: Robot,
+    ranges: Sequence[Range],
+    count: int,
+    rng: np.random.Generator,
+    chance: float = 1.0,
 ) -> tuple[Robot, ...]:
     """Return a robot as often as asked for, each with its own numbers.
 
@@ -69,6 +74,7 @@ def vary(
         ranges: What is drawn, in this order, leg by leg.
         count: How many.
         rng: Source of randomness.
+        chance: That a number is drawn rather than the robot's own.
 
     Raises:
         UsageError: A range's number may not differ from leg to leg.
@@ -82,7 +88,9 @@ def vary(
         variant = robot
         for spread in ranges:
             unit = attrgetter(spread.path)(robot) if spread.relative else 1.0
-            variant = with_value(variant, spread.path.split("."), unit * spread.draw(rng))
+            value = unit * spread.draw(rng)
+            if chance == 1 or rng.random() < chance:
+                variant = with_value(variant, spread.path.split("."), value)
         check_physics(variant, f"variant {number} of {robot.name}")
         variants.append(variant)
     return tuple(variants)
