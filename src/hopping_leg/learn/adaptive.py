@@ -28,7 +28,9 @@ class AdaptiveRecipe(PreciseRecipe):
     name: ClassVar[str] = "adaptive"
 
     task: TaskOptions = field(
-        default_factory=lambda: replace(PreciseRecipe().task, randomised=SURPRISES, unchanged=0.5)
+        default_factory=lambda: replace(
+            PreciseRecipe().task, randomised=SURPRISES, chance=0.5, unchanged=0.5
+        )
     )
     aiming: Aiming = field(default_factory=Aiming)
     """Numbers of the memory."""

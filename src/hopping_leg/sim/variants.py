@@ -52,7 +52,7 @@ SURPRISES = (
     _times("hip.torque_gain", 1 / 1.3, 1.3),
     _times("knee.torque_gain", 1 / 1.3, 1.3),
     *_both("friction", "N m", 0.0, 1.4),
-    Range("reality.latency.command", "s", 0.0, 0.0199, "[C]", step=5e-3),
+    Range("reality.latency.command", "s", 0.0, 0.0149, "[C]", step=5e-3),
 )
 """What may surprise any leg: a payload, heavy links, a worn or dry rail, hard and soft ground,
 motors that give less or more than they should, joints that rub, commands that come late."""
