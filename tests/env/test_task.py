@@ -11,6 +11,7 @@ from hopping_leg.hops import find_hops
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.kinematics import joint_angles
 from hopping_leg.sim import NOTHING
+from hopping_leg.sim.variants import SURPRISES
 
 ROBOT = load_robot("legv2-paper")
 BUSY = TaskOptions(episode=0.2, start="mixed", command_hold=(0.05, 0.1), stagger=True)
@@ -197,6 +198,32 @@ def test_a_restart_shows_nothing_of_the_last_episode():
     assert not np.allclose(step.final_observation, fresh)
 
 
+def fall_apart(draws, **options):
+    """Let legs change; return how high each is after a push each time, (draws, legs)."""
+    one = task(TaskOptions(randomised=SURPRISES, **options), count=6)
+    heights = []
+    for draw in draws:
+        one.diverge(draw)
+        one.legs.stand(slice(None), [0.7, -1.4], 0.05)
+        for _ in range(40):
+            one.legs.step(np.full((6, 2), [1.0, -3.0]))
+        heights.append(one.legs.height.copy())
+    return np.array(heights)
+
+
+def test_a_draw_makes_the_same_legs_again_and_another_one_others():
+    first, second, again = fall_apart([1, 2, 1])
+    np.testing.assert_array_equal(first, again)
+    assert len(set(first)) == 6
+    assert (first != second).all()
+
+
+def test_some_legs_stay_the_robot_itself():
+    legs = fall_apart([1], unchanged=0.5, alike_at_first=True)[0]
+    (same,) = fall_apart([0], alike_at_first=True)
+    np.testing.assert_array_equal(legs == same, [False, True] * 3)
+
+
 @pytest.mark.parametrize(
     "wrong",
     [
@@ -208,6 +235,8 @@ def test_a_restart_shows_nothing_of_the_last_episode():
         {"action_torque": (6.0, -1.0)},
         {"start_length": 0.5},
         {"timestep": 3e-3},
+        {"chance": 1.5},
+        {"unchanged": -0.1},
     ],
 )
 def test_options_without_meaning_are_refused(wrong):

@@ -106,6 +106,16 @@ def test_the_aims_of_ever_more_legs_follow_what_is_felt():
     assert (np.diff(trust) >= 0).all()
 
 
+def test_legs_are_alike_until_the_policy_can_act_and_change_from_then_on():
+    draws = [TINY_ADAPTIVE.draw(taught) for taught in np.linspace(-0.5, 1, 301)]
+    alike = np.linspace(-0.5, 1, 301) < TINY_ADAPTIVE.alike
+    assert not np.array(draws)[alike].any()
+    later = np.array(draws)[~alike]
+    assert later[0] == 1
+    assert set(np.diff(later)) == {0, 1}
+    assert later[-1] == TINY_ADAPTIVE.draws + 1
+
+
 def test_it_can_learn_to_feel():
     """The truth is shown among the measurements: the network that feels finds it."""
     model = learner(TINY_ADAPTIVE)

@@ -1,6 +1,7 @@
 """Each leg of a batch gets its own numbers; a constant delay is the one that twins have."""
 
 import dataclasses
+from operator import attrgetter
 
 import numpy as np
 import pytest
@@ -210,3 +211,13 @@ def test_a_leg_that_begins_anew_has_no_command_under_way():
     legs.stand(np.array([0]), POSTURE, 0.1)
     legs.step(np.zeros((2, 2)))
     assert np.abs(legs.qd[0]).max() < 0.2 * np.abs(legs.qd[1]).max()
+
+
+def test_a_number_is_drawn_by_chance_and_is_the_robots_otherwise():
+    rng = np.random.default_rng(0)
+    robots = vary(LEG, IDENTIFIABLE, 200, rng, chance=0.3)
+    for spread in IDENTIFIABLE:
+        number = attrgetter(spread.path)
+        own = np.array([number(robot) == number(LEG) for robot in robots])
+        assert 0.55 < own.mean() < 0.85
+    assert vary(LEG, IDENTIFIABLE, 3, rng, chance=0.0) == (LEG,) * 3

@@ -29,8 +29,8 @@ class Options:
 
     recipe: str = "fast"
     """How to train: `fast` for accurate hopping soon, `precise` for more accurate hopping later,
-    `adaptive` for the same on legs that differ, `recurrent` for the same with a memory in the
-    network, `paper` for the paper's method."""
+    `adaptive` for one that corrects itself on legs that differ, `recurrent` for one that remembers
+    by itself, `paper` for the paper's method."""
     robot: str = "legv2-paper"
     """A shipped robot or the path of a .toml file."""
     seed: int = 0
