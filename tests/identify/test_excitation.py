@@ -25,7 +25,7 @@ def test_the_papers_grid_lasts_four_minutes_and_covers_every_value():
         assert {p.amplitude for p in template.parts} == {0.15, 0.1, 0.05}
         assert {p.period for p in template.parts} == {0.75, 0.5, 0.25}
     assert {p.swing for p in fixed_base().parts} == {10, 20}
-    assert len(fixed_base(every_pair=True).parts) == 18
+    assert len(fixed_base(duration=360.0, every_pair=True).parts) == 18
 
 
 @pytest.mark.parametrize("bend", ["backward", "forward"])
@@ -138,6 +138,7 @@ def test_other_files_are_no_excitations(tmp_path):
     [
         (lambda: fixed_base((0.1,), (1.0, 2.0)), "1 amplitudes and 2 periods do not pair"),
         (lambda: fixed_base((), ()), "No stroke is left"),
+        (lambda: fixed_base(duration=8.0), "6 strokes lasts 1.33 s, .* 20 s would break off; .*120"),
         (lambda: fixed_base((0.0,), (1.0,)), "'amplitude' is 0 but must be positive"),
         (lambda: fixed_base((0.1,), (float("nan"),)), "'period' is nan"),
         (lambda: moving_base(margin=-0.1), "'margin' is -0.1 m but must be zero or more"),

@@ -182,4 +182,12 @@ def _strokes(parts: Iterable[Stroke]) -> Strokes:
     strokes = Strokes(tuple(parts))
     if not strokes.parts:
         raise UsageError("No stroke is left; give at least one amplitude, period and swing.")
+    count = len(strokes.parts)
+    slowest = max(max(part.period, part.swing or 0.0) for part in strokes.parts)
+    if count > 1 and strokes.duration < count * slowest - 1e-9:
+        raise UsageError(
+            f"Each of {count} strokes lasts {strokes.duration / count:.3g} s, so that one with a"
+            f" period of {slowest:g} s would break off; make them {count * slowest:g} s or longer"
+            " in all, or give fewer or shorter periods."
+        )
     return strokes
