@@ -131,10 +131,13 @@ def test_another_robot_is_refused_or_named(tmp_path, caplog):
     save_policy(path, network(), CARD)
     other = dataclasses.replace(ROBOT, base=dataclasses.replace(ROBOT.base, mass=2.0))
     with pytest.raises(PolicyError, match="trained on robot 'legv2-paper'"):
-        load_controller(path, other, strict=True)
+        load_controller(path, other, other="refuse")
     with caplog.at_level(logging.WARNING):
         load_controller(path, other)
     assert "trained on robot" in caplog.text
+    caplog.clear()
+    load_controller(path, other, other="accept")
+    assert not caplog.text
     with pytest.raises(PolicyError, match="400 Hz"):
         load_policy(path).check_robot(ROBOT, 400.0)
 

@@ -3,6 +3,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from hopping_leg.control.policy import Policy
 from hopping_leg.errors import PolicyError, UsageError
 from hopping_leg.evaluate import candidates
 from hopping_leg.evaluate.candidates import load_candidates
@@ -19,8 +20,7 @@ class FakePolicy:
             seed=seed,
         )
 
-    def check_robot(self, robot, rate, strict):
-        assert not strict
+    stranger = Policy.stranger
 
 
 def test_a_name_that_does_not_exist_is_answered_with_those_that_do(robot):

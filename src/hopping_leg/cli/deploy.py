@@ -123,7 +123,9 @@ def _plan(args: Deploy, robot: Robot) -> Plan:
         controller: Controller = JointPD(excitation.position, excitation.velocity)
         rate, usual = excitation.rate, len(excitation) / excitation.rate
     else:
-        controller = load_controller(args.controller, robot, strict=not args.other_robot)
+        controller = load_controller(
+            args.controller, robot, other="warn" if args.other_robot else "refuse"
+        )
         rate, usual = CONTROL_RATE, _SECONDS
     valid = command_range(controller, robot)
     schedule = _schedule(args, controller, valid)

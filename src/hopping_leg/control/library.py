@@ -6,7 +6,7 @@ from pathlib import Path
 
 from hopping_leg.control.baselines import paper_energy_shaping, tuned_energy_shaping
 from hopping_leg.control.plug_in import is_plug_in, load_plug_in
-from hopping_leg.control.policy import Policy
+from hopping_leg.control.policy import OtherRobot, Policy
 from hopping_leg.control.protocol import Controller
 from hopping_leg.errors import PolicyError, UsageError, unknown_name
 from hopping_leg.robot.parameters import Robot
@@ -58,7 +58,11 @@ def load_policy(name_or_path: str | Path) -> Policy:
 
 
 def load_controller(
-    name_or_path: str | Path, robot: Robot, *, rate: float = CONTROL_RATE, strict: bool = False
+    name_or_path: str | Path,
+    robot: Robot,
+    *,
+    rate: float = CONTROL_RATE,
+    other: OtherRobot = "warn",
 ) -> Controller:
     """Load a controller for a robot.
 
@@ -67,7 +71,7 @@ def load_controller(
             file (``.toml``) for energy shaping, or a Python class, see ``plug_in``.
         robot: The leg it shall drive.
         rate: Control rate, Hz.
-        strict: Refuse a policy that was trained on another robot instead of logging a warning.
+        other: What to do with a policy that was trained for another robot.
 
     Raises:
         PolicyError: The file is missing, truncated or foreign, or does not fit the robot or rate.
@@ -82,5 +86,5 @@ def load_controller(
     if is_plug_in(str(name_or_path)):
         return load_plug_in(str(name_or_path), robot, rate)
     policy = load_policy(name_or_path)
-    policy.check_robot(robot, rate, strict=strict)
+    policy.check_robot(robot, rate, other=other)
     return policy

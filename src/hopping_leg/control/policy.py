@@ -9,7 +9,7 @@ import json
 import logging
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import onnxruntime
@@ -29,6 +29,9 @@ METADATA_KEY = "hopping_leg"
 MEMORY, NEXT_MEMORY = "memory", "next_memory"
 """Input and output of a graph that remembers: what it gave at a tick is what it gets at the next,
 and zeros at first."""
+
+OtherRobot = Literal["refuse", "warn", "accept"]
+"""What to do with a policy that was trained for another robot."""
 
 _log = logging.getLogger(__name__)
 _ROUNDING = 1e-9
@@ -138,16 +141,18 @@ class Policy:
         """Names and shapes of the graph's inputs, without the number of legs."""
         return self._layout.shapes
 
-    def check_robot(self, robot: Robot, rate: float | None = None, *, strict: bool = True) -> None:
+    def check_robot(
+        self, robot: Robot, rate: float | None = None, *, other: OtherRobot = "refuse"
+    ) -> None:
         """Make sure that the policy was trained for this robot and control rate.
 
         Args:
             robot: The leg it shall drive.
             rate: Control rate, Hz; None to skip that check.
-            strict: Refuse another robot instead of logging a warning.
+            other: What to do if it was trained for another one.
 
         Raises:
-            PolicyError: The robot (if strict) or the rate differs.
+            PolicyError: The rate differs, or the robot where that is refused.
         """
         card = self.card
         if rate is not None and rate != card.rate:
@@ -155,18 +160,29 @@ class Policy:
                 f"{self.origin} was trained at {card.rate:g} Hz and cannot run at {rate:g} Hz;"
                 f" set --rate {card.rate:g}."
             )
-        if robot.digest == card.robot_digest:
-            return
-        sentence = (
-            f"{self.origin} was trained on robot '{card.robot}' ({card.robot_digest}),"
-            f" not on '{robot.name}' ({robot.digest}) with these parameters."
-        )
-        if strict:
+        sentence = self.stranger(robot, self.origin)
+        if sentence and other == "refuse":
             raise PolicyError(
                 f"{sentence} Train one for it with `hop train --robot`,"
                 " or allow another robot explicitly."
             )
-        _log.warning(sentence)
+        if sentence and other == "warn":
+            _log.warning(sentence)
+
+    def stranger(self, robot: Robot, name: str) -> str:
+        """Return what there is to say if a robot is not the one it was trained for, else nothing.
+
+        Args:
+            robot: The leg it shall drive.
+            name: Of the policy, in the sentence.
+        """
+        card = self.card
+        if robot.digest == card.robot_digest:
+            return ""
+        return (
+            f"{name} was trained on robot '{card.robot}' ({card.robot_digest}), not on"
+            f" '{robot.name}' ({robot.digest})."
+        )
 
     def reset(self, count: int) -> None:
         """Forget everything; the next measurement has ``count`` rows."""

@@ -93,17 +93,13 @@ def _expand(entry: str) -> list[str]:
 
 def _load(entry: str, robot: Robot, rate: float) -> Candidate:
     label, _, source = (entry, "", entry) if Path(entry).exists() else entry.rpartition("=")
-    controller = load_controller(source, robot, rate=rate)
+    controller = load_controller(source, robot, rate=rate, other="accept")
     name = label or source
     if not isinstance(controller, Policy):
         return Candidate(name, controller)
     card = controller.card
-    notes: tuple[str, ...] = ()
-    if card.robot_digest != robot.digest:
-        notes = (
-            f"{name} was trained on robot '{card.robot}' ({card.robot_digest}),"
-            f" not on '{robot.name}' ({robot.digest}).",
-        )
+    note = controller.stranger(robot, name)
+    notes = (note,) if note else ()
     return Candidate(name, controller, (card.command_low, card.command_high), notes=notes)
 
 

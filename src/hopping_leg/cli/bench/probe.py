@@ -47,7 +47,7 @@ class Probe:
         if len({policy.name for policy in policies}) < len(policies) or not policies:
             raise UsageError("Name one policy or more, each of another name.")
         for policy in policies:
-            policy.check_robot(robot, strict=False)
+            policy.check_robot(robot, other="warn")
         rates = {policy.card.rate for policy in policies}
         if len(rates) > 1:
             raise UsageError("The policies run at different control rates; probe them one by one.")
