@@ -1,8 +1,12 @@
 """Tables of single studies in docs/results that need more than columns picked."""
 
+from statistics import mean
 from typing import Any
 
 from macros_results import grid, number, origin, read
+
+_LOWER = 0.34
+"""Commands up to which less scatter is asked for, m."""
 
 
 def leaderboard(file: str) -> str:
@@ -48,6 +52,33 @@ def _worst(values: list[float | None], factor: float = 1) -> str:
     return number(round(factor * max(known))) if len(known) == len(values) else number(None)
 
 
+def precision(file: str) -> str:
+    """Return how near hops come to all commands of an evaluation: a row per controller, in mm."""
+    content = read(file)
+    rows = []
+    for name in dict.fromkeys(row["controller"] for row in content["summary"]):
+        mine = [row for row in content["summary"] if row["controller"] == name]
+        errors = [1000 * abs(row["median_error_m"]) for row in mine]
+        spreads = {row["command_m"]: 1000 * row["std_m"] for row in mine}
+        cells = [
+            max(errors),
+            mean(errors),
+            max(spread for command, spread in spreads.items() if command <= _LOWER),
+            max(spreads.values()),
+            mean(spreads.values()),
+            sum(row["skipped_hops"] for row in mine),
+            sum(row["body_contacts"] for row in mine),
+            min(row["hop_rate_hz"] for row in mine),
+            100 * min(row["flight_fraction"] for row in mine),
+        ]
+        rows.append([name, *map(number, cells)])
+    titles = [
+        "controller", "worst error, mm", "mean", f"worst std up to {_LOWER} m", "of all",
+        "mean std", "skipped hops", "hits", "fewest hops/s", "least flight, %",
+    ]  # fmt: skip
+    return grid(titles, rows) + origin(file, content)
+
+
 def probe_scores(file: str, controller: str) -> str:
     """Return a policy's probes: a row per set of features, a column per target."""
     content = read(file)
@@ -80,6 +111,7 @@ def percentiles(file: str, **titles: str) -> str:
 
 
 MACROS = {
+    "precision": precision,
     "leaderboard": leaderboard,
     "percentiles": percentiles,
     "probe_scores": probe_scores,

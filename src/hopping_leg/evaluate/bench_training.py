@@ -59,9 +59,9 @@ def bench_training(
         result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
         on_progress(f"judging {recipe.name} with seed {seed}")
         content = (folder / "policy.onnx").read_bytes()
-        selected = _judge({"selected": content}, robot, evaluation_seeds)
+        selected = _judge({"selected": content}, recipe, robot, evaluation_seeds)
         snapshots = {f.stem: f.read_bytes() for f in sorted((folder / "snapshots").glob("*.onnx"))}
-        rows = _judge(snapshots, robot, evaluation_seeds)
+        rows = _judge(snapshots, recipe, robot, evaluation_seeds)
         minutes = {f"{row['steps']:012d}": row["minutes"] for row in result["history"]}
         runs.append(
             {
@@ -96,13 +96,23 @@ def bench_training(
     }
 
 
-def _judge(policies: dict[str, bytes], robot: Robot, seeds: int) -> list[dict[str, Any]]:
+def _judge(
+    policies: dict[str, bytes], recipe: Recipe, robot: Robot, seeds: int
+) -> list[dict[str, Any]]:
+    """Judge policies at the heights of the recipe's own trials."""
     candidates = []
     for label, content in policies.items():
         policy = Policy(content, label, label)
         bounds = (policy.card.command_low, policy.card.command_high)
         candidates.append(Candidate(label, policy, bounds))
-    judged = evaluate(candidates, Setup(robot), repeats=seeds, seed=JUDGING_SEED, kinds=("fixed",))
+    judged = evaluate(
+        candidates,
+        Setup(robot),
+        commands=recipe.judge_commands,
+        repeats=seeds,
+        seed=JUDGING_SEED,
+        kinds=("fixed",),
+    )
     rows: list[dict[str, Any]] = judged.evaluation.to_json()["summary"]
     return rows
 
