@@ -76,7 +76,7 @@ results: $(STAMP)
 	$(BIN)/hop identify runs/results/twin-multisine.parquet --out runs/results/identified.toml --json docs/results/identify.json
 	$(BIN)/hop bench identify --json docs/results/bench_identify.json
 	$(BIN)/hop experiment transfer --recipe precise --methods identified cad --json docs/results/transfer.json
-	$(BIN)/hop bench adapt --figure docs/results/adapt.svg --json docs/results/adapt.json
+	$(BIN)/hop bench finetune --figure docs/results/finetune.svg --json docs/results/finetune.json
 	$(BIN)/hop bench view --json docs/results/view.json
 	$(BIN)/hop bench deploy --json docs/results/deploy.json
 	$(BIN)/hop bench faults --live 5 --json docs/results/faults.json

@@ -59,8 +59,8 @@ SECONDS = {
 """Lengths of the paper's trials and of those that select a policy, which have no option."""
 
 ELSEWHERE = {
-    "hop adapt": "minutes even when small: tests/cli/test_adapt.py",
-    "hop bench adapt": "hours: tests/learn/adapt/test_study.py",
+    "hop finetune": "minutes even when small: tests/cli/test_finetune.py",
+    "hop bench finetune": "hours: tests/learn/finetune/test_study.py",
     "hop experiment transfer": "minutes even when small: tests/cli/test_experiment.py",
     "hop reproduce": "minutes even with --quick: tests/cli/test_reproduce.py",
 }

@@ -24,7 +24,7 @@ VERBS = {
     "compare": "set stored evaluations and trainings beside each other on a page",
     "plot": "draw the figures of stored traces again",
     "train": "train a controller from scratch, or go on after an interruption",
-    "adapt": "continue a policy's training on the real leg, or on a twin",
+    "finetune": "continue a policy's training on the real leg, or on a twin",
     "tune": "search the gains of energy shaping, or a recipe's numbers",
     "bench": "measure speed, convergence and accuracy",
     "excite": "write the trajectory that a leg is identified with",

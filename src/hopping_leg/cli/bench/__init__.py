@@ -12,13 +12,13 @@ Examples:
   hop bench probe fast paper --json probe.json --figure probe.svg
   hop bench identify --skip-paper-size --json identify.json
   hop bench view --json view.json
-  hop bench adapt --json adapt.json --figure adapt.svg
+  hop bench finetune --json finetune.json --figure finetune.svg
 """
 
-from hopping_leg.cli.bench.adaptation import Adapt
 from hopping_leg.cli.bench.controllers import Ablation, EnergyShaping, Training
 from hopping_leg.cli.bench.engines import Engines
 from hopping_leg.cli.bench.faults import Faults
+from hopping_leg.cli.bench.finetuning import Finetune
 from hopping_leg.cli.bench.hardware import Deploy
 from hopping_leg.cli.bench.identification import Identify
 from hopping_leg.cli.bench.probe import Probe
@@ -39,7 +39,7 @@ Benchmark = (
     | Engines
     | View
     | Probe
-    | Adapt
+    | Finetune
 )
 
 

@@ -5,10 +5,10 @@ import pytest
 import torch
 
 from hopping_leg.control.library import load_policy
-from hopping_leg.learn.adapt.exploring import EDGE, Exploring
-from hopping_leg.learn.adapt.learner import Learner, LearnerOptions
-from hopping_leg.learn.adapt.replay import CRITIC_SIZE, Rows
 from hopping_leg.learn.export import build_policy
+from hopping_leg.learn.finetune.exploring import EDGE, Exploring
+from hopping_leg.learn.finetune.learner import Learner, LearnerOptions
+from hopping_leg.learn.finetune.replay import CRITIC_SIZE, Rows
 from hopping_leg.learn.network_file import read_network
 from hopping_leg.sim.disturbance import Measurement
 

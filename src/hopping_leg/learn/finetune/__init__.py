@@ -8,6 +8,6 @@ state there: an outing returns what the encoders reported (``control.outing``). 
 - ``aim`` tells the network another command, so that hops come true on average: two numbers;
 - ``learner`` goes on with soft actor-critic from the policy's own weights.
 
-``adapting`` alternates outings and learning, keeps the best, throws back what became worse, and
+``finetuning`` alternates outings and learning, keeps the best, throws back what became worse, and
 stops by itself.
 """

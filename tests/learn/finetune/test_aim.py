@@ -5,8 +5,8 @@ import pytest
 
 from hopping_leg.control.library import load_policy
 from hopping_leg.control.policy import Policy
-from hopping_leg.learn.adapt.aim import Aim, AimOptions
 from hopping_leg.learn.export import build_policy
+from hopping_leg.learn.finetune.aim import Aim, AimOptions
 from hopping_leg.learn.network_file import read_network
 from hopping_leg.sim.disturbance import Measurement
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hopping_leg.learn.adapt.heard import Heard
+from hopping_leg.learn.finetune.heard import Heard
 
 from .outings import PERIOD, flying_leg, reckoning
 

@@ -8,11 +8,11 @@ import pytest
 from hopping_leg.control import Setup, roll_out
 from hopping_leg.env import ApexReward, HoppingTask, TaskOptions
 from hopping_leg.hops import find_hops
-from hopping_leg.learn.adapt.heard import Heard
-from hopping_leg.learn.adapt.hindsight import Hindsight
-from hopping_leg.learn.adapt.options import AdaptOptions
-from hopping_leg.learn.adapt.replay import CRITIC_SIZE, Rewriter
-from hopping_leg.learn.adapt.simulated import Witness, traces_of
+from hopping_leg.learn.finetune.heard import Heard
+from hopping_leg.learn.finetune.hindsight import Hindsight
+from hopping_leg.learn.finetune.options import FinetuneOptions
+from hopping_leg.learn.finetune.replay import CRITIC_SIZE, Rewriter
+from hopping_leg.learn.finetune.simulated import Witness, traces_of
 from hopping_leg.learn.network_file import read_network
 from hopping_leg.sim import NOTHING
 
@@ -31,7 +31,7 @@ def run():
 
 
 def rewriter():
-    reward = ApexReward(ROBOT, AdaptOptions().reward, 200.0)
+    reward = ApexReward(ROBOT, FinetuneOptions().reward, 200.0)
     reward.anneal(1.0)
     return Rewriter(POLICY.card, read_network(POLICY.content), ROBOT, reward, 5.0), reward
 

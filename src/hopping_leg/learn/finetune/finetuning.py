@@ -17,14 +17,6 @@ from hopping_leg.control.outing import Outing, Outings, Steps
 from hopping_leg.control.policy import Policy
 from hopping_leg.control.protocol import Controller
 from hopping_leg.env import ApexReward
-from hopping_leg.learn.adapt.aim import Aim
-from hopping_leg.learn.adapt.exploring import Exploring
-from hopping_leg.learn.adapt.heard import Heard
-from hopping_leg.learn.adapt.hops import Score, estimated, score, settled
-from hopping_leg.learn.adapt.learner import Learner
-from hopping_leg.learn.adapt.options import AdaptOptions
-from hopping_leg.learn.adapt.prepared import Task, believed_rows, prepare
-from hopping_leg.learn.adapt.replay import Rewriter
 from hopping_leg.learn.checkpoint import (
     Tree,
     list_checkpoints,
@@ -32,6 +24,14 @@ from hopping_leg.learn.checkpoint import (
     write_checkpoint,
 )
 from hopping_leg.learn.export import Network, build_policy
+from hopping_leg.learn.finetune.aim import Aim
+from hopping_leg.learn.finetune.exploring import Exploring
+from hopping_leg.learn.finetune.heard import Heard
+from hopping_leg.learn.finetune.hops import Score, estimated, score, settled
+from hopping_leg.learn.finetune.learner import Learner
+from hopping_leg.learn.finetune.options import FinetuneOptions
+from hopping_leg.learn.finetune.prepared import Task, believed_rows, prepare
+from hopping_leg.learn.finetune.replay import Rewriter
 from hopping_leg.learn.network_file import read_network
 from hopping_leg.trace import Trace
 
@@ -40,7 +40,7 @@ Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Adapted:
+class Finetuned:
     """A finished run.
 
     Attributes:
@@ -54,7 +54,7 @@ class Adapted:
     rows: list[Row]
 
 
-class Adaptation:
+class Finetuning:
     """One continued training.
 
     Args:
@@ -70,7 +70,7 @@ class Adaptation:
         self,
         task: Task,
         robot: Outings,
-        options: AdaptOptions,
+        options: FinetuneOptions,
         folder: Path,
         prepared: Path | None = None,
         on_outing: Callable[[Row], None] = lambda _: None,
@@ -85,7 +85,7 @@ class Adaptation:
         self._explored = 0
         self.rows: list[Row] = []
 
-    def run(self) -> Adapted:
+    def run(self) -> Finetuned:
         """Go on until a rule ends it."""
         self._restore()
         while not (reason := self._reason()):
@@ -98,7 +98,7 @@ class Adaptation:
             self._take(outing, steps, check=check)
             self._checkpoint()
             self._on_outing(self.rows[-1])
-        return Adapted(self._content(*self._best), reason, self.rows)
+        return Finetuned(self._content(*self._best), reason, self.rows)
 
     @property
     def minutes(self) -> float:

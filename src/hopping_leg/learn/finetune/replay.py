@@ -16,10 +16,10 @@ from hopping_leg.control.policy import Card
 from hopping_leg.env import ApexReward
 from hopping_leg.env.observation import Array32
 from hopping_leg.env.transition import Transition
-from hopping_leg.learn.adapt.exploring import EDGE
-from hopping_leg.learn.adapt.heard import Heard
-from hopping_leg.learn.adapt.hindsight import Hindsight
 from hopping_leg.learn.export import Network
+from hopping_leg.learn.finetune.exploring import EDGE
+from hopping_leg.learn.finetune.heard import Heard
+from hopping_leg.learn.finetune.hindsight import Hindsight
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
 

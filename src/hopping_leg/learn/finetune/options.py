@@ -5,17 +5,17 @@ from typing import Literal, get_args
 
 from hopping_leg.env import ApexRewardOptions
 from hopping_leg.errors import UsageError
-from hopping_leg.learn.adapt.aim import AimOptions
-from hopping_leg.learn.adapt.contact import ContactOptions
-from hopping_leg.learn.adapt.learner import LearnerOptions
-from hopping_leg.learn.adapt.rules import Rules
+from hopping_leg.learn.finetune.aim import AimOptions
+from hopping_leg.learn.finetune.contact import ContactOptions
+from hopping_leg.learn.finetune.learner import LearnerOptions
+from hopping_leg.learn.finetune.rules import Rules
 
 Method = Literal["aim", "sac", "both"]
 """Two numbers of the command, all weights, or first the one and then the other."""
 
 
 @dataclass(frozen=True)
-class AdaptOptions:
+class FinetuneOptions:
     """Continued training on a robot."""
 
     method: Method = "both"

@@ -1,6 +1,6 @@
 """When a policy is thrown back, and when its training ends."""
 
-from hopping_leg.learn.adapt.rules import Rules
+from hopping_leg.learn.finetune.rules import Rules
 
 RULES = Rules(minutes=2.0, tolerance=0.004, margin=0.01, patience=3, gain=0.001, confirm=2)
 

@@ -14,12 +14,12 @@ import numpy as np
 
 from hopping_leg.control.outing import Steps
 from hopping_leg.control.policy import Policy
-from hopping_leg.learn.adapt.adapting import Row
-from hopping_leg.learn.adapt.hops import score
-from hopping_leg.learn.adapt.options import AdaptOptions, Method
-from hopping_leg.learn.adapt.prepared import Task
-from hopping_leg.learn.adapt.running import POLICY, RESULT, adapt
-from hopping_leg.learn.adapt.simulated import Guard, Simulated
+from hopping_leg.learn.finetune.finetuning import Row
+from hopping_leg.learn.finetune.hops import score
+from hopping_leg.learn.finetune.options import FinetuneOptions, Method
+from hopping_leg.learn.finetune.prepared import Task
+from hopping_leg.learn.finetune.running import POLICY, RESULT, finetune
+from hopping_leg.learn.finetune.simulated import Guard, Simulated
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import write_atomically
 
@@ -42,7 +42,7 @@ class Study:
     twins: tuple[Robot, ...]
     methods: tuple[Method, ...]
     seeds: tuple[int, ...]
-    options: AdaptOptions
+    options: FinetuneOptions
     guard: Guard
     folder: Path
     judge_commands: tuple[float, ...] = (0.25, 0.27, 0.29, 0.31, 0.33, 0.35)
@@ -96,7 +96,7 @@ def _run(
     folder = _folder(study, twin, method, seed)
     if not (folder / POLICY).exists():
         span = (min(study.options.commands), max(study.options.commands))
-        adapt(
+        finetune(
             Task(study.policy, study.believed, span, seed),
             Simulated(twin, study.guard),
             replace(study.options, method=method),

@@ -19,11 +19,11 @@ from stable_baselines3.common.type_aliases import ReplayBufferSamples
 from torch import nn
 
 from hopping_leg.arrays import Array
-from hopping_leg.learn.adapt.exploring import EDGE
-from hopping_leg.learn.adapt.replay import CRITIC_SIZE, Rows
 from hopping_leg.learn.asymmetric import AsymmetricSACPolicy
 from hopping_leg.learn.checkpoint import Tree
 from hopping_leg.learn.export import Network
+from hopping_leg.learn.finetune.exploring import EDGE
+from hopping_leg.learn.finetune.replay import CRITIC_SIZE, Rows
 from hopping_leg.learn.resumable import learner_state, restore_learner
 
 _ACTIVATIONS = {"relu": nn.ReLU, "tanh": nn.Tanh, "elu": nn.ELU}

@@ -8,9 +8,9 @@ when hops are accurate, when nothing improves, or when the minutes of robot time
 killed run goes on with --resume.
 
 Examples:
-  hop adapt fast --on twin --minutes 3 --method aim
-  hop adapt fast --on my_twin.toml --seed 1 --out runs/adapted --json adapted.json
-  hop adapt fast --robot my_leg.toml --transport /dev/fdcanusb --minutes 5
+  hop finetune fast --on twin --minutes 3 --method aim
+  hop finetune fast --on my_twin.toml --seed 1 --out runs/finetuned --json finetuned.json
+  hop finetune fast --robot my_leg.toml --transport /dev/fdcanusb --minutes 5
 """
 
 import importlib
@@ -33,11 +33,11 @@ from hopping_leg.robot.parameters import Robot
 if TYPE_CHECKING:
     from hopping_leg.control.outing import Outings
     from hopping_leg.control.policy import Policy
-    from hopping_leg.learn.adapt.simulated import Guard
+    from hopping_leg.learn.finetune.simulated import Guard
 
 
 @dataclass(frozen=True)
-class Adapt:
+class Finetune:
     """What goes on learning, on which robot, for how long."""
 
     policy: tyro.conf.Positional[str]
@@ -61,7 +61,7 @@ class Adapt:
     """Error that is good enough, on two checks in a row, m."""
     seed: int = 0
     """Of exploration, commands, batches and a twin's noise."""
-    out: Path = Path("runs/adapt")
+    out: Path = Path("runs/finetune")
     """The run's folder."""
     resume: bool = False
     """Go on with the run in the folder; without one there, begin."""
@@ -71,22 +71,22 @@ class Adapt:
     """Write the numbers to this file as well."""
 
 
-def run(args: Adapt) -> None:
+def run(args: Finetune) -> None:
     """Continue the training, say how it went."""
-    from hopping_leg.learn.adapt.options import AdaptOptions
-    from hopping_leg.learn.adapt.prepared import Task
-    from hopping_leg.learn.adapt.rules import Rules
-    from hopping_leg.learn.adapt.running import POLICY, adapt
+    from hopping_leg.learn.finetune.options import FinetuneOptions
+    from hopping_leg.learn.finetune.prepared import Task
+    from hopping_leg.learn.finetune.rules import Rules
+    from hopping_leg.learn.finetune.running import POLICY, finetune
 
     policy, robot = load_policy(args.policy), load_robot(args.robot)
     _refuse(args, policy, robot)
     rules = Rules(minutes=args.minutes, tolerance=args.tolerance)
-    options = AdaptOptions(
+    options = FinetuneOptions(
         method=args.method, commands=tuple(sorted(args.commands)), outing=args.outing, rules=rules
     )
     span = (min(args.commands), max(args.commands))
     console = Console()
-    result = adapt(
+    result = finetune(
         Task(policy, robot, span, args.seed),
         _outings(args, robot, policy),
         options,
@@ -116,13 +116,13 @@ def guard_of(robot: Robot, rate: float) -> "Guard":
     """Return the supervisor's limits of measured joints, for a simulated leg."""
     import numpy as np
 
-    from hopping_leg.learn.adapt.simulated import Guard
+    from hopping_leg.learn.finetune.simulated import Guard
 
     limits = hopping_envelope(robot, rate)
     return Guard(*(np.array(pair) for pair in (limits.lower, limits.upper, limits.speed)))
 
 
-def _refuse(args: Adapt, policy: "Policy", robot: Robot) -> None:
+def _refuse(args: Finetune, policy: "Policy", robot: Robot) -> None:
     """Refuse what cannot be done, before anything moves.
 
     Raises:
@@ -149,16 +149,16 @@ def _refuse(args: Adapt, policy: "Policy", robot: Robot) -> None:
             )
 
 
-def _outings(args: Adapt, robot: Robot, policy: "Policy") -> "Outings":
+def _outings(args: Finetune, robot: Robot, policy: "Policy") -> "Outings":
     if args.on is not None:
-        from hopping_leg.learn.adapt.simulated import Simulated
+        from hopping_leg.learn.finetune.simulated import Simulated
 
         return Simulated(load_robot(args.on), guard_of(robot, policy.card.rate))
     assert args.transport is not None
     return _deployed(args, robot, policy.card.rate, args.transport)
 
 
-def _deployed(args: Adapt, robot: Robot, rate: float, transport: str) -> "Outings":
+def _deployed(args: Finetune, robot: Robot, rate: float, transport: str) -> "Outings":
     envelope = hopping_envelope(robot, rate)
     deployed: Any = importlib.import_module("hopping_leg.deploy.outings")
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.control.outing import Outing, Steps
-from hopping_leg.learn.adapt.hindsight import Hindsight
+from hopping_leg.learn.finetune.hindsight import Hindsight
 
 SETTLING = 1.0
 """Time after a new command whose hops do not count, s."""

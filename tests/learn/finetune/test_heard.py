@@ -6,8 +6,8 @@ import pytest
 from hopping_leg.control import Setup, roll_out
 from hopping_leg.control.layouts import make_layout
 from hopping_leg.errors import TraceError
-from hopping_leg.learn.adapt.heard import Heard
-from hopping_leg.learn.adapt.simulated import Witness, traces_of
+from hopping_leg.learn.finetune.heard import Heard
+from hopping_leg.learn.finetune.simulated import Witness, traces_of
 from hopping_leg.sim import NOTHING
 from hopping_leg.trace import Trace
 

@@ -8,20 +8,20 @@ from typing import Any
 
 from hopping_leg.control.outing import Outings
 from hopping_leg.errors import UsageError
-from hopping_leg.learn.adapt.adapting import Adaptation, Adapted, Row
-from hopping_leg.learn.adapt.options import AdaptOptions
-from hopping_leg.learn.adapt.prepared import Task
+from hopping_leg.learn.finetune.finetuning import Finetuned, Finetuning, Row
+from hopping_leg.learn.finetune.options import FinetuneOptions
+from hopping_leg.learn.finetune.prepared import Task
 from hopping_leg.learn.run_folder import library_versions
 from hopping_leg.trace import write_atomically
 
-RESULT = "adapt.json"
+RESULT = "finetune.json"
 POLICY = "policy.onnx"
 
 
-def adapt(
+def finetune(
     task: Task,
     robot: Outings,
-    options: AdaptOptions,
+    options: FinetuneOptions,
     out: Path,
     *,
     resume: bool = False,
@@ -40,28 +40,28 @@ def adapt(
         on_outing: Called with every outing's row.
 
     Returns:
-        The content of ``adapt.json``.
+        The content of ``finetune.json``.
 
     Raises:
         UsageError: ``out`` holds a run that cannot be continued like this.
     """
     asked = _asked(task, robot, options)
     _begin(out, asked, resume=resume)
-    adapted = Adaptation(task, robot, options, out, prepared, on_outing).run()
-    result = {**asked, **summary(adapted), "versions": library_versions()}
+    finetuned = Finetuning(task, robot, options, out, prepared, on_outing).run()
+    result = {**asked, **summary(finetuned), "versions": library_versions()}
     _write(out / RESULT, result)
     write_atomically(out / "model_card.md", card(result).encode())
-    write_atomically(out / POLICY, adapted.content)
+    write_atomically(out / POLICY, finetuned.content)
     return result
 
 
-def summary(adapted: Adapted) -> dict[str, Any]:
+def summary(finetuned: Finetuned) -> dict[str, Any]:
     """Return what a finished run comes to, as JSON values."""
-    rows = adapted.rows
+    rows = finetuned.rows
     checks = [row for row in rows if row["kind"] == "check"]
     best = min(checks, key=lambda row: float(row["error_m"])) if checks else None
     return {
-        "why_it_ended": adapted.reason,
+        "why_it_ended": finetuned.reason,
         "minutes": rows[-1]["minutes"] if rows else 0.0,
         "best_check": best,
         "first_check": checks[0] if checks else None,
@@ -78,7 +78,7 @@ def card(result: dict[str, Any]) -> str:
     """Return the model card of a finished run as Markdown.
 
     Args:
-        result: Content of ``adapt.json``.
+        result: Content of ``finetune.json``.
     """
     best, first = result["best_check"], result["first_check"]
     lines = [
@@ -99,7 +99,7 @@ def card(result: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _asked(task: Task, robot: Outings, options: AdaptOptions) -> dict[str, Any]:
+def _asked(task: Task, robot: Outings, options: FinetuneOptions) -> dict[str, Any]:
     asked: dict[str, Any] = json.loads(
         json.dumps(
             {

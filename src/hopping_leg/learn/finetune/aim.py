@@ -14,8 +14,8 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.control.layouts import make_layout
 from hopping_leg.control.policy import Card
-from hopping_leg.learn.adapt.lines import robust_line
 from hopping_leg.learn.export import Network
+from hopping_leg.learn.finetune.lines import robust_line
 
 
 @dataclass(frozen=True)

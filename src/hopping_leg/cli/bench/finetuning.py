@@ -8,8 +8,8 @@ from typing import Any, Literal
 from rich.console import Console
 from rich.table import Table
 
-from hopping_leg.cli.adapt import guard_of
 from hopping_leg.cli.bench.shared import at_least, mm
+from hopping_leg.cli.finetune import guard_of
 from hopping_leg.control.library import load_policy
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot
@@ -18,7 +18,7 @@ from hopping_leg.trace import write_atomically
 
 
 @dataclass(frozen=True)
-class Adapt:
+class Finetune:
     """Continue a policy's training on drawn twins by every method; judge it on other seeds."""
 
     policy: str = "fast"
@@ -35,7 +35,7 @@ class Adapt:
     """Robot time of a run at most."""
     judges: int = 3
     """Judging outings of each policy."""
-    folder: Path = Path("runs/bench-adapt")
+    folder: Path = Path("runs/bench-finetune")
     """Where the runs are kept; finished ones are not repeated, killed ones go on."""
     figure: Path | None = None
     """Draw the errors over robot time to this file, .svg."""
@@ -44,11 +44,11 @@ class Adapt:
 
     def measure(self) -> dict[str, Any]:
         """Run it, print a table, return every number."""
-        from hopping_leg.evaluate.figures.adapting import draw_adapting
+        from hopping_leg.evaluate.figures.finetuning import draw_finetuning
         from hopping_leg.evaluate.figures.style import to_svg
-        from hopping_leg.learn.adapt.options import AdaptOptions
-        from hopping_leg.learn.adapt.rules import Rules
-        from hopping_leg.learn.adapt.study import Study, measure
+        from hopping_leg.learn.finetune.options import FinetuneOptions
+        from hopping_leg.learn.finetune.rules import Rules
+        from hopping_leg.learn.finetune.study import Study, measure
 
         at_least(1, judges=self.judges)
         at_least(0, **{f"seeds {seed}": seed for seed in (*self.seeds, *self.twins)})
@@ -63,7 +63,7 @@ class Adapt:
                 tuple(draw_twin(seed, self.robot).robot for seed in self.twins),
                 self.methods,
                 self.seeds,
-                AdaptOptions(rules=Rules(minutes=self.minutes)),
+                FinetuneOptions(rules=Rules(minutes=self.minutes)),
                 guard_of(robot, policy.card.rate),
                 self.folder,
                 judges=self.judges,
@@ -72,13 +72,13 @@ class Adapt:
         )
         result = {"command": self._command(), **result}
         if self.figure is not None:
-            write_atomically(self.figure, to_svg(draw_adapting(result)))
+            write_atomically(self.figure, to_svg(draw_finetuning(result)))
         _print(console, result)
         return result
 
     def _command(self) -> str:
         """Return the command that measures this again."""
-        words = ["hop bench adapt"]
+        words = ["hop bench finetune"]
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
             if value == field.default or field.name in ("folder", "figure", "json"):

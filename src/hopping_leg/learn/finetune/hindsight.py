@@ -14,10 +14,10 @@ from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.control.height_estimate import flight_time_apex
 from hopping_leg.control.rollout import Rollout
 from hopping_leg.hops import find_hops
-from hopping_leg.learn.adapt.contact import Contact
-from hopping_leg.learn.adapt.heard import Heard
-from hopping_leg.learn.adapt.lines import robust_line
-from hopping_leg.learn.adapt.simulated import traces_of
+from hopping_leg.learn.finetune.contact import Contact
+from hopping_leg.learn.finetune.heard import Heard
+from hopping_leg.learn.finetune.lines import robust_line
+from hopping_leg.learn.finetune.simulated import traces_of
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
 

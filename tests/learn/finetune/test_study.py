@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from hopping_leg.evaluate.figures.adapting import draw_adapting
-from hopping_leg.learn.adapt import study as module
-from hopping_leg.learn.adapt.simulated import Guard
-from hopping_leg.learn.adapt.study import FIRST_JUDGE, Study, measure
+from hopping_leg.evaluate.figures.finetuning import draw_finetuning
+from hopping_leg.learn.finetune import study as module
+from hopping_leg.learn.finetune.simulated import Guard
+from hopping_leg.learn.finetune.study import FIRST_JUDGE, Study, measure
 from hopping_leg.robot import load_robot
 
 from .outings import OPTIONS, POLICY, ROBOT, Imagined
@@ -49,7 +49,7 @@ def test_a_study_measures_every_method_and_is_not_repeated(tmp_path, seeds):
     count = len(seeds)
     assert measure(study, lambda _: None) == result
     assert len(seeds) == count
-    figure = draw_adapting(result)
+    figure = draw_finetuning(result)
     lines = figure.axes[0].get_lines()
     assert len(lines) == 4
     np.testing.assert_allclose(lines[0].get_ydata(), 20.0)

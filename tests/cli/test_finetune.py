@@ -1,11 +1,11 @@
-"""`hop adapt` on the command line."""
+"""`hop finetune` on the command line."""
 
 import json
 
 import pytest
 
 from hopping_leg.cli import main
-from hopping_leg.cli.adapt import guard_of, line
+from hopping_leg.cli.finetune import guard_of, line
 from hopping_leg.robot import load_robot
 
 
@@ -25,7 +25,7 @@ from hopping_leg.robot import load_robot
     ],
 )
 def test_what_has_no_meaning_is_refused_in_a_sentence(words, sentence, capsys, tmp_path):
-    assert main(["adapt", *words, "--out", str(tmp_path / "run")]) == 2
+    assert main(["finetune", *words, "--out", str(tmp_path / "run")]) == 2
     error = capsys.readouterr().err
     assert sentence in error
     assert "Traceback" not in error
@@ -50,14 +50,14 @@ def test_an_outings_line_says_what_happened():
 
 @pytest.mark.slow
 def test_a_run_leaves_policy_card_and_numbers(tmp_path, monkeypatch, capsys):
-    from hopping_leg.learn.adapt import adapting
-    from hopping_leg.learn.adapt.contact import ContactOptions
-    from hopping_leg.learn.adapt.prepared import prepare
+    from hopping_leg.learn.finetune import finetuning
+    from hopping_leg.learn.finetune.contact import ContactOptions
+    from hopping_leg.learn.finetune.prepared import prepare
 
     few = ContactOptions(legs=4, seconds=3.0, steps=50, hidden=(8,))
-    monkeypatch.setattr(adapting, "prepare", lambda task, _, folder: prepare(task, few, folder))
-    out, numbers = tmp_path / "run", tmp_path / "adapt.json"
-    words = ["adapt", "fast", "--on", "twin", "--method", "aim", "--minutes", "0.4", "--outing",
+    monkeypatch.setattr(finetuning, "prepare", lambda task, _, folder: prepare(task, few, folder))
+    out, numbers = tmp_path / "run", tmp_path / "finetune.json"
+    words = ["finetune", "fast", "--on", "twin", "--method", "aim", "--minutes", "0.4", "--outing",
              "10", "--out", str(out), "--json", str(numbers)]  # fmt: skip
     assert main(words) == 0
     result = json.loads(numbers.read_text())

@@ -6,11 +6,11 @@ import numpy as np
 
 from hopping_leg.control.library import load_policy
 from hopping_leg.control.outing import Outing, by_tick, measured_table
-from hopping_leg.learn.adapt.contact import Contact, ContactOptions
-from hopping_leg.learn.adapt.hindsight import Reckoning
-from hopping_leg.learn.adapt.learner import LearnerOptions
-from hopping_leg.learn.adapt.options import AdaptOptions
-from hopping_leg.learn.adapt.rules import Rules
+from hopping_leg.learn.finetune.contact import Contact, ContactOptions
+from hopping_leg.learn.finetune.hindsight import Reckoning
+from hopping_leg.learn.finetune.learner import LearnerOptions
+from hopping_leg.learn.finetune.options import FinetuneOptions
+from hopping_leg.learn.finetune.rules import Rules
 from hopping_leg.robot import kinematics, load_robot
 from hopping_leg.robot.model import GRAVITY
 from hopping_leg.trace import Trace
@@ -19,7 +19,7 @@ ROBOT = load_robot("legv2-paper")
 POLICY = load_policy("fast")
 PERIOD = 0.005
 CONTACT = ContactOptions(legs=4, seconds=3.0, steps=20, batch=64, hidden=(8,))
-OPTIONS = AdaptOptions(
+OPTIONS = FinetuneOptions(
     method="both",
     commands=(0.25, 0.35),
     outing=4.0,

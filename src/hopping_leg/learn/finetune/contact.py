@@ -16,9 +16,9 @@ from torch import nn
 from hopping_leg.arrays import Array
 from hopping_leg.control.protocol import Controller
 from hopping_leg.control.rollout import Rollout
-from hopping_leg.learn.adapt.heard import Heard
-from hopping_leg.learn.adapt.simulated import hop_many, traces_of
 from hopping_leg.learn.checkpoint import Tree
+from hopping_leg.learn.finetune.heard import Heard
+from hopping_leg.learn.finetune.simulated import hop_many, traces_of
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.twins import IDENTIFIABLE, TWIN_RANGES, Range
 from hopping_leg.sim.variants import vary

@@ -9,13 +9,13 @@ import pytest
 
 from hopping_leg.control.policy import Policy
 from hopping_leg.errors import UsageError
-from hopping_leg.learn.adapt import prepared
-from hopping_leg.learn.adapt.adapting import Adaptation
-from hopping_leg.learn.adapt.prepared import Task, prepare
-from hopping_leg.learn.adapt.rules import Rules
-from hopping_leg.learn.adapt.running import POLICY as FILE
-from hopping_leg.learn.adapt.running import adapt
-from hopping_leg.learn.adapt.simulated import Guard, Simulated
+from hopping_leg.learn.finetune import prepared
+from hopping_leg.learn.finetune.finetuning import Finetuning
+from hopping_leg.learn.finetune.prepared import Task, prepare
+from hopping_leg.learn.finetune.rules import Rules
+from hopping_leg.learn.finetune.running import POLICY as FILE
+from hopping_leg.learn.finetune.running import finetune
+from hopping_leg.learn.finetune.simulated import Guard, Simulated
 from hopping_leg.robot import load_robot
 
 from .outings import OPTIONS, POLICY, ROBOT, Imagined
@@ -53,7 +53,7 @@ def test_what_is_learnt_beforehand_is_learnt_once(ready, monkeypatch):
 
 @pytest.mark.slow
 def test_a_killed_run_goes_on_exactly(tmp_path, ready):
-    whole = adapt(TASK, Imagined(), OPTIONS, tmp_path / "whole", prepared=ready)
+    whole = finetune(TASK, Imagined(), OPTIONS, tmp_path / "whole", prepared=ready)
     kinds = [row["kind"] for row in whole["outings"]]
     assert {"check", "exploration"} <= set(kinds)
     for number in (1, 3, 4):
@@ -64,9 +64,9 @@ def test_a_killed_run_goes_on_exactly(tmp_path, ready):
                 raise KilledError
 
         with pytest.raises(KilledError):
-            adapt(TASK, Imagined(), OPTIONS, tmp_path / "cut", resume=number > 1,
+            finetune(TASK, Imagined(), OPTIONS, tmp_path / "cut", resume=number > 1,
                   prepared=ready, on_outing=kill)  # fmt: skip
-    cut = adapt(TASK, Imagined(), OPTIONS, tmp_path / "cut", resume=True, prepared=ready)
+    cut = finetune(TASK, Imagined(), OPTIONS, tmp_path / "cut", resume=True, prepared=ready)
     assert cut["outings"] == whole["outings"]
     assert (tmp_path / "cut" / FILE).read_bytes() == (tmp_path / "whole" / FILE).read_bytes()
 
@@ -74,39 +74,39 @@ def test_a_killed_run_goes_on_exactly(tmp_path, ready):
 @pytest.mark.slow
 def test_weights_move_and_the_policy_file_names_its_source(tmp_path, ready):
     options = dataclasses.replace(OPTIONS, method="sac")
-    run = Adaptation(TASK, Imagined(), options, tmp_path, ready)
-    adapted = run.run()
+    run = Finetuning(TASK, Imagined(), options, tmp_path, ready)
+    finetuned = run.run()
     last = run._content(run._network, run._aim)
-    assert last != adapted.content
-    card = Policy(adapted.content, "adapted", "adapted").card
+    assert last != finetuned.content
+    card = Policy(finetuned.content, "finetuned", "finetuned").card
     assert POLICY.digest in card.recipe
     assert card.robot_digest == POLICY.card.robot_digest
-    assert "used up" in adapted.reason
+    assert "used up" in finetuned.reason
 
 
 def test_outings_that_were_ended_early_never_win_and_are_counted(tmp_path, ready):
     options = dataclasses.replace(OPTIONS, method="aim")
     robot = Imagined(complain_from=1)
-    result = adapt(TASK, robot, options, tmp_path, prepared=ready)
+    result = finetune(TASK, robot, options, tmp_path, prepared=ready)
     assert result["safety"]["ended_early"] == len(result["outings"]) - 1
     assert result["best_check"]["outing"] == 0
     assert result["safety"]["thrown_back"] > 0 or options.rules.margin > 1
     strict = dataclasses.replace(options, rules=Rules(minutes=0.4, margin=0.01, patience=50))
     shutil.rmtree(tmp_path)
-    again = adapt(TASK, Imagined(complain_from=1), strict, tmp_path, prepared=ready)
+    again = finetune(TASK, Imagined(complain_from=1), strict, tmp_path, prepared=ready)
     assert again["safety"]["thrown_back"] > 0
 
 
 def test_a_folder_with_another_run_is_refused(tmp_path, ready):
     options = dataclasses.replace(OPTIONS, method="aim")
-    adapt(TASK, Imagined(), options, tmp_path, prepared=ready)
+    finetune(TASK, Imagined(), options, tmp_path, prepared=ready)
     with pytest.raises(UsageError, match="--resume"):
-        adapt(TASK, Imagined(), options, tmp_path, prepared=ready)
+        finetune(TASK, Imagined(), options, tmp_path, prepared=ready)
     with pytest.raises(UsageError, match="another seed"):
-        adapt(dataclasses.replace(TASK, seed=4), Imagined(), options, tmp_path, resume=True)
+        finetune(dataclasses.replace(TASK, seed=4), Imagined(), options, tmp_path, resume=True)
     with pytest.raises(UsageError, match="finished"):
-        adapt(TASK, Imagined(), options, tmp_path, resume=True)
-    assert json.loads((tmp_path / "adapt.json").read_text())["on"] == "imagined"
+        finetune(TASK, Imagined(), options, tmp_path, resume=True)
+    assert json.loads((tmp_path / "finetune.json").read_text())["on"] == "imagined"
 
 
 def test_a_simulated_outing_tells_what_was_measured_and_keeps_the_truth_apart():

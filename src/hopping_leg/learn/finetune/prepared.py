@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 
 from hopping_leg.control.policy import Policy
-from hopping_leg.learn.adapt.contact import Contact, ContactOptions, doubtful_legs, learn_contact
-from hopping_leg.learn.adapt.exploring import Exploring
-from hopping_leg.learn.adapt.heard import Heard
-from hopping_leg.learn.adapt.hindsight import Reckoning
-from hopping_leg.learn.adapt.replay import Rewriter, Rows
-from hopping_leg.learn.adapt.simulated import hop_many, traces_of
 from hopping_leg.learn.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
+from hopping_leg.learn.finetune.contact import Contact, ContactOptions, doubtful_legs, learn_contact
+from hopping_leg.learn.finetune.exploring import Exploring
+from hopping_leg.learn.finetune.heard import Heard
+from hopping_leg.learn.finetune.hindsight import Reckoning
+from hopping_leg.learn.finetune.replay import Rewriter, Rows
+from hopping_leg.learn.finetune.simulated import hop_many, traces_of
 from hopping_leg.robot.parameters import Robot
 
 BELIEVED_LEGS = 16

@@ -9,11 +9,11 @@ from hopping_leg.evaluate.figures.style import WIDTH, colour, styled
 
 
 @styled
-def draw_adapting(result: dict[str, Any]) -> Figure:
+def draw_finetuning(result: dict[str, Any]) -> Figure:
     """Draw the true error of every check, one panel per twin, one colour per method.
 
     Args:
-        result: JSON values of ``hop bench adapt``; estimated errors are drawn as dots.
+        result: JSON values of ``hop bench finetune``; estimated errors are drawn as dots.
     """
     curves = [row for row in result["curves"] if row["kind"] == "check"]
     twins = list(dict.fromkeys(row["twin"] for row in curves))
