@@ -22,6 +22,7 @@ from hopping_leg.robot import load_robot
         (["fast", "--on", "twin", "--outing", "600"], "outing of 600"),
         (["fast", "--on", "nobody"], "nobody"),
         (["energy-shaping", "--on", "twin"], "energy-shaping"),
+        (["adaptive", "--on", "twin"], "without one, e.g. precise"),
     ],
 )
 def test_what_has_no_meaning_is_refused_in_a_sentence(words, sentence, capsys, tmp_path):

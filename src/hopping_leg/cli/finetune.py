@@ -140,6 +140,11 @@ def _refuse(args: Finetune, policy: "Policy", robot: Robot) -> None:
             " leg with --on, and the robot that its file extends with --robot."
         )
     policy.check_robot(robot)
+    if policy.remembers:
+        raise UsageError(
+            f"{policy.name} carries a memory from tick to tick, which is not learnt further here;"
+            " name a policy without one, e.g. precise."
+        )
     low, high = policy.card.command_low, policy.card.command_high
     for command in args.commands:
         if not low <= command <= high:

@@ -141,6 +141,11 @@ class Policy:
         """Names and shapes of the graph's inputs, without the number of legs."""
         return self._layout.shapes
 
+    @property
+    def remembers(self) -> bool:
+        """Whether it carries a memory from tick to tick."""
+        return self._memory_size > 0
+
     def check_robot(
         self, robot: Robot, rate: float | None = None, *, other: OtherRobot = "refuse"
     ) -> None:
@@ -199,7 +204,7 @@ class Policy:
         self._check_command(measurement.command)
         self._layout.update(measurement, self._torque)
         feeds = self._layout.inputs()
-        if self._memory_size:
+        if self.remembers:
             feeds[MEMORY] = self._memory
         torque, *memory = self._session.run(None, feeds)
         if memory:
