@@ -12,8 +12,12 @@ from hopping_leg.learn.network_file import read_network
 
 
 @pytest.mark.parametrize("name", shipped_policies())
-def test_a_policy_written_again_has_the_same_bytes(name):
+def test_a_policy_written_again_has_the_same_bytes_or_is_refused_for_its_memory(name):
     policy = load_policy(name)
+    if policy.remembers:
+        with pytest.raises(PolicyError, match="remembers"):
+            read_network(policy.content)
+        return
     assert build_policy(read_network(policy.content), policy.card) == policy.content
 
 
