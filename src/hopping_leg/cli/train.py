@@ -45,7 +45,8 @@ class Options:
     """Numbers of the recipe to change, e.g. `--set learning_rate=3e-4 gamma=0.98`."""
     randomise: Literal["none", "twins", "surprises"] | None = None
     """What each leg in training draws for itself instead of the recipe's: nothing; friction,
-    inertia and ground from the twins' ranges; or whatever may surprise a leg, from a payload to late commands."""
+    inertia and ground from the twins' ranges; or whatever may surprise a leg, from a payload to
+    late commands."""
     observation: Literal["three-samples", "dated", "dated-long"] | None = None
     """What the policy sees instead of what the recipe shows it; three-samples is the paper's."""
     minutes: float | None = None
