@@ -19,7 +19,7 @@ def test_everything_is_measured_through_the_real_page(tmp_path):
     latency = result["latency_ms"]
     assert 0 < latency["median"] <= latency["p95"] <= latency["most"]
     for watched in (result, result["small_window"]):
-        assert 0 < watched["frames_per_s"] < 1000
+        assert 0 < watched["frames_per_s"] < 66
         assert min(watched["canvas"]) > 0
     assert result["window"] > result["small_window"]["window"]
     assert 0 < result["pictures_sent_per_s"] < 1.2 * result["setup"]["intended_pictures_per_s"]

@@ -44,11 +44,12 @@ _COLOURS = 128
 _HEIGHT = re.compile(r"\d m")
 
 _COUNT = """() => {
+  if (window.drawn) return;
   window.drawn = [];
   const draw = (at) => { window.drawn.push(at); requestAnimationFrame(draw); };
   requestAnimationFrame(draw);
 }"""
-"""Notes when the browser draws."""
+"""Notes when the browser draws; asked again, it goes on."""
 
 _CANVAS = """() => {
   const canvas = document.querySelector("canvas[data-engine]");
