@@ -58,7 +58,7 @@ class TaskOptions:
     disturbance: Disturbance = field(default_factory=Disturbance)
     """Noise and delay; the paper trains with them."""
     randomised: tuple[Range, ...] = ()
-    """Where each leg draws its own numbers, once, instead of the robot's; none by default."""
+    """Where each leg draws its own numbers instead of the robot's; none by default."""
     chance: float = 1.0
     """That a leg draws one of those numbers rather than has the robot's."""
     alike_at_first: bool = False

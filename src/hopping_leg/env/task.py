@@ -22,6 +22,9 @@ PRIVILEGED = 10
 PRIVILEGED_HEIGHT, PRIVILEGED_COMMAND, PRIVILEGED_CLEARANCE = 0, 6, 7
 """Where the base's height, the command and the foot's clearance stand among them."""
 
+CLEARANCE_GAIN = 10.0
+"""Scale of clearances in the true state, 1/m."""
+
 
 class HoppingTask:
     """n legs learning to hop; the only place where observation and reward are put together.
@@ -51,7 +54,7 @@ class HoppingTask:
         self.autoreset = autoreset
         self.robot, self.count, self.options, self.reward = robot, count, options, reward
         noise, self._rng, draws = rng.spawn(3)
-        self._draws, self._draw = int(draws.integers(2**62)), 0
+        self._draw_seed, self._draw = int(draws.integers(2**62)), 0
         self._numbers = np.zeros((count, len(options.randomised)))
         self.legs = Legs(
             robot,
@@ -90,7 +93,7 @@ class HoppingTask:
         ranges = self.options.randomised
         if not ranges or draw == self._draw:
             return
-        rng = np.random.default_rng([self._draws, draw])
+        rng = np.random.default_rng([self._draw_seed, draw])
         drawn = vary(self.robot, ranges, self.count, rng, self.options.chance)
         same = np.diff(np.floor(self.options.unchanged * np.arange(self.count + 1))) > 0
         variants = [self.robot if s else d for s, d in zip(same, drawn, strict=True)]
@@ -170,9 +173,9 @@ class HoppingTask:
         result[:, 2:4] = (legs.q - o.offset[:2]) * o.gain[:2]
         result[:, 4:6] = legs.qd * o.gain[2:4]
         result[:, PRIVILEGED_COMMAND] = (self.command - o.offset[4]) * o.gain[4]
-        result[:, PRIVILEGED_CLEARANCE] = legs.foot_clearance() * 10
-        result[:, 8] = legs.knee_clearance() * 10
-        result[:, 9] = legs.base_clearance() * 10
+        result[:, PRIVILEGED_CLEARANCE] = legs.foot_clearance() * CLEARANCE_GAIN
+        result[:, 8] = legs.knee_clearance() * CLEARANCE_GAIN
+        result[:, 9] = legs.base_clearance() * CLEARANCE_GAIN
         if self._numbers.size:
             result[:, PRIVILEGED:] = self._numbers
         return result

@@ -16,6 +16,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
+from hopping_leg.env.task import CLEARANCE_GAIN
 from hopping_leg.learn.asymmetric import dense
 from hopping_leg.learn.checkpoint import Tree
 from hopping_leg.learn.hop_watch import FROM, UNTIL, HopWatch
@@ -61,7 +62,7 @@ class Places:
     true_command: int
     """The command again."""
     true_clearance: int
-    """The gap under the foot."""
+    """The gap under the foot, times ``CLEARANCE_GAIN``."""
 
 
 class AimingStudent(nn.Module):
@@ -119,7 +120,7 @@ class AimingStudent(nn.Module):
         aim = told.clamp(-1 - aiming.beyond, 1 + aiming.beyond) - command
         true = self._tell(observation, begun)
         with torch.no_grad():
-            felt = self._feel(seen, memory[:, 2]) * aiming.scale
+            felt = self._feel(seen, memory[:, 2]).clamp(-aiming.most, aiming.most) * aiming.scale
             action: torch.Tensor = self.layers(self._told(seen, aim))
         self._notes.append(torch.stack([aim, memory[:, 2], true / aiming.scale], dim=1))
         trusted = torch.arange(len(seen)) < round(self.trust * len(seen))
@@ -136,12 +137,12 @@ class AimingStudent(nn.Module):
         columns = [p.true_height, p.true_clearance, p.true_command]
         height, clearance, command = observation[:, columns].double().numpy().T
         begun = np.broadcast_to(begun, len(observation))
-        told = self._watch.see(height, clearance, command, begun)
+        told = self._watch.see(height, clearance / CLEARANCE_GAIN, command, begun)
         return torch.from_numpy(told).float()
 
     def _feel(self, seen: torch.Tensor, late: torch.Tensor) -> torch.Tensor:
         shown: torch.Tensor = self.feeling(torch.cat([seen, late[:, None]], dim=1))[:, 0]
-        return shown.clamp(-self.aiming.most, self.aiming.most)
+        return shown
 
     def _told(self, seen: torch.Tensor, aim: torch.Tensor) -> torch.Tensor:
         told = seen.clone()
@@ -161,7 +162,7 @@ class AimingStudent(nn.Module):
         observation, (aim, late, error) = rows[:, :-_NOTES], rows[:, -_NOTES:].T
         seen = observation[:, : self._places.measured]
         most = self.aiming.most
-        felt = self.feeling(torch.cat([seen, late[:, None]], dim=1))[:, 0]
+        felt = self._feel(seen, late)
         observation[:, self._places.true_command] += aim
         acted = functional.mse_loss(self.layers(self._told(seen, aim)), wanted(observation))
         return acted + functional.mse_loss(felt, error.clamp(-most, most))

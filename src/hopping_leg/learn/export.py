@@ -4,7 +4,6 @@ Graph: inputs (flattened, joined) -> (x - offset) * gain -> dense layers -> squa
 what remembers stands before the dense layers.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.control.layouts import make_layout
 from hopping_leg.control.policy import MEMORY, METADATA_KEY, NEXT_MEMORY, Card
 from hopping_leg.errors import UsageError
-from hopping_leg.learn.graph import ACTIVATIONS, Graph, array_info
+from hopping_leg.learn.graph import ACTIVATIONS, Graph, Layers, array_info
 from hopping_leg.learn.memories import Memory
 from hopping_leg.trace import write_atomically
 
@@ -43,7 +42,7 @@ class Network:
 
     offset: Array
     gain: Array
-    layers: Sequence[tuple[Array, Array]]
+    layers: Layers
     activation: str
     squash: str
     bound: float = float("inf")

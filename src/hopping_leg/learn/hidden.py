@@ -26,8 +26,8 @@ def expose_hidden(content: bytes, shuffle: int | None = None) -> bytes:
     graph = model.graph
     if MEMORY in (given.name for given in graph.input):
         raise PolicyError(
-            "The hidden layers of a recurrent policy depend on more than a tick's measurements and"
-            " cannot be read out one by one; name a policy without a memory."
+            "The hidden layers of a policy that remembers depend on more than a tick's measurements"
+            " and cannot be read out one by one; name a policy without a memory."
         )
     names = [name for node in graph.node for name in node.output if name.startswith(PREFIX)]
     if not names:

@@ -12,7 +12,7 @@ stands."""
 _SHORTEST = 20
 """Ticks of a flight that counts as a hop."""
 
-_CLEAR = 1e-3
+_CLEAR = 1e-4
 """Gap under a foot that flies, m."""
 
 
