@@ -68,6 +68,29 @@ def test_differences_stay_inside_the_bounds():
     np.testing.assert_allclose(slopes, np.array([[2.0, 0.3], [0.1, 1.0]]).T, rtol=1e-6)
 
 
+def test_slopes_do_not_take_a_jump_for_a_slope():
+    groups = np.array([0, 1])
+    bounds = (np.full(1, -1.0), np.full(1, 1.0))
+
+    def jumping(vectors):
+        jump = np.where(vectors > 2e-4, 0.5, 0.0)
+        return np.concatenate([3 * vectors + jump, 2 * vectors], axis=1)
+
+    for start in (0.0, 3e-4, 1.0, -1.0):
+        slopes = jacobian(jumping, np.array([start]), bounds, 1e-3, groups)
+        np.testing.assert_allclose(slopes, [[3.0], [2.0]], rtol=1e-6)
+    assert jacobian(jumping, np.zeros(1), bounds, 1e-3)[0, 0] > 100
+
+
+def test_two_differences_stay_inside_the_bounds_too():
+    low, high = TWO.bounds
+    groups = np.arange(bowl(low[None]).shape[1])
+    for start in (low, high, 0.5 * (low + high)):
+        seen = []
+        jacobian(lambda v, s=seen: s.append(v) or bowl(v), start, (low, high), 1e-3, groups)
+        assert (np.concatenate(seen) >= low).all() and (np.concatenate(seen) <= high).all()
+
+
 def test_a_recording_that_the_model_cannot_explain_hardly_moves_the_estimate():
     weak = record(
         CAD.replace({**TRUTH, "knee.motor.torque_limit": 0.3}).robot, swing(2.0, phase=1.0)

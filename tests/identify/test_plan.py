@@ -34,6 +34,7 @@ def test_known_gains_are_kept_and_unknown_ones_are_fitted():
 def test_windows_are_short_where_nothing_holds_the_leg():
     closed, opened = (make_plan([r], LEG).window for r in (FIXED, TORQUES))
     assert opened < closed
+    assert make_plan([FIXED, STANDING], LEG).window <= 0.25
 
 
 @pytest.mark.parametrize("search", ["two-pass", "one-pass"])

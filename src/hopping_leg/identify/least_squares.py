@@ -1,4 +1,11 @@
-"""Bounded least squares: all differences of a Jacobian times all windows in one batch."""
+"""Bounded least squares: all differences of a Jacobian times all windows in one batch.
+
+A simulated touchdown falls on one physics step or the next, so that residuals of a window on the
+ground jump a little wherever a parameter moves it across. A difference that spans such a jump is
+the jump over the step, hundreds of times the slope, and one bad column misleads the whole search.
+So there every slope is taken on both sides, and each window goes by the calmer one: a jump seldom
+lies on both.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -7,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from scipy import optimize
 
-from hopping_leg.arrays import Array
+from hopping_leg.arrays import Array, IntArray
 from hopping_leg.identify.checkpoint import load_state, save_state
 from hopping_leg.identify.levels import Levels
 from hopping_leg.identify.parameters import ParameterSet
@@ -54,21 +61,38 @@ class Found:
 
 
 def jacobian(
-    residuals: Residuals, vector: Array, bounds: tuple[Array, Array], step: float
+    residuals: Residuals,
+    vector: Array,
+    bounds: tuple[Array, Array],
+    step: float,
+    groups: IntArray | None = None,
 ) -> Array:
-    """Return d residuals / d vector, (m, k), by differences taken towards the inside.
+    """Return d residuals / d vector, (m, k), by differences.
 
     Args:
         residuals: Function of search vectors.
         vector: Where, (k,).
         bounds: Lower and upper, (k,) each.
         step: Difference in search coordinates.
+        groups: Number of each residual's group, (m,), where groups jump now and then: each takes
+            the smaller of two differences, to either side, or inside one bound at two distances.
+            None takes one, towards the inside.
     """
-    room = np.minimum(step, np.maximum(bounds[1] - vector, vector - bounds[0]))
-    signed = np.where(vector + room <= bounds[1], room, -room)
-    values = residuals(np.concatenate([vector[None], vector + np.diag(signed)]))
-    slopes: Array = ((values[1:] - values[0]) / signed[:, None]).T
-    return slopes
+    low, high = bounds
+    room = np.minimum(step, np.maximum(high - vector, vector - low))
+    near = np.where(vector + room <= high, room, -room)
+    steps = [near]
+    if groups is not None:
+        other = vector - near
+        steps.append(np.where((low <= other) & (other <= high), -near, 0.5 * near))
+    moved = [vector + np.diag(one) for one in steps]
+    values = residuals(np.concatenate([vector[None], *moved]))
+    sides = np.reshape(values[1:] - values[0], (len(steps), len(vector), -1))
+    slopes = sides / np.stack(steps)[..., None]
+    if groups is None:
+        return np.asarray(slopes[0].T)
+    columns = [_calmer(first, second, groups) for first, second in zip(*slopes, strict=True)]
+    return np.stack(columns, axis=1)
 
 
 def least_squares(
@@ -77,6 +101,7 @@ def least_squares(
     options: LeastSquaresOptions | None = None,
     *,
     levels: Levels | None = None,
+    groups: IntArray | None = None,
     start: Array | None = None,
     about: Mapping[str, object] | None = None,
     checkpoint: Path | None = None,
@@ -89,6 +114,7 @@ def least_squares(
         parameters: Bounds and scales.
         options: How.
         levels: Of residuals that no parameters explain; None counts every one in full.
+        groups: Of residuals that jump now and then, as ``jacobian`` takes them.
         start: Search vector to start from, (k,); None takes the parameters' start.
         about: What else tells this search from others, e.g. the recordings' hashes.
         checkpoint: File for the state after each round.
@@ -113,7 +139,7 @@ def least_squares(
         vector, evaluations = np.array(saved["vector"]), int(saved["evaluations"])
         history = list(saved["history"])
     while len(history) < options.rounds and not _settled(history, options.tolerance):
-        problem = _Problem(residuals, (low, high), options.step, levels)
+        problem = _Problem(residuals, (low, high), options.step, levels, groups)
         result = optimize.least_squares(
             problem.values,
             vector,
@@ -149,6 +175,13 @@ def multi_start(
     return sorted((search(i, x) for i, x in enumerate(draws)), key=lambda found: found.cost)
 
 
+def _calmer(first: Array, second: Array, groups: IntArray) -> Array:
+    """Return two columns of slopes joined, (m,): of each group whichever is smaller."""
+    squares = [np.bincount(groups, np.square(column)) for column in (first, second)]
+    chosen: Array = np.where((squares[0] <= squares[1])[groups], first, second)
+    return chosen
+
+
 def _inside(vector: Array, low: Array, high: Array) -> Array:
     """Return the vector off its bounds, near which the trust region would barely move it."""
     margin = np.minimum(_MARGIN, 0.25 * (high - low))
@@ -168,9 +201,15 @@ class _Problem:
     """
 
     def __init__(
-        self, residuals: Residuals, bounds: tuple[Array, Array], step: float, levels: Levels | None
+        self,
+        residuals: Residuals,
+        bounds: tuple[Array, Array],
+        step: float,
+        levels: Levels | None,
+        groups: IntArray | None,
     ) -> None:
-        self._residuals, self._bounds, self._step, self._levels = residuals, bounds, step, levels
+        self._residuals, self._bounds, self._step = residuals, bounds, step
+        self._levels, self._groups = levels, groups
         self._at: Array = np.empty(0)
         self.count = 0
 
@@ -184,7 +223,7 @@ class _Problem:
 
     def slopes(self, vector: Array) -> Array:
         """Return the slopes of what ``values`` returns, (m, k)."""
-        slopes = jacobian(self._counted, vector, self._bounds, self._step)
+        slopes = jacobian(self._counted, vector, self._bounds, self._step, self._groups)
         if self._levels is None:
             return slopes
         still = np.zeros((len(self._levels.sizes), len(vector)))

@@ -57,12 +57,11 @@ class Levels:
         return mean
 
 
-def levels(counts: Sequence[BoolArray], level: float) -> Levels:
-    """Return levels of residuals whose groups are a window's, in one quantity of one joint.
+def grouping(counts: Sequence[BoolArray]) -> IntArray:
+    """Return the number of each residual's group: a window's, in one quantity of one joint.
 
     Args:
         counts: What counts of each quantity, (windows, rows, ...); residuals are in this order.
-        level: Mean squared residual beyond which a group counts ever less.
     """
     parts, first = [], 0
     for mask in counts:
@@ -70,8 +69,17 @@ def levels(counts: Sequence[BoolArray], level: float) -> Levels:
         numbers = first + np.arange(len(mask) * columns).reshape(len(mask), 1, *mask.shape[2:])
         parts.append(np.broadcast_to(numbers, mask.shape)[mask])
         first += len(mask) * columns
-    groups = np.concatenate(parts)
-    return Levels(groups, np.bincount(groups, minlength=first), level)
+    return np.concatenate(parts)
+
+
+def levels(groups: IntArray, level: float) -> Levels:
+    """Return levels of residuals.
+
+    Args:
+        groups: Number of each residual's group, (size,).
+        level: Mean squared residual beyond which a group counts ever less.
+    """
+    return Levels(groups, np.bincount(groups), level)
 
 
 def total_costs(residuals: Array, levels: Levels | None) -> Array:

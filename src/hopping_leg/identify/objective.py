@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from hopping_leg.arrays import Array
+from hopping_leg.arrays import Array, IntArray
 from hopping_leg.identify.cost import Cost, Scoring
 from hopping_leg.identify.levels import Levels, total_costs
 from hopping_leg.identify.parameters import ParameterSet
@@ -52,6 +52,12 @@ class Objective:
     def levels(self) -> Levels | None:
         """What windows that no parameters explain are worth; None counts every one in full."""
         return self.cost.levels
+
+    @property
+    def jumping(self) -> IntArray | None:
+        """Groups of the residuals, (m,), if feet touch down, which makes them jump; else None."""
+        grounded = any(self.recordings[w.recording].setup.rig != "fixed-base" for w in self.windows)
+        return self.cost.groups if grounded else None
 
     def __call__(self, vectors: Array) -> Array:
         """Return the costs of search vectors (n, k), (n,)."""

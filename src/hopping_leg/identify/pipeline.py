@@ -226,7 +226,8 @@ def _conclude(
         )
     step = options.effort.least_squares.step
     residuals = objective.residuals(vector[None])[0]
-    slopes = jacobian(objective.residuals, vector, last.parameters.bounds, step)
+    bounds, jumping = last.parameters.bounds, objective.jumping
+    slopes = jacobian(objective.residuals, vector, bounds, step, jumping)
     if objective.levels is not None:
         weights = objective.levels.weights(residuals)
         residuals, slopes = weights * residuals, weights[:, None] * slopes

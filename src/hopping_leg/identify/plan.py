@@ -13,7 +13,6 @@ from hopping_leg.identify.parameters import ParameterSet, choose
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.states import full_states
 from hopping_leg.identify.two_pass import INERTIAS, pass_names
-from hopping_leg.robot import kinematics
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.robot.parameters import Robot
 
@@ -32,8 +31,6 @@ _OFTEN, _BEYOND = 0.8, 1.5
 """Share of the time, and factor, that tell a torque limit from a spike."""
 _FASTEST, _REACHED = 0.999, 0.8
 """Quantile that leaves spikes out, and share of it that a motor at least reaches by itself."""
-_CLEARANCE = 5e-3
-"""Height of the foot above the ground that only a hop reaches, m."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +88,7 @@ def make_plan(
         raise UsageError(unknown_name("search", search, SEARCHES))
     start = _start(recordings, robot)
     names = parameters or _names(recordings, paper=search in _PAPER)
-    window, unscored = _window(recordings, robot)
+    window, unscored = _window(recordings)
     return Plan(
         start=start,
         parameters=choose(
@@ -227,24 +224,16 @@ def _timestep(recordings: Sequence[Recording]) -> float:
     return _COARSE if rough else TIMESTEP
 
 
-def _window(recordings: Sequence[Recording], robot: Robot) -> tuple[float, float]:
-    """Return window and unscored beginning, s."""
-    if any(_hops(r, robot) for r in recordings):
+def _window(recordings: Sequence[Recording]) -> tuple[float, float]:
+    """Return window and unscored beginning, s.
+
+    On the ground a longer window is rugged: whether and when the foot lifts off or lands decides
+    all that follows, so that a search from far off is caught long before the truth.
+    """
+    if any(r.setup.rig != "fixed-base" for r in recordings):
         return 0.25, 0.0
     if any(r.setup.onboard == "torque" for r in recordings):
         return 0.4, 0.0
     if _open_gains(recordings):
         return 2.0, 0.5
     return 4.0, 1.0
-
-
-def _hops(recording: Recording, robot: Robot) -> bool:
-    """Return whether the foot leaves the ground, or may do so unseen."""
-    if recording.setup.rig == "fixed-base":
-        return False
-    if not recording.has_column("height_m"):
-        return True
-    clearance = recording.trace.column("height_m") - kinematics.stance_height(
-        robot, recording.array("position")
-    )
-    return bool(np.nanmax(clearance, initial=0.0) > _CLEARANCE)

@@ -174,6 +174,7 @@ class Searcher:
                 objective.parameters,
                 options,
                 levels=levels,
+                groups=objective.jumping,
                 start=start,
                 about=about,
                 checkpoint=checkpoint,
