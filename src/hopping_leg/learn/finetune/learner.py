@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from stable_baselines3 import SAC
 from stable_baselines3.common.buffers import ReplayBuffer
-from stable_baselines3.common.logger import configure
+from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.type_aliases import ReplayBufferSamples
 from torch import nn
 
@@ -175,7 +175,7 @@ class _Offline(SAC):  # type: ignore[misc]
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.n_envs, self._actor_share = 1, actor_share
         self._setup_model()
-        self.set_logger(configure(None, []))
+        self.set_logger(Logger(None, []))
 
     def _update_learning_rate(self, optimizers: Any) -> None:  # noqa: ANN401
         super()._update_learning_rate(optimizers)
