@@ -27,9 +27,8 @@ class _Split(nn.Module):
     ) -> None:
         super().__init__()
         self._actor, self._critic = actor, critic
-        of_actor, of_critic = (torch.empty(1, inputs)[:, part].shape[1] for part in (actor, critic))
-        self.policy_net = dense(of_actor, sizes["pi"], activation)
-        self.value_net = dense(of_critic, sizes["vf"], activation)
+        self.policy_net = dense(_width(actor, inputs), sizes["pi"], activation)
+        self.value_net = dense(_width(critic, inputs), sizes["vf"], activation)
         self.latent_dim_pi, self.latent_dim_vf = sizes["pi"][-1], sizes["vf"][-1]
 
     def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
@@ -80,7 +79,7 @@ class _Columns(BaseFeaturesExtractor):  # type: ignore[misc]
     """Passes on some entries of an observation."""
 
     def __init__(self, space: gymnasium.spaces.Box, columns: slice) -> None:
-        super().__init__(space, len(range(space.shape[0])[columns]))
+        super().__init__(space, _width(columns, space.shape[0]))
         self._columns = columns
 
     def forward(self, observation: torch.Tensor) -> torch.Tensor:
@@ -106,6 +105,11 @@ class AsymmetricSACPolicy(SACPolicy):  # type: ignore[misc]
         """Build a pair of critics on the true state."""
         seen = _Columns(self.observation_space, slice(self._actor_size, None))
         return super().make_critic(seen)
+
+
+def _width(part: slice | list[int], inputs: int) -> int:
+    """Return how many of so many entries a part has."""
+    return len(part) if isinstance(part, list) else len(range(inputs)[part])
 
 
 def dense(inputs: int, hidden: list[int], activation: type[nn.Module]) -> nn.Sequential:
