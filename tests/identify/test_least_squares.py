@@ -88,7 +88,8 @@ def test_two_differences_stay_inside_the_bounds_too():
     for start in (low, high, 0.5 * (low + high)):
         seen = []
         jacobian(lambda v, s=seen: s.append(v) or bowl(v), start, (low, high), 1e-3, groups)
-        assert (np.concatenate(seen) >= low).all() and (np.concatenate(seen) <= high).all()
+        assert (np.concatenate(seen) >= low).all()
+        assert (np.concatenate(seen) <= high).all()
 
 
 def test_a_recording_that_the_model_cannot_explain_hardly_moves_the_estimate():

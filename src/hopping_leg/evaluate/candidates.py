@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hopping_leg.control import Controller
-from hopping_leg.control.library import load_controller
+from hopping_leg.control.library import load_controller, shipped_policies
 from hopping_leg.control.policy import Policy
 from hopping_leg.errors import PolicyError, UsageError
 from hopping_leg.robot.parameters import Robot
@@ -38,8 +38,8 @@ def load_candidates(names: Sequence[str], robot: Robot, rate: float) -> list[Can
     Policy files of one recipe that differ in their training seed become a group.
 
     Args:
-        names: Shipped names, ``.onnx`` files, or patterns of such, e.g. ``runs/*/policy.onnx``;
-            ``LABEL=FILE`` gives a file another name in all tables.
+        names: Shipped names, ``.onnx`` files, or patterns of such; ``LABEL=FILE`` gives a file
+            another name in all tables, and those of ``runs/*/policy.onnx`` go by their folders.
         robot: The leg they shall drive.
         rate: Control rate, Hz.
 
@@ -88,6 +88,10 @@ def _expand(entry: str) -> list[str]:
         raise PolicyError(
             f"No policy file matches '{entry}'; quote the pattern and check the path."
         )
+    folders = [Path(path).parent.name for path in found]
+    alike = len({Path(path).name for path in found}) == 1
+    if len(found) > 1 and alike and len(set(folders)) == len(folders):
+        return [f"{folder}={path}" for folder, path in zip(folders, found, strict=True)]
     return found
 
 
@@ -108,7 +112,7 @@ def _grouped(candidates: list[Candidate]) -> list[Candidate]:
     cards = {
         c.label: c.controller.card
         for c in candidates
-        if isinstance(c.controller, Policy) and c.label.endswith(".onnx")
+        if isinstance(c.controller, Policy) and c.label not in shipped_policies()
     }
     names: dict[str, str] = {}
     for recipe in {card.recipe for card in cards.values()}:
