@@ -1,11 +1,13 @@
 """Jobs are done once, and end with their study."""
 
+import contextlib
 import dataclasses
 import os
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -58,7 +60,7 @@ from hopping_leg.evaluate.transfer.work import work
 from tests.evaluate.transfer.test_work import Note
 if __name__ == "__main__":
     with Board(2.0) as board:
-        work([Note(Path(sys.argv[1]) / f"{n}.txt", 20.0) for n in range(2)], 2, board)
+        work([Note(Path(sys.argv[1]) / f"{n}.txt", 300.0) for n in range(2)], 2, board)
 """
 
 
@@ -71,17 +73,26 @@ def test_no_job_outlives_a_killed_study(tmp_path):
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])},
         stderr=subprocess.DEVNULL,
     )
-    time.sleep(15)
-    children = [
-        int(entry.name)
-        for entry in Path("/proc").iterdir()
-        if entry.name.isdigit()
-        and (entry / "stat").exists()
-        and (entry / "stat").read_text().rsplit(")", 1)[1].split()[1] == str(process.pid)
-    ]
-    assert len(children) >= 2
+    _wait(lambda: len(_children(process.pid)) >= 2)
+    children = _children(process.pid)
     process.send_signal(signal.SIGKILL)
     process.wait()
-    time.sleep(8)
-    assert not [child for child in children if Path(f"/proc/{child}/cmdline").exists()]
+    _wait(lambda: not any(Path(f"/proc/{child}/cmdline").exists() for child in children))
     assert not list(tmp_path.glob("*.txt"))
+
+
+def _children(parent: int) -> list[int]:
+    """Return the processes that a process has begun."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            if (entry / "stat").read_text().rsplit(")", 1)[1].split()[1] == str(parent):
+                found.append(int(entry.name))
+    return found
+
+
+def _wait(happened: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 120
+    while not happened():
+        assert time.monotonic() < deadline
+        time.sleep(0.2)
