@@ -54,11 +54,11 @@ def test_a_pattern_becomes_a_group_with_ranges_and_warnings(robot, folder):
 
 
 def test_files_of_one_name_go_by_their_folders(robot, folder):
-    for name in ("seed1", "seed2"):
+    for name in ("seed=1", "seed=2"):
         (folder / name).mkdir()
         (folder / name / "1.onnx").touch()
     found = load_candidates([str(folder / "seed*" / "1.onnx")], robot, 200.0)
-    assert [c.label for c in found] == ["seed1", "seed2"]
+    assert [c.label for c in found] == ["seed=1", "seed=2"]
 
 
 def test_a_file_can_be_given_a_label(robot, folder):

@@ -47,8 +47,8 @@ def load_candidates(names: Sequence[str], robot: Robot, rate: float) -> list[Can
         PolicyError: A file is unreadable, does not fit, or a pattern matches nothing.
         UsageError: There is no such controller.
     """
-    expanded = [name for entry in names for name in _expand(entry)]
-    return _grouped([_load(name, robot, rate) for name in dict.fromkeys(expanded)])
+    expanded = dict.fromkeys(pair for entry in names for pair in _expand(entry))
+    return _grouped([_load(label, source, robot, rate) for label, source in expanded])
 
 
 def check_labels(candidates: Sequence[Candidate]) -> None:
@@ -80,9 +80,11 @@ def check_range(candidate: Candidate, commands: Sequence[float]) -> None:
         )
 
 
-def _expand(entry: str) -> list[str]:
+def _expand(entry: str) -> list[tuple[str, str]]:
+    """Return the label and source of everything that an entry names."""
     if not any(sign in entry for sign in "*?["):
-        return [entry]
+        label, _, source = (entry, "", entry) if Path(entry).exists() else entry.rpartition("=")
+        return [(label or source, source)]
     found = sorted(glob.glob(entry, recursive=True))  # noqa: PTH207
     if not found:
         raise PolicyError(
@@ -91,14 +93,12 @@ def _expand(entry: str) -> list[str]:
     folders = [Path(path).parent.name for path in found]
     alike = len({Path(path).name for path in found}) == 1
     if len(found) > 1 and alike and len(set(folders)) == len(folders):
-        return [f"{folder}={path}" for folder, path in zip(folders, found, strict=True)]
-    return found
+        return list(zip(folders, found, strict=True))
+    return [(path, path) for path in found]
 
 
-def _load(entry: str, robot: Robot, rate: float) -> Candidate:
-    label, _, source = (entry, "", entry) if Path(entry).exists() else entry.rpartition("=")
+def _load(name: str, source: str, robot: Robot, rate: float) -> Candidate:
     controller = load_controller(source, robot, rate=rate, other="accept")
-    name = label or source
     if not isinstance(controller, Policy):
         return Candidate(name, controller)
     card = controller.card

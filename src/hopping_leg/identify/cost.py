@@ -7,7 +7,7 @@ import numpy as np
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.errors import RecordingError, UsageError
 from hopping_leg.identify.candidate import Candidate
-from hopping_leg.identify.levels import grouping, levels, total_costs
+from hopping_leg.identify.levels import Levels, grouping, total_costs
 from hopping_leg.identify.simulate import Simulated, WindowSimulator
 
 _QUANTITIES = ("position", "velocity", "torque", "height")
@@ -74,7 +74,7 @@ class Cost:
         self.groups = grouping(list(self._counts.values()))
         """Number of each residual's window, quantity and joint, (size,)."""
         level = self.scoring.unexplained
-        self.levels = None if level is None else levels(self.groups, level)
+        self.levels = None if level is None else Levels(self.groups, level)
         """What windows that no parameters explain are worth; None counts every one in full."""
 
     def residuals(self, candidates: list[Candidate]) -> Array:

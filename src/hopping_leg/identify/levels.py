@@ -11,6 +11,7 @@ moment; the rest of the cost beside their squares is residuals that no parameter
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -23,13 +24,16 @@ class Levels:
 
     Attributes:
         groups: Number of each residual's group, (size,).
-        sizes: Residuals in each group, (groups,).
         level: Mean squared residual beyond which a group counts ever less.
     """
 
     groups: IntArray
-    sizes: IntArray
     level: float
+
+    @cached_property
+    def sizes(self) -> IntArray:
+        """Residuals in each group, (groups,)."""
+        return np.bincount(self.groups)
 
     def weights(self, residuals: Array) -> Array:
         """Return factors of one candidate's residuals at its own levels, (size,)."""
@@ -70,16 +74,6 @@ def grouping(counts: Sequence[BoolArray]) -> IntArray:
         parts.append(np.broadcast_to(numbers, mask.shape)[mask])
         first += len(mask) * columns
     return np.concatenate(parts)
-
-
-def levels(groups: IntArray, level: float) -> Levels:
-    """Return levels of residuals.
-
-    Args:
-        groups: Number of each residual's group, (size,).
-        level: Mean squared residual beyond which a group counts ever less.
-    """
-    return Levels(groups, np.bincount(groups), level)
 
 
 def total_costs(residuals: Array, levels: Levels | None) -> Array:
