@@ -53,13 +53,13 @@ results: $(STAMP)
 	$(BIN)/hop evaluate fast paper energy-shaping energy-shaping-literal --seeds 10 --no-video \
 	  --json docs/results/evaluation.json --traces runs/results/traces
 	$(BIN)/hop plot runs/results/traces/*.parquet --out docs/results/figures
-	$(BIN)/hop evaluate precise adaptive energy-shaping --seeds 5 --floor soft --no-video --json docs/results/precise.json \
+	$(BIN)/hop evaluate precise adaptive recurrent energy-shaping --seeds 5 --floor soft --no-video --json docs/results/precise.json \
 	  --commands 0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40
-	$(BIN)/hop evaluate energy-shaping energy-shaping-literal fast precise adaptive paper --suite robustness --seeds 3 \
+	$(BIN)/hop evaluate energy-shaping energy-shaping-literal fast precise adaptive recurrent paper --suite robustness --seeds 3 \
 	  --out runs/results/robustness --json docs/results/robustness.json
 	cp runs/results/robustness/robustness.svg docs/results
-	$(BIN)/hop evaluate fast paper energy-shaping --suite skills --json docs/results/skills.json
-	$(BIN)/hop bench probe fast paper --figure docs/results/probe.svg --json docs/results/probe.json
+	$(BIN)/hop evaluate fast precise adaptive paper energy-shaping --suite skills --json docs/results/skills.json
+	$(BIN)/hop bench probe fast precise adaptive recurrent paper --figure docs/results/probe.svg --json docs/results/probe.json
 	$(BIN)/hop bench env --json docs/results/env.json
 	$(BIN)/hop bench inference --json docs/results/inference.json
 	$(BIN)/hop bench convergence --json docs/results/convergence.json
@@ -71,13 +71,16 @@ results: $(STAMP)
 	  --json docs/results/precise-seeds.json \
 	  --commands 0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40
 	$(BIN)/hop train --recipe precise --observation three-samples --out runs/fifteen
-	$(BIN)/hop evaluate fifteen=runs/fifteen/policy.onnx --seeds 5 --floor soft --no-video --json docs/results/fifteen.json
+	$(BIN)/hop train --recipe recurrent --observation three-samples --out runs/fifteen-recurrent
+	$(BIN)/hop evaluate fifteen=runs/fifteen/policy.onnx fifteen-recurrent=runs/fifteen-recurrent/policy.onnx \
+	  --seeds 5 --floor soft --no-video --json docs/results/fifteen.json
 	$(BIN)/hop bench ablation --json docs/results/ablation.json
+	$(BIN)/hop bench ablation --recipe precise --steps 4500000 --threads 1 --json docs/results/ablation-precise.json
 	$(BIN)/hop excite multisine --robot legv2 --centre 0.7 -1.4 --amplitude 0.3 0.4 --out runs/results/multisine.parquet
 	$(BIN)/hop record runs/results/multisine.parquet --robot twin --believed legv2 --out runs/results
 	$(BIN)/hop identify runs/results/twin-multisine.parquet --out runs/results/identified.toml --json docs/results/identify.json
 	$(BIN)/hop bench identify --json docs/results/bench_identify.json
-	$(BIN)/hop experiment transfer --recipe precise --methods identified cad --json docs/results/transfer.json
+	$(BIN)/hop experiment transfer --recipe adaptive --methods identified cad table-1 randomised --json docs/results/transfer.json
 	$(BIN)/hop bench finetune --figure docs/results/finetune.svg --json docs/results/finetune.json
 	$(BIN)/hop bench view --json docs/results/view.json
 	$(BIN)/hop bench deploy --json docs/results/deploy.json

@@ -36,6 +36,9 @@ def test_one_folder_receives_numbers_report_and_traces(spring, tmp_path, capsys)
     figures = tmp_path / "figures"
     assert main(["plot", *map(str, traces), "--out", str(figures), "--format", "png"]) == 0
     assert {"heights.png", "ladder.png"} <= {path.name for path in figures.iterdir()}
+    ladder = str(traces[1])
+    assert main(["plot", ladder, "--out", str(figures), "--animation", "gif"]) == 2
+    assert "No trace of spring holds one command throughout" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ def test_it_goes_from_a_twin_to_a_judged_policy(calls, tmp_path, capsys):
     [judged] = calls["evaluate"]
     policy, *others = judged.controllers
     assert policy.endswith("identified-seed3/policy.onnx")
-    assert others == ["adaptive", "fast", "paper", "precise", "energy-shaping"]
+    assert others == ["adaptive", "fast", "paper", "precise", "recurrent", "energy-shaping"]
     assert judged.robot.endswith("identified.toml")
     assert judged.out == tmp_path
     assert judged.seed != 3

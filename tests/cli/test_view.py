@@ -23,6 +23,7 @@ pytest.importorskip("viser", reason="the extra 'view' is not installed")
         (["--trace", "a.parquet", "--box", "runs"], "exclude each other"),
         (["--port", "70000"], "between 0 and 65535"),
         (["--host", "no.such.host.invalid"], "cannot be served"),
+        (["--detail", "0"], "--detail is 0 but must lie above 0"),
     ],
 )
 def test_a_bad_wish_gets_a_sentence(arguments, sentence, capsys):

@@ -7,6 +7,7 @@ import onnxruntime
 import pytest
 
 from hopping_leg.control.library import load_policy
+from hopping_leg.control.policy import Policy
 from hopping_leg.errors import PolicyError
 from hopping_leg.learn.export import Network, build_policy
 from hopping_leg.learn.hidden import expose_hidden
@@ -60,11 +61,21 @@ def test_a_network_without_hidden_layers_is_refused():
         expose_hidden(build_policy(network, POLICY.card))
 
 
-def test_a_policy_that_remembers_is_refused():
+def remembering():
     card = dataclasses.replace(POLICY.card, layout="three-samples")
     rng = np.random.default_rng(0)
     unit = RecurrentUnit(*(rng.normal(size=shape) for shape in ((12, 15), (12, 4), 12, 12)))
     layers = [(rng.normal(size=(2, 4)), np.zeros(2))]
     network = Network(np.zeros(15), np.ones(15), layers, "tanh", "clip", memory=unit)
-    with pytest.raises(PolicyError, match="without a memory"):
-        expose_hidden(build_policy(network, card))
+    return Policy(build_policy(network, card), "here", "remembering")
+
+
+def test_a_policy_that_remembers_needs_no_hidden_layer_and_is_shuffled_whole():
+    policy = remembering()
+    rng = np.random.default_rng(1)
+    feeds = {n: rng.normal(size=(3, *s)).astype(np.float32) for n, s in policy.inputs.items()}
+    feeds["memory"] = rng.normal(size=(3, 4)).astype(np.float32)
+    plain = outputs(policy.content, feeds)
+    own, mixed = (outputs(expose_hidden(policy.content, seed), feeds) for seed in (None, 1))
+    np.testing.assert_array_equal(own["next_memory"], plain["next_memory"])
+    assert np.abs(own["next_memory"] - mixed["next_memory"]).max() > 0.01

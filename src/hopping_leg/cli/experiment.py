@@ -42,7 +42,7 @@ class Experiment:
     seeds: tuple[int, ...] = (0,)
     """Of the trainings, one of each method and twin each."""
     recipe: str = Study.recipe
-    """By which policies are trained: fast, precise or paper."""
+    """By which policies are trained, as in `hop train`."""
     steps: int = Study.steps
     """Control steps of experience of a training."""
     seconds: float = 60.0

@@ -8,8 +8,10 @@ Examples:
   hop plot runs/first/traces/fast-staircase-0.parquet
   hop plot runs/first/traces/*-fixed-*.parquet --format png
   hop plot runs/first/traces/*.parquet --format pdf --width column
+  hop plot runs/first/traces/*-fixed-*.parquet --animation gif
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +22,10 @@ from hopping_leg.deploy.black_box import SUFFIX, recover
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.figures.paper import Format, Width, encode
 from hopping_leg.evaluate.gallery import draw_gallery, run_of
+from hopping_leg.evaluate.runs import Run, safe_name
 from hopping_leg.evaluate.tables import tabulate
+from hopping_leg.evaluate.video import Animation, fixed_traces, render_video
+from hopping_leg.robot import load_robot
 from hopping_leg.trace import write_atomically
 
 
@@ -37,6 +42,9 @@ class Plot:
     """Kind of file."""
     width: Width = "screen"
     """What a figure shall fill: a screen, or a column (3.5 in) or page (7.16 in) of a paper."""
+    animation: Animation | None = None
+    """Also render a hop at each command, side by side at half speed, one file per controller; needs
+    OpenGL and traces of a shipped robot."""
 
 
 def run(args: Plot) -> None:
@@ -51,6 +59,25 @@ def run(args: Plot) -> None:
         path = args.out / f"{picture.name}.{args.format}"
         write_atomically(path, encode(picture.figure, args.format, args.width))
         console.print(f"{picture.title}: {path}", highlight=False)
+    if args.animation is not None:
+        for name in controllers:
+            path = args.out / f"hops-{safe_name(name)}.{args.animation}"
+            write_atomically(path, _animation(runs, name, args.animation))
+            console.print(f"Hops of {name}: {path}", highlight=False)
+
+
+def _animation(runs: Sequence[Run], controller: str, kind: Animation) -> bytes:
+    traces = fixed_traces(runs, controller)
+    if not traces:
+        raise UsageError(
+            f"No trace of {controller} holds one command throughout, which an animation needs; name"
+            " some of its 'fixed' ones."
+        )
+    robot = load_robot(str(next(iter(traces.values())).header.get("robot", "")))
+    video = render_video(robot, traces, kind)
+    if video.content is None:
+        raise UsageError(f"The hops of {controller} cannot be rendered: {video.reason}.")
+    return video.content
 
 
 def _trace(path: Path) -> Path:

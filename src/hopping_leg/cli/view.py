@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from hopping_leg.view.source import Source
 
 _ROBOT = "legv2-paper"
+_MOST_DETAIL = 4.0
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,9 @@ class View:
     """Address of this computer to serve at; 0.0.0.0 lets everyone in the network look and steer."""
     port: int = 8080
     """To serve at; a taken one gives the next that is free."""
+    detail: float | None = None
+    """Pixels drawn per pixel of the screen, each way; default: so few that the motion stays smooth
+    where this computer has no GPU, else as many as the browser keeps up with."""
     browser: bool = True
     """Open the page, where there is a screen."""
     seconds: float = float("inf")
@@ -60,10 +64,22 @@ class View:
 
 def run(args: View) -> None:
     """Serve the page until Ctrl-C."""
+    if args.detail is not None and not 0 < args.detail <= _MOST_DETAIL:
+        raise UsageError(
+            f"--detail is {args.detail:g} but must lie above 0 and be at most {_MOST_DETAIL:g};"
+            " 1 draws every pixel of the screen."
+        )
     source = _source(args)
+    from hopping_leg.view import graphics
     from hopping_leg.view.viewer import Viewer
 
-    viewer = Viewer(source, args.robot or _ROBOT, host=args.host, port=args.port)
+    viewer = Viewer(
+        source,
+        args.robot or _ROBOT,
+        host=args.host,
+        port=args.port,
+        detail=graphics.detail() if args.detail is None else args.detail,
+    )
     console = Console()
     console.print(f"Open {viewer.address} in a browser; Ctrl-C stops.", highlight=False)
     if args.browser and _has_screen():

@@ -1,89 +1,22 @@
-"""What each part of the fast recipe is worth: the recipe with one part taken away at a time."""
+"""What each part of a recipe is worth: the recipe with one part taken away at a time."""
 
 import functools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.evaluate.bench_training import bench_training
 from hopping_leg.evaluate.runner import software_versions
-from hopping_leg.learn.fast import FastRecipe
+from hopping_leg.learn.ablations import ABLATIONS
 from hopping_leg.robot.parameters import Robot
 
 
-@dataclass(frozen=True)
-class Ablation:
-    """A variant of the recipe.
-
-    Attributes:
-        name: Of its folder.
-        meaning: What is different, in words.
-        recipe: The variant.
-    """
-
-    name: str
-    meaning: str
-    recipe: FastRecipe
-
-
-def ablations(base: FastRecipe) -> list[Ablation]:
-    """Return the recipe and its variants, each with one change."""
-    task, reward = base.task, base.reward
-    first, last = base.log_std
-    return [
-        Ablation("recipe", "the recipe", base),
-        Ablation(
-            "three-samples",
-            "the paper's three samples, which do not tell their age",
-            replace(base, task=replace(task, observation="three-samples")),
-        ),
-        Ablation(
-            "cheap-jerk",
-            "a third of the price for jerky actions, the paper's",
-            replace(base, reward=replace(reward, jerk=0.05)),
-        ),
-        Ablation(
-            "white-noise",
-            "white exploration noise of the same size instead of gSDE",
-            replace(base, noise_hold=0, log_std=(first + _LATENT, last + _LATENT)),
-        ),
-        Ablation(
-            "blind-critic",
-            "critic on the actor's observation",
-            replace(base, privileged_critic=False),
-        ),
-        Ablation(
-            "no-event", "no reward at the apex", replace(base, reward=replace(reward, apex=0))
-        ),
-        Ablation(
-            "no-patience",
-            "the apex pays alike however soon it follows the last",
-            replace(base, reward=replace(reward, full_period=1e-9)),
-        ),
-        Ablation(
-            "no-prediction",
-            "no predicted apex in flight",
-            replace(base, reward=replace(reward, predicted=0)),
-        ),
-        Ablation(
-            "standing-starts",
-            "every episode starts standing",
-            replace(base, task=replace(task, start="standing")),
-        ),
-        Ablation(
-            "coarse-physics",
-            "physics at 2.5 ms in training",
-            replace(base, task=replace(task, timestep=2.5e-3)),
-        ),
-    ]
-
-
-_LATENT = 1.6
-"""Log norm of the actor's last layer early in training: gSDE's noise over its weights' noise."""
-
-
 def bench_ablation(
+    recipe: str,
     robot: Robot,
     out: Path,
     *,
@@ -96,6 +29,7 @@ def bench_ablation(
     """Train all variants for the same number of steps and judge them.
 
     Args:
+        recipe: Name of the recipe.
         robot: The leg.
         out: Folder of the runs.
         steps: Control steps of experience of each.
@@ -103,12 +37,16 @@ def bench_ablation(
         evaluation_seeds: Realisations of noise and delay per command.
         threads: Of torch and physics.
         on_progress: Called with a sentence on what begins.
+
+    Raises:
+        UsageError: There are no ablations of the recipe.
     """
-    base = replace(FastRecipe(), steps=steps, judge_every=max(1, steps // 5))
+    if recipe not in ABLATIONS:
+        raise UsageError(unknown_name("recipe with ablations", recipe, ABLATIONS))
     rows = []
-    for ablation in ablations(base):
+    for ablation in ABLATIONS[recipe]():
         result = bench_training(
-            ablation.recipe,
+            replace(ablation.recipe, steps=steps, judge_every=max(1, steps // 5)),
             robot,
             out / ablation.name,
             training_seeds=training_seeds,
@@ -120,14 +58,41 @@ def bench_ablation(
             {"variant": ablation.name, "meaning": ablation.meaning, **row} for row in result["rows"]
         ]
     return {
+        "recipe": recipe,
         "robot": robot.name,
         "steps": steps,
         "threads": threads,
         "evaluation_seeds": evaluation_seeds,
         "rows": rows,
+        "variants": _variants(rows),
         "versions": software_versions(),
     }
 
 
 def _named(on_progress: Callable[[str], None], name: str, note: str) -> None:
     on_progress(f"{name}: {note}")
+
+
+def _variants(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return what each training of each variant comes to over the commands.
+
+    Errors and scatter are null where a policy does not hop at some command.
+    """
+    found = []
+    for variant, seed in dict.fromkeys((row["variant"], row["seed"]) for row in rows):
+        mine = [row for row in rows if (row["variant"], row["seed"]) == (variant, seed)]
+        errors = [row["median_error_m"] for row in mine]
+        hops = all(error is not None for error in errors)
+        found.append(
+            {
+                "variant": variant,
+                "meaning": mine[0]["meaning"],
+                "seed": seed,
+                "minutes": mine[0]["minutes"],
+                "worst_abs_median_error_m": float(np.abs(errors).max()) if hops else None,
+                "mean_abs_median_error_m": float(np.abs(errors).mean()) if hops else None,
+                "std_m": float(np.mean([row["std_m"] for row in mine])) if hops else None,
+                **{n: sum(row[n] for row in mine) for n in ("skipped_hops", "body_contacts")},
+            }
+        )
+    return found

@@ -78,7 +78,7 @@ class EnginesStudy:
     """What is compared."""
 
     robot: Robot
-    controllers: Sequence[str] = ("energy-shaping", "fast", "precise", "paper")
+    controllers: Sequence[str]
     """Names or policy files."""
     rated: str = "energy-shaping"
     """Controller that tries the rates."""

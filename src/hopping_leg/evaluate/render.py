@@ -1,10 +1,11 @@
-"""Render poses to an animated WebP: ``python -m hopping_leg.evaluate.render XML NPY OUT M...``.
+"""Render poses to an animation: ``python -m hopping_leg.evaluate.render XML NPY OUT M...``.
 
 Runs as its own process, because the OpenGL backend is fixed when MuJoCo is imported.
 """
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -16,6 +17,12 @@ from hopping_leg.evaluate.video import FRAME_RATE, SLOWDOWN
 SIZE = (220, 300)
 """Width and height of one command's picture, pixels."""
 
+_ENCODING: dict[str, dict[str, Any]] = {
+    ".webp": {"quality": 60, "method": 4},
+    ".gif": {"optimize": True},
+}
+"""By the file's ending."""
+
 _COMMAND_RGBA = np.array([0.84, 0.37, 0.0, 0.8], dtype=np.float32)
 
 
@@ -25,15 +32,14 @@ def main(arguments: list[str]) -> None:
     poses = np.load(arguments[1], allow_pickle=False)
     commands = [float(text) for text in arguments[3:]]
     frames = render(model, poses, commands)
+    out = Path(arguments[2])
     frames[0].save(
-        Path(arguments[2]),
-        format="WEBP",
+        out,
         save_all=True,
         append_images=frames[1:],
         duration=round(1000 * SLOWDOWN / FRAME_RATE),
         loop=0,
-        quality=60,
-        method=4,
+        **_ENCODING[out.suffix],
     )
 
 

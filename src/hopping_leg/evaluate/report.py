@@ -1,7 +1,6 @@
 """The report: one HTML page that holds everything and needs nothing."""
 
 import base64
-from collections.abc import Sequence
 from importlib import resources
 from typing import Any
 
@@ -13,10 +12,8 @@ from hopping_leg.evaluate.figures import to_svg
 from hopping_leg.evaluate.gallery import Picture, draw_gallery
 from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.evaluate.runner import Judged
-from hopping_leg.evaluate.runs import Run
-from hopping_leg.evaluate.video import Video, render_video
+from hopping_leg.evaluate.video import Video, fixed_traces, render_video
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.trace import Trace
 
 _NO_VIDEO = Video(None, "it was not asked for")
 
@@ -54,17 +51,9 @@ def render_videos(judged: Judged, robot: Robot) -> dict[str, Video]:
     videos: dict[str, Video] = {}
     for name in judged.evaluation.controllers:
         failed = next((video for video in videos.values() if video.content is None), None)
-        traces = _fixed_traces(judged.runs, name)
+        traces = fixed_traces(judged.runs, name)
         videos[name] = failed or (render_video(robot, traces) if traces else _NO_VIDEO)
     return videos
-
-
-def _fixed_traces(runs: Sequence[Run], name: str) -> dict[float, Trace]:
-    return {
-        run.trial.steps[0][0]: run.trace
-        for run in runs
-        if run.controller == name and run.trial.kind == "fixed" and run.repeat == 0
-    }
 
 
 def _subtitle(evaluation: Evaluation) -> str:

@@ -41,8 +41,12 @@ class Run:
     @property
     def file_name(self) -> str:
         """Name of the run's trace file, unique within an evaluation."""
-        safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in self.controller)
-        return f"{safe}-{self.trial.name}-{self.repeat}.parquet"
+        return f"{safe_name(self.controller)}-{self.trial.name}-{self.repeat}.parquet"
+
+
+def safe_name(controller: str) -> str:
+    """Return a controller's name as part of a file's."""
+    return "".join(c if c.isalnum() or c in "-_." else "_" for c in controller)
 
 
 def floor_robot(robot: Robot, floor: str) -> Robot:

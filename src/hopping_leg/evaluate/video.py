@@ -7,17 +7,22 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.evaluate.metrics import START_SECONDS
+from hopping_leg.evaluate.runs import Run
 from hopping_leg.hops import find_hops
 from hopping_leg.robot import Robot, get_spec
 from hopping_leg.trace import Trace
+
+Animation = Literal["webp", "gif"]
+"""Kinds of files that move."""
 
 BACKENDS = ("egl", "osmesa")
 """Ways to OpenGL without a screen, in the order of trying."""
@@ -33,7 +38,7 @@ TIMEOUT = 120.0
 
 @dataclass(frozen=True)
 class Video:
-    """An animated WebP, or the reason why there is none.
+    """An animation, or the reason why there is none.
 
     Attributes:
         content: The file, or None.
@@ -44,17 +49,27 @@ class Video:
     reason: str = ""
 
 
-def render_video(robot: Robot, traces: Mapping[float, Trace]) -> Video:
+def fixed_traces(runs: Sequence[Run], controller: str) -> dict[float, Trace]:
+    """Return a controller's first run at each command, m."""
+    return {
+        run.trial.steps[0][0]: run.trace
+        for run in runs
+        if run.controller == controller and run.trial.kind == "fixed" and run.repeat == 0
+    }
+
+
+def render_video(robot: Robot, traces: Mapping[float, Trace], kind: Animation = "webp") -> Video:
     """Render a hop at every command side by side, at half speed.
 
     Args:
         robot: The leg.
         traces: Command in m to a run at it.
+        kind: Of the file.
     """
     commands = list(traces)
     poses = np.stack([clip(trace) for trace in traces.values()])
     with tempfile.TemporaryDirectory() as folder:
-        model, motion, out = (Path(folder) / n for n in ("leg.xml", "poses.npy", "hops.webp"))
+        model, motion, out = (Path(folder) / n for n in ("leg.xml", "poses.npy", f"hops.{kind}"))
         spec = get_spec(robot)
         spec.compile()
         model.write_text(spec.to_xml(), encoding="utf-8")

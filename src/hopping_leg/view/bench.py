@@ -24,6 +24,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.timing import host
 from hopping_leg.trace import write_atomically
+from hopping_leg.view import graphics
 from hopping_leg.view.browser import (
     SIZE,
     SMALL_SIZE,
@@ -110,7 +111,7 @@ def bench_view(
         tell("starting `hop view` as a user does")
         start = _start_seconds(browser, benchmark)
         live = _Noting(benchmark.controllers, benchmark.robot, 0.30)
-        viewer = Viewer(live, benchmark.robot, port=0)
+        viewer = Viewer(live, benchmark.robot, port=0, detail=graphics.detail())
         with running(viewer):
             page = new_page(browser)
             received: list[float] = []
@@ -142,6 +143,7 @@ def bench_view(
             "seconds": benchmark.seconds,
             "commands": benchmark.commands,
             "intended_pictures_per_s": PICTURES,
+            "detail": graphics.detail(),
             "browser": name,
             "viser": version("viser"),
         },

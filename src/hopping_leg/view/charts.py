@@ -30,18 +30,26 @@ class Charts:
         self._server, self._panel = server, panel
         self._tracks: list[Track] = []
         self._plots: list[Any] = []
+        self._curves: list[tuple[Array, ...]] = []
 
-    def show(self, tracks: list[Track], now: float) -> None:
-        """Draw the seconds before ``now``, s; other legs than before get curves of their own."""
-        shown = [track.sample(now + _GRID) for track in tracks]
-        curves = _curves(tracks, shown)
+    def show(self, tracks: list[Track], now: float, turn: int) -> None:
+        """Draw the seconds before ``now``, s; other legs than before get curves of their own.
+
+        A browser without a GPU misses a frame if all plots change in one.
+
+        Args:
+            tracks: Of the legs.
+            now: Time, s.
+            turn: Number of the plot that is drawn; none if there are fewer. The first turn takes
+                the data for all.
+        """
+        if turn == 0 or tracks is not self._tracks:
+            self._curves = _curves(tracks, [track.sample(now + _GRID) for track in tracks])
         if tracks is not self._tracks:
             self._tracks = tracks
-            self._build(tracks, curves)
-            return
-        with self._server.atomic():
-            for plot, data in zip(self._plots, curves, strict=True):
-                plot.data = data
+            self._build(tracks, self._curves)
+        elif turn < len(self._plots):
+            self._plots[turn].data = self._curves[turn]
 
     def _build(self, tracks: list[Track], curves: list[tuple[Array, ...]]) -> None:
         for plot in self._plots:

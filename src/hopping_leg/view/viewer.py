@@ -27,7 +27,7 @@ PICTURES = 60.0
 """Per second."""
 
 _SLOW = 6
-"""Pictures per update of plots and text."""
+"""Pictures per update of each plot and of the text; they take turns."""
 
 _NOTICE_SECONDS = 8.0
 _APEX_SECONDS = 3.0
@@ -46,18 +46,28 @@ class Viewer:
         robot: Name or file that a live simulation was started with.
         host: Address of this computer to listen at.
         port: To listen at; a taken one gives the next that is free.
+        detail: Pixels that the page draws per pixel of the screen, each way; None lets it draw as
+            many as it keeps up with, down to three quarters.
 
     Raises:
         UsageError: The page cannot be served there.
     """
 
     def __init__(
-        self, source: Source, robot: str = "", *, host: str = "127.0.0.1", port: int = 8080
+        self,
+        source: Source,
+        robot: str = "",
+        *,
+        host: str = "127.0.0.1",
+        port: int = 8080,
+        detail: float | None = None,
     ) -> None:
         self._source = source
         self._server = _serve(host, port)
         reached_at = "localhost" if host == "0.0.0.0" else host
         self.address = f"http://{reached_at}:{self._server.get_port()}"
+        if detail is not None:
+            self.address += f"/?fixedDpr={detail:g}"
         self.pace = Pace(1 / CONTROL_RATE)
         self._inbox = Inbox()
         gui = self._server.gui
@@ -97,9 +107,10 @@ class Viewer:
         """Show what is now; plots and text every few pictures."""
         source = self._source
         self._scene.show(source.tracks, source.now)
-        if self.pictures % _SLOW == 0:
+        turn = self.pictures % _SLOW
+        self._charts.show(source.tracks, source.now, turn)
+        if turn == _SLOW - 1:
             self._scene.mark(source.now)
-            self._charts.show(source.tracks, source.now)
             self._status.content = self._text()
             if self._replay_panel is not None and not self.pace.paused:
                 self._replay_panel.show()

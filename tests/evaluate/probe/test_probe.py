@@ -10,7 +10,7 @@ from hopping_leg.control import Setup, roll_out
 from hopping_leg.control.library import load_policy
 from hopping_leg.control.phases import Phase
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.probe.exposed import Exposed
+from hopping_leg.evaluate.probe.exposed import Exposed, record
 from hopping_leg.evaluate.probe.fitting import interval, probe
 from hopping_leg.evaluate.probe.study import Study
 from hopping_leg.evaluate.probe.targets import TARGETS
@@ -107,3 +107,19 @@ def test_command_line_probes_a_policy(tmp_path, capsys):
     assert figure.read_bytes().startswith(b"<?xml")
     assert main(["bench", "probe", "fast", "--commands", "0.9"]) == 2
     assert "trained for" in capsys.readouterr().err
+
+
+def test_what_a_policy_remembers_is_kept_and_shuffled_alike(robot):
+    policy = load_policy("adaptive")
+    graphs = {"": expose_hidden(policy.content), ", shuffled": expose_hidden(policy.content, 1)}
+    commands = np.full((600, 2), 0.3)
+    recording = record(policy, graphs, Setup(robot, threads=1), commands, 1)
+    aims = recording.features["memory"]
+    assert aims.shape == (200, 2, 3)
+    assert np.abs(np.diff(aims[..., :2], axis=0)).max() > 0
+    shown = {name: values.shape for name, values in recording.features.items()}
+    assert {n: shown[f"{n}, shuffled"] for n in shown if f"{n}, shuffled" in shown} == {
+        name: shape
+        for name, shape in shown.items()
+        if name != "observation" and not name.endswith("shuffled")
+    }

@@ -110,8 +110,10 @@ class Training:
 
 @dataclass(frozen=True)
 class Ablation:
-    """Train the fast recipe with one part taken away at a time."""
+    """Train a recipe with one part taken away at a time."""
 
+    recipe: str = "fast"
+    """`fast` or `precise`."""
     steps: int = 2_000_000
     """Control steps of experience of each variant."""
     robot: str = "legv2-paper"
@@ -134,6 +136,7 @@ class Ablation:
         at_least(1, steps=self.steps, evaluation_seeds=self.evaluation_seeds, threads=self.threads)
         console = Console()
         result = bench_ablation(
+            self.recipe,
             load_robot(self.robot),
             self.out,
             steps=self.steps,
@@ -142,9 +145,14 @@ class Ablation:
             threads=self.threads,
             on_progress=console.print,
         )
-        table = Table("variant", "seed", "command, m", "median error, mm", "std, mm", "skipped")
-        for row in result["rows"]:
-            table.add_row(row["meaning"], *_hops(row))
+        table = Table(
+            "variant", "seed", "mean error, mm", "worst, mm", "std, mm", "skipped", "contacts"
+        )
+        for row in result["variants"]:
+            names = ("mean_abs_median_error_m", "worst_abs_median_error_m", "std_m")
+            numbers = [mm(row[name]) for name in names]
+            counts = [str(row[name]) for name in ("skipped_hops", "body_contacts")]
+            table.add_row(row["meaning"], str(row["seed"]), *numbers, *counts)
         console.print(table)
         return result
 

@@ -18,7 +18,14 @@ from hopping_leg.robot.model import TIMESTEP
 class Engines:
     """Let controllers hop in PyBullet as well, without retraining; needs the extra `bullet`."""
 
-    controllers: tuple[str, ...] = ("energy-shaping", "fast", "precise", "paper")
+    controllers: tuple[str, ...] = (
+        "energy-shaping",
+        "fast",
+        "precise",
+        "adaptive",
+        "recurrent",
+        "paper",
+    )
     """Names or .onnx files."""
     robot: str = "legv2-paper"
     """A shipped name or the path of a .toml file."""

@@ -1,15 +1,19 @@
 """What can be read off a policy's observation and hidden layers."""
 
+import math
 from typing import Any
 
 from matplotlib.figure import Figure
 
 from hopping_leg.evaluate.figures.style import COLOURS, WIDTH, styled
 
+_ACROSS = 2
+"""Panels side by side."""
+
 
 @styled
 def draw_probe(result: dict[str, Any]) -> Figure:
-    """Draw the scores of all targets, a panel per policy.
+    """Draw the scores of all targets, a panel per policy, two side by side.
 
     Args:
         result: As ``hop bench probe`` writes it.
@@ -17,9 +21,14 @@ def draw_probe(result: dict[str, Any]) -> Figure:
     rows = result["rows"]
     controllers = list(dict.fromkeys(row["controller"] for row in rows))
     targets = list(dict.fromkeys(row["target"] for row in rows))
-    figure = Figure(figsize=(WIDTH, 0.9 + 0.42 * len(targets) * 1.2), layout="constrained")
-    axes = figure.subplots(1, len(controllers), sharex=True, sharey=True, squeeze=False)[0]
-    for panel, controller in zip(axes, controllers, strict=True):
+    across = min(len(controllers), _ACROSS)
+    down = math.ceil(len(controllers) / across)
+    height = 0.9 + 0.42 * len(targets) * 1.2
+    figure = Figure(figsize=(WIDTH, down * height), layout="constrained")
+    grid = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False)
+    for unused in grid.flat[len(controllers) :]:
+        unused.set_visible(False)
+    for panel, controller in zip(grid.flat, controllers, strict=False):
         own = [row for row in rows if row["controller"] == controller]
         features = list(dict.fromkeys(row["features"] for row in own))
         step = 0.8 / len(features)
@@ -49,7 +58,8 @@ def draw_probe(result: dict[str, Any]) -> Figure:
         panel.set_title(controller)
         panel.set_xlim(-0.02, 1.02)
         panel.set_xlabel("R² or balanced accuracy on other legs")
-        panel.legend(loc="lower left")
-    axes[0].set_yticks(range(len(targets)), targets)
-    axes[0].set_ylim(len(targets) - 0.5, -0.5)
+        panel.tick_params(labelbottom=True)
+        panel.legend(loc="best")
+    grid[0, 0].set_yticks(range(len(targets)), targets)
+    grid[0, 0].set_ylim(len(targets) - 0.5, -0.5)
     return figure

@@ -4,17 +4,21 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import onnxruntime
 
 from hopping_leg.arrays import Array
 from hopping_leg.control import Setup, roll_out
 from hopping_leg.control.layouts import Inputs, make_layout
-from hopping_leg.control.policy import Policy
+from hopping_leg.control.policy import MEMORY, NEXT_MEMORY, Policy
 from hopping_leg.control.protocol import Measurement
 from hopping_leg.evaluate.metrics import START_SECONDS
 
 OBSERVATION = "observation"
 """Name of what the network sees."""
+
+REMEMBERED = "memory"
+"""Name of what it remembers after a tick."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,33 @@ class Recording:
     rate: float
 
 
+class Graph:
+    """A policy's graph, run tick by tick with a memory of its own.
+
+    Args:
+        content: With hidden layers as outputs, see ``learn.hidden``.
+    """
+
+    def __init__(self, content: bytes) -> None:
+        self._session = _open(content)
+        self._outputs = [output.name for output in self._session.get_outputs()]
+        shapes = {i.name: i.shape for i in self._session.get_inputs()}
+        self._size = shapes[MEMORY][1] if MEMORY in shapes else 0
+
+    def reset(self, count: int) -> None:
+        """Forget everything; n is ``count`` from now on."""
+        self._memory = np.zeros((count, self._size), np.float32)
+
+    def run(self, inputs: Inputs) -> dict[str, npt.NDArray[np.float32]]:
+        """Return the torque, N m, what is remembered, and every hidden layer, (n, size) each."""
+        fed = {**inputs, MEMORY: self._memory} if self._size else inputs
+        given = dict(zip(self._outputs, self._session.run(None, fed), strict=True))
+        if self._size:
+            self._memory = given.pop(NEXT_MEMORY)
+            given[REMEMBERED] = self._memory
+        return given
+
+
 class Exposed:
     """Acts as a policy does; implements ``Controller``.
 
@@ -43,12 +74,13 @@ class Exposed:
     def __init__(self, policy: Policy, graph: bytes) -> None:
         self.name, self._policy = policy.name, policy
         self._layout = make_layout(policy.card.layout, 1 / policy.card.rate)
-        self._session = open_graph(graph)
+        self._graph = Graph(graph)
         self.seen: list[Inputs] = []
 
     def reset(self, count: int) -> None:
         """Forget everything."""
         self._layout.reset(count)
+        self._graph.reset(count)
         self._torque = np.zeros((count, 2))
         self.seen = []
 
@@ -57,7 +89,7 @@ class Exposed:
         self._layout.update(measurement, self._torque)
         inputs = {name: np.array(values) for name, values in self._layout.inputs().items()}
         self.seen.append(inputs)
-        self._torque = self._session.run(["torque"], inputs)[0].astype(np.float64)
+        self._torque = self._graph.run(inputs)["torque"].astype(np.float64)
         return self._torque
 
     def internals(self) -> dict[str, Array]:
@@ -72,35 +104,36 @@ def record(
     commands: Array,
     seed: int,
 ) -> Recording:
-    """Let a policy hop; return what its network saw and computed.
+    """Let a policy hop; return what its network saw, remembered and computed.
 
     Args:
         policy: The policy.
         graphs: Suffix of the names of hidden layers to a graph with them as outputs; the graph of
-            the suffix ``""`` acts.
+            the suffix ``""`` acts, the others are shown what it saw.
         setup: The world.
         commands: Desired heights, m, (ticks, n).
         seed: Of noise and delay.
     """
     controller = Exposed(policy, graphs[""])
     run = roll_out(controller, setup, commands, seed)
+    seen, count = controller.seen, commands.shape[1]
     first = round(START_SECONDS * setup.rate)
-    seen = controller.seen[first:]
-    shape = (len(seen), commands.shape[1], -1)
-    stacked = {
-        name: np.concatenate([inputs[name] for inputs in seen]) for name in controller.seen[0]
-    }
-    flat = [values.reshape(len(values), -1) for values in stacked.values()]
-    features = {OBSERVATION: np.concatenate(flat, axis=1).reshape(shape)}
-    for suffix, graph in graphs.items():
-        session = open_graph(graph)
-        names = [output.name for output in session.get_outputs()][1:]
-        for name, values in zip(names, session.run(names, stacked), strict=True):
-            features[name + suffix] = values.reshape(shape)
-    return Recording(features, {k: v[first:] for k, v in run.data.items()}, setup.rate)
+    flat = [[v.reshape(count, -1) for v in inputs.values()] for inputs in seen[first:]]
+    features = {OBSERVATION: np.stack([np.concatenate(tick, axis=1) for tick in flat])}
+    for suffix, content in graphs.items():
+        graph = Graph(content)
+        graph.reset(count)
+        given = [graph.run(inputs) for inputs in seen][first:]
+        features |= {
+            name + suffix: np.stack([tick[name] for tick in given])
+            for name in given[0]
+            if name != "torque"
+        }
+    exact = {name: values.astype(np.float64) for name, values in features.items()}
+    return Recording(exact, {k: v[first:] for k, v in run.data.items()}, setup.rate)
 
 
-def open_graph(content: bytes) -> Any:  # noqa: ANN401
+def _open(content: bytes) -> Any:  # noqa: ANN401
     """Return an onnxruntime session on one thread."""
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
