@@ -26,7 +26,7 @@ class RayCluster:
         if not self._ray.is_initialized():
             try:
                 _knock(address)
-                self._ray.init(address=address, log_to_driver=False)
+                self._ray.init(address=address or "local", log_to_driver=False)
             except (OSError, ValueError, RuntimeError) as error:
                 raise UsageError(
                     f"There is no Ray cluster at {address}: {str(error).rstrip('.')}; start one"
