@@ -80,7 +80,7 @@ results: $(STAMP)
 	$(BIN)/hop record runs/results/multisine.parquet --robot twin --believed legv2 --out runs/results
 	$(BIN)/hop identify runs/results/twin-multisine.parquet --out runs/results/identified.toml --json docs/results/identify.json
 	$(BIN)/hop bench identify --json docs/results/bench_identify.json
-	$(BIN)/hop experiment transfer --recipe adaptive --methods identified cad table-1 randomised --json docs/results/transfer.json
+	$(BIN)/hop experiment transfer --recipe adaptive --steps 10000000 --json docs/results/transfer.json
 	$(BIN)/hop bench finetune --figure docs/results/finetune.svg --json docs/results/finetune.json
 	$(BIN)/hop bench view --json docs/results/view.json
 	$(BIN)/hop bench deploy --json docs/results/deploy.json

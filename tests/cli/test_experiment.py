@@ -31,7 +31,8 @@ def test_bad_options_are_a_sentence_before_anything_runs(tmp_path, capsys, words
 @pytest.mark.slow
 def test_a_study_is_finished_once_and_grows(tmp_path, capsys):
     folder, file = tmp_path / "study", tmp_path / "out.json"
-    words = ["experiment", "transfer", "--folder", str(folder), "--json", str(file), *CHEAP]
+    words = ["experiment", "transfer", "--folder", str(folder), "--json", str(file), *CHEAP,
+             "--untrained", "none"]  # fmt: skip
     assert main([*words, "--twins", "1", "--methods", "truth"]) == 0
     first = json.loads(file.read_text())
     assert first["command"].startswith(
@@ -49,6 +50,9 @@ def test_a_study_is_finished_once_and_grows(tmp_path, capsys):
     assert len(list((folder / "training").iterdir())) == 3
     assert [row["method"] for row in second["comparison"]] == ["cad"]
     assert not second["twins"][0]["paper_disturbance"]
+    told = {row["method"]: row for row in second["prediction"]}
+    assert told["truth"]["median_abs_error_m"] < told["cad"]["median_abs_error_m"]
+    assert set(told["truth"]["errors_m"]) == {"twin-0", "twin-1"}
     assert "truth" in capsys.readouterr().out
     words[words.index("--steps") + 1] = "40000"
     assert main([*words, "--twins", "1", "--methods", "truth"]) == 2

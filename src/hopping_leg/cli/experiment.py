@@ -24,7 +24,7 @@ from rich.table import Table
 from hopping_leg.cli.options import Heights
 from hopping_leg.cli.output import write_json
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.transfer.methods import DEFAULT, choose_methods
+from hopping_leg.evaluate.transfer.methods import DEFAULT, UNTRAINED, choose_methods
 from hopping_leg.evaluate.transfer.study import Study, find_twins
 
 
@@ -39,6 +39,9 @@ class Experiment:
     methods: tuple[str, ...] = DEFAULT
     """What policies are trained on; the others are compared with the first. Valid: identified, cad,
     table-1, randomised, rail-only, fixed-base-only, two-pass, one-pass, truth."""
+    untrained: tuple[str, ...] = UNTRAINED
+    """Of the same, what is compared without trainings: by how well its simulation foretells the
+    hops of a shipped policy. `none` for none."""
     seeds: tuple[int, ...] = (0,)
     """Of the trainings, one of each method and twin each."""
     recipe: str = Study.recipe
@@ -76,6 +79,7 @@ def run(args: Experiment) -> None:
         args.folder,
         find_twins(args.twins, args.folder / "twins"),
         tuple(choose_methods(args.methods)),
+        untrained=() if args.untrained == ("none",) else tuple(choose_methods(args.untrained)),
         seeds=args.seeds,
         recipe=args.recipe,
         steps=args.steps,
@@ -133,6 +137,12 @@ def show(result: dict[str, Any]) -> None:
         console.print(
             f"{row['method']} errs {row['ratio']:.1f} times as much as {row['over']}"
             f" ({row['ratio_low']:.1f} to {row['ratio_high']:.1f})",
+            highlight=False,
+        )
+    for row in result["prediction"]:
+        console.print(
+            f"{row['method']} foretells apexes to {_mm(row['median_abs_error_m'])} mm"
+            f" ({_mm(row['median_abs_error_low_m'])} to {_mm(row['median_abs_error_high_m'])})",
             highlight=False,
         )
 

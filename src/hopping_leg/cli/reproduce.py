@@ -21,12 +21,13 @@ from hopping_leg.cli import evaluate, experiment
 from hopping_leg.cli.output import write_json
 from hopping_leg.control.library import ENERGY_SHAPING, shipped_policies
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.transfer.methods import DEFAULT, choose_methods
+from hopping_leg.evaluate.transfer.methods import DEFAULT, UNTRAINED, choose_methods
 from hopping_leg.evaluate.transfer.study import SHORTEST, USUAL_FIT, Study, find_twins
 from hopping_leg.identify.least_squares import LeastSquaresOptions
 from hopping_leg.trace import write_atomically
 
 _MINIATURE = ("identified", "cad")
+_PAPER = (*DEFAULT, *UNTRAINED, "two-pass")
 _GLANCE = LeastSquaresOptions(rounds=1, evaluations=2)
 _MARK = "size.txt"
 
@@ -130,7 +131,7 @@ def make_study(args: Reproduce) -> Study:
     return Study(
         folder,
         twins,
-        tuple(choose_methods((*DEFAULT, "two-pass", "one-pass") if args.full else _MINIATURE)),
+        tuple(choose_methods(_PAPER if args.full else _MINIATURE)),
         seeds=(args.seed,),
         steps=FastRecipe.steps if args.full else steps,
         seconds=240.0 if args.full else SHORTEST,

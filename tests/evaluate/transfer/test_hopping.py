@@ -21,7 +21,7 @@ def test_one_effect_is_taken_away_and_the_rest_stays(tmp_path, effect):
     whole, less = Hop(one, twin, method, 0), HopWithout(one, twin, method, 0, effect)
     assert less.leg != whole.leg == twin.robot
     assert not less.leg.reality.only_delays
-    assert less._file != whole._file
+    assert less.file != whole.file
     for other in set(EFFECTS) - {effect}:
         assert EFFECTS[other](less.leg.reality) != less.leg.reality
     assert EFFECTS[effect](less.leg.reality) == less.leg.reality

@@ -6,6 +6,7 @@ would come on top. A twin without [reality] is met with the paper's disturbance.
 
 import hashlib
 import json
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -32,30 +33,33 @@ _KEPT = ("command_m", "median_error_m", "std_m", "hops", "skipped_hops", "hop_ra
 
 
 @dataclass(frozen=True)
-class Hop:
-    """A policy tried on a twin."""
+class Tried(ABC):
+    """A policy that hops at the study's commands on some leg."""
 
     study: Study
     twin: TwinFile
-    method: Method
-    seed: int
 
     weight = 0.2
 
     @property
+    @abstractmethod
     def name(self) -> str:
         """What is done."""
-        return f"hop on {self.twin.name}, {self.method.name}, seed {self.seed}"
 
     @property
+    @abstractmethod
     def leg(self) -> Robot:
         """What the policy hops on."""
-        return self.twin.robot
 
     @property
-    def suffix(self) -> str:
-        """Of the file with the result."""
-        return ""
+    @abstractmethod
+    def file(self) -> Path:
+        """Of the result."""
+
+    @property
+    @abstractmethod
+    def policy(self) -> bytes:
+        """The policy's file."""
 
     @property
     def done(self) -> bool:
@@ -64,48 +68,77 @@ class Hop:
         Raises:
             UsageError: It is there, but of other trials.
         """
-        if not self._file.exists():
+        if not self.file.exists():
             return False
-        if json.loads(self._file.read_text(encoding="utf-8"))["asked"] != self._asked():
+        if json.loads(self.file.read_text(encoding="utf-8"))["asked"] != self._asked():
             raise UsageError(
-                f"{self._file} holds trials of another policy, twin or length; give another"
+                f"{self.file} holds trials of another policy, twin or length; give another"
                 " --folder, or delete it to try again."
             )
         return True
 
     def run(self, *, quiet: bool) -> None:
         """Try the policy at every command and write what was measured."""
-        content = {"asked": self._asked(), "rows": hop(self._policy, self.leg, self.study)}
+        content = {"asked": self._asked(), "rows": hop(self.policy, self.leg, self.study)}
         text = json.dumps(content, indent=1, allow_nan=False)
-        write_atomically(self._file, f"{text}\n".encode())
+        write_atomically(self.file, f"{text}\n".encode())
 
     def progress(self) -> tuple[float, str]:
         """Return the share done and what to show while it runs."""
         return 0.0, ""
 
-    def rows(self) -> list[dict[str, Any]]:
+    def measured(self) -> list[dict[str, Any]]:
         """Return what was measured, one row per command."""
-        rows = json.loads(self._file.read_text(encoding="utf-8"))["rows"]
-        where = {"method": self.method.name, "twin": self.twin.name, "seed": self.seed}
-        return [{**where, **row} for row in rows]
-
-    @property
-    def _file(self) -> Path:
-        path = self.study.trial(self.twin, self.method, self.seed)
-        return path.with_name(f"{path.stem}{self.suffix}.json")
-
-    @property
-    def _policy(self) -> bytes:
-        folder = self.study.training(self.twin, self.method, self.seed)
-        return (folder / "policy.onnx").read_bytes()
+        rows: list[dict[str, Any]] = json.loads(self.file.read_text(encoding="utf-8"))["rows"]
+        return rows
 
     def _asked(self) -> dict[str, Any]:
         return {
-            "policy": hashlib.sha256(self._policy).hexdigest()[:16],
+            "policy": hashlib.sha256(self.policy).hexdigest()[:16],
             "twin": self.leg.digest,
             "commands": list(self.study.commands),
             "repeats": self.study.repeats,
         }
+
+
+@dataclass(frozen=True)
+class Hop(Tried):
+    """A trained policy tried on a twin."""
+
+    method: Method
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """What is done."""
+        return f"hop on {self.twin.name}, {self.method.name}, seed {self.seed}"
+
+    @property
+    def leg(self) -> Robot:
+        """The twin."""
+        return self.twin.robot
+
+    @property
+    def suffix(self) -> str:
+        """Of the file with the result."""
+        return ""
+
+    @property
+    def file(self) -> Path:
+        """Of the result."""
+        path = self.study.trial(self.twin, self.method, self.seed)
+        return path.with_name(f"{path.stem}{self.suffix}.json")
+
+    @property
+    def policy(self) -> bytes:
+        """The selected policy of the training."""
+        folder = self.study.training(self.twin, self.method, self.seed)
+        return (folder / "policy.onnx").read_bytes()
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return what was measured, one row per command."""
+        where = {"method": self.method.name, "twin": self.twin.name, "seed": self.seed}
+        return [{**where, **row} for row in self.measured()]
 
 
 def disturbance_of(robot: Robot) -> Disturbance:

@@ -67,15 +67,18 @@ METHODS = {
 }
 """Every method by name."""
 
-DEFAULT = ("identified", "cad", "table-1", "randomised", "rail-only", "fixed-base-only")
-"""What is compared unless asked otherwise."""
+DEFAULT = ("identified", "cad", "table-1", "randomised")
+"""What policies are trained on unless asked otherwise."""
+
+UNTRAINED = ("rail-only", "fixed-base-only", "one-pass")
+"""What is compared by its predictions alone unless asked otherwise: ablations of identification."""
 
 
 def choose_methods(names: Sequence[str]) -> list[Method]:
     """Return methods by name.
 
     Raises:
-        UsageError: There is no such method, or one is named twice.
+        UsageError: There is no such method, one is named twice, or none is named.
     """
     for name in names:
         if name not in METHODS:

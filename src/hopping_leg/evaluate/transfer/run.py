@@ -9,6 +9,7 @@ from hopping_leg.evaluate.transfer.effects import EFFECTS, HopWithout, effect_ro
 from hopping_leg.evaluate.transfer.fitting import Identify
 from hopping_leg.evaluate.transfer.hopping import Hop
 from hopping_leg.evaluate.transfer.methods import Method
+from hopping_leg.evaluate.transfer.prediction import Foretell, Meet, prediction_rows
 from hopping_leg.evaluate.transfer.recording import Record
 from hopping_leg.evaluate.transfer.study import Study, TwinFile
 from hopping_leg.evaluate.transfer.tables import tabulate
@@ -32,13 +33,14 @@ def transfer(study: Study, at_once: int = 1) -> dict[str, Any]:
         records(study),
         fits(study),
         trainings(study),
-        [*hops(study), *without(study)],
+        [*hops(study), *without(study), *foretold(study), *met(study)],
     )
     total = sum(job.weight for stage in stages for job in stage)
     with Board(total, own_bars=at_once == 1) as board:
         for stage in stages:
             work(stage, at_once, board)
     result = tabulate(study, fits(study), trainings(study), hops(study))
+    result["prediction"] = prediction_rows(foretold(study), met(study))
     if study.effects:
         first = [job for job in hops(study) if job.method == study.methods[0]]
         result["effects"] = effect_rows(first, without(study))
@@ -47,13 +49,13 @@ def transfer(study: Study, at_once: int = 1) -> dict[str, Any]:
 
 def records(study: Study) -> list[Record]:
     """Return the recordings that the methods need."""
-    rigs = {rig for method in study.methods if method.fit for rig in method.fit.rigs}
+    rigs = {rig for method in study.compared if method.fit for rig in method.fit.rigs}
     return [Record(study, twin, rig) for twin in study.twins for rig in sorted(rigs)]
 
 
 def fits(study: Study) -> list[Identify]:
     """Return all identifications, those of the first method first."""
-    return [Identify(study, t, m) for m in study.methods if m.fit for t in study.twins]
+    return [Identify(study, t, m) for m in study.compared if m.fit for t in study.twins]
 
 
 def trainings(study: Study) -> list[Train]:
@@ -75,6 +77,17 @@ def without(study: Study) -> list[HopWithout]:
         for seed in study.seeds
         for twin in study.twins
     ]
+
+
+def foretold(study: Study) -> list[Foretell]:
+    """Return what each method's simulation says of the shipped policy's hops."""
+    methods = [m for m in study.compared if not m.randomised]
+    return [Foretell(study, twin, method) for method in methods for twin in study.twins]
+
+
+def met(study: Study) -> list[Meet]:
+    """Return the same policy's hops on the twins."""
+    return [Meet(study, twin) for twin in study.twins]
 
 
 def _all(study: Study) -> Iterable[tuple[int, Method, TwinFile]]:

@@ -1,14 +1,11 @@
 """Third stage: train on what a method believes the twin to be."""
 
-import dataclasses
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from hopping_leg.evaluate.transfer.methods import Method
 from hopping_leg.evaluate.transfer.study import Study, TwinFile
-from hopping_leg.robot import load_robot
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.robot.reality import NEUTRAL
 
 if TYPE_CHECKING:
     from hopping_leg.learn.recipe import Recipe
@@ -69,12 +66,7 @@ class Train:
     @property
     def robot(self) -> Robot:
         """What is trained on."""
-        method = self.method
-        if method.truth:
-            return self.twin.without_surprises
-        if method.fit is not None:
-            return load_robot(self.study.fitted(self.twin, method))
-        return dataclasses.replace(load_robot(method.robot or self.twin.believed), reality=NEUTRAL)
+        return self.study.simulated(self.twin, self.method)
 
     def _recipe(self) -> "Recipe":
         from hopping_leg.learn.recipes import change, get_recipe, randomise
