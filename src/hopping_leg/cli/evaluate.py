@@ -14,8 +14,6 @@ Examples:
   hop evaluate fast --engine pybullet --floor soft --seeds 2
 """
 
-import dataclasses
-import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,6 +23,7 @@ import tyro
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from hopping_leg.cli.command_line import command_line
 from hopping_leg.cli.options import Heights
 from hopping_leg.cli.robustness import judge_robustness
 from hopping_leg.cli.skills import judge_skills, print_skills
@@ -97,7 +96,7 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
         args: Options.
         notes: Sentences for table and report of the paper's trials, before those that arise.
     """
-    command = command_line(args)
+    command = command_line("hop evaluate", args)
     if args.suite == "paper":
         args = _with_folder(args)
     _check(args)
@@ -165,23 +164,6 @@ def _with_folder(args: Evaluate) -> Evaluate:
         report=args.report or args.out / "report.html",
         traces=args.traces or args.out / "traces",
     )
-
-
-def command_line(args: Evaluate) -> str:
-    """Return the command that makes this evaluation again."""
-    words = ["hop evaluate", *map(shlex.quote, args.controllers)]
-    for field in dataclasses.fields(args):
-        value = getattr(args, field.name)
-        if field.name == "controllers" or value == field.default:
-            continue
-        if isinstance(value, bool):
-            words.append(f"--{'' if value else 'no-'}{field.name}")
-        elif field.name == "axes":
-            words.append(f"--axes {shlex.join(value)}")
-        else:
-            text = ",".join(f"{v:g}" for v in value) if isinstance(value, tuple) else str(value)
-            words.append(f"--{field.name} {shlex.quote(text)}")
-    return " ".join(words)
 
 
 def judge(candidates: list[Candidate], setup: Setup, args: Evaluate) -> Judged:

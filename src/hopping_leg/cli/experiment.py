@@ -12,7 +12,6 @@ Examples:
   hop experiment transfer --twins my_twin.toml other_twin.toml --methods identified cad
 """
 
-import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -21,6 +20,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
+from hopping_leg.cli.command_line import KEPT, command_line
 from hopping_leg.cli.options import Heights
 from hopping_leg.cli.output import write_json
 from hopping_leg.errors import UsageError
@@ -92,24 +92,9 @@ def run(args: Experiment) -> None:
     )
     result = transfer(study, args.jobs)
     if args.json is not None:
-        write_json(args.json, {"command": command_line(args), **result})
+        command = command_line("hop experiment", args, KEPT | {"threads"})
+        write_json(args.json, {"command": command, **result})
     show(result)
-
-
-def command_line(args: Experiment) -> str:
-    """Return the command that makes this study again."""
-    words = ["hop experiment", args.experiment]
-    for field in dataclasses.fields(args)[1:]:
-        value = getattr(args, field.name)
-        if value == field.default or field.name in ("jobs", "threads", "folder"):
-            continue
-        if isinstance(value, bool):
-            words.append(f"--{field.name}")
-            continue
-        separator = "," if field.name == "commands" else " "
-        text = separator.join(map(str, value)) if isinstance(value, tuple) else str(value)
-        words.append(f"--{field.name} {text}")
-    return " ".join(words)
 
 
 def show(result: dict[str, Any]) -> None:

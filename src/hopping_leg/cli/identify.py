@@ -14,7 +14,6 @@ Examples:
 import dataclasses
 import math
 import os
-import shlex
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +23,7 @@ import tyro
 from rich.console import Console
 from rich.table import Column, Table
 
+from hopping_leg.cli.command_line import command_line
 from hopping_leg.cli.fit_progress import FitProgress
 from hopping_leg.cli.output import write_json
 from hopping_leg.errors import UsageError
@@ -125,10 +125,11 @@ def run(args: Identify) -> None:
         )
         raise
     save_robot(identified, args.out, origin)
+    command = command_line("hop identify", args, ("folder", "resume", "threads", "ray"))
     if args.json:
-        write_json(args.json, {"command": _command(args), **as_json(identified)})
+        write_json(args.json, {"command": command, **as_json(identified)})
     if args.report:
-        page = write_fit_report(identified, _command(args), args.threads)
+        page = write_fit_report(identified, command, args.threads)
         write_atomically(args.report, page)
     _show(console, identified)
     for name in ("out", "json", "report"):
@@ -226,19 +227,3 @@ def _show(console: Console, identified: Identified) -> None:
     console.print(quality)
     for sentence in identified.told.statements:
         console.print(sentence, highlight=False, markup=False)
-
-
-def _command(args: Identify) -> str:
-    """Return the command that makes the same result."""
-    words = ["hop", "identify", *map(str, args.recordings)]
-    for spec in dataclasses.fields(args)[1:]:
-        value, flag = getattr(args, spec.name), f"--{spec.name}"
-        if value == spec.default or spec.name in ("folder", "resume", "threads", "ray"):
-            continue
-        if spec.name == "parameters":
-            words += [flag, ",".join(value)]
-        elif isinstance(value, tuple):
-            words += [flag, *map(str, value)]
-        else:
-            words += [flag, str(value)]
-    return shlex.join(words)

@@ -25,8 +25,6 @@ RANGE = (0.22, 0.25, 0.28, 0.30, 0.32, 0.35, 0.38, 0.40)
 FIRST_SEED = 1000
 """Seeds from here on have tuned nothing."""
 
-COMMAND = "hop bench energy-shaping"
-
 
 @dataclass(frozen=True)
 class Case:
@@ -157,7 +155,6 @@ def run(
         if on_case is not None:
             on_case(index + 1, len(todo))
     return {
-        "command": f"{COMMAND} --runs {runs} --duration {seconds:g} --seed {seed}",
         "seed": FIRST_SEED + seed,
         "runs_per_command": runs,
         "exponent": float(tuned_energy_shaping(load_robot("legv2-paper")).gains.exponent),

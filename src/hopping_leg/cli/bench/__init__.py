@@ -24,6 +24,7 @@ from hopping_leg.cli.bench.identification import Identify
 from hopping_leg.cli.bench.probe import Probe
 from hopping_leg.cli.bench.simulation import Convergence, Env, Inference
 from hopping_leg.cli.bench.view import View
+from hopping_leg.cli.command_line import KEPT, command_line, verb_of
 from hopping_leg.cli.output import write_json
 
 Benchmark = (
@@ -45,7 +46,8 @@ Benchmark = (
 
 def run(args: Benchmark) -> None:
     """Run one benchmark, print its numbers, write the JSON."""
-    result = args.measure()
+    command = command_line(f"hop bench {verb_of(args)}", args, KEPT | {"recordings"})
+    result = {"command": command, **args.measure()}
     if args.json is not None:
         write_json(args.json, result)
         print(f"Wrote {args.json}.")

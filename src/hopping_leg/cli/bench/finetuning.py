@@ -1,6 +1,5 @@
 """Benchmark of continued training."""
 
-import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -70,22 +69,10 @@ class Finetune:
             ),
             lambda text: console.print(text, highlight=False),
         )
-        result = {"command": self._command(), **result}
         if self.figure is not None:
             write_atomically(self.figure, to_svg(draw_finetuning(result)))
         _print(console, result)
         return result
-
-    def _command(self) -> str:
-        """Return the command that measures this again."""
-        words = ["hop bench finetune"]
-        for field in dataclasses.fields(self):
-            value = getattr(self, field.name)
-            if value == field.default or field.name in ("folder", "figure", "json"):
-                continue
-            text = " ".join(map(str, value)) if isinstance(value, tuple) else str(value)
-            words.append(f"--{field.name} {text}")
-        return " ".join(words)
 
 
 def _print(console: Console, result: dict[str, Any]) -> None:

@@ -1,9 +1,7 @@
 """Benchmark of identification."""
 
 import contextlib
-import dataclasses
 import os
-import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -91,7 +89,7 @@ class Identify:
                 on_repeat=lambda done, total: console.print(f"round {done} of {total}"),
             )
         _print(console, result)
-        return {"command": _command(self), **result}
+        return result
 
 
 class _Progress:
@@ -124,21 +122,6 @@ class _Progress:
 def _recordings() -> Path | None:
     named = os.environ.get(_VARIABLE)
     return Path(named) if named else None
-
-
-def _command(args: Identify) -> str:
-    """Return the command that measures the same, wherever results are kept."""
-    words = ["hop", "bench", "identify"]
-    for spec in dataclasses.fields(args):
-        value = getattr(args, spec.name)
-        if spec.name in ("out", "json", "recordings") or value == spec.default:
-            continue
-        words.append(f"--{spec.name.replace('_', '-')}")
-        if not isinstance(value, bool):
-            words += map(str, value if isinstance(value, tuple) else (value,))
-    if args.recordings or _recordings():
-        words += ["--recordings", "DIR"]
-    return shlex.join([*words, "--json", "FILE"])
 
 
 def _print(console: Console, result: dict[str, Any]) -> None:

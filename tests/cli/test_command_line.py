@@ -1,0 +1,68 @@
+"""The command beside a result is read back as the options that made it."""
+
+import shlex
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import pytest
+import tyro
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hopping_leg.cli.bench import Benchmark
+from hopping_leg.cli.bench.controllers import EnergyShaping, Training
+from hopping_leg.cli.command_line import command_line, verb_of
+from hopping_leg.cli.options import Heights
+
+
+@dataclass(frozen=True)
+class Inner:
+    depth: int = 1
+
+
+@dataclass(frozen=True)
+class Options:
+    names: tyro.conf.Positional[tuple[str, ...]] = ("a",)
+    heights: Heights | None = None
+    some_numbers: tuple[int, ...] = (1, 2)
+    video: bool = True
+    loud: bool = False
+    inner: Annotated[Inner, tyro.conf.arg(name="")] = field(default_factory=Inner)
+    file: Path | None = None
+    out: Path = Path("here")
+
+
+words = st.text(st.characters(categories=("L", "N")) | st.sampled_from(" '*_."), min_size=1)
+
+
+@given(
+    st.builds(
+        Options,
+        names=st.tuples(words, words) | st.just(("a",)),
+        heights=st.none() | st.tuples(st.integers(1, 99).map(lambda cm: cm / 100)),
+        some_numbers=st.lists(st.integers(0, 9), min_size=1).map(tuple),
+        video=st.booleans(),
+        loud=st.booleans(),
+        inner=st.builds(Inner, st.integers(0, 9)),
+        file=st.none() | words.filter(lambda word: word == str(Path(word))).map(Path),
+    )
+)
+def test_tyro_reads_the_command_back(options):
+    verb, *rest = shlex.split(command_line("hop", options))
+    assert verb == "hop"
+    assert tyro.cli(Options, args=rest) == options
+
+
+def test_what_changes_no_number_is_left_out():
+    assert command_line("hop", Options(out=Path("there"))) == "hop"
+    assert command_line("hop", Options(out=Path("there")), ()) == "hop --out there"
+
+
+def test_defaults_are_left_out_and_subcommands_go_by_tyros_names(capsys):
+    verb = f"hop bench {verb_of(Training())}"
+    assert command_line(verb, Training(threads=1)) == "hop bench training --threads 1"
+    with pytest.raises(SystemExit):
+        tyro.cli(Benchmark, args=["--help"])
+    assert verb_of(EnergyShaping()) == "energy-shaping"
+    assert "energy-shaping" in capsys.readouterr().out
