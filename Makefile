@@ -67,6 +67,8 @@ results: $(STAMP)
 	$(BIN)/hop bench energy-shaping --json docs/results/energy_shaping.json
 	$(BIN)/hop bench training --json docs/results/training.json
 	$(BIN)/hop bench training --recipe precise --training-seeds 1 2 3 4 --threads 1 --json docs/results/training-precise.json
+	$(BIN)/hop bench training --recipe precise --minutes 13.5 --steps 20000000 --out runs/bench-quarter \
+	  --json docs/results/training-quarter.json
 	$(BIN)/hop evaluate "runs/bench-training/precise-seed*/policy.onnx" --seeds 5 --floor soft --no-video \
 	  --json docs/results/precise-seeds.json \
 	  --commands 0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40

@@ -30,6 +30,7 @@ def bench_training(
     *,
     training_seeds: Sequence[int] = (0, 1, 2),
     evaluation_seeds: int = 5,
+    minutes: float | None = None,
     threads: int = 2,
     on_progress: Callable[[str], None] = lambda _note: None,
 ) -> dict[str, Any]:
@@ -43,11 +44,12 @@ def bench_training(
         out: Folder of the runs, one per training seed.
         training_seeds: Of the trainings.
         evaluation_seeds: Realisations of noise and delay per command.
+        minutes: Of learning, by the clock; None learns until the recipe's steps are done.
         threads: Of torch and physics.
         on_progress: Called with a sentence on what begins.
 
     Returns:
-        Per training seed: minutes, the selected policy's summary rows, and the curve of
+        Per training seed: minutes, selection included, the selected policy's summary rows, and the curve of
         (minutes, worst and mean |median error| over commands) of all snapshots.
     """
     runs = []
@@ -55,14 +57,22 @@ def bench_training(
         folder = out / f"{recipe.name}-seed{seed}"
         on_progress(f"training {recipe.name} with seed {seed}")
         if not (folder / "policy.onnx").exists():
-            train(recipe, robot, seed, folder, resume=folder.exists(), threads=threads)
+            train(
+                recipe,
+                robot,
+                seed,
+                folder,
+                resume=folder.exists(),
+                minutes=minutes,
+                threads=threads,
+            )
         result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
         on_progress(f"judging {recipe.name} with seed {seed}")
         content = (folder / "policy.onnx").read_bytes()
         selected = _judge({"selected": content}, recipe, robot, evaluation_seeds)
         snapshots = {f.stem: f.read_bytes() for f in sorted((folder / "snapshots").glob("*.onnx"))}
         rows = _judge(snapshots, recipe, robot, evaluation_seeds)
-        minutes = {f"{row['steps']:012d}": row["minutes"] for row in result["history"]}
+        times = {f"{row['steps']:012d}": row["minutes"] for row in result["history"]}
         runs.append(
             {
                 "seed": seed,
@@ -70,7 +80,7 @@ def bench_training(
                 "steps": result["steps"],
                 "selected": selected,
                 "curve": [
-                    {"steps": int(name), "minutes": minutes[name], **_errors(rows, name)}
+                    {"steps": int(name), "minutes": times[name], **_errors(rows, name)}
                     for name in snapshots
                 ],
             }
@@ -79,6 +89,7 @@ def bench_training(
         "recipe": recipe.name,
         "robot": robot.name,
         "threads": threads,
+        "minutes_budget": minutes,
         "evaluation_seed": JUDGING_SEED,
         "evaluation_seeds": evaluation_seeds,
         "runs": runs,

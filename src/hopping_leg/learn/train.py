@@ -171,9 +171,9 @@ class Trainer:
             )
         self._judge()
         model.logger.close()
-        minutes, steps = self.elapsed / 60, int(model.num_timesteps)
         self._show(force=True)
         content, results = self.selection.choose()
+        minutes, steps = self.elapsed / 60, int(model.num_timesteps)
         result = {
             "command": self.folder.command,
             "minutes": minutes,

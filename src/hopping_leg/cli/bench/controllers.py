@@ -73,6 +73,8 @@ class Training:
     """Realisations of noise and delay per command."""
     steps: int | None = None
     """Control steps of experience instead of the recipe's."""
+    minutes: float | None = None
+    """Of learning, by the clock, after which the best snapshot is selected."""
     threads: int = 2
     """Of torch and physics."""
     out: Path = Path("runs/bench-training")
@@ -98,6 +100,7 @@ class Training:
             self.out,
             training_seeds=self.training_seeds,
             evaluation_seeds=self.evaluation_seeds,
+            minutes=self.minutes,
             threads=self.threads,
             on_progress=console.print,
         )
