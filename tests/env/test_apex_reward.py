@@ -86,6 +86,21 @@ def test_energy_gain_fades(reward):
     assert late[0, NAMES.index("energy")] == 0.0
 
 
+def test_the_energy_gain_can_end_where_the_hop_would_be_too_high():
+    options = ApexRewardOptions(energy_beyond=0.03)
+    bounded, free = (
+        ApexReward(load_robot("legv2-paper"), o, RATE) for o in (options, ApexRewardOptions())
+    )
+
+    def gains(command):
+        moving = transition(0.25, 1.5, command=command)
+        return [r(moving)[1][0, NAMES.index("energy")] for r in (bounded, free)]
+
+    low, high = gains(0.22), gains(0.40)
+    assert low[0] < 0.05 * low[1]
+    assert high[0] == high[1] == low[1]
+
+
 def test_coming_close_to_the_ground_costs(reward):
     _, high = reward(transition(0.2, 0.0))
     _, low = reward(transition(0.06, 0.0))

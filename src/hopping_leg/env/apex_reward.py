@@ -53,6 +53,10 @@ class ApexRewardOptions:
     """Of v^2 anywhere, fading to zero until ``energy_until``."""
     energy_until: float = 0.35
     """Share of the training after which that gain is gone."""
+    energy_beyond: float | None = None
+    """How far above the command the predicted apex is where the most of that gain has fallen to
+    1/e, m; None pays it at any height. A leg that is paid for hopping too high learns a gait for
+    it, stretched at every command, from which the narrow kernels do not lead back."""
     jerk: float = 0.15
     """Of the paper's Pj."""
     effort: float = 0.0
@@ -129,7 +133,7 @@ class ApexReward:
             [
                 o.apex * self._event(t),
                 np.where(flying, o.predicted * self._prediction(t, speed_squared), 0.0),
-                self._energy * np.minimum(speed_squared, _FASTEST_SQUARED),
+                self._energy * self._gain(t, speed_squared),
                 -o.jerk * np.sum(np.square(t.action - t.last_action), axis=1),
                 -o.effort * np.where(flying, np.sum(np.square(t.action), axis=1), 0.0),
                 -o.position * self._position(t.q),
@@ -149,9 +153,20 @@ class ApexReward:
         kernel = (1 - tail) * np.exp(-error / self._width) + tail * np.exp(-error / wide)
         return np.where(t.apex, motion * patience * kernel, 0.0)
 
+    def _gain(self, t: Transition, speed_squared: Array) -> Array:
+        most: float | Array = _FASTEST_SQUARED
+        if self.options.energy_beyond is not None:
+            above = np.maximum(self._predicted_apex(t, speed_squared) - t.command, 0.0)
+            most = most * np.exp(-above / self.options.energy_beyond)
+        gain: Array = np.minimum(speed_squared, most)
+        return gain
+
+    def _predicted_apex(self, t: Transition, speed_squared: Array) -> Array:
+        apex: Array = t.height + speed_squared / (2 * self.options.effective_gravity)
+        return apex
+
     def _prediction(self, t: Transition, speed_squared: Array) -> Array:
-        apex = t.height + speed_squared / (2 * self.options.effective_gravity)
-        error = np.abs(apex - t.command)
+        error = np.abs(self._predicted_apex(t, speed_squared) - t.command)
         kernel = np.exp(-error / 0.015) + 0.5 * np.exp(-error / 0.06)
         return np.abs(t.rate) * kernel
 

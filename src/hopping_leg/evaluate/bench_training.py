@@ -49,8 +49,8 @@ def bench_training(
         on_progress: Called with a sentence on what begins.
 
     Returns:
-        Per training seed: minutes, selection included, the selected policy's summary rows, and the curve of
-        (minutes, worst and mean |median error| over commands) of all snapshots.
+        Per training seed: minutes, selection included, the selected policy's summary rows, and the
+        curve of (minutes, worst and mean |median error| over commands) of all snapshots.
     """
     runs = []
     for seed in training_seeds:
