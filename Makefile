@@ -81,7 +81,9 @@ results: $(STAMP)
 	$(BIN)/hop excite multisine --robot legv2 --centre 0.7 -1.4 --amplitude 0.3 0.4 --out runs/results/multisine.parquet
 	$(BIN)/hop record runs/results/multisine.parquet --robot twin --believed legv2 --out runs/results
 	$(BIN)/hop identify runs/results/twin-multisine.parquet --out runs/results/identified.toml --json docs/results/identify.json
-	$(BIN)/hop bench identify --json docs/results/bench_identify.json
+	$(BIN)/hop bench identify --parts synthetic throughput mujoco-sysid --json docs/results/bench_identify.json
+	$(BIN)/hop bench identify --parts paper-size --searches two-pass --json docs/results/bench_identify_size.json
+	$(BIN)/hop bench identify --parts recordings --json docs/results/bench_identify_recordings.json
 	$(BIN)/hop experiment transfer --recipe adaptive --steps 10000000 --json docs/results/transfer.json
 	$(BIN)/hop bench finetune --figure docs/results/finetune.svg --json docs/results/finetune.json
 	$(BIN)/hop bench view --json docs/results/view.json

@@ -27,9 +27,9 @@ class CmaOptions:
     """First standard deviation, in units of the parameters' scales."""
     tolerance: float = 1e-9
     """Range of a generation's costs, relative to its best, below which the search has converged."""
-    seconds: float = 40.0
-    """Simulated for a candidate in each generation. Of more windows each generation is judged by
-    another share, and the end by all."""
+    seconds: float = 25.0
+    """Simulated for a candidate in each generation, about. Of more windows each generation is
+    judged by another share, and the end by all."""
 
 
 _RECENT = 4

@@ -4,7 +4,6 @@ Cost is the sum of squared residuals throughout, as the objective's levels weigh
 """
 
 import dataclasses
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -207,7 +206,7 @@ class Searcher:
         """Return what judges generations in turn; nothing if all windows can judge each."""
         rates = [r.setup.rate_hz for r in objective.recordings]
         simulated = sum(w.length / rates[w.recording] for w in objective.windows)
-        count = max(1, math.ceil(simulated / self._options.cma.seconds))
+        count = max(1, round(simulated / self._options.cma.seconds))
         hands = deal(objective.windows, count, np.random.default_rng(self._seed))
         if len(hands) < 2:
             return []
