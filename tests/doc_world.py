@@ -61,7 +61,7 @@ SECONDS = {
 ELSEWHERE = {
     "hop finetune": "minutes even when small: tests/cli/test_finetune.py",
     "hop bench finetune": "hours: tests/learn/finetune/test_study.py",
-    "hop experiment transfer": "minutes even when small: tests/cli/test_experiment.py",
+    "hop experiment": "minutes even when small: tests/cli/test_experiment.py",
     "hop reproduce": "minutes even with --quick: tests/cli/test_reproduce.py",
 }
 """Commands that are not run here, and why; their options must parse all the same."""

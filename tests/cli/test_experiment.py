@@ -31,8 +31,7 @@ def test_bad_options_are_a_sentence_before_anything_runs(tmp_path, capsys, words
 @pytest.mark.slow
 def test_a_study_is_finished_once_and_grows(tmp_path, capsys):
     folder, file = tmp_path / "study", tmp_path / "out.json"
-    words = ["experiment", "transfer", "--folder", str(folder), "--json", str(file), *CHEAP,
-             "--untrained", "none"]  # fmt: skip
+    words = ["experiment", "transfer", "--folder", str(folder), "--json", str(file), *CHEAP]
     assert main([*words, "--twins", "1", "--methods", "truth"]) == 0
     first = json.loads(file.read_text())
     assert first["command"].startswith(
@@ -50,10 +49,24 @@ def test_a_study_is_finished_once_and_grows(tmp_path, capsys):
     assert len(list((folder / "training").iterdir())) == 3
     assert [row["method"] for row in second["comparison"]] == ["cad"]
     assert not second["twins"][0]["paper_disturbance"]
-    told = {row["method"]: row for row in second["prediction"]}
-    assert told["truth"]["median_abs_error_m"] < told["cad"]["median_abs_error_m"]
-    assert set(told["truth"]["errors_m"]) == {"twin-0", "twin-1"}
     assert "truth" in capsys.readouterr().out
     words[words.index("--steps") + 1] = "40000"
     assert main([*words, "--twins", "1", "--methods", "truth"]) == 2
     assert "another options" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_simulations_foretell_without_a_training(tmp_path, capsys):
+    folder, file = tmp_path / "study", tmp_path / "out.json"
+    words = ["experiment", "prediction", "--folder", str(folder), "--json", str(file)]
+    words += ["--twins", "2", "--repeats", "1", "--commands", "0.25,0.35"]
+    assert main([*words, "--methods", "truth", "cad"]) == 0
+    found = json.loads(file.read_text())
+    assert found["command"].startswith("hop experiment prediction --twins 2")
+    told = {row["method"]: row for row in found["methods"]}
+    assert told["truth"]["median_abs_error_m"] < told["cad"]["median_abs_error_m"]
+    assert set(told["truth"]["errors_m"]) == {"twin-0", "twin-1"}
+    assert not (folder / "training").exists()
+    assert "foretells" in capsys.readouterr().out
+    assert main([*words, "--methods", "randomised"]) == 2
+    assert "none foretells" in capsys.readouterr().err

@@ -13,7 +13,7 @@ pytest.importorskip("torch")
 from hopping_leg.evaluate.transfer import run as transfer_run
 from hopping_leg.learn.fast import FastRecipe
 
-NUMBERS = {"rows": [], "methods": [], "comparison": [], "prediction": []}
+NUMBERS = {"rows": [], "methods": [], "comparison": []}
 
 
 @pytest.fixture

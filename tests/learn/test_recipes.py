@@ -28,9 +28,23 @@ def test_a_cards_changes_give_the_recipe_again(name, steps, rate, privileged):
     assert change(get_recipe(name), changes_of(name, stored)) == recipe
 
 
+def test_numbers_of_a_part_are_changed_by_its_name():
+    usual = get_recipe("precise")
+    changed = change(usual, ["reward.jerk=0.5", "reward.energy_beyond=0.03", "imitation.batch=7"])
+    assert (changed.reward.jerk, changed.reward.energy_beyond) == (0.5, 0.03)
+    assert changed.reward.width == usual.reward.width
+    assert (changed.imitation.batch, changed.steps) == (7, usual.steps)
+    stored = dataclasses.asdict(changed)
+    assert change(usual, changes_of("precise", stored)) == changed
+    del stored["reward"]["energy_beyond"]
+    assert "reward.energy_beyond=0.03" not in changes_of("precise", stored)
+
+
 @pytest.mark.parametrize(
     ("entry", "named"),
     [
+        ("reward.speed=3", "reward.apex"),
+        ("task.timestep=1", "steps"),
         ("speed=3", "steps"),
         ("steps=many", "a whole number"),
         ("learning_rate=nan", "a number"),

@@ -1,13 +1,17 @@
-"""Run the paper's sim-to-real experiment on twins: record, identify, train, hop.
+"""Run the paper's sim-to-real experiment on twins: record, identify, train, hop; or foretell.
 
 A twin plays the real leg: it differs from the CAD in what a fit can find and in what no fit knows.
 It is recorded, identified from the recordings alone, a policy is trained on what was identified,
 and hops on the twin without tuning; beside it policies trained on the CAD's robot, on the paper's
-Table I, and with domain randomisation. Every stage's results stay in the folder: the same command
-goes on after an interruption, and further methods, twins or seeds add to what is there.
+Table I, and with domain randomisation. What trainings add, luck included, is left out by
+`prediction`: there the simulations only foretell how high a shipped policy hops on the twins, so
+that ways to identify can be compared by their fits alone. Every stage's results stay in the folder:
+the same command goes on after an interruption, and further methods, twins or seeds add to what is
+there.
 
 Examples:
   hop experiment transfer --json transfer.json
+  hop experiment prediction --json prediction.json
   hop experiment transfer --twins 10 --seeds 0 1 2 --jobs 8
   hop experiment transfer --twins my_twin.toml other_twin.toml --methods identified cad
 """
@@ -24,7 +28,7 @@ from hopping_leg.cli.command_line import KEPT, command_line
 from hopping_leg.cli.options import Heights
 from hopping_leg.cli.output import write_json
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.transfer.methods import DEFAULT, UNTRAINED, choose_methods
+from hopping_leg.evaluate.transfer.methods import DEFAULT, FORETOLD, choose_methods
 from hopping_leg.evaluate.transfer.study import Study, find_twins
 
 
@@ -32,16 +36,14 @@ from hopping_leg.evaluate.transfer.study import Study, find_twins
 class Experiment:
     """What is compared on which twins, and where it is kept."""
 
-    experiment: tyro.conf.Positional[Literal["transfer"]]
-    """Which experiment."""
+    experiment: tyro.conf.Positional[Literal["transfer", "prediction"]]
+    """Train and hop on the twins, or foretell hops."""
     twins: tuple[str, ...] = ("5",)
     """How many twins to draw, or robot files that extend what is believed of them."""
-    methods: tuple[str, ...] = DEFAULT
-    """What policies are trained on; the others are compared with the first. Valid: identified, cad,
-    table-1, randomised, rail-only, fixed-base-only, two-pass, one-pass, truth."""
-    untrained: tuple[str, ...] = UNTRAINED
-    """Of the same, what is compared without trainings: by how well its simulation foretells the
-    hops of a shipped policy. `none` for none."""
+    methods: tuple[str, ...] | None = None
+    """What policies are trained on, or what foretells; the others are compared with the first.
+    Valid: identified, cad, table-1, randomised (not to foretell), rail-only, fixed-base-only,
+    two-pass, one-pass, truth. Default: the first four; or all that can foretell."""
     seeds: tuple[int, ...] = (0,)
     """Of the trainings, one of each method and twin each."""
     recipe: str = Study.recipe
@@ -73,13 +75,14 @@ def run(args: Experiment) -> None:
     """Run the experiment, print the tables, write the JSON."""
     if args.jobs < 1:
         raise UsageError(f"--jobs is {args.jobs} but must be at least 1.")
-    from hopping_leg.evaluate.transfer.run import transfer
+    from hopping_leg.evaluate.transfer.run import predict, transfer
 
+    foretell = args.experiment == "prediction"
+    usual = FORETOLD if foretell else DEFAULT
     study = Study(
         args.folder,
         find_twins(args.twins, args.folder / "twins"),
-        tuple(choose_methods(args.methods)),
-        untrained=() if args.untrained == ("none",) else tuple(choose_methods(args.untrained)),
+        tuple(choose_methods(args.methods or usual)),
         seeds=args.seeds,
         recipe=args.recipe,
         steps=args.steps,
@@ -90,11 +93,11 @@ def run(args: Experiment) -> None:
         effects=args.effects,
         threads=args.threads,
     )
-    result = transfer(study, args.jobs)
+    result = predict(study, args.jobs) if foretell else transfer(study, args.jobs)
     if args.json is not None:
         command = command_line("hop experiment", args, KEPT | {"threads"})
         write_json(args.json, {"command": command, **result})
-    show(result)
+    (show_predictions if foretell else show)(result)
 
 
 def show(result: dict[str, Any]) -> None:
@@ -124,7 +127,12 @@ def show(result: dict[str, Any]) -> None:
             f" ({row['ratio_low']:.1f} to {row['ratio_high']:.1f})",
             highlight=False,
         )
-    for row in result["prediction"]:
+
+
+def show_predictions(result: dict[str, Any]) -> None:
+    """Print how far off each method's predictions are."""
+    console = Console()
+    for row in result["methods"]:
         console.print(
             f"{row['method']} foretells apexes to {_mm(row['median_abs_error_m'])} mm"
             f" ({_mm(row['median_abs_error_low_m'])} to {_mm(row['median_abs_error_high_m'])})",

@@ -21,13 +21,13 @@ from hopping_leg.cli import evaluate, experiment
 from hopping_leg.cli.output import write_json
 from hopping_leg.control.library import ENERGY_SHAPING, shipped_policies
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.transfer.methods import DEFAULT, UNTRAINED, choose_methods
+from hopping_leg.evaluate.transfer.methods import DEFAULT, choose_methods
 from hopping_leg.evaluate.transfer.study import SHORTEST, USUAL_FIT, Study, find_twins
 from hopping_leg.identify.least_squares import LeastSquaresOptions
 from hopping_leg.trace import write_atomically
 
 _MINIATURE = ("identified", "cad")
-_PAPER = (*DEFAULT, *UNTRAINED, "two-pass")
+_PAPER = (*DEFAULT, "rail-only", "fixed-base-only", "two-pass", "one-pass")
 _GLANCE = LeastSquaresOptions(rounds=1, evaluations=2)
 _MARK = "size.txt"
 

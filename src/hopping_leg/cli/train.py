@@ -42,7 +42,7 @@ class Options:
     source: Path | None = None
     """Begin from the newest checkpoint of this folder's run instead of from scratch."""
     set: tuple[str, ...] = ()
-    """Numbers of the recipe to change, e.g. `--set learning_rate=3e-4 gamma=0.98`."""
+    """Numbers of the recipe to change, e.g. `--set learning_rate=3e-4 reward.jerk=0.2`."""
     randomise: Literal["none", "twins", "surprises"] | None = None
     """What each leg in training draws for itself instead of the recipe's: nothing; friction,
     inertia and ground from the twins' ranges; or whatever may surprise a leg, from a payload to

@@ -53,10 +53,10 @@ class ApexRewardOptions:
     """Of v^2 anywhere, fading to zero until ``energy_until``."""
     energy_until: float = 0.35
     """Share of the training after which that gain is gone."""
-    energy_beyond: float | None = None
+    energy_beyond: float = 0.0
     """How far above the command the predicted apex is where the most of that gain has fallen to
-    1/e, m; None pays it at any height. A leg that is paid for hopping too high learns a gait for
-    it, stretched at every command, from which the narrow kernels do not lead back."""
+    1/e, m; 0 pays it at any height. A leg that is paid for hopping too high for long learns a gait
+    for it, stretched at every command, from which the narrow kernels do not lead back."""
     jerk: float = 0.15
     """Of the paper's Pj."""
     effort: float = 0.0
@@ -155,7 +155,7 @@ class ApexReward:
 
     def _gain(self, t: Transition, speed_squared: Array) -> Array:
         most: float | Array = _FASTEST_SQUARED
-        if self.options.energy_beyond is not None:
+        if self.options.energy_beyond > 0:
             above = np.maximum(self._predicted_apex(t, speed_squared) - t.command, 0.0)
             most = most * np.exp(-above / self.options.energy_beyond)
         gain: Array = np.minimum(speed_squared, most)

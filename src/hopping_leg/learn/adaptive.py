@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from torch import nn
 
 from hopping_leg.control.layouts import make_layout
-from hopping_leg.env import ApexRewardOptions, TaskOptions
+from hopping_leg.env import TaskOptions
 from hopping_leg.env.task import PRIVILEGED_CLEARANCE, PRIVILEGED_COMMAND, PRIVILEGED_HEIGHT
 from hopping_leg.errors import UsageError
 from hopping_leg.learn.actor import aiming_network
@@ -32,11 +32,6 @@ class AdaptiveRecipe(PreciseRecipe):
             PreciseRecipe().task, randomised=SURPRISES, chance=0.5, unchanged=0.5
         )
     )
-    reward: ApexRewardOptions = field(
-        default_factory=lambda: replace(PreciseRecipe().reward, energy_beyond=0.03)
-    )
-    """Of the teacher; on legs that lose little energy the precise recipe's leads to hops that are
-    too high at low commands."""
     aiming: Aiming = field(default_factory=Aiming)
     """Numbers of the memory."""
     feeling: tuple[int, ...] = (256, 128)

@@ -51,7 +51,7 @@ def change(recipe: Recipe, changes: Sequence[str]) -> Recipe:
 
     Args:
         recipe: The defaults.
-        changes: Each ``name=number``.
+        changes: Each ``name=number``, or ``part.name=number`` for a number of its reward, say.
 
     Raises:
         UsageError: The recipe has no such number, or the value is none.
@@ -72,6 +72,11 @@ def change(recipe: Recipe, changes: Sequence[str]) -> Recipe:
                 f"'{entry}' does not say {_KINDS[kind]}; give e.g. {name}={numbers[name]}."
             )
         values[name] = value
+    for name in [name for name in values if "." in name]:
+        part, _, number = name.partition(".")
+        values[part] = dataclasses.replace(
+            values.get(part, getattr(recipe, part)), **{number: values.pop(name)}
+        )
     return dataclasses.replace(recipe, **values)
 
 
@@ -96,9 +101,18 @@ def randomised_by(options: dict[str, Any]) -> Randomise | None:
 
 
 def numbers_of(recipe: Recipe) -> dict[str, int | float]:
-    """Return a recipe's plain numbers by name."""
-    fields = {f.name: getattr(recipe, f.name) for f in dataclasses.fields(recipe)}
-    return {name: value for name, value in fields.items() if isinstance(value, int | float)}
+    """Return a recipe's plain numbers by name; those of its task go with the robot's size."""
+    found: dict[str, int | float] = {}
+    for field in dataclasses.fields(recipe):
+        value = getattr(recipe, field.name)
+        if isinstance(value, int | float):
+            found[field.name] = value
+        elif dataclasses.is_dataclass(value) and field.name != "task":
+            inner = {
+                f"{field.name}.{f.name}": getattr(value, f.name) for f in dataclasses.fields(value)
+            }
+            found |= {name: v for name, v in inner.items() if isinstance(v, int | float)}
+    return found
 
 
 def changes_of(recipe: str, options: dict[str, Any]) -> list[str]:
@@ -111,7 +125,15 @@ def changes_of(recipe: str, options: dict[str, Any]) -> list[str]:
     if recipe not in RECIPES:
         return []
     defaults = numbers_of(RECIPES[recipe]())
-    return [f"{n}={options[n]}" for n, v in defaults.items() if options.get(n, v) != v]
+    stored = {name: _stored(options, name, default) for name, default in defaults.items()}
+    return [f"{name}={value}" for name, value in stored.items() if value != defaults[name]]
+
+
+def _stored(options: dict[str, Any], name: str, default: float) -> float:
+    """Return a number of stored options; a run from before it existed has its default."""
+    part, _, number = name.rpartition(".")
+    value: float = (options.get(part, {}) if part else options).get(number, default)
+    return value
 
 
 def words_of(recipe: str, options: dict[str, Any]) -> list[str]:

@@ -6,7 +6,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from hopping_leg.env import TaskOptions
 from hopping_leg.errors import UsageError
 from hopping_leg.learn.checkpoint import Tree, list_checkpoints, read_checkpoint
 from hopping_leg.learn.recipe import Recipe
@@ -35,6 +34,7 @@ class RunFolder:
         source: Path | None = None,
     ) -> None:
         self.path, self._source = path, source
+        self._defaults = _as_stored(asdict(type(recipe)()))
         self.config = _as_stored(
             {
                 "recipe": recipe.name,
@@ -122,9 +122,7 @@ class RunFolder:
         """
         stored = json.loads(self._config_file.read_text(encoding="utf-8"))
         # A run from before an option existed was asked for what is now its default.
-        task = stored.get("options", {}).get("task", {})
-        for name, value in _as_stored(asdict(TaskOptions())).items():
-            task.setdefault(name, value)
+        _complete(stored.get("options", {}), self._defaults)
         for key in ("recipe", "robot_digest", "seed", "minutes_budget", "source", "options"):
             if stored.get(key) != self.config[key]:
                 raise UsageError(
@@ -132,6 +130,13 @@ class RunFolder:
                     f" ({_short(stored.get(key))} instead of {_short(self.config[key])});"
                     " resume it with the options that it began with."
                 )
+
+
+def _complete(options: dict[str, Any], defaults: dict[str, Any]) -> None:
+    """Add what is missing, in the parts of the options, too."""
+    for name, value in defaults.items():
+        if isinstance(options.setdefault(name, value), dict) and isinstance(value, dict):
+            _complete(options[name], value)
 
 
 def _as_stored(values: dict[str, Any]) -> dict[str, Any]:

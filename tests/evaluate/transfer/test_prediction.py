@@ -5,9 +5,8 @@ import json
 import pytest
 
 from hopping_leg.evaluate.transfer import hopping
-from hopping_leg.evaluate.transfer.methods import choose_methods
 from hopping_leg.evaluate.transfer.prediction import Foretell, Meet, prediction_rows
-from hopping_leg.evaluate.transfer.run import fits, foretold, met, records
+from hopping_leg.evaluate.transfer.run import foretold, met
 from tests.evaluate.transfer.studies import study
 
 
@@ -32,15 +31,6 @@ def test_errors_are_predicted_minus_measured_apexes_of_the_same_twin(tmp_path):
     assert other["median_abs_error_m"] == pytest.approx(0.03)
     assert other["worst_abs_error_m"] == pytest.approx(0.06)
     assert other["errors_m"]["twin-1"] == pytest.approx([-0.04, 0.06])
-
-
-def test_what_is_not_trained_on_is_fitted_and_foretells_all_the_same(tmp_path):
-    more = tuple(choose_methods(["rail-only", "identified"]))
-    one = study(tmp_path, ("identified", "randomised"), untrained=more)
-    assert [m.name for m in one.compared] == ["identified", "randomised", "rail-only"]
-    assert {job.method.name for job in fits(one)} == {"identified", "rail-only"}
-    assert {job.method.name for job in foretold(one)} == {"identified", "rail-only"}
-    assert len(records(one)) == 4
 
 
 def test_the_policy_hops_in_the_methods_simulation(tmp_path, monkeypatch):

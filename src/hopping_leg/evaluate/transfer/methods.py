@@ -70,8 +70,10 @@ METHODS = {
 DEFAULT = ("identified", "cad", "table-1", "randomised")
 """What policies are trained on unless asked otherwise."""
 
-UNTRAINED = ("rail-only", "fixed-base-only", "one-pass")
-"""What is compared by its predictions alone unless asked otherwise: ablations of identification."""
+FORETOLD = (
+    "identified", "cad", "table-1", "rail-only", "fixed-base-only", "two-pass", "one-pass", "truth",
+)  # fmt: skip
+"""Whose predictions are compared unless asked otherwise, ablations of identification among them."""
 
 
 def choose_methods(names: Sequence[str]) -> list[Method]:

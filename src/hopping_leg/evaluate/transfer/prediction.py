@@ -97,7 +97,6 @@ def prediction_rows(foretold: Sequence[Foretell], met: Sequence[Meet]) -> list[d
         rows.append({
             "method": method.name,
             "meaning": method.meaning,
-            "policy": POLICY,
             "median_abs_error_m": float(np.median(np.concatenate(absolute))),
             "median_abs_error_low_m": low,
             "median_abs_error_high_m": high,

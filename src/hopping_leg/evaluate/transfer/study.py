@@ -55,9 +55,6 @@ class Study:
     folder: Path
     twins: tuple[TwinFile, ...]
     methods: tuple[Method, ...]
-    """On what policies are trained."""
-    untrained: tuple[Method, ...] = ()
-    """Further ones, which only foretell how a shipped policy hops on the twins, as all do."""
     seeds: tuple[int, ...] = (0,)
     """Of the trainings, one each."""
     recipe: str = "fast"
@@ -93,11 +90,6 @@ class Study:
     def recording(self, twin: TwinFile, rig: str) -> Path:
         """Return the file of a recording of a twin on a rig."""
         return self.folder / "recordings" / f"{twin.name}-{rig}.parquet"
-
-    @property
-    def compared(self) -> tuple[Method, ...]:
-        """Every method once, those that are trained on first."""
-        return tuple(dict.fromkeys((*self.methods, *self.untrained)))
 
     def simulated(self, twin: TwinFile, method: Method) -> Robot:
         """Return what a method believes a twin to be; what it fits must be there.

@@ -45,6 +45,24 @@ def tabulate(
         for c in study.commands
     ]
     return {
+        **about(study),
+        "training_seeds": list(study.seeds),
+        "recipe": study.recipe,
+        "training_steps": study.steps,
+        "rows": rows,
+        "methods": [_whole(method, trials, study) for method in study.methods],
+        "comparison": [
+            compare(study.methods[0].name, other.name, trials, _SEED) for other in study.methods[1:]
+        ],
+        "identification": [fit_row(fit) for fit in fits],
+        "trainings": [_training(training) for training in trainings],
+        "trials": trials,
+    }
+
+
+def about(study: Study) -> Row:
+    """Return what every study's results begin with: the twins and how they were met."""
+    return {
         "twins": [
             {
                 "name": twin.name,
@@ -54,20 +72,9 @@ def tabulate(
             }
             for twin in study.twins
         ],
-        "training_seeds": list(study.seeds),
-        "recipe": study.recipe,
-        "training_steps": study.steps,
         "recording_seconds": study.seconds,
         "evaluation_seed": FIRST_SEED,
         "evaluation_seeds": study.repeats,
-        "rows": rows,
-        "methods": [_whole(method, trials, study) for method in study.methods],
-        "comparison": [
-            compare(study.methods[0].name, other.name, trials, _SEED) for other in study.methods[1:]
-        ],
-        "identification": [_fit(fit) for fit in fits],
-        "trainings": [_training(training) for training in trainings],
-        "trials": trials,
         "versions": software_versions(),
     }
 
@@ -139,7 +146,8 @@ def _ordered(run: Sequence[Row]) -> bool:
     return moves and all(low < high for low, high in itertools.pairwise(apexes))
 
 
-def _fit(fit: Identify) -> Row:
+def fit_row(fit: Identify) -> Row:
+    """Return how well a fit went: errors on data it has not seen, and its parameters."""
     file = fit.study.fitted(fit.twin, fit.method).with_suffix(".json")
     found = json.loads(file.read_text(encoding="utf-8"))
     before, after = found["start_validation"], found["validation"]
