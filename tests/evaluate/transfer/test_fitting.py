@@ -39,7 +39,7 @@ def test_a_fit_belongs_to_its_recordings(identified, tmp_path, monkeypatch):
     assert believed == "legv2"
     assert [r.digest for r in recordings] == [load_recording(file).digest]
     assert job.done
-    row = tables._fit(job)
+    row = tables.fit_row(job)
     truth = {p["name"]: p["truth"] for p in row["parameters"]}
     assert truth["hip.friction"] == one.twins[0].robot.hip.friction
     record(LEG.robot, swing(3.0)).save(file)
