@@ -161,7 +161,7 @@ def test_the_command_measures_keeps_and_goes_on(tmp_path):
     assert all(row["s_per_candidate"] > 0 for row in speed["rows"])
     assert [row["bar"] for row in first["bars"]] == [3.0, 1.8]
     assert "--throughput-seconds 12" in first["command"]
-    assert str(tmp_path) not in first["command"]
+    assert "--out" not in first["command"]
     assert main([*words, *sizes]) == 0
     assert json.loads(file.read_text())["throughput"] == speed
 
