@@ -41,7 +41,7 @@ class Experiment:
     twins: tuple[str, ...] = ("5",)
     """How many twins to draw, or robot files that extend what is believed of them."""
     methods: tuple[str, ...] | None = None
-    """What policies are trained on, or what foretells; the others are compared with the first.
+    """What policies are trained on, the others being compared with the first; or what foretells.
     Valid: identified, cad, table-1, randomised (not to foretell), rail-only, fixed-base-only,
     two-pass, one-pass, truth. Default: the first four; or all that can foretell."""
     seeds: tuple[int, ...] = (0,)

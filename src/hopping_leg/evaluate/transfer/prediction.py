@@ -1,4 +1,4 @@
-"""What a method's simulation foretells of a policy that was trained on none of the legs.
+"""What a method's simulation foretells of a policy that was trained on none of the twins.
 
 One shipped policy hops in the simulation and on the twin; how far its apexes differ is what the
 simulation gets wrong, without what a training adds.
