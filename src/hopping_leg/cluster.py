@@ -28,10 +28,7 @@ class RayCluster:
                 _knock(address)
                 self._ray.init(address=address or "local", log_to_driver=False)
             except (OSError, ValueError, RuntimeError) as error:
-                raise UsageError(
-                    f"There is no Ray cluster at {address}: {str(error).rstrip('.')}; start one"
-                    " with `ray start --head`, or leave the address out."
-                ) from error
+                raise UsageError(_unreached(address, str(error).rstrip("."))) from error
 
     @property
     def cores(self) -> int:
@@ -74,6 +71,15 @@ class RayCluster:
 
 def _call(function: Callable[..., Any], *values: Any) -> Any:  # noqa: ANN401
     return function(*values)
+
+
+def _unreached(address: str | None, why: str) -> str:
+    if address in (None, "local"):
+        return f"Ray does not start on this machine: {why}; name a cluster by its address instead."
+    return (
+        f"There is no Ray cluster at {address}: {why}; start one with `ray start --head`, or leave"
+        " the address out."
+    )
 
 
 def _knock(address: str | None) -> None:

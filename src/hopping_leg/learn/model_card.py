@@ -6,6 +6,9 @@ from typing import Any
 
 from hopping_leg.trace import write_atomically
 
+MISSED = 0.02
+"""Median error beyond which a policy does not do what it is told, m; the robustness suite's."""
+
 
 def write_card(folder: Path) -> Path:
     """Write ``model_card.md`` into a run's folder from its ``result.json``."""
@@ -43,6 +46,26 @@ step 0.5 ms, the first 2 s of each trial dropped. These seeds chose the policy; 
 {result["recipe"]}` judges it on others.
 
 {table(selected["trials"])}
+{doubt(selected["trials"])}"""
+
+
+def doubt(trials: list[dict[str, Any]]) -> str:
+    """Return a paragraph on the commands that a policy misses in its own simulation, if any.
+
+    Args:
+        trials: Rows of ``judge``.
+    """
+    errors = {t["command_m"]: t["median_error_m"] for t in trials}
+    missed = [
+        f"{command:.2f} m ({'no hops' if error is None else f'{1000 * error:+.0f} mm'})"
+        for command, error in errors.items()
+        if error is None or abs(error) > MISSED
+    ]
+    if not missed:
+        return ""
+    return f"""
+**Commands missed in its own simulation: {", ".join(missed)}.** Train longer or from another seed
+before this policy goes to any other leg.
 """
 
 

@@ -1,0 +1,21 @@
+import pytest
+
+from hopping_leg.learn.model_card import MISSED, doubt
+
+
+def trials(**errors):
+    return [
+        {"command_m": int(name[1:]) / 100, "median_error_m": error}
+        for name, error in errors.items()
+    ]
+
+
+@pytest.mark.parametrize("error", [0.0, MISSED, -MISSED])
+def test_a_policy_that_does_what_it_is_told_is_not_doubted(error):
+    assert doubt(trials(_22=error, _30=0.001)) == ""
+
+
+def test_a_card_names_every_command_that_its_own_simulation_misses():
+    said = doubt(trials(_22=0.235, _25=0.004, _30=-0.021, _35=None))
+    assert "0.22 m (+235 mm), 0.30 m (-21 mm), 0.35 m (no hops)" in said
+    assert "0.25" not in said
