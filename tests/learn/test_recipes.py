@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from hopping_leg.errors import UsageError
 from hopping_leg.learn.recipes import RECIPES, change, changes_of, get_recipe, randomise
 from hopping_leg.learn.run_folder import RunFolder
+from hopping_leg.learn.scale import fit
 from hopping_leg.robot import load_robot
 from hopping_leg.sim.twins import Range
 
@@ -98,3 +99,10 @@ def test_a_run_says_what_its_policy_saw_where_that_is_not_the_recipes(tmp_path):
     bare = dataclasses.replace(recipe, task=task)
     command = RunFolder(tmp_path, bare, robot, 0, None).command
     assert "--observation three-samples" in command
+
+
+def test_a_run_says_for_which_heights_it_was_asked(tmp_path):
+    recipe, robot = get_recipe("precise"), load_robot("legv2")
+    assert "--heights" not in RunFolder(tmp_path, recipe, robot, 0, None).command
+    wide = fit(dataclasses.replace(recipe, heights=(0.2, 0.46)), robot)
+    assert "--heights 0.2 0.46" in RunFolder(tmp_path, wide, robot, 0, None).command

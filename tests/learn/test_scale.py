@@ -1,7 +1,10 @@
+import dataclasses
+
 import pytest
 
 from hopping_leg.learn.fast import FastRecipe
 from hopping_leg.learn.paper import PaperRecipe
+from hopping_leg.learn.precise import PreciseRecipe
 from hopping_leg.learn.scale import fit
 from hopping_leg.robot import load_robot, shipped_robots
 
@@ -27,3 +30,14 @@ def test_every_shipped_leg_can_stand_and_reach_its_commands(recipe, name):
     assert (fitted.task.action_torque <= robot.of_joints("torque_limit")).all()
     env = fitted.__class__.make_env(fitted, robot, 0)
     assert (env.task.legs.height > 0.3 * robot.straight_height).all()
+
+
+@pytest.mark.parametrize("recipe", [PaperRecipe(), PreciseRecipe()], ids=["paper", "precise"])
+@pytest.mark.parametrize("name", LEGS)
+def test_heights_that_are_asked_for_are_those_of_any_leg(recipe, name):
+    asked = dataclasses.replace(recipe, heights=(0.21, 0.47))
+    fitted = fit(asked, load_robot(name))
+    assert fitted.task.command_bounds == (0.21, 0.47)
+    assert len(fitted.judge_commands) == len(recipe.judge_commands)
+    assert 0.21 < min(fitted.judge_commands) < max(fitted.judge_commands) < 0.47
+    assert fitted.task.action_torque == fit(recipe, load_robot(name)).task.action_torque

@@ -49,6 +49,8 @@ class Options:
     late commands."""
     observation: Literal["three-samples", "dated", "dated-long"] | None = None
     """What the policy sees instead of what the recipe shows it; three-samples is the paper's."""
+    heights: tuple[float, float] | None = None
+    """Lowest and highest height that the policy can be told, m, instead of the recipe's."""
     minutes: float | None = None
     """Stop after so much wall-clock time; default: when the recipe's steps are done."""
     steps: int | None = None
@@ -80,6 +82,7 @@ def run(args: Options) -> None:
     if args.observation is not None:
         task = dataclasses.replace(recipe.task, observation=args.observation)
         recipe = dataclasses.replace(recipe, task=task)
+    recipe = dataclasses.replace(recipe, heights=args.heights)
     out = args.out or Path("runs") / f"{args.recipe}-seed{args.seed}"
     try:
         trained = train(

@@ -23,6 +23,9 @@ class Recipe(ABC):
 
     task: TaskOptions = field(default_factory=TaskOptions)
     """The learning problem."""
+    heights: tuple[float, float] | None = None
+    """Lowest and highest desired height, m, on whatever leg; none takes the task's, which grow with
+    the leg."""
     legs: int = 16
     """Legs that gather experience at once."""
     steps: int = 1_000_000

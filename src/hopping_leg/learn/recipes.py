@@ -151,5 +151,7 @@ def words_of(recipe: str, options: dict[str, Any]) -> list[str]:
         words += ["--randomise", ranges]
     if seen != usual["task"]["observation"]:
         words += ["--observation", seen]
+    if options.get("heights"):
+        words += ["--heights", *map(str, options["heights"])]
     changes = changes_of(recipe, options)
     return [*words, "--set", *changes] if changes else words

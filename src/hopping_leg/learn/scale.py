@@ -3,6 +3,8 @@
 import dataclasses
 from typing import TypeVar
 
+import numpy as np
+
 from hopping_leg.env import TaskOptions
 from hopping_leg.learn.recipe import Recipe
 from hopping_leg.robot.parameters import Robot
@@ -21,7 +23,26 @@ def fit(recipe: R, robot: Robot) -> R:
 
     Heights and lengths grow with the straight leg, rounded to 5 mm; torques with mass times length,
     rounded to 0.5 N m and within the motors' limit. A leg of the paper's height keeps the recipe.
+    Heights that the recipe gives as they are stay so; trials lie in their inner four fifths.
+
+    Raises:
+        UsageError: Those heights are no range of heights.
     """
+    return _take_heights(_grow(recipe, robot))
+
+
+def _take_heights(recipe: R) -> R:
+    if recipe.heights is None:
+        return recipe
+    task = dataclasses.replace(recipe.task, command_range=recipe.heights)
+    low, high = task.command_bounds
+    edge = 0.1 * (high - low)
+    judged = np.linspace(low + edge, high - edge, len(recipe.judge_commands))
+    heights = tuple(float(_round(height)) for height in judged)
+    return dataclasses.replace(recipe, task=task, judge_commands=heights)
+
+
+def _grow(recipe: R, robot: Robot) -> R:
     ratio = robot.straight_height / HEIGHT
     if abs(ratio - 1) < 0.01:
         return recipe
