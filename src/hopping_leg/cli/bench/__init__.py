@@ -4,6 +4,7 @@ Examples:
   hop bench env --json env.json
   hop bench convergence --json convergence.json
   hop bench inference fast --json inference.json
+  hop bench reach --json reach.json
   hop bench training --training-seeds 0 1 2 --json training.json
   hop bench faults --json faults.json
   hop bench deploy --json deploy.json
@@ -22,7 +23,7 @@ from hopping_leg.cli.bench.finetuning import Finetune
 from hopping_leg.cli.bench.hardware import Deploy
 from hopping_leg.cli.bench.identification import Identify
 from hopping_leg.cli.bench.probe import Probe
-from hopping_leg.cli.bench.simulation import Convergence, Env, Inference
+from hopping_leg.cli.bench.simulation import Convergence, Env, Inference, Reach
 from hopping_leg.cli.bench.view import View
 from hopping_leg.cli.command_line import KEPT, command_line, verb_of
 from hopping_leg.cli.output import write_json
@@ -31,6 +32,7 @@ Benchmark = (
     Env
     | Convergence
     | Inference
+    | Reach
     | EnergyShaping
     | Training
     | Ablation

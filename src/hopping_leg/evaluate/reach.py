@@ -1,0 +1,220 @@
+"""How high the leg can hop with its torque: a search over ways to push, with nothing hidden.
+
+No noise, no delay, and the true state decides: in flight the leg is held at a length, on the ground
+hip and knee pull with torques that depend on whether the base falls or rises and on the leg's
+length. CMA-ES looks for what keeps hopping highest. It is a lower bound of what is physically
+possible and an upper one of what a policy, which must also be accurate, can be asked for.
+"""
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import cma
+import numpy as np
+
+from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.hops import CLEAR
+from hopping_leg.robot.kinematics import foot_position, joint_angles
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim import Legs
+
+KNOTS = (0.45, 0.65, 0.85, 0.97)
+"""Leg lengths, over the straight leg's, between which the torques are interpolated."""
+
+_SIZE = 1 + 4 * len(KNOTS)
+_FLIGHT = (0.6, 0.97)
+"""Shortest and longest leg in flight, over the straight leg's."""
+
+_START = 0.7
+"""Leg length of the standing start, over the straight leg's."""
+
+_STIFFNESS, _DAMPING = 20.0, 0.5
+"""Joint PD in flight, N m/rad and N m s/rad."""
+
+_SETTLE = 0.5
+"""Share of a trial at its start that does not count."""
+
+_SHORTEST_FLIGHT = 0.1
+"""s."""
+
+_LEAST_HOPS = 3
+"""Hops in the rest without which a leg does not hop on."""
+
+_STEP = 0.3
+"""First step size of the search; parameters lie between 0 and 1."""
+
+
+@dataclass(frozen=True)
+class ReachStudy:
+    """What is searched and for how long."""
+
+    robot: Robot
+    torques: tuple[tuple[float, float], ...]
+    """Largest torques of hip and knee, N m at the joints, one search each."""
+    generations: int = 150
+    """Generations of CMA-ES."""
+    population: int = 32
+    """Candidates per generation."""
+    seconds: float = 5.0
+    """Of a trial; its first half does not count."""
+    seed: int = 0
+    """Of the search."""
+    threads: int = 0
+    """Of the physics, 0 for one per core."""
+
+
+def measure_reach(
+    study: ReachStudy, on_done: Callable[[int, int], None] | None = None
+) -> dict[str, Any]:
+    """Search for the highest lasting hops within each pair of torques.
+
+    Args:
+        study: What is searched.
+        on_done: Called with the generations that are done and all.
+
+    Returns:
+        ``rows``, one per pair: median apex, hops per second, share in flight, RMS torques.
+    """
+    count, total = itertools.count(1), study.generations * len(study.torques)
+
+    def say() -> None:
+        if on_done is not None:
+            on_done(next(count), total)
+
+    return {
+        "rows": [_search(study, np.array(limit), say) for limit in study.torques],
+        "robot": study.robot.name,
+        "generations": study.generations,
+        "population": study.population,
+        "seed": study.seed,
+        "duration_s": study.seconds,
+    }
+
+
+def _search(study: ReachStudy, limit: Array, on_done: Callable[[], None]) -> dict[str, Any]:
+    rng = np.random.default_rng(study.seed)
+    settings = {
+        "bounds": [0.0, 1.0],
+        "popsize": study.population,
+        "randn": lambda *shape: rng.standard_normal(shape),
+        "seed": np.nan,
+        "verbose": -9,
+    }
+    strategy = cma.CMAEvolutionStrategy(np.full(_SIZE, 0.5), _STEP, settings)
+    best, found = -np.inf, np.full(_SIZE, 0.5)
+    for _ in range(study.generations):
+        candidates = strategy.ask()
+        scores = [trial.score for trial in hop(study, np.array(candidates), limit)]
+        strategy.tell(candidates, [-score for score in scores])
+        if max(scores) > best:
+            best, found = max(scores), candidates[int(np.argmax(scores))]
+        on_done()
+    (trial,) = hop(study, np.array([found]), limit)
+    return {
+        "hip_limit_nm": float(limit[0]),
+        "knee_limit_nm": float(limit[1]),
+        "apex_m": trial.apex,
+        "hop_rate_hz": trial.hops / (study.seconds * (1 - _SETTLE)),
+        "flight_fraction": trial.flight,
+        "rms_hip_torque_nm": float(trial.rms[0]),
+        "rms_knee_torque_nm": float(trial.rms[1]),
+        "body_contacts": trial.contacts,
+    }
+
+
+@dataclass(frozen=True)
+class Trial:
+    """How one way to push hopped after the start.
+
+    Attributes:
+        apex: Median apex, m; 0 where the leg does not hop on.
+        hops: Whole flights.
+        flight: Share of the time with the foot off the ground.
+        rms: Of the torques of hip and knee, N m, (2,).
+        contacts: Ticks with base or knee on the ground, from the start on.
+    """
+
+    apex: float
+    hops: int
+    flight: float
+    rms: Array
+    contacts: int
+
+    @property
+    def score(self) -> float:
+        """Apex, less for every touch of base or knee, m."""
+        return self.apex - 0.01 * self.contacts
+
+
+def hop(study: ReachStudy, ways: Array, limit: Array) -> list[Trial]:
+    """Let legs hop, each in its way.
+
+    Args:
+        study: Robot and duration.
+        ways: Leg length in flight, then torques over the limit at the knots, for the falling hip
+            and knee and the rising hip and knee; 0 to 1, (n, 1 + 4 knots).
+        limit: Largest torques of hip and knee, N m, (2,).
+    """
+    robot, count = study.robot, len(ways)
+    straight = robot.thigh.length + robot.shank.length
+    legs = Legs(robot, count, threads=study.threads)
+    legs.stand(slice(None), joint_angles(robot, np.array([_START * straight, 0.0])))
+    low, high = _FLIGHT
+    lengths = straight * (low + (high - low) * ways[:, 0])
+    posture = joint_angles(robot, np.stack([lengths, np.zeros(count)], axis=1))
+    share = 2 * ways[:, 1:].reshape(count, 2, 2, len(KNOTS)) - 1
+    ticks = round(study.seconds * legs.rate)
+    height, clearance = np.empty((ticks, count)), np.empty((ticks, count))
+    given, touched = np.empty((ticks, count, 2)), np.empty((ticks, count), np.bool_)
+    for tick in range(ticks):
+        height[tick], clearance[tick] = legs.height, legs.foot_clearance()
+        touched[tick] = np.minimum(legs.base_clearance(), legs.knee_clearance()) <= 0
+        held = _STIFFNESS * (posture - legs.q) - _DAMPING * legs.qd
+        length = np.linalg.norm(foot_position(robot, legs.q), axis=1) / straight
+        pushed = limit * _interpolate(share, legs.height_rate >= 0, length)
+        torque = np.where((clearance[tick] > 0)[:, None], held, pushed)
+        given[tick] = legs.step(np.clip(torque, -limit, limit))
+    first = round(_SETTLE * ticks)
+    shortest = round(_SHORTEST_FLIGHT * legs.rate)
+    trials = []
+    for leg in range(count):
+        flying = clearance[first:, leg] >= CLEAR
+        tops = flight_tops(height[first:, leg], flying, shortest)
+        trials.append(
+            Trial(
+                apex=float(np.median(tops)) if len(tops) >= _LEAST_HOPS else 0.0,
+                hops=len(tops),
+                flight=float(np.mean(flying)),
+                rms=np.sqrt(np.mean(np.square(given[first:, leg]), axis=0)),
+                contacts=int(touched[:, leg].sum()),
+            )
+        )
+    return trials
+
+
+def flight_tops(height: Array, flying: BoolArray, shortest: int) -> Array:
+    """Return the highest point of every whole flight, m, (flights,).
+
+    A leg that is thrown about in the air moves its base up and down, so apexes would count double.
+
+    Args:
+        height: Base height, m, (ticks,).
+        flying: Whether the foot is clear of the ground, (ticks,).
+        shortest: Ticks below which it is no flight but a bounce.
+    """
+    edges = np.flatnonzero(flying[1:] != flying[:-1]) + 1
+    flights = [(a, b) for a, b in itertools.pairwise(edges) if flying[a] and b - a >= shortest]
+    return np.array([height[a:b].max() for a, b in flights])
+
+
+def _interpolate(share: Array, rising: BoolArray, length: Array) -> Array:
+    """Return torques over the limit for leg lengths over the straight leg's, (n, 2)."""
+    rows = np.arange(len(share))
+    at = np.clip(np.interp(length, KNOTS, range(len(KNOTS))), 0, len(KNOTS) - 1)
+    lower = np.minimum(at.astype(np.int64), len(KNOTS) - 2)
+    rest = (at - lower)[:, None]
+    now = share[rows, rising.astype(np.int64)]
+    result: Array = now[rows, :, lower] * (1 - rest) + now[rows, :, lower + 1] * rest
+    return result
