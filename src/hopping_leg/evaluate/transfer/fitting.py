@@ -32,7 +32,10 @@ class Identify:
     twin: TwinFile
     method: Method
 
-    weight = 0.5
+    @property
+    def weight(self) -> float:
+        """Rough time, min."""
+        return 10.0 if self.study.least_squares == USUAL_FIT else 1.0
 
     @property
     def name(self) -> str:

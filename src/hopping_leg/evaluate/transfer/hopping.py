@@ -39,7 +39,7 @@ class Tried(ABC):
     study: Study
     twin: TwinFile
 
-    weight = 0.2
+    weight = 0.3
 
     @property
     @abstractmethod

@@ -24,7 +24,7 @@ class Record:
     twin: TwinFile
     rig: Rig
 
-    weight = 0.2
+    weight = 0.1
 
     @property
     def name(self) -> str:

@@ -21,7 +21,10 @@ class Train:
     method: Method
     seed: int
 
-    weight = 4.0
+    @property
+    def weight(self) -> float:
+        """Rough time, min."""
+        return self.study.steps / 600_000
 
     @property
     def name(self) -> str:

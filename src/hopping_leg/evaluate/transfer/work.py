@@ -21,7 +21,7 @@ class Job(Protocol):
 
     @property
     def weight(self) -> float:
-        """Rough share of the work, for the time left."""
+        """Rough time it takes one core, min, for the time left."""
         ...
 
     @property
