@@ -76,20 +76,22 @@ class Exposed:
         self._layout = make_layout(policy.card.layout, 1 / policy.card.rate)
         self._graph = Graph(graph)
         self.seen: list[Inputs] = []
+        self.given: list[dict[str, npt.NDArray[np.float32]]] = []
 
     def reset(self, count: int) -> None:
         """Forget everything."""
         self._layout.reset(count)
         self._graph.reset(count)
         self._torque = np.zeros((count, 2))
-        self.seen = []
+        self.seen, self.given = [], []
 
     def act(self, measurement: Measurement) -> Array:
         """Return joint torques, N m, (n, 2)."""
         self._layout.update(measurement, self._torque)
         inputs = {name: np.array(values) for name, values in self._layout.inputs().items()}
         self.seen.append(inputs)
-        self._torque = self._graph.run(inputs)["torque"].astype(np.float64)
+        self.given.append(self._graph.run(inputs))
+        self._torque = self.given[-1]["torque"].astype(np.float64)
         return self._torque
 
     def internals(self) -> dict[str, Array]:
@@ -121,9 +123,7 @@ def record(
     flat = [[v.reshape(count, -1) for v in inputs.values()] for inputs in seen[first:]]
     features = {OBSERVATION: np.stack([np.concatenate(tick, axis=1) for tick in flat])}
     for suffix, content in graphs.items():
-        graph = Graph(content)
-        graph.reset(count)
-        given = [graph.run(inputs) for inputs in seen][first:]
+        given = (_shown(Graph(content), seen, count) if suffix else controller.given)[first:]
         features |= {
             name + suffix: np.stack([tick[name] for tick in given])
             for name in given[0]
@@ -131,6 +131,14 @@ def record(
         }
     exact = {name: values.astype(np.float64) for name, values in features.items()}
     return Recording(exact, {k: v[first:] for k, v in run.data.items()}, setup.rate)
+
+
+def _shown(
+    graph: Graph, seen: list[Inputs], count: int
+) -> list[dict[str, npt.NDArray[np.float32]]]:
+    """Return what a graph computes where n legs show it what another saw, tick by tick."""
+    graph.reset(count)
+    return [graph.run(inputs) for inputs in seen]
 
 
 def _open(content: bytes) -> Any:  # noqa: ANN401
