@@ -35,6 +35,11 @@ def test_a_search_is_repeatable_and_keeps_within_its_torques():
     assert found[0]["rms_knee_torque_nm"] <= 3.0
 
 
+def test_more_torque_reaches_no_less():
+    rows = measure_reach(study((6.0, 6.0), (6.0, 12.0), seconds=3.0))["rows"]
+    assert 0.3 < rows[0]["apex_m"] <= rows[1]["apex_m"]
+
+
 def test_without_torque_there_is_no_hop_and_progress_is_told():
     told = []
     rows = measure_reach(study((1e-3, 1e-3), (1e-3, 1e-3)), lambda n, all_: told.append((n, all_)))

@@ -52,7 +52,8 @@ class ReachStudy:
 
     robot: Robot
     torques: tuple[tuple[float, float], ...]
-    """Largest torques of hip and knee, N m at the joints, one search each."""
+    """Largest torques of hip and knee, N m at the joints, one search each, which begins with what
+    the one before found."""
     generations: int = 150
     """Generations of CMA-ES."""
     population: int = 32
@@ -83,8 +84,13 @@ def measure_reach(
         if on_done is not None:
             on_done(next(count), total)
 
+    rows, way, before = [], np.full(_SIZE, 0.5), np.zeros(2)
+    for limit in map(np.array, study.torques):
+        way = _search(study, limit, _with_limit(way, before, limit), say)
+        rows.append(_row(study, way, limit))
+        before = limit
     return {
-        "rows": [_search(study, np.array(limit), say) for limit in study.torques],
+        "rows": rows,
         "robot": study.robot.name,
         "generations": study.generations,
         "population": study.population,
@@ -93,7 +99,14 @@ def measure_reach(
     }
 
 
-def _search(study: ReachStudy, limit: Array, on_done: Callable[[], None]) -> dict[str, Any]:
+def _with_limit(way: Array, before: Array, limit: Array) -> Array:
+    """Return the way with the same torques, as far as another limit allows, (size,)."""
+    torques = (way[1:] - 0.5).reshape(2, 2, len(KNOTS)) * (before / limit)[:, None]
+    return np.append(way[0], np.clip(0.5 + torques, 0, 1).ravel())
+
+
+def _search(study: ReachStudy, limit: Array, start: Array, on_done: Callable[[], None]) -> Array:
+    """Return the best way to push that was found, no worse than the first, (size,)."""
     rng = np.random.default_rng(study.seed)
     settings = {
         "bounds": [0.0, 1.0],
@@ -102,16 +115,21 @@ def _search(study: ReachStudy, limit: Array, on_done: Callable[[], None]) -> dic
         "seed": np.nan,
         "verbose": -9,
     }
-    strategy = cma.CMAEvolutionStrategy(np.full(_SIZE, 0.5), _STEP, settings)
-    best, found = -np.inf, np.full(_SIZE, 0.5)
+    strategy = cma.CMAEvolutionStrategy(start, _STEP, settings)
+    (first,) = hop(study, start[None], limit)
+    best, found = first.score, start
     for _ in range(study.generations):
         candidates = strategy.ask()
         scores = [trial.score for trial in hop(study, np.array(candidates), limit)]
         strategy.tell(candidates, [-score for score in scores])
         if max(scores) > best:
-            best, found = max(scores), candidates[int(np.argmax(scores))]
+            best, found = max(scores), np.array(candidates[int(np.argmax(scores))])
         on_done()
-    (trial,) = hop(study, np.array([found]), limit)
+    return found
+
+
+def _row(study: ReachStudy, way: Array, limit: Array) -> dict[str, Any]:
+    (trial,) = hop(study, way[None], limit)
     return {
         "hip_limit_nm": float(limit[0]),
         "knee_limit_nm": float(limit[1]),
