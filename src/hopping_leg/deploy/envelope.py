@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from hopping_leg.deploy.observation import Pair
 from hopping_leg.robot.parameters import Robot
 
-MARGIN = 0.5
-"""How far a hopping leg may pass its soft limits, rad; the soft limits' PD acts before."""
+MARGINS = (0.9, 0.5)
+"""How far hip and knee of a hopping leg may pass their soft limits, rad. The soft limits' PD acts
+before; it gives way where a policy swings the leg, most of all at the hip, whose mechanical stops
+are far."""
 
 RECORDING_MARGIN = 0.1
 """How far a recorded leg may pass its mechanical range, rad: backlash and the belt's give."""
@@ -63,8 +65,10 @@ def hopping_envelope(robot: Robot, rate: float) -> Envelope:
         rate: Control rate, Hz.
     """
     ranges = [
-        (max(joint.lower - MARGIN, servo.lower), min(joint.upper + MARGIN, servo.upper))
-        for joint, servo in zip((robot.hip, robot.knee), robot.hardware.servos, strict=True)
+        (max(joint.lower - margin, servo.lower), min(joint.upper + margin, servo.upper))
+        for joint, servo, margin in zip(
+            (robot.hip, robot.knee), robot.hardware.servos, MARGINS, strict=True
+        )
     ]
     return _envelope(robot, rate, ranges)
 

@@ -1,0 +1,32 @@
+import numpy as np
+import pytest
+
+from hopping_leg.control import Setup, roll_out
+from hopping_leg.control.library import load_controller
+from hopping_leg.deploy.envelope import hopping_envelope, recording_envelope
+from hopping_leg.robot import load_robot
+from hopping_leg.sim import NOTHING
+
+LEG = load_robot("legv2-paper")
+
+
+@pytest.mark.parametrize(
+    "name", ["fast", "precise", "adaptive", "recurrent", "paper", "energy-shaping"]
+)
+def test_who_hops_as_trained_is_not_stopped_for_it(name):
+    limits = hopping_envelope(LEG, 200.0)
+    commands = np.tile([0.25, 0.30, 0.35], (800, 1))
+    run = roll_out(load_controller(name, LEG), Setup(LEG, NOTHING, threads=1), commands, seed=0)
+    for joint, lower, upper in zip(("hip", "knee"), limits.lower, limits.upper, strict=True):
+        angle = run.data[f"{joint}_position_rad"]
+        assert lower < angle.min() < angle.max() < upper
+
+
+def test_no_leg_may_go_where_its_mechanism_ends():
+    limits = hopping_envelope(LEG, 200.0)
+    stops = [(servo.lower, servo.upper) for servo in LEG.hardware.servos]
+    for (low, high), lower, upper in zip(stops, limits.lower, limits.upper, strict=True):
+        assert low <= lower < upper <= high
+    recording = recording_envelope(LEG, 200.0)
+    assert (np.array(recording.lower) <= limits.lower).all()
+    assert (np.array(recording.upper) >= limits.upper).all()
