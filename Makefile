@@ -66,18 +66,13 @@ results: $(STAMP)
 	$(BIN)/hop bench engines --json docs/results/bullet.json
 	$(BIN)/hop bench energy-shaping --json docs/results/energy_shaping.json
 	$(BIN)/hop bench training --json docs/results/training.json
-	$(BIN)/hop bench training --recipe precise --training-seeds 1 2 3 4 --threads 1 --json docs/results/training-precise.json
-	$(BIN)/hop bench training --recipe precise --minutes 13.5 --steps 20000000 --out runs/bench-quarter \
+	$(BIN)/hop bench training --recipe precise --minutes 13.5 --steps 20000000 --training-seeds 1 2 3 4 --out runs/bench-quarter \
 	  --json docs/results/training-quarter.json
-	$(BIN)/hop evaluate "runs/bench-training/precise-seed*/policy.onnx" --seeds 5 --floor soft --no-video \
-	  --json docs/results/precise-seeds.json \
-	  --commands 0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40
-	$(BIN)/hop bench reach --json docs/results/reach.json
-	$(BIN)/hop train --recipe precise --heights 0.2 0.46 --out runs/precise-wide
-	$(BIN)/hop evaluate precise-wide=runs/precise-wide/policy.onnx --seeds 5 --floor soft --no-video \
-	  --json docs/results/precise-wide.json --commands \
+	$(BIN)/hop evaluate precise "runs/bench-quarter/precise-seed*/policy.onnx" --seeds 5 --floor soft --no-video \
+	  --json docs/results/precise-seeds.json --commands \
 	0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40,0.41,0.42,0.43,0.44,0.45
-	$(BIN)/hop train --recipe precise --observation three-samples --out runs/fifteen
+	$(BIN)/hop bench reach --json docs/results/reach.json
+	$(BIN)/hop train --recipe precise --observation three-samples --heights 0.2 0.42 --out runs/fifteen
 	$(BIN)/hop train --recipe recurrent --observation three-samples --out runs/fifteen-recurrent
 	$(BIN)/hop evaluate fifteen=runs/fifteen/policy.onnx fifteen-recurrent=runs/fifteen-recurrent/policy.onnx \
 	  --seeds 5 --floor soft --no-video --json docs/results/fifteen.json

@@ -29,9 +29,16 @@ class AdaptiveRecipe(PreciseRecipe):
 
     task: TaskOptions = field(
         default_factory=lambda: replace(
-            PreciseRecipe().task, randomised=SURPRISES, chance=0.5, unchanged=0.5
+            PreciseRecipe().task,
+            command_range=(0.20, 0.42),
+            randomised=SURPRISES,
+            chance=0.5,
+            unchanged=0.5,
         )
     )
+    """The learning problem; wider ranges of commands were not tried."""
+    judge_commands: tuple[float, ...] = (0.22, 0.25, 0.28, 0.31, 0.34, 0.37, 0.40)
+    """Heights of the trials, m."""
     aiming: Aiming = field(default_factory=Aiming)
     """Numbers of the memory."""
     feeling: tuple[int, ...] = (256, 128)

@@ -33,7 +33,7 @@ class PreciseRecipe(FastRecipe):
         default_factory=lambda: replace(
             FastRecipe().task,
             observation="dated-long",
-            command_range=(0.20, 0.42),
+            command_range=(0.20, 0.46),
             timestep=5e-4,
             alike_at_first=True,
         )
@@ -48,7 +48,7 @@ class PreciseRecipe(FastRecipe):
     """Control steps between two trials of the policy, for checkpoint selection."""
     judge_from: float = 0.7
     """Share of the training before which no snapshot is tried."""
-    judge_commands: tuple[float, ...] = (0.22, 0.25, 0.28, 0.31, 0.34, 0.37, 0.40)
+    judge_commands: tuple[float, ...] = (0.225, 0.26, 0.295, 0.33, 0.365, 0.40, 0.435)
     """Heights of those trials, m."""
     teaching: float = 0.55
     """Share of the training in which the teacher learns; in the rest the policy does."""

@@ -25,8 +25,13 @@ class RecurrentRecipe(PreciseRecipe):
     name: ClassVar[str] = "recurrent"
 
     task: TaskOptions = field(
-        default_factory=lambda: replace(PreciseRecipe().task, observation="dated")
+        default_factory=lambda: replace(
+            PreciseRecipe().task, observation="dated", command_range=(0.20, 0.42)
+        )
     )
+    """The learning problem; wider ranges of commands were not tried."""
+    judge_commands: tuple[float, ...] = (0.22, 0.25, 0.28, 0.31, 0.34, 0.37, 0.40)
+    """Heights of the trials, m."""
     legs: int = 256
     """Legs that gather experience at once."""
     rollout: int = 128
