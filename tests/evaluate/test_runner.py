@@ -1,5 +1,6 @@
 import dataclasses
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from hopping_leg.control import Setup
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Candidate, evaluate
+from hopping_leg.evaluate.runner import _note_stopped
 from hopping_leg.evaluate.runs import floor_robot, run_trials, save_traces
 from hopping_leg.evaluate.trials import Trial
 from hopping_leg.robot import load_robot
@@ -141,3 +143,12 @@ def test_a_twin_under_the_papers_disturbance_is_noted(spring):
     assert "came on top" in notes("twin", Disturbance())
     assert "came on top" not in notes("twin", NOTHING)
     assert "came on top" not in notes("legv2-paper", Disturbance())
+
+
+@pytest.mark.parametrize(("knee", "stopped"), [(-1.0, 0), (-0.05, 2), (-2.71, 2)])
+def test_who_would_be_stopped_on_the_real_leg_is_noted(setup, knee, stopped):
+    angles = {"hip_position_rad": np.array([0.5, 0.6]), "knee_position_rad": np.array([-1.0, knee])}
+    runs = [SimpleNamespace(trace=SimpleNamespace(column=angles.get))] * 2
+    notes = _note_stopped("mine", runs, setup)
+    assert len(notes) == (stopped > 0)
+    assert all(f"in {stopped} of 2 runs" in note for note in notes)

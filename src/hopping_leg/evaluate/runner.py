@@ -8,6 +8,7 @@ from importlib.metadata import version
 from typing import Any
 
 from hopping_leg.control import Setup
+from hopping_leg.deploy.envelope import hopping_envelope
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range
 from hopping_leg.evaluate.pooling import pool_group
@@ -63,7 +64,7 @@ def evaluate(
         fitting = [t for t in trials if within(t, candidate.command_range)]
         notes += candidate.notes
         notes += _note_left_out(candidate, trials, fitting)
-        runs += run_trials(
+        own = run_trials(
             candidate.label,
             candidate.controller,
             world,
@@ -72,6 +73,8 @@ def evaluate(
             seed=seed,
             on_progress=functools.partial(on_progress, candidate.label),
         )
+        notes += _note_stopped(candidate.label, own, setup)
+        runs += own
     measured = tabulate(runs, [c.label for c in candidates], seed)
     return Judged(
         replace(
@@ -135,6 +138,22 @@ def _note_left_out(
         f"{t.kind} {t.steps[0][0]:g} m" if len(t.steps) == 1 else t.kind for t in left_out
     )
     return [f"{candidate.label} was made for {low:g} to {high:g} m; left out: {names}."]
+
+
+def _note_stopped(label: str, runs: Sequence[Run], setup: Setup) -> list[str]:
+    """Say so where the supervisor of the real leg would not let a controller hop on."""
+    limits = hopping_envelope(setup.robot, setup.rate)
+    stopped = 0
+    for run in runs:
+        angles = [run.trace.column(f"{joint}_position_rad") for joint in ("hip", "knee")]
+        pairs = zip(angles, limits.lower, limits.upper, strict=True)
+        stopped += any(angle.min() < low or angle.max() > high for angle, low, high in pairs)
+    if not stopped:
+        return []
+    return [
+        f"{label} swings a joint beyond what `hop deploy` allows in {stopped} of {len(runs)} runs;"
+        " its supervisor would stop the leg there."
+    ]
 
 
 def _groups(candidates: Sequence[Candidate], summary: Sequence[Summary], seed: int) -> list[Group]:
