@@ -84,7 +84,8 @@ results: $(STAMP)
 	$(BIN)/hop bench identify --parts synthetic throughput mujoco-sysid --json docs/results/bench_identify.json
 	$(BIN)/hop bench identify --parts paper-size --searches two-pass --json docs/results/bench_identify_size.json
 	$(BIN)/hop bench identify --parts recordings --json docs/results/bench_identify_recordings.json
-	$(BIN)/hop experiment transfer --recipe adaptive --json docs/results/transfer.json
+	$(BIN)/hop experiment transfer --json docs/results/transfer.json
+	$(BIN)/hop experiment transfer --recipe fast --folder runs/transfer-fast --json docs/results/transfer-fast.json
 	$(BIN)/hop experiment prediction --json docs/results/prediction.json
 	$(BIN)/hop bench finetune --figure docs/results/finetune.svg --json docs/results/finetune.json
 	$(BIN)/hop bench view --json docs/results/view.json
