@@ -90,7 +90,7 @@ results: $(STAMP)
 	$(BIN)/hop bench finetune --figure docs/results/finetune.svg --json docs/results/finetune.json
 	$(BIN)/hop bench view --json docs/results/view.json
 	$(BIN)/hop bench deploy --json docs/results/deploy.json
-	$(BIN)/hop bench faults --live 5 --json docs/results/faults.json
+	$(BIN)/hop bench faults --repeats 15 --live 2 --controllers fast precise energy-shaping --json docs/results/faults.json
 
 check: lint types docs wheel
 
