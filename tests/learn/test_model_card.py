@@ -19,3 +19,7 @@ def test_a_card_names_every_command_that_its_own_simulation_misses():
     said = doubt(trials(_22=0.235, _25=0.004, _30=-0.021, _35=None))
     assert "0.22 m (+235 mm), 0.30 m (-21 mm), 0.35 m (no hops)" in said
     assert "0.25" not in said
+
+
+def test_a_command_between_centimetres_is_not_rounded_to_another():
+    assert "0.225 m (+30 mm)" in doubt([{"command_m": 0.225, "median_error_m": 0.03}])

@@ -47,7 +47,7 @@ class Experiment:
     seeds: tuple[int, ...] = (0,)
     """Of the trainings, one of each method and twin each."""
     recipe: str = "adaptive"
-    """By which policies are trained, as in `hop train`; `fast` takes a third of the time, but
+    """By which policies are trained, as in `hop train`; `fast` is the quicker one, but
     corrects nothing of what no fit can find."""
     steps: int = Study.steps
     """Control steps of experience of a training."""

@@ -11,11 +11,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import cma
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.hops import CLEAR
+from hopping_leg.identify.cma import seeded_strategy
 from hopping_leg.robot.kinematics import foot_position, joint_angles
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import Legs
@@ -107,15 +107,7 @@ def _with_limit(way: Array, before: Array, limit: Array) -> Array:
 
 def _search(study: ReachStudy, limit: Array, start: Array, on_done: Callable[[], None]) -> Array:
     """Return the best way to push that was found, no worse than the first, (size,)."""
-    rng = np.random.default_rng(study.seed)
-    settings = {
-        "bounds": [0.0, 1.0],
-        "popsize": study.population,
-        "randn": lambda *shape: rng.standard_normal(shape),
-        "seed": np.nan,
-        "verbose": -9,
-    }
-    strategy = cma.CMAEvolutionStrategy(start, _STEP, settings)
+    strategy = seeded_strategy(start, _STEP, [0.0, 1.0], study.population, study.seed)
     (first,) = hop(study, start[None], limit)
     best, found = first.score, start
     for _ in range(study.generations):

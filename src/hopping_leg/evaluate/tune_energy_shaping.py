@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cma
 import numpy as np
 
 from hopping_leg.control import Rollout, Setup, roll_out
@@ -21,6 +20,7 @@ from hopping_leg.control.shaping_gains import ROBUST, ShapingGains, scale_gains
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.gain_space import from_unit, to_unit
 from hopping_leg.evaluate.hop_cost import CommandScore, calibrated, cost, score
+from hopping_leg.identify.cma import seeded_strategy
 from hopping_leg.robot import Robot, load_robot
 from hopping_leg.trace import write_atomically
 
@@ -106,15 +106,7 @@ def search(
         log: One JSON line per generation; an interrupted search goes on from it.
         report: Called with (generations done, lowest cost so far).
     """
-    rng = np.random.default_rng(seed)
-    settings = {
-        "bounds": [0.0, 1.0],
-        "popsize": options.population,
-        "randn": lambda *shape: rng.standard_normal(shape),
-        "seed": np.nan,
-        "verbose": -9,
-    }
-    strategy = cma.CMAEvolutionStrategy(to_unit(start), options.step, settings)
+    strategy = seeded_strategy(to_unit(start), options.step, [0.0, 1.0], options.population, seed)
     known = _read_log(log, options, seed)
     lowest = np.inf
     for generation in range(options.generations):

@@ -87,7 +87,8 @@ def cma_es(
     }
     saved = load_state(checkpoint, identity) or {"costs": []}
     costs: list[list[float]] = saved["costs"]
-    strategy = cma.CMAEvolutionStrategy(first, options.spread, _settings(options, low, high, seed))
+    bounds = [low.tolist(), high.tolist()]
+    strategy = seeded_strategy(first, options.spread, bounds, options.population, seed)
     judges = [*shares] or [values]
     bests: list[Array] = []
     means: list[Array] = []
@@ -121,13 +122,24 @@ def cma_es(
     return Found(elected[final.argmin()], least, count + len(elected), [*history, least])
 
 
-def _settings(options: CmaOptions, low: Array, high: Array, seed: int) -> dict[str, object]:
-    """Return pycma's options; randomness comes from a generator of our own."""
+def seeded_strategy(
+    first: Array, step: float, bounds: Sequence[object], population: int, seed: int
+) -> cma.CMAEvolutionStrategy:
+    """Return pycma's strategy; randomness comes from a generator of our own.
+
+    Args:
+        first: Where to begin, (size,).
+        step: First step size.
+        bounds: Lower and upper ones, a number or a list each.
+        population: Candidates per generation.
+        seed: Of the generator.
+    """
     rng = np.random.default_rng(seed)
-    return {
-        "popsize": options.population,
-        "bounds": [low.tolist(), high.tolist()],
+    settings = {
+        "popsize": population,
+        "bounds": bounds,
         "randn": lambda *shape: rng.standard_normal(shape),
         "seed": np.nan,
         "verbose": -9,
     }
+    return cma.CMAEvolutionStrategy(first, step, settings)

@@ -57,7 +57,7 @@ def doubt(trials: list[dict[str, Any]]) -> str:
     """
     errors = {t["command_m"]: t["median_error_m"] for t in trials}
     missed = [
-        f"{command:.2f} m ({'no hops' if error is None else f'{1000 * error:+.0f} mm'})"
+        f"{_height(command)} m ({'no hops' if error is None else f'{1000 * error:+.0f} mm'})"
         for command, error in errors.items()
         if error is None or abs(error) > MISSED
     ]
@@ -80,7 +80,7 @@ def table(trials: list[dict[str, Any]]) -> str:
         " | lowest base m |\n|---|---|---|---|---|---|---|---|"
     )
     rows = [
-        f"| {t['command_m']:.2f} | {_mm(t['median_error_m'])} | {_mm(t['std_m'])}"
+        f"| {_height(t['command_m'])} | {_mm(t['median_error_m'])} | {_mm(t['std_m'])}"
         f" | {t['hops_per_s']:.2f} | {100 * t['flight_fraction']:.0f} | {t['skipped_hops']}"
         f" of {t['hops'] + t['skipped_hops']} | {t['body_contact_ticks']}"
         f" | {t['min_height_m']:.3f} |"
@@ -91,3 +91,8 @@ def table(trials: list[dict[str, Any]]) -> str:
 
 def _mm(metres: float | None) -> str:
     return "no hops" if metres is None else f"{1000 * metres:.1f}"
+
+
+def _height(metres: float) -> str:
+    """Return a command to the centimetre, or to the millimetre where it is finer."""
+    return f"{metres:.2f}" if abs(metres - round(metres, 2)) < 1e-9 else f"{metres:.3f}"
