@@ -78,7 +78,7 @@ def _of_fast() -> list[Ablation]:
 
 
 def _of_precise() -> list[Ablation]:
-    base, fast = PreciseRecipe(), FastRecipe()
+    base, fast, recurrent = PreciseRecipe(), FastRecipe(), RecurrentRecipe()
     return [
         Ablation("recipe", "the recipe", base),
         Ablation(
@@ -91,7 +91,15 @@ def _of_precise() -> list[Ablation]:
             "50 ms of dated samples instead of 0.7 s",
             replace(base, task=replace(base.task, observation="dated")),
         ),
-        Ablation("recurrent", "50 ms and a recurrent unit instead of 0.7 s", RecurrentRecipe()),
+        Ablation(
+            "recurrent",
+            "50 ms and a recurrent unit instead of 0.7 s",
+            replace(
+                recurrent,
+                task=replace(recurrent.task, command_range=base.task.command_range),
+                judge_commands=base.judge_commands,
+            ),
+        ),
         Ablation(
             "jumpy-teacher",
             "a teacher for whom jerky actions cost what they cost `fast`, and torque nothing",
