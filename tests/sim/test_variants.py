@@ -12,7 +12,7 @@ from hopping_leg.robot import load_robot
 from hopping_leg.robot.reality import Latency, Reality
 from hopping_leg.sim import Legs
 from hopping_leg.sim.twins import IDENTIFIABLE, Range
-from hopping_leg.sim.variants import places, vary
+from hopping_leg.sim.variants import SURPRISES, places, vary
 
 LEG = load_robot("legv2")
 POSTURE = np.array([0.7, -1.4])
@@ -81,12 +81,45 @@ def test_places_tell_where_numbers_lie_in_their_ranges():
 
 
 def test_a_relative_range_is_of_what_the_robot_has():
-    spread = Range("base.mass", "1", 0.5, 2.0, "test", "logarithmic", relative=True)
+    spread = Range("base.mass", "1", 0.5, 2.0, "test", "logarithmic", "factors")
     robots = vary(LEG, [spread], 200, np.random.default_rng(0))
     shares = np.array([robot.base.mass for robot in robots]) / LEG.base.mass
     assert 0.5 <= shares.min() < 0.55
     assert 1.8 < shares.max() <= 2.0
     np.testing.assert_allclose(places(LEG, robots, [spread])[:, 0], np.log2(shares), atol=1e-9)
+
+
+def test_additions_are_to_what_the_robot_has():
+    spread = Range("reality.latency.command", "s", 0.0, 1e-2, "test", bounds="additions")
+    robots = vary(late(3e-3), [spread], 200, np.random.default_rng(0))
+    delays = np.array([robot.reality.latency.command for robot in robots])
+    assert 3e-3 <= delays.min() < 3.5e-3
+    assert 1.25e-2 < delays.max() <= 1.3e-2
+    found = places(late(3e-3), robots, [spread])[:, 0]
+    np.testing.assert_allclose(found, (delays - 8e-3) / 5e-3, atol=1e-9)
+
+
+@pytest.mark.parametrize("delay", [0.0, 4.56e-3])
+@pytest.mark.parametrize("rubs", [0.0, 0.1])
+def test_whatever_a_leg_is_like_it_can_be_surprised(delay, rubs):
+    """An identified one is late by parts of a tick, and its gears rub; the CAD's rail does not."""
+    robot = dataclasses.replace(
+        late(delay),
+        rail=dataclasses.replace(LEG.rail, friction=rubs),
+        knee=dataclasses.replace(LEG.knee, load_friction=rubs),
+    )
+    robots = vary(robot, SURPRISES, 60, np.random.default_rng(0), chance=0.5)
+    found = places(robot, robots, SURPRISES)
+    assert np.isfinite(found).all()
+    assert (np.abs(found).max(axis=0) > 0.5).sum() >= len(SURPRISES) - 2
+    legs = Legs(robot, 60, threads=1)
+    legs.stand(slice(None), POSTURE, 0.05)
+    legs.step(np.full((60, 2), 3.0))
+    legs.become(robots)
+    assert set(legs.late_ticks) == {0, 1, 2, 3}
+    for _ in range(20):
+        legs.step(np.full((60, 2), 3.0))
+    assert np.ptp(legs.height) > 1e-3
 
 
 def test_the_seed_fixes_the_draws_and_ranges_hold():

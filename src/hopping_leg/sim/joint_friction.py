@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-import mujoco
 import numpy as np
 from mujoco import batch
 
@@ -17,23 +16,14 @@ class JointFriction:
         robots: The leg of each simulation, n of them.
         simulation: The legs.
         joints: Degrees of freedom of hip and knee, (2,).
-        models: One per simulation, none shared, where the simulation was given models; they are
-            edited.
     """
 
-    def __init__(
-        self,
-        robots: Sequence[Robot],
-        simulation: batch.Batch,
-        joints: IntArray,
-        models: Sequence[mujoco.MjModel] | None,
-    ) -> None:
+    def __init__(self, robots: Sequence[Robot], simulation: batch.Batch, joints: IntArray) -> None:
         self._coulomb, self._load = (
             np.array([robot.of_joints(name) for robot in robots])
             for name in ("friction", "load_friction")
         )
-        self._simulation, self._joints, self._models = simulation, joints, models
-        self._loss = simulation.expand("dof_frictionloss") if models is None else None
+        self._joints, self._loss = joints, simulation.expand("dof_frictionloss")
 
     def set(self, torque: Array, further: Array | float = 0.0) -> None:
         """Let the joints rub.
@@ -42,14 +32,7 @@ class JointFriction:
             torque: That the motors give, N m at the joints, (n, 2).
             further: Friction beside Coulomb's and the load's, N m, (n, 2).
         """
-        friction = self._coulomb + self._load * np.abs(torque) + further
-        if self._loss is not None:
-            self._loss[:, self._joints] = friction
-            return
-        assert self._models is not None
-        for model, loss in zip(self._models, friction, strict=True):
-            model.dof_frictionloss[self._joints] = loss
-        self._simulation.set_models(self._models)
+        self._loss[:, self._joints] = self._coulomb + self._load * np.abs(torque) + further
 
 
 def rubs_under_load(robots: Sequence[Robot]) -> bool:

@@ -1,6 +1,5 @@
 """Many legs stepped at once on all cores."""
 
-import copy
 from collections.abc import Sequence
 
 import mujoco
@@ -14,6 +13,7 @@ from hopping_leg.robot.model import TIMESTEP, build_model
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.any_legs import AnyLegs
 from hopping_leg.sim.joint_friction import JointFriction, rubs_under_load
+from hopping_leg.sim.own_models import take_models
 from hopping_leg.sim.reality import RealLegs
 
 CONTROL_RATE = 200.0
@@ -84,26 +84,24 @@ class Legs(AnyLegs):
     def _take_model(self, threads: int, variants: Sequence[Robot]) -> None:
         model = build_model(self.robot, self.timestep)
         self.batch = batch.Batch(model, self.count, threads)
-        self._friction: JointFriction | None = None
         if variants:
-            self._set_models(variants)
-        elif rubs_under_load([self.robot]):
-            robots = [self.robot] * self.count
-            self._friction = JointFriction(robots, self.batch, _JOINTS, None)
+            self._take_models(variants)
+        self._let_rub(variants or [self.robot] * self.count)
         self._ctrl = self.batch.bind("ctrl")
         first = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_TIME)
         self._show(self.batch.state[:, first : first + 6])
 
-    def _set_models(self, variants: Sequence[Robot]) -> None:
+    def _take_models(self, variants: Sequence[Robot]) -> None:
         """Build every robot's model, once where legs share a robot."""
         distinct = {id(robot): robot for robot in variants}
         models = {key: build_model(robot, self.timestep) for key, robot in distinct.items()}
-        own = [models[id(robot)] for robot in variants]
-        self._friction = None
-        if rubs_under_load(variants):
-            own = [copy.copy(model) for model in own]
-            self._friction = JointFriction(variants, self.batch, _JOINTS, own)
-        self.batch.set_models(own)
+        take_models(self.batch, [models[id(robot)] for robot in variants])
+
+    def _let_rub(self, robots: Sequence[Robot]) -> None:
+        """Let friction change with torque where it does for some leg."""
+        self._friction: JointFriction | None = None
+        if rubs_under_load(robots):
+            self._friction = JointFriction(robots, self.batch, _JOINTS)
 
     def _is_plain(self, variants: Sequence[Robot]) -> bool:
         """Tell whether delays are all that is beyond the model, if they differ by whole ticks."""
@@ -140,7 +138,8 @@ class Legs(AnyLegs):
         if self.real is not None:
             self.real.adopt(variants)
         elif self._is_plain(variants):
-            self._set_models(variants)
+            self._take_models(variants)
+            self._let_rub(variants)
             self._motors = MotorLimit(variants, self.count)
             self._come_late(variants)
         else:

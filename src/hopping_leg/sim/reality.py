@@ -9,7 +9,6 @@ Motor, latency     numpy at each physics step, where order matters (``real_drive
 Encoders           numpy once per control period; the physics never sees them (``real_sensors``)
 """
 
-import copy
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,6 +20,7 @@ from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import UsageError
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.joint_friction import JointFriction, rubs_under_load
+from hopping_leg.sim.own_models import take_models
 from hopping_leg.sim.real_drive import RealDrive
 from hopping_leg.sim.real_model import real_model
 from hopping_leg.sim.real_sensors import DRAWS, RealSensors
@@ -84,13 +84,11 @@ class RealLegs:
 
     def _take_models(self, robots: Sequence[Robot], *, differ: bool) -> None:
         """Take on the robots' models, if they differ, and their friction, if it changes."""
-        models = self._models(robots) if differ else None
+        if differ:
+            take_models(self.batch, self._models(robots))
         self._friction: JointFriction | None = None
         if self._excess.any() or rubs_under_load(robots):
-            models = models and [copy.copy(model) for model in models]
-            self._friction = JointFriction(robots, self.batch, self._motor, models)
-        if models:
-            self.batch.set_models(models)
+            self._friction = JointFriction(robots, self.batch, self._motor)
 
     def _models(self, robots: Sequence[Robot]) -> list[mujoco.MjModel]:
         """Build every robot's model, once where legs share a robot."""

@@ -37,8 +37,8 @@ class Range:
     source: str
     """Why these bounds."""
     scale: Literal["uniform", "logarithmic"] = "uniform"
-    relative: bool = False
-    """Whether the bounds are multiples of the number that a robot itself has."""
+    bounds: Literal["values", "factors", "additions"] = "values"
+    """Whether the bounds are the number's own, or factors of or additions to what a robot has."""
     step: float = 0.0
     """Only whole multiples of this are drawn, 0 for any number."""
 
@@ -50,16 +50,38 @@ class Range:
                 f" {self.unit}; its bounds must rise and be finite, and positive if logarithmic."
             )
 
-    def draw(self, rng: np.random.Generator) -> float:
-        """Return one value."""
+    def draw(self, rng: np.random.Generator, own: float = 0.0) -> float:
+        """Return one value.
+
+        Args:
+            rng: Source of randomness.
+            own: What the robot itself has.
+        """
+        drawn = self._draw(rng)
+        if self.bounds == "values":
+            return drawn
+        return own * drawn if self.bounds == "factors" else own + drawn
+
+    def _draw(self, rng: np.random.Generator) -> float:
         if self.scale == "uniform":
             drawn = float(rng.uniform(self.low, self.high))
         else:
             drawn = float(math.exp(rng.uniform(math.log(self.low), math.log(self.high))))
         return round(drawn / self.step) * self.step if self.step else drawn
 
-    def place(self, value: float) -> float:
-        """Return where a value lies in the range, -1 at its lower and 1 at its upper bound."""
+    def place(self, value: float, own: float = 0.0) -> float:
+        """Return where a value lies in the range, -1 at its lower and 1 at its upper bound.
+
+        Args:
+            value: As drawn.
+            own: What the robot itself has; no factor of zero lies anywhere but in the middle.
+        """
+        if self.bounds == "factors":
+            if own == 0:
+                return 0.0
+            value = value / own
+        elif self.bounds == "additions":
+            value = value - own
         ends = (self.low, value, self.high)
         low, at, high = ends if self.scale == "uniform" else map(math.log, ends)
         return 2 * (at - low) / (high - low) - 1 if high > low else 0.0

@@ -35,7 +35,7 @@ VARIABLE = (
 
 
 def _times(path: str, low: float, high: float) -> Range:
-    return Range(path, "1", low, high, "[C]", "logarithmic", relative=True)
+    return Range(path, "1", low, high, "[C]", "logarithmic", "factors")
 
 
 def _both(name: str, unit: str, low: float, high: float) -> tuple[Range, ...]:
@@ -52,10 +52,10 @@ SURPRISES = (
     _times("hip.torque_gain", 1 / 1.3, 1.3),
     _times("knee.torque_gain", 1 / 1.3, 1.3),
     *_both("friction", "N m", 0.0, 1.4),
-    Range("reality.latency.command", "s", 0.0, 0.0149, "[C]", step=5e-3),
+    Range("reality.latency.command", "s", 0.0, 0.0149, "[C]", bounds="additions", step=5e-3),
 )
 """What may surprise any leg: a payload, heavy links, a worn or dry rail, hard and soft ground,
-motors that give less or more than they should, joints that rub, commands that come late."""
+motors that give less or more than they should, joints that rub, commands that come later."""
 
 Part = TypeVar("Part")
 
@@ -87,8 +87,7 @@ def vary(
     for number in range(count):
         variant = robot
         for spread in ranges:
-            unit = attrgetter(spread.path)(robot) if spread.relative else 1.0
-            value = unit * spread.draw(rng)
+            value = spread.draw(rng, attrgetter(spread.path)(robot))
             if chance == 1 or rng.random() < chance:
                 variant = with_value(variant, spread.path.split("."), value)
         check_physics(variant, f"variant {number} of {robot.name}")
@@ -101,8 +100,7 @@ def places(robot: Robot, variants: Sequence[Robot], ranges: Sequence[Range]) -> 
     found = np.empty((len(variants), len(ranges)))
     for column, spread in enumerate(ranges):
         number = attrgetter(spread.path)
-        unit = number(robot) if spread.relative else 1.0
-        found[:, column] = [spread.place(number(variant) / unit) for variant in variants]
+        found[:, column] = [spread.place(number(v), number(robot)) for v in variants]
     return found
 
 

@@ -31,7 +31,7 @@ DOUBTS = (
     Range("knee.armature", "kg m2", 5e-5, 1.5e-2, "Table I to the lab's", "logarithmic"),
     Range("hip.torque_gain", "1", 0.8, 1.05, f"{_CHOSEN} motors and gears that give less"),
     Range("knee.torque_gain", "1", 0.8, 1.05, f"{_CHOSEN} motors and gears that give less"),
-    Range("base.mass", "1", 0.95, 1.05, f"{_CHOSEN} cables and screws", relative=True),
+    Range("base.mass", "1", 0.95, 1.05, f"{_CHOSEN} cables and screws", bounds="factors"),
 )
 """What the legs differ in on which contact is learnt."""
 
