@@ -97,6 +97,14 @@ def test_outings_that_were_ended_early_never_win_and_are_counted(tmp_path, ready
     assert again["safety"]["thrown_back"] > 0
 
 
+def test_an_exploration_that_was_ended_early_goes_back_to_the_best_policy(tmp_path, ready):
+    options = dataclasses.replace(OPTIONS, method="sac")
+    result = finetune(TASK, Imagined(complain_from=3), options, tmp_path, prepared=ready)
+    for row in result["outings"]:
+        assert row["thrown_back"] or not (row["complaint"] and row["kind"] == "exploration")
+    assert any(row["complaint"] for row in result["outings"] if row["kind"] == "exploration")
+
+
 def test_a_folder_with_another_run_is_refused(tmp_path, ready):
     options = dataclasses.replace(OPTIONS, method="aim")
     finetune(TASK, Imagined(), options, tmp_path, prepared=ready)

@@ -1,5 +1,7 @@
 """SAC begins as the policy, learns, and is restored exactly."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import torch
@@ -12,7 +14,7 @@ from hopping_leg.learn.finetune.replay import CRITIC_SIZE, Rows
 from hopping_leg.learn.network_file import read_network
 from hopping_leg.sim.disturbance import Measurement
 
-TINY = LearnerOptions(critic=(8, 8), batch=16, actor_share=1.0)
+TINY = LearnerOptions(critic=(8, 8), batch=16, actor_share=1.0, change=np.inf)
 
 
 def rows(size, count=200, reward=None):
@@ -65,6 +67,26 @@ def test_actions_move_to_where_the_reward_is():
     before = off()
     made.learn(300, 1)
     assert off() < 0.8 * before
+
+
+def test_a_round_changes_actions_no_more_than_it_may():
+    options = dataclasses.replace(TINY, change=0.02)
+    made, network = learner("fast", lambda action: -np.abs(action - 0.5).sum(axis=1), options)
+    real = rows(len(network.offset), 50)
+    seen = torch.from_numpy(real.observation)
+
+    def act():
+        with torch.no_grad():
+            return made.model.actor(seen, deterministic=True)
+
+    for heard in (False, True):
+        before = act()
+        made.learn(100, 1)
+        moved = (act() - before).square().mean().sqrt()
+        assert moved > 1e-4
+        if heard:
+            assert moved <= 0.02
+        made.hear(real)
 
 
 def test_frozen_parts_stay():

@@ -163,7 +163,7 @@ class Finetuning:
             row |= _numbers(score(outing.truth, steps, outing.complaint), "true_")
         row["thrown_back"] = False
         self.rows.append(row)
-        if check:
+        if check or outing.complaint:
             self._keep_best_or_throw_back(row)
         if self._learns_weights():
             self._learn(outing, len(heard.command), explored=not check)
@@ -173,9 +173,10 @@ class Finetuning:
             self._aim = self._aim.corrected(counted[:, 1], errors, self._options.aim)
 
     def _keep_best_or_throw_back(self, row: Row) -> None:
-        if row["error_m"] <= min(self._errors):
+        check = row["kind"] == "check"
+        if check and row["error_m"] <= min(self._errors):
             self._best = (self._network, self._aim)
-        elif self._options.rules.thrown_back(self._errors_since()):
+        elif row["complaint"] or self._options.rules.thrown_back(self._errors_since()):
             row["thrown_back"] = True
             self._network, self._aim = self._best
             if self._learner is not None:

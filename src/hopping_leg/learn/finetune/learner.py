@@ -26,6 +26,12 @@ from hopping_leg.learn.finetune.exploring import EDGE
 from hopping_leg.learn.finetune.replay import CRITIC_SIZE, Rows
 from hopping_leg.learn.resumable import learner_state, restore_learner
 
+_LOOKED_AT = 3000
+"""Ticks on which it is told how much actions have changed, the newest, 15 s."""
+
+_HALVINGS = 8
+"""Of a step that changes actions too much; a longer one is not taken at all."""
+
 _ACTIVATIONS = {"relu": nn.ReLU, "tanh": nn.Tanh, "elu": nn.ELU}
 
 
@@ -41,6 +47,9 @@ class LearnerOptions:
     """The actor's learning rate over the critics'."""
     last_layer: bool = False
     """Whether the actor learns in its last layer alone."""
+    change: float = 0.02
+    """Root mean square by which learning from an outing may change the actor's actions, of full
+    torque: critics that have heard little of the robot would lead it far astray."""
     batch: int = 256
     """Transitions per gradient step."""
     gamma: float = 0.99
@@ -128,7 +137,37 @@ class Learner:
         for name, weight in self.model.actor.named_parameters():
             frozen = name == "log_std" or (self.options.last_layer and "latent_pi" in name)
             weight.requires_grad_(not (critics_only or frozen))
+        before = self._weights()
         self.model.train(steps, self.options.batch)
+        if not critics_only:
+            self._hold_back(before)
+
+    def _weights(self) -> list[torch.Tensor]:
+        return [weight.detach().clone() for weight in self.model.actor.parameters()]
+
+    def _hold_back(self, before: list[torch.Tensor]) -> None:
+        """Take back of what the actor learnt as much as goes beyond the change that it may take.
+
+        Every round halves what is left of the step until the actions on the newest ticks allow it.
+        """
+        real, actor = self.model.replay_buffer, self.model.actor
+        buffer = real if real.size() else real.believed
+        newest = (buffer.pos - 1 - np.arange(min(_LOOKED_AT, buffer.size()))) % buffer.buffer_size
+        seen = torch.from_numpy(buffer.observations[newest, 0])
+        learnt = self._weights()
+        with torch.no_grad():
+            self._set(before)
+            acted = actor(seen, deterministic=True)
+            for share in 0.5 ** np.arange(_HALVINGS):
+                self._set([a + share * (b - a) for a, b in zip(before, learnt, strict=True)])
+                moved = actor(seen, deterministic=True) - acted
+                if moved.square().mean().sqrt() <= self.options.change:
+                    return
+            self._set(before)
+
+    def _set(self, weights: list[torch.Tensor]) -> None:
+        for weight, value in zip(self.model.actor.parameters(), weights, strict=True):
+            weight.copy_(value)
 
     def network(self) -> Network:
         """Return the deterministic actor as it stands."""
