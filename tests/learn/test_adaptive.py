@@ -10,6 +10,8 @@ from hopping_leg.control.policy import Card, Policy
 from hopping_leg.errors import UsageError
 from hopping_leg.learn.export import build_policy
 from hopping_leg.learn.hop_watch import FROM, UNTIL
+from hopping_leg.robot.reality import Latency, Reality
+from hopping_leg.sim.variants import SURPRISES
 from tests.learn.learners import ROBOT, TINY_ADAPTIVE, learner
 
 
@@ -69,6 +71,25 @@ def test_an_aim_follows_the_truth_by_its_share_of_every_hop(command):
     aim = student._memory[0, :2].numpy() @ shares
     assert aim == pytest.approx(0.1 * TINY_ADAPTIVE.aiming.share, rel=1e-4)
     assert FROM > 0
+
+
+def test_an_identified_leg_may_differ_too():
+    """Its gears rub under load, and its commands are late by parts of a tick."""
+    leg = dataclasses.replace(
+        ROBOT,
+        knee=dataclasses.replace(ROBOT.knee, load_friction=0.1),
+        reality=Reality(latency=Latency(command=4.56e-3)),
+    )
+    env = TINY_ADAPTIVE.make_env(leg, 0)
+    env.reset()
+    for draw in (1, 2):
+        env.task.diverge(draw)
+        for _ in range(10):
+            env.step_async(np.full((TINY_ADAPTIVE.legs, 2), 0.3, np.float32))
+            seen, reward, _, _ = env.step_wait()
+        assert np.isfinite(seen).all()
+        assert np.isfinite(reward).all()
+        assert np.ptp(seen[:, -len(SURPRISES) :], axis=0).max() > 0
 
 
 def test_what_a_student_learns_from_is_what_it_was_told():
