@@ -6,6 +6,7 @@ length. CMA-ES looks for what keeps hopping highest. It is a lower bound of what
 possible and an upper one of what a policy, which must also be accurate, can be asked for.
 """
 
+import functools
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.evaluate.keeper import Keeper
 from hopping_leg.hops import CLEAR
 from hopping_leg.identify.cma import seeded_strategy
 from hopping_leg.robot.kinematics import foot_position, joint_angles
@@ -67,28 +69,35 @@ class ReachStudy:
 
 
 def measure_reach(
-    study: ReachStudy, on_done: Callable[[int, int], None] | None = None
+    study: ReachStudy, keeper: Keeper, on_done: Callable[[int, int], None] | None = None
 ) -> dict[str, Any]:
     """Search for the highest lasting hops within each pair of torques.
 
     Args:
         study: What is searched.
+        keeper: Keeps what was found for each pair.
         on_done: Called with the generations that are done and all.
 
     Returns:
         ``rows``, one per pair: median apex, hops per second, share in flight, RMS torques.
     """
-    count, total = itertools.count(1), study.generations * len(study.torques)
+    total = study.generations * len(study.torques)
 
-    def say() -> None:
+    def say(earlier: int, done: int) -> None:
         if on_done is not None:
-            on_done(next(count), total)
+            on_done(earlier * study.generations + done, total)
 
     rows, way, before = [], np.full(_SIZE, 0.5), np.zeros(2)
-    for limit in map(np.array, study.torques):
-        way = _search(study, limit, _with_limit(way, before, limit), say)
-        rows.append(_row(study, way, limit))
-        before = limit
+    for earlier, limit in enumerate(map(np.array, study.torques)):
+        first = _with_limit(way, before, limit)
+        found = keeper.keep(
+            "{:g}-{:g}".format(*limit),
+            "{:g} and {:g} N m".format(*limit),
+            _asked(study, limit, first),
+            functools.partial(_find, study, limit, first, functools.partial(say, earlier)),
+        )
+        way, before = np.array(found["way"]), limit
+        rows.append(found["row"])
     return {
         "rows": rows,
         "robot": study.robot.name,
@@ -99,24 +108,44 @@ def measure_reach(
     }
 
 
+def _asked(study: ReachStudy, limit: Array, first: Array) -> dict[str, Any]:
+    return {
+        "robot": study.robot.digest,
+        "limit": limit.tolist(),
+        "first": first.tolist(),
+        "generations": study.generations,
+        "population": study.population,
+        "seconds": study.seconds,
+        "seed": study.seed,
+    }
+
+
+def _find(
+    study: ReachStudy, limit: Array, first: Array, on_done: Callable[[int], None]
+) -> dict[str, Any]:
+    """Return the best way to push within a limit and how it hops, as JSON values."""
+    way = _search(study, limit, first, on_done)
+    return {"way": way.tolist(), "row": _row(study, way, limit)}
+
+
 def _with_limit(way: Array, before: Array, limit: Array) -> Array:
     """Return the way with the same torques, as far as another limit allows, (size,)."""
     torques = (way[1:] - 0.5).reshape(2, 2, len(KNOTS)) * (before / limit)[:, None]
     return np.append(way[0], np.clip(0.5 + torques, 0, 1).ravel())
 
 
-def _search(study: ReachStudy, limit: Array, start: Array, on_done: Callable[[], None]) -> Array:
+def _search(study: ReachStudy, limit: Array, start: Array, on_done: Callable[[int], None]) -> Array:
     """Return the best way to push that was found, no worse than the first, (size,)."""
     strategy = seeded_strategy(start, _STEP, [0.0, 1.0], study.population, study.seed)
     (first,) = hop(study, start[None], limit)
     best, found = first.score, start
-    for _ in range(study.generations):
+    for generation in range(study.generations):
         candidates = strategy.ask()
         scores = [trial.score for trial in hop(study, np.array(candidates), limit)]
         strategy.tell(candidates, [-score for score in scores])
         if max(scores) > best:
             best, found = max(scores), np.array(candidates[int(np.argmax(scores))])
-        on_done()
+        on_done(generation + 1)
     return found
 
 

@@ -147,11 +147,14 @@ class Reach:
     """Of the search."""
     threads: int = 0
     """Threads of the physics, 0 for all cores; results do not depend on it."""
+    folder: Path = Path("runs/bench-reach")
+    """Where what was found for a pair is kept; it is not searched again."""
     json: Path | None = None
     """Write every number to this file."""
 
     def measure(self) -> dict[str, Any]:
         """Run it, print a table, return every number."""
+        from hopping_leg.evaluate.keeper import Keeper
         from hopping_leg.evaluate.reach import ReachStudy, measure_reach
 
         at_least(1, generations=self.generations)
@@ -170,7 +173,9 @@ class Reach:
         with Progress(transient=True) as bar:
             task = bar.add_task("searching", total=None)
             result = measure_reach(
-                study, lambda done, total: bar.update(task, completed=done, total=total)
+                study,
+                Keeper(self.folder),
+                lambda done, total: bar.update(task, completed=done, total=total),
             )
         table = Table("hip, N m", "knee, N m", "apex, m", "hops/s", "rms hip", "rms knee", "hits")
         for row in result["rows"]:
