@@ -1,13 +1,9 @@
-import json
-import math
-
 import pytest
 import tyro
 from hypothesis import given
 from hypothesis import strategies as st
 
 from hopping_leg.cli.options import Heights, parse_heights
-from hopping_leg.cli.output import write_json
 from hopping_leg.errors import UsageError
 
 
@@ -25,9 +21,3 @@ def test_heights_on_a_command_line():
 def test_other_texts_are_no_heights(text):
     with pytest.raises(UsageError, match="separated by commas"):
         parse_heights(text)
-
-
-def test_json_has_null_where_there_is_no_number(tmp_path):
-    file = tmp_path / "deep" / "x.json"
-    write_json(file, {"a": [math.nan, 1.5, (math.inf,)], "b": None})
-    assert json.loads(file.read_text()) == {"a": [None, 1.5, [None]], "b": None}

@@ -17,13 +17,13 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from hopping_leg.cli.output import write_json
 from hopping_leg.identify import multisine, strokes
 from hopping_leg.identify.excitation import RATE, Excitation, adapt, make_excitation
 from hopping_leg.identify.feasibility import HardwareRange, demand
 from hopping_leg.identify.setup import Pair
 from hopping_leg.identify.strokes import DURATION, Bend, Strokes
 from hopping_leg.identify.templates import Template
+from hopping_leg.json_files import write_json
 from hopping_leg.robot import Robot, load_robot
 
 

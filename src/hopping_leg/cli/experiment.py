@@ -26,10 +26,10 @@ from rich.table import Table
 
 from hopping_leg.cli.command_line import KEPT, command_line
 from hopping_leg.cli.options import Heights
-from hopping_leg.cli.output import write_json
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.transfer.methods import DEFAULT, FORETOLD, choose_methods
 from hopping_leg.evaluate.transfer.study import Study, find_twins
+from hopping_leg.json_files import write_json
 
 
 @dataclass(frozen=True)

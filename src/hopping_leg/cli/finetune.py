@@ -23,10 +23,10 @@ from rich.console import Console
 
 from hopping_leg.cli.motors import ask, check, connect
 from hopping_leg.cli.options import Heights
-from hopping_leg.cli.output import write_json
 from hopping_leg.control.library import load_policy
 from hopping_leg.deploy.envelope import hopping_envelope
 from hopping_leg.errors import RobotError, UsageError
+from hopping_leg.json_files import write_json
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.parameters import Robot
 

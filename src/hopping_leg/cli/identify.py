@@ -25,7 +25,6 @@ from rich.table import Column, Table
 
 from hopping_leg.cli.command_line import command_line
 from hopping_leg.cli.fit_progress import FitProgress
-from hopping_leg.cli.output import write_json
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.fit_report import write_fit_report
 from hopping_leg.identify.cma import CmaOptions
@@ -35,6 +34,7 @@ from hopping_leg.identify.recording import Recording, load_recording, sidecar_pa
 from hopping_leg.identify.result import Identified, as_json, parameters_json, quality_json
 from hopping_leg.identify.robot_file import save_robot
 from hopping_leg.identify.searching import SearchOptions
+from hopping_leg.json_files import write_json
 from hopping_leg.robot import load_robot
 from hopping_leg.trace import write_atomically
 

@@ -18,12 +18,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hopping_leg.cli import evaluate, experiment
-from hopping_leg.cli.output import write_json
 from hopping_leg.control.library import ENERGY_SHAPING, shipped_policies
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.transfer.methods import DEFAULT, choose_methods
 from hopping_leg.evaluate.transfer.study import SHORTEST, USUAL_FIT, Study, find_twins
 from hopping_leg.identify.least_squares import LeastSquaresOptions
+from hopping_leg.json_files import write_json
 from hopping_leg.trace import write_atomically
 
 _MINIATURE = ("identified", "cad")

@@ -3,11 +3,11 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hopping_leg.cli.output import write_json
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.figures import draw_robustness, to_svg
 from hopping_leg.evaluate.keeper import Keeper
 from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
+from hopping_leg.json_files import write_json
 from hopping_leg.trace import write_atomically
 
 if TYPE_CHECKING:

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from hopping_leg.cli.output import write_json
 from hopping_leg.errors import UsageError
+from hopping_leg.json_files import write_json
 from hopping_leg.robot import load_robot
 
 

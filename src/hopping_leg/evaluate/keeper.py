@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hopping_leg.trace import write_atomically
+from hopping_leg.json_files import write_json
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,8 @@ class Keeper:
         self._begin(name, asked)
         self.on_begin(words)
         result = work()
-        text = json.dumps({"asked": asked, "result": result}, indent=1)
-        write_atomically(file, f"{text}\n".encode())
-        return dict(json.loads(text)["result"])
+        write_json(file, {"asked": asked, "result": result})
+        return dict(json.loads(file.read_bytes())["result"])
 
     def _begin(self, name: str, asked: dict[str, Any]) -> None:
         """Prepare for work that is not kept yet."""

@@ -1,12 +1,11 @@
 """The numbers of an evaluation, as typed records and as JSON."""
 
 import dataclasses
-import json
-import math
 from dataclasses import dataclass, field
 from typing import Any
 
 from hopping_leg.evaluate.statistics import Neighbours
+from hopping_leg.json_files import json_text, plain
 
 SCHEMA = 1
 """Version of the JSON, raised when a name changes its meaning."""
@@ -157,23 +156,17 @@ class Evaluation:
 
     def to_json(self) -> dict[str, Any]:
         """Return plain values; numbers that do not exist are None."""
-        return {"schema": SCHEMA, **_plain(dataclasses.asdict(self))}
+        return {"schema": SCHEMA, **plain(_rounded(dataclasses.asdict(self)))}
 
     def dumps(self) -> bytes:
         """Return readable JSON."""
-        return (json.dumps(self.to_json(), indent=1, allow_nan=False) + "\n").encode()
+        return json_text(self.to_json()).encode()
 
 
-def _plain(value: Any) -> Any:  # noqa: ANN401
+def _rounded(value: Any) -> Any:  # noqa: ANN401
+    """Round numbers to nine digits after the point; small p-values stay as they are."""
     if isinstance(value, dict):
-        return {key: _plain(entry) for key, entry in value.items()}
+        return {key: _rounded(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(entry) for entry in value]
-    if isinstance(value, float):
-        return round(value, 9) if math.isfinite(value) and abs(value) > 1e-6 else _tiny(value)
-    return value
-
-
-def _tiny(value: float) -> float | None:
-    """Keep small p-values as they are."""
-    return value if math.isfinite(value) else None
+        return [_rounded(entry) for entry in value]
+    return round(value, 9) if isinstance(value, float) and abs(value) > 1e-6 else value

@@ -16,6 +16,7 @@ from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.searching import Pass
 from hopping_leg.identify.setup import Rig
 from hopping_leg.identify.validate import Validation
+from hopping_leg.json_files import plain
 from hopping_leg.robot.parameters import Robot
 
 _LIBRARIES = ("hopping-leg", "mujoco", "numpy", "scipy", "cma", "polars")
@@ -95,8 +96,8 @@ def as_json(identified: Identified) -> dict[str, Any]:
         "seed": identified.seed,
         "versions": software_versions(),
     }
-    plain: dict[str, Any] = _finite(tree)
-    return plain
+    described: dict[str, Any] = plain(tree)
+    return described
 
 
 def validation_json(validation: Validation) -> dict[str, Any]:
@@ -193,14 +194,3 @@ def _recordings_json(recordings: Iterable[Recording], use: str) -> Sequence[dict
         }
         for r in recordings
     ]
-
-
-def _finite(value: Any) -> Any:  # noqa: ANN401
-    """Return JSON values with null for numbers that do not exist."""
-    if isinstance(value, dict):
-        return {key: _finite(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(entry) for entry in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

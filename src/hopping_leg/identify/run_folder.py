@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from hopping_leg.errors import UsageError
-from hopping_leg.trace import write_atomically
+from hopping_leg.json_files import write_json
 
 _CONFIG, _RESULT = "config.json", "result.json"
 
@@ -44,11 +44,11 @@ class RunFolder:
             return
         for file in (*checkpoints, self.path / _RESULT):
             file.unlink(missing_ok=True)
-        _write(config, self._config)
+        write_json(config, self._config)
 
     def finish(self, result: dict[str, Any]) -> None:
         """Write the result, or why there is none; either marks the run as finished."""
-        _write(self.path / _RESULT, result)
+        write_json(self.path / _RESULT, result)
 
     def _check_same(self, config: Path) -> None:
         try:
@@ -61,7 +61,3 @@ class RunFolder:
                 f"The run in {self.path} began with another {differences[0].replace('_', ' ')};"
                 " go on with what it began with, or give another --folder."
             )
-
-
-def _write(path: Path, content: dict[str, Any]) -> None:
-    write_atomically(path, f"{json.dumps(content, indent=1, allow_nan=False)}\n".encode())

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from hopping_leg.errors import UsageError
+from hopping_leg.json_files import write_json
 from hopping_leg.learn.checkpoint import Tree, list_checkpoints, read_checkpoint
 from hopping_leg.learn.recipe import Recipe
 from hopping_leg.learn.recipes import words_of
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.trace import write_atomically
 
 _LIBRARIES = ("hopping-leg", "mujoco", "numpy", "onnxruntime", "stable-baselines3", "torch")
 
@@ -107,8 +107,7 @@ class RunFolder:
 
     def write(self, name: str, content: Any) -> None:  # noqa: ANN401
         """Write a JSON file of the folder, whole or not at all."""
-        text = json.dumps(content, indent=1, allow_nan=False)
-        write_atomically(self.path / name, f"{text}\n".encode())
+        write_json(self.path / name, content)
 
     @property
     def _config_file(self) -> Path:

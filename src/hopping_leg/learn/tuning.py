@@ -24,6 +24,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from hopping_leg.cluster import RayCluster
 from hopping_leg.errors import PhysicsError, UsageError
+from hopping_leg.json_files import plain
 from hopping_leg.learn.crew import work_here, work_on
 from hopping_leg.learn.judge import FINAL_SEEDS, FIRST_SEED
 from hopping_leg.learn.recipe import Recipe
@@ -153,7 +154,7 @@ def open_study(tuning: Tuning, worker: int = 0) -> Study:
         stored = study.user_attrs.get(name)
         if stored is None:
             study.set_user_attr(name, wanted)
-        elif stored != _plain(wanted):
+        elif stored != plain(wanted):
             raise UsageError(
                 f"The study in {tuning.storage} was begun with another '{name}'; go on with the"
                 " options that it began with, or name another --study."
@@ -254,10 +255,3 @@ def _searched(tuning: Tuning) -> dict[str, Any]:
             f"Recipe '{tuning.recipe}' has no search space; valid: {', '.join(SPACES)}."
         )
     return dict(dimensions(SPACES[tuning.recipe]))
-
-
-def _plain(value: Any) -> Any:  # noqa: ANN401
-    """Return a value as the database gives it back: tuples are lists."""
-    if isinstance(value, dict):
-        return {key: _plain(entry) for key, entry in value.items()}
-    return [_plain(entry) for entry in value] if isinstance(value, list | tuple) else value

@@ -11,7 +11,7 @@ from typing import Any, Self
 from hopping_leg.evaluate import keeper
 from hopping_leg.identify.result import software_versions
 from hopping_leg.identify.searching import Report
-from hopping_leg.trace import write_atomically
+from hopping_leg.json_files import write_json
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Keeper(keeper.Keeper):
         file = self.folder / f"{name}.begun.json"
         if not file.exists() or json.loads(file.read_bytes()) != asked:
             shutil.rmtree(self.fit_folder(name), ignore_errors=True)
-        write_atomically(file, f"{json.dumps(asked, indent=1)}\n".encode())
+        write_json(file, asked)
 
     def fit_folder(self, name: str) -> Path:
         """Return the folder of a fit's checkpoints."""

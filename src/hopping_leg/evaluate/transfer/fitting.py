@@ -16,9 +16,9 @@ from hopping_leg.identify.recording import load_recording
 from hopping_leg.identify.result import Identified, as_json
 from hopping_leg.identify.robot_file import save_robot
 from hopping_leg.identify.searching import SearchOptions
+from hopping_leg.json_files import write_json
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.trace import write_atomically
 
 _INERTIA_FACTOR = 10.0
 """How far off the CAD's link inertias may be: the paper's Table I has nine times the shank's."""
@@ -78,8 +78,7 @@ class Identify:
             resume=True,
         )
         content = {"asked": self._asked(), **as_json(identified), "truth": self._truth(identified)}
-        text = json.dumps(content, indent=1, allow_nan=False)
-        write_atomically(file.with_suffix(".json"), f"{text}\n".encode())
+        write_json(file.with_suffix(".json"), content)
         save_robot(identified, file, self.twin.believed)
 
     def progress(self) -> tuple[float, str]:

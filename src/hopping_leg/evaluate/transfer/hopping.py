@@ -21,9 +21,9 @@ from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.evaluate.runner import evaluate
 from hopping_leg.evaluate.transfer.methods import Method
 from hopping_leg.evaluate.transfer.study import Study, TwinFile
+from hopping_leg.json_files import write_json
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import NOTHING, Disturbance
-from hopping_leg.trace import write_atomically
 
 FIRST_SEED = 1000
 """Of the trials; no seed from here on has chosen anything."""
@@ -80,8 +80,7 @@ class Tried(ABC):
     def run(self, *, quiet: bool) -> None:
         """Try the policy at every command and write what was measured."""
         content = {"asked": self._asked(), "rows": hop(self.policy, self.leg, self.study)}
-        text = json.dumps(content, indent=1, allow_nan=False)
-        write_atomically(self.file, f"{text}\n".encode())
+        write_json(self.file, content)
 
     def progress(self) -> tuple[float, str]:
         """Return the share done and what to show while it runs."""

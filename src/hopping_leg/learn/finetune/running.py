@@ -8,6 +8,7 @@ from typing import Any
 
 from hopping_leg.control.outing import Outings
 from hopping_leg.errors import UsageError
+from hopping_leg.json_files import write_json
 from hopping_leg.learn.finetune.finetuning import Finetuned, Finetuning, Row
 from hopping_leg.learn.finetune.options import FinetuneOptions
 from hopping_leg.learn.finetune.prepared import Task
@@ -49,7 +50,7 @@ def finetune(
     _begin(out, asked, resume=resume)
     finetuned = Finetuning(task, robot, options, out, prepared, on_outing).run()
     result = {**asked, **summary(finetuned), "versions": library_versions()}
-    _write(out / RESULT, result)
+    write_json(out / RESULT, result)
     write_atomically(out / "model_card.md", card(result).encode())
     write_atomically(out / POLICY, finetuned.content)
     return result
@@ -121,7 +122,7 @@ def _begin(out: Path, asked: dict[str, Any], *, resume: bool) -> None:
     if not file.exists():
         if out.is_dir() and any(out.iterdir()):
             raise UsageError(f"{out} is not empty and holds no run; give another --out.")
-        _write(file, asked)
+        write_json(file, asked)
         return
     if not resume:
         raise UsageError(f"{out} already holds a run; go on with --resume or give another --out.")
@@ -134,8 +135,3 @@ def _begin(out: Path, asked: dict[str, Any], *, resume: bool) -> None:
         )
     if (out / POLICY).exists():
         raise UsageError(f"The run in {out} is finished; its policy is {out / POLICY}.")
-
-
-def _write(path: Path, content: dict[str, Any]) -> None:
-    text = json.dumps(content, indent=1, allow_nan=False)
-    write_atomically(path, f"{text}\n".encode())

@@ -14,6 +14,7 @@ import numpy as np
 
 from hopping_leg.control.outing import Steps
 from hopping_leg.control.policy import Policy
+from hopping_leg.json_files import write_json
 from hopping_leg.learn.finetune.finetuning import Row
 from hopping_leg.learn.finetune.hops import score
 from hopping_leg.learn.finetune.options import FinetuneOptions, Method
@@ -21,7 +22,6 @@ from hopping_leg.learn.finetune.prepared import Task
 from hopping_leg.learn.finetune.running import POLICY, RESULT, finetune
 from hopping_leg.learn.finetune.simulated import Guard, Simulated
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.trace import write_atomically
 
 FIRST_JUDGE = 1000
 """Of the seeds that judge; none of them has chosen anything."""
@@ -140,8 +140,7 @@ def _judge(study: Study, twin: Robot, policy: Policy, method: str, seed: int | N
             }
             for command, error in found.by_command.items()
         ]
-    content = json.dumps({"asked": asked, "rows": rows}, indent=1, allow_nan=False)
-    write_atomically(path, f"{content}\n".encode())
+    write_json(path, {"asked": asked, "rows": rows})
     return rows
 
 
