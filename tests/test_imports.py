@@ -23,7 +23,7 @@ ORDER = [
     "view",
     "cli",
 ]
-FOUNDATION = {"", "arrays", "cluster", "errors", "hops", "progress", "trace"}
+FOUNDATION = {"", "arrays", "cluster", "errors", "hops", "json_files", "progress", "trace"}
 TRAINING = {"torch", "stable_baselines3", "onnx", "tensorboard"}
 BESIDE = {("evaluate", "learn"), ("view", "learn")} | {
     ("deploy", room) for room in ("sim", "identify", "env", "learn")
