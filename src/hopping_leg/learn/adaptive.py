@@ -45,8 +45,6 @@ class AdaptiveRecipe(PreciseRecipe):
     """Hidden layers of the network that feels how far the last hop was off, tanh."""
     steps: int = 12_000_000
     """Control steps of experience in all, summed over the legs."""
-    judge_every: int = 500_000
-    """Control steps between two trials of the policy, for checkpoint selection."""
     teaching: float = 0.4
     """Share of the training in which the teacher learns; in the rest the policy does."""
     alike: float = 0.35

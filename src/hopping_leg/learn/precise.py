@@ -42,10 +42,9 @@ class PreciseRecipe(FastRecipe):
         default_factory=lambda: ApexRewardOptions(width=(0.030, 0.006), jerk=0.3, effort=0.2)
     )
     """Apex reward of the teacher; the calmer it is, the better it can be imitated."""
-    steps: int = 4_500_000
-    """Control steps of experience in all, summed over the legs; with more of them the teacher
-    becomes sharper and its pupil's hops scatter more."""
-    judge_every: int = 250_000
+    steps: int = 9_000_000
+    """Control steps of experience in all, summed over the legs."""
+    judge_every: int = 500_000
     """Control steps between two trials of the policy, for checkpoint selection."""
     judge_from: float = 0.7
     """Share of the training before which no snapshot is tried."""

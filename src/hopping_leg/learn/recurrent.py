@@ -32,10 +32,6 @@ class RecurrentRecipe(PreciseRecipe):
     """The learning problem; wider ranges of commands were not tried."""
     judge_commands: tuple[float, ...] = (0.22, 0.25, 0.28, 0.31, 0.34, 0.37, 0.40)
     """Heights of the trials, m."""
-    steps: int = 9_000_000
-    """Control steps of experience in all, summed over the legs."""
-    judge_every: int = 500_000
-    """Control steps between two trials of the policy, for checkpoint selection."""
     legs: int = 256
     """Legs that gather experience at once."""
     rollout: int = 128
