@@ -51,5 +51,10 @@ def test_a_study_measures_every_method_and_is_not_repeated(tmp_path, seeds):
     assert len(seeds) == count
     figure = draw_finetuning(result)
     lines = figure.axes[0].get_lines()
-    assert len(lines) == 4
+    assert len(lines) == 6
     np.testing.assert_allclose(lines[0].get_ydata(), 20.0)
+    count = len(lines[0].get_xdata())
+    result["curves"][0] |= {"ended_early": True, "true_error_m": 1.0}
+    line, _, crosses = draw_finetuning(result).axes[0].get_lines()[:3]
+    assert len(line.get_xdata()) == count - 1
+    assert list(crosses.get_xdata()) == [result["curves"][0]["minutes"]]

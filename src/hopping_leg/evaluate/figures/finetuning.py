@@ -7,13 +7,17 @@ from matplotlib.figure import Figure
 
 from hopping_leg.evaluate.figures.style import WIDTH, colour, styled
 
+_TOP = 0.97
+"""Where crosses are drawn, of the panel's height; those of later methods a little lower."""
+
 
 @styled
 def draw_finetuning(result: dict[str, Any]) -> Figure:
     """Draw the true error of every check, one panel per twin, one colour per method.
 
     Args:
-        result: JSON values of ``hop bench finetune``; estimated errors are drawn as dots.
+        result: JSON values of ``hop bench finetune``; estimated errors are drawn as dots, checks
+            that were ended early, which have no error, as crosses at the top.
     """
     curves = [row for row in result["curves"] if row["kind"] == "check"]
     twins = list(dict.fromkeys(row["twin"] for row in curves))
@@ -26,28 +30,39 @@ def draw_finetuning(result: dict[str, Any]) -> Figure:
             _draw(panel, mine, method, index)
         panel.set_title(twin)
         panel.set_xlabel("robot time / min")
-        panel.set_ylim(bottom=0)
+        panel.margins(y=0.12)
+    panels[0].set_ylim(bottom=0)
     panels[0].set_ylabel("median |apex − command| / mm")
     panels[0].legend()
     return figure
 
 
 def _draw(panel: Axes, rows: list[dict[str, Any]], method: str, index: int) -> None:
-    """Draw a line per seed and a dot per estimate."""
+    """Draw a line per seed, a dot per estimate and a cross per check that was ended early."""
     for number, seed in enumerate(dict.fromkeys(row["seed"] for row in rows)):
         mine = [row for row in rows if row["seed"] == seed]
-        minutes = [row["minutes"] for row in mine]
+        whole = [row for row in mine if not row["ended_early"]]
+        minutes = [row["minutes"] for row in whole]
         panel.plot(
             minutes,
-            [1e3 * row["true_error_m"] for row in mine],
+            [1e3 * row["true_error_m"] for row in whole],
             color=colour(index),
             linewidth=1.2,
             label=method if number == 0 else None,
         )
         panel.plot(
             minutes,
-            [1e3 * row["error_m"] for row in mine],
+            [1e3 * row["error_m"] for row in whole],
             ".",
             color=colour(index),
             markersize=4,
+        )
+        ended = [row["minutes"] for row in mine if row["ended_early"]]
+        panel.plot(
+            ended,
+            [_TOP - 0.03 * index] * len(ended),
+            "x",
+            color=colour(index),
+            markersize=4,
+            transform=panel.get_xaxis_transform(),
         )

@@ -166,7 +166,7 @@ def _pooled(twin: str, method: str, judged: list[Row]) -> Row:
 
 def _point(row: Row) -> Row:
     names = ("outing", "kind", "minutes", "error_m", "true_error_m", "thrown_back")
-    return {name: row[name] for name in names}
+    return {**{name: row[name] for name in names}, "ended_early": bool(row["complaint"])}
 
 
 def _ending(result: dict[str, Any]) -> Row:
