@@ -88,6 +88,8 @@ results: $(STAMP)
 	$(BIN)/hop experiment transfer --recipe fast --folder runs/transfer-fast --json docs/results/transfer-fast.json
 	$(BIN)/hop experiment prediction --json docs/results/prediction.json
 	$(BIN)/hop bench finetune --twins 1 2 --seeds 0 1 --minutes 5 --figure docs/results/finetune.svg --json docs/results/finetune.json
+	$(BIN)/hop tune fast --trials 20 --steps 1000000 --workers 2 --json docs/results/tuning-fast.json
+	mkdir -p docs/results/tuning-fast && cp runs/tune/fast/*.svg docs/results/tuning-fast
 	$(BIN)/hop bench view --json docs/results/view.json
 	$(BIN)/hop bench deploy --json docs/results/deploy.json
 	$(BIN)/hop bench faults --repeats 15 --live 2 --controllers fast precise energy-shaping --json docs/results/faults.json
