@@ -14,7 +14,10 @@ MAKEFILE = Path(__file__).parent.parent / "Makefile"
 
 @dataclasses.dataclass(frozen=True)
 class Column:
-    """A column ``"key"``, ``"key=title"`` or ``"key*factor=title"`` of a table."""
+    """A column ``"key"``, ``"key=title"`` or ``"key*factor=title"`` of a table.
+
+    A key that a row does not have is a dotted path in it.
+    """
 
     key: str
     title: str
@@ -29,7 +32,8 @@ class Column:
 
     def cell(self, row: dict[str, Any]) -> str:
         """Return this column of a row as text."""
-        return number(scaled(row[self.key], self.factor))
+        found = row[self.key] if self.key in row else pick(row, self.key)
+        return number(scaled(found, self.factor))
 
 
 def scaled(value: Any, factor: float | None) -> Any:  # noqa: ANN401
