@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from hopping_leg.evaluate.figures.style import COLOURS, WIDTH, styled
 
@@ -67,9 +68,10 @@ def draw_slices(study: dict[str, Any]) -> Figure:
         places, labels = _places(study, name, done)
         axes.plot(places, scores, "o", color=COLOURS[0], markersize=3)
         if labels:
-            axes.set_xticks(range(len(labels)), labels, fontsize=7)
+            axes.set_xticks(range(len(labels)), labels, fontsize=6, rotation=15)
         elif study["space"][name].get("log"):
             axes.set_xscale("log")
+            axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set_xlabel(name)
         axes.set_yscale("log")
     for axes in panels[len(names) :]:
