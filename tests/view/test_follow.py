@@ -1,3 +1,5 @@
+import os
+
 import numpy as np
 import pytest
 
@@ -101,6 +103,18 @@ def test_joints_without_a_reply_stay_as_they_were(tmp_path):
     follow.advance(1 / 60)
     assert follow.tracks[0].moment(follow.now)[1][0] == 0.8
     writer.close()
+
+
+def test_of_boxes_written_in_one_tick_the_last_by_name_is_followed(tmp_path):
+    for number in (2, 1):
+        writer = box(tmp_path / f"fast-{number}{SUFFIX}")
+        write(writer, 0, 3)
+        writer.close()
+    for number in (1, 2):
+        os.utime(tmp_path / f"fast-{number}{SUFFIX}", ns=(10**18, 10**18))
+    follow = Follow(tmp_path)
+    follow.advance(1.0)
+    assert follow.notices[-1] == f"Following fast-2{SUFFIX}."
 
 
 def test_a_folder_waits_for_a_run_and_turns_to_a_newer_one(tmp_path):

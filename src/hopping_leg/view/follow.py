@@ -89,10 +89,11 @@ class Follow:
         self.notices.append(f"Following {newest.name}.")
 
     def _newest(self) -> Path | None:
+        """Return the box written last; of several in one tick of the file system, by name."""
         if not self._path.is_dir():
             return self._path if self._path.exists() else None
-        boxes = {box: box.stat().st_mtime_ns for box in self._path.glob(f"*{SUFFIX}")}
-        return max(boxes, key=lambda box: boxes[box], default=None)
+        boxes = [(box.stat().st_mtime_ns, box) for box in self._path.glob(f"*{SUFFIX}")]
+        return max(boxes)[1] if boxes else None
 
     def _track(self, tail: BoxTail) -> Track:
         name = self._robot or str(tail.header.get("robot", ""))
