@@ -10,6 +10,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from hopping_leg.deploy.black_box import SUFFIX, recover
 from hopping_leg.deploy.driver import MoteusLink
 from hopping_leg.deploy.emulator.codes import Mode
 from hopping_leg.deploy.emulator.process import EmulatorProcess
@@ -17,6 +18,7 @@ from hopping_leg.deploy.emulator.wire_log import WireLog
 from hopping_leg.deploy.reasons import Reason
 from hopping_leg.deploy.transport import opener
 from hopping_leg.deploy.wire import JOINTS
+from hopping_leg.errors import TraceError
 from hopping_leg.evaluate.faults.case import Case, Result, Scene, words
 from hopping_leg.evaluate.faults.families import Family
 from hopping_leg.evaluate.faults.judging import (
@@ -26,6 +28,7 @@ from hopping_leg.evaluate.faults.judging import (
     problems_of_box,
 )
 from hopping_leg.robot.parameters import Robot
+from hopping_leg.trace import Trace
 
 LIVE = (
     *("encoder jump", "drive fault", "over-temperature", "over-voltage", "under-voltage"),
@@ -99,12 +102,26 @@ def _killed(scene: Scene, emulator: EmulatorProcess, folder: Path) -> Result:
     finally:
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
+    if _gave_up(folder):
+        result.disturbed = True
+        return result
     time.sleep(_AFTERWARDS)
     result.braked = _braked(emulator.record().log, result.began)
     if result.braked is None or result.braked > BRAKED_WITHIN:
         result.problems.append("the drives did not brake in time after the host's death")
     result.problems += problems_of_box(folder)
     return result
+
+
+def _gave_up(folder: Path) -> bool:
+    """Tell whether the host had stopped the leg before it died, as the computer was too slow."""
+    slow = {reason.name.lower() for reason in _OF_A_SLOW_COMPUTER}
+    try:
+        traces = [Trace.load(file) for file in folder.glob("*.parquet")]
+        traces += [recover(file) for file in folder.glob(f"*{SUFFIX}")]
+    except TraceError:
+        return False
+    return any(event.get("reason") in slow for t in traces for event in t.header["events"])
 
 
 def _armed(log: WireLog) -> float:

@@ -30,7 +30,7 @@ _LOOKED_AT = 3000
 """Ticks on which it is told how much actions have changed, the newest, 15 s."""
 
 _HALVINGS = 8
-"""Of a step that changes actions too much; a longer one is not taken at all."""
+"""Shares of a step that are tried, each half of the one before, until one is short enough."""
 
 _ACTIVATIONS = {"relu": nn.ReLU, "tanh": nn.Tanh, "elu": nn.ELU}
 
@@ -148,7 +148,7 @@ class Learner:
     def _hold_back(self, before: list[torch.Tensor]) -> None:
         """Take back of what the actor learnt as much as goes beyond the change that it may take.
 
-        Every round halves what is left of the step until the actions on the newest ticks allow it.
+        The step is halved until the actions on the newest ticks have changed little enough.
         """
         real, actor = self.model.replay_buffer, self.model.actor
         buffer = real if real.size() else real.believed
