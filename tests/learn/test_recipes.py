@@ -1,6 +1,7 @@
 """Recipes changed from the command line: what a card prints gives the same recipe again."""
 
 import dataclasses
+import json
 
 import numpy as np
 import pytest
@@ -8,7 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hopping_leg.errors import UsageError
-from hopping_leg.learn.recipes import RECIPES, change, changes_of, get_recipe, randomise
+from hopping_leg.learn.recipes import (
+    RECIPES,
+    change,
+    changes_of,
+    get_recipe,
+    randomise,
+    recipe_of,
+)
 from hopping_leg.learn.run_folder import RunFolder
 from hopping_leg.learn.scale import fit
 from hopping_leg.robot import load_robot
@@ -106,3 +114,21 @@ def test_a_run_says_for_which_heights_it_was_asked(tmp_path):
     assert "--heights" not in RunFolder(tmp_path, recipe, robot, 0, None).command
     wide = fit(dataclasses.replace(recipe, heights=(0.2, 0.46)), robot)
     assert "--heights 0.2 0.46" in RunFolder(tmp_path, wide, robot, 0, None).command
+
+
+@given(
+    name=st.sampled_from(sorted(RECIPES)),
+    steps=st.integers(1, 10**9),
+    ranges=st.sampled_from([None, "none", "twins", "surprises"]),
+    heights=st.sampled_from([None, (0.2, 0.4)]),
+    observation=st.sampled_from([None, "three-samples", "dated"]),
+)
+def test_a_runs_recipe_is_read_from_its_options(name, steps, ranges, heights, observation):
+    recipe = dataclasses.replace(change(get_recipe(name), [f"steps={steps}"]), heights=heights)
+    if ranges is not None:
+        recipe = randomise(recipe, ranges)
+    if observation is not None:
+        task = dataclasses.replace(recipe.task, observation=observation)
+        recipe = dataclasses.replace(recipe, task=task)
+    stored = json.loads(json.dumps(dataclasses.asdict(recipe)))
+    assert recipe_of(name, stored) == recipe

@@ -6,7 +6,7 @@ import torch
 
 from hopping_leg.env import HoppingTask, TaskOptions
 from hopping_leg.env.observation import SIZE
-from hopping_leg.env.task import PRIVILEGED
+from hopping_leg.env.true_state import PRIVILEGED
 from hopping_leg.learn.asymmetric import AsymmetricPolicy
 from hopping_leg.learn.resumable import ResumablePPO
 from hopping_leg.learn.vecenv import TaskVecEnv

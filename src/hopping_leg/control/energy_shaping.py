@@ -48,8 +48,8 @@ class EnergyShaping:
         name: Shown in tables.
 
     Attributes:
-        truth: Must be set where an option reads ``"true"``, see ``roll_out(..., on_legs=...)``;
-            None for a controller that feels nothing but its joints.
+        truth: What ``watch`` was shown, where an option reads ``"true"``; None for a controller
+            that feels nothing but its joints.
     """
 
     def __init__(
@@ -66,6 +66,11 @@ class EnergyShaping:
         self.options = options or ShapingOptions()
         self.truth: Truth | None = None
         self._longest = _longest_leg(robot)
+
+    def watch(self, legs: Truth) -> None:
+        """Take the true state where an option reads ``"true"``, else ignore it."""
+        if "true" in (self.options.contact, self.options.height):
+            self.truth = legs
 
     def reset(self, count: int) -> None:
         """Forget everything; the legs stand and push next."""
@@ -233,7 +238,7 @@ class EnergyShaping:
     def _true(self) -> Truth:
         if self.truth is None:
             raise UsageError(
-                "Options that read 'true' exist in simulation only; set EnergyShaping.truth."
+                "Options that read 'true' exist in simulation only, where `watch` shows the legs."
             )
         return self.truth
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import polars as pl
@@ -100,6 +100,15 @@ class Setup:
         return _START_SHARE * (self.robot.thigh.length + self.robot.shank.length)
 
 
+@runtime_checkable
+class Watcher(Protocol):
+    """A controller that looks at the simulated legs themselves: for studies, never for a robot."""
+
+    def watch(self, legs: AnyLegs) -> None:
+        """Take the legs, live; called before their first tick."""
+        ...
+
+
 @dataclass(frozen=True)
 class Rollout:
     """Recorded runs of n legs.
@@ -132,12 +141,12 @@ def roll_out(
     """Let a controller hop from a standing start.
 
     Args:
-        controller: Controls all legs at once.
+        controller: Controls all legs at once; a ``Watcher`` is shown them.
         setup: The world it meets.
         commands: Desired height for every tick and leg, m, (ticks, n).
         seed: Of noise and delay.
         on_tick: Called with (ticks done, ticks in all), for progress bars.
-        on_legs: Called once with the legs, for controllers that are shown the truth.
+        on_legs: Called once with the legs, which it may place where they shall start instead.
         perturbation: What befalls the legs that ``setup`` does not know; recorded heights are above
             the ground of the moment, recorded commands are the controller's.
 
@@ -155,6 +164,8 @@ def roll_out(
     legs.stand(slice(None), setup.start_posture)
     plant.channel.restart(slice(None), legs.q, legs.qd, commands[0])
     controller.reset(count)
+    if isinstance(controller, Watcher):
+        controller.watch(legs)
     if on_legs is not None:
         on_legs(legs)
     data = np.empty((len(_STACKED), ticks, count))

@@ -11,19 +11,11 @@ from hopping_leg.env.options import TaskOptions
 from hopping_leg.env.start import Starts
 from hopping_leg.env.step import Step
 from hopping_leg.env.transition import Reward, Transition
+from hopping_leg.env.true_state import PRIVILEGED, true_state
 from hopping_leg.hops import CLEAR
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import Legs, Measurement, Plant
 from hopping_leg.sim.variants import places, vary
-
-PRIVILEGED = 10
-"""Entries of the true state that a critic may see, where all legs are the same."""
-
-PRIVILEGED_HEIGHT, PRIVILEGED_COMMAND, PRIVILEGED_CLEARANCE = 0, 6, 7
-"""Where the base's height, the command and the foot's clearance stand among them."""
-
-CLEARANCE_GAIN = 10.0
-"""Scale of clearances in the true state, 1/m."""
 
 
 class HoppingTask:
@@ -161,21 +153,13 @@ class HoppingTask:
         return apex, height, height - self.command
 
     def privileged(self) -> Array32:
-        """Return the normalised true state that a critic may see in training, (n, size).
+        """Return what a critic may see in training, (n, size).
 
-        Base height and rate, q (2), qd (2), command, clearance of foot, knee and base; then where
-        the leg's own numbers lie in their ranges, if legs may differ; 0 while they are alike.
+        The true state, then where the leg's own numbers lie in their ranges, if legs may differ; 0
+        while they are alike.
         """
-        legs, o = self.legs, self._scaling
         result = np.empty((self.count, self.privileged_size), np.float32)
-        result[:, PRIVILEGED_HEIGHT] = (legs.height - o.offset[4]) * o.gain[4]
-        result[:, 1] = legs.height_rate
-        result[:, 2:4] = (legs.q - o.offset[:2]) * o.gain[:2]
-        result[:, 4:6] = legs.qd * o.gain[2:4]
-        result[:, PRIVILEGED_COMMAND] = (self.command - o.offset[4]) * o.gain[4]
-        result[:, PRIVILEGED_CLEARANCE] = legs.foot_clearance() * CLEARANCE_GAIN
-        result[:, 8] = legs.knee_clearance() * CLEARANCE_GAIN
-        result[:, 9] = legs.base_clearance() * CLEARANCE_GAIN
+        true_state(self.legs, self.command, self._scaling, out=result[:, :PRIVILEGED])
         if self._numbers.size:
             result[:, PRIVILEGED:] = self._numbers
         return result

@@ -171,12 +171,7 @@ def _hop(case: Case, seed: int, runs: int, seconds: float, threads: int) -> list
     rate = 1 / controller.period
     setup = Setup(case.robot, case.disturbance, rate=rate, threads=threads)
     commands = np.tile(np.repeat(case.commands, runs), (round(seconds * rate), 1))
-
-    def show(legs: Any) -> None:  # noqa: ANN401
-        controller.truth = legs
-
-    needs_truth = "true" in (controller.options.contact, controller.options.height)
-    rollout = roll_out(controller, setup, commands, seed, on_legs=show if needs_truth else None)
+    rollout = roll_out(controller, setup, commands, seed)
     return [rollout.trace(leg) for leg in range(commands.shape[1])]
 
 

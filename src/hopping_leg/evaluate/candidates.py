@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hopping_leg.control import Controller
+from hopping_leg.control.energy_shaping import EnergyShaping
 from hopping_leg.control.library import load_controller, shipped_policies
 from hopping_leg.control.policy import Policy
 from hopping_leg.errors import PolicyError, UsageError
@@ -78,6 +79,14 @@ def check_range(candidate: Candidate, commands: Sequence[float]) -> None:
             f"'{candidate.label}' cannot be asked for {outside[0]:g} m: it was trained for"
             f" {low:g} to {high:g} m; choose --commands within that range."
         )
+
+
+def fingerprint(controller: Controller) -> str:
+    """Return what tells a controller from others of its name, as far as it can be told."""
+    if isinstance(controller, EnergyShaping):
+        return repr((controller.gains, controller.options))
+    named = f"{type(controller).__module__}.{type(controller).__qualname__}"
+    return str(getattr(controller, "digest", named))
 
 
 def _expand(entry: str) -> list[tuple[str, str]]:

@@ -11,7 +11,7 @@ from torch import nn
 
 from hopping_leg.control.layouts import make_layout
 from hopping_leg.env import TaskOptions
-from hopping_leg.env.task import PRIVILEGED_CLEARANCE, PRIVILEGED_COMMAND, PRIVILEGED_HEIGHT
+from hopping_leg.env.true_state import PRIVILEGED_CLEARANCE, PRIVILEGED_COMMAND, PRIVILEGED_HEIGHT
 from hopping_leg.errors import UsageError
 from hopping_leg.learn.actor import aiming_network
 from hopping_leg.learn.aiming import Aiming, AimingStudent, Places

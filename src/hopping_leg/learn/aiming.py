@@ -16,7 +16,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from hopping_leg.env.task import CLEARANCE_GAIN
+from hopping_leg.env.true_state import CLEARANCE_GAIN
 from hopping_leg.learn.asymmetric import dense
 from hopping_leg.learn.checkpoint import Tree
 from hopping_leg.learn.hop_watch import FROM, UNTIL, HopWatch

@@ -13,7 +13,7 @@ from torch import nn
 
 from hopping_leg.control.layouts import make_layout
 from hopping_leg.env import ApexRewardOptions, TaskOptions
-from hopping_leg.env.task import PRIVILEGED
+from hopping_leg.env.true_state import PRIVILEGED
 from hopping_leg.learn.actor import dense_network
 from hopping_leg.learn.export import Network
 from hopping_leg.learn.fast import FastRecipe, cosine
@@ -71,7 +71,7 @@ class PreciseRecipe(FastRecipe):
             policy_kwargs={
                 **self.network_options(),
                 "measured": measured,
-                "teacher_sees": [*state, *self._last_torque()],
+                "teacher_sees": [*state, *self.last_torque],
                 "student": lambda: self.make_student(env),
             },
         )
@@ -83,8 +83,9 @@ class PreciseRecipe(FastRecipe):
             env.task.observation.size, size, list(self.student), self.imitation.memory, nn.Tanh
         )
 
-    def _last_torque(self) -> list[int]:
-        """Return where the torques of the last tick stand in an observation, if they do."""
+    @property
+    def last_torque(self) -> list[int]:
+        """Where the torques of the last tick stand in an observation, if they do."""
         shapes = make_layout(self.task.observation, 1 / self.task.rate).shapes
         if "past_torque" not in shapes:
             return []

@@ -100,6 +100,25 @@ def randomised_by(options: dict[str, Any]) -> Randomise | None:
     return None
 
 
+def recipe_of(name: str, options: dict[str, Any]) -> Recipe:
+    """Return the recipe that a run was asked for, the inverse of ``words_of``.
+
+    Args:
+        name: Of the recipe.
+        options: As in the run's ``config.json``.
+
+    Raises:
+        UsageError: There is no such recipe.
+    """
+    recipe = change(get_recipe(name), changes_of(name, options))
+    ranges, seen = randomised_by(options), options["task"]["observation"]
+    if ranges not in (None, randomised_by(dataclasses.asdict(recipe))):
+        recipe = randomise(recipe, ranges)
+    task = dataclasses.replace(recipe.task, observation=seen)
+    heights = options.get("heights")
+    return dataclasses.replace(recipe, task=task, heights=tuple(heights) if heights else None)
+
+
 def numbers_of(recipe: Recipe) -> dict[str, int | float]:
     """Return a recipe's plain numbers by name; those of its task go with the robot's size."""
     found: dict[str, int | float] = {}

@@ -13,7 +13,7 @@ import numpy.typing as npt
 import torch
 
 from hopping_leg.arrays import IntArray
-from hopping_leg.env.task import PRIVILEGED_COMMAND
+from hopping_leg.env.true_state import PRIVILEGED_COMMAND
 from hopping_leg.learn.asymmetric import AsymmetricPolicy
 from hopping_leg.learn.checkpoint import Tree
 from hopping_leg.learn.imitation import Aim, Imitation

@@ -8,9 +8,10 @@ import pytest
 from hopping_leg.control.library import load_controller
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Candidate
+from hopping_leg.evaluate.candidates import fingerprint
 from hopping_leg.evaluate.figures import draw_robustness, to_svg
 from hopping_leg.evaluate.keeper import Keeper
-from hopping_leg.evaluate.robustness.suite import fingerprint, make_suite, run_suite
+from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
 
 AXES = ("links", "pushes")
 

@@ -5,6 +5,7 @@ Examples:
   hop bench convergence --json convergence.json
   hop bench inference fast --json inference.json
   hop bench reach --json reach.json
+  hop bench limits --teacher runs/precise-seed0 --json limits.json
   hop bench training --training-seeds 0 1 2 --json training.json
   hop bench faults --json faults.json
   hop bench deploy --json deploy.json
@@ -22,6 +23,7 @@ from hopping_leg.cli.bench.faults import Faults
 from hopping_leg.cli.bench.finetuning import Finetune
 from hopping_leg.cli.bench.hardware import Deploy
 from hopping_leg.cli.bench.identification import Identify
+from hopping_leg.cli.bench.limits import Limits
 from hopping_leg.cli.bench.probe import Probe
 from hopping_leg.cli.bench.simulation import Convergence, Env, Inference, Reach
 from hopping_leg.cli.bench.view import View
@@ -33,6 +35,7 @@ Benchmark = (
     | Convergence
     | Inference
     | Reach
+    | Limits
     | EnergyShaping
     | Training
     | Ablation

@@ -7,10 +7,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from hopping_leg.control import Controller, Setup
-from hopping_leg.control.energy_shaping import EnergyShaping
-from hopping_leg.control.policy import Policy
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range
+from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range, fingerprint
 from hopping_leg.evaluate.keeper import Keeper
 from hopping_leg.evaluate.robustness import changes
 from hopping_leg.evaluate.robustness.axes import (
@@ -193,15 +191,6 @@ def _report(
     ticks: int,
 ) -> None:
     on_progress(label, (number + tick / ticks) / parts)
-
-
-def fingerprint(controller: Controller) -> str:
-    """Return what tells a controller from others of its name, as far as it can be told."""
-    if isinstance(controller, Policy):
-        return controller.digest
-    if isinstance(controller, EnergyShaping):
-        return repr((controller.gains, controller.options))
-    return f"{type(controller).__module__}.{type(controller).__qualname__}"
 
 
 def _described(axis: Axis) -> dict[str, Any]:

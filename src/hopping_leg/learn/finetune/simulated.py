@@ -60,7 +60,7 @@ class Simulated:
         """Let a controller hop from standing."""
         commands = by_tick(steps, self._setup.rate)[:, None]
         witness = Witness(controller, self._guard)
-        run = roll_out(witness, self._setup, commands, seed, on_legs=witness.watch)
+        run = roll_out(witness, self._setup, commands, seed)
         ended = int(witness.ended[0])
         trace = traces_of(run)[0]
         table = trace.table[: ended + 1] if ended >= 0 else trace.table
@@ -95,7 +95,7 @@ def hop_many(
     differ = Perturbation(tuple(robots), np.zeros((ticks, count, 2)), calm, calm)
     witness = Witness(controller, None)
     setup = Setup(robot, NOTHING, timestep=timestep, threads=1)
-    return roll_out(witness, setup, commands, seed, on_legs=witness.watch, perturbation=differ)
+    return roll_out(witness, setup, commands, seed, perturbation=differ)
 
 
 def traces_of(run: Rollout) -> list[Trace]:

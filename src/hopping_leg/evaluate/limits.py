@@ -1,0 +1,165 @@
+"""What limits accuracy: the same controllers with noise, delay and soft ground taken away in turn.
+
+A controller that is shown the true state says what is left to gain by seeing more; what scatters
+with a single disturbance on says which of them costs how much.
+"""
+
+import functools
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from hopping_leg.control import Setup
+from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range, fingerprint
+from hopping_leg.evaluate.keeper import Keeper
+from hopping_leg.evaluate.result import Summary
+from hopping_leg.evaluate.runner import evaluate, software_versions
+from hopping_leg.evaluate.runs import safe_name
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim import NOTHING, Disturbance
+
+_FULL = Disturbance()
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What disturbs the controllers.
+
+    Attributes:
+        name: In tables and file names.
+        disturbance: Noise and delay.
+        floor: ``soft``, the robot's contact, or ``stiff``.
+    """
+
+    name: str
+    disturbance: Disturbance
+    floor: str = "soft"
+
+
+CONDITIONS = (
+    Condition("all of it", _FULL),
+    Condition("no joint noise", replace(_FULL, joint_noise=0.0)),
+    Condition("no torque noise", replace(_FULL, torque_noise=0.0)),
+    Condition("no delay", replace(_FULL, delay_probability=0.0)),
+    Condition("joint noise alone", replace(NOTHING, joint_noise=_FULL.joint_noise)),
+    Condition("torque noise alone", replace(NOTHING, torque_noise=_FULL.torque_noise)),
+    Condition("delay alone", replace(NOTHING, delay_probability=_FULL.delay_probability)),
+    Condition("nothing", NOTHING),
+    Condition("all of it, stiff ground", _FULL, floor="stiff"),
+)
+"""The paper's noise and delay, with one less, one alone, none, and on other ground."""
+
+_PER_COMMAND = ("command_m", "median_error_m", "std_m", "hops", "skipped_hops")
+
+
+@dataclass(frozen=True)
+class LimitsStudy:
+    """What is tried."""
+
+    robot: Robot
+    commands: Sequence[float]
+    """Desired heights, m."""
+    seeds: int = 5
+    """Realisations of noise and delay per command."""
+    seed: int = 1000
+    """All of them follow from it."""
+    threads: int = 0
+    """Of the physics."""
+    conditions: Sequence[Condition] = CONDITIONS
+
+    def asked(self, candidate: Candidate, condition: Condition) -> dict[str, Any]:
+        """Return all that a result depends on, as JSON values."""
+        return {
+            "controller": fingerprint(candidate.controller),
+            "condition": asdict(condition),
+            "robot": self.robot.digest,
+            "commands_m": self.commands,
+            "seeds": self.seeds,
+            "seed": self.seed,
+            "versions": software_versions(),
+        }
+
+
+def measure_limits(
+    candidates: Sequence[Candidate],
+    study: LimitsStudy,
+    keeper: Keeper,
+    on_done: Callable[[int, int], None] = lambda done, total: None,
+) -> dict[str, Any]:
+    """Let every candidate hop under every condition.
+
+    Args:
+        candidates: What is judged, ``Watcher`` controllers among them.
+        study: Where.
+        keeper: Keeps each result.
+        on_done: Called with (parts done, parts in all).
+
+    Returns:
+        ``rows``, one per candidate and condition, over all commands, and ``commands``, one per
+        command of these.
+
+    Raises:
+        UsageError: A command is out of a candidate's range, or a name is taken twice.
+    """
+    check_labels(candidates)
+    for candidate in candidates:
+        check_range(candidate, study.commands)
+    parts = list(itertools.product(candidates, study.conditions))
+    rows, commands = [], []
+    for done, (candidate, condition) in enumerate(parts, 1):
+        place = {"controller": candidate.label, "condition": condition.name}
+        kept = keeper.keep(
+            safe_name(f"{candidate.label}-{condition.name}"),
+            f"{candidate.label}: {condition.name}",
+            study.asked(candidate, condition),
+            functools.partial(_hop, candidate, study, condition),
+        )
+        rows.append(place | kept["row"])
+        commands += [place | row for row in kept["commands"]]
+        on_done(done, len(parts))
+    return {
+        "rows": rows,
+        "commands": commands,
+        "seeds": study.seeds,
+        "seed": study.seed,
+        "commands_m": study.commands,
+        "robot": study.robot.name,
+        "versions": software_versions(),
+    }
+
+
+def _hop(candidate: Candidate, study: LimitsStudy, condition: Condition) -> dict[str, Any]:
+    setup = Setup(study.robot, condition.disturbance, threads=study.threads)
+    judged = evaluate(
+        [candidate],
+        setup,
+        commands=study.commands,
+        repeats=study.seeds,
+        seed=study.seed,
+        floor=condition.floor,
+        kinds=("fixed",),
+    )
+    summary = judged.evaluation.summary
+    rows = [{name: getattr(row, name) for name in _PER_COMMAND} for row in summary]
+    return {"row": condense(summary), "commands": rows}
+
+
+def condense(summary: Sequence[Summary]) -> dict[str, Any]:
+    """Return numbers over all commands; if one gave no hops, neither error nor std."""
+    errors = np.abs([row.median_error_m for row in summary])
+    stds = np.array([row.std_m for row in summary])
+    hopped = bool(np.isfinite(errors).all())
+    return {
+        "mean_abs_median_error_m": float(errors.mean()) if hopped else None,
+        "worst_abs_median_error_m": float(errors.max()) if hopped else None,
+        "mean_std_m": float(stds.mean()) if hopped else None,
+        "worst_std_m": float(stds.max()) if hopped else None,
+        "rms_hip_torque_nm": float(np.mean([row.rms_hip_torque_nm for row in summary])),
+        "rms_knee_torque_nm": float(np.mean([row.rms_knee_torque_nm for row in summary])),
+        "hop_rate_hz": float(np.mean([row.hop_rate_hz for row in summary])),
+        "skipped_hops": sum(row.skipped_hops for row in summary),
+        "body_contacts": sum(row.body_contacts for row in summary),
+    }

@@ -1,0 +1,70 @@
+"""The teacher of a run as a controller."""
+
+import numpy as np
+import pytest
+import torch
+
+from hopping_leg.control import Setup, roll_out
+from hopping_leg.errors import UsageError
+from hopping_leg.learn.checkpoint import write_checkpoint
+from hopping_leg.learn.recipes import change, get_recipe
+from hopping_leg.learn.resumable import learner_state
+from hopping_leg.learn.run_folder import RunFolder
+from hopping_leg.learn.teacher import Teacher
+from hopping_leg.robot import load_robot
+from tests.learn.learners import ROBOT, learner
+
+
+def stop_early(folder, name="precise"):
+    """Leave a run as it is after its first checkpoint; return its model."""
+    recipe = change(get_recipe(name), ["legs=4"])
+    run = RunFolder(folder, recipe, ROBOT, 3, None)
+    run.begin(resume=False)
+    model = learner(recipe)
+    write_checkpoint(run.checkpoints, 0, {"model": learner_state(model)})
+    return model
+
+
+def test_it_acts_as_the_teacher_does_in_training(tmp_path):
+    model = stop_early(tmp_path)
+    task, teacher = model.env.task, Teacher(tmp_path, ROBOT)
+    seen = model.env.reset()
+    teacher.watch(task.legs)
+    teacher.reset(task.count)
+    for _ in range(20):
+        with torch.no_grad():
+            wanted = model.policy.teacher_action(torch.as_tensor(seen)).numpy()
+        torque = teacher.act(task.measurement)
+        np.testing.assert_allclose(torque, wanted * task.options.action_torque, atol=1e-5)
+        model.env.step_async(wanted)
+        seen = model.env.step_wait()[0]
+    assert np.abs(torque).max() > 1e-3
+
+
+def test_a_rollout_shows_it_the_legs(tmp_path):
+    stop_early(tmp_path)
+    commands = np.full((20, 3), [0.25, 0.3, 0.35])
+    setup = Setup(ROBOT, threads=1)
+    first, second = (roll_out(Teacher(tmp_path, ROBOT), setup, commands, seed=1) for _ in range(2))
+    np.testing.assert_array_equal(first.data["height_m"], second.data["height_m"])
+    assert np.ptp(first.data["hip_command_nm"][-1]) > 0
+
+
+def test_its_digest_tells_other_weights(tmp_path):
+    stop_early(tmp_path)
+    teacher, other = Teacher(tmp_path, ROBOT), Teacher(tmp_path, ROBOT)
+    assert teacher.digest == other.digest
+    with torch.no_grad():
+        other._policy.action_net.bias += 1e-3
+    assert teacher.digest != other.digest
+
+
+def test_what_has_no_teacher_is_refused(tmp_path):
+    with pytest.raises(UsageError, match="no run with a checkpoint"):
+        Teacher(tmp_path, ROBOT)
+    stop_early(tmp_path / "fast", "fast")
+    with pytest.raises(UsageError, match="no teacher"):
+        Teacher(tmp_path / "fast", ROBOT)
+    stop_early(tmp_path / "precise")
+    with pytest.raises(UsageError, match="trained on legv2-paper"):
+        Teacher(tmp_path / "precise", load_robot("legv2"))
