@@ -113,7 +113,7 @@ class PreciseSpace:
     student: OneOf = OneOf((*_LAYERS, (512, 256)))
     gamma: Real = Real(0.97, 0.997)
     gae_lambda: Real = Real(0.90, 0.99)
-    teaching: Real = Real(0.3, 0.8)
+    teaching: Real = Real(0.2, 0.7)
     guided: Real = Real(0.0, 0.5)
 
 
