@@ -71,6 +71,14 @@ results: $(STAMP)
 	$(BIN)/hop evaluate precise "runs/bench-quarter/precise-seed*/policy.onnx" --seeds 5 --floor soft --no-video \
 	  --json docs/results/precise-seeds.json --commands \
 	0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40,0.41,0.42,0.43,0.44,0.45
+	for seed in 0 1 2 3 4; do $(BIN)/hop train --recipe precise --seed $$seed --set teaching=0.28 --out runs/teaching/0.28-seed$$seed; done
+	for seed in 2 4; do $(BIN)/hop train --recipe precise --seed $$seed --set teaching=0.38 --out runs/teaching/0.38-seed$$seed; done
+	$(BIN)/hop evaluate precise "runs/teaching/*/policy.onnx" --seeds 5 --floor soft --no-video --json docs/results/teaching.json \
+	  --commands 0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40
+	$(BIN)/hop evaluate 0.28-seed0=runs/teaching/0.28-seed0/policy.onnx 0.38-seed2=runs/teaching/0.38-seed2/policy.onnx precise \
+	  --suite robustness --seeds 3 --out runs/results/robustness-teaching --json docs/results/teaching-robustness.json
+	$(BIN)/hop bench limits --controllers precise adaptive recurrent energy-shaping 0.28-seed0=runs/teaching/0.28-seed0/policy.onnx \
+	  --teacher runs/teaching/0.28-seed0 --json docs/results/limits.json
 	$(BIN)/hop bench reach --json docs/results/reach.json
 	$(BIN)/hop train --recipe precise --observation three-samples --heights 0.2 0.42 --out runs/fifteen
 	$(BIN)/hop train --recipe recurrent --observation three-samples --out runs/fifteen-recurrent

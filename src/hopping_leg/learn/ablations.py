@@ -6,10 +6,6 @@ from hopping_leg.learn.fast import FastRecipe
 from hopping_leg.learn.precise import PreciseRecipe
 from hopping_leg.learn.recurrent import RecurrentRecipe
 
-_SHORT_TEACHING = 0.55
-"""Share of an ablation of `precise` in which the teacher learns: half the recipe's steps leave the
-teacher as many as it has in a whole training."""
-
 _LATENT = 1.6
 """Log norm of the actor's last layer early in training: gSDE's noise over its weights' noise."""
 
@@ -82,8 +78,7 @@ def _of_fast() -> list[Ablation]:
 
 
 def _of_precise() -> list[Ablation]:
-    base, fast = PreciseRecipe(teaching=_SHORT_TEACHING), FastRecipe()
-    recurrent = RecurrentRecipe(teaching=_SHORT_TEACHING)
+    base, fast, recurrent = PreciseRecipe(), FastRecipe(), RecurrentRecipe()
     return [
         Ablation("recipe", "the recipe", base),
         Ablation(

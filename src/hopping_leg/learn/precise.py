@@ -50,9 +50,8 @@ class PreciseRecipe(FastRecipe):
     """Share of the training before which no snapshot is tried."""
     judge_commands: tuple[float, ...] = (0.225, 0.26, 0.295, 0.33, 0.365, 0.40, 0.435)
     """Heights of those trials, m."""
-    teaching: float = 0.28
-    """Share of the training in which the teacher learns; in the rest the policy does, which needs
-    most of the time: with half of it hops scatter up to three times as much."""
+    teaching: float = 0.55
+    """Share of the training in which the teacher learns; in the rest the policy does."""
     student: tuple[int, ...] = (256, 128)
     """Hidden layers of the policy, tanh; ``actor`` are the teacher's."""
     imitation: Imitation = field(default_factory=Imitation)

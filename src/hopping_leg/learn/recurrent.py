@@ -32,8 +32,6 @@ class RecurrentRecipe(PreciseRecipe):
     """The learning problem; wider ranges of commands were not tried."""
     judge_commands: tuple[float, ...] = (0.22, 0.25, 0.28, 0.31, 0.34, 0.37, 0.40)
     """Heights of the trials, m."""
-    teaching: float = 0.55
-    """Share of the training in which the teacher learns; a shorter one was not tried."""
     legs: int = 256
     """Legs that gather experience at once."""
     rollout: int = 128
