@@ -42,8 +42,9 @@ class Experiment:
     """How many twins to draw, or robot files that extend what is believed of them."""
     methods: tuple[str, ...] | None = None
     """What policies are trained on, the others being compared with the first; or what foretells.
-    Valid: identified, cad, table-1, randomised (not to foretell), rail-only, fixed-base-only,
-    two-pass, one-pass, truth. Default: the first four; or all that can foretell."""
+    Valid: identified, cad, table-1, randomised, identified-surprises, cad-surprises (these three
+    not to foretell), rail-only, fixed-base-only, two-pass, one-pass, truth. Default: the first
+    four; or all that can foretell."""
     seeds: tuple[int, ...] = (0,)
     """Of the trainings, one of each method and twin each."""
     recipe: str = "adaptive"

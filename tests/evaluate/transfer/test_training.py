@@ -1,8 +1,10 @@
 """What policies are trained on."""
 
+from hopping_leg.evaluate.transfer.run import fits
 from hopping_leg.evaluate.transfer.training import Train
 from hopping_leg.robot import load_robot
 from hopping_leg.sim.twins import IDENTIFIABLE
+from hopping_leg.sim.variants import SURPRISES
 from tests.evaluate.transfer.studies import study
 
 
@@ -16,6 +18,19 @@ def test_no_method_trains_on_what_the_twin_alone_knows(tmp_path):
     assert truth.robot.reality.only_delays
     assert truth.robot.rail == twin.robot.rail
     assert truth.robot.reality.latency.command == twin.robot.reality.latency.command
+
+
+def test_legs_may_surprise_around_whatever_is_believed(tmp_path):
+    one = study(tmp_path, ("cad", "cad-surprises", "identified", "identified-surprises"))
+    twin = one.twins[0]
+    cad, surprising, *_ = trains = [Train(one, twin, method, 0) for method in one.methods]
+    assert cad.robot == surprising.robot
+    assert cad._recipe().task.randomised == ()
+    assert surprising._recipe().task.randomised == SURPRISES
+    assert len({one.training(twin, train.method, 0) for train in trains}) == 4
+    fit, shared = (one.fitted(twin, method) for method in one.methods[2:])
+    assert fit == shared
+    assert [job.name for job in fits(one)] == [f"identify {t.name}, identified" for t in one.twins]
 
 
 def test_a_training_that_goes_beyond_its_steps_is_done_once(tmp_path):

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.transfer.methods import Method
+from hopping_leg.evaluate.transfer.methods import Fit, Method
 from hopping_leg.evaluate.transfer.study import USUAL_FIT, Study, TwinFile
 from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.cma import CmaOptions
@@ -40,7 +40,13 @@ class Identify:
     @property
     def name(self) -> str:
         """What is done."""
-        return f"identify {self.twin.name}, {self.method.name}"
+        return f"identify {self.twin.name}, {self.fit.name}"
+
+    @property
+    def fit(self) -> Fit:
+        """How."""
+        assert self.method.fit is not None
+        return self.method.fit
 
     @property
     def done(self) -> bool:
@@ -62,8 +68,7 @@ class Identify:
 
     def run(self, *, quiet: bool) -> None:
         """Identify and write the robot file; a fit that was killed goes on."""
-        assert self.method.fit is not None
-        study, search = self.study, self.method.fit.search
+        study, search = self.study, self.fit.search
         file = study.fitted(self.twin, self.method)
         believed = load_robot(self.twin.believed)
         effort = SearchOptions(
@@ -87,12 +92,10 @@ class Identify:
 
     @property
     def _recordings(self) -> list[Path]:
-        assert self.method.fit is not None
-        return [self.study.recording(self.twin, rig) for rig in self.method.fit.rigs]
+        return [self.study.recording(self.twin, rig) for rig in self.fit.rigs]
 
     def _asked(self) -> dict[str, Any]:
-        assert self.method.fit is not None
-        search = self.method.fit.search
+        search = self.fit.search
         effort = self.study.least_squares
         return {
             "recordings": [load_recording(path).digest for path in self._recordings],

@@ -9,17 +9,22 @@ from hopping_leg.identify.setup import Rig
 
 Search = Literal["least-squares", "two-pass", "one-pass"]
 
+Ranges = Literal["none", "twins", "surprises"]
+"""From which every leg in training draws its own numbers, as in ``hop train --randomise``."""
+
 
 @dataclass(frozen=True)
 class Fit:
     """How the simulation is fitted to recordings of the twin.
 
     Attributes:
+        name: Of its files; methods may share a fit.
         rigs: Whose recordings are used.
         search: ``least-squares`` on positions and torques, the paper's ``two-pass`` CMA-ES on
             positions, or ``one-pass``, the same over all parameters at once.
     """
 
+    name: str = "identified"
     rigs: tuple[Rig, ...] = ("fixed-base", "rail")
     search: Search = "least-squares"
 
@@ -33,7 +38,7 @@ class Method:
         meaning: A phrase for tables.
         fit: How the twin is identified; None if it is not.
         robot: Robot that is trained on without a fit; None takes the one that the twin extends.
-        randomised: Whether every leg in training draws its own numbers.
+        ranges: What every leg in training draws for itself, around the robot.
         truth: Whether the twin's own file is the robot, [reality] left out but for the delay:
             what a perfect fit would find.
     """
@@ -42,8 +47,13 @@ class Method:
     meaning: str
     fit: Fit | None = None
     robot: str | None = None
-    randomised: bool = False
+    ranges: Ranges = "none"
     truth: bool = False
+
+    @property
+    def randomised(self) -> bool:
+        """Whether legs differ in training."""
+        return self.ranges != "none"
 
     @property
     def of_twin(self) -> bool:
@@ -57,11 +67,19 @@ METHODS = {
         Method("identified", "identified from both recordings", Fit()),
         Method("cad", "CAD defaults"),
         Method("table-1", "the paper's Table I", robot="legv2-paper"),
-        Method("randomised", "domain randomisation over the twins' ranges", randomised=True),
-        Method("rail-only", "identified from the rail alone", Fit(rigs=("rail",))),
-        Method("fixed-base-only", "identified with the base clamped", Fit(rigs=("fixed-base",))),
-        Method("two-pass", "the paper's two passes of CMA-ES", Fit(search="two-pass")),
-        Method("one-pass", "the same CMA-ES in one pass", Fit(search="one-pass")),
+        Method("randomised", "domain randomisation over the twins' ranges", ranges="twins"),
+        Method(
+            "identified-surprises", "identified, every leg surprising", Fit(), ranges="surprises"
+        ),
+        Method("cad-surprises", "CAD defaults, every leg surprising", ranges="surprises"),
+        Method("rail-only", "identified from the rail alone", Fit("rail-only", rigs=("rail",))),
+        Method(
+            "fixed-base-only",
+            "identified with the base clamped",
+            Fit("fixed-base-only", rigs=("fixed-base",)),
+        ),
+        Method("two-pass", "the paper's two passes of CMA-ES", Fit("two-pass", search="two-pass")),
+        Method("one-pass", "the same CMA-ES in one pass", Fit("one-pass", search="one-pass")),
         Method("truth", "true parameters: what a perfect fit would find", truth=True),
     )
 }

@@ -78,8 +78,9 @@ def records(study: Study) -> list[Record]:
 
 
 def fits(study: Study) -> list[Identify]:
-    """Return all identifications, those of the first method first."""
-    return [Identify(study, t, m) for m in study.methods if m.fit for t in study.twins]
+    """Return all identifications, those of the first method first; several may share one."""
+    every = (Identify(study, t, m) for m in study.methods if m.fit for t in study.twins)
+    return list({study.fitted(fit.twin, fit.method): fit for fit in every}.values())
 
 
 def trainings(study: Study) -> list[Train]:

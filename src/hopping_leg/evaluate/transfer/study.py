@@ -105,14 +105,15 @@ class Study:
 
     def fitted(self, twin: TwinFile, method: Method) -> Path:
         """Return the robot file that a method fits; beside it, as .json, stands the fit."""
-        return self.folder / "robots" / f"{twin.name}-{method.name}.toml"
+        assert method.fit is not None
+        return self.folder / "robots" / f"{twin.name}-{method.fit.name}.toml"
 
     def training(self, twin: TwinFile, method: Method, seed: int) -> Path:
         """Return a training's folder; what does not depend on the twin is trained once."""
         name = f"{twin.name}-{method.name}"
         if not method.of_twin:
             name = Path(method.robot or twin.believed).stem
-            name += "-randomised" if method.randomised else ""
+            name += f"-{method.ranges}" if method.randomised else ""
         return self.folder / "training" / f"{name}-seed{seed}"
 
     def trial(self, twin: TwinFile, method: Method, seed: int) -> Path:

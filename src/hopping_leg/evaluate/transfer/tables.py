@@ -154,7 +154,7 @@ def fit_row(fit: Identify) -> Row:
     names = ("closed_loop_position_rms_rad", "closed_loop_torque_rms_nm")
     truth = found["truth"]
     return {
-        "method": fit.method.name,
+        "method": fit.fit.name,
         "twin": fit.twin.name,
         **{f"{name}_before": before[name] for name in names},
         **{name: after[name] for name in names},

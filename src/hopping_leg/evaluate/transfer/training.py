@@ -75,7 +75,7 @@ class Train:
         from hopping_leg.learn.recipes import change, get_recipe, randomise
 
         recipe = change(get_recipe(self.study.recipe), [f"steps={self.study.steps}"])
-        return randomise(recipe, "twins" if self.method.randomised else "none")
+        return randomise(recipe, self.method.ranges)
 
     def _folder(self) -> "RunFolder":
         from hopping_leg.learn.run_folder import RunFolder
