@@ -112,7 +112,7 @@ def recipe_of(name: str, options: dict[str, Any]) -> Recipe:
     """
     recipe = change(get_recipe(name), changes_of(name, options))
     ranges, seen = randomised_by(options), options["task"]["observation"]
-    if ranges not in (None, randomised_by(dataclasses.asdict(recipe))):
+    if ranges is not None:
         recipe = randomise(recipe, ranges)
     task = dataclasses.replace(recipe.task, observation=seen)
     heights = options.get("heights")
