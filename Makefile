@@ -71,6 +71,9 @@ results: $(STAMP)
 	$(BIN)/hop evaluate precise "runs/bench-quarter/precise-seed*/policy.onnx" --seeds 5 --floor soft --no-video \
 	  --json docs/results/precise-seeds.json --commands \
 	0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40,0.41,0.42,0.43,0.44,0.45
+	$(BIN)/hop train --recipe adaptive --out runs/adaptive
+	$(BIN)/hop evaluate 12-million-steps=runs/adaptive/policy.onnx adaptive --suite robustness --seeds 3 \
+	  --out runs/results/robustness-adaptive --json docs/results/adaptive-robustness.json
 	for seed in 0 1 2 3 4; do $(BIN)/hop train --recipe precise --seed $$seed --set teaching=0.28 --out runs/teaching/0.28-seed$$seed; done
 	for seed in 2 4; do $(BIN)/hop train --recipe precise --seed $$seed --set teaching=0.38 --out runs/teaching/0.38-seed$$seed; done
 	$(BIN)/hop evaluate precise "runs/teaching/*/policy.onnx" --seeds 5 --floor soft --no-video --json docs/results/teaching.json \
@@ -93,6 +96,7 @@ results: $(STAMP)
 	$(BIN)/hop bench identify --parts paper-size --searches two-pass --json docs/results/bench_identify_size.json
 	$(BIN)/hop bench identify --parts recordings --json docs/results/bench_identify_recordings.json
 	$(BIN)/hop experiment transfer --json docs/results/transfer.json
+	$(BIN)/hop experiment transfer --methods identified-surprises cad-surprises --json docs/results/transfer-surprises.json
 	$(BIN)/hop experiment transfer --recipe fast --folder runs/transfer-fast --json docs/results/transfer-fast.json
 	$(BIN)/hop experiment prediction --json docs/results/prediction.json
 	$(BIN)/hop bench finetune --twins 1 2 --seeds 0 1 --minutes 5 --figure docs/results/finetune.svg --json docs/results/finetune.json
