@@ -66,7 +66,7 @@ results: $(STAMP)
 	$(BIN)/hop bench engines --json docs/results/bullet.json
 	$(BIN)/hop bench energy-shaping --json docs/results/energy_shaping.json
 	$(BIN)/hop bench training --json docs/results/training.json
-	$(BIN)/hop bench training --recipe precise --minutes 13.5 --steps 20000000 --training-seeds 1 2 --out runs/bench-quarter \
+	$(BIN)/hop bench training --recipe precise --minutes 13.5 --steps 20000000 --training-seeds 1 2 3 4 --out runs/bench-quarter \
 	  --json docs/results/training-quarter.json
 	$(BIN)/hop evaluate precise "runs/bench-quarter/precise-seed*/policy.onnx" --seeds 5 --floor soft --no-video \
 	  --json docs/results/precise-seeds.json --commands \
