@@ -8,6 +8,9 @@ from macros_results import grid, number, origin, read
 _LOWER = 0.34
 """Commands up to which less scatter is asked for, m."""
 
+_FLIGHT = 0.5
+"""Least share of the time in flight that is asked for."""
+
 
 def leaderboard(file: str) -> str:
     """Return the scores of a robustness file: a row per axis, a column per controller, in %."""
@@ -27,7 +30,10 @@ def _share(row: dict[str, Any]) -> str:
 
 
 def recoveries(file: str) -> str:
-    """Return how controllers recover in a robustness file: a row per change, the worst command."""
+    """Return how controllers recover in a robustness file: a row per change, the worst command.
+
+    The last rows count changes and commands after which they are back.
+    """
     content = read(file)
     groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for row in content["recovery"]:
@@ -37,6 +43,11 @@ def recoveries(file: str) -> str:
         [change, *(_recovered(groups[change, name]) for name in controllers)]
         for change in dict.fromkeys(change for change, _ in groups)
     ]
+    for title, entry in (
+        ("back, of all changes and commands", "back_after_hops"),
+        ("in the median of the hops' errors", "centred_after_hops"),
+    ):
+        rows.append([title, *(_backs(content, entry, name) for name in controllers)])
     return grid(["change", *controllers], rows) + origin(file, content)
 
 
@@ -44,6 +55,11 @@ def _recovered(rows: list[dict[str, Any]]) -> str:
     first = _worst([error for row in rows for error in row["hop_abs_errors_m"]], 1000)
     later = _worst([row["later_abs_error_m"] for row in rows], 1000)
     return f"{_worst([row['back_after_hops'] for row in rows])} [{first}, {later}]"
+
+
+def _backs(content: dict[str, Any], entry: str, controller: str) -> str:
+    hops = [row[entry] for row in content["recovery"] if row["controller"] == controller]
+    return f"{sum(one is not None for one in hops)} of {len(hops)}"
 
 
 def _worst(values: list[float | None], factor: float = 1) -> str:
@@ -79,6 +95,31 @@ def precision(file: str) -> str:
     return grid(titles, rows) + origin(file, content)
 
 
+def against(file: str, rival: str) -> str:
+    """Return at how many commands controllers are nearer than a rival: a row per controller.
+
+    Of all commands, and of those at which the rival flies for half of the time, as asked of all.
+    """
+    content = read(file)
+    rows_of: dict[str, dict[float, dict[str, Any]]] = {}
+    for row in content["summary"]:
+        rows_of.setdefault(row["controller"], {})[row["command_m"]] = row
+    other = rows_of.pop(rival)
+    flying = [command for command, row in other.items() if row["flight_fraction"] >= _FLIGHT]
+    rows = []
+    for name, mine in rows_of.items():
+        cells = []
+        for commands in (list(other), flying):
+            for column in ("median_error_m", "std_m", "mean_abs_error_m"):
+                nearer = [abs(mine[c][column]) < abs(other[c][column]) for c in commands]
+                cells.append(f"{sum(nearer)} of {len(nearer)}")
+        rows.append([name, *cells])
+    measures = ("error smaller at", "std", "mean distance")
+    half = f"where `{rival}` flies {100 * _FLIGHT:.0f} %"
+    titles = ["controller", *measures, f"error, {half}", *(f"{m}, there" for m in measures[1:])]
+    return grid(titles, rows) + origin(file, content)
+
+
 def probe_scores(file: str, controller: str) -> str:
     """Return a policy's probes: a row per set of features, a column per target."""
     content = read(file)
@@ -111,6 +152,7 @@ def percentiles(file: str, **titles: str) -> str:
 
 
 MACROS = {
+    "against": against,
     "precision": precision,
     "leaderboard": leaderboard,
     "percentiles": percentiles,

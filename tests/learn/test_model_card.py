@@ -1,6 +1,6 @@
 import pytest
 
-from hopping_leg.learn.model_card import MISSED, doubt
+from hopping_leg.learn.model_card import MISSED, doubt, exams
 
 
 def trials(**errors):
@@ -23,3 +23,8 @@ def test_a_card_names_every_command_that_its_own_simulation_misses():
 
 def test_a_command_between_centimetres_is_not_rounded_to_another():
     assert "0.225 m (+30 mm)" in doubt([{"command_m": 0.225, "median_error_m": 0.03}])
+
+
+def test_a_card_tells_how_teachers_did_if_there_were_several():
+    assert exams([]) == ""
+    assert "3 learnt, with scores of 21.0, 4.1, 5.0 mm" in exams([0.021, 0.0041, 0.005])

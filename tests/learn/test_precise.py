@@ -71,6 +71,61 @@ def test_learning_rates_fall_for_the_teacher_and_again_for_the_student():
     assert RECIPE.rate(0.0) < 0.03 * RECIPE.learning_rate
 
 
+def test_every_teacher_learns_from_the_start_at_the_full_rate():
+    each = RECIPE.teaching / RECIPE.teachers
+    for number in range(RECIPE.teachers):
+        begun = 1 - number * each
+        assert RECIPE.rate(begun - 1e-6) > 0.9 * RECIPE.learning_rate
+        assert RECIPE.rate(begun - each + 1e-6) < 0.03 * RECIPE.learning_rate
+
+
+def test_the_teacher_with_the_best_score_teaches():
+    scores = iter([0.03, 0.01, 0.02])
+    examined = []
+
+    def exam(policy):
+        examined.append({k: v.clone() for k, v in policy.state_dict().items()})
+        return next(scores)
+
+    chooser = learner(TINY_PRECISE)
+    chooser._exam = exam
+    learnt = np.linspace(0, TINY_PRECISE.teaching, 7)
+    for share in learnt:
+        TINY_PRECISE.anneal(chooser, chooser.env, share)
+        with torch.no_grad():
+            chooser.policy.action_net.bias += 1.0
+    with torch.no_grad():
+        chooser.policy.action_net.bias -= 1.0
+    assert chooser.exams == [0.03, 0.01, 0.02]
+    assert TINY_PRECISE.findings(chooser) == {"teachers_scores_m": [0.03, 0.01, 0.02]}
+    weights = [one["mlp_extractor.policy_net.0.weight"] for one in examined]
+    assert not torch.equal(weights[0], weights[1])
+    assert not torch.equal(weights[1], weights[2])
+    now = chooser.policy.state_dict()
+    best = {k: v for k, v in examined[1].items() if k != "log_std"}
+    assert all(torch.equal(now[name], value) for name, value in best.items())
+    TINY_PRECISE.anneal(chooser, chooser.env, 1.0)
+    assert len(chooser.exams) == 3
+
+
+def test_a_single_teacher_takes_no_exam():
+    alone = dataclasses.replace(TINY_PRECISE, teachers=1)
+    model = learner(alone)
+    for share in (0.0, alone.teaching, 1.0):
+        alone.anneal(model, model.env, share)
+    assert model.exams == []
+    assert alone.findings(model) == {}
+
+
+def test_an_exam_tells_a_teacher_that_does_not_hop():
+    recipe = dataclasses.replace(TINY_PRECISE, judge_commands=(0.25, 0.35))
+    model = learner(recipe)
+    with torch.no_grad():
+        for weight in model.policy.action_net.parameters():
+            weight.zero_()
+    assert recipe.examine(model.policy, ROBOT) >= 1.0
+
+
 def test_imitation_brings_the_student_to_its_teacher_and_leaves_the_teacher_alone():
     student = learner(TINY_PRECISE)
     policy = student.policy

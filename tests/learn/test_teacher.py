@@ -10,7 +10,7 @@ from hopping_leg.learn.checkpoint import write_checkpoint
 from hopping_leg.learn.recipes import change, get_recipe
 from hopping_leg.learn.resumable import learner_state
 from hopping_leg.learn.run_folder import RunFolder
-from hopping_leg.learn.teacher import Teacher
+from hopping_leg.learn.teacher_of_run import teacher_of_run
 from hopping_leg.robot import load_robot
 from tests.learn.learners import ROBOT, learner
 
@@ -27,7 +27,7 @@ def stop_early(folder, name="precise"):
 
 def test_it_acts_as_the_teacher_does_in_training(tmp_path):
     model = stop_early(tmp_path)
-    task, teacher = model.env.task, Teacher(tmp_path, ROBOT)
+    task, teacher = model.env.task, teacher_of_run(tmp_path, ROBOT)
     seen = model.env.reset()
     teacher.watch(task.legs)
     teacher.reset(task.count)
@@ -45,14 +45,15 @@ def test_a_rollout_shows_it_the_legs(tmp_path):
     stop_early(tmp_path)
     commands = np.full((20, 3), [0.25, 0.3, 0.35])
     setup = Setup(ROBOT, threads=1)
-    first, second = (roll_out(Teacher(tmp_path, ROBOT), setup, commands, seed=1) for _ in range(2))
+    teachers = [teacher_of_run(tmp_path, ROBOT) for _ in range(2)]
+    first, second = (roll_out(teacher, setup, commands, seed=1) for teacher in teachers)
     np.testing.assert_array_equal(first.data["height_m"], second.data["height_m"])
     assert np.ptp(first.data["hip_command_nm"][-1]) > 0
 
 
 def test_its_digest_tells_other_weights(tmp_path):
     stop_early(tmp_path)
-    teacher, other = Teacher(tmp_path, ROBOT), Teacher(tmp_path, ROBOT)
+    teacher, other = teacher_of_run(tmp_path, ROBOT), teacher_of_run(tmp_path, ROBOT)
     assert teacher.digest == other.digest
     with torch.no_grad():
         other._policy.action_net.bias += 1e-3
@@ -61,10 +62,10 @@ def test_its_digest_tells_other_weights(tmp_path):
 
 def test_what_has_no_teacher_is_refused(tmp_path):
     with pytest.raises(UsageError, match="no run with a checkpoint"):
-        Teacher(tmp_path, ROBOT)
+        teacher_of_run(tmp_path, ROBOT)
     stop_early(tmp_path / "fast", "fast")
     with pytest.raises(UsageError, match="no teacher"):
-        Teacher(tmp_path / "fast", ROBOT)
+        teacher_of_run(tmp_path / "fast", ROBOT)
     stop_early(tmp_path / "precise")
     with pytest.raises(UsageError, match="trained on legv2-paper"):
-        Teacher(tmp_path / "precise", load_robot("legv2"))
+        teacher_of_run(tmp_path / "precise", load_robot("legv2"))

@@ -82,6 +82,9 @@ def _of_precise() -> list[Ablation]:
     return [
         Ablation("recipe", "the recipe", base),
         Ablation(
+            "one-teacher", "one teacher with all the teachers' time", replace(base, teachers=1)
+        ),
+        Ablation(
             "no-teacher",
             "no teacher: reinforcement learning on the same inputs, as `fast` learns",
             replace(fast, task=base.task, judge_commands=base.judge_commands),

@@ -47,6 +47,8 @@ class AdaptiveRecipe(PreciseRecipe):
     """Control steps of experience in all, summed over the legs."""
     teaching: float = 0.4
     """Share of the training in which the teacher learns; in the rest the policy does."""
+    teachers: int = 1
+    """Choosing among several was not tried here."""
     alike: float = 0.35
     """Share of the policy's learning in which legs are alike."""
     draws: int = 40

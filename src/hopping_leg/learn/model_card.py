@@ -37,6 +37,7 @@ One network from joint measurements to joint torques, for robot `{result["robot"
 
 - Training: {result["steps"]} control steps, {result["minutes"]:.1f} min of wall-clock time, physics
   step {1000 * task["timestep"]:g} ms.
+{exams(result.get("teachers_scores_m", []))}\
 - Selection: the policy after {selected["steps"]} steps ({selected["minutes"]:.1f} min), the best of
   {len(selected["finalists"])} finalists out of {len(result["history"])} snapshots.
 - Versions: {versions}.
@@ -47,6 +48,21 @@ step 0.5 ms, the first 2 s of each trial dropped. These seeds chose the policy; 
 
 {table(selected["trials"])}
 {doubt(selected["trials"])}"""
+
+
+def exams(scores: list[float]) -> str:
+    """Return a line on the teachers, if there were several.
+
+    Args:
+        scores: Of their exams, m.
+    """
+    if not scores:
+        return ""
+    numbers = ", ".join(f"{1000 * score:.1f}" for score in scores)
+    return (
+        f"- Teachers: {len(scores)} learnt, with scores of {numbers} mm (less is better); the best"
+        " of them taught.\n"
+    )
 
 
 def doubt(trials: list[dict[str, Any]]) -> str:

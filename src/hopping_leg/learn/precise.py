@@ -5,6 +5,7 @@ hard the last stance pushed. A teacher that is told the height learns by PPO, wi
 remember, and the policy learns from it what to do on measurements.
 """
 
+import itertools
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
@@ -18,9 +19,12 @@ from hopping_leg.learn.actor import dense_network
 from hopping_leg.learn.export import Network
 from hopping_leg.learn.fast import FastRecipe, cosine
 from hopping_leg.learn.imitation import Imitation
+from hopping_leg.learn.judge import judge, score
 from hopping_leg.learn.students import WindowStudent
 from hopping_leg.learn.taught import TaughtPolicy, TaughtPPO
+from hopping_leg.learn.teacher import Teacher
 from hopping_leg.learn.vecenv import TaskVecEnv
+from hopping_leg.robot.parameters import Robot
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,7 @@ class PreciseRecipe(FastRecipe):
         default_factory=lambda: ApexRewardOptions(width=(0.030, 0.006), jerk=0.3, effort=0.2)
     )
     """Apex reward of the teacher; the calmer it is, the better it can be imitated."""
-    steps: int = 9_000_000
+    steps: int = 14_000_000
     """Control steps of experience in all, summed over the legs."""
     judge_every: int = 500_000
     """Control steps between two trials of the policy, for checkpoint selection."""
@@ -50,8 +54,10 @@ class PreciseRecipe(FastRecipe):
     """Share of the training before which no snapshot is tried."""
     judge_commands: tuple[float, ...] = (0.225, 0.26, 0.295, 0.33, 0.365, 0.40, 0.435)
     """Heights of those trials, m."""
-    teaching: float = 0.55
-    """Share of the training in which the teacher learns; in the rest the policy does."""
+    teaching: float = 0.54
+    """Share of the training in which teachers learn; in the rest the policy does."""
+    teachers: int = 3
+    """How many learn, one after the other; the best of them teaches."""
     student: tuple[int, ...] = (256, 128)
     """Hidden layers of the policy, tanh; ``actor`` are the teacher's."""
     imitation: Imitation = field(default_factory=Imitation)
@@ -67,6 +73,7 @@ class PreciseRecipe(FastRecipe):
             TaughtPolicy,
             env,
             imitation=self.imitation,
+            exam=lambda policy: self.examine(policy, env.task.robot),
             **self.ppo_options(seed),
             policy_kwargs={
                 **self.network_options(),
@@ -83,6 +90,21 @@ class PreciseRecipe(FastRecipe):
             env.task.observation.size, size, list(self.student), self.imitation.memory, nn.Tanh
         )
 
+    def make_teacher(self, policy: TaughtPolicy, robot: Robot) -> Teacher:
+        """Return a policy's teacher as a controller."""
+        return Teacher(policy, robot, self.task, self.last_torque)
+
+    def examine(self, policy: TaughtPolicy, robot: Robot) -> float:
+        """Score a policy's teacher as snapshots are scored, at twice as many heights, m.
+
+        Between two heights at which it hops well it may change from one kind of hop to another and
+        stumble.
+        """
+        heights = self.judge_commands
+        middles = [(low + high) / 2 for low, high in itertools.pairwise(heights)]
+        commands = tuple(sorted([*heights, *middles]))
+        return score(judge(self.make_teacher(policy, robot), robot, commands, rate=self.task.rate))
+
     @property
     def last_torque(self) -> list[int]:
         """Where the torques of the last tick stand in an observation, if they do."""
@@ -94,24 +116,39 @@ class PreciseRecipe(FastRecipe):
         return [first, first + 1]
 
     def rate(self, left: float) -> float:
-        """Return the learning rate; it falls along a cosine, for the teacher and again after."""
+        """Return the learning rate; it falls along a cosine, for every teacher and again after."""
         done = 1 - left
         if done < self.teaching:
-            return self.learning_rate * cosine(1 - done / self.teaching)
+            return self.learning_rate * cosine(1 - self._learnt(done)[1])
         return self.learning_rate * cosine(left / (1 - self.teaching))
 
     def anneal(self, model: Any, env: TaskVecEnv, share: float) -> None:  # noqa: ANN401
-        """Sharpen the reward and quieten exploration for the teacher, then let the policy act.
+        """Sharpen the reward and quieten exploration for each teacher, then let the policy act.
 
         Where legs differ, they do so for the policy: a teacher that feels the true state is hardly
         the worse for not having met them.
         """
-        super().anneal(model, env, min(1.0, share / self.teaching))
+        before, learnt = self._learnt(share)
+        while self.teachers > 1 and len(model.exams) < before:
+            model.examine()
+            if len(model.exams) < self.teachers:
+                model.next_teacher()
+            else:
+                model.choose_teacher()
+        super().anneal(model, env, learnt)
         taught = (share - self.teaching) / (1 - self.teaching)
         model.policy.imitating = taught >= 0
         if draw := self.draw(taught):
             env.task.diverge(draw)
         model.policy.guidance = max(0.0, 1 - taught / self.guided)
+
+    def _learnt(self, share: float) -> tuple[int, float]:
+        """Return how many teachers have learnt, and the share of its time that the next one has."""
+        if share >= self.teaching:
+            return self.teachers, 1.0
+        learnt = self.teachers * share / self.teaching
+        before = min(int(learnt), self.teachers - 1)
+        return before, learnt - before
 
     def draw(self, taught: float) -> int:
         """Return which draw of differing legs hops, 0 for legs that are alike.
@@ -120,6 +157,10 @@ class PreciseRecipe(FastRecipe):
             taught: Share of the policy's learning that is done, negative before it.
         """
         return int(taught >= 0)
+
+    def findings(self, model: Any) -> dict[str, Any]:  # noqa: ANN401
+        """Return how the teachers did."""
+        return {"teachers_scores_m": list(model.exams)} if model.exams else {}
 
     def network(self, model: Any, env: TaskVecEnv) -> Network:  # noqa: ANN401
         """Return the student as it stands."""

@@ -71,6 +71,10 @@ class Recipe(ABC):
         Called before every rollout, also of a resumed training: depend on ``share`` alone.
         """
 
+    def findings(self, model: Any) -> dict[str, Any]:  # noqa: ANN401
+        """Return what else the result of a finished training tells, as JSON values."""
+        return {}
+
     def network(self, model: Any, env: TaskVecEnv) -> Network:  # noqa: ANN401
         """Return the deterministic actor as it stands."""
         return network_of(model, env.task.observation)

@@ -36,6 +36,12 @@ class RecurrentRecipe(PreciseRecipe):
     """Legs that gather experience at once."""
     rollout: int = 128
     """Ticks between updates, each leg: errors are traced back so far, longer than a hop."""
+    steps: int = 9_000_000
+    """Control steps of experience in all, summed over the legs."""
+    teaching: float = 0.55
+    """Share of the training in which the teacher learns; in the rest the policy does."""
+    teachers: int = 1
+    """Choosing among several was not tried here."""
     memory: int = 128
     """Entries of the memory."""
     imitation: Imitation = field(default_factory=lambda: Imitation(updates=24, batch=8192))

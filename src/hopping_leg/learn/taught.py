@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import torch
+from stable_baselines3.common.type_aliases import Schedule
 
 from hopping_leg.arrays import IntArray
 from hopping_leg.env.true_state import PRIVILEGED_COMMAND
@@ -55,6 +56,14 @@ class TaughtPolicy(AsymmetricPolicy):
         super()._build_mlp_extractor()
         self.mlp_extractor.student = self._make_student()
 
+    def begin_anew(self, rate: Schedule) -> None:
+        """Forget all that teacher and critic have learnt, and what the optimiser remembers.
+
+        Args:
+            rate: Learning rate over the share that is left.
+        """
+        self._build(rate)
+
     @property
     def student(self) -> Student:
         """What learns from the teacher."""
@@ -89,18 +98,46 @@ class TaughtPolicy(AsymmetricPolicy):
 class TaughtPPO(ResumablePPO):
     """PPO while the teacher learns; regression on the teacher's actions while the student does.
 
+    Attributes:
+        exams: What the teachers that have learnt so far scored, m; less is better.
+
     Args:
         imitation: How the student learns.
+        exam: Scores the teacher as it stands.
     """
 
-    def __init__(self, *args: Any, imitation: Imitation, **kwargs: Any) -> None:  # noqa: ANN401
-        self._imitation = imitation
+    def __init__(
+        self,
+        *args: Any,  # noqa: ANN401
+        imitation: Imitation,
+        exam: Callable[[TaughtPolicy], float],
+        **kwargs: Any,  # noqa: ANN401
+    ) -> None:
+        self._imitation, self._exam = imitation, exam
+        self.exams: list[float] = []
+        self._best: dict[str, torch.Tensor] = {}
         super().__init__(*args, **kwargs)
         task = self.env.task
         scaling = task.observation.scaling
         self._told = task.observation.size + PRIVILEGED_COMMAND
         self._aim = Aim(scaling.offset[-1], scaling.gain[-1], imitation.knots)
         self.policy.begun = lambda: self._last_episode_starts
+
+    def examine(self) -> None:
+        """Examine the teacher that has learnt; keep it if it is the best so far."""
+        self.exams.append(self._exam(self.policy))
+        self.logger.record("teacher/score_m", self.exams[-1])
+        if self.exams[-1] == min(self.exams):
+            self._best = {k: v.clone() for k, v in self.policy.state_dict().items()}
+
+    def next_teacher(self) -> None:
+        """Let another teacher begin."""
+        self.policy.begin_anew(self.lr_schedule)
+
+    def choose_teacher(self) -> None:
+        """Let the best teacher go on to teach."""
+        self.policy.load_state_dict(self._best)
+        self._best = {}
 
     def train(self) -> None:
         """Learn from the rollout."""
@@ -142,9 +179,11 @@ class TaughtPPO(ResumablePPO):
             return policy.teacher_action(told)
 
     def own_state(self) -> Tree:
-        """Return what the student learns from, and where the teacher aims."""
+        """Return what the student learns from, where the teacher aims, and the exams so far."""
         policy: TaughtPolicy = self.policy
         return {
+            "exams": list(self.exams),
+            "best": {k: v.numpy().copy() for k, v in self._best.items()},
             "student": policy.student.state(),
             "aim": self._aim.state(),
         }
@@ -152,6 +191,8 @@ class TaughtPPO(ResumablePPO):
     def restore_own(self, state: Tree) -> None:
         """Go on from an ``own_state``."""
         policy: TaughtPolicy = self.policy
+        self.exams = list(state["exams"])
+        self._best = {k: torch.from_numpy(v.copy()) for k, v in state["best"].items()}
         policy.student.restore(state["student"])
         self._aim.restore(state["aim"])
 

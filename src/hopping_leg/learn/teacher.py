@@ -1,21 +1,15 @@
-"""The teacher of a finished run as a controller: what feedback of the full state comes to."""
+"""A teacher as a controller: what feedback of the full state comes to."""
 
 import hashlib
-import json
-from pathlib import Path
+from collections.abc import Sequence
 
 import numpy as np
 import torch
 
 from hopping_leg.arrays import Array
+from hopping_leg.env import TaskOptions
 from hopping_leg.env.observation import sample_scaling
 from hopping_leg.env.true_state import PRIVILEGED, true_state
-from hopping_leg.errors import UsageError
-from hopping_leg.learn.checkpoint import list_checkpoints, read_checkpoint
-from hopping_leg.learn.precise import PreciseRecipe
-from hopping_leg.learn.recipes import recipe_of
-from hopping_leg.learn.resumable import restore_learner
-from hopping_leg.learn.scale import fit
 from hopping_leg.learn.taught import TaughtPolicy
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import AnyLegs, Measurement
@@ -25,19 +19,26 @@ class Teacher:
     """Sees the true state of simulated legs, without noise or delay; its torques are disturbed.
 
     Args:
-        run: Folder of a run of ``precise`` or of a recipe made of it.
-        robot: The leg that it was trained on.
-
-    Raises:
-        UsageError: The run has no teacher, no checkpoint, or another robot.
+        policy: Whose teacher it is.
+        robot: The leg that it learns on.
+        options: The learning problem.
+        last_torque: Where the torques of the last tick stand in an observation, if they do.
     """
 
     name = "true-state"
 
-    def __init__(self, run: Path, robot: Robot) -> None:
-        self._recipe, self._policy = _load(run, robot)
-        self._sample = sample_scaling(robot, self._recipe.task)
-        self._torque = np.array(self._recipe.task.action_torque)
+    def __init__(
+        self,
+        policy: TaughtPolicy,
+        robot: Robot,
+        options: TaskOptions,
+        last_torque: Sequence[int],
+    ) -> None:
+        self._policy, self._last_torque = policy, list(last_torque)
+        self._sample = sample_scaling(robot, options)
+        self._torque = np.array(options.action_torque)
+        self.command_range = options.command_bounds
+        """Heights it was made for, m."""
 
     @property
     def digest(self) -> str:
@@ -46,11 +47,6 @@ class Teacher:
         for value in self._policy.state_dict().values():
             weights.update(value.numpy().tobytes())
         return weights.hexdigest()[:16]
-
-    @property
-    def command_range(self) -> tuple[float, float]:
-        """Heights it was made for, m."""
-        return self._recipe.task.command_bounds
 
     def watch(self, legs: AnyLegs) -> None:
         """Take the legs whose state it sees."""
@@ -64,7 +60,7 @@ class Teacher:
         """Return joint torques, N m, (n, 2)."""
         seen = np.zeros((len(self._last), self._policy.features_dim), np.float32)
         first = self._policy.measured
-        seen[:, self._recipe.last_torque] = self._last
+        seen[:, self._last_torque] = self._last
         told = measurement.command[:, 0]
         true_state(self._legs, told, self._sample, out=seen[:, first : first + PRIVILEGED])
         with torch.no_grad():
@@ -75,25 +71,3 @@ class Teacher:
     def internals(self) -> dict[str, Array]:
         """Return nothing."""
         return {}
-
-
-def _load(run: Path, robot: Robot) -> tuple[PreciseRecipe, TaughtPolicy]:
-    file = run / "config.json"
-    found = list_checkpoints(run / "checkpoints")
-    if not file.exists() or not found:
-        raise UsageError(f"{run} holds no run with a checkpoint; train one with `hop train`.")
-    config = json.loads(file.read_text(encoding="utf-8"))
-    recipe = fit(recipe_of(config["recipe"], config["options"]), robot)
-    if not isinstance(recipe, PreciseRecipe):
-        raise UsageError(
-            f"The run in {run} is of recipe '{recipe.name}', which has no teacher; take one of"
-            " 'precise', 'adaptive' or 'recurrent'."
-        )
-    if config["robot_digest"] != robot.digest:
-        raise UsageError(
-            f"The run in {run} was trained on {config['robot']}, not on this {robot.name}; give the"
-            " robot that it was trained on."
-        )
-    model = recipe.make_model(recipe.make_env(robot, config["seed"]), config["seed"])
-    restore_learner(model, read_checkpoint(found[-1])["model"])
-    return recipe, model.policy

@@ -180,6 +180,7 @@ class Trainer:
             "steps": steps,
             "selected": results,
             "history": self.selection.rows,
+            **recipe.findings(model),
         }
         self.folder.write("result.json", {**self.folder.config, **result})
         write_card(self.folder.path)

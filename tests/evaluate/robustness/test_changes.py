@@ -41,6 +41,8 @@ def test_a_leg_that_stays_down_has_no_hops():
         ([0.02, 0.0, 0.011, 0.01], 3),
         ([0.0, 0.011], None),
         ([0.0, None], None),
+        ([-0.02, -0.01, 0.01], 1),
+        ([0.0, -0.011], None),
     ],
 )
 def test_back_means_back_for_good(sizes, hops):
@@ -55,7 +57,10 @@ def test_every_change_and_step_has_a_row(setup, spring, monkeypatch):
     assert [(r["change"], r["command_m"]) for r in rows] == [
         (change, command) for change in CHANGES for command in (0.28, 0.32)
     ]
-    assert all(len(row["hop_abs_errors_m"]) == 5 for row in rows)
+    for row in rows:
+        assert len(row["hop_abs_errors_m"]) == len(row["hop_errors_m"]) == 5
+        for size, centre in zip(row["hop_abs_errors_m"], row["hop_errors_m"], strict=True):
+            assert size is None or abs(centre) == size, "one run alone has one error"
     assert len({repr(row["hop_abs_errors_m"]) for row in rows}) == len(rows)
     assert [(s["from_m"], s["to_m"]) for s in study["steps"]] == [(0.28, 0.32), (0.32, 0.28)]
     assert study == study_changes(spring, setup, (0.28, 0.32), 1, 1000)

@@ -50,9 +50,9 @@ class Limits:
         robot = load_robot(self.robot)
         candidates = load_candidates(self.controllers, robot, CONTROL_RATE)
         if self.teacher is not None:
-            from hopping_leg.learn.teacher import Teacher
+            from hopping_leg.learn.teacher_of_run import teacher_of_run
 
-            teacher = Teacher(self.teacher, robot)
+            teacher = teacher_of_run(self.teacher, robot)
             candidates.append(Candidate(teacher.name, teacher, teacher.command_range))
         study = LimitsStudy(
             robot, self.commands, seeds=self.seeds, seed=self.seed, threads=self.threads

@@ -22,6 +22,10 @@ from hopping_leg.trace import Trace
 SECONDS, AT = 12.0, 5.0
 """Of each run, and when it changes, s."""
 
+RUNS = 7
+"""Runs of a change and command per seed of the suite: with few of them, noise decides on which side
+of the bound a median falls."""
+
 HOPS = 5
 """Hops that are told one by one."""
 
@@ -74,7 +78,9 @@ def study_changes(
         on_tick: Called with (ticks done, ticks in all).
 
     Returns:
-        ``recovery``, a row per change and command, and ``steps``, a row per step.
+        ``recovery``, a row per change and command, and ``steps``, a row per step. Of recoveries,
+        ``back_after_hops`` counts hops until their median distance is small, scatter included,
+        and ``centred_after_hops`` until the median of their errors is.
     """
     runs = [_Run(change, command, command) for change in CHANGES for command in commands]
     low, high = min(commands), max(commands)
@@ -124,16 +130,19 @@ def _hops(trace: Trace) -> Hops:
 def _recovery(run: _Run, traces: Sequence[Trace], change: int) -> dict[str, Any]:
     after = [hops_after(trace, change) - run.after for trace in traces]
     sizes = [_median(np.abs(_kth(after, hop))) for hop in range(HOPS)]
+    centres = [_median(_kth(after, hop)) for hop in range(HOPS)]
     later = np.concatenate([errors[HOPS:] for errors in after])
-    settled = _median(np.abs(later))
+    settled, centre = _median(np.abs(later)), _median(later)
     return {
         "change": run.change,
         "command_m": run.after,
         "before_abs_error_m": _median(np.abs(_before(run, traces, change))),
         "hop_abs_errors_m": sizes,
         "later_abs_error_m": settled,
-        "later_error_m": _median(later),
+        "later_error_m": centre,
         "back_after_hops": _back([*sizes, settled]),
+        "hop_errors_m": centres,
+        "centred_after_hops": _back([*centres, centre]),
     }
 
 
@@ -170,7 +179,7 @@ def _median(values: Array) -> float | None:
 
 def _back(sizes: Sequence[float | None]) -> int | None:
     """Return the number of hops after which all others are near; None if the last is not."""
-    near = [size is not None and size <= BACK for size in sizes]
+    near = [size is not None and abs(size) <= BACK for size in sizes]
     return (
         max((k + 1 for k, is_near in enumerate(near) if not is_near), default=0)
         if near[-1]

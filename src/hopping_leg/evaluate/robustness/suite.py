@@ -44,7 +44,8 @@ class Suite:
     commands: tuple[float, ...]
     """Desired apex heights, m."""
     repeats: int
-    """Realisations of noise, delay and perturbation per level and command."""
+    """Realisations of noise, delay and perturbation per level and command, and ``changes.RUNS``
+    times as many per change in the middle of a run."""
     seed: int
     """All randomness follows from it."""
     recovery: bool = True
@@ -168,7 +169,7 @@ def _run_part(
     setup, controller = suite.setup, candidate.controller
     if part == RECOVERY:
         return changes.study_changes(
-            controller, setup, suite.commands, suite.repeats, suite.seed, on_tick
+            controller, setup, suite.commands, changes.RUNS * suite.repeats, suite.seed, on_tick
         )
     plan = make_plan(
         part,
@@ -205,6 +206,8 @@ def _levels(axis: str) -> Any:  # noqa: ANN401
     """Return the numbers of an axis that its results depend on."""
     if axis == JOINT:
         return [JOINT_POINTS, JOINT_LEVELS, *((one.name, one.moderate) for one in AXES)]
+    if axis == RECOVERY:
+        return [*changes.CHANGES, changes.RUNS]
     return [one.levels for one in AXES if one.name == axis]
 
 
@@ -233,6 +236,7 @@ def _conditions(suite: Suite) -> dict[str, Any]:
         "back_m": changes.BACK,
         "change_at_s": changes.AT,
         "changes": list(changes.CHANGES),
+        "runs_per_change": changes.RUNS * suite.repeats,
         "timestep_s": setup.timestep,
         "rate_hz": setup.rate,
         "start_length_m": setup.standing_length,
