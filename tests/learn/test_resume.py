@@ -166,8 +166,11 @@ def test_a_run_can_begin_where_another_stopped(tmp_path, monkeypatch):
     with pytest.raises(UsageError, match="no checkpoint"):
         module.train(recipe, ROBOT, 0, second, source=tmp_path, quiet=True)
     longer = dataclasses.replace(recipe, steps=256, learning_rate=1e-4)
+    shares = []
+    monkeypatch.setattr(type(longer), "anneal", lambda *args: shares.append(args[-1]))
     trained = module.train(longer, ROBOT, 0, second, source=first, quiet=True)
     assert trained.steps == 256
+    assert shares == [0.25, 0.5, 0.75], "of the longer training, not of the one that is over"
     history = json.loads((second / "result.json").read_text())["history"]
     assert min(row["steps"] for row in history) >= 64
     assert f"--source {first}" in (second / "model_card.md").read_text()

@@ -151,12 +151,14 @@ class Trainer:
         return self._budget or float("inf")
 
     def restore(self, tree: dict[str, Any]) -> None:
-        """Go on from a checkpoint."""
+        """Go on from a checkpoint, also of another run, of which this one may be the longer part."""
         resumable.restore(self.model, tree["model"])
         self.selection.rows = tree["history"]
         self._earlier = tree["elapsed"]
         self._restored = True
         self._began = time.monotonic()
+        done = self.model.num_timesteps
+        self.model._update_current_progress_remaining(done, self.recipe.steps)
 
     def run(self, progress: TrainingProgress) -> Trained:
         """Learn until steps or time are used up; write the selected policy."""
