@@ -19,6 +19,10 @@ _LEAST_PRESS = 1 / 3
 _BEGIN, _END, _LEAST = 0.2, 0.06, 0.3
 """Leg rate that begins a push, ends it, and must have been reached, sqrt(gravity x height)."""
 
+_SUDDEN = 0.08
+"""Time between the fastest leg rate and the end of a push, s; who only rises slows down for longer.
+"""
+
 _BLIND = 0.9
 """Share of the ballistic flight in which no push is believed."""
 
@@ -37,7 +41,7 @@ class LiftoffDetector:
         self._speed = float(np.sqrt(GRAVITY * robot.straight_height))
         self._press, self._fastest = np.zeros(count), np.zeros(count)
         self._pushing = np.zeros(count, np.bool_)
-        self._blind = np.zeros(count)
+        self._blind, self._slowing = np.zeros(count), np.zeros(count)
 
     def update(self, leg: LegView, force: Array) -> BoolArray:
         """Return which legs have just left the ground, (n,).
@@ -53,9 +57,12 @@ class LiftoffDetector:
         begins &= ~self._pushing & (self._blind == 0)
         self._fastest = np.where(begins, 0.0, self._fastest)
         self._pushing |= begins
-        self._fastest = np.maximum(self._fastest, leg.rate)
+        faster = leg.rate > self._fastest
+        self._slowing = np.where(faster, 0.0, self._slowing + self._period)
+        self._fastest = np.where(faster, leg.rate, self._fastest)
         over = self._pushing & ((leg.rate < _END * self._speed) | (self._press < 0))
         self._pushing &= ~over
         left: BoolArray = over & (self._fastest > _LEAST * self._speed)
+        left &= self._slowing < _SUDDEN
         self._blind = np.where(left, _BLIND * 2 * self._fastest / GRAVITY, self._blind)
         return left

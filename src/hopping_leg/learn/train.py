@@ -151,7 +151,7 @@ class Trainer:
         return self._budget or float("inf")
 
     def restore(self, tree: dict[str, Any]) -> None:
-        """Go on from a checkpoint, also of another run, of which this one may be the longer part."""
+        """Go on from a checkpoint, of this run or of the shorter one that it begins with."""
         resumable.restore(self.model, tree["model"])
         self.selection.rows = tree["history"]
         self._earlier = tree["elapsed"]
