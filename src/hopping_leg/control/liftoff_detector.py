@@ -19,7 +19,7 @@ _LEAST_PRESS = 1 / 3
 _BEGIN, _END, _LEAST = 0.2, 0.06, 0.3
 """Leg rate that begins a push, ends it, and must have been reached, sqrt(gravity x height)."""
 
-_SUDDEN = 0.08
+_SUDDEN = 0.15
 """Time between the fastest leg rate and the end of a push, s; who only rises slows down for longer.
 """
 
