@@ -60,3 +60,13 @@ def test_a_folder_with_other_things_is_left_alone(tmp_path, capsys):
     assert cli.main(["train", "--out", str(tmp_path)]) == cli.FAILED
     assert "holds no run" in capsys.readouterr().err
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_the_benchmark_of_trainings_changes_numbers_too(tiny, tmp_path, capsys):
+    words = ["bench", "training", "--recipe", "tiny", "--threads", "1", "--training-seeds", "0"]
+    words += ["--evaluation-seeds", "1", "--out", str(tmp_path), "--set"]
+    assert cli.main([*words, "learning_rat=1"]) == cli.FAILED
+    assert "Did you mean 'learning_rate'" in capsys.readouterr().err
+    assert cli.main([*words, "learning_rate=0.002"]) == 0
+    (config,) = tmp_path.glob("*/config.json")
+    assert '"learning_rate": 0.002' in config.read_text()

@@ -73,6 +73,8 @@ class Training:
     """Realisations of noise and delay per command."""
     steps: int | None = None
     """Control steps of experience instead of the recipe's."""
+    set: tuple[str, ...] = ()
+    """Numbers of the recipe to change, as for ``hop train``."""
     minutes: float | None = None
     """Of learning, by the clock, after which the best snapshot is selected."""
     threads: int = 2
@@ -85,12 +87,12 @@ class Training:
     def measure(self) -> dict[str, Any]:
         """Run it, print a table, return every number."""
         from hopping_leg.evaluate.bench_training import bench_training
-        from hopping_leg.learn.recipes import get_recipe
+        from hopping_leg.learn.recipes import change, get_recipe
 
         at_least(1, evaluation_seeds=self.evaluation_seeds, threads=self.threads)
         if not self.training_seeds:
             raise UsageError("--training-seeds names no seed; give e.g. --training-seeds 0 1 2.")
-        recipe = get_recipe(self.recipe)
+        recipe = change(get_recipe(self.recipe), self.set)
         if self.steps is not None:
             recipe = replace(recipe, steps=self.steps)
         console = Console()
