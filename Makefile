@@ -66,12 +66,11 @@ results: $(STAMP)
 	$(BIN)/hop bench engines --json docs/results/bullet.json
 	$(BIN)/hop bench energy-shaping --json docs/results/energy_shaping.json
 	$(BIN)/hop bench training --json docs/results/training.json
-	$(BIN)/hop bench training --recipe precise --minutes 13.5 --steps 20000000 --training-seeds 3 --out runs/bench-quarter \
-	  --json docs/results/training-quarter.json
 	$(BIN)/hop bench training --recipe precise --minutes 13.5 --steps 20000000 --training-seeds 1 2 3 4 --set teachers=1 teaching=0.55 \
-	  --out runs/bench-quarter-one --json docs/results/training-quarter-one.json
-	$(BIN)/hop evaluate precise examined-seed3=runs/bench-quarter/precise-seed3/policy.onnx \
-	  $(foreach s,1 2 3 4,one-teacher-seed$(s)=runs/bench-quarter-one/precise-seed$(s)/policy.onnx) --seeds 5 --floor soft --no-video \
+	  --out runs/bench-quarter --json docs/results/training-quarter.json
+	$(BIN)/hop train --recipe precise --threads 2 --out runs/recipe-seed0
+	$(BIN)/hop evaluate precise recipe-seed0=runs/recipe-seed0/policy.onnx \
+	  $(foreach s,1 2 3 4,quarter-seed$(s)=runs/bench-quarter/precise-seed$(s)/policy.onnx) --seeds 5 --floor soft --no-video \
 	  --json docs/results/precise-seeds.json --commands \
 	0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40,0.41,0.42,0.43,0.44,0.45
 	$(BIN)/hop train --recipe adaptive --out runs/adaptive
