@@ -140,6 +140,17 @@ def test_commands_come_from_the_paper_or_a_range_and_switch_on_time():
     assert [i + 1 for i, share in enumerate(changes) if share == 1] == [10, 20, 30]
 
 
+def test_low_commands_can_come_more_often():
+    low_ones = []
+    for skew in (1.0, 2.0):
+        options = TaskOptions(command_range=(0.2, 0.4), command_skew=skew)
+        commands = task(options, count=2000).command
+        assert commands.min() >= 0.2
+        assert commands.max() <= 0.4
+        low_ones.append(np.mean(commands < 0.25))
+    np.testing.assert_allclose(low_ones, [0.25, 0.5], atol=0.04)
+
+
 def test_drops_begin_above_the_ground_within_the_limits():
     dropped = task(TaskOptions(start="drop"), count=300)
     clearance = dropped.legs.foot_clearance()
@@ -230,6 +241,7 @@ def test_some_legs_stay_the_robot_itself():
         {"commands": ()},
         {"commands": (float("nan"),)},
         {"command_range": (0.4, 0.2)},
+        {"command_skew": 0.0},
         {"episode": 0.0},
         {"start": "flying"},
         {"action_torque": (6.0, -1.0)},

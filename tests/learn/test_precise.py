@@ -1,11 +1,13 @@
 """The precise recipe: a teacher on the true state, a student that comes to act like it."""
 
 import dataclasses
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 import torch
 
+from hopping_leg.learn import precise
 from hopping_leg.learn.precise import PreciseRecipe
 from hopping_leg.learn.taught import foresee
 from hopping_leg.sim.variants import SURPRISES
@@ -108,6 +110,35 @@ def test_the_teacher_with_the_best_score_teaches():
     assert len(chooser.exams) == 3
 
 
+def test_a_teacher_that_passes_gives_the_time_of_the_next_ones_to_the_policy():
+    recipe = dataclasses.replace(TINY_PRECISE, passing=0.01)
+    scores = iter([0.03, 0.005])
+    chooser = learner(recipe)
+    chooser._exam = lambda policy: next(scores)
+    until = recipe.teaching * 2 / recipe.teachers
+    for share in (0.0, until / 2, until - 1e-3):
+        recipe.anneal(chooser, chooser.env, share)
+        assert not chooser.policy.imitating
+    recipe.anneal(chooser, chooser.env, until)
+    assert chooser.exams == [0.03, 0.005]
+    assert chooser.policy.imitating
+    assert chooser.policy.guidance == 1.0
+    recipe.anneal(chooser, chooser.env, recipe.teaching)
+    assert len(chooser.exams) == 2
+    assert chooser.policy.guidance < 1.0
+
+
+def test_the_policys_rate_falls_from_when_its_teacher_passed():
+    exams = [0.03, RECIPE.passing]
+    until = RECIPE.taught_until(exams)
+    assert until == pytest.approx(RECIPE.teaching * 2 / RECIPE.teachers)
+    assert RECIPE.pace(until, exams) == pytest.approx(RECIPE.learning_rate)
+    middle, end = (RECIPE.pace(share, exams) for share in ((1 + until) / 2, 1.0))
+    assert RECIPE.learning_rate > middle > end
+    assert RECIPE.taught(until, exams) == 0
+    assert RECIPE.taught(1.0, exams) == 1
+
+
 def test_a_single_teacher_takes_no_exam():
     alone = dataclasses.replace(TINY_PRECISE, teachers=1)
     model = learner(alone)
@@ -124,6 +155,23 @@ def test_an_exam_tells_a_teacher_that_does_not_hop():
         for weight in model.policy.action_net.parameters():
             weight.zero_()
     assert recipe.examine(model.policy, ROBOT) >= 1.0
+
+
+def test_an_exam_counts_the_worst_height_under_errors(monkeypatch):
+    asked = {}
+
+    def judged(teacher, robot, commands, rate):
+        asked.update(erring=teacher._erring, commands=commands)
+        scores = dict.fromkeys(commands, 0.002) | {commands[1]: 0.01}
+        return [Mock(score=score) for score in scores.values()]
+
+    monkeypatch.setattr(precise, "judge", judged)
+    monkeypatch.setattr(precise, "badness", lambda verdict: verdict.score)
+    assert RECIPE.examine(learner(TINY_PRECISE).policy, ROBOT) == 0.01
+    assert asked["erring"] == RECIPE.erring > 0
+    heights = asked["commands"]
+    assert (heights[0], heights[-1]) == (min(RECIPE.judge_commands), max(RECIPE.judge_commands))
+    assert np.diff(heights).max() < 0.011
 
 
 def test_imitation_brings_the_student_to_its_teacher_and_leaves_the_teacher_alone():

@@ -69,3 +69,27 @@ def test_what_has_no_teacher_is_refused(tmp_path):
     stop_early(tmp_path / "precise")
     with pytest.raises(UsageError, match="trained on legv2-paper"):
         teacher_of_run(tmp_path / "precise", load_robot("legv2"))
+
+
+def test_its_torques_can_err_as_an_imitators_do(tmp_path):
+    model = stop_early(tmp_path)
+    task, recipe = model.env.task, get_recipe("precise")
+    right, wrong = (recipe.make_teacher(model.policy, ROBOT, erring) for erring in (0.0, 0.05))
+
+    def errors():
+        model.env.reset()
+        for teacher in (right, wrong):
+            teacher.watch(task.legs)
+            teacher.reset(task.count)
+        gaps = []
+        for _ in range(400):
+            measurement = task.measurement
+            gaps.append((wrong.act(measurement) - right.act(measurement)) / 6.0)
+            wrong._last = right._last
+        return np.array(gaps)
+
+    first = errors()
+    np.testing.assert_allclose(first, errors(), atol=1e-12)
+    assert first.std() == pytest.approx(0.05, rel=0.15)
+    late, early = first[1:].ravel(), first[:-1].ravel()
+    assert 0.7 < np.corrcoef(late, early)[0, 1] < 0.9

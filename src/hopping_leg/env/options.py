@@ -28,6 +28,9 @@ class TaskOptions:
     """Desired heights to draw from, m; the paper's three."""
     command_range: tuple[float, float] | None = None
     """Draw desired heights from this range instead, m."""
+    command_skew: float = 1.0
+    """Draw them as the range's lower end plus a share of its width, the share being a uniform
+    number to this power: above 1 low heights come more often."""
     command_hold: tuple[float, float] | None = None
     """Shortest and longest time between new commands, s; none keeps one command per episode."""
     start: Start = "standing"
@@ -88,7 +91,8 @@ def _check(options: TaskOptions) -> None:
             raise UsageError(
                 f"'{name}' is {pair} but must be two positive numbers, the smaller first."
             )
-    for name in ("start_length", "episode", "velocity_scale", "rate", "timestep"):
+    positive = ("command_skew", "start_length", "episode", "velocity_scale", "rate", "timestep")
+    for name in positive:
         value = getattr(options, name)
         if not 0 < value < math.inf:
             raise UsageError(f"'{name}' is {value} but must be positive and finite.")

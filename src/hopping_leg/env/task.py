@@ -271,7 +271,8 @@ class HoppingTask:
 
     def _draw_commands(self, count: int) -> Array:
         if self.options.command_range is not None:
-            return self._rng.uniform(*self.options.command_range, count)
+            low, high = self.options.command_range
+            return low + (high - low) * self._rng.random(count) ** self.options.command_skew
         return self._rng.choice(self.options.commands, count)
 
     def _draw_holds(self, count: int) -> IntArray:

@@ -31,6 +31,7 @@ class AdaptiveRecipe(PreciseRecipe):
         default_factory=lambda: replace(
             PreciseRecipe().task,
             command_range=(0.20, 0.42),
+            command_skew=1.0,
             randomised=SURPRISES,
             chance=0.5,
             unchanged=0.5,
@@ -47,6 +48,8 @@ class AdaptiveRecipe(PreciseRecipe):
     """Control steps of experience in all, summed over the legs."""
     teaching: float = 0.4
     """Share of the training in which the teacher learns; in the rest the policy does."""
+    epochs: int = 4
+    """Passes over a rollout; more were not tried here."""
     teachers: int = 1
     """Choosing among several was not tried here."""
     alike: float = 0.35
@@ -88,7 +91,7 @@ class AdaptiveRecipe(PreciseRecipe):
     def anneal(self, model: Any, env: TaskVecEnv, share: float) -> None:  # noqa: ANN401
         """Let legs differ once the policy can act, and their aims follow what it feels."""
         super().anneal(model, env, share)
-        apart = self._apart((share - self.teaching) / (1 - self.teaching))
+        apart = self._apart(self.taught(share, model.exams))
         first, last = self.trusting
         model.policy.student.trust = min(1.0, max(0.0, (apart - first) / (last - first)))
 

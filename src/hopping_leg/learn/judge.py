@@ -88,26 +88,27 @@ def judge(
 def score(verdicts: list[Verdict]) -> float:
     """Return how bad a policy is, m.
 
-    Mean over commands of median error + spread + penalties, and a penalty for every pair of
+    Mean over commands of ``badness``, and a penalty for every pair of
     neighbouring commands of which the higher one does not give the higher hops: a policy that
     ignores its command must not win by hopping in between.
     """
     heights = [v.command_m + v.median_error_m for v in verdicts]
     disordered = sum(not low < high for low, high in itertools.pairwise(heights))
-    return float(np.mean([_badness(v) for v in verdicts])) + _DISORDER * disordered
+    return float(np.mean([badness(v) for v in verdicts])) + _DISORDER * disordered
+
+
+def badness(verdict: Verdict) -> float:
+    """Return median error + spread + penalties at a command, m; 1 without hops."""
+    if verdict.hops == 0:
+        return 1.0
+    faults = (verdict.skipped_hops + verdict.body_contact_ticks) / verdict.hops
+    return abs(verdict.median_error_m) + verdict.std_m + _PENALTY * min(faults, 3.0)
 
 
 def as_rows(verdicts: list[Verdict]) -> list[dict[str, Any]]:
     """Return verdicts as JSON rows; null stands for no hops."""
     rows = [asdict(v) for v in verdicts]
     return [{k: None if v != v else v for k, v in row.items()} for row in rows]
-
-
-def _badness(verdict: Verdict) -> float:
-    if verdict.hops == 0:
-        return 1.0
-    faults = (verdict.skipped_hops + verdict.body_contact_ticks) / verdict.hops
-    return abs(verdict.median_error_m) + verdict.std_m + _PENALTY * min(faults, 3.0)
 
 
 def _verdict(runs: list[Rollout], command: float, legs: range, rate: float) -> Verdict:

@@ -5,7 +5,7 @@ hard the last stance pushed. A teacher that is told the height learns by PPO, wi
 remember, and the policy learns from it what to do on measurements.
 """
 
-import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
@@ -19,12 +19,15 @@ from hopping_leg.learn.actor import dense_network
 from hopping_leg.learn.export import Network
 from hopping_leg.learn.fast import FastRecipe, cosine
 from hopping_leg.learn.imitation import Imitation
-from hopping_leg.learn.judge import judge, score
+from hopping_leg.learn.judge import badness, judge
 from hopping_leg.learn.students import WindowStudent
 from hopping_leg.learn.taught import TaughtPolicy, TaughtPPO
 from hopping_leg.learn.teacher import Teacher
 from hopping_leg.learn.vecenv import TaskVecEnv
 from hopping_leg.robot.parameters import Robot
+
+_EXAM_SPACING = 0.01
+"""Of the heights at which teachers are examined, m."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,7 @@ class PreciseRecipe(FastRecipe):
             FastRecipe().task,
             observation="dated-long",
             command_range=(0.20, 0.46),
+            command_skew=1.5,
             timestep=5e-4,
             alike_at_first=True,
         )
@@ -46,7 +50,9 @@ class PreciseRecipe(FastRecipe):
         default_factory=lambda: ApexRewardOptions(width=(0.030, 0.006), jerk=0.3, effort=0.2)
     )
     """Apex reward of the teacher; the calmer it is, the better it can be imitated."""
-    steps: int = 14_000_000
+    epochs: int = 8
+    """Passes over a rollout."""
+    steps: int = 10_000_000
     """Control steps of experience in all, summed over the legs."""
     judge_every: int = 500_000
     """Control steps between two trials of the policy, for checkpoint selection."""
@@ -54,10 +60,14 @@ class PreciseRecipe(FastRecipe):
     """Share of the training before which no snapshot is tried."""
     judge_commands: tuple[float, ...] = (0.225, 0.26, 0.295, 0.33, 0.365, 0.40, 0.435)
     """Heights of those trials, m."""
-    teaching: float = 0.54
-    """Share of the training in which teachers learn; in the rest the policy does."""
-    teachers: int = 3
-    """How many learn, one after the other; the best of them teaches."""
+    teaching: float = 0.5
+    """Share of the training in which teachers learn at most; in the rest the policy does."""
+    teachers: int = 2
+    """How many learn at most, one after the other; the best of them teaches."""
+    passing: float = 0.007
+    """Score in the exam with which a teacher needs no successor, m."""
+    erring: float = 0.05
+    """Errors of the torques in the exam, of the largest: about those that the policy will make."""
     student: tuple[int, ...] = (256, 128)
     """Hidden layers of the policy, tanh; ``actor`` are the teacher's."""
     imitation: Imitation = field(default_factory=Imitation)
@@ -74,6 +84,7 @@ class PreciseRecipe(FastRecipe):
             env,
             imitation=self.imitation,
             exam=lambda policy: self.examine(policy, env.task.robot),
+            pace=self.pace,
             **self.ppo_options(seed),
             policy_kwargs={
                 **self.network_options(),
@@ -90,20 +101,26 @@ class PreciseRecipe(FastRecipe):
             env.task.observation.size, size, list(self.student), self.imitation.memory, nn.Tanh
         )
 
-    def make_teacher(self, policy: TaughtPolicy, robot: Robot) -> Teacher:
-        """Return a policy's teacher as a controller."""
-        return Teacher(policy, robot, self.task, self.last_torque)
+    def make_teacher(self, policy: TaughtPolicy, robot: Robot, erring: float = 0.0) -> Teacher:
+        """Return a policy's teacher as a controller.
+
+        Args:
+            policy: Whose teacher.
+            robot: The leg that it learns on.
+            erring: Errors of its torques, of the largest.
+        """
+        return Teacher(policy, robot, self.task, self.last_torque, erring)
 
     def examine(self, policy: TaughtPolicy, robot: Robot) -> float:
-        """Score a policy's teacher as snapshots are scored, at twice as many heights, m.
+        """Score a policy's teacher where it does worst, m.
 
-        Between two heights at which it hops well it may change from one kind of hop to another and
-        stumble.
+        Its torques err as the policy's will, at every centimetre between the lowest and the highest
+        trial: a teacher may hop well, but know no way back from where it never errs to.
         """
-        heights = self.judge_commands
-        middles = [(low + high) / 2 for low, high in itertools.pairwise(heights)]
-        commands = tuple(sorted([*heights, *middles]))
-        return score(judge(self.make_teacher(policy, robot), robot, commands, rate=self.task.rate))
+        low, high = min(self.judge_commands), max(self.judge_commands)
+        commands = tuple(np.linspace(low, high, round((high - low) / _EXAM_SPACING) + 1))
+        teacher = self.make_teacher(policy, robot, self.erring)
+        return max(badness(v) for v in judge(teacher, robot, commands, rate=self.task.rate))
 
     @property
     def last_torque(self) -> list[int]:
@@ -116,11 +133,34 @@ class PreciseRecipe(FastRecipe):
         return [first, first + 1]
 
     def rate(self, left: float) -> float:
-        """Return the learning rate; it falls along a cosine, for every teacher and again after."""
-        done = 1 - left
-        if done < self.teaching:
-            return self.learning_rate * cosine(1 - self._learnt(done)[1])
-        return self.learning_rate * cosine(left / (1 - self.teaching))
+        """Return the learning rate where no teacher passes before the last one."""
+        return self.pace(1 - left, ())
+
+    def pace(self, share: float, exams: Sequence[float]) -> float:
+        """Return the learning rate; it falls along a cosine, for every teacher and again after.
+
+        Args:
+            share: Of the training that is done.
+            exams: Scores so far, m.
+        """
+        until = self.taught_until(exams)
+        if share < until:
+            return self.learning_rate * cosine(1 - self._learnt(share)[1])
+        return self.learning_rate * cosine((1 - share) / (1 - until))
+
+    def taught_until(self, exams: Sequence[float]) -> float:
+        """Return the share of the training with which the policy begins to learn.
+
+        Args:
+            exams: Scores so far, m; a teacher that passes gives the time of the next ones away.
+        """
+        taught = len(exams) / self.teachers if self._passed(exams) else 1.0
+        return self.teaching * taught
+
+    def taught(self, share: float, exams: Sequence[float]) -> float:
+        """Return the share of the policy's own learning that is done, negative before it."""
+        until = self.taught_until(exams)
+        return (share - until) / (1 - until)
 
     def anneal(self, model: Any, env: TaskVecEnv, share: float) -> None:  # noqa: ANN401
         """Sharpen the reward and quieten exploration for each teacher, then let the policy act.
@@ -129,21 +169,27 @@ class PreciseRecipe(FastRecipe):
         the worse for not having met them.
         """
         before, learnt = self._learnt(share)
-        while self.teachers > 1 and len(model.exams) < before:
+        while self.teachers > 1 and len(model.exams) < before and not self._passed(model.exams):
             model.examine()
-            if len(model.exams) < self.teachers:
-                model.next_teacher()
-            else:
+            if len(model.exams) == self.teachers or self._passed(model.exams):
                 model.choose_teacher()
-        super().anneal(model, env, learnt)
-        taught = (share - self.teaching) / (1 - self.teaching)
+            else:
+                model.next_teacher()
+        taught = self.taught(share, model.exams)
+        super().anneal(model, env, learnt if taught < 0 else 1.0)
         model.policy.imitating = taught >= 0
         if draw := self.draw(taught):
             env.task.diverge(draw)
         model.policy.guidance = max(0.0, 1 - taught / self.guided)
 
+    def _passed(self, exams: Sequence[float]) -> bool:
+        return len(exams) > 0 and exams[-1] <= self.passing
+
     def _learnt(self, share: float) -> tuple[int, float]:
-        """Return how many teachers have learnt, and the share of its time that the next one has."""
+        """Return how many teachers have had their time, and the share of it that the next one has.
+
+        Whether one of them passed does not count here.
+        """
         if share >= self.teaching:
             return self.teachers, 1.0
         learnt = self.teachers * share / self.teaching

@@ -26,7 +26,10 @@ class RecurrentRecipe(PreciseRecipe):
 
     task: TaskOptions = field(
         default_factory=lambda: replace(
-            PreciseRecipe().task, observation="dated", command_range=(0.20, 0.42)
+            PreciseRecipe().task,
+            observation="dated",
+            command_range=(0.20, 0.42),
+            command_skew=1.0,
         )
     )
     """The learning problem; wider ranges of commands were not tried."""
@@ -40,6 +43,8 @@ class RecurrentRecipe(PreciseRecipe):
     """Control steps of experience in all, summed over the legs."""
     teaching: float = 0.55
     """Share of the training in which the teacher learns; in the rest the policy does."""
+    epochs: int = 4
+    """Passes over a rollout; more were not tried here."""
     teachers: int = 1
     """Choosing among several was not tried here."""
     memory: int = 128

@@ -104,6 +104,7 @@ class TaughtPPO(ResumablePPO):
     Args:
         imitation: How the student learns.
         exam: Scores the teacher as it stands.
+        pace: Learning rate at a share of the training, 0 to 1, after exams with these scores.
     """
 
     def __init__(
@@ -111,11 +112,13 @@ class TaughtPPO(ResumablePPO):
         *args: Any,  # noqa: ANN401
         imitation: Imitation,
         exam: Callable[[TaughtPolicy], float],
+        pace: Callable[[float, Sequence[float]], float],
         **kwargs: Any,  # noqa: ANN401
     ) -> None:
         self._imitation, self._exam = imitation, exam
         self.exams: list[float] = []
         self._best: dict[str, torch.Tensor] = {}
+        kwargs["learning_rate"] = lambda left: pace(1 - left, self.exams)
         super().__init__(*args, **kwargs)
         task = self.env.task
         scaling = task.observation.scaling

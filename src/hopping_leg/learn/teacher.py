@@ -1,6 +1,7 @@
 """A teacher as a controller: what feedback of the full state comes to."""
 
 import hashlib
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,6 +15,9 @@ from hopping_leg.learn.taught import TaughtPolicy
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import AnyLegs, Measurement
 
+_LASTING = 0.8
+"""Share of an error that is left after a tick: a policy that has misjudged the state goes on to."""
+
 
 class Teacher:
     """Sees the true state of simulated legs, without noise or delay; its torques are disturbed.
@@ -23,6 +27,8 @@ class Teacher:
         robot: The leg that it learns on.
         options: The learning problem.
         last_torque: Where the torques of the last tick stand in an observation, if they do.
+        erring: Standard deviation of what is added to its torques, of the largest: errors as
+            somebody makes who imitates it, which last for some ticks.
     """
 
     name = "true-state"
@@ -33,8 +39,9 @@ class Teacher:
         robot: Robot,
         options: TaskOptions,
         last_torque: Sequence[int],
+        erring: float = 0.0,
     ) -> None:
-        self._policy, self._last_torque = policy, list(last_torque)
+        self._policy, self._last_torque, self._erring = policy, list(last_torque), erring
         self._sample = sample_scaling(robot, options)
         self._torque = np.array(options.action_torque)
         self.command_range = options.command_bounds
@@ -53,18 +60,24 @@ class Teacher:
         self._legs = legs
 
     def reset(self, count: int) -> None:
-        """Forget its last action."""
-        self._last = np.zeros((count, 2))
+        """Forget its last action; the errors begin anew, the same ones every time."""
+        self._last, self._error = np.zeros((count, 2)), np.zeros((count, 2))
+        self._rng = np.random.default_rng(0)
 
     def act(self, measurement: Measurement) -> Array:
         """Return joint torques, N m, (n, 2)."""
-        seen = np.zeros((len(self._last), self._policy.features_dim), np.float32)
+        count = len(self._last)
+        seen = np.zeros((count, self._policy.features_dim), np.float32)
         first = self._policy.measured
         seen[:, self._last_torque] = self._last
         told = measurement.command[:, 0]
         true_state(self._legs, told, self._sample, out=seen[:, first : first + PRIVILEGED])
         with torch.no_grad():
             self._last = self._policy.teacher_action(torch.from_numpy(seen)).double().numpy()
+        if self._erring > 0:
+            fresh = self._erring * math.sqrt(1 - _LASTING**2) * self._rng.normal(size=(count, 2))
+            self._error = _LASTING * self._error + fresh
+            self._last = (self._last + self._error).clip(-1, 1)
         torque: Array = self._last * self._torque
         return torque
 
