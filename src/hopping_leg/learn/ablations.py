@@ -85,6 +85,16 @@ def _of_precise() -> list[Ablation]:
             "one-teacher", "one teacher with all the teachers' time", replace(base, teachers=1)
         ),
         Ablation(
+            "all-heights-alike",
+            "low commands as often as high ones",
+            replace(base, task=replace(base.task, command_skew=1.0)),
+        ),
+        Ablation(
+            "four-passes",
+            "four passes over a rollout instead of eight",
+            replace(base, epochs=4),
+        ),
+        Ablation(
             "no-teacher",
             "no teacher: reinforcement learning on the same inputs, as `fast` learns",
             replace(fast, task=base.task, judge_commands=base.judge_commands),

@@ -51,17 +51,17 @@ step 0.5 ms, the first 2 s of each trial dropped. These seeds chose the policy; 
 
 
 def exams(scores: list[float]) -> str:
-    """Return a line on the teachers, if there were several.
+    """Return a line on the teachers' exams, if there were any.
 
     Args:
-        scores: Of their exams, m.
+        scores: In the order in which the teachers learnt, m.
     """
     if not scores:
         return ""
     numbers = ", ".join(f"{1000 * score:.1f}" for score in scores)
     return (
-        f"- Teachers: {len(scores)} learnt, with scores of {numbers} mm (less is better); the best"
-        " of them taught.\n"
+        f"- Exams of the teachers, in the order in which they learnt: {numbers} mm where they did"
+        " worst (less is better); the best of them taught.\n"
     )
 
 

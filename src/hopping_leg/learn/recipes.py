@@ -31,6 +31,9 @@ _RANGES: dict[Randomise, tuple[Range, ...]] = {
     "surprises": SURPRISES,
 }
 
+_OF_TASK = ("command_skew",)
+"""Numbers of a task that can be changed like those of a recipe's other parts."""
+
 _SWITCH = {"true": True, "1": True, "false": False, "0": False}
 _KINDS = {bool: "true or false", int: "a whole number", float: "a number"}
 
@@ -120,15 +123,20 @@ def recipe_of(name: str, options: dict[str, Any]) -> Recipe:
 
 
 def numbers_of(recipe: Recipe) -> dict[str, int | float]:
-    """Return a recipe's plain numbers by name; those of its task go with the robot's size."""
+    """Return a recipe's plain numbers by name.
+
+    Of its task's, most go with the robot's size or have options of their own.
+    """
     found: dict[str, int | float] = {}
     for field in dataclasses.fields(recipe):
         value = getattr(recipe, field.name)
         if isinstance(value, int | float):
             found[field.name] = value
-        elif dataclasses.is_dataclass(value) and field.name != "task":
+        elif dataclasses.is_dataclass(value):
             inner = {
-                f"{field.name}.{f.name}": getattr(value, f.name) for f in dataclasses.fields(value)
+                f"{field.name}.{f.name}": getattr(value, f.name)
+                for f in dataclasses.fields(value)
+                if field.name != "task" or f.name in _OF_TASK
             }
             found |= {name: v for name, v in inner.items() if isinstance(v, int | float)}
     return found
