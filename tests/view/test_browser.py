@@ -72,6 +72,10 @@ def slider(page, label):
     )
 
 
+def value_of(handle):
+    return float(handle.get_attribute("aria-valuenow"))
+
+
 def shown_apex(page, leg=0):
     return float(page.locator(".apex").nth(leg).inner_text().removesuffix(" m"))
 
@@ -174,7 +178,14 @@ def test_a_trace_is_replayed(page, tmp_path):
         wait_for_leg(page, viewer)
         page.keyboard.press("Space")
         until(lambda: viewer.pace.paused)
-        slider(page, "Time, s").focus()
+        handle = slider(page, "Time, s")
+        # It shows where the replay stands, also where that stopped between two of its updates.
+        until(lambda: value_of(handle) == pytest.approx(replay.now, abs=0.006))
+        still = replay.now
+        page.keyboard.press("s")
+        until(lambda: replay.now > still)
+        until(lambda: value_of(handle) == pytest.approx(replay.now, abs=0.006))
+        handle.focus()
         page.keyboard.press("Home")
         until(lambda: replay.now == 0.0)
         page.keyboard.press("End")

@@ -20,8 +20,15 @@ class ReplayPanel:
         self._time = server.gui.add_slider(
             "Time, s", min=0.0, max=replay.length, step=0.01, initial_value=0.0
         )
-        self._time.on_update(inbox.from_page(lambda: replay.seek(self._time.value)))
+        self._time.on_update(inbox.from_page(self._seek))
+        self._shown = 0.0
 
     def show(self) -> None:
-        """Bring the slider in line with the replay."""
-        put_value(self._time, round(self._replay.now, 2))
+        """Bring the slider in line with the replay, unless it was the slider that moved it."""
+        if self._replay.now != self._shown:
+            self._shown = self._replay.now
+            put_value(self._time, round(self._shown, 2))
+
+    def _seek(self) -> None:
+        self._replay.seek(self._time.value)
+        self._shown = self._replay.now

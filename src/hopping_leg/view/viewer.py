@@ -112,7 +112,7 @@ class Viewer:
         if turn == _SLOW - 1:
             self._scene.mark(source.now)
             self._status.content = self._text()
-            if self._replay_panel is not None and not self.pace.paused:
+            if self._replay_panel is not None:
                 self._replay_panel.show()
             self._notify(source.notices)
             source.notices.clear()
