@@ -45,7 +45,8 @@ def test_another_seed_differs():
 
 @pytest.mark.parametrize("ticks", [1, 37, 90])
 def test_a_restored_task_goes_on_exactly(ticks):
-    one, other = task(seed=0), task(seed=5)
+    busy = replace(BUSY, idle=0.15)
+    one, other = task(busy, seed=0), task(busy, seed=5)
     plan = actions(ticks + 60)
     for action in plan[:ticks]:
         last = one.step(action)
@@ -197,6 +198,21 @@ def test_a_fall_costs_its_penalty_once():
     pytest.fail("the limp leg never fell")
 
 
+def test_what_has_no_apex_for_too_long_ends():
+    idle = task(TaskOptions(start="hop", idle=0.3, episode=1.0, disturbance=NOTHING), count=64)
+    waited, hopped, ended = np.zeros(64), 0, 0
+    for action in actions(300, count=64):
+        step = idle.step(action)
+        apex = ~np.isnan(step.apex_height)
+        waited = np.where(apex, 0, waited + 1)
+        np.testing.assert_array_equal(step.terminated, waited == 60)
+        assert not (step.terminated & step.truncated).any()
+        waited[step.terminated | step.truncated] = 0
+        hopped, ended = hopped + apex.sum(), ended + step.terminated.sum()
+    assert hopped > 10
+    assert ended > 10
+
+
 def test_a_restart_shows_nothing_of_the_last_episode():
     """A leg that begins anew sees as much of its past as one that never did anything."""
     options = TaskOptions(observation="dated", episode=0.1, disturbance=NOTHING, commands=(0.3,))
@@ -249,6 +265,8 @@ def test_some_legs_stay_the_robot_itself():
         {"timestep": 3e-3},
         {"chance": 1.5},
         {"unchanged": -0.1},
+        {"idle": -1.0},
+        {"idle": float("inf")},
     ],
 )
 def test_options_without_meaning_are_refused(wrong):

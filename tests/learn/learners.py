@@ -20,7 +20,7 @@ TINY = PaperRecipe(
 )
 TINY_FAST = FastRecipe(steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8))
 TINY_PRECISE = PreciseRecipe(
-    judge_commands=(0.3,), teachers=3,
+    judge_commands=(0.3,), teachers=3, exam_at=(1.0,),
     steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8), student=(8, 8),
     teaching=0.4, imitation=Imitation(memory=200, updates=4, batch=64),
 )  # fmt: skip

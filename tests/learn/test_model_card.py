@@ -27,4 +27,4 @@ def test_a_command_between_centimetres_is_not_rounded_to_another():
 
 def test_a_card_tells_how_teachers_did_in_their_exams():
     assert exams([]) == ""
-    assert "order in which they learnt: 21.0, 4.1 mm" in exams([0.021, 0.0041])
+    assert "order in which they were taken: 21.0, 4.1 mm" in exams([0.021, 0.0041])

@@ -99,7 +99,7 @@ def test_the_teacher_with_the_best_score_teaches():
     with torch.no_grad():
         chooser.policy.action_net.bias -= 1.0
     assert chooser.exams == [0.03, 0.01, 0.02]
-    assert TINY_PRECISE.findings(chooser) == {"teachers_scores_m": [0.03, 0.01, 0.02]}
+    assert TINY_PRECISE.findings(chooser) == {"exam_scores_m": [0.03, 0.01, 0.02]}
     weights = [one["mlp_extractor.policy_net.0.weight"] for one in examined]
     assert not torch.equal(weights[0], weights[1])
     assert not torch.equal(weights[1], weights[2])
@@ -129,14 +129,36 @@ def test_a_teacher_that_passes_gives_the_time_of_the_next_ones_to_the_policy():
 
 
 def test_the_policys_rate_falls_from_when_its_teacher_passed():
-    exams = [0.03, RECIPE.passing]
+    exams = [*[0.03] * len(RECIPE.exam_at), RECIPE.passing]
     until = RECIPE.taught_until(exams)
-    assert until == pytest.approx(RECIPE.teaching * 2 / RECIPE.teachers)
+    assert until == pytest.approx(RECIPE.teaching * (1 + RECIPE.exam_at[0]) / RECIPE.teachers)
     assert RECIPE.pace(until, exams) == pytest.approx(RECIPE.learning_rate)
     middle, end = (RECIPE.pace(share, exams) for share in ((1 + until) / 2, 1.0))
     assert RECIPE.learning_rate > middle > end
     assert RECIPE.taught(until, exams) == 0
     assert RECIPE.taught(1.0, exams) == 1
+
+
+def test_a_teacher_is_examined_several_times_and_its_best_counts():
+    recipe = dataclasses.replace(TINY_PRECISE, teachers=2, exam_at=(0.5, 1.0))
+    scores = iter([0.02, 0.9, 0.04, 0.03])
+    kept = []
+
+    def exam(policy):
+        kept.append(policy.action_net.bias.detach().clone())
+        return next(scores)
+
+    chooser = learner(recipe)
+    chooser._exam = exam
+    for share in recipe.teaching * np.array([0.0, 0.24, 0.25, 0.49, 0.5, 0.75, 1.0]):
+        recipe.anneal(chooser, chooser.env, share)
+        assert len(chooser.exams) == 4 * share // recipe.teaching
+        with torch.no_grad():
+            chooser.policy.action_net.bias += 1.0
+    with torch.no_grad():
+        chooser.policy.action_net.bias -= 1.0
+    assert chooser.exams == [0.02, 0.9, 0.04, 0.03]
+    torch.testing.assert_close(chooser.policy.action_net.bias.detach(), kept[0])
 
 
 def test_a_single_teacher_takes_no_exam():
@@ -160,7 +182,7 @@ def test_an_exam_tells_a_teacher_that_does_not_hop():
 def test_an_exam_counts_the_worst_height_under_errors(monkeypatch):
     asked = {}
 
-    def judged(teacher, robot, commands, rate):
+    def judged(teacher, robot, commands, rate, threads):
         asked.update(erring=teacher._erring, commands=commands)
         scores = dict.fromkeys(commands, 0.002) | {commands[1]: 0.01}
         return [Mock(score=score) for score in scores.values()]

@@ -52,6 +52,9 @@ class TaskOptions:
     """Gap between ground and base or knee below which an episode terminates, m; none never does."""
     fall_penalty: float = 0.0
     """Reward lost by such an end: without it a leg with little to win learns to fall."""
+    idle: float = 0.0
+    """Time without an in-flight apex after which an episode terminates, s; 0 never does it. To stand
+    still earns little then, however much hopping costs."""
     velocity_scale: float = 10.0
     """Joint velocity that the observation shows as 1, rad/s."""
     rate: float = CONTROL_RATE
@@ -96,6 +99,8 @@ def _check(options: TaskOptions) -> None:
         value = getattr(options, name)
         if not 0 < value < math.inf:
             raise UsageError(f"'{name}' is {value} but must be positive and finite.")
+    if not 0 <= options.idle < math.inf:
+        raise UsageError(f"'idle' is {options.idle} but must be a time in s, or 0 for never.")
     for name in ("chance", "unchanged"):
         if not 0 <= getattr(options, name) <= 1:
             raise UsageError(f"'{name}' is {getattr(options, name)} but must lie between 0 and 1.")

@@ -63,6 +63,7 @@ class HoppingTask:
         self._starts = Starts(robot, options)
         self._torque = np.tile(options.action_torque, (count, 1))
         self._lowest, self._highest = np.full((count, 2), -1.0), np.full((count, 2), 1.0)
+        self._patience = max(1, round(options.idle * options.rate)) if options.idle > 0 else 0
         self._horizon = max(1, round(options.episode * options.rate))
         self._never = np.zeros(count, np.bool_)
         self._nan = np.full(count, np.nan)
@@ -72,6 +73,7 @@ class HoppingTask:
         self._tick = 0
         self._end = np.empty(count, np.int64)
         self._switch = np.full(count, np.iinfo(np.int64).max)
+        self._hopped = np.zeros(count, np.int64)
         self._last = np.zeros((count, 2))
         self._rises = np.zeros(count, np.bool_)
         self.reset()
@@ -149,6 +151,7 @@ class HoppingTask:
         if not np.count_nonzero(peaked):
             return self._never, self._nan, self._nan
         apex = peaked & (legs.foot_clearance() >= CLEAR)
+        self._hopped[apex] = self._tick + 1
         height = np.where(apex, np.maximum(height_before, legs.height), np.nan)
         return apex, height, height - self.command
 
@@ -176,6 +179,7 @@ class HoppingTask:
             "switch": self._switch.copy(),
             "last_action": self._last.copy(),
             "rises": self._rises.copy(),
+            "hopped": self._hopped.copy(),
             "rng": self._rng.bit_generator.state,
             "reward": self.reward.state(),
             "observation": self.observation.state(),
@@ -192,6 +196,8 @@ class HoppingTask:
         self._end[:] = state["end"]
         self._switch[:] = state["switch"]
         self._last, self._rises = np.array(state["last_action"]), np.array(state["rises"])
+        if "hopped" in state:
+            self._hopped = np.array(state["hopped"])
         self._rng.bit_generator.state = state["rng"]
         self.reward.restore(state["reward"])
         self.observation.restore(state["observation"])
@@ -226,8 +232,11 @@ class HoppingTask:
             truncated = ended = self._end <= self._tick
         if self.options.fall_clearance is not None:
             terminated = self._fallen(self.options.fall_clearance)
-            truncated = truncated & ~terminated
             reward = reward - self.options.fall_penalty * terminated
+        if self._patience > 0:
+            terminated = terminated | (self._tick - self._hopped >= self._patience)
+        if terminated is not self._never:
+            truncated = truncated & ~terminated
             ended = truncated | terminated
         observation = self._observe()
         final_observation = final_privileged = None
@@ -253,6 +262,7 @@ class HoppingTask:
         height, q = self._starts.draw(self.command[rows], self._rng)
         self.legs.place(rows, height, q)
         self._end[rows] = self._tick + self._horizon
+        self._hopped[rows] = self._tick
         self._last[rows], self._rises[rows] = 0.0, False
         if self.options.command_hold is not None:
             self._switch[rows] = self._tick + self._draw_holds(count)

@@ -90,6 +90,11 @@ def _of_precise() -> list[Ablation]:
             replace(base, task=replace(base.task, command_skew=1.0)),
         ),
         Ablation(
+            "standing-still",
+            "legs that do not hop go on standing until their episode's end",
+            replace(base, task=replace(base.task, idle=0.0)),
+        ),
+        Ablation(
             "four-passes",
             "four passes over a rollout instead of eight",
             replace(base, epochs=4),

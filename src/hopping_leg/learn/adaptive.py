@@ -32,6 +32,7 @@ class AdaptiveRecipe(PreciseRecipe):
             PreciseRecipe().task,
             command_range=(0.20, 0.42),
             command_skew=1.0,
+            idle=0.0,
             randomised=SURPRISES,
             chance=0.5,
             unchanged=0.5,

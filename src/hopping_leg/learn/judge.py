@@ -66,6 +66,7 @@ def judge(
     commands: tuple[float, ...],
     seeds: tuple[int, ...] = (FIRST_SEED,),
     rate: float = 200.0,
+    threads: int = 1,
 ) -> list[Verdict]:
     """Let a controller hop at fixed commands with noise and delay on, physics at 0.5 ms.
 
@@ -75,9 +76,10 @@ def judge(
         commands: Desired heights, rising, m.
         seeds: Of noise and delay; each adds four legs per command.
         rate: Control rate, Hz.
+        threads: Worker threads, 0 for one per core.
     """
     schedule = np.tile(np.repeat(commands, _LEGS), (round(_SECONDS * rate), 1))
-    setup = Setup(robot, rate=rate, threads=1)
+    setup = Setup(robot, rate=rate, threads=threads)
     runs = [roll_out(controller, setup, schedule, seed) for seed in seeds]
     return [
         _verdict(runs, command, range(index * _LEGS, (index + 1) * _LEGS), rate)

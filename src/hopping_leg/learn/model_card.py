@@ -37,7 +37,7 @@ One network from joint measurements to joint torques, for robot `{result["robot"
 
 - Training: {result["steps"]} control steps, {result["minutes"]:.1f} min of wall-clock time, physics
   step {1000 * task["timestep"]:g} ms.
-{exams(result.get("teachers_scores_m", []))}\
+{exams(result.get("exam_scores_m", []))}\
 - Selection: the policy after {selected["steps"]} steps ({selected["minutes"]:.1f} min), the best of
   {len(selected["finalists"])} finalists out of {len(result["history"])} snapshots.
 - Versions: {versions}.
@@ -54,14 +54,14 @@ def exams(scores: list[float]) -> str:
     """Return a line on the teachers' exams, if there were any.
 
     Args:
-        scores: In the order in which the teachers learnt, m.
+        scores: In the order in which they were taken, m.
     """
     if not scores:
         return ""
     numbers = ", ".join(f"{1000 * score:.1f}" for score in scores)
     return (
-        f"- Exams of the teachers, in the order in which they learnt: {numbers} mm where they did"
-        " worst (less is better); the best of them taught.\n"
+        f"- Exams of the teachers, in the order in which they were taken: {numbers} mm where they"
+        " did worst (less is better); who did best taught.\n"
     )
 
 

@@ -42,6 +42,7 @@ class PreciseRecipe(FastRecipe):
             observation="dated-long",
             command_range=(0.20, 0.46),
             command_skew=1.5,
+            idle=1.5,
             timestep=5e-4,
             alike_at_first=True,
         )
@@ -64,8 +65,11 @@ class PreciseRecipe(FastRecipe):
     """Share of the training in which teachers learn at most; in the rest the policy does."""
     teachers: int = 2
     """How many learn at most, one after the other; the best of them teaches."""
-    passing: float = 0.007
-    """Score in the exam with which a teacher needs no successor, m."""
+    exam_at: tuple[float, ...] = (0.85, 0.9, 0.95, 1.0)
+    """Shares of its time after which each is examined, the last of them 1; how a teacher does where
+    it does worst changes from one rollout to the next."""
+    passing: float = 0.005
+    """Score in an exam with which a teacher needs neither more time nor a successor, m."""
     erring: float = 0.05
     """Errors of the torques in the exam, of the largest: about those that the policy will make."""
     student: tuple[int, ...] = (256, 128)
@@ -83,7 +87,7 @@ class PreciseRecipe(FastRecipe):
             TaughtPolicy,
             env,
             imitation=self.imitation,
-            exam=lambda policy: self.examine(policy, env.task.robot),
+            exam=lambda policy: self.examine(policy, env.task.robot, env.task.legs.threads),
             pace=self.pace,
             **self.ppo_options(seed),
             policy_kwargs={
@@ -111,7 +115,7 @@ class PreciseRecipe(FastRecipe):
         """
         return Teacher(policy, robot, self.task, self.last_torque, erring)
 
-    def examine(self, policy: TaughtPolicy, robot: Robot) -> float:
+    def examine(self, policy: TaughtPolicy, robot: Robot, threads: int = 1) -> float:
         """Score a policy's teacher where it does worst, m.
 
         Its torques err as the policy's will, at every centimetre between the lowest and the highest
@@ -120,7 +124,8 @@ class PreciseRecipe(FastRecipe):
         low, high = min(self.judge_commands), max(self.judge_commands)
         commands = tuple(np.linspace(low, high, round((high - low) / _EXAM_SPACING) + 1))
         teacher = self.make_teacher(policy, robot, self.erring)
-        return max(badness(v) for v in judge(teacher, robot, commands, rate=self.task.rate))
+        verdicts = judge(teacher, robot, commands, rate=self.task.rate, threads=threads)
+        return max(badness(v) for v in verdicts)
 
     @property
     def last_torque(self) -> list[int]:
@@ -152,10 +157,13 @@ class PreciseRecipe(FastRecipe):
         """Return the share of the training with which the policy begins to learn.
 
         Args:
-            exams: Scores so far, m; a teacher that passes gives the time of the next ones away.
+            exams: Scores so far, m; a teacher that passes gives away what is left of its time and
+                that of the next ones.
         """
-        taught = len(exams) / self.teachers if self._passed(exams) else 1.0
-        return self.teaching * taught
+        if not self._passed(exams):
+            return self.teaching
+        before, last = divmod(len(exams) - 1, len(self.exam_at))
+        return self.teaching * (before + self.exam_at[last]) / self.teachers
 
     def taught(self, share: float, exams: Sequence[float]) -> float:
         """Return the share of the policy's own learning that is done, negative before it."""
@@ -168,12 +176,13 @@ class PreciseRecipe(FastRecipe):
         Where legs differ, they do so for the policy: a teacher that feels the true state is hardly
         the worse for not having met them.
         """
-        before, learnt = self._learnt(share)
-        while self.teachers > 1 and len(model.exams) < before and not self._passed(model.exams):
+        due, learnt = self._due(share), self._learnt(share)[1]
+        while len(model.exams) < due and not self._passed(model.exams):
             model.examine()
-            if len(model.exams) == self.teachers or self._passed(model.exams):
+            number, more = divmod(len(model.exams), len(self.exam_at))
+            if number == self.teachers or self._passed(model.exams):
                 model.choose_teacher()
-            else:
+            elif not more:
                 model.next_teacher()
         taught = self.taught(share, model.exams)
         super().anneal(model, env, learnt if taught < 0 else 1.0)
@@ -184,6 +193,15 @@ class PreciseRecipe(FastRecipe):
 
     def _passed(self, exams: Sequence[float]) -> bool:
         return len(exams) > 0 and exams[-1] <= self.passing
+
+    def _due(self, share: float) -> int:
+        """Return how many exams have been due; a single teacher takes none."""
+        if self.teachers == 1:
+            return 0
+        before, learnt = self._learnt(share)
+        if before == self.teachers:
+            return before * len(self.exam_at)
+        return before * len(self.exam_at) + sum(learnt >= at for at in self.exam_at)
 
     def _learnt(self, share: float) -> tuple[int, float]:
         """Return how many teachers have had their time, and the share of it that the next one has.
@@ -205,8 +223,8 @@ class PreciseRecipe(FastRecipe):
         return int(taught >= 0)
 
     def findings(self, model: Any) -> dict[str, Any]:  # noqa: ANN401
-        """Return how the teachers did."""
-        return {"teachers_scores_m": list(model.exams)} if model.exams else {}
+        """Return how the teachers did in their exams."""
+        return {"exam_scores_m": list(model.exams)} if model.exams else {}
 
     def network(self, model: Any, env: TaskVecEnv) -> Network:  # noqa: ANN401
         """Return the student as it stands."""

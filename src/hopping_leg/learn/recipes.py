@@ -31,7 +31,7 @@ _RANGES: dict[Randomise, tuple[Range, ...]] = {
     "surprises": SURPRISES,
 }
 
-_OF_TASK = ("command_skew",)
+_OF_TASK = ("command_skew", "idle")
 """Numbers of a task that can be changed like those of a recipe's other parts."""
 
 _SWITCH = {"true": True, "1": True, "false": False, "0": False}
@@ -151,15 +151,20 @@ def changes_of(recipe: str, options: dict[str, Any]) -> list[str]:
     """
     if recipe not in RECIPES:
         return []
-    defaults = numbers_of(RECIPES[recipe]())
-    stored = {name: _stored(options, name, default) for name, default in defaults.items()}
+    usual = RECIPES[recipe]()
+    defaults = numbers_of(usual)
+    stored = {name: _stored(options, usual, name) for name in defaults}
     return [f"{name}={value}" for name, value in stored.items() if value != defaults[name]]
 
 
-def _stored(options: dict[str, Any], name: str, default: float) -> float:
-    """Return a number of stored options; a run from before it existed has its default."""
+def _stored(options: dict[str, Any], usual: Recipe, name: str) -> float:
+    """Return a number of stored options.
+
+    A run from before it existed has that of its part without a recipe, which changes nothing.
+    """
     part, _, number = name.rpartition(".")
-    value: float = (options.get(part, {}) if part else options).get(number, default)
+    inner = type(getattr(usual, part))() if part else usual
+    value: float = (options.get(part, {}) if part else options).get(number, getattr(inner, number))
     return value
 
 

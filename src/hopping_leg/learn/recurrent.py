@@ -30,6 +30,7 @@ class RecurrentRecipe(PreciseRecipe):
             observation="dated",
             command_range=(0.20, 0.42),
             command_skew=1.0,
+            idle=0.0,
         )
     )
     """The learning problem; wider ranges of commands were not tried."""

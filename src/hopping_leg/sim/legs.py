@@ -33,6 +33,9 @@ class Legs(AnyLegs):
     if legs differ in it, by whole control periods; the rest is left to ``RealLegs``, which is
     slower.
 
+    Attributes:
+        threads: Worker threads, 0 for one per core.
+
     Args:
         robot: The leg.
         count: Number of simulations n.
@@ -62,6 +65,7 @@ class Legs(AnyLegs):
         detailed: bool = False,
     ) -> None:
         super().__init__(robot, count, rate, timestep)
+        self.threads = threads
         if variants and (clamped or len(variants) != count):
             raise UsageError(
                 f"{len(variants)} variants were given for {count} legs"
