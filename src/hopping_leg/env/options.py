@@ -53,8 +53,8 @@ class TaskOptions:
     fall_penalty: float = 0.0
     """Reward lost by such an end: without it a leg with little to win learns to fall."""
     idle: float = 0.0
-    """Time without an in-flight apex after which an episode terminates, s; 0 never does it. To stand
-    still earns little then, however much hopping costs."""
+    """Time without an in-flight apex after which an episode terminates, s; 0 never does it. Then
+    standing still earns little, however much hopping costs."""
     velocity_scale: float = 10.0
     """Joint velocity that the observation shows as 1, rad/s."""
     rate: float = CONTROL_RATE

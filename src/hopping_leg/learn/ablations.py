@@ -95,6 +95,11 @@ def _of_precise() -> list[Ablation]:
             replace(base, task=replace(base.task, idle=0.0)),
         ),
         Ablation(
+            "narrow-alone",
+            "no wide part of the apex event's kernel at the end",
+            replace(base, reward=replace(base.reward, tail=0.0)),
+        ),
+        Ablation(
             "four-passes",
             "four passes over a rollout instead of eight",
             replace(base, epochs=4),

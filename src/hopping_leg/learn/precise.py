@@ -48,7 +48,9 @@ class PreciseRecipe(FastRecipe):
         )
     )
     reward: ApexRewardOptions = field(
-        default_factory=lambda: ApexRewardOptions(width=(0.030, 0.006), jerk=0.3, effort=0.2)
+        default_factory=lambda: ApexRewardOptions(
+            width=(0.030, 0.006), tail=0.25, jerk=0.3, effort=0.2
+        )
     )
     """Apex reward of the teacher; the calmer it is, the better it can be imitated."""
     epochs: int = 8
