@@ -189,7 +189,7 @@ def test_a_fall_ends_the_episode_only_if_asked():
 
 def test_a_fall_costs_its_penalty_once():
     options = TaskOptions(fall_clearance=0.05, disturbance=NOTHING)
-    free, dear = task(options, count=1), task(replace(options, fall_penalty=7.0), count=1)
+    free, dear = task(options, count=1), task(replace(options, end_penalty=7.0), count=1)
     for _ in range(100):
         a, b = free.step(np.zeros((1, 2))), dear.step(np.zeros((1, 2)))
         assert a.reward[0] - b.reward[0] == pytest.approx(7.0 * a.terminated[0])

@@ -50,11 +50,10 @@ class TaskOptions:
     """Cut the first episode of each leg at a random length, so that a batch does not end as one."""
     fall_clearance: float | None = None
     """Gap between ground and base or knee below which an episode terminates, m; none never does."""
-    fall_penalty: float = 0.0
-    """Reward lost by such an end: without it a leg with little to win learns to fall."""
     idle: float = 0.0
-    """Time without an in-flight apex after which an episode terminates, s; 0 never does it. Then
-    standing still earns little, however much hopping costs."""
+    """Time without an in-flight apex after which an episode terminates, s; 0 never does it."""
+    end_penalty: float = 0.0
+    """Reward lost by either end: without it a leg with little to win learns to bring it about."""
     velocity_scale: float = 10.0
     """Joint velocity that the observation shows as 1, rad/s."""
     rate: float = CONTROL_RATE

@@ -232,10 +232,10 @@ class HoppingTask:
             truncated = ended = self._end <= self._tick
         if self.options.fall_clearance is not None:
             terminated = self._fallen(self.options.fall_clearance)
-            reward = reward - self.options.fall_penalty * terminated
         if self._patience > 0:
             terminated = terminated | (self._tick - self._hopped >= self._patience)
         if terminated is not self._never:
+            reward = reward - self.options.end_penalty * terminated
             truncated = truncated & ~terminated
             ended = truncated | terminated
         observation = self._observe()
