@@ -75,19 +75,19 @@ results: $(STAMP)
 	$(BIN)/hop train --recipe adaptive --out runs/adaptive
 	$(BIN)/hop evaluate 12-million-steps=runs/adaptive/policy.onnx adaptive --suite robustness --seeds 3 \
 	  --out runs/results/robustness-adaptive --json docs/results/adaptive-robustness.json
-	for seed in 0 1 2 3 4; do $(BIN)/hop train --recipe precise --seed $$seed --steps 9000000 --set teachers=1 epochs=4 task.command_skew=1 task.idle=0 reward.tail=0 teaching=0.28 --out runs/teaching/0.28-seed$$seed; done
-	for seed in 2 4; do $(BIN)/hop train --recipe precise --seed $$seed --steps 9000000 --set teachers=1 epochs=4 task.command_skew=1 task.idle=0 reward.tail=0 teaching=0.38 --out runs/teaching/0.38-seed$$seed; done
-	$(BIN)/hop train --recipe precise --steps 9000000 --set teachers=1 epochs=4 task.command_skew=1 task.idle=0 reward.tail=0 teaching=0.55 --out runs/teaching/0.55-seed0
+	for seed in 0 1 2 3 4; do $(BIN)/hop train --recipe precise --seed $$seed --steps 9000000 --set teachers=1 epochs=4 task.command_skew=1 teaching=0.28 --out runs/teaching/0.28-seed$$seed; done
+	for seed in 2 4; do $(BIN)/hop train --recipe precise --seed $$seed --steps 9000000 --set teachers=1 epochs=4 task.command_skew=1 teaching=0.38 --out runs/teaching/0.38-seed$$seed; done
+	$(BIN)/hop train --recipe precise --steps 9000000 --set teachers=1 epochs=4 task.command_skew=1 teaching=0.55 --out runs/teaching/0.55-seed0
 	$(BIN)/hop evaluate "runs/teaching/*/policy.onnx" --seeds 5 --floor soft --no-video --json docs/results/teaching.json \
 	  --commands 0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40
 	$(BIN)/hop evaluate 0.28-seed0=runs/teaching/0.28-seed0/policy.onnx 0.38-seed2=runs/teaching/0.38-seed2/policy.onnx \
 	  0.55-seed0=runs/teaching/0.55-seed0/policy.onnx --suite robustness --seeds 3 --out runs/results/robustness-teaching --json docs/results/teaching-robustness.json
-	$(BIN)/hop train --recipe precise --seed 4 --steps 9000000 --set teachers=1 epochs=4 task.command_skew=1 task.idle=0 reward.tail=0 teaching=0.28 reward.energy_beyond=0.03 --out runs/short
-	$(BIN)/hop train --recipe precise --seed 4 --steps 18000000 --set teachers=1 epochs=4 task.command_skew=1 task.idle=0 reward.tail=0 teaching=0.14 reward.energy_beyond=0.03 judge_from=0.85 \
+	$(BIN)/hop train --recipe precise --seed 4 --steps 9000000 --set teachers=1 epochs=4 task.command_skew=1 teaching=0.28 reward.energy_beyond=0.03 --out runs/short
+	$(BIN)/hop train --recipe precise --seed 4 --steps 18000000 --set teachers=1 epochs=4 task.command_skew=1 teaching=0.14 reward.energy_beyond=0.03 judge_from=0.85 \
 	  --source runs/short --out runs/precise
 	$(BIN)/hop bench limits --controllers precise adaptive recurrent energy-shaping --teacher runs/precise --json docs/results/limits.json
 	$(BIN)/hop bench reach --json docs/results/reach.json
-	$(BIN)/hop train --recipe precise --steps 9000000 --set teachers=1 epochs=4 task.command_skew=1 task.idle=0 reward.tail=0 teaching=0.55 --observation three-samples --heights 0.2 0.42 --out runs/fifteen
+	$(BIN)/hop train --recipe precise --steps 9000000 --set teachers=1 epochs=4 task.command_skew=1 teaching=0.55 --observation three-samples --heights 0.2 0.42 --out runs/fifteen
 	$(BIN)/hop train --recipe recurrent --observation three-samples --out runs/fifteen-recurrent
 	$(BIN)/hop evaluate fifteen=runs/fifteen/policy.onnx fifteen-recurrent=runs/fifteen-recurrent/policy.onnx \
 	  --seeds 5 --floor soft --no-video --json docs/results/fifteen.json

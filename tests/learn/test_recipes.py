@@ -51,8 +51,8 @@ def test_numbers_of_a_part_are_changed_by_its_name():
 
 def test_a_run_from_before_a_number_existed_did_without_it():
     stored = dataclasses.asdict(get_recipe("precise"))
-    del stored["task"]["idle"]
-    assert changes_of("precise", stored) == ["task.idle=0.0"]
+    del stored["task"]["command_skew"]
+    assert changes_of("precise", stored) == ["task.command_skew=1.0"]
 
 
 @pytest.mark.parametrize(

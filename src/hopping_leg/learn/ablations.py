@@ -90,14 +90,14 @@ def _of_precise() -> list[Ablation]:
             replace(base, task=replace(base.task, command_skew=1.0)),
         ),
         Ablation(
-            "standing-still",
-            "legs that do not hop go on standing until their episode's end",
-            replace(base, task=replace(base.task, idle=0.0)),
+            "no-standing-still",
+            "a leg without a hop for 1.5 s begins anew",
+            replace(base, task=replace(base.task, idle=1.5)),
         ),
         Ablation(
-            "narrow-alone",
-            "no wide part of the apex event's kernel at the end",
-            replace(base, reward=replace(base.reward, tail=0.0)),
+            "wide-tail",
+            "a quarter of the apex event's kernel stays wide to the end",
+            replace(base, reward=replace(base.reward, tail=0.25)),
         ),
         Ablation(
             "four-passes",

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from torch import nn
 
 from hopping_leg.control.layouts import make_layout
-from hopping_leg.env import ApexRewardOptions, TaskOptions
+from hopping_leg.env import TaskOptions
 from hopping_leg.env.true_state import PRIVILEGED_CLEARANCE, PRIVILEGED_COMMAND, PRIVILEGED_HEIGHT
 from hopping_leg.errors import UsageError
 from hopping_leg.learn.actor import aiming_network
@@ -32,17 +32,12 @@ class AdaptiveRecipe(PreciseRecipe):
             PreciseRecipe().task,
             command_range=(0.20, 0.42),
             command_skew=1.0,
-            idle=0.0,
             randomised=SURPRISES,
             chance=0.5,
             unchanged=0.5,
         )
     )
     """The learning problem; wider ranges of commands were not tried."""
-    reward: ApexRewardOptions = field(
-        default_factory=lambda: replace(PreciseRecipe().reward, tail=0.0)
-    )
-    """Apex reward of the teacher."""
     judge_commands: tuple[float, ...] = (0.22, 0.25, 0.28, 0.31, 0.34, 0.37, 0.40)
     """Heights of the trials, m."""
     aiming: Aiming = field(default_factory=Aiming)

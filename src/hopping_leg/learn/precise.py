@@ -42,15 +42,12 @@ class PreciseRecipe(FastRecipe):
             observation="dated-long",
             command_range=(0.20, 0.46),
             command_skew=1.5,
-            idle=1.5,
             timestep=5e-4,
             alike_at_first=True,
         )
     )
     reward: ApexRewardOptions = field(
-        default_factory=lambda: ApexRewardOptions(
-            width=(0.030, 0.006), tail=0.25, jerk=0.3, effort=0.2
-        )
+        default_factory=lambda: ApexRewardOptions(width=(0.030, 0.006), jerk=0.3, effort=0.2)
     )
     """Apex reward of the teacher; the calmer it is, the better it can be imitated."""
     epochs: int = 8
@@ -67,10 +64,9 @@ class PreciseRecipe(FastRecipe):
     """Share of the training in which teachers learn at most; in the rest the policy does."""
     teachers: int = 2
     """How many learn at most, one after the other; the best of them teaches."""
-    exam_at: tuple[float, ...] = (0.85, 0.9, 0.95, 1.0)
-    """Shares of its time after which each is examined, the last of them 1; how a teacher does where
-    it does worst changes from one rollout to the next."""
-    passing: float = 0.005
+    exam_at: tuple[float, ...] = (1.0,)
+    """Shares of its time after which each is examined, the last of them 1; the best exam counts."""
+    passing: float = 0.007
     """Score in an exam with which a teacher needs neither more time nor a successor, m."""
     erring: float = 0.05
     """Errors of the torques in the exam, of the largest: about those that the policy will make."""

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from torch import nn
 
-from hopping_leg.env import ApexRewardOptions, TaskOptions
+from hopping_leg.env import TaskOptions
 from hopping_leg.learn.actor import recurrent_network
 from hopping_leg.learn.export import Network
 from hopping_leg.learn.imitation import Imitation
@@ -30,14 +30,9 @@ class RecurrentRecipe(PreciseRecipe):
             observation="dated",
             command_range=(0.20, 0.42),
             command_skew=1.0,
-            idle=0.0,
         )
     )
     """The learning problem; wider ranges of commands were not tried."""
-    reward: ApexRewardOptions = field(
-        default_factory=lambda: replace(PreciseRecipe().reward, tail=0.0)
-    )
-    """Apex reward of the teacher."""
     judge_commands: tuple[float, ...] = (0.22, 0.25, 0.28, 0.31, 0.34, 0.37, 0.40)
     """Heights of the trials, m."""
     legs: int = 256
