@@ -187,15 +187,16 @@ def test_a_fall_ends_the_episode_only_if_asked():
         assert any(limp.step(np.zeros((1, 2))).terminated[0] for _ in range(100)) == falls
 
 
-def test_a_fall_costs_its_penalty_once():
-    options = TaskOptions(fall_clearance=0.05, disturbance=NOTHING)
-    free, dear = task(options, count=1), task(replace(options, end_penalty=7.0), count=1)
+@pytest.mark.parametrize("end", [{"fall_clearance": 0.05}, {"idle": 0.3}])
+def test_an_end_costs_its_penalty_once(end):
+    options = TaskOptions(disturbance=NOTHING, **end)
+    free, dear = task(options, count=1), task(replace(options, fall_penalty=7.0), count=1)
     for _ in range(100):
         a, b = free.step(np.zeros((1, 2))), dear.step(np.zeros((1, 2)))
         assert a.reward[0] - b.reward[0] == pytest.approx(7.0 * a.terminated[0])
         if a.terminated[0]:
             return
-    pytest.fail("the limp leg never fell")
+    pytest.fail("the limp leg's episode never ended")
 
 
 def test_what_has_no_apex_for_too_long_ends():

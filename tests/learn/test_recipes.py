@@ -53,6 +53,9 @@ def test_a_run_from_before_a_number_existed_did_without_it():
     stored = dataclasses.asdict(get_recipe("precise"))
     del stored["task"]["command_skew"]
     assert changes_of("precise", stored) == ["task.command_skew=1.0"]
+    stored = dataclasses.asdict(get_recipe("paper"))
+    del stored["task"]["idle"]
+    assert changes_of("paper", stored) == []
 
 
 @pytest.mark.parametrize(

@@ -52,8 +52,8 @@ class TaskOptions:
     """Gap between ground and base or knee below which an episode terminates, m; none never does."""
     idle: float = 0.0
     """Time without an in-flight apex after which an episode terminates, s; 0 never does it."""
-    end_penalty: float = 0.0
-    """Reward lost by either end: without it a leg with little to win learns to bring it about."""
+    fall_penalty: float = 0.0
+    """Reward lost by either end: without it a leg with little to win learns to fall, or to idle."""
     velocity_scale: float = 10.0
     """Joint velocity that the observation shows as 1, rad/s."""
     rate: float = CONTROL_RATE

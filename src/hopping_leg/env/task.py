@@ -235,7 +235,7 @@ class HoppingTask:
         if self._patience > 0:
             terminated = terminated | (self._tick - self._hopped >= self._patience)
         if terminated is not self._never:
-            reward = reward - self.options.end_penalty * terminated
+            reward = reward - self.options.fall_penalty * terminated
             truncated = truncated & ~terminated
             ended = truncated | terminated
         observation = self._observe()

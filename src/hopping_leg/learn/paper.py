@@ -25,7 +25,7 @@ class PaperRecipe(Recipe):
 
     task: TaskOptions = field(
         default_factory=lambda: TaskOptions(
-            start="mixed", stagger=True, fall_clearance=0.01, end_penalty=20.0
+            start="mixed", stagger=True, fall_clearance=0.01, fall_penalty=20.0
         )
     )
     reward: PaperRewardOptions = field(default_factory=PaperRewardOptions)

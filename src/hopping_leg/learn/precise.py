@@ -197,9 +197,8 @@ class PreciseRecipe(FastRecipe):
         if self.teachers == 1:
             return 0
         before, learnt = self._learnt(share)
-        if before == self.teachers:
-            return before * len(self.exam_at)
-        return before * len(self.exam_at) + sum(learnt >= at for at in self.exam_at)
+        each = len(self.exam_at)
+        return min(before * each + sum(learnt >= at for at in self.exam_at), self.teachers * each)
 
     def _learnt(self, share: float) -> tuple[int, float]:
         """Return how many teachers have had their time, and the share of it that the next one has.
