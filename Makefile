@@ -53,7 +53,7 @@ results: $(STAMP)
 	$(BIN)/hop evaluate fast paper energy-shaping energy-shaping-literal --seeds 10 --no-video \
 	  --json docs/results/evaluation.json --traces runs/results/traces
 	$(BIN)/hop plot runs/results/traces/*.parquet --out docs/results/figures
-	$(BIN)/hop evaluate precise adaptive recurrent energy-shaping --seeds 5 --floor soft --no-video --json docs/results/precise.json \
+	$(BIN)/hop evaluate precise adaptive recurrent energy-shaping energy-shaping-flying --seeds 5 --floor soft --no-video --json docs/results/precise.json \
 	  --commands 0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40
 	$(BIN)/hop evaluate energy-shaping energy-shaping-literal fast precise adaptive recurrent paper --suite robustness --seeds 3 \
 	  --out runs/results/robustness --json docs/results/robustness.json
@@ -65,6 +65,9 @@ results: $(STAMP)
 	$(BIN)/hop bench convergence --json docs/results/convergence.json
 	$(BIN)/hop bench engines --json docs/results/bullet.json
 	$(BIN)/hop bench energy-shaping --json docs/results/energy_shaping.json
+	$(BIN)/hop tune energy-shaping --start energy-shaping --flight 0.52 --generations 40 --population 16 --step 0.2 --out runs/flying-0
+	$(BIN)/hop tune energy-shaping --start runs/flying-0/gains.toml --seed 1 --flight 0.52 --generations 40 --population 16 \
+	  --step 0.1 --out runs/flying --json docs/results/energy_shaping_flying.json
 	$(BIN)/hop bench training --json docs/results/training.json
 	$(BIN)/hop bench training --recipe precise --minutes 13.5 --steps 20000000 --training-seeds 0 1 2 3 4 \
 	  --out runs/bench-quarter --json docs/results/training-quarter.json
@@ -82,9 +85,7 @@ results: $(STAMP)
 	  --commands 0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40
 	$(BIN)/hop evaluate 0.28-seed0=runs/teaching/0.28-seed0/policy.onnx 0.38-seed2=runs/teaching/0.38-seed2/policy.onnx \
 	  0.55-seed0=runs/teaching/0.55-seed0/policy.onnx --suite robustness --seeds 3 --out runs/results/robustness-teaching --json docs/results/teaching-robustness.json
-	$(BIN)/hop train --recipe precise --seed 4 --steps 9000000 --set teachers=1 epochs=4 task.command_skew=1 teaching=0.28 reward.energy_beyond=0.03 --out runs/short
-	$(BIN)/hop train --recipe precise --seed 4 --steps 18000000 --set teachers=1 epochs=4 task.command_skew=1 teaching=0.14 reward.energy_beyond=0.03 judge_from=0.85 \
-	  --source runs/short --out runs/precise
+	$(BIN)/hop train --recipe precise --seed 3 --steps 12000000 --set teaching=0.42 imitation.knots=16 --out runs/precise
 	$(BIN)/hop bench limits --controllers precise adaptive recurrent energy-shaping --teacher runs/precise --json docs/results/limits.json
 	$(BIN)/hop bench reach --json docs/results/reach.json
 	$(BIN)/hop train --recipe precise --steps 9000000 --set teachers=1 epochs=4 task.command_skew=1 teaching=0.55 --observation three-samples --heights 0.2 0.42 --out runs/fifteen
@@ -101,6 +102,8 @@ results: $(STAMP)
 	$(BIN)/hop bench identify --parts recordings --json docs/results/bench_identify_recordings.json
 	$(BIN)/hop experiment transfer --json docs/results/transfer.json
 	$(BIN)/hop experiment transfer --methods identified-surprises cad-surprises --json docs/results/transfer-surprises.json
+	$(BIN)/hop experiment transfer --folder runs/transfer-standing --set epochs=8 task.idle=1.5 task.fall_penalty=2 task.command_skew=1.5 \
+	  reward.tail=0.25 --json docs/results/transfer-standing.json
 	$(BIN)/hop experiment transfer --recipe fast --folder runs/transfer-fast --json docs/results/transfer-fast.json
 	$(BIN)/hop experiment prediction --json docs/results/prediction.json
 	$(BIN)/hop bench finetune --twins 1 2 --seeds 0 1 --minutes 5 --figure docs/results/finetune.svg --json docs/results/finetune.json

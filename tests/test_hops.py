@@ -54,6 +54,17 @@ def test_ripples_in_stance_are_no_bounces():
     assert len(find_bounces(height, np.zeros_like(height))) == 0
 
 
+@pytest.mark.parametrize("again", [(2,), (2, 4, 8)])
+def test_several_apexes_of_one_flight_are_one_hop(again):
+    height, rate, gap = hopping([0.3] * 20)
+    ticks = find_hops(height, rate, gap).tick
+    every = np.sort(np.concatenate([ticks, *(ticks + later for later in again)]))
+    assert hop_period(every, RATE) == hop_period(ticks, RATE)
+    assert count_skipped(every, np.zeros(0), 0, len(height), RATE) == 0
+    missing = np.delete(every, np.searchsorted(every, [ticks[9] + late for late in (0, *again)]))
+    assert count_skipped(missing, np.zeros(0), 0, len(height), RATE) == 1
+
+
 def test_steady_hopping_skips_nothing():
     height, rate, gap = hopping([0.3] * 20)
     ticks = find_hops(height, rate, gap).tick

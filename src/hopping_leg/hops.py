@@ -23,6 +23,10 @@ SKIP_RATIO = 1.6
 USUAL_PERIOD = 0.5
 """Period assumed where a run has too few hops to tell its own, s."""
 
+SHORTEST_PERIOD = 0.1
+"""Apexes closer than this belong to one flight, s: a leg that is swung hard at the top makes the
+base rise and fall more than once. Each of them counts as an apex, all of them as one hop."""
+
 
 @dataclass(frozen=True)
 class Hops:
@@ -80,15 +84,22 @@ def find_bounces(height: Array, clearance: Array) -> IntArray:
 
 
 def hop_period(apex_tick: IntArray, rate: float) -> float:
-    """Return the median time between successive apexes, s; ``USUAL_PERIOD`` below three apexes.
+    """Return the median time between successive hops, s; ``USUAL_PERIOD`` below three hops.
 
     Args:
         apex_tick: Index of each apex, (hops,).
         rate: Ticks per second, Hz.
     """
-    if len(apex_tick) < 3:
+    tick = _one_per_flight(apex_tick, rate)
+    if len(tick) < 3:
         return USUAL_PERIOD
-    return float(np.median(np.diff(apex_tick))) / rate
+    return float(np.median(np.diff(tick))) / rate
+
+
+def _one_per_flight(apex_tick: IntArray, rate: float) -> IntArray:
+    """Return the first apex of every flight."""
+    first: IntArray = apex_tick[np.diff(apex_tick, prepend=-np.inf) >= SHORTEST_PERIOD * rate]
+    return first
 
 
 def count_skipped(
@@ -96,10 +107,10 @@ def count_skipped(
 ) -> int:
     """Count hops that should have happened between two ticks and did not.
 
-    The apexes cut the window into gaps. A gap longer than ``SKIP_RATIO`` median periods misses
-    ``round(gap / period) - 1`` apexes between two apexes and ``floor(gap / period)`` at the ends of
-    the window; a bounce misses one. Each gap counts the larger of the two, so that a bounce in a
-    long gap is one skipped hop, not two.
+    The apexes, those of one flight taken as one, cut the window into gaps. A gap longer than
+    ``SKIP_RATIO`` median periods misses ``round(gap / period) - 1`` apexes between two apexes and
+    ``floor(gap / period)`` at the ends of the window; a bounce misses one. Each gap counts the
+    larger of the two, so that a bounce in a long gap is one skipped hop, not two.
 
     Args:
         apex_tick: Index of each in-flight apex in the window, rising, (hops,).
@@ -109,7 +120,7 @@ def count_skipped(
         rate: Ticks per second, Hz.
     """
     period = hop_period(apex_tick, rate) * rate
-    edges = np.concatenate([[start], apex_tick, [end]])
+    edges = np.concatenate([[start], _one_per_flight(apex_tick, rate), [end]])
     periods = np.diff(edges) / period
     apexes = np.round(periods) - 1
     apexes[[0, -1]] = np.floor(periods[[0, -1]])

@@ -18,7 +18,9 @@ SETUP = Setup(load_robot("legv2-paper"), threads=1)
 
 def scores(shift=0.0, scale=1.0, **changed):
     return [
-        replace(CommandScore(c, 0.3 + shift + scale * (c - 0.3), 0.002, 2.0, 0.03, 0.08), **changed)
+        replace(
+            CommandScore(c, 0.3 + shift + scale * (c - 0.3), 0.002, 2.0, 0.4, 0.03, 0.08), **changed
+        )
         for c in tune_energy_shaping.COMMANDS
     ]
 
@@ -51,6 +53,11 @@ def test_cost_ignores_what_calibration_removes_and_counts_the_rest():
     assert cost(scores(median=float("nan"))) > 100
 
 
+def test_cost_counts_a_lack_of_flight_where_flight_is_asked_for():
+    assert cost(scores(flight=0.3), 0.5) == pytest.approx(cost(scores()) + 20)
+    assert cost(scores(flight=0.6), 0.5) == pytest.approx(cost(scores(flight=0.1)))
+
+
 def test_calibration_moves_the_estimate_by_what_the_medians_missed():
     found = calibrated(GAINS, scores(shift=0.01, scale=1.1))
     assert found.height_scale == pytest.approx(1.1 * GAINS.height_scale)
@@ -76,6 +83,8 @@ def test_log_of_another_search_is_refused(tmp_path, monkeypatch):
     search(GAINS, SETUP, Search(generations=1), 3, log, quiet)
     with pytest.raises(UsageError, match="seed 3"):
         search(GAINS, SETUP, Search(generations=1), 4, log, quiet)
+    with pytest.raises(UsageError, match="flight 0;"):
+        search(GAINS, SETUP, Search(generations=1, flight=0.5), 3, log, quiet)
 
 
 def test_candidates_are_judged_side_by_side():

@@ -50,6 +50,8 @@ class Experiment:
     recipe: str = "adaptive"
     """By which policies are trained, as in `hop train`; `fast` is the quicker one, but
     corrects nothing of what no fit can find."""
+    set: tuple[str, ...] = ()
+    """Numbers of the recipe to change, as in `hop train`; not its steps."""
     steps: int = Study.steps
     """Control steps of experience of a training."""
     seconds: float = 60.0
@@ -87,6 +89,7 @@ def run(args: Experiment) -> None:
         tuple(choose_methods(args.methods or usual)),
         seeds=args.seeds,
         recipe=args.recipe,
+        changes=args.set,
         steps=args.steps,
         seconds=args.seconds,
         generations=args.generations,

@@ -12,6 +12,7 @@ they share the work, or let a Ray cluster do so.
 Examples:
   hop tune energy-shaping
   hop tune energy-shaping --robot my_leg.toml --out runs/my_leg
+  hop tune energy-shaping --flight 0.5     # in the air for half of the time, at every height
   hop tune fast --trials 60 --steps 1000000 --workers 2
   hop tune paper --study postgresql://host/tuning --trials 100
   hop tune paper --study postgresql://host/tuning --trials 100 --ray auto

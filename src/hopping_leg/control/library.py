@@ -1,6 +1,7 @@
 """Controllers by name: energy shaping, shipped policies, a user's policy, gain file or class."""
 
 from collections.abc import Callable
+from functools import partial
 from importlib import resources
 from pathlib import Path
 
@@ -15,11 +16,15 @@ from hopping_leg.sim import CONTROL_RATE
 ENERGY_SHAPING = "energy-shaping"
 """The tuned baseline."""
 
+ENERGY_SHAPING_FLYING = "energy-shaping-flying"
+"""The same, tuned to fly for half of the time at every command, as is asked of policies."""
+
 ENERGY_SHAPING_LITERAL = "energy-shaping-literal"
 """The paper's law and gains as printed."""
 
 _FACTORIES: dict[str, Callable[..., Controller]] = {
     ENERGY_SHAPING: tuned_energy_shaping,
+    ENERGY_SHAPING_FLYING: partial(tuned_energy_shaping, gains=ENERGY_SHAPING_FLYING),
     ENERGY_SHAPING_LITERAL: paper_energy_shaping,
 }
 _SHIPPED = resources.files("hopping_leg") / "policies"

@@ -16,6 +16,9 @@ SETTLED = 2.0
 _RATE = 1.5
 """Fewer hops per second than this cost."""
 
+_FLIGHT = 0.1
+"""Cost of a lack of flight, m: a tenth of the time, 1 cm."""
+
 _KNEE, _BASE = 0.012, 0.06
 """Less room than this between knee or base and the ground costs, m."""
 
@@ -29,6 +32,7 @@ class CommandScore:
         median: Of all apexes, m; NaN without hops.
         std: Of all apexes, m.
         rate: Hops per second.
+        flight: Share of the time with the foot off the ground.
         knee_clearance: Least gap between knee and ground, m.
         base_clearance: Least gap between base and ground, m.
     """
@@ -37,6 +41,7 @@ class CommandScore:
     median: float
     std: float
     rate: float
+    flight: float
     knee_clearance: float
     base_clearance: float
 
@@ -47,20 +52,27 @@ def score(rollout: Rollout, command: float, legs: slice) -> CommandScore:
     names = ("height_m", "height_rate_m_s", "foot_clearance_m")
     columns = [data[name][kept, legs] for name in names]
     count = columns[0].shape[1]
-    apex = np.concatenate([find_hops(*(c[:, i] for c in columns)).apex for i in range(count)])
+    hops = [find_hops(*(c[:, i] for c in columns)) for i in range(count)]
+    apex = np.concatenate([h.apex for h in hops])
     settled = count * kept.sum() * (rollout.time[1] - rollout.time[0])
     return CommandScore(
         command,
         float(np.median(apex)) if len(apex) else float("nan"),
         float(np.std(apex)) if len(apex) else float("nan"),
         len(apex) / settled,
+        float(np.mean([h.in_flight for h in hops])),
         float(data["knee_clearance_m"][kept, legs].min()),
         float(data["base_clearance_m"][kept, legs].min()),
     )
 
 
-def cost(scores: list[CommandScore]) -> float:
-    """Return scatter, what bias no calibration removes, missed hops and lack of room, mm."""
+def cost(scores: list[CommandScore], flight: float = 0.0) -> float:
+    """Return scatter, what bias no calibration removes, missed hops and lack of room, mm.
+
+    Args:
+        scores: One per command.
+        flight: Share of the time in the air that is asked for at every command; less costs.
+    """
     if any(np.isnan(s.median) for s in scores):
         return 500.0
     _, _, residual = _line(scores)
@@ -68,6 +80,7 @@ def cost(scores: list[CommandScore]) -> float:
         s.std
         + abs(r)
         + 0.03 * max(0.0, _RATE - s.rate)
+        + _FLIGHT * max(0.0, flight - s.flight)
         + max(0.0, _KNEE - s.knee_clearance)
         + max(0.0, _BASE - s.base_clearance)
         for s, r in zip(scores, residual, strict=True)

@@ -46,6 +46,8 @@ class Search:
     """Simulated time per run, the first 2 s of which do not count."""
     step: float = 0.12
     """First step size, as a share of each gain's range."""
+    flight: float = 0.0
+    """Share of the time in the air that is asked for at every height; less costs."""
     threads: int = 0
     """Physics threads, 0 for one per core."""
 
@@ -54,6 +56,8 @@ class Search:
             raise UsageError("A search needs --generations of 1 and a --population of 4 or more.")
         if not 3 <= self.seconds <= 600 or not 0 < self.step <= 1:
             raise UsageError("--seconds must lie between 3 and 600, --step between 0 and 1.")
+        if not 0 <= self.flight < 1:
+            raise UsageError("--flight is a share of the time, from 0 to below 1, e.g. 0.5.")
 
 
 def evaluate(
@@ -116,8 +120,8 @@ def search(
         else:
             candidates = [from_unit(np.asarray(p), start) for p in points]
             scores = evaluate(candidates, setup, options.seconds, generation % _LAST_SEED)
-            costs = [cost(s) for s in scores]
-            _append_log(log, {"seed": seed, "costs": costs})
+            costs = [cost(s, options.flight) for s in scores]
+            _append_log(log, {"seed": seed, "flight": options.flight, "costs": costs})
         strategy.tell(points, costs)
         lowest = min(lowest, *costs)
         report(generation + 1, lowest)
@@ -141,6 +145,7 @@ class Tuned:
         before: Scores of the start, calibrated as well, one per command.
         after: Scores of the find.
         generations: How long the search was.
+        flight: Share of the time in the air that was asked for.
         seed: Of the search.
     """
 
@@ -148,6 +153,7 @@ class Tuned:
     before: list[CommandScore]
     after: list[CommandScore]
     generations: int
+    flight: float
     seed: int
 
     def record(self) -> dict[str, Any]:
@@ -155,8 +161,9 @@ class Tuned:
         return {
             "generations": self.generations,
             "seed": self.seed,
-            "cost_before_mm": cost(self.before),
-            "cost_after_mm": cost(self.after),
+            "flight": self.flight,
+            "cost_before_mm": cost(self.before, self.flight),
+            "cost_after_mm": cost(self.after, self.flight),
             "before": [dataclasses.asdict(s) for s in self.before],
             "after": [dataclasses.asdict(s) for s in self.after],
             "gains": {k: float(v) for k, v in dataclasses.asdict(self.gains).items()},
@@ -189,10 +196,21 @@ def tune(
     best = search(first, setup, options, seed, out / "log.jsonl", report)
     before, after = (calibrate(g, setup, options.seconds) for g in (first, best))
     scores = [evaluate([g], setup, 2 * options.seconds, _LAST_SEED)[0] for g in (before, after)]
-    source = f"hop tune energy-shaping --generations {options.generations} --seed {seed}"
-    better = after if cost(scores[1]) < cost(scores[0]) else before
-    save_gains(out / "gains.toml", GainFile(robot_name, f"{source}, from {start}", better))
-    return Tuned(better, scores[0], scores[1], options.generations, seed)
+    costs = [cost(s, options.flight) for s in scores]
+    better = after if costs[1] < costs[0] else before
+    save_gains(out / "gains.toml", GainFile(robot_name, _command(start, options, seed), better))
+    return Tuned(better, scores[0], scores[1], options.generations, options.flight, seed)
+
+
+def _command(start: str, options: Search, seed: int) -> str:
+    """Return the command that searches so, what goes without saying left out."""
+    words = ["hop tune energy-shaping", f"--start {start}", f"--seed {seed}"]
+    usual = Search()
+    for field in dataclasses.fields(options):
+        value = getattr(options, field.name)
+        if field.name != "threads" and value != getattr(usual, field.name):
+            words.append(f"--{field.name} {value}")
+    return " ".join(words)
 
 
 def _score_command(rollout: Rollout, command: float, first: int) -> CommandScore:
@@ -209,10 +227,11 @@ def _read_log(log: Path, options: Search, seed: int) -> list[list[float]]:
             entry = json.loads(line)
         except json.JSONDecodeError:
             break
-        if entry["seed"] != seed or len(entry["costs"]) != options.population:
+        found = entry["seed"], len(entry["costs"]), entry.get("flight", 0.0)
+        if found != (seed, options.population, options.flight):
             raise UsageError(
-                f"{log} belongs to a search with seed {entry['seed']} and population"
-                f" {len(entry['costs'])}; repeat with those or choose another --out."
+                f"{log} belongs to a search with seed {found[0]}, population {found[1]} and flight"
+                f" {found[2]:g}; repeat with those or choose another --out."
             )
         known.append([float(c) for c in entry["costs"]])
     write_atomically(log, "".join(f"{line}\n" for line in lines[: len(known)]).encode())

@@ -14,7 +14,7 @@ def test_no_method_trains_on_what_the_twin_alone_knows(tmp_path):
     cad, paper, mixed, truth = (Train(one, twin, method, 0) for method in one.methods)
     assert cad.robot == mixed.robot == load_robot("legv2")
     assert paper.robot == load_robot("legv2-paper")
-    assert mixed._recipe().task.randomised == IDENTIFIABLE
+    assert mixed.recipe().task.randomised == IDENTIFIABLE
     assert truth.robot.reality.only_delays
     assert truth.robot.rail == twin.robot.rail
     assert truth.robot.reality.latency.command == twin.robot.reality.latency.command
@@ -25,12 +25,19 @@ def test_legs_may_surprise_around_whatever_is_believed(tmp_path):
     twin = one.twins[0]
     cad, surprising, *_ = trains = [Train(one, twin, method, 0) for method in one.methods]
     assert cad.robot == surprising.robot
-    assert cad._recipe().task.randomised == ()
-    assert surprising._recipe().task.randomised == SURPRISES
+    assert cad.recipe().task.randomised == ()
+    assert surprising.recipe().task.randomised == SURPRISES
     assert len({one.training(twin, train.method, 0) for train in trains}) == 4
     fit, shared = (one.fitted(twin, method) for method in one.methods[2:])
     assert fit == shared
     assert [job.name for job in fits(one)] == [f"identify {t.name}, identified" for t in one.twins]
+
+
+def test_a_study_can_change_the_recipe_but_for_its_steps(tmp_path):
+    one = study(tmp_path, ["cad"], recipe="adaptive", changes=("task.idle=0.7", "steps=3"), steps=5)
+    recipe = Train(one, one.twins[0], one.methods[0], 0).recipe()
+    assert recipe.task.idle == 0.7
+    assert recipe.steps == 5
 
 
 def test_a_training_that_goes_beyond_its_steps_is_done_once(tmp_path):

@@ -28,8 +28,10 @@ def transfer(study: Study, at_once: int = 1) -> dict[str, Any]:
         at_once: Jobs that run at the same time, each in a process of its own.
 
     Raises:
-        UsageError: The folder holds results of other options.
+        UsageError: The folder holds results of other options, or there is no such recipe.
     """
+    for training in trainings(study):
+        training.recipe()
     _work((records(study), fits(study), trainings(study), [*hops(study), *without(study)]), at_once)
     result = tabulate(study, fits(study), trainings(study), hops(study))
     if study.effects:

@@ -59,6 +59,8 @@ class Study:
     """Of the trainings, one each."""
     recipe: str = "fast"
     """By which policies are trained."""
+    changes: tuple[str, ...] = ()
+    """Numbers of the recipe that differ from its defaults, each ``name=number``."""
     steps: int = 6_000_000
     """Control steps of experience of a training."""
     seconds: float = 60.0

@@ -48,6 +48,7 @@ def tabulate(
         **about(study),
         "training_seeds": list(study.seeds),
         "recipe": study.recipe,
+        "recipe_changes": list(study.changes),
         "training_steps": study.steps,
         "rows": rows,
         "methods": [_whole(method, trials, study) for method in study.methods],

@@ -50,7 +50,7 @@ class Train:
 
         folder = self._folder()
         train(
-            self._recipe(),
+            self.recipe(),
             self.robot,
             self.seed,
             folder.path,
@@ -66,22 +66,28 @@ class Train:
         share = min(steps / self.study.steps, 1.0)
         return share, f"{steps / 1e6:.1f}M steps" if steps else "begun"
 
+    def recipe(self) -> "Recipe":
+        """Return how it is trained.
+
+        Raises:
+            UsageError: There is no such recipe, or it has no such number.
+        """
+        from hopping_leg.learn.recipes import change, get_recipe, randomise
+
+        study = self.study
+        recipe = change(get_recipe(study.recipe), [*study.changes, f"steps={study.steps}"])
+        return randomise(recipe, self.method.ranges)
+
     @property
     def robot(self) -> Robot:
         """What is trained on."""
         return self.study.simulated(self.twin, self.method)
-
-    def _recipe(self) -> "Recipe":
-        from hopping_leg.learn.recipes import change, get_recipe, randomise
-
-        recipe = change(get_recipe(self.study.recipe), [f"steps={self.study.steps}"])
-        return randomise(recipe, self.method.ranges)
 
     def _folder(self) -> "RunFolder":
         from hopping_leg.learn.run_folder import RunFolder
         from hopping_leg.learn.scale import fit
 
         robot = self.robot
-        recipe = fit(self._recipe(), robot)
+        recipe = fit(self.recipe(), robot)
         path = self.study.training(self.twin, self.method, self.seed)
         return RunFolder(path, recipe, robot, self.seed, None)
