@@ -29,6 +29,9 @@ from hopping_leg.robot.parameters import Robot
 _EXAM_SPACING = 0.01
 """Of the heights at which teachers are examined, m."""
 
+_FLIGHT = 0.1
+"""What a lack of flight adds to an exam's score, m: a tenth of the time, 1 cm."""
+
 
 @dataclass(frozen=True)
 class PreciseRecipe(FastRecipe):
@@ -117,13 +120,15 @@ class PreciseRecipe(FastRecipe):
         """Score a policy's teacher where it does worst, m.
 
         Its torques err as the policy's will, at every centimetre between the lowest and the highest
-        trial: a teacher may hop well, but know no way back from where it never errs to.
+        trial: a teacher may hop well, but know no way back from where it never errs to. One that
+        is on the ground for more than half of the time is marked down, too: next to standing, the
+        policy may fall into it.
         """
         low, high = min(self.judge_commands), max(self.judge_commands)
         commands = tuple(np.linspace(low, high, round((high - low) / _EXAM_SPACING) + 1))
         teacher = self.make_teacher(policy, robot, self.erring)
         verdicts = judge(teacher, robot, commands, rate=self.task.rate, threads=threads)
-        return max(badness(v) for v in verdicts)
+        return max(badness(v) + _FLIGHT * max(0.0, 0.5 - v.flight_fraction) for v in verdicts)
 
     @property
     def last_torque(self) -> list[int]:
