@@ -4,7 +4,9 @@ import dataclasses
 import json
 import subprocess
 import sys
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -223,6 +225,23 @@ def test_a_ray_cluster_works_on_a_study(tmp_path, monkeypatch):
     assert all((out / f"trial-{t['number']:04d}" / "policy.onnx").exists() for t in complete)
     first, second = sorted(complete, key=lambda trial: trial["number"])[:2]
     assert first["params"] != second["params"]
+
+
+def test_a_waiting_trial_is_given_to_one_worker_only(small):
+    waiting, workers = 20, 4
+    study = open_study(small)
+    for number in range(1, waiting):
+        study.enqueue_trial({"learning_rate": 10 ** (-3 - number / waiting)})
+    together = threading.Barrier(workers)
+
+    def take(worker):
+        own = open_study(small, worker)
+        together.wait()
+        return [own.ask().number for _ in range(waiting // workers)]
+
+    with ThreadPoolExecutor(workers) as crew:
+        taken = [number for numbers in crew.map(take, range(workers)) for number in numbers]
+    assert sorted(taken) == list(range(waiting))
 
 
 def test_a_file_is_no_database_for_machines_elsewhere(small, monkeypatch):

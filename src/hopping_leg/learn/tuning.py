@@ -20,6 +20,7 @@ from optuna.samplers import TPESampler
 from optuna.storages import RDBStorage
 from optuna.study import Study
 from optuna.trial import FrozenTrial, Trial, TrialState
+from sqlalchemy import Connection, Engine, event
 from sqlalchemy.exc import SQLAlchemyError
 
 from hopping_leg.cluster import RayCluster
@@ -37,6 +38,9 @@ from hopping_leg.robot import load_robot
 
 _FAILURES = (PhysicsError, ValueError, FloatingPointError)
 """What a training with bad numbers may end in; the study goes on."""
+
+_PATIENCE = 60.0
+"""How long a worker waits for others to let go of SQLite's file, s."""
 
 
 @dataclass(frozen=True)
@@ -133,12 +137,7 @@ def open_study(tuning: Tuning, worker: int = 0) -> Study:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ExperimentalWarning)
-            storage = RDBStorage(
-                tuning.storage,
-                heartbeat_interval=tuning.heartbeat,
-                grace_period=3 * tuning.heartbeat,
-                heartbeat_stale_trial_callback=_take_up,
-            )
+            storage = _open_storage(tuning)
             study = optuna.create_study(
                 storage=storage,
                 study_name=tuning.recipe,
@@ -169,6 +168,39 @@ def open_study(tuning: Tuning, worker: int = 0) -> Study:
     if not begun:
         study.enqueue_trial(defaults(_recipe(tuning), SPACES[tuning.recipe]), skip_if_exists=True)
     return study
+
+
+def _open_storage(tuning: Tuning) -> RDBStorage:
+    """Return the study's database, in which a trial is given to one worker only."""
+    file = tuning.storage.startswith("sqlite")
+    storage = RDBStorage(
+        tuning.storage,
+        engine_kwargs={"connect_args": {"timeout": _PATIENCE}} if file else None,
+        heartbeat_interval=tuning.heartbeat,
+        grace_period=3 * tuning.heartbeat,
+        heartbeat_stale_trial_callback=_take_up,
+    )
+    if file:
+        _lock_before_reading(storage.engine)
+    return storage
+
+
+def _lock_before_reading(engine: Engine) -> None:
+    """Let SQLite's transactions lock the file before they read.
+
+    Optuna locks the row of a waiting trial, reads that it still waits and takes it. SQLite has no
+    locks of rows: two workers would find the same trial waiting, and train in the same folder.
+    """
+
+    def begin_by_hand(connection: Any, _record: Any) -> None:  # noqa: ANN401
+        connection.isolation_level = None
+
+    def begin(connection: Connection) -> None:
+        connection.exec_driver_sql("BEGIN IMMEDIATE")
+
+    event.listen(engine, "connect", begin_by_hand)
+    event.listen(engine, "begin", begin)
+    engine.dispose()  # what was connected before begins as before
 
 
 def _run_trial(trial: Trial, tuning: Tuning) -> float:
