@@ -100,7 +100,7 @@ results: $(STAMP)
 	$(BIN)/hop bench identify --parts synthetic throughput mujoco-sysid --json docs/results/bench_identify.json
 	$(BIN)/hop bench identify --parts paper-size --searches two-pass --json docs/results/bench_identify_size.json
 	$(BIN)/hop bench identify --parts recordings --json docs/results/bench_identify_recordings.json
-	$(BIN)/hop experiment transfer --json docs/results/transfer.json
+	$(BIN)/hop experiment transfer --seeds 0 1 --json docs/results/transfer.json
 	$(BIN)/hop experiment transfer --methods identified-surprises cad-surprises --json docs/results/transfer-surprises.json
 	$(BIN)/hop experiment transfer --folder runs/transfer-standing --set epochs=8 task.idle=1.5 task.fall_penalty=2 task.command_skew=1.5 \
 	  reward.tail=0.25 --json docs/results/transfer-standing.json

@@ -120,6 +120,13 @@ def show(result: dict[str, Any]) -> None:
         )
     console = Console()
     console.print(table)
+    _show_overall(console, result)
+    if "best_in_own_simulation" in result:
+        console.print("\nOf several trainings, those alone that hop best in their own simulation:")
+        _show_overall(console, result["best_in_own_simulation"])
+
+
+def _show_overall(console: Console, result: dict[str, Any]) -> None:
     for row in result["methods"]:
         console.print(
             f"{row['method']}: {_mm(row['median_abs_error_m'])} mm over all commands,"

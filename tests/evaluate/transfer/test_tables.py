@@ -1,5 +1,7 @@
 """The tables say what came out."""
 
+import json
+
 import pytest
 
 from hopping_leg.evaluate.transfer import tables
@@ -55,3 +57,24 @@ def test_order_is_of_the_apexes_and_a_leg_that_stands_has_none(tmp_path):
     for row in rows[-2:]:
         row["motionless"] = True
     assert tables._whole(method, rows, one)["ordered"] == 1
+
+
+def test_of_several_trainings_the_better_one_is_chosen_in_its_own_simulation_alone(tmp_path):
+    one = study(tmp_path, seeds=(0, 1), commands=(0.25, 0.35))
+    good, bad = (0.01, 0.01), (0.1, 0.1)
+    rows = []
+    for method in one.methods:
+        for number, twin in enumerate(one.twins):
+            best = number if method.of_twin else 1
+            for seed in one.seeds:
+                folder = one.training(twin, method, seed)
+                folder.mkdir(parents=True, exist_ok=True)
+                selected = {"selected": {"score_m": 0.002 if seed == best else 0.3}}
+                (folder / "result.json").write_text(json.dumps(selected))
+                errors = {method.name: {twin.name: bad if seed == best else good}}
+                rows += [{**row, "seed": seed} for row in trials(errors)]
+    (found,) = tables._best_in_own_simulation(rows, one).values()
+    assert [row["policies"] for row in found["methods"]] == [2, 2]
+    assert [row["worst_abs_error_m"] for row in found["methods"]] == [0.1, 0.1]
+    assert found["comparison"][0]["ratio"] == pytest.approx(1.0)
+    assert tables._best_in_own_simulation(rows, study(tmp_path)) == {}

@@ -7,6 +7,7 @@ whole twins. The paper reports its offset with the other sign, command minus act
 import itertools
 import json
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from hopping_leg.evaluate.transfer.fitting import Identify
 from hopping_leg.evaluate.transfer.hopping import FIRST_SEED, Hop, disturbance_of
 from hopping_leg.evaluate.transfer.methods import Method
 from hopping_leg.evaluate.transfer.ratio import compare
-from hopping_leg.evaluate.transfer.study import Study
+from hopping_leg.evaluate.transfer.study import Study, TwinFile
 from hopping_leg.evaluate.transfer.training import Train
 
 Row = dict[str, Any]
@@ -51,14 +52,44 @@ def tabulate(
         "recipe_changes": list(study.changes),
         "training_steps": study.steps,
         "rows": rows,
-        "methods": [_whole(method, trials, study) for method in study.methods],
-        "comparison": [
-            compare(study.methods[0].name, other.name, trials, _SEED) for other in study.methods[1:]
-        ],
+        **_overall(trials, study),
+        **_best_in_own_simulation(trials, study),
         "identification": [fit_row(fit) for fit in fits],
         "trainings": [_training(training) for training in trainings],
         "trials": trials,
     }
+
+
+def _overall(trials: Sequence[Row], study: Study) -> Row:
+    """Return one row per method over all commands, and how the others compare with the first."""
+    first, *others = study.methods
+    return {
+        "methods": [_whole(method, trials, study) for method in study.methods],
+        "comparison": [compare(first.name, other.name, trials, _SEED) for other in others],
+    }
+
+
+def _best_in_own_simulation(trials: Sequence[Row], study: Study) -> Row:
+    """Return the same over the better trainings alone, if there are several of each.
+
+    Of the training seeds of a method and twin, the one counts whose policy scored best in the
+    simulation that it was trained in: what someone gets who trains several times and chooses
+    without having met the leg.
+    """
+    if len(study.seeds) == 1:
+        return {}
+    best = {
+        (method.name, twin.name): min(study.seeds, key=lambda s: _own_score(study, twin, method, s))
+        for method in study.methods
+        for twin in study.twins
+    }
+    chosen = [row for row in trials if row["seed"] == best[row["method"], row["twin"]]]
+    return {"best_in_own_simulation": _overall(chosen, study)}
+
+
+def _own_score(study: Study, twin: TwinFile, method: Method, seed: int) -> float:
+    """Return how bad a policy is in its own simulation, m."""
+    return float(_result(study.training(twin, method, seed))["selected"]["score_m"])
 
 
 def about(study: Study) -> Row:
@@ -167,10 +198,16 @@ def fit_row(fit: Identify) -> Row:
     }  # fmt: skip
 
 
+def _result(folder: Path) -> Row:
+    """Return what a training left in its folder."""
+    result: Row = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    return result
+
+
 def _training(training: Train) -> Row:
     """Return how a policy hops in the simulation that it was trained in."""
     folder = training.study.training(training.twin, training.method, training.seed)
-    result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    result = _result(folder)
     errors = [trial["median_error_m"] for trial in result["selected"]["trials"]]
     known = [abs(error) for error in errors if error is not None]
     return {
