@@ -50,7 +50,7 @@ test-fast: $(STAMP)
 
 # Every number and figure of docs/results.md; takes long, and only an idle machine gives fair timings.
 results: $(STAMP)
-	$(BIN)/hop evaluate fast paper energy-shaping energy-shaping-literal --seeds 10 --no-video \
+	$(BIN)/hop evaluate fast precise adaptive paper energy-shaping energy-shaping-literal --seeds 10 --no-video \
 	  --json docs/results/evaluation.json --traces runs/results/traces
 	$(BIN)/hop plot runs/results/traces/*.parquet --out docs/results/figures
 	$(BIN)/hop evaluate precise adaptive recurrent energy-shaping energy-shaping-flying --seeds 5 --floor soft --no-video --json docs/results/precise.json \
