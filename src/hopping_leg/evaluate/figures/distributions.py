@@ -55,7 +55,8 @@ def _draw(
         for body in cast("list[PolyCollection]", parts["bodies"]):
             body.set(facecolor=paint, alpha=0.25, edgecolor="none")
     jitter = rng.uniform(-0.18, 0.18, len(apex)) * slot
-    axes.plot(
+    dots, *_ = axes.plot(
         centre + jitter, apex, ".", color=paint, markersize=2.5, alpha=0.6, markeredgecolor="none"
     )
+    dots.set_rasterized(True)  # thousands of them; as shapes they make a file of megabytes
     axes.hlines(np.median(apex), centre - 0.42 * slot, centre + 0.42 * slot, color=paint, lw=2.2)
