@@ -185,7 +185,7 @@ def test_an_exam_counts_the_worst_height_under_errors(monkeypatch):
     def judged(teacher, robot, commands, rate, threads):
         asked.update(erring=teacher._erring, commands=commands)
         scores = dict.fromkeys(commands, 0.002) | {commands[1]: 0.01}
-        return [Mock(score=score) for score in scores.values()]
+        return [Mock(score=score, flight_fraction=0.6) for score in scores.values()]
 
     monkeypatch.setattr(precise, "judge", judged)
     monkeypatch.setattr(precise, "badness", lambda verdict: verdict.score)
@@ -194,6 +194,19 @@ def test_an_exam_counts_the_worst_height_under_errors(monkeypatch):
     heights = asked["commands"]
     assert (heights[0], heights[-1]) == (min(RECIPE.judge_commands), max(RECIPE.judge_commands))
     assert np.diff(heights).max() < 0.011
+
+
+def test_an_exam_counts_time_on_the_ground_beyond_half(monkeypatch):
+    flights = iter([0.5, 0.7, 0.42])
+
+    def judged(teacher, robot, commands, rate, threads):
+        return [Mock(score=0.003, flight_fraction=next(flights))]
+
+    monkeypatch.setattr(precise, "judge", judged)
+    monkeypatch.setattr(precise, "badness", lambda verdict: verdict.score)
+    policy = learner(TINY_PRECISE).policy
+    scores = [RECIPE.examine(policy, ROBOT) for _ in range(3)]
+    assert scores == pytest.approx([0.003, 0.003, 0.011])
 
 
 def test_imitation_brings_the_student_to_its_teacher_and_leaves_the_teacher_alone():
