@@ -79,6 +79,11 @@ class Tuning:
             raise UsageError(f"--seed is {self.seed} but must be 0 or more.")
 
     @property
+    def in_file(self) -> bool:
+        """Whether the database is a file, of SQLite."""
+        return self.storage.startswith("sqlite")
+
+    @property
     def conditions(self) -> dict[str, Any]:
         """What all trials of a study share, as JSON values."""
         return {
@@ -172,15 +177,14 @@ def open_study(tuning: Tuning, worker: int = 0) -> Study:
 
 def _open_storage(tuning: Tuning) -> RDBStorage:
     """Return the study's database, in which a trial is given to one worker only."""
-    file = tuning.storage.startswith("sqlite")
     storage = RDBStorage(
         tuning.storage,
-        engine_kwargs={"connect_args": {"timeout": _PATIENCE}} if file else None,
+        engine_kwargs={"connect_args": {"timeout": _PATIENCE}} if tuning.in_file else None,
         heartbeat_interval=tuning.heartbeat,
         grace_period=3 * tuning.heartbeat,
         heartbeat_stale_trial_callback=_take_up,
     )
-    if file:
+    if tuning.in_file:
         _lock_before_reading(storage.engine)
     return storage
 
@@ -241,7 +245,7 @@ def _run_trial(trial: Trial, tuning: Tuning) -> float:
 def _reach(tuning: Tuning, address: str) -> RayCluster:
     """Return the cluster; refuse a file as database where others than this machine would work."""
     cluster = RayCluster(address)
-    if tuning.storage.startswith("sqlite") and cluster.elsewhere:
+    if tuning.in_file and cluster.elsewhere:
         raise UsageError(
             f"{', '.join(cluster.elsewhere)} cannot share the study in {tuning.storage}: SQLite is"
             " for one machine; name a database that all reach, e.g. --study"

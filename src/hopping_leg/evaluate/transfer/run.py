@@ -1,7 +1,6 @@
 """Whole studies: record, identify, then train and hop, or foretell; what is done is not redone."""
 
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from typing import Any, TypeVar
 
 from hopping_leg.errors import UsageError
@@ -88,7 +87,7 @@ def fits(study: Study) -> list[Identify]:
 def trainings(study: Study) -> list[Train]:
     """Return all trainings; several twins may share one."""
     every = (Train(study, t, m, s) for s, m, t in _all(study))
-    return list({_folder(train): train for train in every}.values())
+    return list({train.path: train for train in every}.values())
 
 
 def hops(study: Study) -> list[Hop]:
@@ -118,7 +117,3 @@ def met(study: Study) -> list[Meet]:
 
 def _all(study: Study) -> Iterable[tuple[int, Method, TwinFile]]:
     return ((s, m, t) for s in study.seeds for m in study.methods for t in study.twins)
-
-
-def _folder(train: Train) -> Path:
-    return train.study.training(train.twin, train.method, train.seed)

@@ -7,7 +7,6 @@ whole twins. The paper reports its offset with the other sign, command minus act
 import itertools
 import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from hopping_leg.evaluate.transfer.fitting import Identify
 from hopping_leg.evaluate.transfer.hopping import FIRST_SEED, Hop, disturbance_of
 from hopping_leg.evaluate.transfer.methods import Method
 from hopping_leg.evaluate.transfer.ratio import compare
-from hopping_leg.evaluate.transfer.study import Study, TwinFile
+from hopping_leg.evaluate.transfer.study import Study
 from hopping_leg.evaluate.transfer.training import Train
 
 Row = dict[str, Any]
@@ -78,18 +77,12 @@ def _best_in_own_simulation(trials: Sequence[Row], study: Study) -> Row:
     """
     if len(study.seeds) == 1:
         return {}
-    best = {
-        (method.name, twin.name): min(study.seeds, key=lambda s: _own_score(study, twin, method, s))
-        for method in study.methods
-        for twin in study.twins
-    }
+    best = {}
+    for method, twin in itertools.product(study.methods, study.twins):
+        runs = [Train(study, twin, method, seed) for seed in study.seeds]
+        best[method.name, twin.name] = min(runs, key=lambda run: run.own_score).seed
     chosen = [row for row in trials if row["seed"] == best[row["method"], row["twin"]]]
     return {"best_in_own_simulation": _overall(chosen, study)}
-
-
-def _own_score(study: Study, twin: TwinFile, method: Method, seed: int) -> float:
-    """Return how bad a policy is in its own simulation, m."""
-    return float(_result(study.training(twin, method, seed))["selected"]["score_m"])
 
 
 def about(study: Study) -> Row:
@@ -198,24 +191,17 @@ def fit_row(fit: Identify) -> Row:
     }  # fmt: skip
 
 
-def _result(folder: Path) -> Row:
-    """Return what a training left in its folder."""
-    result: Row = json.loads((folder / "result.json").read_text(encoding="utf-8"))
-    return result
-
-
 def _training(training: Train) -> Row:
     """Return how a policy hops in the simulation that it was trained in."""
-    folder = training.study.training(training.twin, training.method, training.seed)
-    result = _result(folder)
+    result = training.result
     errors = [trial["median_error_m"] for trial in result["selected"]["trials"]]
     known = [abs(error) for error in errors if error is not None]
     return {
-        "training": folder.name,
+        "training": training.path.name,
         "minutes": result["minutes"],
         "steps": result["steps"],
         "own_simulation_worst_abs_median_error_m": max(known)
         if len(known) == len(errors)
         else None,
-        "own_simulation_score_m": result["selected"]["score_m"],
+        "own_simulation_score_m": training.own_score,
     }

@@ -1,7 +1,8 @@
 """Third stage: train on what a method believes the twin to be."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from hopping_leg.evaluate.transfer.methods import Method
 from hopping_leg.evaluate.transfer.study import Study, TwinFile
@@ -83,11 +84,31 @@ class Train:
         """What is trained on."""
         return self.study.simulated(self.twin, self.method)
 
+    @property
+    def path(self) -> Path:
+        """The training's folder."""
+        return self.study.training(self.twin, self.method, self.seed)
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """What the finished training left: how long it took, how the policy hops where it learnt.
+
+        Raises:
+            UsageError: It is not finished.
+        """
+        from hopping_leg.learn.run_folder import read_result
+
+        return read_result(self.path)
+
+    @property
+    def own_score(self) -> float:
+        """How bad the policy is in the simulation that it was trained in, m."""
+        return float(self.result["selected"]["score_m"])
+
     def _folder(self) -> "RunFolder":
         from hopping_leg.learn.run_folder import RunFolder
         from hopping_leg.learn.scale import fit
 
         robot = self.robot
         recipe = fit(self.recipe(), robot)
-        path = self.study.training(self.twin, self.method, self.seed)
-        return RunFolder(path, recipe, robot, self.seed, None)
+        return RunFolder(self.path, recipe, robot, self.seed, None)
