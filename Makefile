@@ -71,6 +71,8 @@ results: $(STAMP)
 	$(BIN)/hop bench training --json docs/results/training.json
 	$(BIN)/hop bench training --recipe precise --minutes 13.5 --steps 20000000 --training-seeds 0 1 2 3 4 \
 	  --out runs/bench-quarter --json docs/results/training-quarter.json
+	$(BIN)/hop bench training --recipe precise --set reward.energy=0.8 reward.energy_beyond=0.05 --minutes 13.5 --steps 20000000 \
+	  --training-seeds 1 --out runs/bench-quarter-bounded --json docs/results/training-quarter-bounded.json
 	$(BIN)/hop evaluate precise \
 	  $(foreach s,0 1 2 3 4,quarter-seed$(s)=runs/bench-quarter/precise-seed$(s)/policy.onnx) --seeds 5 --floor soft --no-video \
 	  --json docs/results/precise-seeds.json --commands \
