@@ -50,9 +50,13 @@ class PreciseRecipe(FastRecipe):
         )
     )
     reward: ApexRewardOptions = field(
-        default_factory=lambda: ApexRewardOptions(width=(0.030, 0.006), jerk=0.3, effort=0.2)
+        default_factory=lambda: ApexRewardOptions(
+            width=(0.030, 0.006), energy=0.8, energy_beyond=0.05, jerk=0.3, effort=0.2
+        )
     )
-    """Apex reward of the teacher; the calmer it is, the better it can be imitated."""
+    """Apex reward of the teacher. The calmer it is, the better it can be imitated. Its energy gain
+    ends where hops are too high: otherwise it learns one high hop for all commands, from which
+    some never come back to the low ones."""
     epochs: int = 8
     """Passes over a rollout."""
     steps: int = 10_000_000
