@@ -7,6 +7,9 @@ STAMP := $(VENV)/.complete
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 WORKERS ?= auto
 ARGS ?=
+# The energy gain with which the shipped `precise`, `adaptive` and `recurrent` and some results were
+# made, before the recipes' own ended above the command.
+FORMER := reward.energy=0.4 reward.energy_beyond=0
 
 .PHONY: help install reproduce test test-fast check format lint types docs wheel results lock clean
 
@@ -71,27 +74,25 @@ results: $(STAMP)
 	$(BIN)/hop bench training --json docs/results/training.json
 	$(BIN)/hop bench training --recipe precise --minutes 13.5 --steps 20000000 --training-seeds 0 1 2 3 4 \
 	  --out runs/bench-quarter --json docs/results/training-quarter.json
-	$(BIN)/hop bench training --recipe precise --set reward.energy=0.8 reward.energy_beyond=0.05 --minutes 13.5 --steps 20000000 \
-	  --training-seeds 1 --out runs/bench-quarter-bounded --json docs/results/training-quarter-bounded.json
 	$(BIN)/hop evaluate precise \
 	  $(foreach s,0 1 2 3 4,quarter-seed$(s)=runs/bench-quarter/precise-seed$(s)/policy.onnx) --seeds 5 --floor soft --no-video \
 	  --json docs/results/precise-seeds.json --commands \
 	0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40,0.41,0.42,0.43,0.44,0.45
-	$(BIN)/hop train --recipe adaptive --out runs/adaptive
+	$(BIN)/hop train --recipe adaptive --set $(FORMER) --out runs/adaptive
 	$(BIN)/hop evaluate 12-million-steps=runs/adaptive/policy.onnx adaptive --suite robustness --seeds 3 \
 	  --out runs/results/robustness-adaptive --json docs/results/adaptive-robustness.json
-	for seed in 0 1 2 3 4; do $(BIN)/hop train --recipe precise --seed $$seed --steps 9000000 --set teachers=1 epochs=4 task.command_skew=1 teaching=0.28 --out runs/teaching/0.28-seed$$seed; done
-	for seed in 2 4; do $(BIN)/hop train --recipe precise --seed $$seed --steps 9000000 --set teachers=1 epochs=4 task.command_skew=1 teaching=0.38 --out runs/teaching/0.38-seed$$seed; done
-	$(BIN)/hop train --recipe precise --steps 9000000 --set teachers=1 epochs=4 task.command_skew=1 teaching=0.55 --out runs/teaching/0.55-seed0
+	for seed in 0 1 2 3 4; do $(BIN)/hop train --recipe precise --seed $$seed --steps 9000000 --set $(FORMER) teachers=1 epochs=4 task.command_skew=1 teaching=0.28 --out runs/teaching/0.28-seed$$seed; done
+	for seed in 2 4; do $(BIN)/hop train --recipe precise --seed $$seed --steps 9000000 --set $(FORMER) teachers=1 epochs=4 task.command_skew=1 teaching=0.38 --out runs/teaching/0.38-seed$$seed; done
+	$(BIN)/hop train --recipe precise --steps 9000000 --set $(FORMER) teachers=1 epochs=4 task.command_skew=1 teaching=0.55 --out runs/teaching/0.55-seed0
 	$(BIN)/hop evaluate "runs/teaching/*/policy.onnx" --seeds 5 --floor soft --no-video --json docs/results/teaching.json \
 	  --commands 0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40
 	$(BIN)/hop evaluate 0.28-seed0=runs/teaching/0.28-seed0/policy.onnx 0.38-seed2=runs/teaching/0.38-seed2/policy.onnx \
 	  0.55-seed0=runs/teaching/0.55-seed0/policy.onnx --suite robustness --seeds 3 --out runs/results/robustness-teaching --json docs/results/teaching-robustness.json
-	$(BIN)/hop train --recipe precise --seed 3 --steps 12000000 --set teaching=0.42 imitation.knots=16 --out runs/precise
+	$(BIN)/hop train --recipe precise --seed 3 --steps 12000000 --set $(FORMER) teaching=0.42 imitation.knots=16 --out runs/precise
 	$(BIN)/hop bench limits --controllers precise adaptive recurrent energy-shaping --teacher runs/precise --json docs/results/limits.json
 	$(BIN)/hop bench reach --json docs/results/reach.json
-	$(BIN)/hop train --recipe precise --steps 9000000 --set teachers=1 epochs=4 task.command_skew=1 teaching=0.55 --observation three-samples --heights 0.2 0.42 --out runs/fifteen
-	$(BIN)/hop train --recipe recurrent --observation three-samples --out runs/fifteen-recurrent
+	$(BIN)/hop train --recipe precise --steps 9000000 --set $(FORMER) teachers=1 epochs=4 task.command_skew=1 teaching=0.55 --observation three-samples --heights 0.2 0.42 --out runs/fifteen
+	$(BIN)/hop train --recipe recurrent --set $(FORMER) --observation three-samples --out runs/fifteen-recurrent
 	$(BIN)/hop evaluate fifteen=runs/fifteen/policy.onnx fifteen-recurrent=runs/fifteen-recurrent/policy.onnx \
 	  --seeds 5 --floor soft --no-video --json docs/results/fifteen.json
 	$(BIN)/hop bench ablation --json docs/results/ablation.json
@@ -102,9 +103,9 @@ results: $(STAMP)
 	$(BIN)/hop bench identify --parts synthetic throughput mujoco-sysid --json docs/results/bench_identify.json
 	$(BIN)/hop bench identify --parts paper-size --searches two-pass --json docs/results/bench_identify_size.json
 	$(BIN)/hop bench identify --parts recordings --json docs/results/bench_identify_recordings.json
-	$(BIN)/hop experiment transfer --seeds 0 1 --json docs/results/transfer.json
-	$(BIN)/hop experiment transfer --methods identified-surprises cad-surprises --json docs/results/transfer-surprises.json
-	$(BIN)/hop experiment transfer --folder runs/transfer-standing --set epochs=8 task.idle=1.5 task.fall_penalty=2 task.command_skew=1.5 \
+	$(BIN)/hop experiment transfer --set $(FORMER) --seeds 0 1 --json docs/results/transfer.json
+	$(BIN)/hop experiment transfer --set $(FORMER) --methods identified-surprises cad-surprises --json docs/results/transfer-surprises.json
+	$(BIN)/hop experiment transfer --folder runs/transfer-standing --set $(FORMER) epochs=8 task.idle=1.5 task.fall_penalty=2 task.command_skew=1.5 \
 	  reward.tail=0.25 --json docs/results/transfer-standing.json
 	$(BIN)/hop experiment transfer --recipe fast --folder runs/transfer-fast --json docs/results/transfer-fast.json
 	$(BIN)/hop experiment prediction --json docs/results/prediction.json
