@@ -29,6 +29,20 @@ def test_all_variants_train_as_long_and_are_summed_up(monkeypatch, tmp_path, rob
     assert found["no-event"]["mean_abs_median_error_m"] is None
 
 
+def test_named_variants_alone_train_in_the_order_of_all(monkeypatch, tmp_path, robot):
+    trained = []
+
+    def train(_recipe, _robot, out, **_options):
+        trained.append(out.name)
+        return {"rows": [row(0.25, 0.001, 0)]}
+
+    monkeypatch.setattr(bench, "bench_training", train)
+    bench.bench_ablation("fast", robot, tmp_path, steps=1000, variants=["no-event", "recipe"])
+    assert trained == ["recipe", "no-event"]
+    with pytest.raises(bench.UsageError, match=r"variant of fast 'no-events'.*'no-event'"):
+        bench.bench_ablation("fast", robot, tmp_path, steps=1000, variants=["no-events"])
+
+
 def test_a_recipe_without_ablations_is_refused(tmp_path, robot):
     with pytest.raises(bench.UsageError, match=r"'paper'.*fast"):
         bench.bench_ablation("paper", robot, tmp_path, steps=1000)

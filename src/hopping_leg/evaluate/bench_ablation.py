@@ -21,30 +21,36 @@ def bench_ablation(
     out: Path,
     *,
     steps: int,
+    variants: Sequence[str] = (),
     training_seeds: Sequence[int] = (0,),
     evaluation_seeds: int = 5,
     threads: int = 2,
     on_progress: Callable[[str], None] = lambda _note: None,
 ) -> dict[str, Any]:
-    """Train all variants for the same number of steps and judge them.
+    """Train variants for the same number of steps and judge them.
 
     Args:
         recipe: Name of the recipe.
         robot: The leg.
         out: Folder of the runs.
         steps: Control steps of experience of each.
+        variants: Names of those to train, in any order; all if there are none.
         training_seeds: Of the trainings.
         evaluation_seeds: Realisations of noise and delay per command.
         threads: Of torch and physics.
         on_progress: Called with a sentence on what begins.
 
     Raises:
-        UsageError: There are no ablations of the recipe.
+        UsageError: There are no ablations of the recipe, or none of a name.
     """
     if recipe not in ABLATIONS:
         raise UsageError(unknown_name("recipe with ablations", recipe, ABLATIONS))
+    known = {ablation.name: ablation for ablation in ABLATIONS[recipe]()}
+    for name in variants:
+        if name not in known:
+            raise UsageError(unknown_name(f"variant of {recipe}", name, known))
     rows = []
-    for ablation in ABLATIONS[recipe]():
+    for ablation in [known[name] for name in known if not variants or name in variants]:
         result = bench_training(
             replace(ablation.recipe, steps=steps, judge_every=max(1, steps // 5)),
             robot,

@@ -90,14 +90,9 @@ def _of_precise() -> list[Ablation]:
             replace(base, task=replace(base.task, command_skew=1.0)),
         ),
         Ablation(
-            "no-standing-still",
-            "a leg without a hop for 1.5 s begins anew",
-            replace(base, task=replace(base.task, idle=1.5)),
-        ),
-        Ablation(
-            "wide-tail",
-            "a quarter of the apex event's kernel stays wide to the end",
-            replace(base, reward=replace(base.reward, tail=0.25)),
+            "energy-anywhere",
+            "the teacher's energy gain is paid at any height, and half as much",
+            replace(base, reward=replace(base.reward, energy=0.4, energy_beyond=0.0)),
         ),
         Ablation(
             "four-passes",

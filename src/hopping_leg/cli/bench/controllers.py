@@ -121,6 +121,8 @@ class Ablation:
     """`fast` or `precise`."""
     steps: int = 2_000_000
     """Control steps of experience of each variant."""
+    variants: tuple[str, ...] = ()
+    """Names of those to train; all, unless some are named."""
     robot: str = "legv2-paper"
     """A shipped name or the path of a .toml file."""
     training_seeds: tuple[int, ...] = (0,)
@@ -145,6 +147,7 @@ class Ablation:
             load_robot(self.robot),
             self.out,
             steps=self.steps,
+            variants=self.variants,
             training_seeds=self.training_seeds,
             evaluation_seeds=self.evaluation_seeds,
             threads=self.threads,
