@@ -78,6 +78,12 @@ results: $(STAMP)
 	  $(foreach s,0 1 2 3 4,quarter-seed$(s)=runs/bench-quarter/precise-seed$(s)/policy.onnx) --seeds 5 --floor soft --no-video \
 	  --json docs/results/precise-seeds.json --commands \
 	0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40,0.41,0.42,0.43,0.44,0.45
+	$(BIN)/hop bench training --recipe precise --set $(FORMER) --minutes 13.5 --steps 20000000 --training-seeds 0 1 2 3 4 \
+	  --out runs/bench-quarter-former
+	$(BIN)/hop evaluate precise \
+	  $(foreach s,0 1 2 3 4,quarter-seed$(s)=runs/bench-quarter-former/precise-seed$(s)/policy.onnx) --seeds 5 --floor soft --no-video \
+	  --json docs/results/precise-seeds-former.json --commands \
+	0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40,0.41,0.42,0.43,0.44,0.45
 	$(BIN)/hop train --recipe adaptive --set $(FORMER) --out runs/adaptive
 	$(BIN)/hop evaluate 12-million-steps=runs/adaptive/policy.onnx adaptive --suite robustness --seeds 3 \
 	  --out runs/results/robustness-adaptive --json docs/results/adaptive-robustness.json
