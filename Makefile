@@ -10,6 +10,8 @@ ARGS ?=
 # The energy gain with which the shipped `precise`, `adaptive` and `recurrent` and some results were
 # made, before the recipes' own ended above the command.
 FORMER := reward.energy=0.4 reward.energy_beyond=0
+# The commands at which precision is asked for.
+HEIGHTS := 0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40
 
 .PHONY: help install reproduce test test-fast check format lint types docs wheel results lock clean
 
@@ -57,7 +59,7 @@ results: $(STAMP)
 	  --json docs/results/evaluation.json --traces runs/results/traces
 	$(BIN)/hop plot runs/results/traces/*.parquet --out docs/results/figures
 	$(BIN)/hop evaluate precise adaptive recurrent energy-shaping energy-shaping-flying --seeds 5 --floor soft --no-video --json docs/results/precise.json \
-	  --commands 0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40
+	  --commands $(HEIGHTS)
 	$(BIN)/hop evaluate energy-shaping energy-shaping-literal fast precise adaptive recurrent paper --suite robustness --seeds 3 \
 	  --out runs/results/robustness --json docs/results/robustness.json
 	cp runs/results/robustness/robustness.svg docs/results
@@ -76,14 +78,12 @@ results: $(STAMP)
 	  --out runs/bench-quarter --json docs/results/training-quarter.json
 	$(BIN)/hop evaluate precise \
 	  $(foreach s,0 1 2 3 4,quarter-seed$(s)=runs/bench-quarter/precise-seed$(s)/policy.onnx) --seeds 5 --floor soft --no-video \
-	  --json docs/results/precise-seeds.json --commands \
-	0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40,0.41,0.42,0.43,0.44,0.45
+	  --json docs/results/precise-seeds.json --commands $(HEIGHTS),0.41,0.42,0.43,0.44,0.45
 	$(BIN)/hop bench training --recipe precise --set $(FORMER) --minutes 13.5 --steps 20000000 --training-seeds 0 1 2 3 4 \
 	  --out runs/bench-quarter-former
 	$(BIN)/hop evaluate precise \
 	  $(foreach s,0 1 2 3 4,quarter-seed$(s)=runs/bench-quarter-former/precise-seed$(s)/policy.onnx) --seeds 5 --floor soft --no-video \
-	  --json docs/results/precise-seeds-former.json --commands \
-	0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40,0.41,0.42,0.43,0.44,0.45
+	  --json docs/results/precise-seeds-former.json --commands $(HEIGHTS),0.41,0.42,0.43,0.44,0.45
 	$(BIN)/hop train --recipe adaptive --set $(FORMER) --out runs/adaptive
 	$(BIN)/hop evaluate 12-million-steps=runs/adaptive/policy.onnx adaptive --suite robustness --seeds 3 \
 	  --out runs/results/robustness-adaptive --json docs/results/adaptive-robustness.json
@@ -91,7 +91,7 @@ results: $(STAMP)
 	for seed in 2 4; do $(BIN)/hop train --recipe precise --seed $$seed --steps 9000000 --set $(FORMER) teachers=1 epochs=4 task.command_skew=1 teaching=0.38 --out runs/teaching/0.38-seed$$seed; done
 	$(BIN)/hop train --recipe precise --steps 9000000 --set $(FORMER) teachers=1 epochs=4 task.command_skew=1 teaching=0.55 --out runs/teaching/0.55-seed0
 	$(BIN)/hop evaluate "runs/teaching/*/policy.onnx" --seeds 5 --floor soft --no-video --json docs/results/teaching.json \
-	  --commands 0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40
+	  --commands $(HEIGHTS)
 	$(BIN)/hop evaluate 0.28-seed0=runs/teaching/0.28-seed0/policy.onnx 0.38-seed2=runs/teaching/0.38-seed2/policy.onnx \
 	  0.55-seed0=runs/teaching/0.55-seed0/policy.onnx --suite robustness --seeds 3 --out runs/results/robustness-teaching --json docs/results/teaching-robustness.json
 	$(BIN)/hop train --recipe precise --seed 3 --steps 12000000 --set $(FORMER) teaching=0.42 imitation.knots=16 --out runs/precise

@@ -144,12 +144,14 @@ def origin(file: str, content: Any) -> str:  # noqa: ANN401
 
 def commands() -> dict[str, str]:
     """Return the command behind each results file, as ``make results`` runs it."""
-    text = MAKEFILE.read_text(encoding="utf-8").replace("\\\n", " ")
+    text = MAKEFILE.read_text(encoding="utf-8").replace("\\\n", " ").replace("$(BIN)/", "")
+    for name, meaning in re.findall(r"^(\w+) := (.*)$", text, re.MULTILINE):
+        text = text.replace(f"$({name})", meaning)
     found = {}
     for line in text.splitlines():
         target = re.search(r"--json docs/results/(\S+)", line)
         if target:
-            found[target[1]] = " ".join(line.replace("$(BIN)/", "").split())
+            found[target[1]] = " ".join(line.split())
     return found
 
 
