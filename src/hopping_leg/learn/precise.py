@@ -51,7 +51,7 @@ class PreciseRecipe(FastRecipe):
     )
     reward: ApexRewardOptions = field(
         default_factory=lambda: ApexRewardOptions(
-            width=(0.030, 0.006), energy=0.8, energy_beyond=0.05, jerk=0.3, effort=0.2
+            width=(0.030, 0.006), energy=0.8, energy_beyond=0.05, jerk=0.4, effort=0.2
         )
     )
     """Apex reward of the teacher. The calmer it is, the better it can be imitated. Its energy gain
