@@ -14,6 +14,8 @@ from hopping_leg.evaluate.runner import software_versions
 from hopping_leg.learn.ablations import ABLATIONS
 from hopping_leg.robot.parameters import Robot
 
+_OF_A_RUN = ("seed", "minutes", "exam_scores_m")
+
 
 def bench_ablation(
     recipe: str,
@@ -49,7 +51,8 @@ def bench_ablation(
     for name in variants:
         if name not in known:
             raise UsageError(unknown_name(f"variant of {recipe}", name, known))
-    rows = []
+    rows: list[dict[str, Any]] = []
+    found: list[dict[str, Any]] = []
     for ablation in [known[name] for name in known if not variants or name in variants]:
         result = bench_training(
             replace(ablation.recipe, steps=steps, judge_every=max(1, steps // 5)),
@@ -60,8 +63,11 @@ def bench_ablation(
             threads=threads,
             on_progress=functools.partial(_named, on_progress, ablation.name),
         )
-        rows += [
-            {"variant": ablation.name, "meaning": ablation.meaning, **row} for row in result["rows"]
+        named = {"variant": ablation.name, "meaning": ablation.meaning}
+        rows += [{**named, **row} for row in result["rows"]]
+        found += [
+            {**named, **_over_commands(run["selected"]), **{key: run[key] for key in _OF_A_RUN}}
+            for run in result["runs"]
         ]
     return {
         "recipe": recipe,
@@ -70,7 +76,7 @@ def bench_ablation(
         "threads": threads,
         "evaluation_seeds": evaluation_seeds,
         "rows": rows,
-        "variants": _variants(rows),
+        "variants": found,
         "versions": software_versions(),
     }
 
@@ -79,26 +85,16 @@ def _named(on_progress: Callable[[str], None], name: str, note: str) -> None:
     on_progress(f"{name}: {note}")
 
 
-def _variants(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return what each training of each variant comes to over the commands.
+def _over_commands(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return what a policy's rows come to over the commands.
 
-    Errors and scatter are null where a policy does not hop at some command.
+    Errors and scatter are null where it does not hop at some command.
     """
-    found = []
-    for variant, seed in dict.fromkeys((row["variant"], row["seed"]) for row in rows):
-        mine = [row for row in rows if (row["variant"], row["seed"]) == (variant, seed)]
-        errors = [row["median_error_m"] for row in mine]
-        hops = all(error is not None for error in errors)
-        found.append(
-            {
-                "variant": variant,
-                "meaning": mine[0]["meaning"],
-                "seed": seed,
-                "minutes": mine[0]["minutes"],
-                "worst_abs_median_error_m": float(np.abs(errors).max()) if hops else None,
-                "mean_abs_median_error_m": float(np.abs(errors).mean()) if hops else None,
-                "std_m": float(np.mean([row["std_m"] for row in mine])) if hops else None,
-                **{n: sum(row[n] for row in mine) for n in ("skipped_hops", "body_contacts")},
-            }
-        )
-    return found
+    errors = [row["median_error_m"] for row in rows]
+    hops = all(error is not None for error in errors)
+    return {
+        "worst_abs_median_error_m": float(np.abs(errors).max()) if hops else None,
+        "mean_abs_median_error_m": float(np.abs(errors).mean()) if hops else None,
+        "std_m": float(np.mean([row["std_m"] for row in rows])) if hops else None,
+        **{name: sum(row[name] for row in rows) for name in ("skipped_hops", "body_contacts")},
+    }

@@ -49,8 +49,9 @@ def bench_training(
         on_progress: Called with a sentence on what begins.
 
     Returns:
-        Per training seed: minutes, selection included, the selected policy's summary rows, and the
-        curve of (minutes, worst and mean |median error| over commands) of all snapshots.
+        Per training seed: minutes, selection included, how its teachers did in their exams, the
+        selected policy's summary rows, and the curve of (minutes, worst and mean |median error|
+        over commands) of all snapshots.
     """
     runs = []
     for seed in training_seeds:
@@ -78,6 +79,7 @@ def bench_training(
                 "seed": seed,
                 "minutes": result["minutes"],
                 "steps": result["steps"],
+                "exam_scores_m": result.get("exam_scores_m", []),
                 "selected": selected,
                 "curve": [
                     {"steps": int(name), "minutes": times[name], **_errors(rows, name)}
