@@ -68,12 +68,18 @@ def _worst(values: list[float | None], factor: float = 1) -> str:
     return number(round(factor * max(known))) if len(known) == len(values) else number(None)
 
 
-def precision(file: str) -> str:
-    """Return how near hops come to all commands of an evaluation: a row per controller, in mm."""
+def precision(file: str, high: float = 1.0) -> str:
+    """Return how near hops come to commands of an evaluation: a row per controller, in mm.
+
+    Args:
+        file: In docs/results.
+        high: The highest command that counts, m.
+    """
     content = read(file)
+    summary = [row for row in content["summary"] if row["command_m"] <= high]
     rows = []
-    for name in dict.fromkeys(row["controller"] for row in content["summary"]):
-        mine = [row for row in content["summary"] if row["controller"] == name]
+    for name in dict.fromkeys(row["controller"] for row in summary):
+        mine = [row for row in summary if row["controller"] == name]
         errors = [1000 * abs(row["median_error_m"]) for row in mine]
         spreads = {row["command_m"]: 1000 * row["std_m"] for row in mine}
         cells = [
