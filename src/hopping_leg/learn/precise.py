@@ -73,7 +73,7 @@ class PreciseRecipe(FastRecipe):
     """How many learn at most, one after the other; the best of them teaches."""
     exam_at: tuple[float, ...] = (1.0,)
     """Shares of its time after which each is examined, the last of them 1; the best exam counts."""
-    passing: float = 0.010
+    passing: float = 0.007
     """Score in an exam with which a teacher needs neither more time nor a successor, m."""
     erring: float = 0.05
     """Errors of the torques in the exam, of the largest: about those that the policy will make."""
