@@ -92,11 +92,12 @@ def precision(file: str, high: float = 1.0) -> str:
             sum(row["body_contacts"] for row in mine),
             min(row["hop_rate_hz"] for row in mine),
             100 * min(row["flight_fraction"] for row in mine),
+            100 * mean(row["flight_fraction"] for row in mine),
         ]
         rows.append([name, *map(number, cells)])
     titles = [
         "controller", "worst error, mm", "mean", f"worst std up to {_LOWER} m", "of all",
-        "mean std", "skipped hops", "hits", "fewest hops/s", "least flight, %",
+        "mean std", "skipped hops", "hits", "fewest hops/s", "least flight, %", "mean",
     ]  # fmt: skip
     return grid(titles, rows) + origin(file, content)
 
