@@ -81,6 +81,9 @@ results: $(STAMP)
 	  $(foreach s,0 1 2 3 4,quarter-seed$(s)=runs/bench-quarter/precise-seed$(s)/policy.onnx) \
 	  again-seed3=runs/bench-quarter-again/precise-seed3/policy.onnx --seeds 5 --floor soft --no-video \
 	  --json docs/results/precise-seeds.json --commands $(HEIGHTS),0.41,0.42,0.43,0.44,0.45
+	$(BIN)/hop train --recipe precise --threads 2 --minutes 13.5 --steps 20000000 --set epochs=4 --out runs/parts/four-passes
+	$(BIN)/hop evaluate four-passes=runs/parts/four-passes/policy.onnx --seeds 5 --floor soft --no-video \
+	  --json docs/results/precise-passes.json --commands $(HEIGHTS),0.41,0.42,0.43,0.44,0.45
 	$(BIN)/hop bench training --recipe precise --set reward.jerk=0.3 --minutes 13.5 --steps 20000000 --training-seeds 0 1 2 3 4 \
 	  --out runs/bench-quarter-jerks --json docs/results/training-quarter-jerks.json
 	$(BIN)/hop evaluate precise \
