@@ -7,8 +7,8 @@ STAMP := $(VENV)/.complete
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 WORKERS ?= auto
 ARGS ?=
-# The energy gain with which the shipped `precise`, `adaptive` and `recurrent` and some results were
-# made, before the recipes' own ended above the command.
+# The energy gain and the price of jerks with which the shipped `precise`, `adaptive` and `recurrent`
+# and some results were made, before the recipes' gain ended above the command and jerks cost more.
 FORMER := reward.energy=0.4 reward.energy_beyond=0 reward.jerk=0.3
 # The commands at which precision is asked for.
 HEIGHTS := 0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.30,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.40

@@ -6,15 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from hopping_leg.errors import UsageError, unknown_name
-from hopping_leg.evaluate.bench_training import bench_training
+from hopping_leg.evaluate.bench_training import bench_training, over_commands
 from hopping_leg.evaluate.runner import software_versions
 from hopping_leg.learn.ablations import ABLATIONS
 from hopping_leg.robot.parameters import Robot
 
 _OF_A_RUN = ("seed", "minutes", "exam_scores_m")
+_COUNTED = ("skipped_hops", "body_contacts")
 
 
 def bench_ablation(
@@ -66,7 +65,12 @@ def bench_ablation(
         named = {"variant": ablation.name, "meaning": ablation.meaning}
         rows += [{**named, **row} for row in result["rows"]]
         found += [
-            {**named, **_over_commands(run["selected"]), **{key: run[key] for key in _OF_A_RUN}}
+            {
+                **named,
+                **{key: run[key] for key in _OF_A_RUN},
+                **over_commands(run["selected"]),
+                **{key: sum(row[key] for row in run["selected"]) for key in _COUNTED},
+            }
             for run in result["runs"]
         ]
     return {
@@ -83,18 +87,3 @@ def bench_ablation(
 
 def _named(on_progress: Callable[[str], None], name: str, note: str) -> None:
     on_progress(f"{name}: {note}")
-
-
-def _over_commands(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return what a policy's rows come to over the commands.
-
-    Errors and scatter are null where it does not hop at some command.
-    """
-    errors = [row["median_error_m"] for row in rows]
-    hops = all(error is not None for error in errors)
-    return {
-        "worst_abs_median_error_m": float(np.abs(errors).max()) if hops else None,
-        "mean_abs_median_error_m": float(np.abs(errors).mean()) if hops else None,
-        "std_m": float(np.mean([row["std_m"] for row in rows])) if hops else None,
-        **{name: sum(row[name] for row in rows) for name in ("skipped_hops", "body_contacts")},
-    }

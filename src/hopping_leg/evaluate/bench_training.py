@@ -82,7 +82,11 @@ def bench_training(
                 "exam_scores_m": result.get("exam_scores_m", []),
                 "selected": selected,
                 "curve": [
-                    {"steps": int(name), "minutes": times[name], **_errors(rows, name)}
+                    {
+                        "steps": int(name),
+                        "minutes": times[name],
+                        **over_commands([row for row in rows if row["controller"] == name]),
+                    }
                     for name in snapshots
                 ],
             }
@@ -130,15 +134,21 @@ def _judge(
     return rows
 
 
-def _errors(rows: list[dict[str, Any]], label: str) -> dict[str, float | None]:
-    """Return how far off a policy's hops are; null where it does not hop at some command."""
-    mine = [row for row in rows if row["controller"] == label]
-    errors = [row["median_error_m"] for row in mine]
-    spreads = [row["std_m"] for row in mine]
+def over_commands(rows: list[dict[str, Any]]) -> dict[str, float | None]:
+    """Return how far off a policy's hops are over the commands, m.
+
+    Args:
+        rows: Its summary, a row per command.
+
+    Returns:
+        Worst and mean |median error|, and the mean scatter; null where it does not hop at some
+        command.
+    """
+    errors = [row["median_error_m"] for row in rows]
     if any(error is None for error in errors):
         return {"worst_abs_median_error_m": None, "mean_abs_median_error_m": None, "std_m": None}
     return {
         "worst_abs_median_error_m": float(np.max(np.abs(errors))),
         "mean_abs_median_error_m": float(np.mean(np.abs(errors))),
-        "std_m": float(np.mean(spreads)),
+        "std_m": float(np.mean([row["std_m"] for row in rows])),
     }
