@@ -27,6 +27,9 @@ SETTLE = 0.2
 _DISORDER = 0.1
 """Score for neighbouring commands whose hops are not in order, m."""
 
+_UNRELIABLE = 0.01
+"""Score for hops that are skipped or hit the ground at a command, however few, m."""
+
 _LEGS = 4
 _SECONDS = 10.0
 _PENALTY = 0.1
@@ -90,13 +93,16 @@ def judge(
 def score(verdicts: list[Verdict]) -> float:
     """Return how bad a policy is, m.
 
-    Mean over commands of ``badness``, and a penalty for every pair of
-    neighbouring commands of which the higher one does not give the higher hops: a policy that
+    Mean over commands of ``badness`` and of a penalty where hops are skipped or the body hits the
+    ground at all: who seldom does so must not win by scattering less. And a penalty for every pair
+    of neighbouring commands of which the higher one does not give the higher hops: a policy that
     ignores its command must not win by hopping in between.
     """
     heights = [v.command_m + v.median_error_m for v in verdicts]
     disordered = sum(not low < high for low, high in itertools.pairwise(heights))
-    return float(np.mean([badness(v) for v in verdicts])) + _DISORDER * disordered
+    unreliable = [v.skipped_hops + v.body_contact_ticks > 0 for v in verdicts]
+    worse = _UNRELIABLE * float(np.mean(unreliable)) + _DISORDER * disordered
+    return float(np.mean([badness(v) for v in verdicts])) + worse
 
 
 def badness(verdict: Verdict) -> float:
