@@ -13,6 +13,7 @@ from typing import Any
 
 import jinja2
 import macros_package
+import macros_precision
 import macros_results
 import macros_studies
 from mkdocs.exceptions import PluginError
@@ -43,6 +44,7 @@ def page(file: str, title: str) -> str:
 
 MACROS = {
     **macros_results.MACROS,
+    **macros_precision.MACROS,
     **macros_studies.MACROS,
     **macros_package.MACROS,
     "example": example,

@@ -11,6 +11,9 @@ from mkdocs.exceptions import PluginError
 RESULTS = Path(__file__).parent / "results"
 MAKEFILE = Path(__file__).parent.parent / "Makefile"
 
+_FOREACH = r"\$\(foreach (\w+),([^,]*),((?:\$\(\w+\)|[^()])*)\)"
+"""Of make: a variable, its values and the text that is repeated."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Column:
@@ -147,12 +150,19 @@ def commands() -> dict[str, str]:
     text = MAKEFILE.read_text(encoding="utf-8").replace("\\\n", " ").replace("$(BIN)/", "")
     for name, meaning in re.findall(r"^(\w+) := (.*)$", text, re.MULTILINE):
         text = text.replace(f"$({name})", meaning)
+    text = re.sub(_FOREACH, _each, text)
     found = {}
     for line in text.splitlines():
         target = re.search(r"--json docs/results/(\S+)", line)
         if target:
             found[target[1]] = " ".join(line.split())
     return found
+
+
+def _each(match: re.Match[str]) -> str:
+    """Return what make's ``foreach`` comes to."""
+    name, words, body = match.groups()
+    return " ".join(body.replace(f"$({name})", word) for word in words.split())
 
 
 def grid(titles: list[str], rows: list[list[str]]) -> str:

@@ -1,15 +1,8 @@
 """Tables of single studies in docs/results that need more than columns picked."""
 
-from statistics import mean
 from typing import Any
 
 from macros_results import grid, number, origin, read
-
-_LOWER = 0.34
-"""Commands up to which less scatter is asked for, m."""
-
-_FLIGHT = 0.5
-"""Least share of the time in flight that is asked for."""
 
 
 def leaderboard(file: str) -> str:
@@ -68,65 +61,6 @@ def _worst(values: list[float | None], factor: float = 1) -> str:
     return number(round(factor * max(known))) if len(known) == len(values) else number(None)
 
 
-def precision(file: str, high: float = 1.0) -> str:
-    """Return how near hops come to commands of an evaluation: a row per controller, in mm.
-
-    Args:
-        file: In docs/results.
-        high: The highest command that counts, m.
-    """
-    content = read(file)
-    summary = [row for row in content["summary"] if row["command_m"] <= high]
-    rows = []
-    for name in dict.fromkeys(row["controller"] for row in summary):
-        mine = [row for row in summary if row["controller"] == name]
-        errors = [1000 * abs(row["median_error_m"]) for row in mine]
-        spreads = {row["command_m"]: 1000 * row["std_m"] for row in mine}
-        cells = [
-            max(errors),
-            mean(errors),
-            max(spread for command, spread in spreads.items() if command <= _LOWER),
-            max(spreads.values()),
-            mean(spreads.values()),
-            sum(row["skipped_hops"] for row in mine),
-            sum(row["body_contacts"] for row in mine),
-            min(row["hop_rate_hz"] for row in mine),
-            100 * min(row["flight_fraction"] for row in mine),
-            100 * mean(row["flight_fraction"] for row in mine),
-        ]
-        rows.append([name, *map(number, cells)])
-    titles = [
-        "controller", "worst error, mm", "mean", f"worst std up to {_LOWER} m", "of all",
-        "mean std", "skipped hops", "hits", "fewest hops/s", "least flight, %", "mean",
-    ]  # fmt: skip
-    return grid(titles, rows) + origin(file, content)
-
-
-def against(file: str, rival: str) -> str:
-    """Return at how many commands controllers are nearer than a rival: a row per controller.
-
-    Of all commands, and of those at which the rival flies for half of the time, as asked of all.
-    """
-    content = read(file)
-    rows_of: dict[str, dict[float, dict[str, Any]]] = {}
-    for row in content["summary"]:
-        rows_of.setdefault(row["controller"], {})[row["command_m"]] = row
-    other = rows_of.pop(rival)
-    flying = [command for command, row in other.items() if row["flight_fraction"] >= _FLIGHT]
-    rows = []
-    for name, mine in rows_of.items():
-        cells = []
-        for commands in (list(other), flying):
-            for column in ("median_error_m", "std_m", "mean_abs_error_m"):
-                nearer = [abs(mine[c][column]) < abs(other[c][column]) for c in commands]
-                cells.append(f"{sum(nearer)} of {len(nearer)}")
-        rows.append([name, *cells])
-    measures = ("error smaller at", "std", "mean distance")
-    half = f"where `{rival}` flies {100 * _FLIGHT:.0f} %"
-    titles = ["controller", *measures, f"error, {half}", *(f"{m}, there" for m in measures[1:])]
-    return grid(titles, rows) + origin(file, content)
-
-
 def probe_scores(file: str, controller: str) -> str:
     """Return a policy's probes: a row per set of features, a column per target."""
     content = read(file)
@@ -159,8 +93,6 @@ def percentiles(file: str, **titles: str) -> str:
 
 
 MACROS = {
-    "against": against,
-    "precision": precision,
     "leaderboard": leaderboard,
     "percentiles": percentiles,
     "probe_scores": probe_scores,
