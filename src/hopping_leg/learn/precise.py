@@ -51,7 +51,7 @@ class PreciseRecipe(FastRecipe):
     )
     reward: ApexRewardOptions = field(
         default_factory=lambda: ApexRewardOptions(
-            width=(0.030, 0.006), energy=0.8, energy_beyond=0.05, jerk=0.4, effort=0.2
+            width=(0.030, 0.006), energy=0.8, energy_beyond=0.05, jerk=0.5, effort=0.2
         )
     )
     """Apex reward of the teacher. The calmer it is, the better it can be imitated. Its energy gain
@@ -59,7 +59,7 @@ class PreciseRecipe(FastRecipe):
     some never come back to the low ones."""
     epochs: int = 8
     """Passes over a rollout."""
-    steps: int = 10_000_000
+    steps: int = 15_000_000
     """Control steps of experience in all, summed over the legs."""
     judge_every: int = 500_000
     """Control steps between two trials of the policy, for checkpoint selection."""
@@ -69,7 +69,7 @@ class PreciseRecipe(FastRecipe):
     """Heights of those trials, m."""
     teaching: float = 0.5
     """Share of the training in which teachers learn at most; in the rest the policy does."""
-    teachers: int = 2
+    teachers: int = 3
     """How many learn at most, one after the other; the best of them teaches."""
     exam_at: tuple[float, ...] = (1.0,)
     """Shares of its time after which each is examined, the last of them 1; the best exam counts."""
