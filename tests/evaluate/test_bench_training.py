@@ -16,7 +16,13 @@ def complete(tmp_path):
     (run / "policy.onnx").write_bytes(b"selected")
     (run / "snapshots" / "000000000500.onnx").write_bytes(b"snapshot")
     history = [{"steps": 500, "minutes": 0.5}]
-    result = {"minutes": 1.0, "steps": 1000, "history": history, "exam_scores_m": [0.02, 0.004]}
+    result = {
+        "seed": 3,
+        "minutes": 1.0,
+        "steps": 1000,
+        "history": history,
+        "exam_scores_m": [0.02, 0.004],
+    }
     (run / "result.json").write_text(json.dumps(result), encoding="utf-8")
     return tmp_path
 
@@ -47,7 +53,7 @@ def test_what_is_missing_is_trained_by_the_clock(monkeypatch, complete, robot):
         begun.append((seed, options["minutes"], options["resume"]))
         out.mkdir()
         (out / "policy.onnx").write_bytes(b"selected")
-        result = {"minutes": 2.0, "steps": 10, "history": []}
+        result = {"seed": seed, "minutes": 2.0, "steps": 10, "history": []}
         (out / "result.json").write_text(json.dumps(result), encoding="utf-8")
 
     monkeypatch.setattr(bench, "train", train)
@@ -57,3 +63,40 @@ def test_what_is_missing_is_trained_by_the_clock(monkeypatch, complete, robot):
     assert begun == [(4, 2.0, False)]
     assert [run["exam_scores_m"] for run in result["runs"]] == [[0.02, 0.004], []]
     assert result["minutes_max"] == 2.0
+
+
+def test_of_several_starts_the_best_counts_and_all_are_on_the_curve(monkeypatch, tmp_path, robot):
+    begun = []
+
+    class Fake:
+        def __init__(self, _recipe, _robot, seed, out, count, minutes, threads):
+            self.out = out
+            begun.append((seed, count, minutes, threads))
+
+        def train(self, *, resume):
+            assert not resume
+            tried = []
+            for k in range(2):
+                run = self.out / f"start-{k}"
+                (run / "snapshots").mkdir(parents=True)
+                (run / "snapshots" / "000000000500.onnx").write_bytes(b"snapshot")
+                history = [{"steps": 500, "minutes": 0.5}]
+                tried.append({"seed": 14 + k, "minutes": 1.0, "steps": 9, "exam_scores_m": []})
+                result = json.dumps({**tried[k], "history": history})
+                (run / "result.json").write_text(result, encoding="utf-8")
+                tried[k] |= {"score_m": 0.004 - k / 1000, "trials": []}
+            result = {**tried[1], "seed": 7, "starts_tried": tried, "chosen_start": 1}
+            (self.out / "result.json").write_text(json.dumps(result), encoding="utf-8")
+            (self.out / "policy.onnx").write_bytes(b"best")
+
+    monkeypatch.setattr(bench, "Starts", Fake)
+    monkeypatch.setattr(bench, "_judge", judge)
+    options = {"minutes": 3.0, "threads": 1, "starts": 2}
+    result = bench.bench_training(
+        get_recipe("fast"), robot, tmp_path, training_seeds=[7], **options
+    )
+    assert begun == [(7, 2, 3.0, 1)]
+    (run,) = result["runs"]
+    assert (run["seed"], run["chosen_start"]) == (7, 1)
+    assert [(s["seed"], s["score_m"]) for s in run["starts"]] == [(14, 0.004), (15, 0.003)]
+    assert [point["seed"] for point in result["curve"]] == [14, 15]

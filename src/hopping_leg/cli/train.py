@@ -6,6 +6,7 @@ nothing had happened.
 
 Examples:
   hop train --recipe fast --minutes 5
+  hop train --recipe precise --starts 2 --minutes 13
   hop train --recipe paper --seed 1 --out runs/mine
   hop train --recipe paper --seed 1 --out runs/mine --resume
   hop train --recipe fast --out runs/shared --log wandb
@@ -57,6 +58,10 @@ class Options:
     """Control steps of experience, all legs together, instead of the recipe's."""
     threads: int = 1
     """Threads of the networks and the physics."""
+    starts: int = 1
+    """Trainings side by side, each with a seed and in a process of its own, of which the best
+    policy is kept. A training may fail by bad luck; two of one thread each hardly fail both, and
+    take two cores no longer than one."""
     log: Literal["tensorboard", "wandb", "trackio"] = "tensorboard"
     """Who gets the curves besides TensorBoard; wandb and trackio are packages of their own."""
     json: Path | None = None
@@ -67,11 +72,14 @@ def run(args: Options) -> None:
     """Train a controller."""
     from hopping_leg.learn.recipes import change, get_recipe, randomise
     from hopping_leg.learn.run_folder import read_result
+    from hopping_leg.learn.starts import Starts
     from hopping_leg.learn.train import train
 
     recipe = get_recipe(args.recipe)
-    if args.seed < 0 or args.threads < 1:
-        raise UsageError("--seed must not be negative and --threads must be at least 1.")
+    if args.starts != 1 and args.source is not None:
+        raise UsageError("--source begins from one run's checkpoint; leave --starts out.")
+    if args.seed < 0 or min(args.threads, args.starts) < 1:
+        raise UsageError("--seed must be at least 0, --threads and --starts at least 1.")
     if args.steps is not None:
         if args.steps < 1:
             raise UsageError(f"--steps is {args.steps} but must be at least 1.")
@@ -84,18 +92,31 @@ def run(args: Options) -> None:
         recipe = dataclasses.replace(recipe, task=task)
     recipe = dataclasses.replace(recipe, heights=args.heights)
     out = args.out or Path("runs") / f"{args.recipe}-seed{args.seed}"
+    robot = load_robot(args.robot)
     try:
-        trained = train(
-            recipe,
-            load_robot(args.robot),
-            args.seed,
-            out,
-            resume=args.resume,
-            source=args.source,
-            minutes=args.minutes,
-            threads=args.threads,
-            log=args.log,
-        )
+        if args.starts == 1:
+            trained = train(
+                recipe,
+                robot,
+                args.seed,
+                out,
+                resume=args.resume,
+                source=args.source,
+                minutes=args.minutes,
+                threads=args.threads,
+                log=args.log,
+            )
+        else:
+            trained = Starts(
+                recipe,
+                robot,
+                args.seed,
+                out,
+                args.starts,
+                minutes=args.minutes,
+                threads=args.threads,
+                log=args.log,
+            ).train(resume=args.resume)
     except KeyboardInterrupt:
         print(f"Stopped; the same command with --resume goes on in {out}.", file=sys.stderr)
         raise

@@ -4,7 +4,6 @@ Training chooses its snapshots on its own seeds; every snapshot is judged here o
 that chose nothing, so that the curve is what a user gets who stops early.
 """
 
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,11 +15,15 @@ from hopping_leg.control.policy import Policy
 from hopping_leg.evaluate.candidates import Candidate
 from hopping_leg.evaluate.runner import evaluate, software_versions
 from hopping_leg.learn.recipe import Recipe
+from hopping_leg.learn.run_folder import read_result
+from hopping_leg.learn.starts import Starts
 from hopping_leg.learn.train import train
 from hopping_leg.robot.parameters import Robot
 
 JUDGING_SEED = 1000
 """First of the evaluation seeds."""
+
+_OF_A_START = ("seed", "minutes", "steps", "exam_scores_m", "score_m")
 
 
 def bench_training(
@@ -32,6 +35,7 @@ def bench_training(
     evaluation_seeds: int = 5,
     minutes: float | None = None,
     threads: int = 2,
+    starts: int = 1,
     on_progress: Callable[[str], None] = lambda _note: None,
 ) -> dict[str, Any]:
     """Train from scratch with several seeds and judge every snapshot and every selected policy.
@@ -45,49 +49,45 @@ def bench_training(
         training_seeds: Of the trainings.
         evaluation_seeds: Realisations of noise and delay per command.
         minutes: Of learning, by the clock; None learns until the recipe's steps are done.
-        threads: Of torch and physics.
+        threads: Of torch and physics, of each start.
+        starts: Trainings side by side, of which the best policy counts.
         on_progress: Called with a sentence on what begins.
 
     Returns:
-        Per training seed: minutes, selection included, how its teachers did in their exams, the
-        selected policy's summary rows, and the curve of (minutes, worst and mean |median error|
-        over commands) of all snapshots.
+        Per training seed: minutes, selection included, how its teachers did in their exams, its
+        starts if there were several, the selected policy's summary rows, and the curve of
+        (minutes, worst and mean |median error| over commands) of all snapshots of all starts.
     """
     runs = []
     for seed in training_seeds:
         folder = out / f"{recipe.name}-seed{seed}"
         on_progress(f"training {recipe.name} with seed {seed}")
         if not (folder / "policy.onnx").exists():
-            train(
-                recipe,
-                robot,
-                seed,
-                folder,
-                resume=folder.exists(),
-                minutes=minutes,
-                threads=threads,
-            )
-        result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+            resume = folder.exists()
+            if starts == 1:
+                train(recipe, robot, seed, folder, resume=resume, minutes=minutes, threads=threads)
+            else:
+                several = Starts(recipe, robot, seed, folder, starts, minutes, threads)
+                several.train(resume=resume)
         on_progress(f"judging {recipe.name} with seed {seed}")
+        result = read_result(folder)
         content = (folder / "policy.onnx").read_bytes()
-        selected = _judge({"selected": content}, recipe, robot, evaluation_seeds)
-        snapshots = {f.stem: f.read_bytes() for f in sorted((folder / "snapshots").glob("*.onnx"))}
-        rows = _judge(snapshots, recipe, robot, evaluation_seeds)
-        times = {f"{row['steps']:012d}": row["minutes"] for row in result["history"]}
+        tried = {"chosen_start": result["chosen_start"]} if "chosen_start" in result else {}
         runs.append(
             {
                 "seed": seed,
                 "minutes": result["minutes"],
                 "steps": result["steps"],
                 "exam_scores_m": result.get("exam_scores_m", []),
-                "selected": selected,
+                **tried,
+                "starts": [
+                    {key: row[key] for key in _OF_A_START} for row in result.get("starts_tried", [])
+                ],
+                "selected": _judge({"selected": content}, recipe, robot, evaluation_seeds),
                 "curve": [
-                    {
-                        "steps": int(name),
-                        "minutes": times[name],
-                        **over_commands([row for row in rows if row["controller"] == name]),
-                    }
-                    for name in snapshots
+                    point
+                    for run in (sorted(folder.glob("start-*")) or [folder])
+                    for point in _curve(run, recipe, robot, evaluation_seeds)
                 ],
             }
         )
@@ -95,6 +95,7 @@ def bench_training(
         "recipe": recipe.name,
         "robot": robot.name,
         "threads": threads,
+        "starts": starts,
         "minutes_budget": minutes,
         "evaluation_seed": JUDGING_SEED,
         "evaluation_seeds": evaluation_seeds,
@@ -104,13 +105,32 @@ def bench_training(
             for run in runs
             for row in run["selected"]
         ],
-        "curve": [{"seed": run["seed"], **point} for run in runs for point in run["curve"]],
+        "curve": [point for run in runs for point in run["curve"]],
         "minutes_max": max(run["minutes"] for run in runs),
         "worst_abs_median_error_m": max(
             abs(row["median_error_m"]) for run in runs for row in run["selected"]
         ),
         "versions": software_versions(),
     }
+
+
+def _curve(
+    folder: Path, recipe: Recipe, robot: Robot, evaluation_seeds: int
+) -> list[dict[str, Any]]:
+    """Judge every snapshot of a training."""
+    result = read_result(folder)
+    snapshots = {f.stem: f.read_bytes() for f in sorted((folder / "snapshots").glob("*.onnx"))}
+    rows = _judge(snapshots, recipe, robot, evaluation_seeds)
+    times = {f"{row['steps']:012d}": row["minutes"] for row in result["history"]}
+    return [
+        {
+            "seed": result["seed"],
+            "steps": int(name),
+            "minutes": times[name],
+            **over_commands([row for row in rows if row["controller"] == name]),
+        }
+        for name in snapshots
+    ]
 
 
 def _judge(

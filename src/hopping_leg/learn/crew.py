@@ -1,10 +1,13 @@
 """Several workers at once: processes on this machine, or tasks of a Ray cluster."""
 
 import multiprocessing
+import os
+import sys
+import threading
 from collections.abc import Callable
 
 from hopping_leg.cluster import RayCluster
-from hopping_leg.errors import UsageError
+from hopping_leg.errors import HoppingLegError, UsageError
 
 Work = Callable[[int], None]
 """Works until nothing is left, given the worker's number; it can be sent elsewhere."""
@@ -41,8 +44,23 @@ def work_on(cluster: RayCluster, work: Work, workers: int | None = None) -> None
 
 
 def _work_beside(work: Work, worker: int) -> None:
-    """Work in a process of its own, which an interruption ends without a word."""
+    """Work in a process of its own, which an interruption ends without a word.
+
+    It ends with the process that began it, too, however that one ends: the same command, given
+    again, must not find its old workers still writing.
+    """
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
         work(worker)
     except KeyboardInterrupt:
         raise SystemExit(1) from None
+    except HoppingLegError as error:
+        print(f"Worker {worker}: {error}", file=sys.stderr)
+        raise SystemExit(1) from None
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)

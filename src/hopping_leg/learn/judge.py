@@ -4,6 +4,7 @@ The seeds here select; they must never be among those that judge (1000 and above
 """
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -20,6 +21,12 @@ FIRST_SEED = 500
 
 FINAL_SEEDS = (501, 502, 503, 504)
 """Judge the best snapshots once more at the end."""
+
+DECIDING_SEEDS = (505, 506, 507, 508)
+"""Judge the policies of several starts, each the best of its own training."""
+
+_SPACING = 0.01
+"""Of the heights at which nothing between two others should be missed, m."""
 
 SETTLE = 0.2
 """Share of a trial at its start that does not count."""
@@ -88,6 +95,16 @@ def judge(
         _verdict(runs, command, range(index * _LEGS, (index + 1) * _LEGS), rate)
         for index, command in enumerate(commands)
     ]
+
+
+def every_centimetre(commands: Sequence[float]) -> tuple[float, ...]:
+    """Return the heights from the lowest to the highest command in steps of about 1 cm, m.
+
+    A policy may hop in one way at low commands and in another at high ones, and fail where it
+    changes.
+    """
+    low, high = min(commands), max(commands)
+    return tuple(map(float, np.linspace(low, high, round((high - low) / _SPACING) + 1)))
 
 
 def score(verdicts: list[Verdict]) -> float:

@@ -37,6 +37,7 @@ One network from joint measurements to joint torques, for robot `{result["robot"
 
 - Training: {result["steps"]} control steps, {result["minutes"]:.1f} min of wall-clock time, physics
   step {1000 * task["timestep"]:g} ms.
+{starts(result)}\
 {exams(result.get("exam_scores_m", []))}\
 - Selection: the policy after {selected["steps"]} steps ({selected["minutes"]:.1f} min), the best of
   {len(selected["finalists"])} finalists out of {len(result["history"])} snapshots.
@@ -48,6 +49,24 @@ step 0.5 ms, the first 2 s of each trial dropped. These seeds chose the policy; 
 
 {table(selected["trials"])}
 {doubt(selected["trials"])}"""
+
+
+def starts(result: dict[str, Any]) -> str:
+    """Return a line on the trainings of which this was the best, if there were several.
+
+    Args:
+        result: Content of ``result.json``.
+    """
+    if "starts_tried" not in result:
+        return ""
+    rows = result["starts_tried"]
+    scores = ", ".join(f"{1000 * row['score_m']:.1f} (seed {row['seed']})" for row in rows)
+    chosen = rows[result["chosen_start"]]["seed"]
+    return (
+        f"- Starts: the training with seed {chosen}, the best of {len(rows)} in trials at every"
+        f" centimetre on the\n  selection seeds {', '.join(map(str, result['deciding_seeds']))};"
+        f" their scores, error and scatter in mm: {scores}.\n"
+    )
 
 
 def exams(scores: list[float]) -> str:

@@ -19,15 +19,12 @@ from hopping_leg.learn.actor import dense_network
 from hopping_leg.learn.export import Network
 from hopping_leg.learn.fast import FastRecipe, cosine
 from hopping_leg.learn.imitation import Imitation
-from hopping_leg.learn.judge import badness, judge
+from hopping_leg.learn.judge import badness, every_centimetre, judge
 from hopping_leg.learn.students import WindowStudent
 from hopping_leg.learn.taught import TaughtPolicy, TaughtPPO
 from hopping_leg.learn.teacher import Teacher
 from hopping_leg.learn.vecenv import TaskVecEnv
 from hopping_leg.robot.parameters import Robot
-
-_EXAM_SPACING = 0.01
-"""Of the heights at which teachers are examined, m."""
 
 _FLIGHT = 0.1
 """What a lack of flight adds to an exam's score, m: a tenth of the time, 1 cm."""
@@ -128,8 +125,7 @@ class PreciseRecipe(FastRecipe):
         is on the ground for more than half of the time is marked down, too: next to standing, the
         policy may fall into it.
         """
-        low, high = min(self.judge_commands), max(self.judge_commands)
-        commands = tuple(np.linspace(low, high, round((high - low) / _EXAM_SPACING) + 1))
+        commands = every_centimetre(self.judge_commands)
         teacher = self.make_teacher(policy, robot, self.erring)
         verdicts = judge(teacher, robot, commands, rate=self.task.rate, threads=threads)
         return max(badness(v) + _FLIGHT * max(0.0, 0.5 - v.flight_fraction) for v in verdicts)

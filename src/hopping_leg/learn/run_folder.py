@@ -15,6 +15,17 @@ from hopping_leg.robot.parameters import Robot
 
 _LIBRARIES = ("hopping-leg", "mujoco", "numpy", "onnxruntime", "stable-baselines3", "torch")
 
+_ASKED = (
+    "recipe",
+    "robot_digest",
+    "seed",
+    "number_of_starts",
+    "minutes_budget",
+    "source",
+    "options",
+)
+"""What a run must have been asked for alike to go on."""
+
 
 class RunFolder:
     """Paths and files of one run.
@@ -32,6 +43,7 @@ class RunFolder:
         seed: int,
         minutes: float | None,
         source: Path | None = None,
+        starts: int = 1,
     ) -> None:
         self.path, self._source = path, source
         self._defaults = _as_stored(asdict(type(recipe)()))
@@ -44,6 +56,7 @@ class RunFolder:
                 "seed": seed,
                 "minutes_budget": minutes,
                 "source": str(source) if source else None,
+                "number_of_starts": starts,
                 "versions": library_versions(),
             }
         )
@@ -68,6 +81,8 @@ class RunFolder:
             words += ["--source", config["source"]]
         if config["minutes_budget"] is not None:
             words += ["--minutes", f"{config['minutes_budget']:g}"]
+        if config["number_of_starts"] > 1:
+            words += ["--starts", str(config["number_of_starts"])]
         return " ".join([*words, *words_of(config["recipe"], config["options"])])
 
     def snapshot(self, steps: int) -> Path:
@@ -122,7 +137,8 @@ class RunFolder:
         stored = json.loads(self._config_file.read_text(encoding="utf-8"))
         # A run from before an option existed was asked for what is now its default.
         _complete(stored.get("options", {}), self._defaults)
-        for key in ("recipe", "robot_digest", "seed", "minutes_budget", "source", "options"):
+        stored.setdefault("number_of_starts", 1)
+        for key in _ASKED:
             if stored.get(key) != self.config[key]:
                 raise UsageError(
                     f"The run in {self.path} has another {key.replace('_', ' ')}"

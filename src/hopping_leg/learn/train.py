@@ -86,10 +86,7 @@ def train(
             is not installed.
         RobotError: The robot has effects that training does not simulate.
     """
-    _refuse_reality(robot)
-    check_log(log)
-    if minutes is not None and not 0 < minutes < float("inf"):
-        raise UsageError(f"--minutes is {minutes:g} but must be positive.")
+    check(robot, minutes, log)
     torch.set_num_threads(max(threads, 1))
     recipe = fit(recipe, robot)
     folder = RunFolder(out, recipe, robot, seed, minutes, source)
@@ -103,8 +100,21 @@ def train(
         return trainer.run(progress)
 
 
-def _refuse_reality(robot: Robot) -> None:
-    """Refuse a leg that plays the real one: who trains on it has nothing left to transfer."""
+def check(robot: Robot, minutes: float | None, log: Log) -> None:
+    """Refuse what cannot be trained before anything is written.
+
+    Args:
+        robot: The leg; one that plays the real one leaves nothing to transfer.
+        minutes: Of the training, None for no limit.
+        log: Who gets the curves.
+
+    Raises:
+        UsageError: The time is no time, or what ``log`` needs is not installed.
+        RobotError: The robot has effects that training does not simulate.
+    """
+    check_log(log)
+    if minutes is not None and not 0 < minutes < float("inf"):
+        raise UsageError(f"--minutes is {minutes:g} but must be positive.")
     if not robot.reality.only_delays:
         raise RobotError(
             f"{robot.name} has effects in [reality] that training does not know; train on what is"

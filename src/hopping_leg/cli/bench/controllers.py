@@ -78,7 +78,10 @@ class Training:
     minutes: float | None = None
     """Of learning, by the clock, after which the best snapshot is selected."""
     threads: int = 2
-    """Of torch and physics."""
+    """Of torch and physics, of each start."""
+    starts: int = 1
+    """Trainings side by side for every seed, of which the best policy counts, as for
+    ``hop train``."""
     out: Path = Path("runs/bench-training")
     """Where the trainings are kept; finished ones are not repeated, killed ones go on."""
     json: Path | None = None
@@ -90,6 +93,7 @@ class Training:
         from hopping_leg.learn.recipes import change, get_recipe
 
         at_least(1, evaluation_seeds=self.evaluation_seeds, threads=self.threads)
+        at_least(1, starts=self.starts)
         if not self.training_seeds:
             raise UsageError("--training-seeds names no seed; give e.g. --training-seeds 0 1 2.")
         recipe = change(get_recipe(self.recipe), self.set)
@@ -104,6 +108,7 @@ class Training:
             evaluation_seeds=self.evaluation_seeds,
             minutes=self.minutes,
             threads=self.threads,
+            starts=self.starts,
             on_progress=console.print,
         )
         table = Table("minutes", "seed", "command, m", "median error, mm", "std, mm", "skipped")

@@ -1,0 +1,125 @@
+"""Of several trainings side by side the best is kept, and none outlives who began them."""
+
+import itertools
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from hopping_leg.errors import UsageError
+from hopping_leg.learn import starts as module
+from hopping_leg.learn.checkpoint import list_checkpoints
+from hopping_leg.learn.judge import DECIDING_SEEDS, FINAL_SEEDS, FIRST_SEED, every_centimetre
+from hopping_leg.learn.run_folder import RunFolder
+from hopping_leg.learn.starts import Starts
+from tests.learn.learners import ROBOT, TINY
+
+
+def finished(out, scores):
+    """Return what works in the place of trainings and leaves what they leave."""
+
+    def work(_work, count):
+        for number, start in enumerate(scores):
+            assert number < count
+            folder = RunFolder(out / f"start-{number}", TINY, ROBOT, 100 + number, None)
+            folder.path.mkdir()
+            selected = {"steps": 800, "minutes": 0.9, "score_m": 1.0, "finalists": [1]}
+            selected |= {"trials": [], "seeds": [501]}
+            result = {"command": "", "minutes": 1.0 + number, "steps": 1600, "history": [1]}
+            folder.write("result.json", {**folder.config, **result, "selected": selected})
+            decision = {"score_m": start, "deciding_minutes": 0.5, "trials": []}
+            folder.write("decision.json", decision)
+            folder.policy.write_bytes(b"policy %d" % number)
+
+    return work
+
+
+@pytest.mark.parametrize(("scores", "best"), [((0.004, 0.003), 1), ((0.003, 0.004, 0.02), 0)])
+def test_the_best_where_they_are_compared_is_kept(scores, best, tmp_path, monkeypatch):
+    out = tmp_path / "run"
+    monkeypatch.setattr(module, "work_here", finished(out, scores))
+    several = Starts(TINY, ROBOT, 5, out, len(scores), quiet=True)
+    trained = several.train()
+    assert trained.policy.read_bytes() == b"policy %d" % best
+    result = json.loads((out / "result.json").read_text())
+    assert [row["score_m"] for row in result["starts_tried"]] == list(scores)
+    assert f"--seed 5 --starts {len(scores)}" in result["command"]
+    # The last of them to be ready decides how long it took.
+    assert trained.minutes == result["minutes"] == pytest.approx(len(scores) + 0.5)
+    card = (out / "model_card.md").read_text()
+    assert f"the training with seed {100 + best}, the best of {len(scores)}" in card
+    with pytest.raises(UsageError, match="is finished"):
+        several.train(resume=True)
+
+
+def test_no_two_seeds_share_a_start(tmp_path, monkeypatch):
+    seeds = []
+
+    def train(_recipe, _robot, seed, _out, **_options):
+        seeds.append(seed)
+        raise UsageError("no time for that")
+
+    monkeypatch.setattr(module, "train", train)
+    for seed in range(4):
+        for number in range(3):
+            with pytest.raises(UsageError, match="no time"):
+                Starts(TINY, ROBOT, seed, tmp_path, 3).work(number)
+    assert len(seeds) == len(set(seeds)) == 12
+
+
+def test_starts_are_compared_on_seeds_that_chose_none_of_their_snapshots():
+    assert not set(DECIDING_SEEDS) & {FIRST_SEED, *FINAL_SEEDS}
+    assert max(DECIDING_SEEDS) < 1000
+
+
+def test_no_height_between_two_commands_is_missed():
+    heights = every_centimetre((0.435, 0.225, 0.3))
+    assert (heights[0], heights[-1]) == (0.225, 0.435)
+    steps = [high - low for low, high in itertools.pairwise(heights)]
+    assert steps == pytest.approx([0.01] * 21)
+    assert every_centimetre((0.3,)) == (0.3,)
+
+
+def test_one_training_is_none_of_several(tmp_path):
+    with pytest.raises(UsageError, match="at least 2"):
+        Starts(TINY, ROBOT, 0, tmp_path / "run", 1).train()
+    assert not (tmp_path / "run").exists()
+
+
+_SEVERAL = """
+import dataclasses, sys
+from pathlib import Path
+from hopping_leg.learn.starts import Starts
+from tests.learn.learners import ROBOT, TINY
+recipe = dataclasses.replace(TINY, steps=1600, checkpoint_seconds=0.0, judge_commands=(0.3,))
+Starts(recipe, ROBOT, 1, Path(sys.argv[1]), 2, quiet=True).train(resume=True)
+"""
+
+
+def checkpoints(out):
+    return {path for k in range(2) for path in list_checkpoints(out / f"start-{k}" / "checkpoints")}
+
+
+@pytest.mark.slow
+def test_workers_end_with_who_began_them_and_go_on_with_the_next(tmp_path):
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    command = [sys.executable, "-c", _SEVERAL]
+    subprocess.run([*command, str(tmp_path / "alone")], check=True, env=environment)
+    out = tmp_path / "killed"
+    process = subprocess.Popen([*command, str(out)], env=environment)
+    while process.poll() is None and not checkpoints(out):
+        time.sleep(0.01)
+    process.kill()
+    process.wait()
+    time.sleep(2)
+    left = checkpoints(out)
+    assert left
+    time.sleep(2)
+    assert checkpoints(out) == left, "a worker goes on without the process that began it"
+    subprocess.run([*command, str(out)], check=True, env=environment)
+    for name in ("policy.onnx", "start-0/policy.onnx", "start-1/policy.onnx"):
+        assert (out / name).read_bytes() == (tmp_path / "alone" / name).read_bytes()
