@@ -65,7 +65,7 @@ def test_what_is_missing_is_trained_by_the_clock(monkeypatch, complete, robot):
     assert result["minutes_max"] == 2.0
 
 
-def test_of_several_starts_the_best_counts_and_all_are_on_the_curve(monkeypatch, tmp_path, robot):
+def test_of_several_starts_the_one_that_went_on_is_judged(monkeypatch, tmp_path, robot):
     begun = []
 
     class Fake:
@@ -75,17 +75,13 @@ def test_of_several_starts_the_best_counts_and_all_are_on_the_curve(monkeypatch,
 
         def train(self, *, resume):
             assert not resume
-            tried = []
-            for k in range(2):
-                run = self.out / f"start-{k}"
-                (run / "snapshots").mkdir(parents=True)
-                (run / "snapshots" / "000000000500.onnx").write_bytes(b"snapshot")
-                history = [{"steps": 500, "minutes": 0.5}]
-                tried.append({"seed": 14 + k, "minutes": 1.0, "steps": 9, "exam_scores_m": []})
-                result = json.dumps({**tried[k], "history": history})
-                (run / "result.json").write_text(result, encoding="utf-8")
-                tried[k] |= {"score_m": 0.004 - k / 1000, "trials": []}
-            result = {**tried[1], "seed": 7, "starts_tried": tried, "chosen_start": 1}
+            run = self.out / "start-1"
+            (run / "snapshots").mkdir(parents=True)
+            (run / "snapshots" / "000000000500.onnx").write_bytes(b"snapshot")
+            history = [{"steps": 500, "minutes": 0.5}]
+            result = {"seed": 15, "minutes": 1.0, "steps": 9, "history": history}
+            (run / "result.json").write_text(json.dumps(result), encoding="utf-8")
+            result |= {"seed": 7, "chosen_start": 1, "starts": [{"seed": 14}, {"seed": 15}]}
             (self.out / "result.json").write_text(json.dumps(result), encoding="utf-8")
             (self.out / "policy.onnx").write_bytes(b"best")
 
@@ -98,5 +94,5 @@ def test_of_several_starts_the_best_counts_and_all_are_on_the_curve(monkeypatch,
     assert begun == [(7, 2, 3.0, 1)]
     (run,) = result["runs"]
     assert (run["seed"], run["chosen_start"]) == (7, 1)
-    assert [(s["seed"], s["score_m"]) for s in run["starts"]] == [(14, 0.004), (15, 0.003)]
-    assert [point["seed"] for point in result["curve"]] == [14, 15]
+    assert [start["seed"] for start in run["starts"]] == [14, 15]
+    assert [(point["seed"], point["steps"]) for point in result["curve"]] == [(7, 500)]

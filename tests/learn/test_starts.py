@@ -11,49 +11,84 @@ from pathlib import Path
 import pytest
 
 from hopping_leg.errors import UsageError
+from hopping_leg.learn import judge
 from hopping_leg.learn import starts as module
 from hopping_leg.learn.checkpoint import list_checkpoints
 from hopping_leg.learn.judge import DECIDING_SEEDS, FINAL_SEEDS, FIRST_SEED, every_centimetre
 from hopping_leg.learn.run_folder import RunFolder
 from hopping_leg.learn.starts import Starts
-from tests.learn.learners import ROBOT, TINY
+from hopping_leg.learn.train import train
+from tests.learn.learners import ROBOT, TINY, TINY_PRECISE
 
 
-def finished(out, scores):
-    """Return what works in the place of trainings and leaves what they leave."""
+def leave(folder, *, score, minutes, policy):
+    """Leave what a start leaves: what decides, and a finished training if it has a policy."""
+    folder.path.mkdir(exist_ok=True)
+    decision = {"seed": folder.config["seed"], "score_m": score, "minutes": minutes}
+    folder.write("decision.json", decision)
+    if policy:
+        selected = {"steps": 800, "minutes": 0.9, "score_m": 1.0, "finalists": [1]}
+        selected |= {"trials": [], "seeds": [501]}
+        result = {"command": "", "minutes": 9.0, "steps": 1600, "history": [1]}
+        folder.write("result.json", {**folder.config, **result, "selected": selected})
+        folder.policy.write_bytes(policy)
+
+
+@pytest.mark.parametrize("finished", [True, False])
+@pytest.mark.parametrize(("scores", "best"), [((0.004, 0.003), 1), ((0.003, 0.004, 0.02), 0)])
+def test_the_best_goes_on_with_the_threads_of_all(scores, best, finished, tmp_path, monkeypatch):
+    out, trained = tmp_path / "run", []
+
+    def start(number):
+        return RunFolder(out / f"start-{number}", TINY, ROBOT, 100 + number, None)
 
     def work(_work, count):
-        for number, start in enumerate(scores):
-            assert number < count
-            folder = RunFolder(out / f"start-{number}", TINY, ROBOT, 100 + number, None)
-            folder.path.mkdir()
-            selected = {"steps": 800, "minutes": 0.9, "score_m": 1.0, "finalists": [1]}
-            selected |= {"trials": [], "seeds": [501]}
-            result = {"command": "", "minutes": 1.0 + number, "steps": 1600, "history": [1]}
-            folder.write("result.json", {**folder.config, **result, "selected": selected})
-            decision = {"score_m": start, "deciding_minutes": 0.5, "trials": []}
-            folder.write("decision.json", decision)
-            folder.policy.write_bytes(b"policy %d" % number)
+        assert count == len(scores)
+        for number, score in enumerate(scores):
+            policy = b"policy %d" % number if finished else None
+            leave(start(number), score=score, minutes=3.0 + number, policy=policy)
 
-    return work
+    def train(_recipe, _robot, _seed, folder, **options):
+        number = int(folder.name[-1])
+        trained.append((number, options["threads"]))
+        leave(start(number), score=0, minutes=0, policy=b"policy %d" % number)
+        leave(start(number), score=scores[number], minutes=3.0 + number, policy=None)
 
-
-@pytest.mark.parametrize(("scores", "best"), [((0.004, 0.003), 1), ((0.003, 0.004, 0.02), 0)])
-def test_the_best_where_they_are_compared_is_kept(scores, best, tmp_path, monkeypatch):
-    out = tmp_path / "run"
-    monkeypatch.setattr(module, "work_here", finished(out, scores))
-    several = Starts(TINY, ROBOT, 5, out, len(scores), quiet=True)
-    trained = several.train()
-    assert trained.policy.read_bytes() == b"policy %d" % best
-    result = json.loads((out / "result.json").read_text())
-    assert [row["score_m"] for row in result["starts_tried"]] == list(scores)
-    assert f"--seed 5 --starts {len(scores)}" in result["command"]
-    # The last of them to be ready decides how long it took.
-    assert trained.minutes == result["minutes"] == pytest.approx(len(scores) + 0.5)
+    monkeypatch.setattr(module, "work_here", work)
+    monkeypatch.setattr(module, "train", train)
+    several = Starts(TINY, ROBOT, 5, out, len(scores), threads=2, quiet=True)
+    result = several.train()
+    assert trained == ([] if finished else [(best, 2 * len(scores))])
+    assert result.policy.read_bytes() == b"policy %d" % best
+    stored = json.loads((out / "result.json").read_text())
+    assert [row["score_m"] for row in stored["starts"]] == list(scores)
+    assert f"--seed 5 --starts {len(scores)}" in stored["command"]
+    # Who is ready first waits for the last.
+    assert result.minutes == stored["minutes"] == 9.0 + (len(scores) - 1 - best)
     card = (out / "model_card.md").read_text()
     assert f"the training with seed {100 + best}, the best of {len(scores)}" in card
     with pytest.raises(UsageError, match="is finished"):
         several.train(resume=True)
+
+
+def test_a_start_stops_at_the_exam_of_its_teacher_and_goes_on_from_there(tmp_path, monkeypatch):
+    monkeypatch.setattr(judge, "_SECONDS", 0.5)
+    monkeypatch.setattr(TINY_PRECISE.__class__, "examine", lambda *_args: 0.005)
+    several = Starts(TINY_PRECISE, ROBOT, 1, tmp_path, 2, quiet=True)
+    several.work(1)
+    run = several.folder(1)
+    decision = json.loads((run / "decision.json").read_text())
+    assert (decision["seed"], decision["score_m"]) == (3, 0.005)
+    (last,) = list_checkpoints(run / "checkpoints")
+    stopped = int(last.name.split("-")[-1])
+    # Each of three teachers learns for a third of 0.4 of the steps.
+    assert TINY_PRECISE.steps * 0.4 / 3 <= stopped < TINY_PRECISE.steps / 2
+    assert not (run / "policy.onnx").exists()
+    several.work(1)
+    assert list_checkpoints(run / "checkpoints") == [last]
+    alone = train(TINY_PRECISE, ROBOT, 3, tmp_path / "alone", quiet=True)
+    going_on = train(TINY_PRECISE, ROBOT, 3, run, resume=True, quiet=True)
+    assert going_on.policy.read_bytes() == alone.policy.read_bytes()
 
 
 def test_no_two_seeds_share_a_start(tmp_path, monkeypatch):

@@ -59,9 +59,9 @@ class Options:
     threads: int = 1
     """Threads of the networks and the physics."""
     starts: int = 1
-    """Trainings side by side, each with a seed and in a process of its own, of which the best
-    policy is kept. A training may fail by bad luck; two of one thread each hardly fail both, and
-    take two cores no longer than one."""
+    """Trainings that begin side by side, each with a seed and in a process of its own. As soon as
+    the recipe can tell how they will end, at the exam of their teachers or else at the end, the
+    best goes on alone with the threads of all. A training may fail by bad luck; two hardly do."""
     log: Literal["tensorboard", "wandb", "trackio"] = "tensorboard"
     """Who gets the curves besides TensorBoard; wandb and trackio are packages of their own."""
     json: Path | None = None

@@ -23,7 +23,7 @@ from hopping_leg.robot.parameters import Robot
 JUDGING_SEED = 1000
 """First of the evaluation seeds."""
 
-_OF_A_START = ("seed", "minutes", "steps", "exam_scores_m", "score_m")
+_OF_STARTS = ("starts", "chosen_start")
 
 
 def bench_training(
@@ -56,7 +56,7 @@ def bench_training(
     Returns:
         Per training seed: minutes, selection included, how its teachers did in their exams, its
         starts if there were several, the selected policy's summary rows, and the curve of
-        (minutes, worst and mean |median error| over commands) of all snapshots of all starts.
+        (minutes, worst and mean |median error| over commands) of all snapshots.
     """
     runs = []
     for seed in training_seeds:
@@ -72,23 +72,16 @@ def bench_training(
         on_progress(f"judging {recipe.name} with seed {seed}")
         result = read_result(folder)
         content = (folder / "policy.onnx").read_bytes()
-        tried = {"chosen_start": result["chosen_start"]} if "chosen_start" in result else {}
+        learnt = folder / f"start-{result['chosen_start']}" if starts > 1 else folder
         runs.append(
             {
                 "seed": seed,
                 "minutes": result["minutes"],
                 "steps": result["steps"],
                 "exam_scores_m": result.get("exam_scores_m", []),
-                **tried,
-                "starts": [
-                    {key: row[key] for key in _OF_A_START} for row in result.get("starts_tried", [])
-                ],
+                **{key: result[key] for key in _OF_STARTS if key in result},
                 "selected": _judge({"selected": content}, recipe, robot, evaluation_seeds),
-                "curve": [
-                    point
-                    for run in (sorted(folder.glob("start-*")) or [folder])
-                    for point in _curve(run, recipe, robot, evaluation_seeds)
-                ],
+                "curve": _curve(learnt, recipe, robot, evaluation_seeds),
             }
         )
     return {
@@ -105,7 +98,7 @@ def bench_training(
             for run in runs
             for row in run["selected"]
         ],
-        "curve": [point for run in runs for point in run["curve"]],
+        "curve": [{"seed": run["seed"], **point} for run in runs for point in run["curve"]],
         "minutes_max": max(run["minutes"] for run in runs),
         "worst_abs_median_error_m": max(
             abs(row["median_error_m"]) for run in runs for row in run["selected"]
@@ -124,7 +117,6 @@ def _curve(
     times = {f"{row['steps']:012d}": row["minutes"] for row in result["history"]}
     return [
         {
-            "seed": result["seed"],
             "steps": int(name),
             "minutes": times[name],
             **over_commands([row for row in rows if row["controller"] == name]),

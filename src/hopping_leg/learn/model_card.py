@@ -57,15 +57,14 @@ def starts(result: dict[str, Any]) -> str:
     Args:
         result: Content of ``result.json``.
     """
-    if "starts_tried" not in result:
+    if "starts" not in result:
         return ""
-    rows = result["starts_tried"]
-    scores = ", ".join(f"{1000 * row['score_m']:.1f} (seed {row['seed']})" for row in rows)
+    rows = result["starts"]
+    scores = ", ".join(f"{1000 * row['score_m']:.1f} mm (seed {row['seed']})" for row in rows)
     chosen = rows[result["chosen_start"]]["seed"]
     return (
-        f"- Starts: the training with seed {chosen}, the best of {len(rows)} in trials at every"
-        f" centimetre on the\n  selection seeds {', '.join(map(str, result['deciding_seeds']))};"
-        f" their scores, error and scatter in mm: {scores}.\n"
+        f"- Starts: the training with seed {chosen}, the best of {len(rows)} when they could be"
+        f" compared, less being better:\n  {scores}.\n"
     )
 
 

@@ -56,7 +56,7 @@ class PreciseRecipe(FastRecipe):
     some never come back to the low ones."""
     epochs: int = 8
     """Passes over a rollout."""
-    steps: int = 15_000_000
+    steps: int = 10_000_000
     """Control steps of experience in all, summed over the legs."""
     judge_every: int = 500_000
     """Control steps between two trials of the policy, for checkpoint selection."""
@@ -66,7 +66,7 @@ class PreciseRecipe(FastRecipe):
     """Heights of those trials, m."""
     teaching: float = 0.5
     """Share of the training in which teachers learn at most; in the rest the policy does."""
-    teachers: int = 3
+    teachers: int = 2
     """How many learn at most, one after the other; the best of them teaches."""
     exam_at: tuple[float, ...] = (1.0,)
     """Shares of its time after which each is examined, the last of them 1; the best exam counts."""
@@ -223,6 +223,11 @@ class PreciseRecipe(FastRecipe):
             taught: Share of the policy's learning that is done, negative before it.
         """
         return int(taught >= 0)
+
+    def promise(self, model: Any) -> float | None:  # noqa: ANN401
+        """Return the first teacher's score in its last exam, m, once it has learnt."""
+        taken = len(self.exam_at)
+        return float(model.exams[taken - 1]) if len(model.exams) >= taken else None
 
     def findings(self, model: Any) -> dict[str, Any]:  # noqa: ANN401
         """Return how the teachers did in their exams."""

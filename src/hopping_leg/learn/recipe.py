@@ -71,6 +71,13 @@ class Recipe(ABC):
         Called before every rollout, also of a resumed training: depend on ``share`` alone.
         """
 
+    def promise(self, model: Any) -> float | None:  # noqa: ANN401
+        """Return how bad a training is likely to end, m, if that can be told before its end.
+
+        None as long as it cannot; trainings side by side are compared as soon as it can.
+        """
+        return None
+
     def findings(self, model: Any) -> dict[str, Any]:  # noqa: ANN401
         """Return what else the result of a finished training tells, as JSON values."""
         return {}

@@ -1,7 +1,8 @@
-"""Train from several starts side by side and keep the policy of the best.
+"""Train from several starts side by side, and go on with the best.
 
-A training may fail by bad luck, as its teachers may. Trainings of one thread each, one per core,
-also learn more in the same time than one of several threads.
+A training may fail by bad luck, its teacher above all, and trainings of one thread each learn more
+on as many cores than one of several threads. So all begin, each in a process of its own; as soon as
+the recipe can tell how each is likely to end, the best one goes on alone, with the threads of all.
 """
 
 import json
@@ -27,6 +28,10 @@ from hopping_leg.trace import write_atomically
 _DECISION = "decision.json"
 
 
+class _ComparableError(Exception):
+    """A training can be compared with the others."""
+
+
 @dataclass(frozen=True)
 class Starts:
     """Several trainings of a recipe that differ in their seeds.
@@ -36,9 +41,9 @@ class Starts:
         robot: The leg.
         seed: Of all of them together; the k-th of n has seed ``n * seed + k``, so that no two
             seeds share a start.
-        out: Folder in which each has its own, and in which the best policy is left.
+        out: Folder in which each has its own, and in which the policy is left.
         count: How many.
-        minutes: Wall-clock time after which each stops learning; None for the recipe's steps.
+        minutes: Wall-clock time after which learning stops; None for the recipe's steps.
         threads: Of each.
         quiet: Show no progress.
         log: Who gets the curves besides TensorBoard.
@@ -55,7 +60,7 @@ class Starts:
     log: Log = "tensorboard"
 
     def train(self, *, resume: bool = False) -> Trained:
-        """Train all of them, each in a process of its own, and choose.
+        """Begin all of them, finish the best one.
 
         Args:
             resume: Go on with those in ``out``; without any, begin.
@@ -71,74 +76,91 @@ class Starts:
         recipe = fit(self.recipe, self.robot)
         folder = RunFolder(self.out, recipe, self.robot, self.seed, self.minutes, starts=self.count)
         folder.begin(resume=resume)
-        work_here(self.work, self.count)
-        return self._choose(folder)
+        if any(self._decision(number) is None for number in range(self.count)):
+            work_here(self.work, self.count)
+        return self._finish(folder)
 
     def folder(self, number: int) -> Path:
         """Return the folder of a start."""
         return self.out / f"start-{number}"
 
     def work(self, number: int) -> None:
-        """Train one of them, or go on, and try its policy where the starts are compared.
+        """Train one of them, or go on, until it can be compared; leave what decides.
 
         Only the first shows its progress: all take about as long.
         """
-        folder, seed = self.folder(number), self.count * self.seed + number
-        policy = folder / "policy.onnx"
-        if not policy.exists():
-            train(
-                self.recipe,
-                self.robot,
-                seed,
-                folder,
-                resume=True,
-                minutes=self.minutes,
-                threads=self.threads,
-                quiet=self.quiet or number > 0,
-                log=self.log,
-            )
-        if not (folder / _DECISION).exists():
-            began = time.monotonic()
-            commands = every_centimetre(fit(self.recipe, self.robot).judge_commands)
-            verdicts = judge(
-                Policy(policy.read_bytes(), policy.stem, self.recipe.name),
-                self.robot,
-                commands,
-                DECIDING_SEEDS,
-                self.recipe.task.rate,
-                self.threads,
-            )
-            decision = {
-                "score_m": score(verdicts),
-                "deciding_minutes": (time.monotonic() - began) / 60,
-                "trials": as_rows(verdicts),
-            }
-            write_json(folder / _DECISION, decision)
+        if self._decision(number) is not None:
+            return
+        folder = self.folder(number)
+        try:
+            if not (folder / "policy.onnx").exists():
+                self._train(number, self.threads, quiet=number > 0, compare=True)
+            decision = self._try(folder)
+        except _ComparableError as promise:
+            score_m, minutes = promise.args
+            decision = {"score_m": score_m, "minutes": minutes}
+        seed = self._seed(number)
+        write_json(folder / _DECISION, {"seed": seed, **decision})
 
-    def _choose(self, folder: RunFolder) -> Trained:
-        rows = [self._row(number) for number in range(self.count)]
-        best = min(range(self.count), key=lambda number: float(rows[number]["score_m"]))
-        chosen = self.folder(best)
+    def _train(self, number: int, threads: int, *, quiet: bool = False, compare: bool) -> None:
+        train(
+            self.recipe,
+            self.robot,
+            self._seed(number),
+            self.folder(number),
+            resume=True,
+            minutes=self.minutes,
+            threads=threads,
+            quiet=self.quiet or quiet,
+            log=self.log,
+            on_promise=_stop if compare else None,
+        )
+
+    def _seed(self, number: int) -> int:
+        return self.count * self.seed + number
+
+    def _try(self, folder: Path) -> dict[str, Any]:
+        """Try the policy of a finished training at every centimetre."""
+        began = time.monotonic()
+        policy = Policy((folder / "policy.onnx").read_bytes(), folder.name, self.recipe.name)
+        commands = every_centimetre(fit(self.recipe, self.robot).judge_commands)
+        rate = self.recipe.task.rate
+        verdicts = judge(policy, self.robot, commands, DECIDING_SEEDS, rate, self.threads)
+        minutes = read_result(folder)["minutes"] + (time.monotonic() - began) / 60
+        return {"score_m": score(verdicts), "minutes": minutes, "trials": as_rows(verdicts)}
+
+    def _decision(self, number: int) -> dict[str, Any] | None:
+        """Return what decides about a start: seed, score in m, and minutes until then."""
+        file = self.folder(number) / _DECISION
+        if not file.exists():
+            return None
+        decision: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        return decision
+
+    def _finish(self, folder: RunFolder) -> Trained:
+        """Go on with the best of them where it is not finished, and keep its policy."""
+        decisions = [d for number in range(self.count) if (d := self._decision(number))]
+        chosen = min(range(self.count), key=lambda number: float(decisions[number]["score_m"]))
+        best = self.folder(chosen)
+        if not (best / "policy.onnx").exists():
+            self._train(chosen, self.count * self.threads, compare=False)
+        # The last of them to be comparable is waited for.
+        slowest = max(decision["minutes"] for decision in decisions)
+        own = read_result(best)
         result = {
-            **read_result(chosen),
+            **own,
             **folder.config,
             "command": folder.command,
-            "minutes": max(row["minutes"] + row["deciding_minutes"] for row in rows),
-            "starts_tried": rows,
-            "deciding_seeds": list(DECIDING_SEEDS),
-            "chosen_start": best,
+            "minutes": max(own["minutes"] + slowest - decisions[chosen]["minutes"], slowest),
+            "starts": decisions,
+            "chosen_start": chosen,
         }
         folder.write("result.json", result)
         write_card(folder.path)
-        write_atomically(folder.policy, (chosen / "policy.onnx").read_bytes())
-        trials = rows[best]["trials"]
-        return Trained(folder.policy, folder.path, result["minutes"], result["steps"], trials)
+        write_atomically(folder.policy, (best / "policy.onnx").read_bytes())
+        trials = own["selected"]["trials"]
+        return Trained(folder.policy, folder.path, result["minutes"], own["steps"], trials)
 
-    def _row(self, number: int) -> dict[str, Any]:
-        """Return how a start did, as JSON values."""
-        folder = self.folder(number)
-        result = read_result(folder)
-        decision = json.loads((folder / _DECISION).read_text(encoding="utf-8"))
-        kept = ("seed", "minutes", "steps")
-        exams = result.get("exam_scores_m", [])
-        return {**{key: result[key] for key in kept}, "exam_scores_m": exams, **decision}
+
+def _stop(promise: float, minutes: float) -> None:
+    raise _ComparableError(promise, minutes)

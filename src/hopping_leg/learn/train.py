@@ -60,6 +60,7 @@ def train(
     quiet: bool = False,
     log: Log = "tensorboard",
     on_snapshot: Callable[[int, float], None] = lambda _steps, _score: None,
+    on_promise: Callable[[float, float], None] | None = None,
 ) -> Trained:
     """Train a controller and leave its policy, card and history in ``out``.
 
@@ -80,6 +81,9 @@ def train(
         log: Who gets the curves besides TensorBoard.
         on_snapshot: Called with the steps and the score, m, of every snapshot that was tried; what
             it raises ends the training.
+        on_promise: Called once, as soon as the recipe can tell how bad the training is likely to
+            end, with that in m and with the minutes so far, a checkpoint being written; what it
+            raises ends the training.
 
     Raises:
         UsageError: ``out`` holds a run that cannot be continued like this, or what ``log`` needs
@@ -94,6 +98,7 @@ def train(
     trainer = Trainer(recipe, robot, seed, folder, minutes, threads)
     trainer.model.set_logger(make_logger(folder.path, log, folder.config))
     trainer.on_snapshot = on_snapshot
+    trainer.on_promise = on_promise
     if tree is not None:
         trainer.restore(tree)
     with TrainingProgress(f"{recipe.name} seed {seed}", quiet=quiet) as progress:
@@ -150,6 +155,7 @@ class Trainer:
         self._shown = 0.0
         self._progress: TrainingProgress | None = None
         self.on_snapshot: Callable[[int, float], None] = lambda _steps, _score: None
+        self.on_promise: Callable[[float, float], None] | None = None
 
     @property
     def elapsed(self) -> float:
@@ -207,10 +213,18 @@ class Trainer:
     def _at_boundary(self) -> None:
         share = 1 - self.model._current_progress_remaining
         self.recipe.anneal(self.model, self.env, share)
+        self._tell_promise()
         if share >= self.recipe.judge_from and self.model.num_timesteps >= self.selection.next_at:
             self._judge()
         if time.monotonic() - self._saved >= self.recipe.checkpoint_seconds:
             self.checkpoint()
+
+    def _tell_promise(self) -> None:
+        promise, tell = self.recipe.promise(self.model), self.on_promise
+        if promise is not None and tell is not None:
+            self.on_promise = None
+            self.checkpoint()
+            tell(promise, self.elapsed / 60)
 
     def checkpoint(self) -> None:
         """Write a checkpoint; only at a boundary does it continue exactly."""

@@ -80,8 +80,7 @@ class Training:
     threads: int = 2
     """Of torch and physics, of each start."""
     starts: int = 1
-    """Trainings side by side for every seed, of which the best policy counts, as for
-    ``hop train``."""
+    """Trainings that begin side by side for every seed, as for ``hop train``."""
     out: Path = Path("runs/bench-training")
     """Where the trainings are kept; finished ones are not repeated, killed ones go on."""
     json: Path | None = None
