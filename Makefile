@@ -74,27 +74,32 @@ results: $(STAMP)
 	$(BIN)/hop tune energy-shaping --start runs/flying-0/gains.toml --seed 1 --flight 0.52 --generations 40 --population 16 \
 	  --step 0.1 --out runs/flying --json docs/results/energy_shaping_flying.json
 	$(BIN)/hop bench training --json docs/results/training.json
-	$(BIN)/hop bench training --recipe precise --minutes 13.5 --steps 20000000 --training-seeds 0 1 2 3 4 \
+	$(BIN)/hop bench training --recipe precise --starts 2 --threads 1 --minutes 13.5 --steps 20000000 --training-seeds 0 1 2 3 4 \
 	  --out runs/bench-quarter --json docs/results/training-quarter.json
 	$(BIN)/hop evaluate precise \
 	  $(foreach s,0 1 2 3 4,quarter-seed$(s)=runs/bench-quarter/precise-seed$(s)/policy.onnx) --seeds 5 --floor soft --no-video \
 	  --json docs/results/precise-seeds.json --commands $(HEIGHTS),0.41,0.42,0.43,0.44,0.45
-	$(BIN)/hop bench training --recipe precise --set reward.jerk=0.4 teachers=2 --minutes 13.5 --steps 20000000 --training-seeds 0 1 2 3 4 \
+	$(BIN)/hop bench training --recipe precise --set teachers=3 --minutes 13.5 --steps 20000000 --training-seeds 0 1 2 3 4 \
+	  --out runs/bench-quarter-one-start --json docs/results/training-quarter-one-start.json
+	$(BIN)/hop evaluate precise \
+	  $(foreach s,0 1 2 3 4,quarter-seed$(s)=runs/bench-quarter-one-start/precise-seed$(s)/policy.onnx) --seeds 5 --floor soft --no-video \
+	  --json docs/results/precise-seeds-one-start.json --commands $(HEIGHTS),0.41,0.42,0.43,0.44,0.45
+	$(BIN)/hop bench training --recipe precise --set reward.jerk=0.4 --minutes 13.5 --steps 20000000 --training-seeds 0 1 2 3 4 \
 	  --out runs/bench-quarter-0.4 --json docs/results/training-quarter-jerk-0.4.json
-	$(BIN)/hop bench training --recipe precise --set reward.jerk=0.4 teachers=2 --minutes 13.5 --steps 20000000 --training-seeds 3 --out runs/bench-quarter-again
+	$(BIN)/hop bench training --recipe precise --set reward.jerk=0.4 --minutes 13.5 --steps 20000000 --training-seeds 3 --out runs/bench-quarter-again
 	$(BIN)/hop evaluate precise \
 	  $(foreach s,0 1 2 3 4,quarter-seed$(s)=runs/bench-quarter-0.4/precise-seed$(s)/policy.onnx) \
 	  again-seed3=runs/bench-quarter-again/precise-seed3/policy.onnx --seeds 5 --floor soft --no-video \
 	  --json docs/results/precise-seeds-jerk-0.4.json --commands $(HEIGHTS),0.41,0.42,0.43,0.44,0.45
-	$(BIN)/hop train --recipe precise --threads 2 --minutes 13.5 --steps 20000000 --set reward.jerk=0.4 teachers=2 epochs=4 --out runs/parts/four-passes
+	$(BIN)/hop train --recipe precise --threads 2 --minutes 13.5 --steps 20000000 --set reward.jerk=0.4 epochs=4 --out runs/parts/four-passes
 	$(BIN)/hop evaluate four-passes=runs/parts/four-passes/policy.onnx --seeds 5 --floor soft --no-video \
 	  --json docs/results/precise-passes.json --commands $(HEIGHTS),0.41,0.42,0.43,0.44,0.45
-	$(BIN)/hop bench training --recipe precise --set reward.jerk=0.3 teachers=2 --minutes 13.5 --steps 20000000 --training-seeds 0 1 2 3 4 \
+	$(BIN)/hop bench training --recipe precise --set reward.jerk=0.3 --minutes 13.5 --steps 20000000 --training-seeds 0 1 2 3 4 \
 	  --out runs/bench-quarter-0.3 --json docs/results/training-quarter-jerk-0.3.json
 	$(BIN)/hop evaluate precise \
 	  $(foreach s,0 1 2 3 4,quarter-seed$(s)=runs/bench-quarter-0.3/precise-seed$(s)/policy.onnx) --seeds 5 --floor soft --no-video \
 	  --json docs/results/precise-seeds-jerk-0.3.json --commands $(HEIGHTS),0.41,0.42,0.43,0.44,0.45
-	$(BIN)/hop bench training --recipe precise --set $(FORMER) teachers=2 --minutes 13.5 --steps 20000000 --training-seeds 0 1 2 3 4 \
+	$(BIN)/hop bench training --recipe precise --set $(FORMER) --minutes 13.5 --steps 20000000 --training-seeds 0 1 2 3 4 \
 	  --out runs/bench-quarter-former
 	$(BIN)/hop evaluate precise \
 	  $(foreach s,0 1 2 3 4,quarter-seed$(s)=runs/bench-quarter-former/precise-seed$(s)/policy.onnx) --seeds 5 --floor soft --no-video \
@@ -109,7 +114,7 @@ results: $(STAMP)
 	  --commands $(HEIGHTS)
 	$(BIN)/hop evaluate 0.28-seed0=runs/teaching/0.28-seed0/policy.onnx 0.38-seed2=runs/teaching/0.38-seed2/policy.onnx \
 	  0.55-seed0=runs/teaching/0.55-seed0/policy.onnx --suite robustness --seeds 3 --out runs/results/robustness-teaching --json docs/results/teaching-robustness.json
-	$(BIN)/hop train --recipe precise --seed 3 --steps 12000000 --set $(FORMER) teachers=2 teaching=0.42 imitation.knots=16 --out runs/precise
+	$(BIN)/hop train --recipe precise --seed 3 --steps 12000000 --set $(FORMER) teaching=0.42 imitation.knots=16 --out runs/precise
 	$(BIN)/hop bench limits --controllers precise adaptive recurrent energy-shaping --teacher runs/precise --json docs/results/limits.json
 	$(BIN)/hop bench reach --json docs/results/reach.json
 	$(BIN)/hop train --recipe precise --steps 9000000 --set $(FORMER) teachers=1 epochs=4 task.command_skew=1 teaching=0.55 --observation three-samples --heights 0.2 0.42 --out runs/fifteen

@@ -6,7 +6,7 @@ nothing had happened.
 
 Examples:
   hop train --recipe fast --minutes 5
-  hop train --recipe precise --starts 2 --minutes 13
+  hop train --recipe precise --starts 2 --minutes 13.5 --steps 20000000
   hop train --recipe paper --seed 1 --out runs/mine
   hop train --recipe paper --seed 1 --out runs/mine --resume
   hop train --recipe fast --out runs/shared --log wandb
