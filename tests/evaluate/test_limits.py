@@ -6,6 +6,7 @@ import pytest
 
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Candidate
+from hopping_leg.evaluate import limits as module
 from hopping_leg.evaluate.keeper import Keeper
 from hopping_leg.evaluate.limits import CONDITIONS, LimitsStudy, condense, measure_limits
 from hopping_leg.sim import NOTHING, Disturbance
@@ -24,6 +25,24 @@ def test_one_disturbance_is_taken_away_or_left_alone(words, number):
     assert asdict(by_name(f"no {words}").disturbance) == {**everything, number: 0.0}
     alone = by_name(f"{words} alone").disturbance
     assert asdict(alone) == {**nothing, number: everything[number]}
+
+
+def test_a_slow_ground_is_the_robots_own_but_slower(robot, spring, tmp_path, monkeypatch):
+    grounds = []
+
+    def stand(_candidates, setup, **_options):
+        grounds.append((setup.robot.contact.time_constant, setup.robot.contact.damping_ratio))
+        raise UsageError("no time for that")
+
+    monkeypatch.setattr(module, "evaluate", stand)
+    for words in ("all of it", "all of it, ground twice as slow", "nothing, ground twice as slow"):
+        study = LimitsStudy(robot, (0.30,), conditions=(by_name(words),))
+        with pytest.raises(UsageError, match="no time"):
+            measure_limits([Candidate("spring", spring)], study, Keeper(tmp_path))
+    ground = robot.contact
+    slow = (2 * ground.time_constant, ground.damping_ratio)
+    assert grounds == [(ground.time_constant, ground.damping_ratio), slow, slow]
+    assert by_name("nothing, ground twice as slow").disturbance == NOTHING
 
 
 def test_a_leg_that_nothing_disturbs_repeats_its_hops(robot, spring, tmp_path):

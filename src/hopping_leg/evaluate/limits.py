@@ -16,6 +16,7 @@ from hopping_leg.control import Setup
 from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range, fingerprint
 from hopping_leg.evaluate.keeper import Keeper
 from hopping_leg.evaluate.result import Summary
+from hopping_leg.evaluate.robustness.case import times
 from hopping_leg.evaluate.runner import evaluate, software_versions
 from hopping_leg.evaluate.runs import safe_name
 from hopping_leg.robot.parameters import Robot
@@ -32,11 +33,13 @@ class Condition:
         name: In tables and file names.
         disturbance: Noise and delay.
         floor: ``soft``, the robot's contact, or ``stiff``.
+        slowness: Of a soft ground, times the robot's contact time constant; nobody is told.
     """
 
     name: str
     disturbance: Disturbance
     floor: str = "soft"
+    slowness: float = 1.0
 
 
 CONDITIONS = (
@@ -49,6 +52,8 @@ CONDITIONS = (
     Condition("delay alone", replace(NOTHING, delay_probability=_FULL.delay_probability)),
     Condition("nothing", NOTHING),
     Condition("all of it, stiff ground", _FULL, floor="stiff"),
+    Condition("all of it, ground twice as slow", _FULL, slowness=2.0),
+    Condition("nothing, ground twice as slow", NOTHING, slowness=2.0),
 )
 """The paper's noise and delay, with one less, one alone, none, and on other ground."""
 
@@ -132,7 +137,8 @@ def measure_limits(
 
 
 def _hop(candidate: Candidate, study: LimitsStudy, condition: Condition) -> dict[str, Any]:
-    setup = Setup(study.robot, condition.disturbance, threads=study.threads)
+    robot = times(study.robot, condition.slowness, "contact.time_constant")
+    setup = Setup(robot, condition.disturbance, threads=study.threads)
     judged = evaluate(
         [candidate],
         setup,
