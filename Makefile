@@ -115,14 +115,16 @@ results: $(STAMP)
 	$(BIN)/hop evaluate 0.28-seed0=runs/teaching/0.28-seed0/policy.onnx 0.38-seed2=runs/teaching/0.38-seed2/policy.onnx \
 	  0.55-seed0=runs/teaching/0.55-seed0/policy.onnx --suite robustness --seeds 3 --out runs/results/robustness-teaching --json docs/results/teaching-robustness.json
 	$(BIN)/hop train --recipe precise --seed 3 --steps 12000000 --set $(FORMER) teaching=0.42 imitation.knots=16 --out runs/precise
-	$(BIN)/hop bench limits --controllers precise adaptive recurrent energy-shaping --teacher runs/precise --json docs/results/limits.json
+	$(BIN)/hop bench limits --controllers precise adaptive recurrent energy-shaping quarter=runs/bench-quarter/precise-seed3/policy.onnx \
+	  --teacher runs/bench-quarter/precise-seed3/start-1 --json docs/results/limits.json
 	$(BIN)/hop bench reach --json docs/results/reach.json
 	$(BIN)/hop train --recipe precise --steps 9000000 --set $(FORMER) teachers=1 epochs=4 task.command_skew=1 teaching=0.55 --observation three-samples --heights 0.2 0.42 --out runs/fifteen
 	$(BIN)/hop train --recipe recurrent --set $(FORMER) --observation three-samples --out runs/fifteen-recurrent
 	$(BIN)/hop evaluate fifteen=runs/fifteen/policy.onnx fifteen-recurrent=runs/fifteen-recurrent/policy.onnx \
 	  --seeds 5 --floor soft --no-video --json docs/results/fifteen.json
 	$(BIN)/hop bench ablation --json docs/results/ablation.json
-	$(BIN)/hop bench ablation --recipe precise --steps 4500000 --threads 1 --json docs/results/ablation-precise.json
+	$(BIN)/hop bench ablation --recipe precise --steps 9000000 --threads 1 \
+	  --variants recipe no-teacher short-past jumpy-teacher no-aim all-heights-alike --json docs/results/ablation-precise.json
 	$(BIN)/hop excite multisine --robot legv2 --centre 0.7 -1.4 --amplitude 0.3 0.4 --out runs/results/multisine.parquet
 	$(BIN)/hop record runs/results/multisine.parquet --robot twin --believed legv2 --out runs/results
 	$(BIN)/hop identify runs/results/twin-multisine.parquet --out runs/results/identified.toml --json docs/results/identify.json
