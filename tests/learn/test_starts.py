@@ -3,6 +3,7 @@
 import itertools
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -139,22 +140,32 @@ def checkpoints(out):
     return {path for k in range(2) for path in list_checkpoints(out / f"start-{k}" / "checkpoints")}
 
 
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+COMMAND = [sys.executable, "-c", _SEVERAL]
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """Return the folder of trainings that nothing interrupted."""
+    out = tmp_path_factory.mktemp("starts") / "alone"
+    subprocess.run([*COMMAND, str(out)], check=True, env=ENVIRONMENT)
+    return out
+
+
 @pytest.mark.slow
-def test_workers_end_with_who_began_them_and_go_on_with_the_next(tmp_path):
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
-    command = [sys.executable, "-c", _SEVERAL]
-    subprocess.run([*command, str(tmp_path / "alone")], check=True, env=environment)
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
+def test_workers_end_with_who_began_them_and_go_on_with_the_next(how, alone, tmp_path):
     out = tmp_path / "killed"
-    process = subprocess.Popen([*command, str(out)], env=environment)
+    process = subprocess.Popen([*COMMAND, str(out)], env=ENVIRONMENT)
     while process.poll() is None and not checkpoints(out):
         time.sleep(0.01)
-    process.kill()
-    process.wait()
+    process.send_signal(how)
+    process.wait(20)
     time.sleep(2)
     left = checkpoints(out)
     assert left
     time.sleep(2)
     assert checkpoints(out) == left, "a worker goes on without the process that began it"
-    subprocess.run([*command, str(out)], check=True, env=environment)
+    subprocess.run([*COMMAND, str(out)], check=True, env=ENVIRONMENT)
     for name in ("policy.onnx", "start-0/policy.onnx", "start-1/policy.onnx"):
-        assert (out / name).read_bytes() == (tmp_path / "alone" / name).read_bytes()
+        assert (out / name).read_bytes() == (alone / name).read_bytes()

@@ -26,8 +26,12 @@ def work_here(work: Work, workers: int) -> None:
     crew = [context.Process(target=_work_beside, args=(work, k)) for k in range(workers)]
     for process in crew:
         process.start()
-    for process in crew:
-        process.join()
+    try:
+        for process in crew:
+            process.join()
+    finally:
+        for process in crew:
+            process.terminate()
     if any(process.exitcode for process in crew):
         raise UsageError("A worker ended early; what it began is taken up by the next call.")
 
