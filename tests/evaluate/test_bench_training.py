@@ -5,6 +5,7 @@ import json
 import pytest
 
 from hopping_leg.evaluate import bench_training as bench
+from hopping_leg.learn import starts as module
 from hopping_leg.learn.recipes import get_recipe
 
 
@@ -16,13 +17,7 @@ def complete(tmp_path):
     (run / "policy.onnx").write_bytes(b"selected")
     (run / "snapshots" / "000000000500.onnx").write_bytes(b"snapshot")
     history = [{"steps": 500, "minutes": 0.5}]
-    result = {
-        "seed": 3,
-        "minutes": 1.0,
-        "steps": 1000,
-        "history": history,
-        "exam_scores_m": [0.02, 0.004],
-    }
+    result = {"minutes": 1.0, "steps": 1000, "history": history, "exam_scores_m": [0.02, 0.004]}
     (run / "result.json").write_text(json.dumps(result), encoding="utf-8")
     return tmp_path
 
@@ -36,7 +31,7 @@ def judge(policies, recipe, _robot, _seeds):
 
 
 def test_what_is_complete_is_judged_and_not_trained_again(monkeypatch, complete, robot):
-    monkeypatch.setattr(bench, "train", lambda *_args, **_options: pytest.fail("trained again"))
+    monkeypatch.setattr(module, "train", lambda *_args, **_options: pytest.fail("trained again"))
     monkeypatch.setattr(bench, "_judge", judge)
     result = bench.bench_training(get_recipe("fast"), robot, complete, training_seeds=[3])
     (run,) = result["runs"]
@@ -53,10 +48,10 @@ def test_what_is_missing_is_trained_by_the_clock(monkeypatch, complete, robot):
         begun.append((seed, options["minutes"], options["resume"]))
         out.mkdir()
         (out / "policy.onnx").write_bytes(b"selected")
-        result = {"seed": seed, "minutes": 2.0, "steps": 10, "history": []}
+        result = {"minutes": 2.0, "steps": 10, "history": []}
         (out / "result.json").write_text(json.dumps(result), encoding="utf-8")
 
-    monkeypatch.setattr(bench, "train", train)
+    monkeypatch.setattr(module, "train", train)
     monkeypatch.setattr(bench, "_judge", judge)
     recipe = get_recipe("fast")
     result = bench.bench_training(recipe, robot, complete, training_seeds=[3, 4], minutes=2.0)
@@ -71,6 +66,7 @@ def test_of_several_starts_the_one_that_went_on_is_judged(monkeypatch, tmp_path,
     class Fake:
         def __init__(self, _recipe, _robot, seed, out, count, minutes, threads):
             self.out = out
+            self.folder = lambda number: out / f"start-{number}"
             begun.append((seed, count, minutes, threads))
 
         def train(self, *, resume):

@@ -120,10 +120,25 @@ def test_no_height_between_two_commands_is_missed():
     assert every_centimetre((0.3,)) == (0.3,)
 
 
-def test_one_training_is_none_of_several(tmp_path):
-    with pytest.raises(UsageError, match="at least 2"):
-        Starts(TINY, ROBOT, 0, tmp_path / "run", 1).train()
-    assert not (tmp_path / "run").exists()
+def test_a_single_start_is_a_training_in_the_folder_itself(tmp_path, monkeypatch):
+    begun = []
+
+    def train(_recipe, _robot, seed, out, **options):
+        begun.append((seed, out, options["resume"], options["source"], options["on_promise"]))
+
+    monkeypatch.setattr(module, "train", train)
+    Starts(TINY, ROBOT, 7, tmp_path, 1, source=tmp_path / "before").train(resume=True)
+    Starts(TINY, ROBOT, 7, tmp_path, 1).train()
+    before = tmp_path / "before"
+    assert begun == [(7, tmp_path, True, before, None), (7, tmp_path, False, None, None)]
+
+
+@pytest.mark.parametrize(("count", "says"), [(0, "at least 1"), (2, "leave --starts out")])
+def test_no_start_and_several_from_one_source_are_refused(count, says, tmp_path):
+    out = tmp_path / "run"
+    with pytest.raises(UsageError, match=says):
+        Starts(TINY, ROBOT, 0, out, count, source=tmp_path).train()
+    assert not out.exists()
 
 
 _SEVERAL = """

@@ -73,11 +73,8 @@ def run(args: Options) -> None:
     from hopping_leg.learn.recipes import change, get_recipe, randomise
     from hopping_leg.learn.run_folder import read_result
     from hopping_leg.learn.starts import Starts
-    from hopping_leg.learn.train import train
 
     recipe = get_recipe(args.recipe)
-    if args.starts != 1 and args.source is not None:
-        raise UsageError("--source begins from one run's checkpoint; leave --starts out.")
     if args.seed < 0 or min(args.threads, args.starts) < 1:
         raise UsageError("--seed must be at least 0, --threads and --starts at least 1.")
     if args.steps is not None:
@@ -94,29 +91,17 @@ def run(args: Options) -> None:
     out = args.out or Path("runs") / f"{args.recipe}-seed{args.seed}"
     robot = load_robot(args.robot)
     try:
-        if args.starts == 1:
-            trained = train(
-                recipe,
-                robot,
-                args.seed,
-                out,
-                resume=args.resume,
-                source=args.source,
-                minutes=args.minutes,
-                threads=args.threads,
-                log=args.log,
-            )
-        else:
-            trained = Starts(
-                recipe,
-                robot,
-                args.seed,
-                out,
-                args.starts,
-                minutes=args.minutes,
-                threads=args.threads,
-                log=args.log,
-            ).train(resume=args.resume)
+        trained = Starts(
+            recipe,
+            robot,
+            args.seed,
+            out,
+            args.starts,
+            minutes=args.minutes,
+            threads=args.threads,
+            log=args.log,
+            source=args.source,
+        ).train(resume=args.resume)
     except KeyboardInterrupt:
         print(f"Stopped; the same command with --resume goes on in {out}.", file=sys.stderr)
         raise

@@ -17,7 +17,6 @@ from hopping_leg.evaluate.runner import evaluate, software_versions
 from hopping_leg.learn.recipe import Recipe
 from hopping_leg.learn.run_folder import read_result
 from hopping_leg.learn.starts import Starts
-from hopping_leg.learn.train import train
 from hopping_leg.robot.parameters import Robot
 
 JUDGING_SEED = 1000
@@ -62,17 +61,13 @@ def bench_training(
     for seed in training_seeds:
         folder = out / f"{recipe.name}-seed{seed}"
         on_progress(f"training {recipe.name} with seed {seed}")
+        several = Starts(recipe, robot, seed, folder, starts, minutes, threads)
         if not (folder / "policy.onnx").exists():
-            resume = folder.exists()
-            if starts == 1:
-                train(recipe, robot, seed, folder, resume=resume, minutes=minutes, threads=threads)
-            else:
-                several = Starts(recipe, robot, seed, folder, starts, minutes, threads)
-                several.train(resume=resume)
+            several.train(resume=folder.exists())
         on_progress(f"judging {recipe.name} with seed {seed}")
         result = read_result(folder)
         content = (folder / "policy.onnx").read_bytes()
-        learnt = folder / f"start-{result['chosen_start']}" if starts > 1 else folder
+        learnt = several.folder(result.get("chosen_start", 0))
         runs.append(
             {
                 "seed": seed,

@@ -7,6 +7,7 @@ the recipe can tell how each is likely to end, the best one goes on alone, with 
 
 import json
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -41,12 +42,14 @@ class Starts:
         robot: The leg.
         seed: Of all of them together; the k-th of n has seed ``n * seed + k``, so that no two
             seeds share a start.
-        out: Folder in which each has its own, and in which the policy is left.
+        out: Folder in which each has its own, and in which the policy is left; of a single one it
+            is its own.
         count: How many.
         minutes: Wall-clock time after which learning stops; None for the recipe's steps.
         threads: Of each.
         quiet: Show no progress.
         log: Who gets the curves besides TensorBoard.
+        source: Folder of another run, from whose checkpoint a single one begins.
     """
 
     recipe: Recipe
@@ -58,6 +61,7 @@ class Starts:
     threads: int = 1
     quiet: bool = False
     log: Log = "tensorboard"
+    source: Path | None = None
 
     def train(self, *, resume: bool = False) -> Trained:
         """Begin all of them, finish the best one.
@@ -66,12 +70,16 @@ class Starts:
             resume: Go on with those in ``out``; without any, begin.
 
         Raises:
-            UsageError: ``out`` holds something else, what ``log`` needs is not installed, or one
-                of the trainings ended early.
+            UsageError: There is none, or several from one source; ``out`` holds something else,
+                what ``log`` needs is not installed, or one of the trainings ended early.
             RobotError: The robot has effects that training does not simulate.
         """
-        if self.count < 2:
-            raise UsageError(f"--starts is {self.count} but several are at least 2.")
+        if self.count < 1:
+            raise UsageError(f"--starts is {self.count} but must be at least 1.")
+        if self.count == 1:
+            return self._train(0, self.threads, resume=resume, quiet=self.quiet)
+        if self.source is not None:
+            raise UsageError("--source begins from one run's checkpoint; leave --starts out.")
         check(self.robot, self.minutes, self.log)
         recipe = fit(self.recipe, self.robot)
         folder = RunFolder(self.out, recipe, self.robot, self.seed, self.minutes, starts=self.count)
@@ -82,7 +90,7 @@ class Starts:
 
     def folder(self, number: int) -> Path:
         """Return the folder of a start."""
-        return self.out / f"start-{number}"
+        return self.out if self.count == 1 else self.out / f"start-{number}"
 
     def work(self, number: int) -> None:
         """Train one of them, or go on, until it can be compared; leave what decides.
@@ -94,7 +102,8 @@ class Starts:
         folder = self.folder(number)
         try:
             if not (folder / "policy.onnx").exists():
-                self._train(number, self.threads, quiet=number > 0, compare=True)
+                quiet = self.quiet or number > 0
+                self._train(number, self.threads, quiet=quiet, on_promise=_stop)
             decision = self._try(folder)
         except _ComparableError as promise:
             score_m, minutes = promise.args
@@ -102,18 +111,27 @@ class Starts:
         seed = self._seed(number)
         write_json(folder / _DECISION, {"seed": seed, **decision})
 
-    def _train(self, number: int, threads: int, *, quiet: bool = False, compare: bool) -> None:
-        train(
+    def _train(
+        self,
+        number: int,
+        threads: int,
+        *,
+        resume: bool = True,
+        quiet: bool,
+        on_promise: Callable[[float, float], None] | None = None,
+    ) -> Trained:
+        return train(
             self.recipe,
             self.robot,
             self._seed(number),
             self.folder(number),
-            resume=True,
+            resume=resume,
+            source=self.source,
             minutes=self.minutes,
             threads=threads,
-            quiet=self.quiet or quiet,
+            quiet=quiet,
             log=self.log,
-            on_promise=_stop if compare else None,
+            on_promise=on_promise,
         )
 
     def _seed(self, number: int) -> int:
@@ -143,7 +161,7 @@ class Starts:
         chosen = min(range(self.count), key=lambda number: float(decisions[number]["score_m"]))
         best = self.folder(chosen)
         if not (best / "policy.onnx").exists():
-            self._train(chosen, self.count * self.threads, compare=False)
+            self._train(chosen, self.count * self.threads, quiet=self.quiet)
         # The last of them to be comparable is waited for.
         slowest = max(decision["minutes"] for decision in decisions)
         own = read_result(best)
