@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from hopping_leg.learn.checkpoint import list_checkpoints
+from hopping_leg.rl.checkpoint import list_checkpoints
 from hopping_leg.trace import write_atomically
 
 

@@ -6,7 +6,7 @@ import math
 from macros_results import grid, number
 
 from hopping_leg.cli.robots import derived, numbers
-from hopping_leg.deploy.emulator.faults import KINDS
+from hopping_leg.emulator.faults import KINDS
 from hopping_leg.evaluate.faults.families import FAMILIES
 from hopping_leg.evaluate.robustness.axes import AXES
 from hopping_leg.robot import load_robot
@@ -38,8 +38,8 @@ def trace_columns() -> str:
 
 def search_space(recipe: str) -> str:
     """Return what `hop tune` searches of a recipe as a table."""
-    from hopping_leg.learn.recipes import get_recipe
-    from hopping_leg.learn.search_space import SPACES, OneOf, dimensions
+    from hopping_leg.rl.recipes import get_recipe
+    from hopping_leg.rl.search_space import SPACES, OneOf, dimensions
 
     rows, shipped = [], get_recipe(recipe)
     for name, found in dimensions(SPACES[recipe]).items():

@@ -22,8 +22,8 @@ class Bouncer:
 
 
 if __name__ == "__main__":
-    from hopping_leg.control import Setup, roll_out
-    from hopping_leg.control.library import load_controller
+    from hopping_leg.controllers import Setup, roll_out
+    from hopping_leg.controllers.library import load_controller
     from hopping_leg.robot import load_robot
 
     leg = load_robot("legv2-paper")

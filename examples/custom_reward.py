@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.env.apex_reward import ApexReward
-from hopping_leg.env.transition import Transition
-from hopping_leg.learn.fast import FastRecipe
-from hopping_leg.learn.train import train
+from hopping_leg.envs.apex_reward import ApexReward
+from hopping_leg.envs.transition import Transition
+from hopping_leg.rl.fast import FastRecipe
+from hopping_leg.rl.train import train
 from hopping_leg.robot import Robot, load_robot
 
 

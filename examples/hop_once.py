@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hopping_leg.control import Setup, roll_out
-from hopping_leg.control.library import load_controller
+from hopping_leg.controllers import Setup, roll_out
+from hopping_leg.controllers.library import load_controller
 from hopping_leg.hops import find_hops
 from hopping_leg.robot import load_robot
 

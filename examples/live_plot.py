@@ -6,8 +6,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib import get_backend
 
-from hopping_leg.control import Setup, roll_out
-from hopping_leg.control.library import load_controller
+from hopping_leg.controllers import Setup, roll_out
+from hopping_leg.controllers.library import load_controller
 from hopping_leg.robot import load_robot
 
 SHOWN_EVERY = 20

@@ -3,7 +3,7 @@
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.control import Setup, roll_out
+from hopping_leg.controllers import Setup, roll_out
 from hopping_leg.robot import Robot, kinematics, load_robot
 from hopping_leg.sim.disturbance import Measurement
 

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from hopping_leg.control import Setup, roll_out
-from hopping_leg.control.library import load_controller
-from hopping_leg.learn.fast import FastRecipe
-from hopping_leg.learn.train import train
+from hopping_leg.controllers import Setup, roll_out
+from hopping_leg.controllers.library import load_controller
+from hopping_leg.rl.fast import FastRecipe
+from hopping_leg.rl.train import train
 from hopping_leg.robot import load_robot
 
 steps = int(sys.argv[1]) if len(sys.argv) > 1 else 200_000

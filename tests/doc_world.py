@@ -8,8 +8,8 @@ import numpy as np
 import polars.selectors as cs
 
 from hopping_leg import cli
-from hopping_leg.control import Setup, roll_out
-from hopping_leg.control.library import load_controller
+from hopping_leg.controllers import Setup, roll_out
+from hopping_leg.controllers.library import load_controller
 from hopping_leg.deploy.black_box import BlackBox
 from hopping_leg.robot import load_robot
 from hopping_leg.sim.twins import draw_twin
@@ -54,13 +54,13 @@ with the most words counts."""
 SECONDS = {
     "hopping_leg.evaluate.trials.FIXED_SECONDS": 3.0,
     "hopping_leg.evaluate.trials.STEP_SECONDS": 2.0,
-    "hopping_leg.learn.judge._SECONDS": 0.5,
+    "hopping_leg.rl.judge._SECONDS": 0.5,
 }
 """Lengths of the paper's trials and of those that select a policy, which have no option."""
 
 ELSEWHERE = {
     "hop finetune": "minutes even when small: tests/cli/test_finetune.py",
-    "hop bench finetune": "hours: tests/learn/finetune/test_study.py",
+    "hop bench finetune": "hours: tests/rl/finetune/test_study.py",
     "hop experiment": "minutes even when small: tests/cli/test_experiment.py",
     "hop reproduce": "minutes even with --quick: tests/cli/test_reproduce.py",
 }
@@ -76,9 +76,9 @@ REFUSED = {
 
 BEFORE = {
     "own-controller": "class TheirController:\n    def __init__(self, mass, dt): pass",
-    "emulator": "from hopping_leg.deploy.emulator.faults import Fault\n"
-    "from hopping_leg.deploy.emulator.process import EmulatorProcess\n"
-    "from hopping_leg.deploy.emulator.start import Start\n"
+    "emulator": "from hopping_leg.emulator.faults import Fault\n"
+    "from hopping_leg.emulator.process import EmulatorProcess\n"
+    "from hopping_leg.emulator.start import Start\n"
     "def drive(path): assert path.exists()",
 }
 """Python that a page takes for granted."""

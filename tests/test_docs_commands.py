@@ -154,7 +154,7 @@ def run_hop(words, monkeypatch):
             robot = words[words.index("--robot") + 1] if "--robot" in words else "legv2-paper"
             put_behind(patch, robot=robot, pose="zero" if "--home" in words else "stand")
         if command in INTERRUPTED:
-            patch.setattr("hopping_leg.learn.train.Trainer.tick", interrupt)
+            patch.setattr("hopping_leg.rl.train.Trainer.tick", interrupt)
         code = main(with_files(shorten(words)[1:]))
     assert code == {**INTERRUPTED, **REFUSED}.get(command, 0), f"exit code {code}"
 

@@ -14,12 +14,12 @@ def test_every_example_runs(path, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "agg")
     if path.stem in ARGUMENTS:
-        monkeypatch.setattr("hopping_leg.learn.judge._SECONDS", 0.5)
+        monkeypatch.setattr("hopping_leg.rl.judge._SECONDS", 0.5)
     monkeypatch.setattr(sys, "argv", [str(path), *ARGUMENTS.get(path.stem, [])])
     runpy.run_path(str(path), run_name="__main__")
     assert capsys.readouterr().out
     if path.stem in ARGUMENTS:  # what is finished is not refused when it is run again
-        monkeypatch.setattr("hopping_leg.learn.train.Trainer", None)
+        monkeypatch.setattr("hopping_leg.rl.train.Trainer", None)
         runpy.run_path(str(path), run_name="__main__")
         assert "finished" in capsys.readouterr().out
 

@@ -4,8 +4,8 @@ import time
 import pytest
 
 from hopping_leg.evaluate.transfer.board import Board
-from hopping_leg.learn.progress import TrainingProgress
 from hopping_leg.progress import LiveProgress, minutes
+from hopping_leg.rl.progress import TrainingProgress
 
 
 def test_without_a_terminal_there_is_a_line_at_most_once_a_minute(capsys, monkeypatch):

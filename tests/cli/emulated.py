@@ -5,9 +5,9 @@ import functools
 
 from hopping_leg.cli import deploy, motors, record_motors
 from hopping_leg.deploy import driver, session
-from hopping_leg.deploy.emulator.lockstep import Lockstep
-from hopping_leg.deploy.emulator.start import Start
 from hopping_leg.deploy.sequence import Timing
+from hopping_leg.emulator.lockstep import Lockstep
+from hopping_leg.emulator.start import Start
 
 
 def put_behind(monkeypatch, **start):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.cli import main
-from hopping_leg.deploy.emulator.faults import Fault
+from hopping_leg.emulator.faults import Fault
 from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.robot import load_robot

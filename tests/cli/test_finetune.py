@@ -51,9 +51,9 @@ def test_an_outings_line_says_what_happened():
 
 @pytest.mark.slow
 def test_a_run_leaves_policy_card_and_numbers(tmp_path, monkeypatch, capsys):
-    from hopping_leg.learn.finetune import finetuning
-    from hopping_leg.learn.finetune.contact import ContactOptions
-    from hopping_leg.learn.finetune.prepared import prepare
+    from hopping_leg.rl.finetune import finetuning
+    from hopping_leg.rl.finetune.contact import ContactOptions
+    from hopping_leg.rl.finetune.prepared import prepare
 
     few = ContactOptions(legs=4, seconds=3.0, steps=50, hidden=(8,))
     monkeypatch.setattr(finetuning, "prepare", lambda task, _, folder: prepare(task, few, folder))

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.cli import main
-from hopping_leg.control.joint_pd import JointGains
+from hopping_leg.controllers.joint_pd import JointGains
 from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.recording import load_recording
 

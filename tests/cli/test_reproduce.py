@@ -11,7 +11,7 @@ from hopping_leg.cli.reproduce import NOTHING_MEANT
 
 pytest.importorskip("torch")
 from hopping_leg.evaluate.transfer import run as transfer_run
-from hopping_leg.learn.fast import FastRecipe
+from hopping_leg.rl.fast import FastRecipe
 
 NUMBERS = {"rows": [], "methods": [], "comparison": []}
 

@@ -3,8 +3,8 @@ import dataclasses
 import pytest
 
 from hopping_leg import cli
-from hopping_leg.learn import judge, recipes
-from tests.learn.learners import TINY
+from hopping_leg.rl import judge, recipes
+from tests.rl.learners import TINY
 
 
 @pytest.fixture

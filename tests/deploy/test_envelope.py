@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from hopping_leg.control import Setup, roll_out
-from hopping_leg.control.library import load_controller
+from hopping_leg.controllers import Setup, roll_out
+from hopping_leg.controllers.library import load_controller
 from hopping_leg.deploy.envelope import hopping_envelope, recording_envelope
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import NOTHING

@@ -10,13 +10,13 @@ import pytest
 
 from hopping_leg.deploy.bring_up import judge, require
 from hopping_leg.deploy.driver import MoteusLink
-from hopping_leg.deploy.emulator.frames import Frame
-from hopping_leg.deploy.emulator.line_protocol import LineProtocol, received_line
-from hopping_leg.deploy.emulator.start import Start
 from hopping_leg.deploy.envelope import hopping_envelope
 from hopping_leg.deploy.inspection import inspect
 from hopping_leg.deploy.observation import LIMP, STOP
 from hopping_leg.deploy.transport import opener
+from hopping_leg.emulator.frames import Frame
+from hopping_leg.emulator.line_protocol import LineProtocol, received_line
+from hopping_leg.emulator.start import Start
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot import load_robot
 

@@ -7,7 +7,7 @@ pytest.importorskip("playwright", reason="playwright is not installed")
 
 from hopping_leg.deploy.height_page import HeightPage
 from hopping_leg.deploy.keyboard import LiveHeight
-from hopping_leg.view.browser import chromium, find_chromium, new_page
+from hopping_leg.viewer.browser import chromium, find_chromium, new_page
 
 pytestmark = [
     pytest.mark.slow,

@@ -5,10 +5,10 @@ import contextlib
 import numpy as np
 import pytest
 
-from hopping_leg.control.library import load_policy
-from hopping_leg.deploy.emulator.lockstep import Lockstep
-from hopping_leg.deploy.emulator.start import Start
+from hopping_leg.controllers.library import load_policy
 from hopping_leg.deploy.outings import Deployed
+from hopping_leg.emulator.lockstep import Lockstep
+from hopping_leg.emulator.start import Start
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot import load_robot
 

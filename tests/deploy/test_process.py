@@ -13,10 +13,10 @@ import pytest
 
 from hopping_leg.cli import main
 from hopping_leg.deploy.black_box import recover
-from hopping_leg.deploy.emulator.process import EmulatorProcess
-from hopping_leg.deploy.emulator.start import Start
 from hopping_leg.deploy.observation import DriveMode
 from hopping_leg.deploy.supervisor import State
+from hopping_leg.emulator.process import EmulatorProcess
+from hopping_leg.emulator.start import Start
 from hopping_leg.errors import TraceError
 from hopping_leg.trace import Trace
 

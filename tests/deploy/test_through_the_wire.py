@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from hopping_leg.control.library import load_controller
+from hopping_leg.controllers.library import load_controller
 from hopping_leg.deploy.bring_up import judge, require
 from hopping_leg.deploy.configuration import wanted
-from hopping_leg.deploy.emulator.faults import Fault
-from hopping_leg.deploy.emulator.lockstep import Lockstep
-from hopping_leg.deploy.emulator.start import Start
 from hopping_leg.deploy.envelope import hopping_envelope
 from hopping_leg.deploy.inspection import configure, home, inspect
 from hopping_leg.deploy.schedule import Schedule
 from hopping_leg.deploy.sequence import Phase, Sequence, Timing, hopping_poses
 from hopping_leg.deploy.session import header_of, perform
 from hopping_leg.deploy.supervisor import State
+from hopping_leg.emulator.faults import Fault
+from hopping_leg.emulator.lockstep import Lockstep
+from hopping_leg.emulator.start import Start
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.limits import SoftLimiter, SoftLimits

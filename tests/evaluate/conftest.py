@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from hopping_leg.control import Setup
+from hopping_leg.controllers import Setup
 from hopping_leg.evaluate import Candidate, evaluate
 from hopping_leg.robot import kinematics, load_robot
 

@@ -3,7 +3,7 @@
 import pytest
 
 from hopping_leg.evaluate import bench_ablation as bench
-from hopping_leg.learn.ablations import ABLATIONS
+from hopping_leg.rl.ablations import ABLATIONS
 
 
 def row(command, error, skipped):

@@ -3,8 +3,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from hopping_leg.control import Setup
-from hopping_leg.control.library import load_controller
+from hopping_leg.controllers import Setup
+from hopping_leg.controllers.library import load_controller
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Candidate, evaluate
 from hopping_leg.evaluate.bench_engines import (

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from hopping_leg.env import HoppingTask, PaperReward, TaskOptions
+from hopping_leg.envs import HoppingTask, PaperReward, TaskOptions
 from hopping_leg.evaluate.bench_env import EnvBenchmark, bench_env, record
 from hopping_leg.evaluate.timing import interleave
 from hopping_leg.robot import load_robot

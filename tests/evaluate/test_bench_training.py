@@ -5,8 +5,8 @@ import json
 import pytest
 
 from hopping_leg.evaluate import bench_training as bench
-from hopping_leg.learn import starts as module
-from hopping_leg.learn.recipes import get_recipe
+from hopping_leg.rl import starts as module
+from hopping_leg.rl.recipes import get_recipe
 
 
 @pytest.fixture

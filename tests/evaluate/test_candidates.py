@@ -3,7 +3,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from hopping_leg.control.policy import Policy
+from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import PolicyError, UsageError
 from hopping_leg.evaluate import candidates
 from hopping_leg.evaluate.candidates import load_candidates

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hopping_leg.control import Setup
+from hopping_leg.controllers import Setup
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Candidate, evaluate
 from hopping_leg.evaluate.runner import _note_stopped

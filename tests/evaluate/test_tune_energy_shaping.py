@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hopping_leg.control import Setup
-from hopping_leg.control.gain_files import load_gains
+from hopping_leg.controllers import Setup
+from hopping_leg.controllers.gain_files import load_gains
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import tune_energy_shaping
 from hopping_leg.evaluate.gain_space import SPACE, from_unit, to_unit

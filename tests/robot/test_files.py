@@ -6,8 +6,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hopping_leg.control.rollout import Setup
-from hopping_leg.env import HoppingEnv
+from hopping_leg.controllers.rollout import Setup
+from hopping_leg.envs import HoppingEnv
 from hopping_leg.errors import RobotError
 from hopping_leg.robot import build_model, load_robot, shipped_robots
 from hopping_leg.robot.files import load_tree

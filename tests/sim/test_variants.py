@@ -6,7 +6,7 @@ from operator import attrgetter
 import numpy as np
 import pytest
 
-from hopping_leg.env import HoppingTask, PaperReward, TaskOptions
+from hopping_leg.envs import HoppingTask, PaperReward, TaskOptions
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.reality import Latency, Reality

@@ -28,7 +28,7 @@ from typing import Literal
 from rich.console import Console
 from rich.table import Table
 
-from hopping_leg.deploy.emulator.faults import KINDS
+from hopping_leg.emulator.faults import KINDS
 from hopping_leg.errors import UsageError
 
 

@@ -10,13 +10,13 @@ from types import FrameType
 from rich.console import Console
 
 from hopping_leg.cli.emulate import Emulate
-from hopping_leg.deploy.emulator.faults import load_faults
-from hopping_leg.deploy.emulator.pty_port import PtyPort
-from hopping_leg.deploy.emulator.robot import EmulatedRobot
-from hopping_leg.deploy.emulator.server import Port, Server
-from hopping_leg.deploy.emulator.start import Start
-from hopping_leg.deploy.emulator.status import Events, status_line
 from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
+from hopping_leg.emulator.faults import load_faults
+from hopping_leg.emulator.pty_port import PtyPort
+from hopping_leg.emulator.robot import EmulatedRobot
+from hopping_leg.emulator.server import Port, Server
+from hopping_leg.emulator.start import Start
+from hopping_leg.emulator.status import Events, status_line
 
 _RENEWED = 0.2
 """How often the status line is renewed, s."""

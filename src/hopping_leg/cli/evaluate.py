@@ -27,7 +27,7 @@ from hopping_leg.cli.command_line import command_line
 from hopping_leg.cli.options import Heights
 from hopping_leg.cli.robustness import judge_robustness
 from hopping_leg.cli.skills import judge_skills, print_skills
-from hopping_leg.control import Setup
+from hopping_leg.controllers import Setup
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Candidate, Judged, evaluate
 from hopping_leg.evaluate.candidates import load_candidates

@@ -23,7 +23,7 @@ from rich.console import Console
 
 from hopping_leg.cli.motors import ask, check, connect
 from hopping_leg.cli.options import Heights
-from hopping_leg.control.library import load_policy
+from hopping_leg.controllers.library import load_policy
 from hopping_leg.deploy.envelope import hopping_envelope
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.json_files import write_json
@@ -31,9 +31,9 @@ from hopping_leg.robot import load_robot
 from hopping_leg.robot.parameters import Robot
 
 if TYPE_CHECKING:
-    from hopping_leg.control.outing import Outings
-    from hopping_leg.control.policy import Policy
-    from hopping_leg.learn.finetune.simulated import Guard
+    from hopping_leg.controllers.outing import Outings
+    from hopping_leg.controllers.policy import Policy
+    from hopping_leg.rl.finetune.simulated import Guard
 
 
 @dataclass(frozen=True)
@@ -73,10 +73,10 @@ class Finetune:
 
 def run(args: Finetune) -> None:
     """Continue the training, say how it went."""
-    from hopping_leg.learn.finetune.options import FinetuneOptions
-    from hopping_leg.learn.finetune.prepared import Task
-    from hopping_leg.learn.finetune.rules import Rules
-    from hopping_leg.learn.finetune.running import POLICY, finetune
+    from hopping_leg.rl.finetune.options import FinetuneOptions
+    from hopping_leg.rl.finetune.prepared import Task
+    from hopping_leg.rl.finetune.rules import Rules
+    from hopping_leg.rl.finetune.running import POLICY, finetune
 
     policy, robot = load_policy(args.policy), load_robot(args.robot)
     _refuse(args, policy, robot)
@@ -116,7 +116,7 @@ def guard_of(robot: Robot, rate: float) -> "Guard":
     """Return the supervisor's limits of measured joints, for a simulated leg."""
     import numpy as np
 
-    from hopping_leg.learn.finetune.simulated import Guard
+    from hopping_leg.rl.finetune.simulated import Guard
 
     limits = hopping_envelope(robot, rate)
     return Guard(*(np.array(pair) for pair in (limits.lower, limits.upper, limits.speed)))
@@ -156,7 +156,7 @@ def _refuse(args: Finetune, policy: "Policy", robot: Robot) -> None:
 
 def _outings(args: Finetune, robot: Robot, policy: "Policy") -> "Outings":
     if args.on is not None:
-        from hopping_leg.learn.finetune.simulated import Simulated
+        from hopping_leg.rl.finetune.simulated import Simulated
 
         return Simulated(load_robot(args.on), guard_of(robot, policy.card.rate))
     assert args.transport is not None

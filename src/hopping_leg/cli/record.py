@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from hopping_leg.cli import record_motors
-from hopping_leg.control.joint_pd import JointGains
+from hopping_leg.controllers.joint_pd import JointGains
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.excitation import load_excitation
 from hopping_leg.identify.playing import play

@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import Console
 
 from hopping_leg.cli.motors import ask, check, connect
-from hopping_leg.control.joint_pd import JointGains, JointPD
+from hopping_leg.controllers.joint_pd import JointGains, JointPD
 from hopping_leg.deploy.envelope import recording_envelope
 from hopping_leg.deploy.keyboard import keys
 from hopping_leg.deploy.reasons import Reason

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hopping_leg.cli import evaluate, experiment
-from hopping_leg.control.library import ENERGY_SHAPING, shipped_policies
+from hopping_leg.controllers.library import ENERGY_SHAPING, shipped_policies
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.transfer.methods import DEFAULT, choose_methods
 from hopping_leg.evaluate.transfer.study import SHORTEST, USUAL_FIT, Study, find_twins
@@ -122,7 +122,7 @@ def run(args: Reproduce) -> None:
 
 def make_study(args: Reproduce) -> Study:
     """Return what is done with how many twins."""
-    from hopping_leg.learn.fast import FastRecipe
+    from hopping_leg.rl.fast import FastRecipe
 
     folder = args.folder / "transfer"
     count = "5" if args.full else "1"

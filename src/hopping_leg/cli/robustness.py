@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from hopping_leg.cli.evaluate import Evaluate
-    from hopping_leg.control import Setup
+    from hopping_leg.controllers import Setup
     from hopping_leg.evaluate import Candidate
 
 FOLDER = Path("runs/robustness")

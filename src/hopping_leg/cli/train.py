@@ -70,9 +70,9 @@ class Options:
 
 def run(args: Options) -> None:
     """Train a controller."""
-    from hopping_leg.learn.recipes import change, get_recipe, randomise
-    from hopping_leg.learn.run_folder import read_result
-    from hopping_leg.learn.starts import Starts
+    from hopping_leg.rl.recipes import change, get_recipe, randomise
+    from hopping_leg.rl.run_folder import read_result
+    from hopping_leg.rl.starts import Starts
 
     recipe = get_recipe(args.recipe)
     if args.seed < 0 or min(args.threads, args.starts) < 1:

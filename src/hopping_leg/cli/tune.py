@@ -104,8 +104,8 @@ class _Recipe:
         """Search, print the best, write all trials and the figures."""
         from hopping_leg.evaluate.figures import to_svg
         from hopping_leg.evaluate.figures.tuning import FIGURES
-        from hopping_leg.learn.tuning import Tuning
-        from hopping_leg.learn.tuning import tune as tune_recipe
+        from hopping_leg.rl.tuning import Tuning
+        from hopping_leg.rl.tuning import tune as tune_recipe
 
         at_least(1, workers=1 if self.workers is None else self.workers)
         out = self.out or Path("runs/tune") / self.recipe

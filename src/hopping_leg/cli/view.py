@@ -27,7 +27,7 @@ from rich.console import Console
 from hopping_leg.errors import UsageError
 
 if TYPE_CHECKING:
-    from hopping_leg.view.source import Source
+    from hopping_leg.viewer.source import Source
 
 _ROBOT = "legv2-paper"
 _MOST_DETAIL = 4.0
@@ -70,8 +70,8 @@ def run(args: View) -> None:
             " 1 draws every pixel of the screen."
         )
     source = _source(args)
-    from hopping_leg.view import graphics
-    from hopping_leg.view.viewer import Viewer
+    from hopping_leg.viewer import graphics
+    from hopping_leg.viewer.viewer import Viewer
 
     viewer = Viewer(
         source,
@@ -94,9 +94,9 @@ def run(args: View) -> None:
 
 def _source(args: View) -> "Source":
     """Return what is to be shown; whatever can be wrong with it is found here."""
-    from hopping_leg.view.follow import Follow
-    from hopping_leg.view.live import Live
-    from hopping_leg.view.replay import Replay
+    from hopping_leg.viewer.follow import Follow
+    from hopping_leg.viewer.live import Live
+    from hopping_leg.viewer.replay import Replay
 
     if args.trace and args.box is not None:
         raise UsageError("--trace and --box exclude each other; give one of them.")

@@ -12,8 +12,8 @@ from typing import Any
 
 import polars as pl
 
-from hopping_leg.control.outing import Outing, Steps
-from hopping_leg.control.protocol import Controller
+from hopping_leg.controllers.outing import Outing, Steps
+from hopping_leg.controllers.protocol import Controller
 from hopping_leg.deploy.clock import Clock
 from hopping_leg.deploy.driver import MoteusLink
 from hopping_leg.deploy.envelope import hopping_envelope

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hopping_leg.control.protocol import Controller
+from hopping_leg.controllers.protocol import Controller
 from hopping_leg.deploy.observation import Outgoing, Pair, Replies
 from hopping_leg.deploy.sequence import Step
 from hopping_leg.deploy.supervisor import Memory

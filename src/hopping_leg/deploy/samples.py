@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hopping_leg.control.protocol import Measurement
+from hopping_leg.controllers.protocol import Measurement
 from hopping_leg.deploy.observation import Reply
 
 REMEMBERED = 16

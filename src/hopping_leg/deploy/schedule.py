@@ -6,8 +6,8 @@ from typing import Protocol
 
 import numpy as np
 
-from hopping_leg.control.policy import Policy
-from hopping_leg.control.protocol import Controller
+from hopping_leg.controllers.policy import Policy
+from hopping_leg.controllers.protocol import Controller
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot

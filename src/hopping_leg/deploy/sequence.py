@@ -10,9 +10,9 @@ from enum import IntEnum
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.control.joint_pd import JointGains
-from hopping_leg.control.protocol import Controller, Measurement
-from hopping_leg.control.rollout import Setup
+from hopping_leg.controllers.joint_pd import JointGains
+from hopping_leg.controllers.protocol import Controller, Measurement
+from hopping_leg.controllers.rollout import Setup
 from hopping_leg.deploy.observation import Pair
 from hopping_leg.deploy.schedule import Commands
 from hopping_leg.robot import kinematics

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hopping_leg.control.policy import Policy
-from hopping_leg.control.protocol import Controller
+from hopping_leg.controllers.policy import Policy
+from hopping_leg.controllers.protocol import Controller
 from hopping_leg.deploy.black_box import SUFFIX, BlackBox, recover
 from hopping_leg.deploy.clock import Clock, RealClock
 from hopping_leg.deploy.driver import MoteusLink

@@ -9,7 +9,7 @@ from typing import Any
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.evaluate.bench_training import bench_training, over_commands
 from hopping_leg.evaluate.runner import software_versions
-from hopping_leg.learn.ablations import ABLATIONS
+from hopping_leg.rl.ablations import ABLATIONS
 from hopping_leg.robot.parameters import Robot
 
 _OF_A_RUN = ("seed", "minutes", "exam_scores_m")

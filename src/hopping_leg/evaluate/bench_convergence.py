@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.control import Setup, roll_out
-from hopping_leg.control.library import load_controller
+from hopping_leg.controllers import Setup, roll_out
+from hopping_leg.controllers.library import load_controller
 from hopping_leg.hops import find_hops
 from hopping_leg.robot import Robot
 from hopping_leg.robot.kinematics import joint_angles

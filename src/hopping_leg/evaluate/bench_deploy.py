@@ -15,18 +15,18 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.control import Setup, roll_out
-from hopping_leg.control.library import load_controller
-from hopping_leg.control.policy import Policy
+from hopping_leg.controllers import Setup, roll_out
+from hopping_leg.controllers.library import load_controller
+from hopping_leg.controllers.policy import Policy
 from hopping_leg.deploy.driver import MoteusLink
-from hopping_leg.deploy.emulator.lockstep import Lockstep
-from hopping_leg.deploy.emulator.process import EmulatorProcess
-from hopping_leg.deploy.emulator.start import Start
 from hopping_leg.deploy.envelope import hopping_envelope
 from hopping_leg.deploy.schedule import Schedule
 from hopping_leg.deploy.sequence import Phase, Sequence, Timing, hopping_poses
 from hopping_leg.deploy.session import Performance, header_of, perform
 from hopping_leg.deploy.transport import opener
+from hopping_leg.emulator.lockstep import Lockstep
+from hopping_leg.emulator.process import EmulatorProcess
+from hopping_leg.emulator.start import Start
 from hopping_leg.evaluate.bench_inference import bench_inference
 from hopping_leg.evaluate.emulated_truth import Truth, apexes_of, watched
 from hopping_leg.evaluate.metrics import START_SECONDS

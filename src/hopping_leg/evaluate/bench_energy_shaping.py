@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from hopping_leg.control import Setup, roll_out
-from hopping_leg.control.baselines import paper_energy_shaping, tuned_energy_shaping
-from hopping_leg.control.energy_shaping import EnergyShaping
+from hopping_leg.controllers import Setup, roll_out
+from hopping_leg.controllers.baselines import paper_energy_shaping, tuned_energy_shaping
+from hopping_leg.controllers.energy_shaping import EnergyShaping
 from hopping_leg.evaluate.estimator import APEX, apex_errors
 from hopping_leg.evaluate.metrics import Window, measure, pooled_apexes
 from hopping_leg.robot import Robot, load_robot

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.control import Setup
+from hopping_leg.controllers import Setup
 from hopping_leg.errors import PhysicsError
 from hopping_leg.evaluate.candidates import load_candidates
 from hopping_leg.evaluate.result import Summary

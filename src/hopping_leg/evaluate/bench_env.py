@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.env import HoppingEnv, HoppingTask, PaperReward, TaskOptions
+from hopping_leg.envs import HoppingEnv, HoppingTask, PaperReward, TaskOptions
 from hopping_leg.evaluate.timing import Timed, host, interleave, median_ratio
 from hopping_leg.robot import Robot, build_model
 from hopping_leg.robot.kinematics import joint_angles

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.control import Setup
-from hopping_leg.control.policy import Policy
+from hopping_leg.controllers import Setup
+from hopping_leg.controllers.policy import Policy
 from hopping_leg.evaluate.candidates import Candidate
 from hopping_leg.evaluate.runner import evaluate, software_versions
-from hopping_leg.learn.recipe import Recipe
-from hopping_leg.learn.run_folder import read_result
-from hopping_leg.learn.starts import Starts
+from hopping_leg.rl.recipe import Recipe
+from hopping_leg.rl.run_folder import read_result
+from hopping_leg.rl.starts import Starts
 from hopping_leg.robot.parameters import Robot
 
 JUDGING_SEED = 1000

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from hopping_leg.control import Controller
-from hopping_leg.control.energy_shaping import EnergyShaping
-from hopping_leg.control.library import load_controller, shipped_policies
-from hopping_leg.control.policy import Policy
+from hopping_leg.controllers import Controller
+from hopping_leg.controllers.energy_shaping import EnergyShaping
+from hopping_leg.controllers.library import load_controller, shipped_policies
+from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import PolicyError, UsageError
 from hopping_leg.robot.parameters import Robot
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.signal import find_peaks
 
-from hopping_leg.deploy.emulator.process import EmulatorProcess
 from hopping_leg.deploy.sequence import Phase
+from hopping_leg.emulator.process import EmulatorProcess
 from hopping_leg.evaluate.metrics import START_SECONDS
 from hopping_leg.hops import BOUNCE, CLEAR
 from hopping_leg.robot import kinematics

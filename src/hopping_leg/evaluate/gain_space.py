@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.control.shaping_gains import ShapingGains
+from hopping_leg.controllers.shaping_gains import ShapingGains
 
 SPACE: dict[str, tuple[float, float]] = {
     "exponent": (0.2, 2.0),

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.control import Rollout
-from hopping_leg.control.shaping_gains import ShapingGains
+from hopping_leg.controllers import Rollout
+from hopping_leg.controllers.shaping_gains import ShapingGains
 from hopping_leg.hops import find_hops
 
 SETTLED = 2.0

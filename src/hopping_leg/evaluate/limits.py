@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.control import Setup
+from hopping_leg.controllers import Setup
 from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range, fingerprint
 from hopping_leg.evaluate.keeper import Keeper
 from hopping_leg.evaluate.result import Summary

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from typing import Any
 
-from hopping_leg.control import Setup
+from hopping_leg.controllers import Setup
 from hopping_leg.deploy.envelope import hopping_envelope
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hopping_leg.control import Controller, Setup, roll_out
+from hopping_leg.controllers import Controller, Setup, roll_out
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.evaluate.trials import Trial
 from hopping_leg.robot.parameters import Contact, Robot

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.control import Rollout, Setup, roll_out
-from hopping_leg.control.energy_shaping import EnergyShaping
-from hopping_leg.control.gain_files import GainFile, load_gains, save_gains
-from hopping_leg.control.shaping_gains import ROBUST, ShapingGains, scale_gains
+from hopping_leg.controllers import Rollout, Setup, roll_out
+from hopping_leg.controllers.energy_shaping import EnergyShaping
+from hopping_leg.controllers.gain_files import GainFile, load_gains, save_gains
+from hopping_leg.controllers.shaping_gains import ROBUST, ShapingGains, scale_gains
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.gain_space import from_unit, to_unit
 from hopping_leg.evaluate.hop_cost import CommandScore, calibrated, cost, score

@@ -3,7 +3,7 @@
 import numpy as np
 import polars as pl
 
-from hopping_leg.control.joint_pd import JointGains
+from hopping_leg.controllers.joint_pd import JointGains
 from hopping_leg.errors import RecordingError
 from hopping_leg.identify.columns import MEASURED, PAIRS
 from hopping_leg.identify.excitation import Excitation

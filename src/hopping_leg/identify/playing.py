@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import polars as pl
 
-from hopping_leg.control.joint_pd import JointGains, JointPD
+from hopping_leg.controllers.joint_pd import JointGains, JointPD
 from hopping_leg.errors import PhysicsError
 from hopping_leg.identify.columns import PAIRS
 from hopping_leg.identify.excitation import Excitation

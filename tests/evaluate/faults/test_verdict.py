@@ -2,8 +2,8 @@ import math
 
 import pytest
 
-from hopping_leg.deploy.emulator.codes import Mode
-from hopping_leg.deploy.emulator.wire_log import Answered, Told, WireLog
+from hopping_leg.emulator.codes import Mode
+from hopping_leg.emulator.wire_log import Answered, Told, WireLog
 from hopping_leg.evaluate.faults.verdict import (
     Limits,
     problems_of_commands,

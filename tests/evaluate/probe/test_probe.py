@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from hopping_leg.cli import main
-from hopping_leg.control import Setup, roll_out
-from hopping_leg.control.library import load_policy
-from hopping_leg.control.phases import Phase
+from hopping_leg.controllers import Setup, roll_out
+from hopping_leg.controllers.library import load_policy
+from hopping_leg.controllers.phases import Phase
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.probe.exposed import Exposed, record
 from hopping_leg.evaluate.probe.fitting import interval, probe
 from hopping_leg.evaluate.probe.study import Study
 from hopping_leg.evaluate.probe.targets import TARGETS
-from hopping_leg.learn.hidden import expose_hidden
+from hopping_leg.rl.hidden import expose_hidden
 
 RNG = np.random.default_rng(3)
 BY_NAME = {target.name: target for target in TARGETS}

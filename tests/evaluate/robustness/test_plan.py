@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from hopping_leg.control import roll_out
+from hopping_leg.controllers import roll_out
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.robustness.axes import AXES, JOINT, NOMINAL, axis_names
 from hopping_leg.evaluate.robustness.case import Case

@@ -89,7 +89,7 @@ class Training:
     def measure(self) -> dict[str, Any]:
         """Run it, print a table, return every number."""
         from hopping_leg.evaluate.bench_training import bench_training
-        from hopping_leg.learn.recipes import change, get_recipe
+        from hopping_leg.rl.recipes import change, get_recipe
 
         at_least(1, evaluation_seeds=self.evaluation_seeds, threads=self.threads)
         at_least(1, starts=self.starts)

@@ -9,7 +9,7 @@ from rich.table import Table
 
 from hopping_leg.cli.bench.shared import at_least, mm
 from hopping_leg.cli.finetune import guard_of
-from hopping_leg.control.library import load_policy
+from hopping_leg.controllers.library import load_policy
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot
 from hopping_leg.sim.twins import draw_twin
@@ -45,9 +45,9 @@ class Finetune:
         """Run it, print a table, return every number."""
         from hopping_leg.evaluate.figures.finetuning import draw_finetuning
         from hopping_leg.evaluate.figures.style import to_svg
-        from hopping_leg.learn.finetune.options import FinetuneOptions
-        from hopping_leg.learn.finetune.rules import Rules
-        from hopping_leg.learn.finetune.study import Study, measure
+        from hopping_leg.rl.finetune.options import FinetuneOptions
+        from hopping_leg.rl.finetune.rules import Rules
+        from hopping_leg.rl.finetune.study import Study, measure
 
         at_least(1, judges=self.judges)
         at_least(0, **{f"seeds {seed}": seed for seed in (*self.seeds, *self.twins)})

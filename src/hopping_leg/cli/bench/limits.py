@@ -50,7 +50,7 @@ class Limits:
         robot = load_robot(self.robot)
         candidates = load_candidates(self.controllers, robot, CONTROL_RATE)
         if self.teacher is not None:
-            from hopping_leg.learn.teacher_of_run import teacher_of_run
+            from hopping_leg.rl.teacher_of_run import teacher_of_run
 
             teacher = teacher_of_run(self.teacher, robot)
             candidates.append(Candidate(teacher.name, teacher, teacher.command_range))

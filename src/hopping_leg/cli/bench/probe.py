@@ -33,12 +33,12 @@ class Probe:
 
     def measure(self) -> dict[str, Any]:
         """Run it, print a table, return every number."""
-        from hopping_leg.control import Setup
-        from hopping_leg.control.library import load_policy
+        from hopping_leg.controllers import Setup
+        from hopping_leg.controllers.library import load_policy
         from hopping_leg.evaluate.figures import to_svg
         from hopping_leg.evaluate.figures.probe import draw_probe
         from hopping_leg.evaluate.probe.study import run_study
-        from hopping_leg.learn.hidden import expose_hidden
+        from hopping_leg.rl.hidden import expose_hidden
         from hopping_leg.trace import write_atomically
 
         at_least(0, threads=self.threads, seed=self.study.seed)

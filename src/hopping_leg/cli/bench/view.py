@@ -31,7 +31,7 @@ class View:
 
     def measure(self) -> dict[str, Any]:
         """Run it, print a table, return every number."""
-        from hopping_leg.view.bench import ViewBenchmark, bench_view
+        from hopping_leg.viewer.bench import ViewBenchmark, bench_view
 
         at_least(1, commands=self.commands)
         if not 1 <= self.seconds <= 600:

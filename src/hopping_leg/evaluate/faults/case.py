@@ -7,18 +7,18 @@ from pathlib import Path
 
 import numpy as np
 
-from hopping_leg.control.library import load_controller
+from hopping_leg.controllers.library import load_controller
 from hopping_leg.deploy.bring_up import judge, require
 from hopping_leg.deploy.clock import Clock
 from hopping_leg.deploy.driver import MoteusLink
-from hopping_leg.deploy.emulator.faults import Fault
-from hopping_leg.deploy.emulator.start import Start
 from hopping_leg.deploy.envelope import hopping_envelope
 from hopping_leg.deploy.inspection import inspect
 from hopping_leg.deploy.reasons import Reason
 from hopping_leg.deploy.schedule import Schedule
 from hopping_leg.deploy.sequence import Sequence, Timing, hopping_poses
 from hopping_leg.deploy.session import Performance, header_of, perform
+from hopping_leg.emulator.faults import Fault
+from hopping_leg.emulator.start import Start
 from hopping_leg.evaluate.faults.families import Family, Mishap
 from hopping_leg.evaluate.faults.verdict import Limits
 from hopping_leg.robot.limits import SoftLimiter, SoftLimits

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hopping_leg.deploy.emulator.faults import Fault
-from hopping_leg.deploy.emulator.start import Start
 from hopping_leg.deploy.reasons import FAULTS, Reason
+from hopping_leg.emulator.faults import Fault
+from hopping_leg.emulator.start import Start
 
 HOP_SECONDS = 1.0
 """Faults begin at a random time of this long after the first lift-off, s: two to three hops."""

@@ -5,9 +5,9 @@ import signal
 import threading
 import time
 
-from hopping_leg.deploy.emulator.codes import CONTROLLING, Mode
-from hopping_leg.deploy.emulator.drive import Drive
-from hopping_leg.deploy.emulator.lockstep import Lockstep
+from hopping_leg.emulator.codes import CONTROLLING, Mode
+from hopping_leg.emulator.drive import Drive
+from hopping_leg.emulator.lockstep import Lockstep
 
 _WATCHED = 0.1
 """How long the drives are watched after the host's death, s."""

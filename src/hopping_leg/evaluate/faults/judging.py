@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from hopping_leg.deploy.black_box import SUFFIX, recover
-from hopping_leg.deploy.emulator.codes import Mode
-from hopping_leg.deploy.emulator.wire_log import WireLog
 from hopping_leg.deploy.reasons import Reason
 from hopping_leg.deploy.session import Performance
 from hopping_leg.deploy.supervisor import State
+from hopping_leg.emulator.codes import Mode
+from hopping_leg.emulator.wire_log import WireLog
 from hopping_leg.errors import TraceError
 from hopping_leg.evaluate.faults.case import Result, Scene
 from hopping_leg.evaluate.faults.verdict import problems_of_commands, reaction, restarts

@@ -12,12 +12,12 @@ from pathlib import Path
 
 from hopping_leg.deploy.black_box import SUFFIX, recover
 from hopping_leg.deploy.driver import MoteusLink
-from hopping_leg.deploy.emulator.codes import Mode
-from hopping_leg.deploy.emulator.process import EmulatorProcess
-from hopping_leg.deploy.emulator.wire_log import WireLog
 from hopping_leg.deploy.reasons import Reason
 from hopping_leg.deploy.transport import opener
 from hopping_leg.deploy.wire import JOINTS
+from hopping_leg.emulator.codes import Mode
+from hopping_leg.emulator.process import EmulatorProcess
+from hopping_leg.emulator.wire_log import WireLog
 from hopping_leg.errors import TraceError
 from hopping_leg.evaluate.faults.case import Case, Result, Scene, words
 from hopping_leg.evaluate.faults.families import Family

@@ -5,8 +5,8 @@ import signal
 import tempfile
 from pathlib import Path
 
-from hopping_leg.deploy.emulator.codes import Mode
-from hopping_leg.deploy.emulator.lockstep import Lockstep
+from hopping_leg.emulator.codes import Mode
+from hopping_leg.emulator.lockstep import Lockstep
 from hopping_leg.errors import HardwareError
 from hopping_leg.evaluate.faults.case import Case, Result, Scene, words
 from hopping_leg.evaluate.faults.families import Family

@@ -4,9 +4,9 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from hopping_leg.deploy.emulator.codes import Mode
-from hopping_leg.deploy.emulator.wire_log import Answered, Told, WireLog
 from hopping_leg.deploy.envelope import Envelope
+from hopping_leg.emulator.codes import Mode
+from hopping_leg.emulator.wire_log import Answered, Told, WireLog
 from hopping_leg.robot.parameters import Robot
 
 SAFE = (Mode.STOPPED, Mode.BRAKE)

@@ -8,10 +8,10 @@ import numpy.typing as npt
 import onnxruntime
 
 from hopping_leg.arrays import Array
-from hopping_leg.control import Setup, roll_out
-from hopping_leg.control.layouts import Inputs, make_layout
-from hopping_leg.control.policy import MEMORY, NEXT_MEMORY, Policy
-from hopping_leg.control.protocol import Measurement
+from hopping_leg.controllers import Setup, roll_out
+from hopping_leg.controllers.layouts import Inputs, make_layout
+from hopping_leg.controllers.policy import MEMORY, NEXT_MEMORY, Policy
+from hopping_leg.controllers.protocol import Measurement
 from hopping_leg.evaluate.metrics import START_SECONDS
 
 OBSERVATION = "observation"

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.control import Setup
-from hopping_leg.control.policy import Policy
+from hopping_leg.controllers import Setup
+from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.metrics import START_SECONDS
 from hopping_leg.evaluate.probe.exposed import OBSERVATION, Recording, record

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.control.phases import Phase
+from hopping_leg.controllers.phases import Phase
 from hopping_leg.hops import CLEAR
 
 Truth = dict[str, Array]

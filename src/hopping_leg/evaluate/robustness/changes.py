@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.control import Controller, Setup, roll_out
+from hopping_leg.controllers import Controller, Setup, roll_out
 from hopping_leg.evaluate.metrics import START_SECONDS
 from hopping_leg.evaluate.robustness.axes import axis_named
 from hopping_leg.evaluate.robustness.case import Case, times, with_numbers

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hopping_leg.control import Controller, Setup, roll_out
+from hopping_leg.controllers import Controller, Setup, roll_out
 from hopping_leg.evaluate.metrics import Window, measure, pooled_apexes
 from hopping_leg.evaluate.robustness.plan import Plan, Trial
 from hopping_leg.trace import Trace

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from hopping_leg.control import Controller, Setup
+from hopping_leg.controllers import Controller, Setup
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range, fingerprint
 from hopping_leg.evaluate.keeper import Keeper

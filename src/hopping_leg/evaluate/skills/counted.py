@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.control import Controller, Setup, roll_out
-from hopping_leg.control.supervised import STAND_SECONDS, Supervised
+from hopping_leg.controllers import Controller, Setup, roll_out
+from hopping_leg.controllers.supervised import STAND_SECONDS, Supervised
 from hopping_leg.evaluate.metrics import measure
 from hopping_leg.evaluate.skills.impact import last_touchdown, peak_force
 from hopping_leg.hops import find_hops

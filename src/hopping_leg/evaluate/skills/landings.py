@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.control import Controller, Setup, roll_out
-from hopping_leg.control.joint_pd import JointPD
-from hopping_leg.control.landing import landing_posture
-from hopping_leg.control.supervised import Supervised
+from hopping_leg.controllers import Controller, Setup, roll_out
+from hopping_leg.controllers.joint_pd import JointPD
+from hopping_leg.controllers.landing import landing_posture
+from hopping_leg.controllers.supervised import Supervised
 from hopping_leg.evaluate.metrics import measure
 from hopping_leg.evaluate.skills.impact import peak_force, rebound
 from hopping_leg.robot import kinematics

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.control import Controller, Setup, roll_out
+from hopping_leg.controllers import Controller, Setup, roll_out
 from hopping_leg.evaluate.metrics import START_SECONDS, measure, skipped_in_run
 from hopping_leg.hops import find_hops
 from hopping_leg.sim.perturbation import Perturbation

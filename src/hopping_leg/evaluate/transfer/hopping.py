@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.control import Setup
-from hopping_leg.control.policy import Policy
+from hopping_leg.controllers import Setup
+from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.candidates import Candidate
 from hopping_leg.evaluate.result import Evaluation

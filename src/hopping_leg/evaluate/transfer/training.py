@@ -9,8 +9,8 @@ from hopping_leg.evaluate.transfer.study import Study, TwinFile
 from hopping_leg.robot.parameters import Robot
 
 if TYPE_CHECKING:
-    from hopping_leg.learn.recipe import Recipe
-    from hopping_leg.learn.run_folder import RunFolder
+    from hopping_leg.rl.recipe import Recipe
+    from hopping_leg.rl.run_folder import RunFolder
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Train:
 
     def run(self, *, quiet: bool) -> None:
         """Train; a training that was killed goes on."""
-        from hopping_leg.learn.train import train
+        from hopping_leg.rl.train import train
 
         folder = self._folder()
         train(
@@ -73,7 +73,7 @@ class Train:
         Raises:
             UsageError: There is no such recipe, or it has no such number.
         """
-        from hopping_leg.learn.recipes import change, get_recipe, randomise
+        from hopping_leg.rl.recipes import change, get_recipe, randomise
 
         study = self.study
         recipe = change(get_recipe(study.recipe), [*study.changes, f"steps={study.steps}"])
@@ -96,7 +96,7 @@ class Train:
         Raises:
             UsageError: It is not finished.
         """
-        from hopping_leg.learn.run_folder import read_result
+        from hopping_leg.rl.run_folder import read_result
 
         return read_result(self.path)
 
@@ -106,8 +106,8 @@ class Train:
         return float(self.result["selected"]["score_m"])
 
     def _folder(self) -> "RunFolder":
-        from hopping_leg.learn.run_folder import RunFolder
-        from hopping_leg.learn.scale import fit
+        from hopping_leg.rl.run_folder import RunFolder
+        from hopping_leg.rl.scale import fit
 
         robot = self.robot
         recipe = fit(self.recipe(), robot)

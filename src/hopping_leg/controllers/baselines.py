@@ -1,0 +1,46 @@
+"""The energy shaping controllers that are shipped and compared."""
+
+from hopping_leg.controllers.energy_shaping import EnergyShaping
+from hopping_leg.controllers.gain_files import TUNED, load_gains
+from hopping_leg.controllers.shaping_gains import (
+    LITERAL,
+    ROBUST,
+    TRUE_CONTACT,
+    ShapingGains,
+    scale_gains,
+)
+from hopping_leg.robot import load_robot
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim import CONTROL_RATE
+
+
+def tuned_energy_shaping(
+    robot: Robot, *, rate: float = CONTROL_RATE, gains: str = TUNED
+) -> EnergyShaping:
+    """Return the baseline with a tuned set of gains, carried over to ``robot``.
+
+    Args:
+        robot: The leg.
+        rate: Control rate, Hz.
+        gains: Shipped name or path of a gain file.
+    """
+    found = load_gains(gains)
+    scaled = scale_gains(found.gains, load_robot(found.robot), robot)
+    return EnergyShaping(robot, scaled, ROBUST, rate=rate, name=gains)
+
+
+def paper_energy_shaping(
+    robot: Robot, *, rate: float = CONTROL_RATE, true_contact: bool = False
+) -> EnergyShaping:
+    """Return the paper's law and gains with nothing added.
+
+    Args:
+        robot: The leg.
+        rate: Control rate, Hz.
+        true_contact: Take contact, base velocity and height from the simulator, so that the law
+            is judged apart from what feeds it.
+    """
+    origin = load_robot(load_gains().robot)
+    gains = scale_gains(ShapingGains(), origin, robot)
+    options = TRUE_CONTACT if true_contact else LITERAL
+    return EnergyShaping(robot, gains, options, rate=rate, name="energy-shaping-literal")

@@ -1,0 +1,249 @@
+"""Energy shaping: a state machine that sets the hopping height by the gain of its push.
+
+Paper, "Energy Shaping". Each push presses with k F_f; each hop corrects k by the energy reached.
+"""
+
+from typing import Protocol
+
+import numpy as np
+
+from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.controllers import height_estimate, push
+from hopping_leg.controllers.cartesian import foot_force_torque, leg_force
+from hopping_leg.controllers.contact_detector import TouchdownDetector
+from hopping_leg.controllers.joint_observer import DatedObserver, LatestObserver
+from hopping_leg.controllers.leg_view import LegView, view_leg
+from hopping_leg.controllers.phases import BRAKE_LIMIT, FLIGHT_LIMIT, PUSH_LIMIT, Phase, Phases
+from hopping_leg.controllers.posture import per_joint, retraction
+from hopping_leg.controllers.shaping_gains import Gain, ShapingGains, ShapingOptions
+from hopping_leg.errors import UsageError
+from hopping_leg.robot import kinematics
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim import CONTROL_RATE
+from hopping_leg.sim.disturbance import Measurement
+
+_BLIND_TICKS = 4
+"""Ticks after a change of phase in which true contact still flickers."""
+
+
+class Truth(Protocol):
+    """What the simulator knows and the leg does not; live views of n legs."""
+
+    height: Array
+    height_rate: Array
+
+    def foot_clearance(self) -> Array:
+        """Return the gap under each foot, m, (n,)."""
+        ...
+
+
+class EnergyShaping:
+    """The baseline controller.
+
+    Args:
+        robot: The leg, as far as the controller knows it.
+        gains: Each one number, or one per leg.
+        options: Readings of the paper.
+        rate: Control rate, Hz.
+        name: Shown in tables.
+
+    Attributes:
+        truth: What ``watch`` was shown, where an option reads ``"true"``; None for a controller
+            that feels nothing but its joints.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        gains: ShapingGains | None = None,
+        options: ShapingOptions | None = None,
+        *,
+        rate: float = CONTROL_RATE,
+        name: str = "energy-shaping",
+    ) -> None:
+        self.robot, self.name, self.period = robot, name, 1 / rate
+        self.gains = gains or ShapingGains()
+        self.options = options or ShapingOptions()
+        self.truth: Truth | None = None
+        self._longest = _longest_leg(robot)
+
+    def watch(self, legs: Truth) -> None:
+        """Take the true state where an option reads ``"true"``, else ignore it."""
+        if "true" in (self.options.contact, self.options.height):
+            self.truth = legs
+
+    def reset(self, count: int) -> None:
+        """Forget everything; the legs stand and push next."""
+        options = self.options
+        if options.state == "dated":
+            self._observer: DatedObserver | LatestObserver = DatedObserver(
+                self.period, self.gains.position_pull
+            )
+        else:
+            self._observer = LatestObserver()
+        self._observer.reset(count)
+        self._detector = TouchdownDetector(count, debounced=options.contact == "debounced")
+        self._phases = Phases(count)
+        self._k_ratio = np.ones(count)
+        self._length_0 = np.full(count, np.nan)
+        self._pushed = np.full(count, np.nan)
+        self._share = np.ones(count)
+        self._rate = np.zeros(count)
+        self._liftoff_height, self._liftoff_rate = np.zeros(count), np.zeros(count)
+        self._liftoff_q = np.zeros((count, 2))
+        self._highest = np.zeros(count)
+        self._height = np.zeros(count)
+        self._apex = np.full((3, count), np.nan)
+
+    def act(self, measurement: Measurement) -> Array:
+        """Return joint torques, N m, (n, 2)."""
+        command = measurement.command[:, 0]
+        leg = view_leg(self.robot, self._observer.update(measurement))
+        self._length_0 = np.where(np.isnan(self._length_0), leg.length, self._length_0)
+        self._pushed = np.where(np.isnan(self._pushed), command, self._pushed)
+        self._phases.tick(self.period)
+        gains = self.gains
+        liftoff = self._length(gains.liftoff_length, gains.liftoff_slope, command)
+        landing = self._length(gains.landing_length, gains.landing_slope, command)
+        self._end_touchdown(leg, command)
+        self._end_push(leg, liftoff)
+        posture, posture_rate = self._posture(landing)
+        flying = per_joint(gains.hip_stiffness, gains.knee_stiffness) * (posture - leg.q)
+        flying += per_joint(gains.hip_damping, gains.knee_damping) * (posture_rate - leg.qd)
+        self._end_flight(leg, posture_rate, flying, command)
+        self._estimate_height(leg)
+        pressing = foot_force_torque(
+            self.robot, leg.q, self._force(leg, command, liftoff, landing), self._side(leg)
+        )
+        self._share, self._rate = self._pressing_share(leg, liftoff), leg.rate
+        return flying + self._share[:, None] * (pressing - flying)
+
+    def internals(self) -> dict[str, Array]:
+        """Return height estimates, phase and gain of the last tick."""
+        return {
+            "estimated_height_m": self._height,
+            "estimated_apex_m": self._apex[0],
+            "ballistic_apex_m": self._apex[1],
+            "flight_time_apex_m": self._apex[2],
+            "phase": self._phases.phase.astype(np.float64),
+            "gain_k": self._gain(self._pushed),
+        }
+
+    def _length(self, length: Gain, slope: Gain, command: Array) -> Array:
+        wanted = length + slope * (command - self.gains.reference)
+        return np.minimum(wanted, self._longest)
+
+    def _gain(self, command: Array) -> Array:
+        """Return k, (n,)."""
+        gains = self.gains
+        return (gains.k0 + gains.k0_slope * (command - gains.reference)) * self._k_ratio
+
+    def _force(self, leg: LegView, command: Array, liftoff: Array, landing: Array) -> Array:
+        """Return the force along the leg: k F_f in the push, spring and damper before, N, (n,)."""
+        gains = self.gains
+        final = gains.push_rate + gains.push_rate_slope * (command - gains.reference)
+        intended = push.intended_rate(leg.length, self._length_0, liftoff, final)
+        forward = push.feedforward_force(self.robot, command, self._length_0, liftoff)
+        thrust = self._gain(command) * forward + gains.push_damping * (intended - leg.rate)
+        brake = gains.touchdown_stiffness * (landing - leg.length)
+        brake = brake - gains.touchdown_damping * leg.rate
+        return np.where(self._phases.are(Phase.LIFTOFF), thrust, brake)
+
+    def _side(self, leg: LegView) -> Array:
+        return -self.gains.kp_y * leg.y - self.gains.kd_y * leg.y_rate
+
+    def _pressing_share(self, leg: LegView, liftoff: Array) -> Array:
+        """Return how much of the coming period the foot presses the ground, 0 to 1, (n,)."""
+        share = np.where(self._phases.are(Phase.FLIGHT), 0.0, 1.0)
+        if self.options.liftoff == "timed":
+            until = push.share_of_period(leg.length, leg.rate, liftoff, self.period)
+            share = np.where(self._phases.are(Phase.LIFTOFF), until, share)
+        return share
+
+    def _posture(self, landing: Array) -> tuple[Array, Array]:
+        target = kinematics.joint_angles(self.robot, np.stack([landing, 0 * landing], axis=-1))
+        return retraction(self._liftoff_q, target, self._phases.clock, self.gains.retract_time)
+
+    def _end_push(self, leg: LegView, liftoff: Array) -> None:
+        clock, rate, since = self._phases.clock, leg.rate, np.zeros_like(leg.rate)
+        match self.options.liftoff:
+            case "true":
+                done = (self._true().foot_clearance() > 0) & (clock > _BLIND_TICKS * self.period)
+            case "length":
+                done = leg.length >= liftoff
+            case "timed":
+                done, rate, since = self._share < 1, self._rate, (1 - self._share) * self.period
+        who = self._phases.are(Phase.LIFTOFF) & (done | (clock > PUSH_LIMIT))
+        self._liftoff_height = np.where(who, leg.stand, self._liftoff_height)
+        self._liftoff_rate = np.where(who, rate, self._liftoff_rate)
+        self._liftoff_q = np.where(who[:, None], leg.q, self._liftoff_q)
+        self._highest = np.where(who, 0.0, self._highest)
+        self._phases.enter(who, Phase.FLIGHT, since)
+
+    def _end_flight(self, leg: LegView, posture_rate: Array, flying: Array, command: Array) -> None:
+        gains, clock = self.gains, self._phases.clock
+        along = kinematics.jacobian(self.robot, leg.q)[:, 0]
+        planned = np.einsum("ni,ni->n", along, posture_rate)
+        pushed = self._detector.update(
+            leg.rate - planned,
+            leg_force(self.robot, leg.q, flying),
+            gains.touchdown_rate,
+            gains.touchdown_force,
+        )
+        shortest = gains.flight_min + gains.flight_min_slope * (command - gains.reference)
+        touched = pushed & (clock > shortest)
+        if self.options.contact == "true":
+            touched = (self._true().foot_clearance() <= 0) & (clock > _BLIND_TICKS * self.period)
+        who = self._phases.are(Phase.FLIGHT) & (touched | (clock > FLIGHT_LIMIT))
+        if who.any():
+            too_short = np.minimum(clock, shortest)
+            self._judge_hop(who, leg, command, np.where(touched, clock, too_short))
+        self._phases.enter(who, Phase.TOUCHDOWN)
+
+    def _judge_hop(self, who: BoolArray, leg: LegView, command: Array, airborne: Array) -> None:
+        """Estimate the apex that is over and correct k.
+
+        A touchdown that nobody noticed came before contact was believed: the hop was that short.
+        """
+        gains, options = self.gains, self.options
+        airborne = np.maximum(airborne, self.period)
+        ballistic = height_estimate.ballistic_apex(self._liftoff_height, self._liftoff_rate)
+        timed = height_estimate.flight_time_apex(self._liftoff_height, leg.stand, airborne)
+        raw = {"ballistic": ballistic, "flight_time": timed, "true": self._highest}[options.height]
+        lean = raw - gains.reference
+        apex = gains.reference + gains.height_offset + gains.height_scale * lean
+        self._apex = np.where(who, np.stack([apex, ballistic, timed]), self._apex)
+        desired = self._pushed if options.desired == "pushed" else command
+        gain = push.updated_gain(self._k_ratio, desired, apex, gains.exponent)
+        self._k_ratio = np.where(who, gain, self._k_ratio)
+
+    def _end_touchdown(self, leg: LegView, command: Array) -> None:
+        clock = self._phases.clock
+        rate = self._true().height_rate if self.options.contact == "true" else leg.rate
+        turned = (rate >= 0) & (clock > 2 * self.period)
+        who = self._phases.are(Phase.TOUCHDOWN) & (turned | (clock > BRAKE_LIMIT))
+        self._length_0 = np.where(who, leg.length, self._length_0)
+        self._pushed = np.where(who, command, self._pushed)
+        self._phases.enter(who, Phase.LIFTOFF)
+
+    def _estimate_height(self, leg: LegView) -> None:
+        """Ballistic in flight, forward kinematics on the ground."""
+        flying = height_estimate.ballistic_height(
+            self._liftoff_height, self._liftoff_rate, self._phases.clock
+        )
+        self._height = np.where(self._phases.are(Phase.FLIGHT), flying, leg.stand)
+        if self.truth is not None:
+            self._highest = np.maximum(self._highest, self.truth.height)
+
+    def _true(self) -> Truth:
+        if self.truth is None:
+            raise UsageError(
+                "Options that read 'true' exist in simulation only, where `watch` shows the legs."
+            )
+        return self.truth
+
+
+def _longest_leg(robot: Robot) -> float:
+    """Return the leg length at the knee's soft limit, m."""
+    thigh, shank, knee = robot.thigh.length, robot.shank.length, robot.knee.upper
+    return float(np.sqrt(thigh**2 + shank**2 + 2 * thigh * shank * np.cos(knee)))

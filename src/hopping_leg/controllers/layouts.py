@@ -1,0 +1,225 @@
+"""What a policy file asks for at every tick: named arrays made from the joint measurements.
+
+A policy's metadata names its layout; the arrays are raw, in SI units. Normalisation is part of the
+policy's graph, so that a policy file needs nothing but encoders and a command.
+"""
+
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from hopping_leg.arrays import Array, IntArray
+from hopping_leg.controllers.dated_track import DatedTrack
+from hopping_leg.controllers.recent import Recent
+from hopping_leg.errors import PolicyError, unknown_name
+from hopping_leg.sim.disturbance import SAMPLES, Measurement
+
+Inputs = dict[str, npt.NDArray[np.float32]]
+"""Graph input to its array, (n, ...)."""
+
+
+class Layout(Protocol):
+    """Turns measurements into a policy's inputs; may remember past ticks."""
+
+    name: ClassVar[str]
+    """As stored in policy files."""
+    shapes: ClassVar[dict[str, tuple[int, ...]]]
+    """Graph inputs, in the order in which the network sees them, without the leading n."""
+
+    def reset(self, count: int) -> None:
+        """Forget the past of all legs; the next measurement has ``count`` rows."""
+        ...
+
+    def restart(self, rows: IntArray, measurement: Measurement) -> None:
+        """Forget the past of some legs within a tick: they begin with this measurement."""
+        ...
+
+    def update(self, measurement: Measurement, last_torque: Array) -> None:
+        """Take in what a tick brings.
+
+        Args:
+            measurement: Of this tick.
+            last_torque: What the policy asked for one tick ago, N m, (n, 2); zero after a reset.
+        """
+        ...
+
+    def inputs(self) -> Inputs:
+        """Return the graph's inputs at this tick."""
+        ...
+
+    def state(self) -> dict[str, Any]:
+        """Return what is remembered from tick to tick, as arrays."""
+        ...
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a ``state``."""
+        ...
+
+
+class ThreeSamples:
+    """The paper's observation: position, velocity and command at three ticks, newest first.
+
+    q and qd are (n, 3, 2) in rad and rad/s, command is (n, 3) in m.
+    """
+
+    name: ClassVar[str] = "three-samples"
+    shapes: ClassVar[dict[str, tuple[int, ...]]] = {
+        "q": (SAMPLES, 2),
+        "qd": (SAMPLES, 2),
+        "command": (SAMPLES,),
+    }
+
+    def reset(self, count: int) -> None:
+        """Do nothing: the measurement holds all three samples."""
+
+    def restart(self, rows: IntArray, measurement: Measurement) -> None:
+        """Take this tick's measurement."""
+        self._measurement = measurement
+
+    def update(self, measurement: Measurement, last_torque: Array) -> None:
+        """Take this tick's measurement."""
+        self._measurement = measurement
+
+    def inputs(self) -> Inputs:
+        """Return the samples as they are."""
+        m = self._measurement
+        return {
+            "q": m.q.astype(np.float32),
+            "qd": m.qd.astype(np.float32),
+            "command": m.command.astype(np.float32),
+        }
+
+    def state(self) -> dict[str, Any]:
+        """Return nothing: the measurement holds all."""
+        return {}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Do nothing."""
+
+
+def _dated_shapes(
+    lags: tuple[int, ...], torque_lags: tuple[int, ...]
+) -> dict[str, tuple[int, ...]]:
+    return {
+        "q": (len(lags), 2),
+        "qd": (len(lags), 2),
+        "age": (1,),
+        "past_torque": (len(torque_lags), 2),
+        "command": (1,),
+    }
+
+
+class Dated:
+    """Samples at fixed times before now, however late they came, and the policy's own torques.
+
+    A late sample is put where it belongs; a tick whose sample has not arrived shows the one before.
+    q and qd are (n, lags, 2) in rad and rad/s, age is that of the newest sample, (n, 1) in s,
+    past_torque is what the policy asked for at past ticks, (n, lags, 2) in N m, command is (n, 1)
+    in m.
+    """
+
+    name: ClassVar[str] = "dated"
+    LAGS: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 5, 7, 10)
+    """Ticks before now of the samples."""
+    TORQUE_LAGS: ClassVar[tuple[int, ...]] = (0, 1, 2, 4, 6)
+    """Ticks before the last action of the torques."""
+    shapes: ClassVar[dict[str, tuple[int, ...]]] = _dated_shapes(LAGS, TORQUE_LAGS)
+
+    def __init__(self, period: float) -> None:
+        self._track = DatedTrack(max(*self.LAGS, LATEST) + 1, period)
+        self._lags, self._torque_lags = list(self.LAGS), list(self.TORQUE_LAGS)
+        self.reset(0)
+
+    def reset(self, count: int) -> None:
+        """Forget everything."""
+        self._track.reset(count)
+        self._torques = Recent(np.zeros((max(self.TORQUE_LAGS) + 1, count, 2)))
+        self._command = np.zeros(count)
+        self._fresh = True
+
+    def restart(self, rows: IntArray, measurement: Measurement) -> None:
+        """Let the newest sample stand for the past of some legs."""
+        self._track.fill(rows, measurement)
+        self._torques.frames[:, rows] = 0.0
+        self._fresh = False
+        self._take(measurement)
+
+    def update(self, measurement: Measurement, last_torque: Array) -> None:
+        """Put this tick's samples and the last torque in their places."""
+        if self._fresh:
+            self._track.fill(slice(None), measurement)
+            self._fresh = False
+        else:
+            self._track.shift()
+            self._torques.shift()
+            self._torques.frames[0] = last_torque
+        self._take(measurement)
+
+    def _take(self, measurement: Measurement) -> None:
+        self._track.insert(measurement)
+        self._track.hold(LATEST)
+        self._command = measurement.command[:, 0]
+
+    def inputs(self) -> Inputs:
+        """Return the chosen lags of the tracks."""
+        track, torques = self._track, self._torques.frames
+        age = np.argmax(track.known[:LATEST], axis=0) * track.period
+        return {
+            "q": track.q[self._lags].swapaxes(0, 1).astype(np.float32),
+            "qd": track.qd[self._lags].swapaxes(0, 1).astype(np.float32),
+            "age": age[:, None].astype(np.float32),
+            "past_torque": torques[self._torque_lags].swapaxes(0, 1).astype(np.float32),
+            "command": self._command[:, None].astype(np.float32),
+        }
+
+    def state(self) -> dict[str, Any]:
+        """Return samples, torques and command."""
+        return {
+            "track": self._track.state(),
+            "torques": self._torques.frames.copy(),
+            "command": self._command.copy(),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a ``state``."""
+        self._track.restore(state["track"])
+        self._torques, self._command = Recent(state["torques"]), np.array(state["command"])
+        self._fresh = False
+
+
+class DatedLong(Dated):
+    """The dated layout with a memory of 0.7 s, longer than a hop; the lags grow with age.
+
+    How long the last flight took, and what the last stance put into it, is in there.
+    """
+
+    name: ClassVar[str] = "dated-long"
+    LAGS: ClassVar[tuple[int, ...]] = (
+        0, 1, 2, 3, 4, 5, 6, 8, 10, 13, 16, 20, 25, 31, 38, 46, 55, 65, 77, 90, 105, 122, 140,
+    )  # fmt: skip
+    TORQUE_LAGS: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64)
+    shapes: ClassVar[dict[str, tuple[int, ...]]] = _dated_shapes(LAGS, TORQUE_LAGS)
+
+
+LATEST = 10
+"""Ticks after which the paper's channel delivers a sample no more."""
+
+LAYOUTS: dict[str, Any] = {
+    ThreeSamples.name: lambda period: ThreeSamples(),
+    Dated.name: Dated,
+    DatedLong.name: DatedLong,
+}
+"""Layout names that policy files may carry, to their makers."""
+
+
+def make_layout(name: str, period: float) -> Layout:
+    """Return a fresh layout for a control period, s.
+
+    Raises:
+        PolicyError: No layout has that name.
+    """
+    if name not in LAYOUTS:
+        raise PolicyError(unknown_name("observation layout", name, LAYOUTS))
+    layout: Layout = LAYOUTS[name](period)
+    return layout

@@ -1,0 +1,95 @@
+"""Controllers by name: energy shaping, shipped policies, a user's policy, gain file or class."""
+
+from collections.abc import Callable
+from functools import partial
+from importlib import resources
+from pathlib import Path
+
+from hopping_leg.controllers.baselines import paper_energy_shaping, tuned_energy_shaping
+from hopping_leg.controllers.plug_in import is_plug_in, load_plug_in
+from hopping_leg.controllers.policy import OtherRobot, Policy
+from hopping_leg.controllers.protocol import Controller
+from hopping_leg.errors import PolicyError, UsageError, unknown_name
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim import CONTROL_RATE
+
+ENERGY_SHAPING = "energy-shaping"
+"""The tuned baseline."""
+
+ENERGY_SHAPING_FLYING = "energy-shaping-flying"
+"""The same, tuned to fly for half of the time at every command, as is asked of policies."""
+
+ENERGY_SHAPING_LITERAL = "energy-shaping-literal"
+"""The paper's law and gains as printed."""
+
+_FACTORIES: dict[str, Callable[..., Controller]] = {
+    ENERGY_SHAPING: tuned_energy_shaping,
+    ENERGY_SHAPING_FLYING: partial(tuned_energy_shaping, gains=ENERGY_SHAPING_FLYING),
+    ENERGY_SHAPING_LITERAL: paper_energy_shaping,
+}
+_SHIPPED = resources.files("hopping_leg") / "policies"
+
+
+def shipped_policies() -> list[str]:
+    """Return the names of the policies that come with the package."""
+    return sorted(
+        f.name.removesuffix(".onnx") for f in _SHIPPED.iterdir() if f.name.endswith(".onnx")
+    )
+
+
+def controller_names() -> list[str]:
+    """Return every name that ``load_controller`` knows."""
+    return [*_FACTORIES, *shipped_policies()]
+
+
+def load_policy(name_or_path: str | Path) -> Policy:
+    """Load a shipped policy by name or a policy file.
+
+    Raises:
+        PolicyError: The file is missing, truncated or foreign.
+        UsageError: There is no such shipped policy.
+    """
+    name = str(name_or_path)
+    if name in shipped_policies():
+        return Policy((_SHIPPED / f"{name}.onnx").read_bytes(), f"shipped policy '{name}'", name)
+    if name.endswith(".onnx"):
+        return Policy.load(Path(name))
+    if Path(name).exists():
+        raise PolicyError(f"{name} is not a policy file; those end in .onnx.")
+    raise UsageError(
+        unknown_name("controller", name, controller_names())
+        + " Or give an .onnx file, or a Python class as path/to/file.py:CLASS."
+    )
+
+
+def load_controller(
+    name_or_path: str | Path,
+    robot: Robot,
+    *,
+    rate: float = CONTROL_RATE,
+    other: OtherRobot = "warn",
+) -> Controller:
+    """Load a controller for a robot.
+
+    Args:
+        name_or_path: One of ``controller_names()``, the path of an ``.onnx`` file or of a gain
+            file (``.toml``) for energy shaping, or a Python class, see ``plug_in``.
+        robot: The leg it shall drive.
+        rate: Control rate, Hz.
+        other: What to do with a policy that was trained for another robot.
+
+    Raises:
+        PolicyError: The file is missing, truncated or foreign, or does not fit the robot or rate.
+        ControllerError: A Python class cannot be loaded or is no controller.
+        UsageError: There is no such controller.
+    """
+    factory = _FACTORIES.get(str(name_or_path))
+    if factory is not None:
+        return factory(robot, rate=rate)
+    if str(name_or_path).endswith(".toml"):
+        return tuned_energy_shaping(robot, rate=rate, gains=str(name_or_path))
+    if is_plug_in(str(name_or_path)):
+        return load_plug_in(str(name_or_path), robot, rate)
+    policy = load_policy(name_or_path)
+    policy.check_robot(robot, rate, other=other)
+    return policy

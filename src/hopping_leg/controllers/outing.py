@@ -1,0 +1,88 @@
+"""How a robot is reached that nothing is known of but what it measures: one outing at a time.
+
+On an outing a controller hops for a limited time through a schedule of heights, and what comes back
+is a trace. The simulated twin and the drives behind a wire are both reached like this.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import polars as pl
+
+from hopping_leg.arrays import Array
+from hopping_leg.controllers.protocol import Controller
+from hopping_leg.trace import Trace
+
+Steps = tuple[tuple[float, float], ...]
+"""Commanded heights in order, each with how long it is commanded, m and s."""
+
+
+@dataclass(frozen=True)
+class Outing:
+    """What came back.
+
+    Attributes:
+        trace: What was measured and asked for while the controller had the leg, one row per control
+            period: the trace's joint positions, velocities and torques are the measured ones, NaN
+            where no sample arrived.
+        seconds: For which the robot was in use.
+        complaint: Why it was ended early, a sentence; empty if it was not.
+        truth: Time, command and height of every true apex, s, m, m, (hops, 3), for those who judge;
+            None where nobody knows. Learners must not look.
+    """
+
+    trace: Trace
+    seconds: float
+    complaint: str = ""
+    truth: Array | None = None
+
+
+class Outings(Protocol):
+    """A robot that can be sent on outings."""
+
+    name: str
+    """Of the robot."""
+
+    def hop(self, controller: Controller, steps: Steps, seed: int) -> Outing:
+        """Let a controller hop from standing.
+
+        Args:
+            controller: Has the leg.
+            steps: Heights in order.
+            seed: Of the outing's own randomness, where there is any to choose.
+        """
+        ...
+
+
+def by_tick(steps: Steps, rate: float) -> Array:
+    """Return the commanded height of every tick, m, (ticks,).
+
+    Args:
+        steps: Heights in order.
+        rate: Control rate, Hz.
+    """
+    return np.concatenate([np.full(round(seconds * rate), height) for height, seconds in steps])
+
+
+MEASURED = {
+    "q": ("hip_position_rad", "knee_position_rad"),
+    "qd": ("hip_velocity_rad_s", "knee_velocity_rad_s"),
+    "torque": ("hip_torque_nm", "knee_torque_nm"),
+    "asked": ("hip_command_nm", "knee_command_nm"),
+}
+"""What a trace of an outing holds of both joints, to its columns."""
+
+
+def measured_table(time: Array, command: Array, joints: dict[str, Array]) -> pl.DataFrame:
+    """Return an outing's table.
+
+    Args:
+        time: s, (ticks,).
+        command: Desired heights, m, (ticks,).
+        joints: By the names of ``MEASURED``, (ticks, 2) each.
+    """
+    columns = {"time_s": time, "command_m": command}
+    for name, values in joints.items():
+        columns |= dict(zip(MEASURED[name], values.T, strict=True))
+    return pl.DataFrame(columns)

@@ -1,0 +1,215 @@
+"""Someone else's controller: a Python class, named ``path/to/file.py:Class`` or ``module:Class``.
+
+The class is made as ``Class(robot, rate=rate)``. It implements ``Controller``, of which ``name``
+and ``internals`` may be left out, or controls one leg by ``get_control_output``, see
+``single_leg``. Whatever it does, the caller gets torques or one sentence that names it.
+"""
+
+import functools
+import hashlib
+import importlib
+import importlib.util
+import sys
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any, TypeVar
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.controllers.single_leg import METHOD, SingleLeg
+from hopping_leg.errors import ControllerError, HoppingLegError, unknown_name
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim.disturbance import Measurement
+from hopping_leg.trace import COLUMNS
+
+T = TypeVar("T")
+
+
+class PlugIn:
+    """Guards a controller of someone else; implements ``Controller``.
+
+    Args:
+        controller: With ``reset`` and ``act``.
+        origin: As it was named, for error messages.
+    """
+
+    def __init__(self, controller: Any, origin: str) -> None:  # noqa: ANN401
+        self.controller, self.origin = controller, origin
+        named = getattr(controller, "name", None)
+        self.name = (named if isinstance(named, str) else origin).rpartition(":")[2]
+        self._count = 0
+
+    def reset(self, count: int) -> None:
+        """Forget everything; the next measurement has ``count`` rows."""
+        self._count = count
+        attempt(self.origin, lambda: self.controller.reset(count))
+
+    def act(self, measurement: Measurement) -> Array:
+        """Return joint torques, N m, (n, 2).
+
+        Raises:
+            ControllerError: The controller failed or answered something else than torques.
+        """
+        answer = attempt(self.origin, lambda: self.controller.act(measurement))
+        torque = self._array(answer, "torques")
+        if torque.shape != (self._count, 2):
+            raise ControllerError(
+                f"Controller '{self.origin}' answered an array of shape {torque.shape}; torques of"
+                f" hip and knee are ({self._count}, 2)."
+            )
+        if not np.isfinite(torque).all():
+            leg = int(np.flatnonzero(~np.isfinite(torque).all(axis=1))[0])
+            raise ControllerError(
+                f"Controller '{self.origin}' answered torques of {torque[leg].tolist()} N m; they"
+                " must be finite."
+            )
+        return torque
+
+    def internals(self) -> dict[str, Array]:
+        """Return what the controller wants recorded of the last ``act``, each (n,).
+
+        Raises:
+            ControllerError: It is no dictionary of (n,), or would replace a column of the trace.
+        """
+        method = getattr(self.controller, "internals", None)
+        if method is None:
+            return {}
+        found = attempt(self.origin, method)
+        if not isinstance(found, dict) or not all(isinstance(name, str) for name in found):
+            raise ControllerError(
+                f"'internals' of controller '{self.origin}' must return a dictionary of arrays."
+            )
+        return {name: self._column(name, values) for name, values in found.items()}
+
+    def _column(self, name: str, values: object) -> Array:
+        if name in COLUMNS:
+            raise ControllerError(
+                f"'internals' of controller '{self.origin}' names '{name}', which every trace has;"
+                " choose another name."
+            )
+        column = self._array(values, f"'{name}'")
+        if column.shape not in ((), (self._count,)):
+            raise ControllerError(
+                f"'{name}' of controller '{self.origin}' has shape {column.shape} but must be"
+                f" ({self._count},)."
+            )
+        return np.broadcast_to(column, self._count)
+
+    def _array(self, values: object, what: str) -> Array:
+        try:
+            return np.asarray(values, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise ControllerError(
+                f"Controller '{self.origin}' answered {what} that are no numbers:"
+                f" {type(values).__name__}."
+            ) from error
+
+
+def is_plug_in(name: str) -> bool:
+    """Tell whether a name means a Python class (or a Python file whose class was forgotten)."""
+    source, _, wanted = name.rpartition(":")
+    dotted = all(part.isidentifier() for part in source.split("."))
+    return name.endswith(".py") or (wanted.isidentifier() and (source.endswith(".py") or dotted))
+
+
+def load_plug_in(name: str, robot: Robot, rate: float) -> PlugIn:
+    """Make a controller from a Python class.
+
+    Args:
+        name: ``path/to/file.py:Class``, or ``package.module:Class`` for what Python can import.
+        robot: The leg it shall drive.
+        rate: Control rate, Hz.
+
+    Raises:
+        ControllerError: There is no such file, module or class, it fails, or is no controller.
+    """
+    source, _, wanted = name.rpartition(":")
+    if name.endswith(".py"):
+        source, wanted = name, ""
+    module = _load_file(Path(source)) if source.endswith(".py") else _load_module(source)
+    kind = getattr(module, wanted, None) if wanted else None
+    if not callable(kind):
+        classes = [n for n, v in vars(module).items() if _defined_here(v, module)]
+        if not wanted:
+            raise ControllerError(
+                f"'{name}' names no class; write {source}:CLASS, one of: {', '.join(classes)}."
+            )
+        raise ControllerError(f"In {source}: " + unknown_name("class", wanted, classes))
+    make: Callable[[], Any] = functools.partial(kind, robot, rate=rate)
+    controller = attempt(name, make, f"could not be made as {wanted}(robot, rate={rate:g})")
+    if not callable(getattr(controller, "act", None)) and callable(
+        getattr(controller, METHOD, None)
+    ):
+        controller = attempt(name, lambda: SingleLeg(make, rate, name))
+    missing = [m for m in ("reset", "act") if not callable(getattr(controller, m, None))]
+    if missing:
+        raise ControllerError(
+            f"'{name}' is no controller: it lacks the method '{missing[0]}'; a controller has"
+            f" 'reset' and 'act', or '{METHOD}' for a single leg."
+        )
+    # Kept results tell controllers apart by class: with the digest in its name, an edited file is
+    # judged anew.
+    guard = type(f"{PlugIn.__name__}_{_digest(module)}", (PlugIn,), {})
+    made: PlugIn = guard(controller, name)
+    return made
+
+
+def attempt(origin: str, work: Callable[[], T], failure: str = "failed") -> T:
+    """Run code of someone else; what it raises becomes one sentence.
+
+    Raises:
+        ControllerError: Naming the controller, the error and its line.
+    """
+    try:
+        return work()
+    except HoppingLegError:
+        raise
+    except Exception as error:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(last.filename).name}, line {last.lineno}"
+        raise ControllerError(
+            f"Controller '{origin}' {failure}: {type(error).__name__}: {error} ({where})."
+        ) from error
+
+
+def _load_file(path: Path) -> ModuleType:
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise ControllerError(f"Cannot read {path}: {error.strerror}.") from error
+    # A name of its own keeps files of equal names apart; dataclasses look their module up by it.
+    name = f"hopping_leg_plug_in_{hashlib.sha256(content).hexdigest()[:16]}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    loader = spec.loader
+    attempt(str(path), lambda: loader.exec_module(module), "could not be imported")
+    return module
+
+
+def _load_module(name: str) -> ModuleType:
+    try:
+        found = importlib.util.find_spec(name)
+    except (ImportError, ValueError):
+        found = None
+    if found is None:
+        raise ControllerError(
+            f"There is no Python module '{name}'; install it, put its folder on PYTHONPATH, or name"
+            " a file as path/to/file.py:CLASS."
+        )
+    return attempt(name, lambda: importlib.import_module(name), "could not be imported")
+
+
+def _digest(module: ModuleType) -> str:
+    file = getattr(module, "__file__", None)
+    content = Path(file).read_bytes() if file else module.__name__.encode()
+    return hashlib.sha256(content).hexdigest()[:16]
+
+
+def _defined_here(value: object, module: ModuleType) -> bool:
+    return isinstance(value, type) and value.__module__ == module.__name__

@@ -1,0 +1,256 @@
+"""A trained policy: an ONNX graph from raw joint measurements to joint torques.
+
+The file is self-contained: normalisation and torque scaling are inside the graph; recipe, robot,
+layout, control rate and command range are in its metadata. It runs through onnxruntime alone.
+"""
+
+import hashlib
+import json
+import logging
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import onnxruntime
+
+from hopping_leg.arrays import Array
+from hopping_leg.controllers.layouts import Layout, make_layout
+from hopping_leg.errors import PolicyError, UsageError
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim.disturbance import Measurement
+
+SCHEMA = 1
+"""Version of the policy file's layout."""
+
+METADATA_KEY = "hopping_leg"
+"""Entry of the ONNX metadata that holds a ``Card`` as JSON."""
+
+MEMORY, NEXT_MEMORY = "memory", "next_memory"
+"""Input and output of a graph that remembers: what it gave at a tick is what it gets at the next,
+and zeros at first."""
+
+OtherRobot = Literal["refuse", "warn", "accept"]
+"""What to do with a policy that was trained for another robot."""
+
+_log = logging.getLogger(__name__)
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Card:
+    """What a policy file says about itself."""
+
+    recipe: str
+    """Training recipe."""
+    layout: str
+    """Observation layout, one of ``control.layouts.LAYOUTS``."""
+    command_low: float
+    """Lowest command of the training, m."""
+    command_high: float
+    """Highest command of the training, m."""
+    torque_scale: tuple[float, float]
+    """Joint torque at full action, N m."""
+    robot: str
+    """Name of the robot it was trained on."""
+    robot_digest: str
+    """Hash of that robot's parameters."""
+    rate: float
+    """Control rate, Hz."""
+    seed: int = 0
+    """Training seed."""
+    steps: int = 0
+    """Control steps of experience."""
+    versions: dict[str, str] = field(default_factory=dict)
+    """Of the libraries that trained it."""
+
+    def to_json(self) -> str:
+        """Return the card as stored in the file."""
+        return json.dumps({"schema": SCHEMA, **asdict(self)}, sort_keys=True)
+
+    @staticmethod
+    def from_json(text: str, origin: str) -> "Card":
+        """Read a stored card.
+
+        Raises:
+            PolicyError: It is of another schema, incomplete or damaged.
+        """
+        try:
+            values = json.loads(text)
+            schema = values.pop("schema")
+            if schema != SCHEMA:
+                raise PolicyError(
+                    f"{origin} has policy schema {schema}; this version reads schema {SCHEMA}."
+                )
+            hip, knee = values.pop("torque_scale")
+            return Card(**values, torque_scale=(float(hip), float(knee)))
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise PolicyError(f"{origin} has a damaged policy card: {error}.") from error
+
+
+class Policy:
+    """Runs a policy file; implements ``Controller``.
+
+    Attributes:
+        card: What the file says about itself.
+        content: The ONNX file.
+        digest: First 16 hex digits of the file's SHA-256.
+    """
+
+    def __init__(self, content: bytes, origin: str, name: str) -> None:
+        """Load a policy.
+
+        Args:
+            content: The ONNX file.
+            origin: Where it came from, for error messages.
+            name: Shown in tables.
+
+        Raises:
+            PolicyError: The content is no policy file that this version can run.
+        """
+        self.name = name
+        self.origin = origin
+        self.content = content
+        self.digest = hashlib.sha256(content).hexdigest()[:16]
+        self._session = _open(content, origin)
+        text = self._session.get_modelmeta().custom_metadata_map.get(METADATA_KEY)
+        if text is None:
+            raise PolicyError(
+                f"{origin} is an ONNX file but not a policy; make one with `hop train`."
+            )
+        self.card = Card.from_json(text, origin)
+        self._layout: Layout = make_layout(self.card.layout, 1 / self.card.rate)
+        self._memory_size = _check_signature(self._session, self._layout, origin)
+        self.reset(0)
+
+    @staticmethod
+    def load(path: Path, name: str | None = None) -> "Policy":
+        """Read a policy file.
+
+        Raises:
+            PolicyError: It is missing, truncated, foreign or of another schema.
+        """
+        try:
+            content = path.read_bytes()
+        except OSError as error:
+            raise PolicyError(f"Cannot read policy file {path}: {error.strerror}.") from error
+        return Policy(content, str(path), name or path.stem)
+
+    @property
+    def inputs(self) -> dict[str, tuple[int, ...]]:
+        """Names and shapes of the graph's inputs, without the number of legs."""
+        return self._layout.shapes
+
+    @property
+    def remembers(self) -> bool:
+        """Whether it carries a memory from tick to tick."""
+        return self._memory_size > 0
+
+    def check_robot(
+        self, robot: Robot, rate: float | None = None, *, other: OtherRobot = "refuse"
+    ) -> None:
+        """Make sure that the policy was trained for this robot and control rate.
+
+        Args:
+            robot: The leg it shall drive.
+            rate: Control rate, Hz; None to skip that check.
+            other: What to do if it was trained for another one.
+
+        Raises:
+            PolicyError: The rate differs, or the robot where that is refused.
+        """
+        card = self.card
+        if rate is not None and rate != card.rate:
+            raise PolicyError(
+                f"{self.origin} was trained at {card.rate:g} Hz and cannot run at {rate:g} Hz;"
+                f" set --rate {card.rate:g}."
+            )
+        sentence = self.stranger(robot, self.origin)
+        if sentence and other == "refuse":
+            raise PolicyError(
+                f"{sentence} Train one for it with `hop train --robot`,"
+                " or allow another robot explicitly."
+            )
+        if sentence and other == "warn":
+            _log.warning(sentence)
+
+    def stranger(self, robot: Robot, name: str) -> str:
+        """Return what there is to say if a robot is not the one it was trained for, else nothing.
+
+        Args:
+            robot: The leg it shall drive.
+            name: Of the policy, in the sentence.
+        """
+        card = self.card
+        if robot.digest == card.robot_digest:
+            return ""
+        return (
+            f"{name} was trained on robot '{card.robot}' ({card.robot_digest}), not on"
+            f" '{robot.name}' ({robot.digest})."
+        )
+
+    def reset(self, count: int) -> None:
+        """Forget everything; the next measurement has ``count`` rows."""
+        self._layout.reset(count)
+        self._torque = np.zeros((count, 2))
+        self._memory = np.zeros((count, self._memory_size), np.float32)
+
+    def act(self, measurement: Measurement) -> Array:
+        """Return joint torques, N m, (n, 2).
+
+        Raises:
+            UsageError: A command lies outside the range that the policy was trained for.
+        """
+        self._check_command(measurement.command)
+        self._layout.update(measurement, self._torque)
+        feeds = self._layout.inputs()
+        if self.remembers:
+            feeds[MEMORY] = self._memory
+        torque, *memory = self._session.run(None, feeds)
+        if memory:
+            (self._memory,) = memory
+        self._torque = torque.astype(np.float64)
+        return self._torque
+
+    def internals(self) -> dict[str, Array]:
+        """Return nothing: a network has no state to show."""
+        return {}
+
+    def _check_command(self, command: Array) -> None:
+        newest = command[:, 0]
+        low, high = (newest[0], newest[0]) if len(newest) == 1 else (newest.min(), newest.max())
+        card = self.card
+        if not (low >= card.command_low - _ROUNDING and high <= card.command_high + _ROUNDING):
+            worst = low if not low >= card.command_low - _ROUNDING else high
+            raise UsageError(
+                f"{self.name} was trained for commands from {card.command_low:g} to"
+                f" {card.command_high:g} m, not for {worst:g} m."
+            )
+
+
+def _open(content: bytes, origin: str) -> Any:  # noqa: ANN401
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    options.inter_op_num_threads = 1
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    options.log_severity_level = 4
+    try:
+        return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+    except Exception as error:
+        # onnxruntime raises many unrelated types, all derived from Exception only.
+        raise PolicyError(
+            f"{origin} is not a readable ONNX file: truncated, damaged or of another kind."
+        ) from error
+
+
+def _check_signature(session: Any, layout: Layout, origin: str) -> int:  # noqa: ANN401
+    """Check a graph's inputs and outputs; return the entries of its memory, 0 if it has none."""
+    found = {i.name: tuple(i.shape[1:]) for i in session.get_inputs()}
+    outputs = [tuple(o.shape[1:]) for o in session.get_outputs()]
+    memory = found.pop(MEMORY, ())
+    if found != layout.shapes or outputs != ([(2,), memory] if memory else [(2,)]):
+        raise PolicyError(
+            f"{origin} takes {found} and gives {outputs}, but layout '{layout.name}' takes"
+            f" {layout.shapes} and gives one array of two torques."
+        )
+    return memory[0] if memory else 0

@@ -1,0 +1,71 @@
+"""The push of energy shaping: how hard, how fast, how long (paper, "Controller design")."""
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.controllers.shaping_gains import Gain
+from hopping_leg.robot.model import GRAVITY
+from hopping_leg.robot.parameters import Robot
+
+SHORTEST_PUSH = 0.02
+"""Least Delta x_l, m: the paper's quotient has no bound where the leg lands almost extended."""
+
+STEP = (0.7, 1.4)
+"""Bounds of E_d / E_{j-1}: one missed touchdown must not spoil the gain."""
+
+RANGE = (0.3, 4.0)
+"""Bounds of k over its first value."""
+
+
+def feedforward_force(robot: Robot, command: Array, length_0: Array, liftoff: Array) -> Array:
+    """Return F_f = m g (x_d - x_0) / Delta x_l (paper, Eq. 3), N, (n,).
+
+    Args:
+        robot: The leg.
+        command: x_d, m, (n,).
+        length_0: Leg length at the turning point; x_0 lies a foot radius above it, m, (n,).
+        liftoff: Leg length at the intended lift-off, m, (n,).
+    """
+    rise = np.maximum(command - length_0 - robot.foot.radius, 0.0)
+    return robot.mass * GRAVITY * rise / push_distance(length_0, liftoff)
+
+
+def push_distance(length_0: Array, liftoff: Array) -> Array:
+    """Return Delta x_l, at least ``SHORTEST_PUSH``, m, (n,)."""
+    return np.maximum(liftoff - length_0, SHORTEST_PUSH)
+
+
+def intended_rate(length: Array, length_0: Array, liftoff: Array, final: Array) -> Array:
+    """Return the leg rate that a push should have at a leg length, m/s, (n,).
+
+    An almost constant force makes the rate grow with the root of the distance; joint damping and
+    the lighter load towards the end flatten it. Only the shape matters: the gain update makes up
+    for a wrong ``final``.
+
+    Args:
+        length: Now, m, (n,).
+        length_0: At the turning point, m, (n,).
+        liftoff: At the intended lift-off, m, (n,).
+        final: Leg rate there, m/s, (n,).
+    """
+    share = np.clip((length - length_0) / push_distance(length_0, liftoff), 0.0, 1.0)
+    return final * np.sqrt(share * (2 - share))
+
+
+def share_of_period(length: Array, rate: Array, liftoff: Array, period: float) -> Array:
+    """Return how much of the coming control period passes before lift-off, 0 to 1, (n,)."""
+    ahead = np.maximum(rate, 1e-3) * period
+    return np.clip((liftoff - length) / ahead, 0.0, 1.0)
+
+
+def updated_gain(gain: Array, desired: Array, reached: Array, exponent: Gain) -> Array:
+    """Return k_j = k_{j-1} (E_d / E_{j-1})^2 with E = m g x (paper, Eqs. 1, 2 and 6), (n,).
+
+    Args:
+        gain: k_{j-1} over its first value, (n,).
+        desired: x_d, m, (n,).
+        reached: Estimated apex x_{j-1}, m, (n,); nonsense is cut to ``STEP``.
+        exponent: 2 in the paper.
+    """
+    step = np.clip(desired / np.maximum(reached, 1e-3), *STEP)
+    return np.clip(gain * step**exponent, *RANGE)

@@ -1,0 +1,243 @@
+"""Run a controller on many legs at once and record what happened."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+import polars as pl
+
+from hopping_leg.arrays import Array
+from hopping_leg.controllers.protocol import Controller
+from hopping_leg.errors import PhysicsError, UsageError
+from hopping_leg.robot import kinematics
+from hopping_leg.robot.limits import SoftLimits
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim import (
+    CONTROL_RATE,
+    AnyLegs,
+    Disturbance,
+    Engine,
+    Ground,
+    Legs,
+    Plant,
+    check_ground,
+    make_legs,
+)
+from hopping_leg.sim.perturbation import Perturbation, Perturber
+from hopping_leg.trace import Trace
+
+_START_SHARE = 0.2 / 0.29
+"""Leg length of the standing start as a share of the straight leg's."""
+
+_IMPOSSIBLE = 1e4
+"""Joint speed that no leg reaches, rad/s."""
+
+_STACKED = {
+    "height_m": 0,
+    "height_rate_m_s": 1,
+    "hip_position_rad": 2,
+    "knee_position_rad": 3,
+    "hip_velocity_rad_s": 4,
+    "knee_velocity_rad_s": 5,
+    "hip_command_nm": 6,
+    "knee_command_nm": 7,
+    "hip_torque_nm": 8,
+    "knee_torque_nm": 9,
+    "foot_clearance_m": 10,
+    "knee_clearance_m": 11,
+    "base_clearance_m": 12,
+    "command_m": 13,
+}
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Where a controller is tried: robot, disturbances, rates and start."""
+
+    robot: Robot
+    disturbance: Disturbance = field(default_factory=Disturbance)
+    soft_limits: SoftLimits | None = field(default_factory=SoftLimits)
+    rate: float = CONTROL_RATE
+    """Control rate, Hz."""
+    timestep: float = 5e-4
+    """Physics step, s."""
+    start_length: float | None = None
+    """Leg length of the standing start, m, hip axis to the foot's centre, foot below the hip; none
+    takes the paper leg's 0.2 m, scaled to the links."""
+    threads: int = 0
+    """Worker threads, 0 for one per core."""
+    engine: Engine = "mujoco"
+    """What computes the physics."""
+    ground: Ground = "robot"
+    """What the foot stands on."""
+
+    def __post_init__(self) -> None:
+        self.robot.require_leg()
+        check_ground(self.engine, self.ground)
+        for name in ("rate", "timestep"):
+            value = getattr(self, name)
+            if not 0 < value < math.inf:
+                raise UsageError(f"'{name}' is {value:g} but must be positive and finite.")
+        if self.threads < 0:
+            raise UsageError(f"'threads' is {self.threads} but must be 0 (all cores) or more.")
+        if np.isnan(self.start_posture).any():
+            raise UsageError(
+                f"'start_length' is {self.start_length} m, out of reach of {self.robot.name}."
+            )
+
+    @property
+    def start_posture(self) -> Array:
+        """Joint angles of the standing start, rad, (2,)."""
+        return kinematics.joint_angles(self.robot, np.array([self.standing_length, 0.0]))
+
+    @property
+    def standing_length(self) -> float:
+        """Leg length of the standing start, m."""
+        if self.start_length is not None:
+            return self.start_length
+        return _START_SHARE * (self.robot.thigh.length + self.robot.shank.length)
+
+
+@runtime_checkable
+class Watcher(Protocol):
+    """A controller that looks at the simulated legs themselves: for studies, never for a robot."""
+
+    def watch(self, legs: AnyLegs) -> None:
+        """Take the legs, live; called before their first tick."""
+        ...
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """Recorded runs of n legs.
+
+    Attributes:
+        time: (ticks,), s.
+        data: Trace columns to (ticks, n) arrays.
+        header: Shared header of the traces.
+    """
+
+    time: Array
+    data: dict[str, Array]
+    header: dict[str, Any]
+
+    def trace(self, leg: int, **header: Any) -> Trace:  # noqa: ANN401
+        """Return one leg's run; ``header`` entries are added to the shared ones."""
+        columns = {"time_s": self.time} | {k: v[:, leg] for k, v in self.data.items()}
+        return Trace(pl.DataFrame(columns), {**self.header, **header})
+
+
+def roll_out(
+    controller: Controller,
+    setup: Setup,
+    commands: Array,
+    seed: int,
+    on_tick: Callable[[int, int], None] | None = None,
+    on_legs: Callable[[AnyLegs], None] | None = None,
+    perturbation: Perturbation | None = None,
+) -> Rollout:
+    """Let a controller hop from a standing start.
+
+    Args:
+        controller: Controls all legs at once; a ``Watcher`` is shown them.
+        setup: The world it meets.
+        commands: Desired height for every tick and leg, m, (ticks, n).
+        seed: Of noise and delay.
+        on_tick: Called with (ticks done, ticks in all), for progress bars.
+        on_legs: Called once with the legs, which it may place where they shall start instead.
+        perturbation: What befalls the legs that ``setup`` does not know; recorded heights are above
+            the ground of the moment, recorded commands are the controller's.
+
+    Raises:
+        PhysicsError: The simulation became unstable.
+
+    Returns:
+        What happened, one row per control period; each row holds the state at its start and the
+        torques during it.
+    """
+    ticks, count = commands.shape
+    perturber = _perturb(setup, perturbation) if perturbation else None
+    legs = perturber.legs if perturber else _make_legs(setup, count)
+    plant = Plant(legs, setup.disturbance, setup.soft_limits, np.random.default_rng(seed))
+    legs.stand(slice(None), setup.start_posture)
+    plant.channel.restart(slice(None), legs.q, legs.qd, commands[0])
+    controller.reset(count)
+    if isinstance(controller, Watcher):
+        controller.watch(legs)
+    if on_legs is not None:
+        on_legs(legs)
+    data = np.empty((len(_STACKED), ticks, count))
+    internals: dict[str, Array] = {}
+    for tick in range(ticks):
+        if perturber is not None:
+            perturber.act(tick)
+        _record_state(data[:, tick], legs, commands[tick])
+        torque = controller.act(plant.sense(commands[tick]))
+        for name, values in controller.internals().items():
+            internals.setdefault(name, np.empty((ticks, count)))[tick] = values
+        data[6:8, tick] = torque.T
+        if perturbation is not None:
+            torque = torque + perturbation.torque[tick]
+        data[8:10, tick] = plant.drive(torque).T
+        if on_tick is not None:
+            on_tick(tick + 1, ticks)
+    _check_stable(data, setup)
+    header = {
+        "robot": setup.robot.name,
+        "robot_digest": setup.robot.digest,
+        "controller": controller.name,
+        "seed": seed,
+        "rate_hz": setup.rate,
+        "timestep_s": setup.timestep,
+        "engine": setup.engine,
+        "ground": setup.ground,
+    }
+    columns = {name: data[row] for name, row in _STACKED.items()}
+    return Rollout(np.arange(ticks) / setup.rate, columns | internals, header)
+
+
+def _make_legs(setup: Setup, count: int) -> AnyLegs:
+    return make_legs(
+        setup.robot,
+        count,
+        engine=setup.engine,
+        ground=setup.ground,
+        rate=setup.rate,
+        timestep=setup.timestep,
+        threads=setup.threads,
+    )
+
+
+def _perturb(setup: Setup, perturbation: Perturbation) -> Perturber:
+    """Return what befalls newly made legs, which only MuJoCo's legs can suffer."""
+    if setup.engine != "mujoco":
+        raise UsageError(f"Perturbations need the engine mujoco, not {setup.engine}.")
+    legs = Legs(
+        setup.robot,
+        len(perturbation.robots),
+        rate=setup.rate,
+        timestep=setup.timestep,
+        threads=setup.threads,
+        variants=perturbation.robots,
+        detailed=bool(perturbation.later),
+    )
+    return Perturber(perturbation, legs)
+
+
+def _check_stable(data: Array, setup: Setup) -> None:
+    """MuJoCo resets an unstable simulation and goes on, so that only its speed tells."""
+    speed = np.abs(data[4:6]).max()
+    if not speed < _IMPOSSIBLE:
+        raise PhysicsError(
+            f"The simulation of {setup.robot.name} became unstable at a physics step of"
+            f" {setup.timestep:g} s; take a smaller one or check masses and inertias."
+        )
+
+
+def _record_state(row: Array, legs: AnyLegs, command: Array) -> None:
+    row[0], row[1] = legs.height, legs.height_rate
+    row[2:4], row[4:6] = legs.q.T, legs.qd.T
+    row[10], row[11], row[12] = legs.foot_clearance(), legs.knee_clearance(), legs.base_clearance()
+    row[13] = command

@@ -1,0 +1,140 @@
+"""The CAN bus: what a drive makes of a frame, and what it answers."""
+
+from dataclasses import dataclass
+
+from moteus import multiplex
+from moteus.multiplex import FlowStreamSubframe, RegisterSubframe, StreamSubframe, SubframeType
+from moteus.protocol import Register
+
+from hopping_leg.emulator.diagnostic import CHANNEL
+from hopping_leg.emulator.drive import UNKNOWN_REGISTER, Drive
+from hopping_leg.emulator.frames import BROADCAST, Frame
+from hopping_leg.emulator.registers import ReplyWriter
+
+_UUID_MASKS = range(Register.UUID_MASK1, Register.UUID_MASK4 + 1)
+
+_WORDS_ONLY = range(Register.MODEL_NUMBER, Register.UUID_MASK_CAPABLE)
+"""Registers that can be read as 32-bit integers only."""
+
+
+Errors = list[tuple[int, int]]
+"""Register and error code of each write that failed."""
+
+
+@dataclass(frozen=True)
+class Message:
+    """A frame and what its payload says.
+
+    Attributes:
+        frame: From the host.
+        subframes: Up to the first that makes no sense.
+    """
+
+    frame: Frame
+    subframes: tuple[multiplex.Subframe, ...]
+
+    @staticmethod
+    def read(frame: Frame) -> "Message":
+        """Return the message of a frame."""
+        subframes: list[multiplex.Subframe] = []
+        try:
+            subframes.extend(multiplex.parse_frame(frame.data))
+        except Exception:
+            # The parser raises whatever a short buffer leads to.
+            return Message(frame, tuple(subframes))
+        return Message(frame, tuple(subframes))
+
+    def heard(self, drive: Drive) -> tuple[multiplex.Subframe, ...]:
+        """Return what a drive hears: nothing if another is meant."""
+        if self.frame.destination not in (drive.id, BROADCAST):
+            return ()
+        return self.subframes if _addressed(self.subframes, drive) else ()
+
+
+def act(message: Message, drive: Drive, time: float) -> Errors:
+    """Let a drive take what a message writes, if it is meant; return what it could not take."""
+    errors = []
+    for s in message.heard(drive):
+        if isinstance(s, RegisterSubframe) and s.type is SubframeType.WRITE:
+            assert s.value is not None
+            error = drive.write(s.register, s.resolution, s.value)
+            if error:
+                errors.append((s.register, error))
+    drive.commit(time)
+    return errors
+
+
+def answer(message: Message, drive: Drive, time: float, errors: Errors) -> Frame | None:
+    """Return a drive's answer to a message; None if it is not meant or none is wanted.
+
+    Args:
+        message: From the host.
+        drive: On the bus.
+        time: Now, s.
+        errors: Of its writes.
+    """
+    subframes = message.heard(drive)
+    if not subframes:
+        return None
+    reply = ReplyWriter()
+    for register, code in errors:
+        reply.error(register, code, reading=False)
+    _stream(subframes, drive, reply, time)
+    _read(subframes, drive, reply)
+    return message.frame.reply(drive.id, reply.data) if message.frame.wants_reply else None
+
+
+def _addressed(subframes: tuple[multiplex.Subframe, ...], drive: Drive) -> bool:
+    """Whether a frame that names a UUID, or its beginning, means this drive."""
+    for s in subframes:
+        if (
+            isinstance(s, RegisterSubframe)
+            and s.register in _UUID_MASKS
+            and s.type is SubframeType.WRITE
+        ):
+            own = drive.identity.register(s.register - Register.UUID_MASK1 + Register.UUID1)
+            if own != s.value:
+                return False
+    return True
+
+
+def _stream(
+    subframes: tuple[multiplex.Subframe, ...], drive: Drive, reply: ReplyWriter, time: float
+) -> None:
+    for s in subframes:
+        if not isinstance(s, StreamSubframe | FlowStreamSubframe) or s.channel != CHANNEL:
+            continue
+        if s.type is SubframeType.STREAM_CLIENT_TO_SERVER:
+            drive.diagnostic.write(s.data, time)
+        elif isinstance(s, FlowStreamSubframe):
+            packet, data = drive.diagnostic.poll_flow(s.packet_number, s.data[0])
+            reply.stream(s.channel, data, packet)
+        elif s.type is SubframeType.STREAM_CLIENT_POLL_SERVER:
+            reply.stream(s.channel, drive.diagnostic.poll(s.data[0]))
+
+
+def _read(subframes: tuple[multiplex.Subframe, ...], drive: Drive, reply: ReplyWriter) -> None:
+    """Answer reads in runs of consecutive registers of one resolution, as they were asked."""
+    state = drive.state()
+    run: list[float] = []
+    first = resolution = 0
+    for s in subframes:
+        if not isinstance(s, RegisterSubframe) or s.type is not SubframeType.READ:
+            continue
+        value = state.get(s.register)
+        if value is None:
+            value = drive.stored(s.register)
+        if s.register in _WORDS_ONLY and s.resolution != multiplex.INT32:
+            value = None
+        goes_on = run and s.register == first + len(run) and s.resolution == resolution
+        if run and (value is None or not goes_on):
+            reply.values(first, resolution, run)
+            run = []
+        if value is None:
+            reply.error(s.register, UNKNOWN_REGISTER, reading=True)
+            continue
+        if not run:
+            first, resolution = s.register, s.resolution
+        run.append(value)
+    if run:
+        reply.values(first, resolution, run)

@@ -1,0 +1,95 @@
+"""The drive's text console, tunnelled in frames: ``tel stop``, ``conf ...``, ``d ...``.
+
+The host writes lines and polls for the answers, with or without packet numbers.
+"""
+
+from typing import TYPE_CHECKING
+
+from hopping_leg.errors import UsageError
+
+if TYPE_CHECKING:
+    from hopping_leg.emulator.drive import Drive
+
+CHANNEL = 1
+"""Of the console."""
+
+_OK = b"OK\r\n"
+_PACKETS = 256
+
+
+class Diagnostic:
+    """The console of one drive.
+
+    Args:
+        drive: That it configures.
+    """
+
+    def __init__(self, drive: "Drive") -> None:
+        self._drive = drive
+        self._input = self._output = self._sent = b""
+        self._packet = 0
+
+    def write(self, data: bytes, time: float) -> None:
+        """Take text from the host; complete lines are executed."""
+        *lines, self._input = (self._input + data).replace(b"\r", b"\n").split(b"\n")
+        for line in lines:
+            words = line.decode("latin1").split()
+            if words:
+                self._output += self._execute(words, time)
+
+    def poll(self, most: int) -> bytes:
+        """Return the next bytes of the answers, at most so many."""
+        piece, self._output = self._output[:most], self._output[most:]
+        return piece
+
+    def poll_flow(self, acknowledged: int, most: int) -> tuple[int, bytes]:
+        """Return packet number and bytes: new ones if the last packet arrived, else it again."""
+        if acknowledged in (self._packet, 0):
+            self._packet = self._packet % (_PACKETS - 1) + 1
+            self._sent = self.poll(most)
+        return self._packet, self._sent
+
+    def _execute(self, words: list[str], time: float) -> bytes:
+        try:
+            return self._answer(words, time)
+        except UsageError as error:
+            return f"ERR {error}\r\n".encode()
+
+    def _answer(self, words: list[str], time: float) -> bytes:
+        settings = self._drive.settings
+        match words:
+            case ["tel", "stop"]:
+                return _OK
+            case ["conf", "get", name]:
+                if name not in settings.names():
+                    raise UsageError("error reading")
+                return f"{settings.text(name)}\r\n".encode()
+            case ["conf", "set", name, value]:
+                settings.set(name, value)
+            case ["conf", "enumerate", *group]:
+                names = settings.names(*group[:1])
+                return b"".join(f"{n} {settings.text(n)}\r\n".encode() for n in names) + _OK
+            case ["conf", "write"]:
+                settings.save()
+            case ["conf", "load"]:
+                settings.load()
+            case ["conf", "default"]:
+                settings.reset()
+            case ["d", "stop"]:
+                self._drive.stop(time)
+            case ["d", "nearest" | "rezero", *where]:
+                self._drive.encoder.set_nearest(float(where[0]) if where else 0.0)
+            case ["d", "exact", where]:
+                self._drive.encoder.set_exact(float(where))
+            case ["d", "cfg-set-output", where]:
+                self._set_offset(float(where))
+            case _:
+                raise UsageError("unknown command")
+        return _OK
+
+    def _set_offset(self, where: float) -> None:
+        """Change the configured offset so that the output is at a position, revolutions."""
+        settings, position = self._drive.settings, self._drive.encoder.position
+        change = (where - position) * float(settings["motor_position.output.sign"])
+        offset = float(settings["motor_position.output.offset"]) + change
+        settings.set("motor_position.output.offset", repr(offset))

@@ -1,0 +1,256 @@
+"""One drive: registers in, torque out, one step of physics at a time.
+
+Time comes as an argument; between two steps nothing changes but the command registers.
+"""
+
+import math
+from dataclasses import dataclass, fields
+
+from moteus.multiplex import F32
+from moteus.protocol import Register, scale_register
+
+from hopping_leg.emulator.codes import CONTROLLING, MODES, Fault, Mode, Notice
+from hopping_leg.emulator.command import COMMAND_FIELDS, Command
+from hopping_leg.emulator.diagnostic import Diagnostic
+from hopping_leg.emulator.identity import Identity
+from hopping_leg.emulator.mode_machine import ModeMachine
+from hopping_leg.emulator.rotor_encoder import RotorEncoder
+from hopping_leg.emulator.settings import Settings
+from hopping_leg.emulator.torque_law import TORQUE_CONSTANT, WITH_BOUNDS, TorqueLaw
+
+AMBIENT = 30.0
+"""Temperature of an idle drive, degrees C."""
+
+_HEATING = 0.008
+"""Rise at rest over the square of the phase current, K/A2."""
+_WARMING_TIME = 60.0
+"""Time constant of the output stage, s."""
+_LOWEST_VOLTAGE = 4.0
+"""Below it the firmware reports under-voltage, V."""
+
+UNKNOWN_REGISTER, NOT_WRITABLE, INVALID_VALUE = 1, 2, 3
+"""Error codes of reads and writes."""
+
+
+@dataclass
+class Disturbances:
+    """What faults do to a drive; see ``faults``."""
+
+    voltage: float = 0.0
+    """Added to the bus voltage, V."""
+    temperature: float = 0.0
+    """Added to the output stage's temperature, K."""
+    notice: int = 0
+    """Limit notice shown whatever happens."""
+    fault: int = 0
+    """Fault code that comes up as soon as the drive is powered."""
+
+
+class Drive:
+    """A moteus controller on a geared motor.
+
+    Args:
+        identity: Numbers that it was made with.
+        settings: Its configuration.
+        gear_ratio: True turns of the rotor per turn of the output.
+        brake: Damping of the output with the phases shorted, N m s/rad.
+        voltage: Of the bus, V.
+    """
+
+    def __init__(
+        self,
+        identity: Identity,
+        settings: Settings,
+        *,
+        gear_ratio: float,
+        brake: float,
+        voltage: float,
+    ) -> None:
+        self.identity, self.settings = identity, settings
+        self.encoder = RotorEncoder(settings, gear_ratio)
+        self.machine = ModeMachine()
+        self.law = TorqueLaw(settings)
+        self.command = Command()
+        self.diagnostic = Diagnostic(self)
+        self.disturbances = Disturbances()
+        self.uptime = 0.0
+        self._brake, self.nominal_voltage = brake * 2 * math.pi, voltage
+        self._warmth = 0.0
+        self._commanded = False
+        self._velocity = self._torque = self._asked = 0.0
+
+    @property
+    def id(self) -> int:
+        """Address on the bus."""
+        return int(self.settings["id.id"])
+
+    @property
+    def voltage(self) -> float:
+        """Of the bus, V."""
+        return self.nominal_voltage + self.disturbances.voltage
+
+    @property
+    def temperature(self) -> float:
+        """Of the output stage, degrees C."""
+        return AMBIENT + self._warmth + self.disturbances.temperature
+
+    @property
+    def active(self) -> bool:
+        """Whether the output stage is powered."""
+        return self.machine.mode in CONTROLLING
+
+    def boot(self, output: float) -> None:
+        """Power up with the output at a true position, revolutions."""
+        self.settings.load()
+        self.encoder.boot(output)
+        self.machine, self.command, self.uptime = ModeMachine(), Command(), 0.0
+
+    def write(self, register: int, resolution: int, value: float) -> int:
+        """Take one register from the host; return 0 or an error code."""
+        scaled = value if resolution == F32 else scale_register(register, resolution, value)
+        if register == Register.MODE:
+            return self._write_mode(int(scaled))
+        name = COMMAND_FIELDS.get(register)
+        if name is not None:
+            setattr(self.command, name, float(scaled))
+        elif register == Register.SET_OUTPUT_NEAREST:
+            self.encoder.set_nearest(float(scaled))
+        elif register == Register.SET_OUTPUT_EXACT:
+            self.encoder.set_exact(float(scaled))
+        elif Register.UUID_MASK1 <= register <= Register.UUID_MASK4:
+            return 0
+        else:
+            known = register in self.state() or self.stored(register) is not None
+            return NOT_WRITABLE if known else UNKNOWN_REGISTER
+        return 0
+
+    def _write_mode(self, mode: int) -> int:
+        if mode not in MODES:
+            return INVALID_VALUE
+        self.command = Command(Mode(mode))
+        self._commanded = True
+        return 0
+
+    def commit(self, time: float) -> None:
+        """Act on a frame's mode write, once all its registers are written."""
+        if self._commanded:
+            self._commanded = False
+            command = self.command
+            timeout = command.timeout or float(self.settings["servo.default_timeout_s"])
+            self.machine.command(command.mode, time, timeout)
+
+    def stop(self, time: float) -> None:
+        """Stop, as ``d stop`` does."""
+        self._write_mode(Mode.STOPPED)
+        self.commit(time)
+
+    def sense(self, output: float, velocity: float, torque: float) -> None:
+        """Take in what the sensors see after a step of physics.
+
+        Args:
+            output: Position of the output, revolutions.
+            velocity: Of the output, rev/s.
+            torque: What the motor gave, at the output, N m.
+        """
+        self.encoder.watch(output)
+        self._velocity = self.encoder.velocity(velocity)
+        self._torque = torque if self.active else 0.0
+
+    def step(self, time: float, dt: float) -> float:
+        """Let one step of physics begin.
+
+        Args:
+            time: Now, s.
+            dt: Length of the step, s.
+
+        Returns:
+            Torque that the drive asks of its motor, at the output, N m; finite.
+        """
+        self.uptime += dt
+        amperes = self._torque / (self.encoder.gear_ratio * TORQUE_CONSTANT)
+        self._warmth += dt / _WARMING_TIME * (_HEATING * amperes**2 - self._warmth)
+        free = bool(self.command.ignore_bounds)
+        if self.machine.advance(time, outside_limits=not free and self._outside_limits()):
+            self.law.begin()
+        self._check()
+        self.law.notice = 0
+        wanted = self._control(dt)
+        if self.active:
+            self.machine.fault = self.disturbances.notice or self.law.notice
+        self._asked = wanted
+        if math.isnan(wanted):
+            self.machine.fault = Notice.MAX_VOLTAGE
+            return 0.0
+        return self.encoder.torque_to_output(wanted)
+
+    def _control(self, dt: float) -> float:
+        mode, command, law = self.machine.mode, self.command, self.law
+        position, velocity = self.encoder.position, self._velocity
+        if mode is Mode.TIMEOUT:
+            mode = Mode(int(self.settings["servo.timeout_mode"]))
+            command = Command(mode, position=math.nan, kd_scale=command.kd_scale)
+        if mode is Mode.POSITION:
+            torque = law.position(command, position, velocity, dt)
+        elif mode is Mode.ZERO_VELOCITY:
+            torque = law.zero_velocity(command.kd_scale, velocity)
+        elif mode is Mode.STAY_WITHIN:
+            torque = law.stay_within(command, position, velocity)
+        elif mode is Mode.BRAKE:
+            return -self._brake * velocity
+        else:
+            return 0.0
+        bounds = mode in WITH_BOUNDS and not command.ignore_bounds
+        return law.limited(torque, position, velocity, self.temperature, bounds=bounds)
+
+    def _check(self) -> None:
+        """Go to fault where the firmware would."""
+        machine, settings = self.machine, self.settings
+        if self.disturbances.fault:
+            machine.trip(self.disturbances.fault)
+        if self.voltage > float(settings["servo.max_voltage"]):
+            machine.trip(Fault.OVER_VOLTAGE)
+        if self.voltage < _LOWEST_VOLTAGE:
+            machine.trip(Fault.UNDER_VOLTAGE)
+        if self.temperature > float(settings["servo.fault_temperature"]):
+            machine.trip(Fault.OVER_TEMPERATURE)
+
+    def _outside_limits(self) -> bool:
+        low, high = (float(self.settings[f"servopos.position_{end}"]) for end in ("min", "max"))
+        return self.encoder.position < low or self.encoder.position > high
+
+    def stored(self, register: int) -> float | None:
+        """Return a command or identity register, None if it is neither."""
+        name = COMMAND_FIELDS.get(register)
+        if name is not None:
+            return float(getattr(self.command, name))
+        return self.identity.register(register)
+
+    def state(self) -> dict[int, float]:
+        """Return the registers that tell how the drive is, in its units."""
+        position = self.encoder.position
+        torque = self.encoder.torque_as_reported(self._torque)
+        amperes = self._torque / (self.encoder.gear_ratio * TORQUE_CONSTANT)
+        return {
+            Register.MODE: self.machine.mode,
+            Register.POSITION: position,
+            Register.VELOCITY: self._velocity,
+            Register.TORQUE: torque,
+            Register.Q_CURRENT: math.nan if math.isnan(self._asked) else amperes,
+            Register.D_CURRENT: 0.0,
+            Register.ABS_POSITION: position,
+            Register.POWER: self._torque * self._velocity * 2 * math.pi,
+            Register.MOTOR_TEMPERATURE: 0.0,
+            Register.TRAJECTORY_COMPLETE: float(math.isnan(self.command.position)),
+            Register.HOME_STATE: self.encoder.home,
+            Register.VOLTAGE: self.voltage,
+            Register.TEMPERATURE: self.temperature,
+            Register.FAULT: self.machine.fault,
+            Register.CONTROL_POSITION: self.law.control_position,
+            Register.CONTROL_VELOCITY: self.law.control_velocity,
+            Register.CONTROL_TORQUE: self._asked,
+            Register.MILLISECOND_COUNTER: int(self.uptime * 1000),
+            Register.MULTIPLEX_ID: self.id,
+        }
+
+
+assert set(COMMAND_FIELDS.values()) <= {f.name for f in fields(Command)}

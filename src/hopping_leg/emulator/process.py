@@ -1,0 +1,184 @@
+"""An emulator in a process of its own, for tests and benchmarks.
+
+with EmulatorProcess(Start(robot="legv2")) as emulator:
+    drive(emulator.path)
+    print(emulator.state().height)
+"""
+
+import multiprocessing
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+from types import TracebackType
+
+from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
+from hopping_leg.emulator.faults import Fault
+from hopping_leg.emulator.pty_port import PtyPort
+from hopping_leg.emulator.robot import EmulatedRobot
+from hopping_leg.emulator.server import Server
+from hopping_leg.emulator.start import Start
+from hopping_leg.emulator.wire_log import WireLog
+from hopping_leg.errors import UsageError
+
+_PATIENCE = 60.0
+"""Longest wait for an answer of the process, s; importing takes long on a busy machine."""
+
+
+@dataclass(frozen=True)
+class State:
+    """The truth about the emulated robot at one time; pairs are hip and knee.
+
+    Attributes:
+        time: Since the start, s.
+        modes: Of the drives.
+        faults: Codes or notices of the drives.
+        q: Joint angles, rad.
+        qd: Joint velocities, rad/s.
+        height: Of the base, m.
+        lost: Time that was not simulated for want of the processor, s.
+        flown: When the foot left the ground for the first time, s; infinite if it did not yet.
+    """
+
+    time: float
+    modes: tuple[int, int]
+    faults: tuple[int, int]
+    q: tuple[float, float]
+    qd: tuple[float, float]
+    height: float
+    lost: float
+    flown: float
+
+
+@dataclass(frozen=True)
+class Record:
+    """What happened since the start.
+
+    Attributes:
+        log: Of the wire.
+        faults: Those that began, with when, s.
+    """
+
+    log: WireLog
+    faults: tuple[tuple[float, Fault], ...]
+
+
+class EmulatorProcess:
+    """A running emulator; ``path`` is the terminal that the host opens, empty for a CAN bus.
+
+    Args:
+        start: What is emulated.
+
+    Raises:
+        UsageError: The process did not start; the message says why.
+    """
+
+    def __init__(self, start: Start) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._pipe, theirs = context.Pipe()
+        self._process = context.Process(target=_serve, args=(start, theirs), daemon=True)
+        self._process.start()
+        theirs.close()
+        answer = self._answer()
+        if not isinstance(answer, Path):
+            raise UsageError(f"The emulator did not start: {answer}")
+        self.path = answer
+
+    @property
+    def pid(self) -> int:
+        """Of the process."""
+        assert self._process.pid is not None
+        return self._process.pid
+
+    def state(self) -> State:
+        """Return the truth about the robot now."""
+        self._pipe.send("state")
+        state = self._answer()
+        assert isinstance(state, State)
+        return state
+
+    def record(self) -> Record:
+        """Return what went over the wire and which faults began."""
+        self._pipe.send("record")
+        record = self._answer()
+        assert isinstance(record, Record)
+        return record
+
+    def inflict(self, fault: Fault) -> None:
+        """Let a fault happen; its time counts from now."""
+        self._pipe.send(fault)
+        self._answer()
+
+    def close(self) -> None:
+        """End the process."""
+        self._pipe.close()
+        self._process.join(5)
+        self._process.kill()
+        self._process.join()
+
+    def __enter__(self) -> "EmulatorProcess":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _answer(self) -> object:
+        if not self._pipe.poll(_PATIENCE):
+            raise UsageError("The emulator's process does not answer.")
+        try:
+            return self._pipe.recv()
+        except EOFError as error:
+            raise UsageError("The emulator's process ended by itself.") from error
+
+
+def _serve(start: Start, pipe: Connection) -> None:
+    """Run in the process: serve the terminal until the pipe is closed."""
+    try:
+        robot, port = start.build(), start.open()
+    except Exception as error:
+        pipe.send(str(error))
+        return
+    server = Server(robot, port)
+    pipe.send(port.path if isinstance(port, PtyPort) else Path())
+    prefer_this_thread()
+    running = True
+    with uninterrupted():
+        while running:
+            server.turn()
+            running = _obey(pipe, robot, server)
+    port.close()
+
+
+def _obey(pipe: Connection, robot: EmulatedRobot, server: Server) -> bool:
+    """Answer what the parent asked; return whether it is still there."""
+    try:
+        while pipe.poll():
+            wish = pipe.recv()
+            if isinstance(wish, Fault):
+                robot.misfortune.add(wish)
+            if wish == "record":
+                pipe.send(Record(robot.log, tuple(robot.misfortune.log)))
+            else:
+                pipe.send(_state(robot, server))
+    except (EOFError, OSError):
+        return False
+    return True
+
+
+def _state(robot: EmulatedRobot, server: Server) -> State:
+    hip, knee = robot.drives
+    q, qd = robot.leg.q, robot.leg.qd
+    return State(
+        time=robot.time,
+        modes=(int(hip.machine.mode), int(knee.machine.mode)),
+        faults=(int(hip.machine.fault), int(knee.machine.fault)),
+        q=(float(q[0]), float(q[1])),
+        qd=(float(qd[0]), float(qd[1])),
+        height=robot.leg.height,
+        lost=server.lost,
+        flown=robot.misfortune.flown,
+    )

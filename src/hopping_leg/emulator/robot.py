@@ -1,0 +1,138 @@
+"""The emulated robot: two drives, the leg that they turn, and the faults that befall them.
+
+Time comes as an argument. Nothing here knows of sockets, terminals or the clock on the wall.
+"""
+
+import heapq
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.deploy.configuration import wanted
+from hopping_leg.deploy.wire import JOINTS
+from hopping_leg.emulator import bus
+from hopping_leg.emulator.drive import Drive
+from hopping_leg.emulator.faults import Fault
+from hopping_leg.emulator.frames import Frame
+from hopping_leg.emulator.identity import Identity
+from hopping_leg.emulator.leg import TIMESTEP, EmulatedLeg
+from hopping_leg.emulator.misfortune import Misfortune
+from hopping_leg.emulator.outbox import Outbox
+from hopping_leg.emulator.settings import Settings
+from hopping_leg.emulator.wire_log import WireLog
+from hopping_leg.robot.parameters import Robot
+
+NOMINAL_VOLTAGE = 26.0
+"""Bus voltage at which the qdd100 has the speed limit of the robot files, V."""
+
+
+class EmulatedRobot:
+    """Leg and drives, moved by ``advance`` and ``receive``.
+
+    A person holds the leg where it stands until both drives are powered.
+
+    Args:
+        robot: What stands behind the wire; its ``reality`` holds.
+        q: Joint angles at the start, rad, (2,).
+        configured: Whether the drives are configured as the robot's file asks; else as the
+            firmware is delivered, but for their ids.
+        homed: Whether somebody homed the drives already.
+        held: Whether the leg is held until the drives are powered.
+        seed: Of sensor noise and jitter.
+        faults: What goes wrong, and when.
+        timestep: Physics step, s.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        q: Array,
+        *,
+        configured: bool = True,
+        homed: bool = True,
+        held: bool = True,
+        seed: int = 0,
+        faults: Sequence[Fault] = (),
+        timestep: float = TIMESTEP,
+    ) -> None:
+        self.robot, self.time, self.timestep, self.held = robot, 0.0, timestep, held
+        self.leg = EmulatedLeg(robot, q, seed=seed, timestep=timestep)
+        self.drives = tuple(_drive(robot, joint, configured) for joint in range(len(JOINTS)))
+        self._latency, self._rng = robot.reality.latency, np.random.default_rng(seed)
+        self._due: list[tuple[float, int, bus.Message]] = []
+        self._numbers = itertools.count()
+        self._last_delivery = 0.0
+        for joint, drive in enumerate(self.drives):
+            position, *_ = self.leg.sensed(joint)
+            drive.boot(position)
+            if homed:
+                drive.encoder.set_nearest(position)
+        self.outbox = Outbox()
+        """What is on its way to the host."""
+        self.wire_time = 0.0
+        """What a reply takes at least, s."""
+        self.log = WireLog()
+        """What went over the wire."""
+        self._sense()
+        self.misfortune = Misfortune(self, faults, self._rng)
+
+    def advance(self, until: float) -> None:
+        """Simulate whole steps up to a time, s."""
+        while self.time + self.timestep <= until + 1e-9:
+            self._step()
+
+    def receive(self, frame: Frame) -> None:
+        """Take a frame from the host now; the drives' answers go to the outbox.
+
+        Where the robot's ``reality`` has a latency of commands, the frame acts later but is
+        answered at once.
+        """
+        message = bus.Message.read(frame)
+        late = self._latency.command + self._latency.jitter * float(self._rng.random())
+        if late:
+            due = max(self.time + late, self._last_delivery)
+            self._last_delivery = due
+            heapq.heappush(self._due, (due, next(self._numbers), message))
+        for joint, drive in enumerate(self.drives):
+            errors = [] if late else bus.act(message, drive, self.time)
+            answer = bus.answer(message, drive, self.time, errors)
+            self.log.told(self.time, joint, message, drive)
+            if answer is not None:
+                self.log.answered(self.time, joint, answer)
+                self.misfortune.send(answer, joint, self.outbox)
+
+    def _step(self) -> None:
+        self.misfortune.step()
+        while self._due and self._due[0][0] <= self.time:
+            message = heapq.heappop(self._due)[2]
+            for drive in self.drives:
+                bus.act(message, drive, self.time)
+        hip, knee = (drive.step(self.time, self.timestep) for drive in self.drives)
+        if self.held and all(drive.active for drive in self.drives):
+            self.held = False
+        if not self.held:
+            self.leg.step((hip, knee))
+        self.time += self.timestep
+        self._sense()
+
+    def _sense(self) -> None:
+        for joint, drive in enumerate(self.drives):
+            drive.sense(*self.leg.sensed(joint))
+            self.log.stepped(self.time, joint, drive)
+
+
+def _drive(robot: Robot, joint: int, configured: bool) -> Drive:
+    servo = robot.hardware.servos[joint]
+    motor = (robot.hip, robot.knee)[joint].motor
+    changes: dict[str, float] = {"id.id": servo.id}
+    if configured:
+        changes |= {setting.name: setting.value for setting in wanted(robot, joint)}
+    return Drive(
+        Identity(f"{robot.name} {JOINTS[joint]}"),
+        Settings(**changes),
+        gear_ratio=motor.gear_ratio,
+        brake=motor.peak_torque / motor.no_load_speed,
+        voltage=NOMINAL_VOLTAGE * robot.reality.voltage,
+    )

@@ -1,0 +1,82 @@
+"""The one encoder of a drive: absolute within a turn of the rotor, relative beyond.
+
+After power-up the firmware takes the rotor's turn nearest to zero, so the output is known only up
+to whole turns of the rotor (1/6 turn of the output behind a gear of 6) until the host tells where
+it is (homing).
+"""
+
+from hopping_leg.emulator.settings import Settings
+
+HOMED_ROTOR = 1
+"""Register 0x00c: known within a turn of the rotor."""
+HOMED_OUTPUT = 2
+"""Register 0x00c: the host has told where the output is."""
+
+
+class RotorEncoder:
+    """Position of one drive's output as its firmware knows it.
+
+    Args:
+        settings: Of the drive.
+        gear_ratio: Turns of the rotor per turn of the output: the truth, whatever is configured.
+    """
+
+    def __init__(self, settings: Settings, gear_ratio: float) -> None:
+        self._settings, self.gear_ratio = settings, gear_ratio
+        self.home = HOMED_ROTOR
+        self._rotor = 0.0
+        self._shift = 0.0
+        self.jump = 0.0
+        """Turns of the rotor by which the encoder errs since a fault."""
+
+    @property
+    def _ratio(self) -> float:
+        return float(self._settings["motor_position.rotor_to_output_ratio"])
+
+    @property
+    def _sign(self) -> float:
+        return float(self._settings["motor_position.output.sign"])
+
+    def boot(self, output: float) -> None:
+        """Begin anew with the true output at a position, revolutions."""
+        self._rotor = output * self.gear_ratio
+        self._shift = -float(round(self._rotor))
+        self.jump, self.home = 0.0, HOMED_ROTOR
+
+    def misplace(self, turns: float) -> None:
+        """Err by turns of the rotor, as after power-up in another pose; homing is lost."""
+        self._shift += turns
+        self.home = HOMED_ROTOR
+
+    def watch(self, output: float) -> None:
+        """Take in the true position of the output, revolutions."""
+        self._rotor = output * self.gear_ratio
+
+    @property
+    def position(self) -> float:
+        """Output as the firmware reports it, revolutions."""
+        offset = float(self._settings["motor_position.output.offset"])
+        rotor = self._rotor + self._shift + self.jump
+        return self._sign * (rotor * self._ratio + offset)
+
+    def velocity(self, output: float) -> float:
+        """Return the reported velocity for a true one of the output, rev/s."""
+        return self._sign * output * self.gear_ratio * self._ratio
+
+    def set_nearest(self, position: float) -> None:
+        """Home: the output is within half a turn of the rotor of a position, revolutions."""
+        self._shift += round((position - self.position) * self._sign / self._ratio)
+        self.home = HOMED_OUTPUT
+
+    def set_exact(self, position: float) -> None:
+        """Home: the output is exactly at a position, revolutions."""
+        self._shift += (position - self.position) * self._sign / self._ratio
+        self.home = HOMED_OUTPUT
+
+    def torque_to_output(self, torque: float) -> float:
+        """Return the output's true torque when the firmware believes to give ``torque``, N m."""
+        return self._sign * torque * self._ratio * self.gear_ratio
+
+    def torque_as_reported(self, torque: float) -> float:
+        """Return what the firmware reports for a true torque of the output, N m."""
+        return self._sign * torque / (self._ratio * self.gear_ratio)

@@ -1,0 +1,144 @@
+"""From a command to the output's torque: the firmware's PD, zero velocity and limits.
+
+The integral term, flux braking and power limits are left out: a qdd100 has none configured.
+"""
+
+import math
+
+from hopping_leg.emulator.codes import Mode, Notice
+from hopping_leg.emulator.command import Command
+from hopping_leg.emulator.settings import Settings
+
+TORQUE_CONSTANT = 0.0275
+"""Of the rotor, N m/A: 16 N m behind a gear of 6 take the 97 A that the board can give."""
+
+
+class TorqueLaw:
+    """The position controller of one drive and the limits behind it.
+
+    Args:
+        settings: Of the drive.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self.control_position = math.nan
+        self.control_velocity = math.nan
+        self.notice = 0
+        """Limit that was at work in the last step, 0 if none."""
+
+    def begin(self) -> None:
+        """Forget where the last mode was heading."""
+        self.control_position = self.control_velocity = math.nan
+
+    def position(self, command: Command, position: float, velocity: float, dt: float) -> float:
+        """Return the torque of position mode, N m; see the firmware's ``ISR_DoPositionCommon``."""
+        self._head_for(command, position, dt)
+        kp, kd = (float(self._settings[f"servo.pid_position.{k}"]) for k in ("kp", "kd"))
+        stiff, damp = kp * command.kp_scale, kd * command.kd_scale
+        torque = command.feedforward + damp * (self.control_velocity - velocity)
+        if stiff:
+            torque += stiff * (self.control_position - position)
+        return self._within(torque, command.max_torque)
+
+    def zero_velocity(self, kd_scale: float, velocity: float) -> float:
+        """Return the torque of zero-velocity mode, N m."""
+        damp = float(self._settings["servo.pid_position.kd"]) * kd_scale
+        return self._within(-damp * velocity, float(self._settings["servo.timeout_max_torque_Nm"]))
+
+    def stay_within(self, command: Command, position: float, velocity: float) -> float:
+        """Return the torque of stay-within mode, N m: none but feedforward inside the bounds."""
+        low = math.nan if math.isnan(command.lower) else max(command.lower, position)
+        high = math.nan if math.isnan(command.upper) else min(command.upper, position)
+        target = low if low > position else high if high < position else None
+        torque = command.feedforward
+        if target is not None:
+            kp, kd = (float(self._settings[f"servo.pid_position.{k}"]) for k in ("kp", "kd"))
+            torque += kp * command.kp_scale * (target - position) - kd * command.kd_scale * velocity
+        return self._within(torque, command.max_torque)
+
+    def limited(
+        self, torque: float, position: float, velocity: float, temperature: float, *, bounds: bool
+    ) -> float:
+        """Return the torque that the limits leave, N m; NaN passes, as in the firmware.
+
+        Args:
+            torque: Asked for.
+            position: Of the output, as reported, revolutions.
+            velocity: Of the output, as reported, rev/s.
+            temperature: Of the output stage, degrees C.
+            bounds: Whether the position limits hold.
+        """
+        if bounds:
+            torque = self._in_bounds(torque, position)
+        highest = float(self._settings["servo.max_velocity"])
+        amperes = float(self._settings["servo.max_current_A"])
+        if abs(velocity) > highest and torque * velocity > 0:
+            over = (abs(velocity) - highest) / float(self._settings["servo.max_velocity_derate"])
+            torque = self._capped(torque, max(0.0, 1 - over) * amperes, Notice.MAX_VELOCITY)
+        return self._cooled(torque, amperes, temperature)
+
+    def _cooled(self, torque: float, amperes: float, temperature: float) -> float:
+        margin = float(self._settings["servo.temperature_margin"])
+        begin = float(self._settings["servo.fault_temperature"]) - margin
+        hot = (temperature - begin) / margin
+        if hot <= 0:
+            return self._capped(torque, amperes, Notice.MAX_CURRENT)
+        least = float(self._settings["servo.derate_current_A"])
+        left = min(amperes, max(0.0, amperes + hot * (least - amperes)))
+        return self._capped(torque, left, Notice.FET_TEMPERATURE)
+
+    def _in_bounds(self, torque: float, position: float) -> float:
+        derate = float(self._settings["servo.position_derate"])
+        high, low = (float(self._settings[f"servopos.position_{end}"]) for end in ("max", "min"))
+        beyond = max(position - high, 0.0) if torque > 0 else max(low - position, 0.0)
+        if not beyond > 0:
+            return torque
+        self.notice = Notice.POSITION_BOUNDS
+        return torque * max(0.0, 1 - beyond / derate)
+
+    def _capped(self, torque: float, amperes: float, notice: Notice) -> float:
+        ratio = float(self._settings["motor_position.rotor_to_output_ratio"])
+        most = amperes * TORQUE_CONSTANT / ratio
+        if abs(torque) > most:
+            self.notice = notice
+            return math.copysign(most, torque)
+        return torque
+
+    def _within(self, torque: float, most: float) -> float:
+        if abs(torque) > most:
+            self.notice = Notice.MAX_TORQUE
+            return math.copysign(most, torque)
+        return torque
+
+    def _head_for(self, command: Command, position: float, dt: float) -> None:
+        """Move the control position: at once, or as fast as the velocity limit allows."""
+        speed = 0.0 if math.isnan(command.velocity) else command.velocity
+        if math.isnan(self.control_position):
+            self.control_position = position
+        self.control_velocity = speed
+        target = command.position
+        if math.isnan(target):
+            self.control_position += speed * dt
+        elif math.isnan(command.velocity_limit):
+            self.control_position, command.position = target, math.nan
+        else:
+            reach = command.velocity_limit * dt
+            gap = target - self.control_position
+            self.control_position += min(max(gap, -reach), reach)
+            if abs(gap) <= reach:
+                command.position = math.nan
+            else:
+                self.control_velocity = math.copysign(command.velocity_limit, gap)
+        self._clip_control_position()
+
+    def _clip_control_position(self) -> None:
+        low, high = (float(self._settings[f"servopos.position_{end}"]) for end in ("min", "max"))
+        if not math.isnan(high):
+            self.control_position = min(self.control_position, high)
+        if not math.isnan(low):
+            self.control_position = max(self.control_position, low)
+
+
+WITH_BOUNDS = (Mode.POSITION, Mode.STAY_WITHIN, Mode.ZERO_VELOCITY, Mode.TIMEOUT, Mode.CURRENT)
+"""Modes in which the position limits take outward torque away."""

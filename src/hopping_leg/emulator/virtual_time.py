@@ -1,0 +1,115 @@
+"""The host's asyncio client in virtual time, with the emulator at the other end of its line.
+
+An event loop that has nothing to do does not sleep: it lets the emulated robot move until something
+arrives or the next timer is due. All of the client runs unchanged, down to the bytes on the
+terminal; a run is exact and as fast as the processor.
+"""
+
+import asyncio
+import selectors
+from collections.abc import Callable, Coroutine
+from typing import Any, TypeVar
+
+from hopping_leg.emulator.robot import EmulatedRobot
+from hopping_leg.emulator.server import Port, serve
+from hopping_leg.errors import HardwareError
+
+Result = TypeVar("Result")
+
+_BUSY = 20
+"""Rounds that a busy loop may go without a look at the line."""
+
+_FOREVER = 60.0
+"""Virtual time after which nobody waits for anything any more, s."""
+
+
+class VirtualTime(asyncio.SelectorEventLoop):
+    """An event loop whose time is the emulated robot's.
+
+    Args:
+        robot: That moves while the loop waits.
+        port: Between both.
+    """
+
+    def __init__(self, robot: EmulatedRobot, port: Port) -> None:
+        super().__init__(_Waiting(robot, port))
+        self._robot = robot
+
+    def time(self) -> float:
+        """Return the robot's time, s."""
+        return self._robot.time
+
+
+class _Waiting(selectors.SelectSelector):
+    """Lets the robot move instead of waiting."""
+
+    def __init__(self, robot: EmulatedRobot, port: Port) -> None:
+        super().__init__()
+        self._robot, self._port = robot, port
+        self._busy = 0
+
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        """Return what is ready now or becomes ready within a virtual timeout, s."""
+        if timeout is not None and timeout <= 0 and self._busy < _BUSY:
+            self._busy += 1  # the loop has other work, and no time passes meanwhile
+            return []
+        self._busy = 0
+        robot = self._robot
+        until = robot.time + (_FOREVER if timeout is None else timeout)
+        serve(robot, self._port, ready=True)
+        ready = super().select(0)
+        while not ready and robot.time < until - 1e-9:
+            robot.advance(robot.time + robot.timestep)
+            if serve(robot, self._port, ready=False):
+                ready = super().select(0)
+        return ready
+
+
+class SteppedClient:
+    """Stands for the thread in which the host's client runs; whoever asks does the work.
+
+    Args:
+        robot: Behind the port.
+        port: That the client opens.
+        on_error: Told what went wrong inside of the loop, in a few words.
+    """
+
+    def __init__(
+        self, robot: EmulatedRobot, port: Port, on_error: Callable[[str], None] = lambda _: None
+    ) -> None:
+        self._port = port
+        self.loop = VirtualTime(robot, port)
+        self.loop.set_exception_handler(lambda _, context: on_error(_words(context)))
+
+    def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        """Do work now, until it is done."""
+        self.loop.run_until_complete(work())
+
+    def call(self, work: Coroutine[Any, Any, Result], seconds: float) -> Result:
+        """Do work and return its result.
+
+        Raises:
+            HardwareError: It took too long.
+        """
+        try:
+            return self.loop.run_until_complete(asyncio.wait_for(work, seconds))
+        except TimeoutError as error:
+            raise HardwareError(f"The adapter did not answer within {seconds:g} s.") from error
+
+    def wait(self, until: float) -> None:
+        """Let the robot move until a time, s."""
+        if until > self.loop.time():
+            self.loop.run_until_complete(asyncio.sleep(until - self.loop.time()))
+
+    def close(self) -> None:
+        """End all that is under way, and take the port away."""
+        for task in asyncio.all_tasks(self.loop):
+            task.cancel()
+        self.loop.run_until_complete(asyncio.sleep(0))
+        self.loop.close()
+        if self._port.plugged:
+            self._port.close()
+
+
+def _words(context: dict[str, Any]) -> str:
+    return str(context.get("exception") or context.get("message", "unknown"))

@@ -1,0 +1,123 @@
+"""What went over the wire: every command of the host, every answer of a drive, every change.
+
+It tells, independently of what the host believes, whether anything unsafe was commanded and how
+soon after a bad answer the host reacted.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from moteus.multiplex import RegisterSubframe, SubframeType
+from moteus.protocol import Register, parse_reply
+
+from hopping_leg.emulator.codes import MODES, Mode
+
+if TYPE_CHECKING:
+    from hopping_leg.emulator.bus import Message
+    from hopping_leg.emulator.drive import Drive
+    from hopping_leg.emulator.frames import Frame
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """A command that wrote a drive's mode.
+
+    Attributes:
+        time: When it arrived, s.
+        joint: 0 for the hip, 1 for the knee.
+        mode: Commanded.
+        torque: Feedforward at the motor's output, N m.
+        most: Largest torque allowed to the drive, N m.
+    """
+
+    time: float
+    joint: int
+    mode: Mode
+    torque: float
+    most: float
+
+
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """The state that a drive's answer tells, rounded as it travels.
+
+    Attributes:
+        time: When it left, s.
+        joint: 0 for the hip, 1 for the knee.
+        mode: Of the drive.
+        fault: Code or notice.
+        voltage: Of the bus, V.
+        temperature: Of the output stage, degrees C.
+    """
+
+    time: float
+    joint: int
+    mode: Mode
+    fault: int
+    voltage: float
+    temperature: float
+
+
+@dataclass(frozen=True, slots=True)
+class Changed:
+    """A drive's change of mode.
+
+    Attributes:
+        time: When, s.
+        joint: 0 for the hip, 1 for the knee.
+        mode: From then on.
+    """
+
+    time: float
+    joint: int
+    mode: Mode
+
+
+_TOLD = (Register.MODE, Register.FAULT, Register.VOLTAGE, Register.TEMPERATURE)
+_STATE = set(_TOLD)
+"""Registers of an answer that is noted."""
+
+_REMEMBERED = 100_000
+"""Commands and answers each, about a minute's."""
+
+
+class WireLog:
+    """Commands, answers and changes of mode in the order of time; the oldest are forgotten."""
+
+    def __init__(self) -> None:
+        self.commands: deque[Told] = deque(maxlen=_REMEMBERED)
+        self.answers: deque[Answered] = deque(maxlen=_REMEMBERED)
+        self.changes: deque[Changed] = deque(maxlen=_REMEMBERED)
+        self._modes = [Mode.STOPPED, Mode.STOPPED]
+
+    def told(self, time: float, joint: int, message: "Message", drive: "Drive") -> None:
+        """Note what a message commands a drive, if it does."""
+        mode, torque, most = None, 0.0, 0.0
+        for s in message.heard(drive):
+            if not isinstance(s, RegisterSubframe) or s.type is not SubframeType.WRITE:
+                continue
+            if s.register == Register.MODE and s.value in MODES:
+                mode = Mode(int(s.value or 0))
+            elif s.register == Register.COMMAND_FEEDFORWARD_TORQUE:
+                torque = float(s.value or 0.0)
+            elif s.register == Register.COMMAND_POSITION_MAX_TORQUE:
+                most = float(s.value or 0.0)
+        if mode is not None:
+            self.commands.append(Told(time, joint, mode, torque, most))
+
+    def answered(self, time: float, joint: int, answer: "Frame") -> None:
+        """Note a drive's answer, if it tells the drive's state."""
+        values = parse_reply(answer.data)
+        if values.keys() >= _STATE:
+            mode, fault, voltage, temperature = (values[register] for register in _TOLD)
+            self.answers.append(
+                Answered(time, joint, Mode(int(mode)), int(fault), voltage, temperature)
+            )
+
+    def stepped(self, time: float, joint: int, drive: "Drive") -> None:
+        """Note a drive's mode after a step, if it is another."""
+        mode = drive.machine.mode
+        if mode is not self._modes[joint]:
+            self._modes[joint] = mode
+            self.changes.append(Changed(time, joint, mode))

@@ -1,0 +1,182 @@
+"""What a learner sees: a policy layout's inputs, normalised and joined.
+
+``three-samples`` is the paper's 15-dimensional observation (Sec. II-C, "Observation and action
+space"): three samples, newest first, each of normalised (q1, q2, qd1, qd2, command). Joint
+positions run from -1 at the lower to 1 at the upper soft limit, velocities are divided by one
+scale, the command runs from -1 to 1 over its range.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from hopping_leg.arrays import Array, IntArray
+from hopping_leg.controllers.layouts import Layout, ThreeSamples, make_layout
+from hopping_leg.envs.options import TaskOptions
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim import SAMPLES, Channel
+
+SIZE = 15
+"""Entries of the paper's observation."""
+
+Array32 = npt.NDArray[np.float32]
+
+_LEAST_SPAN = 0.05
+"""Half the command range of an observation at least, m, so that a single command has a scale."""
+
+_LATE = 0.025
+"""Age of a sample that an observation shows as 1, s."""
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """Normalised value = (value - offset) * gain.
+
+    Attributes:
+        offset: In SI units, (k,).
+        gain: Inverse scales of the same, (k,).
+    """
+
+    offset: Array
+    gain: Array
+
+
+class Observation(Protocol):
+    """Makes the observations of n legs."""
+
+    layout: str
+    """Name of the policy layout that gives a trained policy the same inputs."""
+    size: int
+    """Entries of an observation."""
+    order: IntArray
+    """Where each of the layout's joined inputs stands in an observation, (size,)."""
+    scaling: Scaling
+    """Of the layout's joined inputs."""
+
+    def advance(self, samples: Array, channel: Channel, last_action: Array) -> None:
+        """Take in a new tick.
+
+        Args:
+            samples: (q1, q2, qd1, qd2, command), newest first, (n, 3, 5).
+            channel: That delivered them in this tick.
+            last_action: Taken one tick ago, zero at the start of an episode, (n, 2).
+        """
+        ...
+
+    def restart(self, rows: IntArray, samples: Array, channel: Channel) -> None:
+        """Forget the past of some legs, which begin anew within this tick."""
+        ...
+
+    def view(self, samples: Array) -> Array32:
+        """Return what is seen in this tick, (n, size)."""
+        ...
+
+    def state(self) -> dict[str, Any]:
+        """Return what is remembered from tick to tick."""
+        ...
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a ``state``."""
+        ...
+
+
+class PaperObservation:
+    """The paper's three samples; made straight from the channel's, because it is the fast path."""
+
+    layout = ThreeSamples.name
+    size = SIZE
+
+    def __init__(self, sample: Scaling, count: int) -> None:
+        place = np.arange(SIZE).reshape(SAMPLES, 5)
+        self.order = np.concatenate([place[:, 0:2].ravel(), place[:, 2:4].ravel(), place[:, 4]])
+        tiled = [np.tile(values, SAMPLES)[self.order] for values in (sample.offset, sample.gain)]
+        self.scaling = Scaling(*tiled)
+        shape = (count, SAMPLES, 1)
+        self._offset, self._gain = np.tile(sample.offset, shape), np.tile(sample.gain, shape)
+
+    def advance(self, samples: Array, channel: Channel, last_action: Array) -> None:
+        """Do nothing: the samples are all there is."""
+
+    def restart(self, rows: IntArray, samples: Array, channel: Channel) -> None:
+        """Do nothing."""
+
+    def view(self, samples: Array) -> Array32:
+        """Return the normalised samples, (n, 15)."""
+        centred = samples - self._offset
+        centred *= self._gain
+        return centred.reshape(-1, SIZE).astype(np.float32)
+
+    def state(self) -> dict[str, Any]:
+        """Return nothing."""
+        return {}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Do nothing."""
+
+
+class LayoutObservation:
+    """The inputs of any policy layout, made by the very code that makes them on the robot."""
+
+    def __init__(self, layout: Layout, scaling: Scaling, torque: Array, count: int) -> None:
+        self._layout, self.layout, self.scaling = layout, layout.name, scaling
+        self._torque = torque
+        self.size = len(scaling.offset)
+        self.order = np.arange(self.size)
+        layout.reset(count)
+
+    def advance(self, samples: Array, channel: Channel, last_action: Array) -> None:
+        """Let the layout take in a new tick."""
+        self._layout.update(channel.measurement(samples), last_action * self._torque)
+
+    def restart(self, rows: IntArray, samples: Array, channel: Channel) -> None:
+        """Let the layout forget the past of some legs."""
+        self._layout.restart(rows, channel.measurement(samples))
+
+    def view(self, samples: Array) -> Array32:
+        """Return the normalised inputs, (n, size)."""
+        parts = [part.reshape(len(part), -1) for part in self._layout.inputs().values()]
+        joined = np.concatenate(parts, axis=1, dtype=np.float64)
+        return ((joined - self.scaling.offset) * self.scaling.gain).astype(np.float32)
+
+    def state(self) -> dict[str, Any]:
+        """Return what the layout remembers."""
+        return self._layout.state()
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a ``state``."""
+        self._layout.restore(state)
+
+
+def sample_scaling(robot: Robot, options: TaskOptions) -> Scaling:
+    """Return the normalisation of (q1, q2, qd1, qd2, command), rad, rad/s, m, (5,)."""
+    lower, upper = robot.of_joints("lower"), robot.of_joints("upper")
+    low, high = options.command_bounds
+    half = max((high - low) / 2, _LEAST_SPAN)
+    offset = np.concatenate([(lower + upper) / 2, [0.0, 0.0, (low + high) / 2]])
+    velocity = options.velocity_scale
+    span = np.concatenate([(upper - lower) / 2, [velocity, velocity, half]])
+    return Scaling(offset, 1 / span)
+
+
+def make_observation(robot: Robot, options: TaskOptions, count: int) -> Observation:
+    """Return the observation that a task asks for."""
+    sample = sample_scaling(robot, options)
+    if options.observation == ThreeSamples.name:
+        return PaperObservation(sample, count)
+    layout = make_layout(options.observation, 1 / options.rate)
+    torque = np.array(options.action_torque)
+    parts = {
+        "q": (sample.offset[0:2], sample.gain[0:2]),
+        "qd": (sample.offset[2:4], sample.gain[2:4]),
+        "age": (np.zeros(1), np.full(1, 1 / _LATE)),
+        "past_torque": (np.zeros(2), 1 / torque),
+        "command": (sample.offset[4:5], sample.gain[4:5]),
+    }
+    columns = [
+        [np.tile(values, shape[0] if len(shape) > 1 else 1) for values in parts[name]]
+        for name, shape in layout.shapes.items()
+    ]
+    offset, gain = (np.concatenate(column) for column in zip(*columns, strict=True))
+    return LayoutObservation(layout, Scaling(offset, gain), torque, count)

@@ -1,0 +1,297 @@
+"""Continue a policy's training on a robot: outings, checks, learning, the best one kept.
+
+A check is an outing without exploration at fixed heights; its error, as estimated from the joints,
+decides what is best, what is thrown back and when to stop. Checks take robot time like any outing.
+All randomness follows from seed and number of the outing, so that a run that was killed goes on
+exactly: networks and optimisers from a checkpoint, experience from the outings' traces.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hopping_leg.controllers.outing import Outing, Outings, Steps
+from hopping_leg.controllers.policy import Policy
+from hopping_leg.controllers.protocol import Controller
+from hopping_leg.envs import ApexReward
+from hopping_leg.rl.checkpoint import (
+    Tree,
+    list_checkpoints,
+    read_checkpoint,
+    write_checkpoint,
+)
+from hopping_leg.rl.export import Network, build_policy
+from hopping_leg.rl.finetune.aim import Aim
+from hopping_leg.rl.finetune.exploring import Exploring
+from hopping_leg.rl.finetune.heard import Heard
+from hopping_leg.rl.finetune.hops import Score, estimated, score, settled
+from hopping_leg.rl.finetune.learner import Learner
+from hopping_leg.rl.finetune.options import FinetuneOptions
+from hopping_leg.rl.finetune.prepared import Task, believed_rows, prepare
+from hopping_leg.rl.finetune.replay import Rewriter
+from hopping_leg.rl.network_file import read_network
+from hopping_leg.trace import Trace
+
+Row = dict[str, Any]
+"""Of an outing, as JSON values."""
+
+
+@dataclass(frozen=True)
+class Finetuned:
+    """A finished run.
+
+    Attributes:
+        content: The best policy's file.
+        reason: Why it ended, a sentence.
+        rows: One per outing.
+    """
+
+    content: bytes
+    reason: str
+    rows: list[Row]
+
+
+class Finetuning:
+    """One continued training.
+
+    Args:
+        task: Policy, believed robot, range of commands, seed.
+        robot: The real one, or what plays it.
+        options: What is asked for.
+        folder: For traces, checkpoints and what is learnt beforehand.
+        prepared: Folder of what is learnt beforehand, if others share it.
+        on_outing: Called with every outing's row.
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        robot: Outings,
+        options: FinetuneOptions,
+        folder: Path,
+        prepared: Path | None = None,
+        on_outing: Callable[[Row], None] = lambda _: None,
+    ) -> None:
+        self._task, self._robot, self._options, self._folder = task, robot, options, folder
+        self._on_outing = on_outing
+        self._reckon = prepare(task, options.contact, prepared or folder / "prepared")
+        self._network = read_network(task.policy.content)
+        self._aim = Aim(*task.commands)
+        self._learner: Learner | None = None
+        self._best = self._origin = (self._network, self._aim)
+        self._explored = 0
+        self.rows: list[Row] = []
+
+    def run(self) -> Finetuned:
+        """Go on until a rule ends it."""
+        self._restore()
+        while not (reason := self._reason()):
+            check = self._check_is_due()
+            number = len(self.rows)
+            steps = self._check_steps() if check else self._exploring_steps(number)
+            controller = self._controller(check=check, number=number)
+            outing = self._robot.hop(controller, steps, self._seed(number, 0))
+            outing.trace.save(self._trace(number))
+            self._take(outing, steps, check=check)
+            self._checkpoint()
+            self._on_outing(self.rows[-1])
+        return Finetuned(self._content(*self._best), reason, self.rows)
+
+    @property
+    def minutes(self) -> float:
+        """Robot time so far."""
+        return float(self.rows[-1]["minutes"]) if self.rows else 0.0
+
+    @property
+    def _errors(self) -> list[float]:
+        return [row["error_m"] for row in self.rows if row["kind"] == "check"]
+
+    def _errors_since(self) -> list[float]:
+        """Return the best error and those of the checks since a policy was thrown back, m."""
+        checks = [row for row in self.rows if row["kind"] == "check"]
+        thrown = [index for index, row in enumerate(checks) if row["thrown_back"]]
+        first = thrown[-1] + 1 if thrown else 0
+        return [min(self._errors), *(row["error_m"] for row in checks[first:])]
+
+    def _reason(self) -> str:
+        return self._options.rules.reason(self._errors, self.minutes, self._options.outing / 60)
+
+    def _learns_weights(self) -> bool:
+        method = self._options.method
+        return method == "sac" or (method == "both" and self.minutes >= self._options.aiming)
+
+    def _check_is_due(self) -> bool:
+        latest = [row["kind"] for row in self.rows[-self._options.explorations :]]
+        return not self._learns_weights() or "check" not in latest
+
+    def _check_steps(self) -> Steps:
+        o = self._options
+        return tuple((command, o.outing / len(o.commands)) for command in o.commands)
+
+    def _exploring_steps(self, number: int) -> Steps:
+        o, rng = self._options, np.random.default_rng((self._task.seed, number, 1))
+        return tuple((float(c), o.hold) for c in
+                     rng.uniform(*self._task.commands, round(o.outing / o.hold)))  # fmt: skip
+
+    def _controller(self, *, check: bool, number: int) -> Controller:
+        content = self._content(self._network, self._aim)
+        if check:
+            return Policy(content, "the policy in training", self._task.policy.name)
+        assert self._learner is not None
+        rng = np.random.default_rng((self._task.seed, number, 2))
+        card = self._task.policy.card
+        return Exploring(content, card, self._learner.spread, self._options.noise_hold, rng)
+
+    def _take(self, outing: Outing, steps: Steps, *, check: bool) -> None:
+        """Judge an outing, learn from it, note it."""
+        heard = Heard.of([outing.trace])
+        hindsight = self._reckon(heard)
+        apexes = estimated(outing, hindsight)
+        judged = score(apexes, steps, outing.complaint)
+        row: Row = {
+            "outing": len(self.rows),
+            "kind": "check" if check else "exploration",
+            "minutes": self.minutes + outing.seconds / 60,
+            "complaint": outing.complaint,
+            "aim_m": list(self._aim.shift),
+            **_numbers(judged, ""),
+        }
+        if outing.truth is not None:
+            row |= _numbers(score(outing.truth, steps, outing.complaint), "true_")
+        row["thrown_back"] = False
+        self.rows.append(row)
+        if check or outing.complaint:
+            self._keep_best_or_throw_back(row)
+        if self._learns_weights():
+            self._learn(outing, len(heard.command), explored=not check)
+        elif not row["thrown_back"]:
+            counted = settled(apexes, steps)
+            errors = counted[:, 2] - counted[:, 1]
+            self._aim = self._aim.corrected(counted[:, 1], errors, self._options.aim)
+
+    def _keep_best_or_throw_back(self, row: Row) -> None:
+        check = row["kind"] == "check"
+        if check and row["error_m"] <= min(self._errors):
+            self._best = (self._network, self._aim)
+        elif row["complaint"] or self._options.rules.thrown_back(self._errors_since()):
+            row["thrown_back"] = True
+            self._network, self._aim = self._best
+            if self._learner is not None:
+                self._learner.take_back(self._network)
+
+    def _learn(self, outing: Outing, ticks: int, *, explored: bool) -> None:
+        if self._learner is None:
+            self._network, self._aim = self._best
+            self._begin_learning()
+            self._pretrain()
+        else:
+            self._hear(outing.trace, bool(outing.complaint))
+        assert self._learner is not None
+        self._explored += explored
+        steps = round(self._options.steps_per_tick * ticks)
+        first = self._explored <= self._options.critics_first
+        self._learner.learn(steps, self._seed(len(self.rows), 3), critics_only=first)
+        self._network = self._learner.network()
+
+    def _hear(self, trace: Trace, ended: bool) -> None:
+        assert self._learner is not None
+        heard = Heard.of([trace])
+        self._learner.hear(self._rewriter()(heard, self._reckon(heard), ended=ended))
+
+    def _begin_learning(self) -> None:
+        """Make a learner that knows the believed robot and every outing so far."""
+        o, task = self._options, self._task
+        self._origin = (self._network, self._aim)
+        hidden = len(self._network.layers[-1][0][0])
+        spread = np.full((hidden, 2), np.exp(o.learner.log_std))
+        rng = np.random.default_rng((task.seed, 4))
+        content = self._content(self._network, self._aim)
+        explorer = Exploring(content, task.policy.card, spread, o.noise_hold, rng)
+        rows = believed_rows(task, explorer, self._reckon, self._rewriter(), o.believed_seconds)
+        self._learner = Learner(self._network, rows, o.learner, task.seed)
+        for row in self.rows:
+            self._hear(Trace.load(self._trace(row["outing"])), bool(row["complaint"]))
+
+    def _pretrain(self) -> None:
+        """Let the critics learn from what is there before the actor does."""
+        assert self._learner is not None
+        steps = self._options.first_steps
+        self._learner.learn(steps, self._seed(0, 5), critics_only=True)
+
+    def _rewriter(self) -> Rewriter:
+        o, card = self._options, self._task.policy.card
+        reward = ApexReward(self._task.robot, o.reward, card.rate)
+        reward.anneal(1.0)
+        scaled = self._aim.applied(self._network, card)
+        return Rewriter(card, scaled, self._task.robot, reward, o.penalty)
+
+    def _content(self, network: Network, aim: Aim) -> bytes:
+        policy = self._task.policy
+        card = replace(
+            policy.card,
+            recipe=f"{policy.card.recipe}, continued from {policy.digest}",
+            seed=self._task.seed,
+            steps=policy.card.steps + round(60 * self.minutes * policy.card.rate),
+        )
+        return build_policy(aim.applied(network, card), card)
+
+    def _seed(self, number: int, purpose: int) -> int:
+        sequence = np.random.SeedSequence((self._task.seed, number, purpose))
+        return int(sequence.generate_state(1)[0])
+
+    def _trace(self, number: int) -> Path:
+        return self._folder / "outings" / f"{number:04d}.parquet"
+
+    def _checkpoint(self) -> None:
+        tree: Tree = {
+            "rows": self.rows,
+            "explored": self._explored,
+            "now": _as_tree(self._network, self._aim),
+            "best": _as_tree(*self._best),
+            "origin": _as_tree(*self._origin),
+            "learner": None if self._learner is None else self._learner.state(),
+        }
+        write_checkpoint(self._folder / "checkpoints", len(self.rows), tree)
+
+    def _restore(self) -> None:
+        """Go on from the newest checkpoint, if there is one."""
+        found = list_checkpoints(self._folder / "checkpoints")
+        if not found:
+            return
+        tree = read_checkpoint(found[-1])
+        self.rows, self._explored = tree["rows"], tree["explored"]
+        if tree["learner"] is not None:
+            self._network, self._aim = self._from_tree(tree["origin"])
+            self._begin_learning()
+            assert self._learner is not None
+            self._learner.restore(tree["learner"])
+        self._network, self._aim = self._from_tree(tree["now"])
+        self._best = self._from_tree(tree["best"])
+
+    def _from_tree(self, tree: Tree) -> tuple[Network, Aim]:
+        layers = [(np.array(weight), np.array(bias)) for weight, bias in tree["layers"]]
+        a, b = tree["shift"]
+        return replace(self._network, layers=layers), replace(self._aim, shift=(a, b))
+
+
+def _as_tree(network: Network, aim: Aim) -> Tree:
+    return {"layers": [list(layer) for layer in network.layers], "shift": list(aim.shift)}
+
+
+def _numbers(judged: Score, prefix: str) -> Row:
+    commands = list(judged.by_command)
+    return {
+        f"{prefix}error_m": judged.error,
+        f"{prefix}hops": judged.hops,
+        f"{prefix}by_command": [
+            {
+                "command_m": c,
+                "median_abs_error_m": judged.by_command[c],
+                "median_error_m": judged.offsets[c],
+            }
+            for c in commands
+        ],
+    }

@@ -1,0 +1,181 @@
+"""A simulated leg that is reached like a real one: by outings that return what it measured.
+
+The leg is stepped by the code that ``hop evaluate`` hops on. What the twin brings of latency and
+noise is all there is; its true state goes nowhere but into ``Outing.truth``.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.controllers.outing import MEASURED, Outing, Steps, by_tick, measured_table
+from hopping_leg.controllers.protocol import Controller, Measurement
+from hopping_leg.controllers.rollout import Rollout, Setup, roll_out
+from hopping_leg.hops import find_hops
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim import NOTHING, AnyLegs
+from hopping_leg.sim.perturbation import Perturbation
+from hopping_leg.trace import Trace
+
+_BRAKING = 0.15
+"""Of the joints once a leg was stopped, N m s/rad."""
+
+
+@dataclass(frozen=True)
+class Guard:
+    """Beyond what measured joints end an outing; pairs are hip and knee, (2,) each."""
+
+    lower: Array
+    """rad"""
+    upper: Array
+    """rad"""
+    speed: Array
+    """rad/s"""
+
+    def complaint(self, q: Array, qd: Array) -> str:
+        """Return what is wrong with a leg's joints, rad and rad/s, (2,) each; else nothing."""
+        if (q < self.lower).any() or (q > self.upper).any():
+            return "A joint left its range."
+        if (np.abs(qd) > self.speed).any():
+            return "A joint is faster than its motor can turn it."
+        return ""
+
+
+class Simulated:
+    """A simulated leg; implements ``Outings``.
+
+    Args:
+        robot: The leg that plays the real one.
+        guard: When to stop; None never does.
+        threads: Of the physics.
+    """
+
+    def __init__(self, robot: Robot, guard: Guard | None, threads: int = 1) -> None:
+        self.name, self._robot, self._guard = robot.name, robot, guard
+        self._setup = Setup(robot, NOTHING, threads=threads)
+
+    def hop(self, controller: Controller, steps: Steps, seed: int) -> Outing:
+        """Let a controller hop from standing."""
+        commands = by_tick(steps, self._setup.rate)[:, None]
+        witness = Witness(controller, self._guard)
+        run = roll_out(witness, self._setup, commands, seed)
+        ended = int(witness.ended[0])
+        trace = traces_of(run)[0]
+        table = trace.table[: ended + 1] if ended >= 0 else trace.table
+        return Outing(
+            Trace(table, trace.header),
+            table.height / self._setup.rate,
+            witness.complaints[0],
+            _true_apexes(run, table.height),
+        )
+
+
+def hop_many(
+    controller: Controller,
+    robot: Robot,
+    robots: Sequence[Robot],
+    commands: Array,
+    seed: int,
+    timestep: float = 1e-3,
+) -> Rollout:
+    """Let a controller hop on many simulated legs; measured joints are columns, see ``traces_of``.
+
+    Args:
+        controller: Has all legs.
+        robot: That the controller believes to have.
+        robots: What each leg is, n of them.
+        commands: Desired heights, m, (ticks, n).
+        seed: Of the simulation.
+        timestep: Physics step, s.
+    """
+    ticks, count = commands.shape
+    calm = np.zeros((ticks, count))
+    differ = Perturbation(tuple(robots), np.zeros((ticks, count, 2)), calm, calm)
+    witness = Witness(controller, None)
+    setup = Setup(robot, NOTHING, timestep=timestep, threads=1)
+    return roll_out(witness, setup, commands, seed, perturbation=differ)
+
+
+def traces_of(run: Rollout) -> list[Trace]:
+    """Return what each leg of a witnessed run measured, without anything true."""
+    return [
+        Trace(
+            measured_table(
+                run.time,
+                run.data["command_m"][:, leg],
+                {
+                    name: np.stack([run.data[_own(column)][:, leg] for column in columns], axis=1)
+                    for name, columns in MEASURED.items()
+                },
+            ),
+            {**run.header, "simulated": True},
+        )
+        for leg in range(run.data["command_m"].shape[1])
+    ]
+
+
+class Witness:
+    """Writes down what a controller is shown, and takes the leg from it where a guard objects.
+
+    Args:
+        controller: Has the legs.
+        guard: When to stop a leg; None never does.
+
+    Attributes:
+        ended: Tick at which each leg was stopped, -1 for never, (n,).
+        complaints: Why, by leg.
+    """
+
+    def __init__(self, controller: Controller, guard: Guard | None) -> None:
+        self.name, self._controller, self._guard = controller.name, controller, guard
+
+    def watch(self, legs: AnyLegs) -> None:
+        """Take the legs whose motors' torque is read."""
+        self._legs = legs
+
+    def reset(self, count: int) -> None:
+        """Forget everything."""
+        self._controller.reset(count)
+        self.ended = np.full(count, -1)
+        self.complaints = [""] * count
+        self._tick = -1
+
+    def act(self, measurement: Measurement) -> Array:
+        """Return joint torques, N m, (n, 2)."""
+        self._tick += 1
+        q, qd = measurement.q[:, 0], measurement.qd[:, 0]
+        asked = self._controller.act(measurement)
+        seen = {"q": q, "qd": qd, "torque": self._legs.measured_torque, "asked": asked}
+        self._seen = {name: np.array(values) for name, values in seen.items()}
+        if self._guard is not None:
+            self._judge(self._guard, q, qd)
+        stopped = (self.ended >= 0)[:, None]
+        return np.where(stopped, -_BRAKING * qd, asked)
+
+    def internals(self) -> dict[str, Array]:
+        """Return what was seen at the last tick."""
+        return {
+            _own(column): self._seen[name][:, joint]
+            for name, columns in MEASURED.items()
+            for joint, column in enumerate(columns)
+        }
+
+    def _judge(self, guard: Guard, q: Array, qd: Array) -> None:
+        for leg in np.flatnonzero(self.ended < 0):
+            complaint = guard.complaint(q[leg], qd[leg])
+            if complaint:
+                self.ended[leg], self.complaints[leg] = self._tick, complaint
+
+
+def _own(column: str) -> str:
+    """Return the name of a measured column beside the true one of the same name."""
+    return f"measured_{column}"
+
+
+def _true_apexes(run: Rollout, ticks: int) -> Array:
+    columns = ("height_m", "height_rate_m_s", "foot_clearance_m", "command_m")
+    height, rate, clearance, command = (run.data[name][:ticks, 0] for name in columns)
+    hops = find_hops(height, rate, clearance)
+    return np.stack([run.time[hops.tick], command[hops.tick], hops.apex], axis=1)

@@ -1,0 +1,171 @@
+"""Try a policy as evaluation does, to choose among the snapshots of a training.
+
+The seeds here select; they must never be among those that judge (1000 and above).
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.controllers.protocol import Controller
+from hopping_leg.controllers.rollout import Rollout, Setup, roll_out
+from hopping_leg.hops import count_skipped, find_bounces, find_hops
+from hopping_leg.robot.parameters import Robot
+
+FIRST_SEED = 500
+"""Judges every snapshot while training."""
+
+FINAL_SEEDS = (501, 502, 503, 504)
+"""Judge the best snapshots once more at the end."""
+
+DECIDING_SEEDS = (505, 506, 507, 508)
+"""Judge the policies of several starts, each the best of its own training."""
+
+_SPACING = 0.01
+"""Of the heights at which nothing between two others should be missed, m."""
+
+SETTLE = 0.2
+"""Share of a trial at its start that does not count."""
+
+_DISORDER = 0.1
+"""Score for neighbouring commands whose hops are not in order, m."""
+
+_UNRELIABLE = 0.01
+"""Score for hops that are skipped or hit the ground at a command, however few, m."""
+
+_LEGS = 4
+_SECONDS = 10.0
+_PENALTY = 0.1
+"""Score for every hop skipped and every contact of body and ground, per hop, m."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Hops at one command, pooled over legs and seeds.
+
+    Attributes:
+        command_m: Desired apex height, m.
+        median_error_m: Median of apex - command, m; NaN without hops.
+        std_m: Standard deviation of the apexes, m; NaN without hops.
+        hops: In-flight apexes.
+        hops_per_s: Their rate, 1/s.
+        flight_fraction: Share of the time with the foot off the ground.
+        skipped_hops: Hops that should have happened and did not.
+        body_contact_ticks: Ticks with base or knee on the ground.
+        min_height_m: Lowest base height, m.
+    """
+
+    command_m: float
+    median_error_m: float
+    std_m: float
+    hops: int
+    hops_per_s: float
+    flight_fraction: float
+    skipped_hops: int
+    body_contact_ticks: int
+    min_height_m: float
+
+
+def judge(
+    controller: Controller,
+    robot: Robot,
+    commands: tuple[float, ...],
+    seeds: tuple[int, ...] = (FIRST_SEED,),
+    rate: float = 200.0,
+    threads: int = 1,
+) -> list[Verdict]:
+    """Let a controller hop at fixed commands with noise and delay on, physics at 0.5 ms.
+
+    Args:
+        controller: To be judged.
+        robot: The leg.
+        commands: Desired heights, rising, m.
+        seeds: Of noise and delay; each adds four legs per command.
+        rate: Control rate, Hz.
+        threads: Worker threads, 0 for one per core.
+    """
+    schedule = np.tile(np.repeat(commands, _LEGS), (round(_SECONDS * rate), 1))
+    setup = Setup(robot, rate=rate, threads=threads)
+    runs = [roll_out(controller, setup, schedule, seed) for seed in seeds]
+    return [
+        _verdict(runs, command, range(index * _LEGS, (index + 1) * _LEGS), rate)
+        for index, command in enumerate(commands)
+    ]
+
+
+def every_centimetre(commands: Sequence[float]) -> tuple[float, ...]:
+    """Return the heights from the lowest to the highest command in steps of about 1 cm, m.
+
+    A policy may hop in one way at low commands and in another at high ones, and fail where it
+    changes.
+    """
+    low, high = min(commands), max(commands)
+    return tuple(map(float, np.linspace(low, high, round((high - low) / _SPACING) + 1)))
+
+
+def score(verdicts: list[Verdict]) -> float:
+    """Return how bad a policy is, m.
+
+    Mean over commands of ``badness`` and of a penalty where hops are skipped or the body hits the
+    ground at all: who seldom does so must not win by scattering less. And a penalty for every pair
+    of neighbouring commands of which the higher one does not give the higher hops: a policy that
+    ignores its command must not win by hopping in between.
+    """
+    heights = [v.command_m + v.median_error_m for v in verdicts]
+    disordered = sum(not low < high for low, high in itertools.pairwise(heights))
+    unreliable = [v.skipped_hops + v.body_contact_ticks > 0 for v in verdicts]
+    worse = _UNRELIABLE * float(np.mean(unreliable)) + _DISORDER * disordered
+    return float(np.mean([badness(v) for v in verdicts])) + worse
+
+
+def badness(verdict: Verdict) -> float:
+    """Return median error + spread + penalties at a command, m; 1 without hops."""
+    if verdict.hops == 0:
+        return 1.0
+    faults = (verdict.skipped_hops + verdict.body_contact_ticks) / verdict.hops
+    return abs(verdict.median_error_m) + verdict.std_m + _PENALTY * min(faults, 3.0)
+
+
+def as_rows(verdicts: list[Verdict]) -> list[dict[str, Any]]:
+    """Return verdicts as JSON rows; null stands for no hops."""
+    rows = [asdict(v) for v in verdicts]
+    return [{k: None if v != v else v for k, v in row.items()} for row in rows]
+
+
+def _verdict(runs: list[Rollout], command: float, legs: range, rate: float) -> Verdict:
+    start = round(SETTLE * _SECONDS * rate)
+    apexes: list[Array] = []
+    skipped = contacts = ticks = flight = 0
+    lowest = np.inf
+    for run in runs:
+        for leg in legs:
+            data = {name: values[:, leg] for name, values in run.data.items()}
+            height, clearance = data["height_m"], data["foot_clearance_m"]
+            found = find_hops(height, data["height_rate_m_s"], clearance)
+            counts = found.tick >= start
+            bounces = find_bounces(height, clearance)
+            apexes.append(found.apex[counts])
+            skipped += count_skipped(
+                found.tick[counts], bounces[bounces >= start], start, len(height), rate
+            )
+            body = np.minimum(data["base_clearance_m"], data["knee_clearance_m"])
+            contacts += int((body <= 0).sum())
+            ticks += len(height) - start
+            flight += int(found.in_flight[start:].sum())
+            lowest = min(lowest, float(height.min()))
+    apex = np.concatenate(apexes)
+    return Verdict(
+        command_m=command,
+        median_error_m=float(np.median(apex) - command) if len(apex) else float("nan"),
+        std_m=float(apex.std()) if len(apex) else float("nan"),
+        hops=len(apex),
+        hops_per_s=len(apex) * rate / ticks,
+        flight_fraction=flight / ticks,
+        skipped_hops=skipped,
+        body_contact_ticks=contacts,
+        min_height_m=lowest,
+    )

@@ -1,0 +1,69 @@
+"""Choose among a training's snapshots, on seeds that judge nothing else."""
+
+from typing import Any
+
+from hopping_leg.controllers.policy import Policy
+from hopping_leg.rl.judge import FINAL_SEEDS, FIRST_SEED, as_rows, judge, score
+from hopping_leg.rl.recipe import Recipe
+from hopping_leg.rl.run_folder import RunFolder
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.trace import write_atomically
+
+FINALISTS = 4
+"""Snapshots that are tried once more at the end."""
+
+
+class Selection:
+    """Tries every snapshot on one seed; the best few again on others, and one of those wins.
+
+    Attributes:
+        rows: Every snapshot so far: steps, minutes, score and trials, as JSON values.
+    """
+
+    def __init__(self, recipe: Recipe, robot: Robot, folder: RunFolder) -> None:
+        self._recipe, self._robot, self._folder = recipe, robot, folder
+        self.rows: list[dict[str, Any]] = []
+
+    @property
+    def next_at(self) -> int:
+        """Steps after which the next snapshot is due."""
+        every = self._recipe.judge_every
+        return every * (self.rows[-1]["steps"] // every + 1) if self.rows else every
+
+    def add(self, steps: int, minutes: float, content: bytes) -> dict[str, Any]:
+        """Keep and try a snapshot.
+
+        Args:
+            steps: Control steps so far.
+            minutes: Wall-clock time so far.
+            content: The policy file.
+        """
+        write_atomically(self._folder.snapshot(steps), content)
+        row = {"steps": steps, "minutes": minutes, **self._trials(content, (FIRST_SEED,))}
+        self.rows.append(row)
+        return row
+
+    def choose(self) -> tuple[bytes, dict[str, Any]]:
+        """Return the best policy file and its row, with the scores of all finalists."""
+        ranked = sorted(self.rows, key=lambda row: float(row["score_m"]))[:FINALISTS]
+        finals = []
+        for row in ranked:
+            content = self._folder.snapshot(row["steps"]).read_bytes()
+            again = self._trials(content, FINAL_SEEDS)
+            finals.append(({"steps": row["steps"], "minutes": row["minutes"], **again}, content))
+        best, content = min(finals, key=lambda final: float(final[0]["score_m"]))
+        scores = [{"steps": row["steps"], "score_m": row["score_m"]} for row, _ in finals]
+        return content, {**best, "finalists": scores, "seeds": list(FINAL_SEEDS)}
+
+    def describe(self) -> str:
+        """Return what to show of the best snapshot so far, or nothing."""
+        if not self.rows:
+            return ""
+        best = min(self.rows, key=lambda row: float(row["score_m"]))
+        return f" · best snapshot {1000 * best['score_m']:.0f} mm"
+
+    def _trials(self, content: bytes, seeds: tuple[int, ...]) -> dict[str, Any]:
+        recipe = self._recipe
+        policy = Policy(content, "snapshot", recipe.name)
+        verdicts = judge(policy, self._robot, recipe.judge_commands, seeds, recipe.task.rate)
+        return {"score_m": score(verdicts), "trials": as_rows(verdicts)}

@@ -1,0 +1,293 @@
+"""Train a recipe: learn, checkpoint, try snapshots, choose the best, write the policy."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from stable_baselines3.common.callbacks import BaseCallback
+
+from hopping_leg.controllers.policy import Card
+from hopping_leg.errors import RobotError, UsageError
+from hopping_leg.rl import resumable
+from hopping_leg.rl.checkpoint import write_checkpoint
+from hopping_leg.rl.dashboards import Log, check_log, make_logger
+from hopping_leg.rl.export import build_policy
+from hopping_leg.rl.model_card import write_card
+from hopping_leg.rl.progress import TrainingProgress
+from hopping_leg.rl.recipe import Recipe
+from hopping_leg.rl.run_folder import RunFolder
+from hopping_leg.rl.scale import fit
+from hopping_leg.rl.selection import Selection
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.trace import write_atomically
+
+SHOWN_EVERY = 0.5
+"""Time between two updates of the progress bar, s."""
+
+
+@dataclass(frozen=True)
+class Trained:
+    """A finished training.
+
+    Attributes:
+        policy: The selected policy file.
+        folder: The run's folder.
+        minutes: Wall-clock time of the training, pauses excluded.
+        steps: Control steps of experience.
+        results: Verdicts on the selected policy, on selection seeds, as JSON rows.
+    """
+
+    policy: Path
+    folder: Path
+    minutes: float
+    steps: int
+    results: list[dict[str, Any]]
+
+
+def train(
+    recipe: Recipe,
+    robot: Robot,
+    seed: int,
+    out: Path,
+    *,
+    resume: bool = False,
+    source: Path | None = None,
+    minutes: float | None = None,
+    threads: int = 1,
+    quiet: bool = False,
+    log: Log = "tensorboard",
+    on_snapshot: Callable[[int, float], None] = lambda _steps, _score: None,
+    on_promise: Callable[[float, float], None] | None = None,
+) -> Trained:
+    """Train a controller and leave its policy, card and history in ``out``.
+
+    A run that was killed at any moment continues with ``resume`` as if nothing had happened; with
+    ``minutes`` that holds up to the clock, which the learning rate then follows.
+
+    Args:
+        recipe: What to train; scaled to the robot's size.
+        robot: The leg.
+        seed: Of weights, exploration, task, noise and delay.
+        out: The run's folder.
+        resume: Go on with the run in ``out``; without one, begin.
+        source: Folder of another run of this recipe and robot; its newest checkpoint is the start,
+            its steps and time count, its snapshots do not.
+        minutes: Stop after so much wall-clock time, pauses excluded, or at the recipe's steps.
+        threads: Of torch and physics; torch's is set for the whole process.
+        quiet: Show no progress.
+        log: Who gets the curves besides TensorBoard.
+        on_snapshot: Called with the steps and the score, m, of every snapshot that was tried; what
+            it raises ends the training.
+        on_promise: Called once, as soon as the recipe can tell how bad the training is likely to
+            end, with that in m and with the minutes so far, a checkpoint being written; what it
+            raises ends the training.
+
+    Raises:
+        UsageError: ``out`` holds a run that cannot be continued like this, or what ``log`` needs
+            is not installed.
+        RobotError: The robot has effects that training does not simulate.
+    """
+    check(robot, minutes, log)
+    torch.set_num_threads(max(threads, 1))
+    recipe = fit(recipe, robot)
+    folder = RunFolder(out, recipe, robot, seed, minutes, source)
+    tree = folder.begin(resume=resume)
+    trainer = Trainer(recipe, robot, seed, folder, minutes, threads)
+    trainer.model.set_logger(make_logger(folder.path, log, folder.config))
+    trainer.on_snapshot = on_snapshot
+    trainer.on_promise = on_promise
+    if tree is not None:
+        trainer.restore(tree)
+    with TrainingProgress(f"{recipe.name} seed {seed}", quiet=quiet) as progress:
+        return trainer.run(progress)
+
+
+def check(robot: Robot, minutes: float | None, log: Log) -> None:
+    """Refuse what cannot be trained before anything is written.
+
+    Args:
+        robot: The leg; one that plays the real one leaves nothing to transfer.
+        minutes: Of the training, None for no limit.
+        log: Who gets the curves.
+
+    Raises:
+        UsageError: The time is no time, or what ``log`` needs is not installed.
+        RobotError: The robot has effects that training does not simulate.
+    """
+    check_log(log)
+    if minutes is not None and not 0 < minutes < float("inf"):
+        raise UsageError(f"--minutes is {minutes:g} but must be positive.")
+    if not robot.reality.only_delays:
+        raise RobotError(
+            f"{robot.name} has effects in [reality] that training does not know; train on what is"
+            " believed of it, the robot that its file extends or one from `hop identify`, and"
+            " judge the policy on it with `hop evaluate`."
+        )
+
+
+class Trainer:
+    """One training in one process."""
+
+    def __init__(
+        self,
+        recipe: Recipe,
+        robot: Robot,
+        seed: int,
+        folder: RunFolder,
+        minutes: float | None,
+        threads: int,
+    ) -> None:
+        self.recipe, self.robot, self.seed, self.folder = recipe, robot, seed, folder
+        self._budget = None if minutes is None else 60 * minutes
+        self.env = recipe.make_env(robot, seed, threads)
+        self.model = recipe.make_model(self.env, seed)
+        self.model.on_boundary = self._at_boundary
+        if self._budget is not None:
+            self.model.remaining = lambda: max(0.0, 1 - self.elapsed / self._seconds)
+        self.selection = Selection(recipe, robot, folder)
+        self._restored = False
+        self._earlier = 0.0
+        self._began = time.monotonic()
+        self._saved = self._began
+        self._shown = 0.0
+        self._progress: TrainingProgress | None = None
+        self.on_snapshot: Callable[[int, float], None] = lambda _steps, _score: None
+        self.on_promise: Callable[[float, float], None] | None = None
+
+    @property
+    def elapsed(self) -> float:
+        """Wall-clock time of the training, pauses excluded, s."""
+        return self._earlier + time.monotonic() - self._began
+
+    @property
+    def _seconds(self) -> float:
+        return self._budget or float("inf")
+
+    def restore(self, tree: dict[str, Any]) -> None:
+        """Go on from a checkpoint, of this run or of the shorter one that it begins with."""
+        resumable.restore(self.model, tree["model"])
+        self.selection.rows = tree["history"]
+        self._earlier = tree["elapsed"]
+        self._restored = True
+        self._began = time.monotonic()
+        done = self.model.num_timesteps
+        self.model._update_current_progress_remaining(done, self.recipe.steps)
+
+    def run(self, progress: TrainingProgress) -> Trained:
+        """Learn until steps or time are used up; write the selected policy."""
+        self._progress = progress
+        model, recipe = self.model, self.recipe
+        if self.elapsed < self._seconds and model.num_timesteps < recipe.steps:
+            model.learn(
+                recipe.steps - model.num_timesteps,
+                callback=_Watch(self),
+                log_interval=recipe.log_every,
+                reset_num_timesteps=not self._restored,
+            )
+        self._judge()
+        model.logger.close()
+        self._show(force=True)
+        content, results = self.selection.choose()
+        minutes, steps = self.elapsed / 60, int(model.num_timesteps)
+        result = {
+            "command": self.folder.command,
+            "minutes": minutes,
+            "steps": steps,
+            "selected": results,
+            "history": self.selection.rows,
+            **recipe.findings(model),
+        }
+        self.folder.write("result.json", {**self.folder.config, **result})
+        write_card(self.folder.path)
+        write_atomically(self.folder.policy, content)
+        return Trained(self.folder.policy, self.folder.path, minutes, steps, results["trials"])
+
+    def tick(self) -> bool:
+        """Show the progress; return whether there is time left."""
+        self._show()
+        return self.elapsed < self._seconds
+
+    def _at_boundary(self) -> None:
+        share = 1 - self.model._current_progress_remaining
+        self.recipe.anneal(self.model, self.env, share)
+        self._tell_promise()
+        if share >= self.recipe.judge_from and self.model.num_timesteps >= self.selection.next_at:
+            self._judge()
+        if time.monotonic() - self._saved >= self.recipe.checkpoint_seconds:
+            self.checkpoint()
+
+    def _tell_promise(self) -> None:
+        promise, tell = self.recipe.promise(self.model), self.on_promise
+        if promise is not None and tell is not None:
+            self.on_promise = None
+            self.checkpoint()
+            tell(promise, self.elapsed / 60)
+
+    def checkpoint(self) -> None:
+        """Write a checkpoint; only at a boundary does it continue exactly."""
+        tree = {
+            "model": resumable.state_of(self.model),
+            "history": self.selection.rows,
+            "elapsed": self.elapsed,
+        }
+        write_checkpoint(self.folder.checkpoints, self.model.num_timesteps, tree)
+        self._saved = time.monotonic()
+
+    def policy_content(self) -> bytes:
+        """Return the deterministic policy as it stands, as a policy file."""
+        recipe, robot = self.recipe, self.robot
+        low, high = recipe.task.command_bounds
+        hip, knee = recipe.task.action_torque
+        card = Card(
+            recipe=recipe.name,
+            layout=recipe.task.observation,
+            command_low=low,
+            command_high=high,
+            torque_scale=(float(hip), float(knee)),
+            robot=robot.name,
+            robot_digest=robot.digest,
+            rate=recipe.task.rate,
+            seed=self.seed,
+            steps=int(self.model.num_timesteps),
+            versions=self.folder.config["versions"],
+        )
+        return build_policy(recipe.network(self.model, self.env), card)
+
+    def _judge(self) -> None:
+        steps = int(self.model.num_timesteps)
+        content = self.policy_content()
+        row = self.selection.add(steps, self.elapsed / 60, content)
+        logger = self.model.logger
+        logger.record("trial/score_m", row["score_m"])
+        for trial in row["trials"]:
+            at = f"trial/{trial['command_m']:.2f}"
+            for name in ("median_error_m", "std_m", "hops_per_s", "skipped_hops"):
+                if trial[name] is not None:
+                    logger.record(f"{at}/{name}", trial[name])
+        logger.dump(steps)
+        self.on_snapshot(steps, row["score_m"])
+
+    def _show(self, *, force: bool = False) -> None:
+        now = time.monotonic()
+        if self._progress is None or (now - self._shown < SHOWN_EVERY and not force):
+            return
+        self._shown = now
+        steps = int(self.model.num_timesteps)
+        share = max(steps / self.recipe.steps, self.elapsed / self._seconds)
+        self._progress.update(
+            min(share, 1.0), steps, self.env.hops, self.env.apex_error, self.selection.describe()
+        )
+
+
+class _Watch(BaseCallback):  # type: ignore[misc]
+    """Looks at the clock after every tick."""
+
+    def __init__(self, trainer: Trainer) -> None:
+        super().__init__()
+        self._trainer = trainer
+
+    def _on_step(self) -> bool:
+        return self._trainer.tick()

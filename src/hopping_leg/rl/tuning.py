@@ -1,0 +1,293 @@
+"""Search a recipe's numbers with Optuna: each trial is a training, its score that of `hop train`.
+
+The study lives in a database, a SQLite file unless another is named. Every process that is given
+the same study takes part in it, and a killed one leaves its trial to the next, which goes on from
+the training's checkpoint where it can reach it.
+"""
+
+import dataclasses
+import functools
+import shutil
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import optuna
+from optuna.exceptions import ExperimentalWarning
+from optuna.pruners import MedianPruner
+from optuna.samplers import TPESampler
+from optuna.storages import RDBStorage
+from optuna.study import Study
+from optuna.trial import FrozenTrial, Trial, TrialState
+from sqlalchemy import Connection, Engine, event
+from sqlalchemy.exc import SQLAlchemyError
+
+from hopping_leg.cluster import RayCluster
+from hopping_leg.errors import PhysicsError, UsageError
+from hopping_leg.json_files import plain
+from hopping_leg.rl.crew import work_here, work_on
+from hopping_leg.rl.judge import FINAL_SEEDS, FIRST_SEED
+from hopping_leg.rl.recipe import Recipe
+from hopping_leg.rl.recipes import change, get_recipe
+from hopping_leg.rl.run_folder import read_result
+from hopping_leg.rl.search_space import SPACES, defaults, dimensions, suggest
+from hopping_leg.rl.train import train
+from hopping_leg.rl.trial_record import ERROR, FOLDER, record
+from hopping_leg.robot import load_robot
+
+_FAILURES = (PhysicsError, ValueError, FloatingPointError)
+"""What a training with bad numbers may end in; the study goes on."""
+
+_PATIENCE = 60.0
+"""How long a worker waits for others to let go of SQLite's file, s."""
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """What is searched, and where it is kept."""
+
+    recipe: str
+    """Name of the recipe."""
+    storage: str
+    """URL of the study's database."""
+    out: Path
+    """Folder of the trainings."""
+    robot: str = "legv2-paper"
+    """A shipped name or the path of a .toml file."""
+    trials: int = 50
+    """Trials in the study when it is over, of all processes together."""
+    steps: int = 1_000_000
+    """Control steps of each training."""
+    snapshots: int = 5
+    """Times that a training is tried before it ends, and may be given up."""
+    startup: int = 10
+    """Finished trials before any is given up, and before the search learns from them."""
+    seed: int = 0
+    """Of the trainings, and of the search."""
+    fixed: tuple[str, ...] = ()
+    """Numbers of the recipe that every trial takes, each ``name=number``."""
+    heartbeat: int = 15
+    """Time between two signs of life of a trial, s; after three without one it is given to the
+    next process."""
+
+    def __post_init__(self) -> None:
+        for name in ("trials", "steps", "snapshots", "startup", "heartbeat"):
+            if getattr(self, name) < 1:
+                raise UsageError(f"--{name} is {getattr(self, name)} but must be 1 or more.")
+        if self.seed < 0:
+            raise UsageError(f"--seed is {self.seed} but must be 0 or more.")
+
+    @property
+    def in_file(self) -> bool:
+        """Whether the database is a file, of SQLite."""
+        return self.storage.startswith("sqlite")
+
+    @property
+    def conditions(self) -> dict[str, Any]:
+        """What all trials of a study share, as JSON values."""
+        return {
+            "recipe": self.recipe,
+            "robot_digest": load_robot(self.robot).digest,
+            "steps": self.steps,
+            "snapshots": self.snapshots,
+            "training_seed": self.seed,
+            "selection_seeds": [FIRST_SEED, *FINAL_SEEDS],
+            "fixed": list(self.fixed),
+            "space": {n: dataclasses.asdict(d) for n, d in _searched(self).items()},
+        }
+
+
+def tune(tuning: Tuning, workers: int | None = None, ray: str | None = None) -> dict[str, Any]:
+    """Search until the study has all its trials; return them, see ``record``.
+
+    Args:
+        tuning: What is searched.
+        workers: Processes on this machine, one by default; tasks of the cluster, by default one
+            per CPU.
+        ray: Address of a Ray cluster that works, ``local`` for one on this machine.
+
+    Raises:
+        UsageError: The database cannot be used, or holds a study of something else; there is no
+            such cluster, or some of it cannot reach the database.
+    """
+    cluster = None if ray is None else _reach(tuning, ray)
+    study = open_study(tuning)
+    if cluster is None:
+        work_here(functools.partial(work, tuning), workers or 1)
+    else:
+        work_on(cluster, functools.partial(work, _anywhere(tuning)), workers)
+    return {**tuning.conditions, "robot": tuning.robot, **record(study)}
+
+
+def work(tuning: Tuning, worker: int = 0) -> None:
+    """Take trials of a study until it has all of them; any process on any machine may."""
+    study = open_study(tuning, worker)
+    if not _over(study, tuning):
+        study.optimize(
+            lambda trial: _run_trial(trial, tuning),
+            catch=_FAILURES,
+            callbacks=[lambda study, _: study.stop() if _over(study, tuning) else None],
+        )
+
+
+def open_study(tuning: Tuning, worker: int = 0) -> Study:
+    """Return the study, new or as it stands.
+
+    Raises:
+        UsageError: The database cannot be used, or holds a study of something else.
+    """
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    conditions = tuning.conditions
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ExperimentalWarning)
+            storage = _open_storage(tuning)
+            study = optuna.create_study(
+                storage=storage,
+                study_name=tuning.recipe,
+                direction="minimize",
+                load_if_exists=True,
+                pruner=MedianPruner(n_startup_trials=tuning.startup),
+            )
+    except (SQLAlchemyError, ImportError) as error:
+        raise UsageError(
+            f"Cannot use the database {tuning.storage}: {str(error).splitlines()[0]}."
+        ) from error
+    for name, wanted in conditions.items():
+        stored = study.user_attrs.get(name)
+        if stored is None:
+            study.set_user_attr(name, wanted)
+        elif stored != plain(wanted):
+            raise UsageError(
+                f"The study in {tuning.storage} was begun with another '{name}'; go on with the"
+                " options that it began with, or name another --study."
+            )
+    # Each call draws anew: with the same seed a resumed search would repeat its first trials.
+    begun = len(study.get_trials(deepcopy=False))
+    study.sampler = TPESampler(
+        n_startup_trials=tuning.startup,
+        constant_liar=True,
+        seed=10_007 * begun + 97 * worker + tuning.seed,
+    )
+    if not begun:
+        study.enqueue_trial(defaults(_recipe(tuning), SPACES[tuning.recipe]), skip_if_exists=True)
+    return study
+
+
+def _open_storage(tuning: Tuning) -> RDBStorage:
+    """Return the study's database, in which a trial is given to one worker only."""
+    storage = RDBStorage(
+        tuning.storage,
+        engine_kwargs={"connect_args": {"timeout": _PATIENCE}} if tuning.in_file else None,
+        heartbeat_interval=tuning.heartbeat,
+        grace_period=3 * tuning.heartbeat,
+        heartbeat_stale_trial_callback=_take_up,
+    )
+    if tuning.in_file:
+        _lock_before_reading(storage.engine)
+    return storage
+
+
+def _lock_before_reading(engine: Engine) -> None:
+    """Let SQLite's transactions lock the file before they read.
+
+    Optuna locks the row of a waiting trial, reads that it still waits and takes it. SQLite has no
+    locks of rows: two workers would find the same trial waiting, and train in the same folder.
+    """
+
+    def begin_by_hand(connection: Any, _record: Any) -> None:  # noqa: ANN401
+        connection.isolation_level = None
+
+    def begin(connection: Connection) -> None:
+        connection.exec_driver_sql("BEGIN IMMEDIATE")
+
+    event.listen(engine, "connect", begin_by_hand)
+    event.listen(engine, "begin", begin)
+    engine.dispose()  # what was connected before begins as before
+
+
+def _run_trial(trial: Trial, tuning: Tuning) -> float:
+    """Train with a trial's numbers; return the score of the policy it selects, m."""
+    space = SPACES[tuning.recipe]
+    recipe = dataclasses.replace(_recipe(tuning), **suggest(trial, space))
+    folder = tuning.out / f"trial-{trial.user_attrs.get(FOLDER, trial.number):04d}"
+    if (folder / "policy.onnx").exists():
+        return float(read_result(folder)["selected"]["score_m"])
+
+    def watch(steps: int, score: float) -> None:
+        trial.report(score, steps * tuning.snapshots // tuning.steps)
+        if steps < tuning.steps and trial.should_prune():
+            raise optuna.TrialPruned
+
+    try:
+        train(
+            recipe,
+            load_robot(tuning.robot),
+            tuning.seed,
+            folder,
+            resume=True,
+            quiet=True,
+            on_snapshot=watch,
+        )
+    except KeyboardInterrupt:
+        _take_up(trial.study, trial)
+        raise
+    except optuna.TrialPruned:
+        shutil.rmtree(folder / "checkpoints", ignore_errors=True)
+        raise
+    except _FAILURES as error:
+        trial.set_user_attr(ERROR, f"{type(error).__name__}: {error}")
+        raise
+    return float(read_result(folder)["selected"]["score_m"])
+
+
+def _reach(tuning: Tuning, address: str) -> RayCluster:
+    """Return the cluster; refuse a file as database where others than this machine would work."""
+    cluster = RayCluster(address)
+    if tuning.in_file and cluster.elsewhere:
+        raise UsageError(
+            f"{', '.join(cluster.elsewhere)} cannot share the study in {tuning.storage}: SQLite is"
+            " for one machine; name a database that all reach, e.g. --study"
+            " postgresql://host/tuning."
+        )
+    return cluster
+
+
+def _anywhere(tuning: Tuning) -> Tuning:
+    """Return the same search, from whichever folder a worker starts."""
+    robot = tuning.robot
+    if robot.endswith(".toml"):
+        robot = str(Path(robot).resolve())
+    return dataclasses.replace(tuning, out=tuning.out.resolve(), robot=robot)
+
+
+def _take_up(study: Study, trial: FrozenTrial | Trial) -> None:
+    """Let the next process go on with a trial that was cut off."""
+    folder = trial.user_attrs.get(FOLDER, trial.number)
+    study.enqueue_trial(trial.params, user_attrs={FOLDER: folder})
+
+
+def _over(study: Study, tuning: Tuning) -> bool:
+    """Tell whether a study has all its trials; those that were cut off do not count."""
+    trials = study.get_trials(deepcopy=False)
+    ended = (TrialState.COMPLETE, TrialState.PRUNED)
+    return sum(t.state in ended or ERROR in t.user_attrs for t in trials) >= tuning.trials
+
+
+def _recipe(tuning: Tuning) -> Recipe:
+    """Return the recipe with what all trials share."""
+    recipe = dataclasses.replace(
+        get_recipe(tuning.recipe),
+        steps=tuning.steps,
+        judge_every=max(tuning.steps // tuning.snapshots, 1),
+    )
+    return change(recipe, tuning.fixed)
+
+
+def _searched(tuning: Tuning) -> dict[str, Any]:
+    if tuning.recipe not in SPACES:
+        raise UsageError(
+            f"Recipe '{tuning.recipe}' has no search space; valid: {', '.join(SPACES)}."
+        )
+    return dict(dimensions(SPACES[tuning.recipe]))

@@ -1,0 +1,149 @@
+"""The hopping task as stable-baselines3 wants it: one VecEnv over many legs stepped at once."""
+
+import time
+from collections import deque
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from stable_baselines3.common.vec_env import VecEnv
+
+from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.envs.observation import Array32
+from hopping_leg.envs.step import Step
+from hopping_leg.envs.task import HoppingTask
+
+_RECENT_HOPS = 500
+"""Hops that the live numbers look back over."""
+
+
+class TaskVecEnv(VecEnv):  # type: ignore[misc]
+    """A ``HoppingTask`` for stable-baselines3.
+
+    Observations are (n, size); with ``privileged`` the true state follows in the same
+    rows, for critics that may see it in training.
+
+    Attributes:
+        hops: In-flight apexes so far, of all legs.
+    """
+
+    def __init__(self, task: HoppingTask, *, privileged: bool = False) -> None:
+        self.task, self._privileged = task, privileged
+        size = task.observation.size + (task.privileged_size if privileged else 0)
+        space = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
+        self.render_mode = None
+        super().__init__(task.count, space, gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32))
+        self.hops = 0
+        self._recent: deque[tuple[float, float]] = deque(maxlen=_RECENT_HOPS)
+        self._return = np.zeros(task.count)
+        self._length = np.zeros(task.count, np.int64)
+        self._started = time.monotonic()
+        self._nothing: list[dict[str, Any]] = [{} for _ in range(task.count)]
+        self._action: Array32 = np.zeros((task.count, 2), np.float32)
+
+    @property
+    def apex_error(self) -> float:
+        """Mean |apex - command| over the latest hops of all legs, m; NaN before the first."""
+        _, errors = self.recent_hops
+        return float(np.mean(np.abs(errors))) if len(errors) else float("nan")
+
+    @property
+    def recent_hops(self) -> tuple[Array, Array]:
+        """Commands of the latest hops and apex minus command, m, (hops,) each."""
+        commands, errors = np.array(self._recent).reshape(-1, 2).T
+        return commands, errors
+
+    def reset(self) -> Array32:
+        """Begin new episodes of all legs."""
+        self._return[:], self._length[:] = 0.0, 0
+        return self._observation(self.task.reset())
+
+    def step_async(self, actions: Array32) -> None:
+        """Keep the actions, (n, 2), for ``step_wait``."""
+        self._action = actions
+
+    def step_wait(self) -> tuple[Array32, Array, BoolArray, list[dict[str, Any]]]:
+        """Step all legs; legs whose episode ended have begun the next."""
+        command = self.task.command.copy()
+        step = self.task.step(self._action)
+        self._return += step.reward
+        self._length += 1
+        if step.apex_error is not None:
+            (legs,) = np.nonzero(~np.isnan(step.apex_error))
+            self.hops += len(legs)
+            self._recent.extend(zip(command[legs], step.apex_error[legs], strict=True))
+        done = step.terminated | step.truncated
+        infos = self._end_episodes(step, done) if done.any() else self._nothing
+        return self._observation(step.observation), step.reward, done, infos
+
+    def _end_episodes(self, step: Step, done: BoolArray) -> list[dict[str, Any]]:
+        assert step.final_observation is not None
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        for leg in np.flatnonzero(done):
+            final: Any = step.final_observation[leg]
+            if self._privileged:
+                assert step.final_privileged is not None
+                final = np.concatenate([final, step.final_privileged[leg]])
+            infos[leg] = {
+                "terminal_observation": final,
+                "TimeLimit.truncated": bool(step.truncated[leg]),
+                "episode": {
+                    "r": float(self._return[leg]),
+                    "l": int(self._length[leg]),
+                    "t": time.monotonic() - self._started,
+                },
+            }
+        self._return[done], self._length[done] = 0.0, 0
+        return infos
+
+    def _observation(self, seen: Array32) -> Array32:
+        if self._privileged:
+            return np.concatenate([seen, self.task.privileged()], axis=1)
+        return seen
+
+    def state(self) -> dict[str, Any]:
+        """Return everything needed to go on exactly from here."""
+        return {
+            "task": self.task.state(),
+            "hops": self.hops,
+            "recent": np.array(self._recent).reshape(-1, 2),
+            "return": self._return.copy(),
+            "length": self._length.copy(),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a ``state``."""
+        self.task.restore(state["task"])
+        self.hops = state["hops"]
+        self._recent = deque(map(tuple, state["recent"].tolist()), maxlen=_RECENT_HOPS)
+        self._return[:], self._length[:] = state["return"], state["length"]
+
+    def close(self) -> None:
+        """Do nothing: the legs hold no resources beyond memory."""
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Do nothing: the task's generator is seeded where it is made."""
+        return [None] * self.num_envs
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:  # noqa: ANN401
+        """Return an attribute once per selected leg."""
+        return [getattr(self, attr_name)] * len(list(self._get_indices(indices)))
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:  # noqa: ANN401
+        """Refuse: legs have no attributes of their own."""
+        raise NotImplementedError("legs have no attributes of their own; set them on the task")
+
+    def env_method(
+        self,
+        method_name: str,
+        *args: Any,  # noqa: ANN401
+        indices: Any = None,  # noqa: ANN401
+        **kwargs: Any,  # noqa: ANN401
+    ) -> list[Any]:
+        """Refuse: legs have no methods of their own."""
+        raise NotImplementedError("legs have no methods of their own; call the task's")
+
+    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:  # noqa: ANN401
+        """Return False per selected leg."""
+        return [False] * len(list(self._get_indices(indices)))

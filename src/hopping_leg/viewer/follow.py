@@ -1,0 +1,108 @@
+"""The real leg while `hop deploy` runs: its black box, read as it grows."""
+
+from pathlib import Path
+
+import polars as pl
+
+from hopping_leg.deploy.black_box import SUFFIX
+from hopping_leg.deploy.box_tail import BoxTail
+from hopping_leg.errors import RobotError, UsageError
+from hopping_leg.robot import load_robot
+from hopping_leg.sim import CONTROL_RATE
+from hopping_leg.trace import Trace
+from hopping_leg.viewer.tracks import Track, trace_rows
+
+KEPT_SECONDS = 20.0
+"""Of the past."""
+
+_LOOK = 0.5
+"""Seconds between looks for a newer run."""
+
+
+class Follow:
+    """Shows the newest run; the robot that runs it learns nothing of it.
+
+    Attributes:
+        tracks: Of the run, none before the first one.
+        now: Time of its newest row, s.
+        notices: What the reader should be told.
+
+    Args:
+        path: Of a black box, or of the folder in which `hop deploy` writes them.
+        robot: Name or file of the leg; none takes the one that the run names.
+
+    Raises:
+        UsageError: There is neither such a file nor such a folder.
+    """
+
+    def __init__(self, path: Path, robot: str | None = None) -> None:
+        if not path.exists():
+            raise UsageError(
+                f"There is no {path}; give a {SUFFIX} file or the folder of `hop deploy --out`."
+            )
+        self.tracks: list[Track] = []
+        self.notices: list[str] = []
+        self.now = 0.0
+        self._path, self._robot = path, robot
+        self._tail: BoxTail | None = None
+        self._over = False
+        self._wait = 0.0
+        if path.is_dir():
+            self.notices.append(f"Waiting for a run in {path}.")
+
+    def advance(self, seconds: float) -> None:
+        """Read what is new.
+
+        Raises:
+            RobotError: The run's robot is no shipped one and none was given.
+            TraceError: The file is no black box.
+        """
+        self._wait -= seconds
+        if self._wait <= 0:
+            self._wait = _LOOK
+            self._look()
+        if self._tail is None:
+            return
+        rows = self._tail.rows()
+        if not len(rows):
+            return
+        if not self.tracks:
+            self.tracks = [self._track(self._tail)]
+        track = self.tracks[0]
+        table = pl.DataFrame(dict(zip(self._tail.columns, rows.T, strict=True)))
+        last = tuple(track.moment(self.now)[1]) if len(track) else None
+        time, values, track.note = trace_rows(Trace(table), track.robot, last)
+        track.extend(time, values)
+        self.now = float(time[-1])
+
+    def _look(self) -> None:
+        """Turn to a newer run, if there is one; say when this one is over."""
+        if self._tail is not None and self._tail.over and not self._over:
+            self._over = True
+            self.notices.append("The run is over; its trace is on disk.")
+        newest = self._newest()
+        if newest is None or (self._tail is not None and newest == self._tail.path):
+            return
+        if self._tail is not None:
+            self._tail.close()
+        self._tail, self._over, self.tracks, self.now = BoxTail(newest), False, [], 0.0
+        self.notices.append(f"Following {newest.name}.")
+
+    def _newest(self) -> Path | None:
+        """Return the box written last; of several in one tick of the file system, by name."""
+        if not self._path.is_dir():
+            return self._path if self._path.exists() else None
+        boxes = [(box.stat().st_mtime_ns, box) for box in self._path.glob(f"*{SUFFIX}")]
+        return max(boxes)[1] if boxes else None
+
+    def _track(self, tail: BoxTail) -> Track:
+        name = self._robot or str(tail.header.get("robot", ""))
+        try:
+            robot = load_robot(name)
+        except RobotError as error:
+            raise RobotError(
+                f"{tail.path} is of '{name}', which is no shipped robot; give its file with"
+                " --robot."
+            ) from error
+        depth = round(KEPT_SECONDS * CONTROL_RATE)
+        return Track(str(tail.header.get("controller", "")), robot, depth=depth)

@@ -1,0 +1,158 @@
+"""The picture: legs side by side, the commanded height, the last apex of each."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import viser
+
+from hopping_leg.viewer.leg_mesh import PLAIN, Colour, LegMesh, add_leg
+from hopping_leg.viewer.tracks import Track
+
+COLOURS: tuple[Colour, ...] = ((28, 113, 216), (230, 97, 0))
+"""Of the legs and their curves."""
+
+COMMAND: Colour = (38, 162, 105)
+"""Of what is commanded."""
+
+_APART = 0.36
+"""Between legs, m."""
+
+_AWAY = 1.2
+"""Of the camera from a single leg, m."""
+
+_FIELD_OF_VIEW = math.radians(32)
+
+_FLOOR = (1.2, 0.5)
+"""Half its size, m."""
+
+_LEGS = "/legs"
+_APEX_SECONDS = 3.0
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """One leg's handles."""
+
+    mesh: LegMesh
+    command: viser.BoxHandle
+    apex: viser.BoxHandle
+
+
+class Scene:
+    """Draws tracks; call ``show`` for every picture.
+
+    Args:
+        server: Of the page.
+    """
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._drawn: list[_Drawn] = []
+        self._tracks: list[Track] = []
+        _light(server.scene)
+        _add_floor(server.scene)
+
+    def show(self, tracks: list[Track], now: float) -> None:
+        """Draw the legs as they are at a time, s; other legs than before are put up first."""
+        if tracks is not self._tracks:
+            self._build(tracks)
+        with self._server.atomic():
+            for drawn, track in zip(self._drawn, tracks, strict=True):
+                if len(track):
+                    drawn.mesh.pose(*track.moment(now))
+
+    def mark(self, now: float) -> None:
+        """Move the marks of command and last apex; may be called less often than ``show``."""
+        for drawn, track in zip(self._drawn, self._tracks, strict=True):
+            command = track.latest("command_m", now)
+            _, apexes = track.apexes(now, _APEX_SECONDS)
+            _put(drawn.command, command)
+            _put(drawn.apex, apexes[-1] if len(apexes) else math.nan)
+
+    def _build(self, tracks: list[Track]) -> None:
+        for drawn in self._drawn:
+            drawn.mesh.root.remove()
+        self._tracks = tracks
+        self._drawn = [self._add(number, track) for number, track in enumerate(tracks)]
+        self._look(len(tracks))
+
+    def _look(self, legs: int) -> None:
+        """Turn all cameras, also those of pages that are open, to so many legs."""
+        middle = _APART * (legs - 1) / 2
+        look_at, position = (middle, 0.0, 0.25), (middle + 0.12, -_AWAY - 2 * middle, 0.38)
+        initial = self._server.initial_camera
+        initial.fov, initial.look_at, initial.position = _FIELD_OF_VIEW, look_at, position
+        for client in self._server.get_clients().values():
+            client.camera.position = position
+            client.camera.look_at = look_at
+
+    def _add(self, number: int, track: Track) -> _Drawn:
+        name = f"{_LEGS}/{number}"
+        mesh = add_leg(self._server, name, track.robot, _APART * number, COLOURS[number])
+        for tenth in range(1, 6):
+            self._server.scene.add_label(
+                f"{name}/ruler/label{tenth}",
+                f"{tenth / 10:g}",
+                position=(-0.115, 0.027, tenth / 10),
+                font_screen_scale=0.8,
+                anchor="center-right",
+            )
+        for tick in range(1, 17):
+            long = tick % 2 == 0
+            self._server.scene.add_box(
+                f"{name}/ruler/{tick}",
+                (90, 96, 104),
+                (0.016 if long else 0.008, 0.002, 0.0016),
+                position=(-0.086 if long else -0.082, 0.027, 0.05 * tick),
+                **PLAIN,
+            )
+        return _Drawn(
+            mesh,
+            self._bar(f"{name}/command", COMMAND, 0.003),
+            self._bar(f"{name}/apex", COLOURS[number], 0.002),
+        )
+
+    def _bar(self, name: str, colour: Colour, thick: float) -> viser.BoxHandle:
+        return self._server.scene.add_box(
+            name, colour, (0.26, 0.002, thick), visible=False, **PLAIN
+        )
+
+
+def _put(bar: viser.BoxHandle, height: float) -> None:
+    """Move a mark, if it has anywhere to be; what does not change is not sent."""
+    known = bool(np.isfinite(height))
+    if known and abs(bar.position[2] - height) > 1e-6:
+        bar.position = (0.03, 0.07, height)
+    if bar.visible != known:
+        bar.visible = known
+
+
+def _light(scene: viser.SceneApi) -> None:
+    """Light the scene cheaply: shadows and reflections cost most where there is no GPU."""
+    scene.set_up_direction("+z")
+    scene.configure_environment_map(None)
+    scene.configure_default_lights(enabled=False)
+    scene.add_light_ambient("/light/all", intensity=1.6)
+    scene.add_light_directional("/light/sun", intensity=2.6, position=(-0.5, -1.2, 1.6))
+
+
+def _add_floor(scene: viser.SceneApi) -> None:
+    """Lay out a floor with lines every 0.1 m."""
+    (x, y), thick = _FLOOR, 0.02
+    scene.add_box(
+        "/floor/slab",
+        (226, 230, 235),
+        (2 * x, 2 * y, thick),
+        position=(0.0, 0.0, -thick / 2),
+        **PLAIN,
+    )
+    lines = [((at, -y, 0.0), (at, y, 0.0)) for at in np.arange(-x, x + 0.05, 0.1)]
+    lines += [((-x, at, 0.0), (x, at, 0.0)) for at in np.arange(-y, y + 0.05, 0.1)]
+    scene.add_line_segments(
+        "/floor/lines",
+        np.array(lines) + np.array([0.0, 0.0, 0.0005]),
+        (196, 202, 210),
+        thickness=1.0,
+        thickness_units="screen",
+    )

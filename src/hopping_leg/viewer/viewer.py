@@ -1,0 +1,167 @@
+"""The page and the loop behind it: what is asked, what passes, what is shown."""
+
+import contextlib
+import html
+import io
+import math
+import socket
+import time
+
+import viser
+
+from hopping_leg.errors import UsageError
+from hopping_leg.sim import CONTROL_RATE
+from hopping_leg.viewer.charts import Charts
+from hopping_leg.viewer.controls import TimeControls
+from hopping_leg.viewer.follow import Follow
+from hopping_leg.viewer.inbox import Inbox
+from hopping_leg.viewer.live import Live
+from hopping_leg.viewer.live_panel import LivePanel
+from hopping_leg.viewer.pace import Pace
+from hopping_leg.viewer.replay import Replay
+from hopping_leg.viewer.replay_panel import ReplayPanel
+from hopping_leg.viewer.scene import COLOURS, Scene
+from hopping_leg.viewer.source import Source
+
+PICTURES = 60.0
+"""Per second."""
+
+_SLOW = 6
+"""Pictures per update of each plot and of the text; they take turns."""
+
+_NOTICE_SECONDS = 8.0
+_APEX_SECONDS = 3.0
+
+
+class Viewer:
+    """Serves the page from when it is made; nothing moves before ``run``.
+
+    Attributes:
+        address: Of the page.
+        pace: How fast time passes.
+        pictures: Shown so far.
+
+    Args:
+        source: What is shown.
+        robot: Name or file that a live simulation was started with.
+        host: Address of this computer to listen at.
+        port: To listen at; a taken one gives the next that is free.
+        detail: Pixels that the page draws per pixel of the screen, each way; None lets it draw as
+            many as it keeps up with, down to three quarters.
+
+    Raises:
+        UsageError: The page cannot be served there.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        robot: str = "",
+        *,
+        host: str = "127.0.0.1",
+        port: int = 8080,
+        detail: float | None = None,
+    ) -> None:
+        self._source = source
+        self._server = _serve(host, port)
+        reached_at = "localhost" if host == "0.0.0.0" else host
+        self.address = f"http://{reached_at}:{self._server.get_port()}"
+        if detail is not None:
+            self.address += f"/?fixedDpr={detail:g}"
+        self.pace = Pace(1 / CONTROL_RATE)
+        self._inbox = Inbox()
+        gui = self._server.gui
+        gui.configure_theme(show_logo=False, show_share_button=False, brand_color=COLOURS[0])
+        gui.set_panel_label("Hopping leg")
+        gui.main_panel.dock_left()
+        gui.main_panel.set_width(290)
+        self._status = gui.add_html("")
+        self._replay_panel: ReplayPanel | None = None
+        if isinstance(source, Live):
+            LivePanel(self._server, self._inbox, source, robot)
+        if isinstance(source, Replay):
+            self._replay_panel = ReplayPanel(self._server, self._inbox, source)
+        if not isinstance(source, Follow):
+            TimeControls(self._server, self._inbox, self.pace)
+        panel = gui.add_panel()
+        self._charts = Charts(self._server, panel.add_tab("Last seconds"))
+        panel.dock_right()
+        panel.set_width(390)
+        self._scene = Scene(self._server)
+        self.pictures = 0
+        self._stopped = False
+
+    def run(self, seconds: float = math.inf) -> None:
+        """Simulate and show until the time is over, ``stop`` or Ctrl-C."""
+        begun = last = next_at = time.monotonic()
+        while last - begun < seconds and not self._stopped:
+            self._notify(self._inbox.work())
+            now = time.monotonic()
+            self._source.advance(self.pace.due(now - last))
+            last = now
+            self.picture()
+            next_at = max(next_at + 1 / PICTURES, time.monotonic())
+            time.sleep(max(next_at - time.monotonic(), 0.0))
+
+    def picture(self) -> None:
+        """Show what is now; plots and text every few pictures."""
+        source = self._source
+        self._scene.show(source.tracks, source.now)
+        turn = self.pictures % _SLOW
+        self._charts.show(source.tracks, source.now, turn)
+        if turn == _SLOW - 1:
+            self._scene.mark(source.now)
+            self._status.content = self._text()
+            if self._replay_panel is not None:
+                self._replay_panel.show()
+            self._notify(source.notices)
+            source.notices.clear()
+        self.pictures += 1
+
+    def stop(self) -> None:
+        """End ``run`` after the present picture; any thread may."""
+        self._stopped = True
+
+    def close(self) -> None:
+        """Serve no more."""
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._server.stop()
+
+    def _notify(self, sentences: list[str]) -> None:
+        for sentence in sentences:
+            for client in self._server.get_clients().values():
+                client.add_notification("Hopping leg", sentence, auto_close_seconds=_NOTICE_SECONDS)
+
+    def _text(self) -> str:
+        """Return what the page says: one line per leg, and the time."""
+        source, lines = self._source, []
+        for number, track in enumerate(source.tracks):
+            _, apexes = track.apexes(source.now, _APEX_SECONDS)
+            apex = f"{apexes[-1]:.3f} m" if len(apexes) else "none yet"
+            colour = "#{:02x}{:02x}{:02x}".format(*COLOURS[number])
+            lines.append(
+                f'<b style="color:{colour}">{html.escape(track.name)}</b>: last apex'
+                f' <span class="apex">{apex}</span>'
+            )
+            if track.note:
+                lines.append(html.escape(track.note))
+        if isinstance(source, Live):
+            lines.insert(0, f'Commanded: <b><span id="command">{source.height:.3f}</span> m</b>')
+        keeps = "" if math.isnan(self.pace.real_time) else f", real time {self.pace.real_time:.2f}"
+        lines.append(f'<span style="color:#77767b">{source.now:.2f} s{keeps}</span>')
+        return f'<div style="padding:0.4em 1em;line-height:1.5">{"<br>".join(lines)}</div>'
+
+
+def _serve(host: str, port: int) -> viser.ViserServer:
+    if not 0 <= port < 65536:
+        raise UsageError(f"--port is {port} but must lie between 0 and 65535.")
+    try:
+        # viser itself would try other ports without end.
+        socket.create_server((host, 0)).close()
+    except OSError as error:
+        raise UsageError(
+            f"The page cannot be served at {host} ({error}); --host must be an address of this"
+            " computer, e.g. 127.0.0.1."
+        ) from error
+    with contextlib.redirect_stdout(io.StringIO()):
+        return viser.ViserServer(host=host, port=port, verbose=False)

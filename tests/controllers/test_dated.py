@@ -1,0 +1,114 @@
+"""Dated samples: late ones find their place, whatever the order of arrival."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hopping_leg.controllers.dated_track import DatedTrack
+from hopping_leg.controllers.layouts import Dated
+from hopping_leg.sim.disturbance import Channel, Disturbance
+
+PERIOD = 0.005
+LATE = Disturbance(joint_noise=0.0, torque_noise=0.0)
+
+
+def measurements(ticks, count=4, seed=0, disturbance=LATE):
+    """Yield (tick, measurement) of joints whose position tells the tick, through a channel."""
+    channel = Channel(count, disturbance, PERIOD, np.random.default_rng(seed))
+    for tick in range(ticks):
+        q = np.tile([tick, -tick], (count, 1)).astype(float)
+        if tick == 0:
+            channel.restart(slice(None), q, q, np.full(count, 0.3))
+        yield tick, channel.sense(q, 10 * q, np.full(count, 0.3))
+        channel.actuate(np.zeros((count, 2)))
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_every_known_sample_stands_at_its_tick(seed):
+    track = DatedTrack(15, PERIOD)
+    track.reset(4)
+    for tick, measurement in measurements(40, seed=seed):
+        if tick == 0:
+            track.fill(slice(None), measurement)
+            continue
+        track.shift()
+        track.insert(measurement)
+        expected = np.maximum(tick - np.arange(15), 0)[:, None] * np.ones(4)
+        np.testing.assert_array_equal(track.q[..., 0][track.known], expected[track.known])
+        np.testing.assert_array_equal(track.qd[..., 1][track.known], -10 * expected[track.known])
+
+
+def test_what_has_not_arrived_holds_the_sample_before():
+    track = DatedTrack(15, PERIOD)
+    track.reset(4)
+    for tick, measurement in measurements(60):
+        if tick == 0:
+            track.fill(slice(None), measurement)
+            continue
+        track.shift()
+        track.insert(measurement)
+        track.hold(10)
+        for leg in range(4):
+            known = np.flatnonzero(track.known[:, leg])
+            for back in range(10):
+                newest_before = known[known >= back][0]
+                assert track.q[back, leg, 0] == track.q[newest_before, leg, 0]
+
+
+def test_without_delay_the_lags_are_exact():
+    layout = Dated(PERIOD)
+    layout.reset(4)
+    quiet = Disturbance(0.0, 0.0, 0.0)
+    for tick, measurement in measurements(40, disturbance=quiet):
+        layout.update(measurement, np.full((4, 2), tick - 1.0))
+        inputs = layout.inputs()
+        expected = np.maximum(tick - np.array(Dated.LAGS), 0)
+        np.testing.assert_array_equal(inputs["q"][:, :, 0], np.tile(expected, (4, 1)))
+        assert not inputs["age"].any()
+        if tick > 10:
+            torque = tick - 1.0 - np.array(Dated.TORQUE_LAGS)
+            np.testing.assert_array_equal(inputs["past_torque"][0, :, 0], torque)
+
+
+def test_age_is_that_of_the_newest_sample():
+    layout = Dated(PERIOD)
+    layout.reset(4)
+    ages = []
+    for tick, measurement in measurements(300):
+        layout.update(measurement, np.zeros((4, 2)))
+        inputs = layout.inputs()
+        if tick > 10:
+            newest = inputs["q"][:, 0, 0]
+            np.testing.assert_allclose(inputs["age"][:, 0], (tick - newest) * PERIOD, atol=1e-6)
+            ages.append(inputs["age"])
+    assert 0.6 < np.mean(np.array(ages) == 0) < 0.7  # 0.5 + 0.5 * 3 / 10
+
+
+def test_state_restores_the_whole_memory():
+    one, other = Dated(PERIOD), Dated(PERIOD)
+    one.reset(4)
+    for tick, measurement in measurements(50):
+        one.update(measurement, np.full((4, 2), float(tick)))
+        if tick == 30:
+            other.restore(one.state())
+        if tick > 30:
+            other.update(measurement, np.full((4, 2), float(tick)))
+            for name, values in one.inputs().items():
+                np.testing.assert_array_equal(values, other.inputs()[name])
+
+
+@pytest.mark.parametrize("rows", [[1], [0, 3]])
+def test_a_restarted_leg_forgets_and_the_others_do_not(rows):
+    layout = Dated(PERIOD)
+    layout.reset(4)
+    for _, measurement in measurements(30):
+        layout.update(measurement, np.ones((4, 2)))
+    before = layout.inputs()
+    layout.restart(np.array(rows), measurement)
+    after = layout.inputs()
+    others = [leg for leg in range(4) if leg not in rows]
+    for name in before:
+        np.testing.assert_array_equal(before[name][others], after[name][others])
+    assert (after["q"][rows, -1] == measurement.q[rows, 0]).all()
+    assert not after["past_torque"][rows].any()

@@ -1,0 +1,216 @@
+"""A Python class enters wherever a controller is named; what is wrong with it is one sentence."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hopping_leg.cli import main
+from hopping_leg.controllers import Setup, roll_out
+from hopping_leg.controllers.library import load_controller
+from hopping_leg.controllers.plug_in import is_plug_in
+from hopping_leg.errors import ControllerError, UsageError
+from hopping_leg.hops import find_hops
+from hopping_leg.robot import load_robot
+from hopping_leg.sim.disturbance import Measurement
+
+ROBOT = load_robot("legv2-paper")
+BOUNCER = Path(__file__).parents[2] / "examples" / "bouncer.py"
+
+BATCHED = """
+import numpy as np
+class Held:
+    def __init__(self, robot, rate):
+        self.rate = rate
+    def reset(self, count):
+        self.count = count
+    def act(self, measurement):
+        return {answer}
+"""
+
+SINGLE = """
+class Leg:
+    made = 0
+    def __init__(self, robot, rate):
+        Leg.made += 1
+        self.ticks = 0
+    def get_control_output(self, {arguments}):
+        self.ticks += 1
+        return {answer}
+"""
+
+
+def measurement(count):
+    rng = np.random.default_rng(0)
+    q, qd = rng.normal(size=(2, count, 3, 2))
+    command = np.full((count, 3), 0.3) + 0.01 * np.arange(count)[:, None]
+    return Measurement(q, qd, command, np.zeros((count, 3)))
+
+
+def written(path, text, **parts):
+    for name, value in parts.items():
+        text = text.replace(f"{{{name}}}", value)
+    path.write_text(text)
+    return path
+
+
+def acted(path, name, count=3):
+    controller = load_controller(f"{path}:{name}", ROBOT)
+    controller.reset(count)
+    return controller.act(measurement(count))
+
+
+def test_example_hops_with_every_leg_on_its_own():
+    assert len(BOUNCER.read_text().splitlines()) <= 40
+    controller = load_controller(f"{BOUNCER}:Bouncer", ROBOT)
+    commands = np.tile([0.30, 0.35], (800, 1))
+    run = roll_out(controller, Setup(ROBOT, threads=1), commands, seed=3)
+    columns = [run.data[c] for c in ("height_m", "height_rate_m_s", "foot_clearance_m")]
+    low, high = (find_hops(*(column[200:, leg] for column in columns)) for leg in (0, 1))
+    assert len(low.apex) > 5
+    assert len(high.apex) > 5
+    assert np.median(high.apex) > np.median(low.apex) + 0.02
+    assert run.header["controller"] == "Bouncer"
+
+
+def test_batched_class_gets_robot_and_rate(tmp_path):
+    text = BATCHED.replace("{answer}", "np.full((self.count, 2), self.rate)")
+    path = written(tmp_path / "mine.py", text)
+    controller = load_controller(f"{path}:Held", ROBOT, rate=100.0)
+    controller.reset(2)
+    np.testing.assert_array_equal(controller.act(measurement(2)), np.full((2, 2), 100.0))
+    assert controller.internals() == {}
+
+
+def test_module_on_the_path_is_found(tmp_path, monkeypatch):
+    written(tmp_path / "own_legs.py", BATCHED, answer="np.zeros((self.count, 2))")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert acted("own_legs", "Held").shape == (3, 2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "answer", "expected"),
+    [
+        ("meas_pos, meas_vel, meas_tau, meas_time", "meas_tau + meas_pos", "q"),
+        ("meas_pos, meas_vel, meas_tau=0, meas_time=0", "(None, None, meas_vel)", "qd"),
+        ("x, t=None", "x[2:]", "qd"),
+        ("x, t=None", "[self.desired_height, t]", "command"),
+    ],
+)
+def test_single_leg_styles(tmp_path, arguments, answer, expected):
+    path = written(tmp_path / "leg.py", SINGLE, arguments=arguments, answer=answer)
+    seen = measurement(3)
+    torque = acted(path, "Leg")
+    if expected == "command":
+        np.testing.assert_allclose(torque, np.stack([seen.command[:, 0], np.zeros(3)], axis=1))
+    else:
+        np.testing.assert_array_equal(torque, getattr(seen, expected)[:, 0])
+
+
+def test_single_legs_share_no_state_and_are_made_anew_by_reset(tmp_path):
+    path = written(tmp_path / "leg.py", SINGLE, arguments="x, t", answer="[self.ticks, t]")
+    controller = load_controller(f"{path}:Leg", ROBOT)
+    for _ in range(2):
+        controller.reset(2)
+        first, second = (controller.act(measurement(2)) for _ in range(2))
+        np.testing.assert_array_equal(first, [[1, 0]] * 2)
+        np.testing.assert_allclose(second, [[2, 0.005]] * 2)
+
+
+@pytest.mark.parametrize(
+    ("answer", "says"),
+    [
+        ("np.zeros((self.count, 3))", r"shape \(3, 3\)"),
+        ("np.zeros(2)", r"shape \(2,\)"),
+        ("np.full((self.count, 2), np.nan)", "must be finite"),
+        ("'much'", "no numbers"),
+        ("None", "must be finite|shape"),
+        ("1 / 0", r"ZeroDivisionError: division by zero \(mine.py, line 9\)"),
+    ],
+)
+def test_wrong_answers_are_stopped_by_name(tmp_path, answer, says):
+    path = written(tmp_path / "mine.py", BATCHED, answer=answer)
+    with pytest.raises(ControllerError, match=says) as caught:
+        acted(path, "Held")
+    assert "mine.py:Held" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "answer", "says"),
+    [
+        ("x, t", "[1.0]", "must return the torques"),
+        ("x, t", "([0, 0], None, [0, 0])", "asks for positions"),
+        ("x, t", "[float('inf'), 0.0]", "must be finite"),
+        ("a, b, c, d, e", "[0, 0]", "must take"),
+    ],
+)
+def test_wrong_single_legs_are_stopped_by_name(tmp_path, arguments, answer, says):
+    path = written(tmp_path / "mine.py", SINGLE, arguments=arguments, answer=answer)
+    with pytest.raises(ControllerError, match=says) as caught:
+        acted(path, "Leg")
+    assert "mine.py:Leg" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("content", "name", "says"),
+    [
+        (None, "none.py:Leg", "Cannot read"),
+        ("class Leg: pass", "mine.py:Log", "no class 'Log'. Did you mean 'Leg'"),
+        ("class Leg: pass", "mine.py", "names no class; write .*mine.py:CLASS, one of: Leg"),
+        ("class Leg: pass", "mine.py:Leg", r"Leg\(robot, rate=200\)"),
+        ("def make(robot, rate): return 3", "mine.py:make", "lacks the method 'reset'"),
+        ("import nowhere", "mine.py:Leg", r"No module named 'nowhere' \(mine.py, line 1\)"),
+        ("class Leg(", "mine.py:Leg", "could not be imported: SyntaxError"),
+        ("", "no_such.module:Leg", "no Python module 'no_such.module'"),
+    ],
+)
+def test_what_cannot_be_loaded_is_one_sentence(tmp_path, content, name, says):
+    if content is not None:
+        (tmp_path / "mine.py").write_text(content)
+    given = name if name.startswith("no_such") else str(tmp_path / name)
+    with pytest.raises(ControllerError, match=says):
+        load_controller(given, ROBOT)
+
+
+def test_a_trace_keeps_its_own_columns(tmp_path):
+    path = written(tmp_path / "mine.py", BATCHED, answer="np.zeros((self.count, 2))")
+    path.write_text(
+        path.read_text() + "    def internals(self):\n        return {'height_m': 1.0}\n"
+    )
+    controller = load_controller(f"{path}:Held", ROBOT)
+    controller.reset(1)
+    with pytest.raises(ControllerError, match="'height_m'"):
+        controller.internals()
+
+
+def test_an_edited_file_is_another_controller(tmp_path):
+    path = written(tmp_path / "mine.py", BATCHED, answer="np.zeros((self.count, 2))")
+    before = type(load_controller(f"{path}:Held", ROBOT))
+    assert type(load_controller(f"{path}:Held", ROBOT)).__qualname__ == before.__qualname__
+    written(path, BATCHED, answer="np.ones((self.count, 2))")
+    assert type(load_controller(f"{path}:Held", ROBOT)).__qualname__ != before.__qualname__
+
+
+def test_other_names_are_no_classes():
+    assert not any(
+        is_plug_in(n) for n in ("fast", "a/b.onnx", "my.toml", "energy-shaping", "a b:c")
+    )
+    with pytest.raises(UsageError, match=r"path/to/file\.py:CLASS"):
+        load_controller("energy-shapin", ROBOT)
+
+
+@pytest.mark.slow
+def test_command_line_judges_a_class_and_names_a_broken_one(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / "robustness.json"
+    words = ["--suite", "robustness", "--axes", "pushes", "--seeds", "1", "--commands", "0.3"]
+    words += ["--threads", "1", "--json", str(file)]
+    assert main(["evaluate", f"mine={BOUNCER}:Bouncer", *words]) == 0
+    assert {row["controller"] for row in json.loads(file.read_text())["scores"]} == {"mine"}
+    path = written(tmp_path / "bad.py", BATCHED, answer="np.full((self.count, 2), np.nan)")
+    capsys.readouterr()
+    assert main(["evaluate", f"{path}:Held", *words]) == 2
+    error = capsys.readouterr().err
+    assert "bad.py:Held" in error
+    assert "Traceback" not in error

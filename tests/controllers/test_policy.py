@@ -1,0 +1,160 @@
+import dataclasses
+import itertools
+import json
+import logging
+
+import numpy as np
+import onnx
+import pytest
+from onnx import TensorProto, helper
+
+from hopping_leg.controllers.library import controller_names, load_controller, load_policy
+from hopping_leg.controllers.policy import Card, Policy
+from hopping_leg.errors import PolicyError, UsageError
+from hopping_leg.rl.export import Network, build_policy, save_policy
+from hopping_leg.robot import load_robot
+from hopping_leg.sim.disturbance import Measurement
+
+ROBOT = load_robot("legv2-paper")
+CARD = Card("test", "three-samples", 0.22, 0.4, (8.0, 6.0), ROBOT.name, ROBOT.digest, 200.0)
+
+
+def network(activation="relu", squash="tanh", seed=0):
+    rng = np.random.default_rng(seed)
+    sizes = [15, 32, 16, 2]
+    layers = [
+        (rng.normal(size=(o, i)) / np.sqrt(i), rng.normal(size=o))
+        for i, o in itertools.pairwise(sizes)
+    ]
+    return Network(rng.normal(size=15), rng.uniform(0.1, 2, 15), layers, activation, squash)
+
+
+def measurement(count, seed=1):
+    rng = np.random.default_rng(seed)
+    return Measurement(
+        rng.normal(size=(count, 3, 2)),
+        rng.normal(size=(count, 3, 2)),
+        np.full((count, 3), 0.3),
+        np.zeros((count, 3)),
+    )
+
+
+def by_hand(net, m):
+    count = len(m.q)
+    x = np.concatenate([m.q.reshape(count, 6), m.qd.reshape(count, 6), m.command], axis=1)
+    x = (x - net.offset) * net.gain
+    act = {
+        "relu": lambda v: np.maximum(v, 0),
+        "tanh": np.tanh,
+        "elu": lambda v: np.where(v > 0, v, np.expm1(v)),
+    }
+    for weight, bias in net.layers[:-1]:
+        x = act[net.activation](x @ weight.T + bias)
+    x = x @ net.layers[-1][0].T + net.layers[-1][1]
+    return (np.tanh(x) if net.squash == "tanh" else np.clip(x, -1, 1)) * CARD.torque_scale
+
+
+@pytest.mark.parametrize("activation", ["relu", "tanh", "elu"])
+@pytest.mark.parametrize("squash", ["tanh", "clip"])
+def test_policy_computes_what_the_weights_say(activation, squash):
+    net = network(activation, squash)
+    policy = Policy(build_policy(net, CARD), "memory", "test")
+    policy.reset(7)
+    torque = policy.act(measurement(7))
+    assert torque.dtype == np.float64
+    np.testing.assert_allclose(torque, by_hand(net, measurement(7)), atol=2e-5)
+
+
+def test_card_survives_the_file(tmp_path):
+    path = tmp_path / "a.onnx"
+    save_policy(path, network(), CARD)
+    assert Policy.load(path).card == CARD
+    assert Policy.load(path).name == "a"
+
+
+def test_same_weights_give_the_same_bytes():
+    assert build_policy(network(), CARD) == build_policy(network(), CARD)
+
+
+@pytest.mark.parametrize("keep", [0, 10, 0.5, 0.99])
+def test_truncated_file_is_refused_in_a_sentence(tmp_path, keep):
+    content = build_policy(network(), CARD)
+    path = tmp_path / "cut.onnx"
+    path.write_bytes(content[: keep if keep in (0, 10) else int(keep * len(content))])
+    with pytest.raises(PolicyError, match=r"cut\.onnx"):
+        Policy.load(path)
+
+
+def test_foreign_onnx_file_is_refused(tmp_path):
+    node = helper.make_node("Relu", ["x"], ["y"])
+    values = [helper.make_tensor_value_info(n, TensorProto.FLOAT, ["n", 2]) for n in "xy"]
+    graph = helper.make_graph([node], "g", [values[0]], [values[1]])
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)])
+    model.ir_version = 8
+    path = tmp_path / "foreign.onnx"
+    onnx.save(model, path)
+    with pytest.raises(PolicyError, match="not a policy"):
+        Policy.load(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"schema": 99}, "schema 99"),
+        ({"layout": "seven-samples"}, "three-samples"),
+        ({"rate": None, "foo": 1}, "damaged"),
+    ],
+)
+def test_wrong_metadata_is_refused(tmp_path, change, says):
+    model = onnx.load_from_string(build_policy(network(), CARD))
+    card = json.loads(model.metadata_props[0].value) | change
+    model.metadata_props[0].value = json.dumps(card)
+    path = tmp_path / "wrong.onnx"
+    onnx.save(model, path)
+    with pytest.raises(PolicyError, match=says):
+        Policy.load(path)
+
+
+def test_missing_file_and_unknown_name(tmp_path):
+    with pytest.raises(PolicyError, match="Cannot read"):
+        load_controller(tmp_path / "none.onnx", ROBOT)
+    with pytest.raises(UsageError, match="energy-shaping"):
+        load_controller("energy-shapin", ROBOT)
+    other = tmp_path / "weights.zip"
+    other.write_bytes(b"PK")
+    with pytest.raises(PolicyError, match=r"end in \.onnx"):
+        load_controller(other, ROBOT)
+
+
+def test_another_robot_is_refused_or_named(tmp_path, caplog):
+    path = tmp_path / "a.onnx"
+    save_policy(path, network(), CARD)
+    other = dataclasses.replace(ROBOT, base=dataclasses.replace(ROBOT.base, mass=2.0))
+    with pytest.raises(PolicyError, match="trained on robot 'legv2-paper'"):
+        load_controller(path, other, other="refuse")
+    with caplog.at_level(logging.WARNING):
+        load_controller(path, other)
+    assert "trained on robot" in caplog.text
+    caplog.clear()
+    load_controller(path, other, other="accept")
+    assert not caplog.text
+    with pytest.raises(PolicyError, match="400 Hz"):
+        load_policy(path).check_robot(ROBOT, 400.0)
+
+
+@pytest.mark.parametrize("command", [0.1, 0.5, np.nan])
+@pytest.mark.parametrize("count", [1, 3])
+def test_command_out_of_range_is_refused(command, count):
+    policy = Policy(build_policy(network(), CARD), "memory", "test")
+    policy.reset(count)
+    m = measurement(count)
+    m.command[-1, 0] = command
+    with pytest.raises(UsageError, match=r"0\.22 to 0\.4 m"):
+        policy.act(m)
+
+
+def test_every_shipped_policy_loads():
+    for name in controller_names():
+        if not name.startswith("energy-shaping"):
+            policy = load_policy(name)
+            assert policy.card.rate > 0

@@ -1,0 +1,78 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from hopping_leg.controllers import Setup, roll_out
+from hopping_leg.errors import PhysicsError, RobotError, UsageError
+from hopping_leg.robot import build_model, load_robot
+from hopping_leg.sim import NOTHING
+
+ROBOT = load_robot("legv2")
+
+
+class Constant:
+    """Asks for the same torques at every tick."""
+
+    name = "constant"
+
+    def __init__(self, torque):
+        self.torque = np.array(torque, dtype=float)
+
+    def reset(self, count):
+        self.count = count
+
+    def act(self, measurement):
+        return np.tile(self.torque, (self.count, 1))
+
+    def internals(self):
+        return {"tick_torque_nm": np.full(self.count, self.torque[1])}
+
+
+def with_shank(**changes):
+    return dataclasses.replace(ROBOT, shank=dataclasses.replace(ROBOT.shank, **changes))
+
+
+def test_a_rollout_records_states_before_and_torques_during_each_tick():
+    setup = Setup(ROBOT, NOTHING, threads=1)
+    run = roll_out(Constant([0.5, -1.0]), setup, np.full((50, 3), 0.3), seed=0)
+    np.testing.assert_allclose(run.data["hip_position_rad"][0], setup.start_posture[0])
+    np.testing.assert_array_equal(run.data["knee_command_nm"], -1.0)
+    np.testing.assert_array_equal(run.data["tick_torque_nm"], -1.0)
+    assert run.time[1] == pytest.approx(0.005)
+    trace = run.trace(1, trial="x")
+    assert trace.header["trial"] == "x"
+    assert len(trace.table) == 50
+
+
+@pytest.mark.parametrize("length", [0.03, 0.15, 0.5])
+def test_legs_of_any_size_start_standing(length):
+    robot = dataclasses.replace(
+        with_shank(length=length, com=length / 3),
+        thigh=dataclasses.replace(ROBOT.thigh, length=length, com=length / 3),
+    )
+    setup = Setup(robot, NOTHING, threads=1)
+    run = roll_out(Constant([0, 0]), setup, np.full((2, 1), 0.3), seed=0)
+    assert run.data["foot_clearance_m"][0, 0] == pytest.approx(0, abs=1e-9)
+    assert np.isfinite(run.data["height_m"]).all()
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("rate", 0.0), ("rate", np.nan), ("timestep", -1.0), ("threads", -1), ("start_length", 0.5)],
+)
+def test_meaningless_setups_are_refused(field, value):
+    with pytest.raises(UsageError, match=field):
+        Setup(ROBOT, **{field: value})
+
+
+def test_an_unstable_simulation_is_an_error():
+    knee = dataclasses.replace(ROBOT.knee, armature=1e-12, friction=0.0, damping=0.0)
+    robot = dataclasses.replace(with_shank(mass=1e-6, inertia=1e-12), knee=knee)
+    with pytest.raises(PhysicsError, match="unstable"):
+        roll_out(Constant([5, -20]), Setup(robot, threads=1), np.full((100, 2), 0.3), seed=0)
+
+
+def test_parameters_that_mujoco_refuses_are_a_robot_error():
+    with pytest.raises(RobotError, match="legv2"):
+        build_model(with_shank(mass=1e-18))

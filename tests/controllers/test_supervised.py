@@ -1,0 +1,102 @@
+"""A supervised leg stands, hops as often as asked, is caught in the air and stands again."""
+
+import numpy as np
+import pytest
+
+from hopping_leg.controllers import Setup, roll_out
+from hopping_leg.controllers.landing import LandingGains
+from hopping_leg.controllers.library import load_controller
+from hopping_leg.controllers.supervised import STAND_SECONDS, Mode, Supervised
+from hopping_leg.errors import UsageError
+from hopping_leg.hops import find_hops
+from hopping_leg.robot import load_robot
+from tests.evaluate.conftest import Spring
+
+ROBOT = load_robot("legv2-paper")
+COLUMNS = ("height_m", "height_rate_m_s", "foot_clearance_m")
+
+
+@pytest.fixture(scope="module")
+def hopped():
+    supervised = Supervised(load_controller("energy-shaping", ROBOT), ROBOT, 2)
+    return roll_out(supervised, Setup(ROBOT, threads=1), np.full((900, 4), 0.3), seed=11)
+
+
+def test_it_hops_as_often_as_asked_and_ends_at_rest(hopped):
+    for leg in range(4):
+        hops = find_hops(*(hopped.data[name][:, leg] for name in COLUMNS))
+        assert len(hops.apex) == 2
+        assert hopped.data["counted_hops"][-1, leg] == 2
+        assert hops.tick[0] > STAND_SECONDS * 200
+    end = hopped.data["height_m"][-60:]
+    assert np.ptp(end) < 0.002
+    np.testing.assert_allclose(end, Setup(ROBOT).standing_length + 0.01, atol=0.015)
+    assert hopped.data["base_clearance_m"].min() > 0
+
+
+def test_modes_follow_each_other_and_the_catch_is_in_the_air(hopped):
+    mode, clear = hopped.data["mode"], hopped.data["foot_clearance_m"]
+    for leg in range(4):
+        changes = np.flatnonzero(np.diff(mode[:, leg])) + 1
+        assert mode[changes, leg].tolist() == [Mode.HOP, Mode.FLY, Mode.BRAKE, Mode.STAND]
+        caught, met = changes[1], changes[2]
+        assert clear[caught + 6, leg] > 0
+        assert clear[met, leg] < 0.003
+        assert clear[met - 10, leg] > 0
+
+
+def test_same_seed_same_run(hopped):
+    supervised = Supervised(load_controller("energy-shaping", ROBOT), ROBOT, 2)
+    again = roll_out(supervised, Setup(ROBOT, threads=1), np.full((900, 4), 0.3), seed=11)
+    for name, values in hopped.data.items():
+        np.testing.assert_array_equal(values, again.data[name])
+
+
+@pytest.mark.parametrize("hops", [1, 3])
+def test_it_feels_nothing_but_joints(hops):
+    """The same joint samples give the same torques, whatever the height was."""
+    supervised = Supervised(Spring(ROBOT), ROBOT, hops)
+    seen = []
+
+    class Spy:
+        name = "spy"
+
+        def reset(self, count):
+            supervised.reset(count)
+
+        def act(self, measurement):
+            seen.append((measurement, supervised.act(measurement)))
+            return seen[-1][1]
+
+        def internals(self):
+            return {}
+
+    roll_out(Spy(), Setup(ROBOT, threads=1), np.full((500, 2), 0.3), seed=1)
+    supervised.reset(2)
+    for measurement, torque in seen:
+        np.testing.assert_array_equal(supervised.act(measurement), torque)
+        assert np.isfinite(torque).all()
+
+
+def test_what_makes_no_sense_is_refused():
+    spring = Spring(ROBOT)
+    for controller, hops in ((spring, 0), (spring, -1), (None, 3)):
+        with pytest.raises(UsageError, match="make no sense"):
+            Supervised(controller, ROBOT, hops)
+    for wrong in ({"length": 1.2}, {"damping": -1.0}, {"stiffness": float("nan")}):
+        with pytest.raises(UsageError, match=next(iter(wrong))):
+            LandingGains(**wrong)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["fast", "energy-shaping"])
+def test_liftoffs_are_counted_under_noise_and_delay(name):
+    hopper = load_controller(name, ROBOT)
+    supervised = Supervised(hopper, ROBOT, 1000)
+    run = roll_out(supervised, Setup(ROBOT, threads=1), np.tile([0.3, 0.35], (1600, 4)), seed=2)
+    made = [
+        len(find_hops(*(run.data[column][:, leg] for column in COLUMNS)).apex) for leg in range(8)
+    ]
+    counted = run.data["counted_hops"][-1]
+    assert min(made) > 10
+    assert np.abs(counted - made).max() <= 2

@@ -1,0 +1,63 @@
+"""An emulated robot on the bench: the client library's commands, time moved by hand."""
+
+import asyncio
+import math
+
+import moteus
+import numpy as np
+
+from hopping_leg.emulator.in_process import InProcessDevice
+from hopping_leg.emulator.robot import EmulatedRobot
+from hopping_leg.robot import load_robot
+
+R = moteus.Register
+
+
+class Bench:
+    """Two drives and their leg, asked through the unmodified client."""
+
+    def __init__(self, q=(0.6, -1.3), robot="legv2", **options):
+        loaded = load_robot(robot) if isinstance(robot, str) else robot
+        self.robot = EmulatedRobot(loaded, np.array(q), **options)
+        self.transport = moteus.Transport([InProcessDevice(self.robot)])
+        self.drives = [moteus.Controller(id=n, transport=self.transport) for n in (1, 2)]
+
+    def wait(self, seconds):
+        self.robot.advance(self.robot.time + seconds)
+
+    def cycle(self, *commands):
+        return asyncio.run(self.transport.cycle(list(commands)))
+
+    def run(self, coroutine):
+        return asyncio.run(coroutine)
+
+    def torque(self, *torques, watchdog=1.0, maximum=20.0, **more):
+        """Command pure torques; return the replies."""
+        frame = {"position": math.nan, "velocity": 0.0, "kp_scale": 0.0, "kd_scale": 0.0}
+        frame |= {"ilimit_scale": 0.0, "maximum_torque": maximum, "watchdog_timeout": watchdog}
+        frame |= {"query": True, **more}
+        pairs = zip(self.drives, torques, strict=True)
+        return self.cycle(*(d.make_position(feedforward_torque=t, **frame) for d, t in pairs))
+
+    def power(self, **more):
+        """Bring both drives into torque mode at zero torque."""
+        self.torque(0.0, 0.0, **more)
+        self.wait(0.02)
+        assert self.modes() == [10, 10]
+
+    def stop(self):
+        self.cycle(*(drive.make_stop(query=True) for drive in self.drives))
+        self.wait(0.001)
+
+    def read(self, *registers, drive=0, resolution=moteus.F32):
+        (result,) = self.cycle(
+            self.drives[drive].make_custom_query(dict.fromkeys(registers, resolution))
+        )
+        values = [result.values.get(int(register)) for register in registers]
+        return values[0] if len(values) == 1 else values
+
+    def modes(self):
+        return [self.read(R.MODE, drive=n) for n in (0, 1)]
+
+    def faults(self):
+        return [self.read(R.FAULT, drive=n) for n in (0, 1)]

@@ -1,0 +1,82 @@
+import moteus
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hopping_leg.emulator.frames import Frame
+from hopping_leg.emulator.registers import ReplyWriter
+from tests.emulator.bench import Bench, R
+
+
+@pytest.fixture(scope="module")
+def bench():
+    return Bench()
+
+
+@given(
+    st.sampled_from(
+        [R.POSITION, R.VELOCITY, R.TORQUE, R.VOLTAGE, R.TEMPERATURE, R.COMMAND_TIMEOUT]
+    ),
+    st.sampled_from([moteus.INT8, moteus.INT16, moteus.INT32, moteus.F32]),
+    st.floats(-1.2, 1.2),
+)
+def test_the_client_reads_what_was_written(register, resolution, value):
+    reply = ReplyWriter()
+    reply.values(register, resolution, [value])
+    read = moteus.protocol.parse_reply(reply.data)[register]
+    assert read == pytest.approx(value, abs=1.0)
+    reply = ReplyWriter()
+    reply.values(register, resolution, [float("nan")])
+    assert np.isnan(moteus.protocol.parse_reply(reply.data)[register])
+
+
+def test_a_query_of_everything_is_answered_in_full(bench):
+    resolution = moteus.QueryResolution()
+    for name in ("q_current", "abs_position", "power", "motor_temperature", "home_state"):
+        setattr(resolution, name, moteus.F32)
+    resolution._extra = {R.MILLISECOND_COUNTER: moteus.INT32}
+    (result,) = bench.cycle(bench.drives[0].make_query(query_override=resolution))
+    assert {R.MODE, R.POSITION, R.ABS_POSITION, R.HOME_STATE, R.FAULT} <= set(result.values)
+    assert result.values[R.MILLISECOND_COUNTER] >= 0
+
+
+def test_unknown_registers_are_errors_between_known_ones(bench):
+    registers = {0x0E: moteus.F32, 0x0F: moteus.INT8, 0x1FF: moteus.INT8}
+    (result,) = bench.cycle(bench.drives[0].make_custom_query(registers))
+    parsed = moteus.protocol.parse_registers(result.data)
+    assert set(parsed.response) == {0x0E, 0x0F}
+    assert parsed.errors == [(0x1FF, 1)]
+
+
+def test_identity_is_read_as_words_and_cannot_be_written(bench):
+    assert bench.read(R.REGISTER_MAP_VERSION, resolution=moteus.INT32) == 5
+    assert bench.read(R.FIRMWARE_VERSION, resolution=moteus.F32) is None
+    serials = [bench.read(R.SERIAL_NUMBER1, drive=n, resolution=moteus.INT32) for n in (0, 1)]
+    assert serials[0] != serials[1]
+    writing = Frame(0x8001, bytes([0x09, 0x81, 0x02, 1, 0, 0, 0]))
+    bench.robot.receive(writing)
+    (item,) = bench.robot.outbox.take(bench.robot.time)
+    assert moteus.protocol.parse_registers(item.frame.data).errors == [(0x101, 2)]
+
+
+def test_discovery_finds_both_drives_and_a_uuid_means_one(bench):
+    found = bench.run(bench.transport.discover())
+    assert [device.can_id for device in found] == [1, 2]
+    assert found[0].uuid != found[1].uuid
+    address = moteus.DeviceAddress(uuid=found[1].uuid)
+    controller = moteus.Controller(id=address, transport=bench.transport)
+    assert bench.run(controller.custom_query({R.MODE: moteus.INT8})).id == 2
+
+
+def test_other_destinations_are_not_answered(bench):
+    bench.robot.receive(Frame(0x8003, b"\x11\x00"))
+    assert bench.robot.outbox.take(bench.robot.time) == []
+
+
+@given(st.binary(max_size=64))
+def test_no_payload_breaks_a_drive(bench, data):
+    bench.robot.receive(Frame(0x807F, data))
+    bench.wait(5e-4)
+    assert len(bench.robot.outbox.take(bench.robot.time)) <= 2
+    assert np.isfinite(bench.robot.leg.q).all()

@@ -1,0 +1,70 @@
+import moteus
+import pytest
+
+from tests.emulator.bench import Bench
+
+
+@pytest.fixture
+def bench():
+    return Bench()
+
+
+def console(bench, *lines, **options):
+    """Send lines through the client's stream; return the answers."""
+
+    async def talk():
+        stream = moteus.Stream(bench.drives[0], **options)
+        await stream.write_message(b"tel stop")
+        await stream.flush_read(timeout=0.02)
+        return [
+            await stream.command(line.encode(), allow_any_response=any_) for line, any_ in asked
+        ]
+
+    asked = [(line, line.startswith("conf get")) for line in lines]
+    return [answer.decode() for answer in bench.run(talk())]
+
+
+@pytest.mark.parametrize("flow", [True, False, None])
+def test_settings_are_read_set_and_kept(bench, flow):
+    answers = console(
+        bench,
+        "conf get servo.timeout_mode",
+        "conf set servo.timeout_mode 12",
+        "conf get servo.timeout_mode",
+        "conf set servopos.position_min nan",
+        "conf enumerate servopos",
+        use_flow_control=flow,
+    )
+    assert answers[0] == "15"
+    assert answers[2] == "12"
+    assert answers[4].startswith("servopos.position_min nan\nservopos.position_max 0.5")
+    drive = bench.robot.drives[0]
+    drive.boot(0.0)
+    assert drive.settings["servo.timeout_mode"] == 15
+    console(bench, "conf set servo.timeout_mode 12", "conf write")
+    drive.boot(0.0)
+    assert drive.settings["servo.timeout_mode"] == 12
+
+
+def test_everything_can_be_enumerated(bench):
+    (text,) = console(bench, "conf enumerate")
+    names = [line.split()[0] for line in text.splitlines()]
+    assert names == bench.robot.drives[0].settings.names()
+
+
+@pytest.mark.parametrize(
+    "line", ["conf set servo.nonsense 1", "conf set id.id x", "hello", "d fly"]
+)
+def test_nonsense_is_an_error_that_the_client_raises(bench, line):
+    with pytest.raises(moteus.moteus.CommandError, match="ERR"):
+        console(bench, line)
+
+
+def test_the_console_stops_and_homes(bench):
+    bench.power()
+    console(bench, "d stop", "d exact 0.25")
+    bench.wait(0.001)
+    assert bench.modes()[0] == 0
+    assert bench.read(moteus.Register.POSITION) == pytest.approx(0.25, abs=1e-4)
+    console(bench, "d cfg-set-output 0")
+    assert bench.read(moteus.Register.POSITION) == pytest.approx(0.0, abs=1e-4)

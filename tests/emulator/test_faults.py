@@ -1,0 +1,198 @@
+import math
+
+import numpy as np
+import pytest
+from moteus.fdcanusb_device import _strip_and_validate_checksum
+
+from hopping_leg.emulator.codes import Fault as Code
+from hopping_leg.emulator.codes import Mode
+from hopping_leg.emulator.faults import KINDS, Fault, load_faults
+from hopping_leg.emulator.frames import Frame
+from hopping_leg.emulator.line_protocol import LineProtocol
+from hopping_leg.emulator.outbox import Outgoing
+from hopping_leg.errors import UsageError
+from tests.emulator.bench import Bench, R
+
+
+def hopping(*faults, seconds=0.1, watchdog=1.0):
+    """Run torque commands at 200 Hz; return the bench and the replies of each tick."""
+    bench = Bench(held=False, faults=faults)
+    bench.power()
+    ticks = []
+    for _ in range(round(seconds / 0.005)):
+        ticks.append(bench.torque(0.02, -0.02, watchdog=watchdog))
+        bench.wait(0.005)
+    return bench, ticks
+
+
+def answered(ticks):
+    return [[reply.id for reply in replies] for replies in ticks]
+
+
+def test_dropped_replies_are_missing_once_per_drive():
+    _, ticks = hopping(Fault("drop_reply", at=0.03, count=2, drive="knee"))
+    counts = [len(ids) for ids in answered(ticks)]
+    assert counts.count(1) == 2
+    assert [1] in answered(ticks)
+
+
+def test_silence_lasts_as_long_as_it_says():
+    _, ticks = hopping(Fault("silence", at=0.03, duration=0.03))
+    silent = [n for n, ids in enumerate(answered(ticks)) if not ids]
+    assert len(silent) == 6
+    assert silent == list(range(silent[0], silent[0] + 6))
+
+
+def test_a_late_reply_comes_later_and_holds_the_past():
+    bench, ticks = hopping(Fault("late_reply", at=0.03, value=0.012, drive="hip"))
+    assert [len(ids) for ids in answered(ticks)].count(1) == 1
+    (stray,) = bench.transport.devices()[0]._receive_queue
+    assert (stray.arbitration_id >> 8) & 0x7F == 1
+
+
+def test_a_duplicated_reply_arrives_twice():
+    bench, ticks = hopping(Fault("duplicate_reply", at=0.03, drive="knee"))
+    assert all(len(ids) == 2 for ids in answered(ticks))
+    assert len(bench.transport.devices()[0]._receive_queue) == 1
+
+
+@pytest.mark.parametrize("checksums", [True, False])
+def test_a_corrupted_line_fails_its_checksum_or_means_something_else(checksums):
+    from hopping_leg.emulator.pty_port import PtyPort
+
+    port = PtyPort()
+    lines = []
+    port._write = lines.append
+    port._protocol = LineProtocol()
+    port._protocol.checksums = checksums
+    frame = Frame(0x100, bytes.fromhex("20040001020304"))
+    for flip in (-1, 0, 5, 77, 4711, 65535):
+        port.send(Outgoing(frame, flip=flip))
+    port.close()
+    good, *broken = (_strip_and_validate_checksum(line.strip()) for line in lines)
+    assert good[2] == checksums
+    for bad in broken:
+        assert good[1] == bad[1] == checksums
+        assert not bad[2]
+        before, after = (line[0].split(b" ") for line in (good, bad))
+        assert before.pop(2) != after.pop(2)
+        assert before == after
+
+
+def test_an_encoder_jump_moves_what_is_reported_not_the_leg():
+    bench, ticks = hopping(Fault("encoder_jump", at=0.03, value=0.5, drive="knee"))
+    positions = np.array([replies[1].values[R.POSITION] for replies in ticks])
+    jumps = np.abs(np.diff(positions)) * math.tau / 2
+    assert (jumps > 0.4).sum() == 1
+    assert jumps.max() == pytest.approx(0.5, abs=0.1)
+    truth = bench.robot.leg.wires[1].motor_position(bench.robot.leg.q[1])
+    assert bench.read(R.POSITION, drive=1) - truth == pytest.approx(0.5 * 2 / math.tau, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("fault", "code"),
+    [
+        (Fault("drive_fault", at=0.03, value=33, drive="hip"), Code.MOTOR_DRIVER),
+        (Fault("over_temperature", at=0.0, value=1000, drive="hip"), Code.OVER_TEMPERATURE),
+        (Fault("over_voltage", at=0.03, drive="hip"), Code.OVER_VOLTAGE),
+        (Fault("under_voltage", at=0.03, value=3, drive="hip"), Code.UNDER_VOLTAGE),
+    ],
+)
+def test_drive_faults_switch_off_and_stay(fault, code):
+    _, ticks = hopping(fault)
+    assert ticks[-1][0].values[R.MODE] == Mode.FAULT
+    assert ticks[-1][0].values[R.FAULT] == code
+    assert ticks[-1][0].values[R.TORQUE] == 0.0
+    assert ticks[-1][1].values[R.MODE] == Mode.POSITION
+
+
+def test_a_notice_changes_nothing_but_the_register():
+    _, ticks = hopping(Fault("limit_notice", at=0.03, value=100))
+    assert {replies[0].values[R.FAULT] for replies in ticks} == {0, 100}
+    assert {replies[0].values[R.MODE] for replies in ticks} == {Mode.POSITION}
+
+
+def test_power_loss_stops_the_drive_and_forgets_its_home():
+    bench, ticks = hopping(Fault("power_loss", at=0.03, drive="hip"), seconds=0.035)
+    modes = [replies[0].values[R.MODE] for replies in ticks]
+    assert modes[0] == Mode.POSITION
+    assert Mode.STOPPED in modes or modes[-1] in (Mode.ENABLING, Mode.CALIBRATING)
+    assert bench.read(R.HOME_STATE) == 1
+
+
+def test_a_pulled_plug_silences_the_host_and_trips_the_watchdogs():
+    _, ticks = hopping(Fault("unplug", at=0.03, duration=0.06), seconds=0.14, watchdog=0.02)
+    gone = [n for n, ids in enumerate(answered(ticks)) if not ids]
+    assert 11 <= len(gone) <= 13
+    back = ticks[gone[-1] + 1]
+    assert [reply.values[R.MODE] for reply in back] == [Mode.TIMEOUT, Mode.TIMEOUT]
+
+
+def test_a_wrong_start_is_there_from_the_start():
+    bench = Bench(
+        faults=(
+            Fault("boot_pose", value=2, drive="hip"),
+            Fault("configuration", name="servo.timeout_mode", value=12, drive="knee"),
+        )
+    )
+    truth = bench.robot.leg.wires[0].motor_position(bench.robot.leg.q[0])
+    assert bench.read(R.POSITION) == pytest.approx(truth + 2 / 6)
+    assert bench.read(R.HOME_STATE) == 1
+    assert [d.settings["servo.timeout_mode"] for d in bench.robot.drives] == [15, 12]
+
+
+@pytest.mark.parametrize("phase", ["flight", "falling", "touchdown"])
+def test_a_fault_waits_for_its_phase(phase):
+    bench = Bench(held=False, faults=[Fault("limit_notice", phase=phase)])
+    bench.power()
+    bench.robot.leg._legs.place(slice(None), 0.5, np.array([0.6, -1.3]))
+    states = []
+    while not bench.robot.misfortune.log:
+        leg = bench.robot.leg
+        states.append((leg.foot_clearance, leg.height_rate))
+        bench.wait(5e-4)
+        assert bench.robot.time < 1.0
+    clearance, rate = states[-1]
+    assert {
+        "flight": clearance > 0,
+        "falling": clearance > 0 and rate <= 0,
+        "touchdown": clearance <= 0 < states[-2][0],
+    }[phase]
+
+
+def test_a_script_is_read(tmp_path):
+    file = tmp_path / "faults.toml"
+    file.write_text(
+        '[[fault]]\nkind = "late_reply"\nat = 2\nvalue = 0.01\n[[fault]]\nkind="unplug"'
+    )
+    late, unplug = load_faults(file)
+    assert (late.at, late.amount) == (2, 0.01)
+    assert unplug.lasts == KINDS["unplug"].duration
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ('[[fault]]\nkind = "late"', "There is no fault kind 'late'"),
+        ("[[fault]]\nat = 1.0", "'kind' is missing"),
+        ('[[fault]]\nkind = "unplug"\nwhen = 2', "There is no field 'when'"),
+        ('[[fault]]\nkind = "unplug"\nat = -1', "must be 0 or more"),
+        ('[[fault]]\nkind = "unplug"\nat = "1"', "must be a number"),
+        ('[[fault]]\nkind = "unplug"\ncount = 0', "must be 1 or more"),
+        ('[[fault]]\nkind = "configuration"\nname = "servo.x"', "There is no drive setting"),
+        ('[[fault]]\nkind = "unplug"\nphase = "noon"', "There is no fault phase 'noon'"),
+        ("x = 1", "must hold tables"),
+        ("[[fault", "not a readable TOML"),
+    ],
+)
+def test_mistakes_in_a_script_are_one_sentence(tmp_path, text, sentence):
+    file = tmp_path / "faults.toml"
+    file.write_text(text)
+    with pytest.raises(UsageError, match=sentence) as error:
+        load_faults(file)
+    assert str(file) in str(error.value)
+
+
+def test_a_missing_script_is_named(tmp_path):
+    with pytest.raises(UsageError, match="no fault script"):
+        load_faults(tmp_path / "none.toml")

@@ -1,0 +1,84 @@
+import math
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hopping_leg.emulator.codes import BETWEEN, Fault, Mode
+from hopping_leg.emulator.mode_machine import STARTING_TIME, ModeMachine
+
+STEP = 5e-4
+
+
+def run(machine, seconds, time=0.0):
+    """Let time pass; return it and the modes on the way."""
+    modes = []
+    for _ in range(round(seconds / STEP)):
+        machine.advance(time)
+        modes.append(machine.mode)
+        time += STEP
+    return time, modes
+
+
+def powered(timeout=math.nan):
+    machine = ModeMachine()
+    machine.command(Mode.POSITION, 0.0, timeout)
+    time, _ = run(machine, STARTING_TIME + STEP)
+    assert machine.mode is Mode.POSITION
+    return machine, time
+
+
+def test_starting_takes_its_time_and_steps():
+    machine = ModeMachine()
+    machine.command(Mode.POSITION, 0.0, math.nan)
+    _, modes = run(machine, 0.02)
+    assert list(dict.fromkeys(modes)) == [Mode.ENABLING, Mode.CALIBRATING, Mode.POSITION]
+    assert abs(modes.index(Mode.POSITION) * STEP - STARTING_TIME) <= STEP
+
+
+def test_silence_leads_to_timeout_and_only_stop_leads_out():
+    machine, time = powered(timeout=0.02)
+    time, modes = run(machine, 0.03, time)
+    assert modes[-1] is Mode.TIMEOUT
+    machine.command(Mode.POSITION, time, 0.02)
+    time, modes = run(machine, 0.05, time)
+    assert set(modes) == {Mode.TIMEOUT}
+    machine.command(Mode.STOPPED, time, 0.02)
+    time, modes = run(machine, 0.01, time)
+    assert modes[-1] is Mode.STOPPED
+    machine.command(Mode.POSITION, time, 0.1)
+    assert run(machine, 0.02, time)[1][-1] is Mode.POSITION
+
+
+def test_the_watchdog_covers_position_but_not_brake():
+    machine, time = powered(timeout=0.02)
+    machine.command(Mode.BRAKE, time, 0.02)
+    assert run(machine, 0.1, time)[1][-1] is Mode.BRAKE
+
+
+@given(st.lists(st.sampled_from([m for m in Mode if m is not Mode.STOPPED]), max_size=8))
+def test_fault_stays_until_stop_whatever_is_commanded(commands):
+    machine, time = powered()
+    machine.trip(Fault.MOTOR_DRIVER)
+    for mode in commands:
+        machine.command(mode, time, math.nan)
+        time, modes = run(machine, 0.01, time)
+        assert set(modes) == {Mode.FAULT}
+        assert machine.fault == Fault.MOTOR_DRIVER
+    machine.command(Mode.STOPPED, time, math.nan)
+    run(machine, STEP, time)
+    assert (machine.mode, machine.fault) == (Mode.STOPPED, 0)
+
+
+def test_modes_in_between_cannot_be_commanded():
+    machine, time = powered()
+    for mode in BETWEEN:
+        machine.command(mode, time, math.nan)
+        assert run(machine, STEP, time)[1][-1] is Mode.POSITION
+
+
+def test_position_mode_does_not_begin_outside_its_limits():
+    machine = ModeMachine()
+    machine.command(Mode.POSITION, 0.0, math.nan)
+    for n in range(40):
+        machine.advance(n * STEP, outside_limits=True)
+    assert (machine.mode, machine.fault) == (Mode.FAULT, Fault.START_OUTSIDE_LIMIT)

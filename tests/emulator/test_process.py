@@ -1,0 +1,138 @@
+import asyncio
+import math
+import time
+
+import moteus
+import pytest
+from moteus.fdcanusb_device import FdcanusbDevice
+
+from hopping_leg.emulator.faults import Fault
+from hopping_leg.emulator.process import EmulatorProcess
+from hopping_leg.emulator.start import Start
+from hopping_leg.errors import UsageError
+from hopping_leg.robot import load_robot
+
+PATIENT = 1.0
+"""Watchdog of the tests, s: this machine may be busy."""
+
+TORQUE = {
+    "position": math.nan,
+    "velocity": 0.0,
+    "kp_scale": 0.0,
+    "kd_scale": 0.0,
+    "watchdog_timeout": PATIENT,
+}
+
+
+@pytest.fixture(scope="module")
+def emulator():
+    with EmulatorProcess(Start(pose="0.7,-1.4")) as running:
+        yield running
+
+
+def talk(emulator, conversation, *, checksums):
+    """Run a conversation with the client library as it is installed."""
+
+    async def run():
+        device = FdcanusbDevice(str(emulator.path))
+        if not checksums:
+            device._is_fdcanusb, device._checksum_active = True, False
+        transport = moteus.Transport([device])
+        try:
+            drives = [moteus.Controller(id=n, transport=transport) for n in (1, 2)]
+            return await asyncio.wait_for(conversation(transport, drives), 20)
+        finally:
+            asyncio.get_running_loop().remove_reader(device._serial.fd)
+            transport.close()
+
+    return asyncio.run(run())
+
+
+def test_the_client_drives_the_leg_with_checksums(emulator):
+    async def push(transport, drives):
+        frames = [
+            drive.make_position(**TORQUE, feedforward_torque=torque, maximum_torque=5.0, query=True)
+            for drive, torque in zip(drives, (0.3, -0.3), strict=True)
+        ]
+        seen = []
+        for _ in range(20):
+            seen.append([r.values for r in await transport.cycle(frames)])
+            await asyncio.sleep(0.002)
+        await transport.cycle([drive.make_stop() for drive in drives])
+        return seen
+
+    before = emulator.state()
+    seen = talk(emulator, push, checksums=True)
+    assert [values[moteus.Register.MODE] for values in seen[-1]] == [10, 10]
+    torques = [[round(values[moteus.Register.TORQUE], 6) for values in pair] for pair in seen]
+    assert [0.3, -0.3] in torques
+    time.sleep(0.1)
+    after = emulator.state()
+    assert after.time > before.time
+    assert after.modes == (0, 0)
+    assert after.q != before.q
+
+
+def test_a_client_without_checksums_learns_that_they_are_wanted(emulator):
+    async def ask(transport, drives):
+        assert (await drives[0].query()).id == 1
+        return transport.devices()[0]._checksum_active
+
+    assert talk(emulator, ask, checksums=True)
+    emulator_wants_them = talk(emulator, ask, checksums=False)
+    assert emulator_wants_them
+
+
+def test_plain_lines_and_identity():
+    robot = load_robot("legv2")
+
+    async def ask(transport, drives):
+        reply = await drives[1].custom_query(dict.fromkeys(range(0x100, 0x103), moteus.INT32))
+        return reply.values, await transport.discover()
+
+    with EmulatorProcess(Start()) as emulator:
+        values, found = talk(emulator, ask, checksums=False)
+    assert values[moteus.Register.REGISTER_MAP_VERSION] == 5
+    assert [device.can_id for device in found] == [robot.hardware.hip.id, robot.hardware.knee.id]
+
+
+def test_a_wrong_start_is_told_to_the_parent():
+    with pytest.raises(UsageError, match="There is no pose 'handstand'"):
+        EmulatorProcess(Start(pose="handstand"))
+
+
+def test_a_plug_comes_back_under_the_same_name(tmp_path):
+    async def ask(transport, drives):
+        return (await drives[0].query()).id
+
+    link = tmp_path / "leg"
+    with EmulatorProcess(Start(link=link)) as emulator:
+        assert emulator.path == link
+        assert talk(emulator, ask, checksums=True) == 1
+        emulator.inflict(Fault("unplug", duration=0.3))
+        until = time.monotonic() + 10
+        while link.exists() and time.monotonic() < until:
+            time.sleep(0.01)
+        assert not link.exists()
+        while not link.exists() and time.monotonic() < until:
+            time.sleep(0.01)
+        assert talk(emulator, ask, checksums=True) == 1
+        assert [fault.kind for _, fault in emulator.record().faults] == ["unplug"]
+    assert not link.is_symlink()
+
+
+def test_an_inflicted_fault_shows_on_the_wire(emulator):
+    async def power(transport, drives):
+        frames = [drive.make_position(**TORQUE, query=True) for drive in drives]
+        codes = set()
+        for _ in range(200):
+            results = await transport.cycle(frames)
+            codes |= {int(result.values[moteus.Register.FAULT]) for result in results}
+            if 33 in codes:
+                break
+            await asyncio.sleep(0.01)
+        await transport.cycle([drive.make_stop() for drive in drives])
+        return codes
+
+    emulator.inflict(Fault("drive_fault", since="powered", drive="hip", value=33))
+    assert 33 in talk(emulator, power, checksums=True)

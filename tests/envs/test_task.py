@@ -1,0 +1,275 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hopping_leg.envs import HoppingTask, PaperReward, TaskOptions
+from hopping_leg.envs.observation import sample_scaling
+from hopping_leg.errors import UsageError
+from hopping_leg.hops import find_hops
+from hopping_leg.robot import load_robot
+from hopping_leg.robot.kinematics import joint_angles
+from hopping_leg.sim import NOTHING
+from hopping_leg.sim.variants import SURPRISES
+
+ROBOT = load_robot("legv2-paper")
+BUSY = TaskOptions(episode=0.2, start="mixed", command_hold=(0.05, 0.1), stagger=True)
+
+
+def task(options=BUSY, count=6, seed=0, threads=1, **kwargs):
+    rng = np.random.default_rng(seed)
+    return HoppingTask(ROBOT, count, options, PaperReward(ROBOT), rng, threads, **kwargs)
+
+
+def actions(ticks, count=6, seed=7):
+    return np.random.default_rng(seed).uniform(-1.2, 1.2, (ticks, count, 2))
+
+
+def fingerprint(step):
+    parts = [step.observation, step.reward, step.truncated, step.apex_error, step.height]
+    return [part.tobytes() for part in (*parts, step.terms)]
+
+
+def test_same_seed_same_bytes_at_any_thread_count():
+    runs = [task(threads=threads) for threads in (1, 2, 4)]
+    for action in actions(120):
+        first, *others = [fingerprint(run.step(action)) for run in runs]
+        assert all(other == first for other in others)
+
+
+def test_another_seed_differs():
+    one, other = task(seed=0), task(seed=1)
+    assert fingerprint(one.step(np.zeros((6, 2)))) != fingerprint(other.step(np.zeros((6, 2))))
+
+
+@pytest.mark.parametrize("ticks", [1, 37, 90])
+def test_a_restored_task_goes_on_exactly(ticks):
+    busy = replace(BUSY, idle=0.15)
+    one, other = task(busy, seed=0), task(busy, seed=5)
+    plan = actions(ticks + 60)
+    for action in plan[:ticks]:
+        last = one.step(action)
+    np.testing.assert_array_equal(other.restore(one.state()), last.observation)
+    for action in plan[ticks:]:
+        assert fingerprint(one.step(action)) == fingerprint(other.step(action))
+
+
+def test_the_state_is_arrays_and_plain_values():
+    def plain(value):
+        if isinstance(value, dict):
+            return {key: plain(entry) for key, entry in value.items()}
+        return value.tolist() if isinstance(value, np.ndarray) else value
+
+    assert json.loads(json.dumps(plain(task().state())))["tick"] == 0
+
+
+def test_observations_are_newest_first_and_normalised():
+    options = TaskOptions(disturbance=NOTHING)
+    quiet = task(options, count=2)
+    scaling = sample_scaling(ROBOT, options)
+    offset, gain = scaling.offset, scaling.gain
+    truth = []
+    for action in actions(5, count=2):
+        observation = quiet.step(action).observation
+        legs = quiet.legs
+        truth.insert(0, np.hstack([legs.q, legs.qd, quiet.command[:, None]]))
+    expected = np.hstack([(sample - offset) * gain for sample in truth[:3]])
+    np.testing.assert_allclose(observation, expected, rtol=1e-5, atol=1e-6)
+    lower = np.hstack([ROBOT.of_joints("lower"), [0, 0, 0.25]])
+    np.testing.assert_allclose(((lower - offset) * gain)[[0, 1, 4]], -1.0)
+    upper = np.hstack([ROBOT.of_joints("upper"), [10, 10, 0.35]])
+    np.testing.assert_allclose((upper - offset) * gain, 1.0)
+
+
+def test_episodes_end_on_time_and_the_last_observation_is_kept():
+    timed = task(TaskOptions(episode=0.1, disturbance=NOTHING), count=3)
+    for tick in range(1, 41):
+        step = timed.step(np.full((3, 2), 0.1))
+        assert step.truncated.all() == (tick % 20 == 0)
+        assert not step.terminated.any()
+        if tick % 20 == 0:
+            assert not np.array_equal(step.final_observation, step.observation)
+            assert step.final_privileged.shape == timed.privileged().shape
+            np.testing.assert_allclose(timed.legs.height, 0.2 + ROBOT.foot.radius)
+            assert (step.height != timed.legs.height).all()
+        else:
+            assert step.final_observation is None
+
+
+def test_staggered_legs_do_not_end_together():
+    spread = task(TaskOptions(episode=0.5, stagger=True), count=50)
+    ends = [spread.step(np.zeros((50, 2))).truncated.sum() for _ in range(100)]
+    assert sum(ends) == 50
+    assert max(ends) < 10
+
+
+def test_without_autoreset_a_leg_goes_on():
+    going = task(TaskOptions(episode=0.05), count=1, autoreset=False)
+    heights = []
+    for _ in range(15):
+        step = going.step(np.full((1, 2), 0.5))
+        heights.append(step.height[0])
+    assert step.truncated.all()
+    assert step.final_observation is None
+    assert heights[-1] != pytest.approx(0.21, abs=1e-6)
+
+
+def test_resetting_some_legs_leaves_the_others_alone():
+    some = task(TaskOptions(disturbance=NOTHING), count=4)
+    for action in actions(30, count=4):
+        some.step(action)
+    before = some.legs.batch.state.copy()
+    some.reset(np.array([1, 3]))
+    np.testing.assert_array_equal(some.legs.batch.state[[0, 2]], before[[0, 2]])
+    np.testing.assert_allclose(some.legs.height[[1, 3]], 0.2 + ROBOT.foot.radius)
+
+
+def test_commands_come_from_the_paper_or_a_range_and_switch_on_time():
+    paper = task(TaskOptions(), count=200)
+    assert set(paper.command) == {0.25, 0.30, 0.35}
+    options = TaskOptions(command_range=(0.22, 0.40), command_hold=(0.05, 0.05), episode=10)
+    ranged = task(options, count=200)
+    assert len(set(ranged.command)) == 200
+    changes = []
+    for _ in range(30):
+        before = ranged.command.copy()
+        ranged.step(np.zeros((200, 2)))
+        changes.append((ranged.command != before).mean())
+        assert ranged.command.min() >= 0.22
+        assert ranged.command.max() <= 0.40
+    assert [i + 1 for i, share in enumerate(changes) if share == 1] == [10, 20, 30]
+
+
+def test_low_commands_can_come_more_often():
+    low_ones = []
+    for skew in (1.0, 2.0):
+        options = TaskOptions(command_range=(0.2, 0.4), command_skew=skew)
+        commands = task(options, count=2000).command
+        assert commands.min() >= 0.2
+        assert commands.max() <= 0.4
+        low_ones.append(np.mean(commands < 0.25))
+    np.testing.assert_allclose(low_ones, [0.25, 0.5], atol=0.04)
+
+
+def test_drops_begin_above_the_ground_within_the_limits():
+    dropped = task(TaskOptions(start="drop"), count=300)
+    clearance = dropped.legs.foot_clearance()
+    assert clearance.min() >= -1e-12
+    assert clearance.max() <= 0.1
+    assert np.ptp(clearance) > 0.08
+    assert (dropped.legs.q >= ROBOT.of_joints("lower")).all()
+    assert (dropped.legs.q <= ROBOT.of_joints("upper")).all()
+
+
+def test_apexes_are_those_of_the_recorded_heights():
+    hopper = task(TaskOptions(action_torque=(10, 20), disturbance=NOTHING), count=1)
+    postures = joint_angles(ROBOT, np.array([[0.15, 0.0], [0.26, 0.0]]))
+    rows, apexes = [], []
+    for tick in range(400):
+        target = postures[tick // 50 % 2]
+        seen = hopper.measurement
+        torque = 60 * (target - seen.q[:, 0]) - 1.0 * seen.qd[:, 0]
+        step = hopper.step(torque / [10, 20])
+        legs = hopper.legs
+        rows.append((legs.height[0], legs.height_rate[0], legs.foot_clearance()[0]))
+        if not np.isnan(step.apex_height[0]):
+            apexes.append(step.apex_height[0])
+            assert step.apex_error[0] == pytest.approx(apexes[-1] - hopper.command[0])
+    found = find_hops(*np.array(rows).T)
+    assert len(found.apex) >= 3
+    np.testing.assert_array_equal(apexes, found.apex)
+
+
+def test_a_fall_ends_the_episode_only_if_asked():
+    for clearance, falls in ((None, False), (0.05, True)):
+        limp = task(TaskOptions(fall_clearance=clearance, disturbance=NOTHING), count=1)
+        assert any(limp.step(np.zeros((1, 2))).terminated[0] for _ in range(100)) == falls
+
+
+@pytest.mark.parametrize("end", [{"fall_clearance": 0.05}, {"idle": 0.3}])
+def test_an_end_costs_its_penalty_once(end):
+    options = TaskOptions(disturbance=NOTHING, **end)
+    free, dear = task(options, count=1), task(replace(options, fall_penalty=7.0), count=1)
+    for _ in range(100):
+        a, b = free.step(np.zeros((1, 2))), dear.step(np.zeros((1, 2)))
+        assert a.reward[0] - b.reward[0] == pytest.approx(7.0 * a.terminated[0])
+        if a.terminated[0]:
+            return
+    pytest.fail("the limp leg's episode never ended")
+
+
+def test_what_has_no_apex_for_too_long_ends():
+    idle = task(TaskOptions(start="hop", idle=0.3, episode=1.0, disturbance=NOTHING), count=64)
+    waited, hopped, ended = np.zeros(64), 0, 0
+    for action in actions(300, count=64):
+        step = idle.step(action)
+        apex = ~np.isnan(step.apex_height)
+        waited = np.where(apex, 0, waited + 1)
+        np.testing.assert_array_equal(step.terminated, waited == 60)
+        assert not (step.terminated & step.truncated).any()
+        waited[step.terminated | step.truncated] = 0
+        hopped, ended = hopped + apex.sum(), ended + step.terminated.sum()
+    assert hopped > 10
+    assert ended > 10
+
+
+def test_a_restart_shows_nothing_of_the_last_episode():
+    """A leg that begins anew sees as much of its past as one that never did anything."""
+    options = TaskOptions(observation="dated", episode=0.1, disturbance=NOTHING, commands=(0.3,))
+    first = task(options, count=2)
+    fresh = first.reset()
+    for action in actions(20, count=2):
+        step = first.step(action)
+    assert step.truncated.all()
+    np.testing.assert_array_equal(step.observation, fresh)
+    assert not np.allclose(step.final_observation, fresh)
+
+
+def fall_apart(draws, **options):
+    """Let legs change; return how high each is after a push each time, (draws, legs)."""
+    one = task(TaskOptions(randomised=SURPRISES, **options), count=6)
+    heights = []
+    for draw in draws:
+        one.diverge(draw)
+        one.legs.stand(slice(None), [0.7, -1.4], 0.05)
+        for _ in range(40):
+            one.legs.step(np.full((6, 2), [1.0, -3.0]))
+        heights.append(one.legs.height.copy())
+    return np.array(heights)
+
+
+def test_a_draw_makes_the_same_legs_again_and_another_one_others():
+    first, second, again = fall_apart([1, 2, 1])
+    np.testing.assert_array_equal(first, again)
+    assert len(set(first)) == 6
+    assert (first != second).all()
+
+
+def test_some_legs_stay_the_robot_itself():
+    legs = fall_apart([1], unchanged=0.5, alike_at_first=True)[0]
+    (same,) = fall_apart([0], alike_at_first=True)
+    np.testing.assert_array_equal(legs == same, [False, True] * 3)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"commands": ()},
+        {"commands": (float("nan"),)},
+        {"command_range": (0.4, 0.2)},
+        {"command_skew": 0.0},
+        {"episode": 0.0},
+        {"start": "flying"},
+        {"action_torque": (6.0, -1.0)},
+        {"start_length": 0.5},
+        {"timestep": 3e-3},
+        {"chance": 1.5},
+        {"unchanged": -0.1},
+        {"idle": -1.0},
+        {"idle": float("inf")},
+    ],
+)
+def test_options_without_meaning_are_refused(wrong):
+    with pytest.raises(UsageError):
+        task(TaskOptions(**wrong), count=1)

@@ -1,0 +1,98 @@
+"""Short outings of a small continued training."""
+
+import dataclasses
+
+import numpy as np
+
+from hopping_leg.controllers.library import load_policy
+from hopping_leg.controllers.outing import Outing, by_tick, measured_table
+from hopping_leg.rl.finetune.contact import Contact, ContactOptions
+from hopping_leg.rl.finetune.hindsight import Reckoning
+from hopping_leg.rl.finetune.learner import LearnerOptions
+from hopping_leg.rl.finetune.options import FinetuneOptions
+from hopping_leg.rl.finetune.rules import Rules
+from hopping_leg.robot import kinematics, load_robot
+from hopping_leg.robot.model import GRAVITY
+from hopping_leg.trace import Trace
+
+ROBOT = load_robot("legv2-paper")
+POLICY = load_policy("fast")
+PERIOD = 0.005
+CONTACT = ContactOptions(legs=4, seconds=3.0, steps=20, batch=64, hidden=(8,))
+OPTIONS = FinetuneOptions(
+    method="both",
+    commands=(0.25, 0.35),
+    outing=4.0,
+    hold=2.0,
+    explorations=1,
+    aiming=0.1,
+    believed_seconds=32.0,
+    first_steps=2,
+    steps_per_tick=0.004,
+    critics_first=0,
+    rules=Rules(minutes=0.4, patience=50, margin=10.0),
+    learner=LearnerOptions(critic=(8,), batch=16, buffer=4000),
+    contact=CONTACT,
+)
+
+
+class Imagined:
+    """A robot whose hops are always so much off their command; what its joints do is made up."""
+
+    name = "imagined"
+
+    def __init__(self, off=0.02, complain_from=10**9):
+        self.off, self.complain_from, self.outings = off, complain_from, 0
+
+    def hop(self, controller, steps, seed):
+        command = by_tick(steps, 1 / PERIOD)
+        rng = np.random.default_rng(seed)
+        joints = {name: rng.normal(0, 0.1, (len(command), 2)) for name in ("q", "qd", "torque")}
+        joints["q"] += [0.6, -1.3]
+        joints["asked"] = rng.uniform(-3, 3, (len(command), 2))
+        table = measured_table(np.arange(len(command)) * PERIOD, command, joints)
+        self.outings += 1
+        complaint = "A joint left its range." if self.outings > self.complain_from else ""
+        time = np.arange(1.2, len(command) * PERIOD, 0.4)
+        at = command[(time / PERIOD).astype(int)]
+        truth = np.stack([time, at, at + self.off], axis=1)
+        trace = Trace(table, {"rate_hz": 1 / PERIOD})
+        return Outing(trace, len(command) * PERIOD, complaint, truth)
+
+
+def flying_leg(hops, noise=0.0):
+    """Return joints of a leg that stands still between flights, its height, and who flies.
+
+    Args:
+        hops: Apex heights, m.
+        noise: Of nothing; the posture is constant.
+    """
+    posture = np.array([0.6, -1.25])
+    stand = float(kinematics.stance_height(ROBOT, posture))
+    height, flying = [np.full(100, stand)], [np.zeros(100, bool)]
+    for apex in hops:
+        speed = np.sqrt(2 * GRAVITY * (apex - stand))
+        time = np.arange(PERIOD, 2 * speed / GRAVITY, PERIOD)
+        height.append(stand + speed * time - GRAVITY * time**2 / 2)
+        flying.append(np.ones(len(time), bool))
+        height.append(np.full(60, stand))
+        flying.append(np.zeros(60, bool))
+    height, flying = np.concatenate(height), np.concatenate(flying)
+    q = np.tile(posture, (len(height), 1, 1)).reshape(len(height), 1, 2)
+    return q, height, flying
+
+
+class Known(Contact):
+    """Knows who flies."""
+
+    def __init__(self, flying):
+        super().__init__(dataclasses.replace(CONTACT, hidden=(2,)))
+        self._flying = flying
+
+    def airborne(self, heard):
+        """Return it."""
+        return np.where(self._flying, 1.0, -1.0)[:, None]
+
+
+def reckoning(flying):
+    return Reckoning(ROBOT, Known(flying))

@@ -1,0 +1,138 @@
+"""Outings, learning and stopping as a whole, on a robot that is made up or simulated."""
+
+import dataclasses
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from hopping_leg.controllers.policy import Policy
+from hopping_leg.errors import UsageError
+from hopping_leg.rl.finetune import prepared
+from hopping_leg.rl.finetune.finetuning import Finetuning
+from hopping_leg.rl.finetune.prepared import Task, prepare
+from hopping_leg.rl.finetune.rules import Rules
+from hopping_leg.rl.finetune.running import POLICY as FILE
+from hopping_leg.rl.finetune.running import finetune
+from hopping_leg.rl.finetune.simulated import Guard, Simulated
+from hopping_leg.robot import load_robot
+
+from .outings import OPTIONS, POLICY, ROBOT, Imagined
+
+TASK = Task(POLICY, ROBOT, (0.25, 0.35), 3)
+
+
+@pytest.fixture(scope="module")
+def ready(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("prepared")
+    prepare(TASK, OPTIONS.contact, folder)
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def few_legs(monkeypatch):
+    monkeypatch.setattr(prepared, "BELIEVED_LEGS", 2)
+
+
+class KilledError(Exception):
+    pass
+
+
+def test_what_is_learnt_beforehand_is_learnt_once(ready, monkeypatch):
+    def never(*_):
+        raise AssertionError("simulated again")
+
+    monkeypatch.setattr(prepared, "doubtful_legs", never)
+    again = prepare(TASK, OPTIONS.contact, ready)
+    assert again.drag.shape == (2,)
+    other = dataclasses.replace(OPTIONS.contact, seed=6)
+    with pytest.raises(AssertionError, match="simulated again"):
+        prepare(TASK, other, ready)
+
+
+@pytest.mark.slow
+def test_a_killed_run_goes_on_exactly(tmp_path, ready):
+    whole = finetune(TASK, Imagined(), OPTIONS, tmp_path / "whole", prepared=ready)
+    kinds = [row["kind"] for row in whole["outings"]]
+    assert {"check", "exploration"} <= set(kinds)
+    for number in (1, 3, 4):
+        count = number
+
+        def kill(row, at=count):
+            if row["outing"] == at:
+                raise KilledError
+
+        with pytest.raises(KilledError):
+            finetune(TASK, Imagined(), OPTIONS, tmp_path / "cut", resume=number > 1,
+                  prepared=ready, on_outing=kill)  # fmt: skip
+    cut = finetune(TASK, Imagined(), OPTIONS, tmp_path / "cut", resume=True, prepared=ready)
+    assert cut["outings"] == whole["outings"]
+    assert (tmp_path / "cut" / FILE).read_bytes() == (tmp_path / "whole" / FILE).read_bytes()
+
+
+@pytest.mark.slow
+def test_weights_move_and_the_policy_file_names_its_source(tmp_path, ready):
+    options = dataclasses.replace(OPTIONS, method="sac")
+    run = Finetuning(TASK, Imagined(), options, tmp_path, ready)
+    finetuned = run.run()
+    last = run._content(run._network, run._aim)
+    assert last != finetuned.content
+    card = Policy(finetuned.content, "finetuned", "finetuned").card
+    assert POLICY.digest in card.recipe
+    assert card.robot_digest == POLICY.card.robot_digest
+    assert "used up" in finetuned.reason
+
+
+def test_outings_that_were_ended_early_never_win_and_are_counted(tmp_path, ready):
+    options = dataclasses.replace(OPTIONS, method="aim")
+    robot = Imagined(complain_from=1)
+    result = finetune(TASK, robot, options, tmp_path, prepared=ready)
+    assert result["safety"]["ended_early"] == len(result["outings"]) - 1
+    assert result["best_check"]["outing"] == 0
+    assert result["safety"]["thrown_back"] > 0 or options.rules.margin > 1
+    strict = dataclasses.replace(options, rules=Rules(minutes=0.4, margin=0.01, patience=50))
+    shutil.rmtree(tmp_path)
+    again = finetune(TASK, Imagined(complain_from=1), strict, tmp_path, prepared=ready)
+    assert again["safety"]["thrown_back"] > 0
+
+
+def test_an_exploration_that_was_ended_early_goes_back_to_the_best_policy(tmp_path, ready):
+    options = dataclasses.replace(OPTIONS, method="sac")
+    result = finetune(TASK, Imagined(complain_from=3), options, tmp_path, prepared=ready)
+    for row in result["outings"]:
+        assert row["thrown_back"] or not (row["complaint"] and row["kind"] == "exploration")
+    assert any(row["complaint"] for row in result["outings"] if row["kind"] == "exploration")
+
+
+def test_a_folder_with_another_run_is_refused(tmp_path, ready):
+    options = dataclasses.replace(OPTIONS, method="aim")
+    finetune(TASK, Imagined(), options, tmp_path, prepared=ready)
+    with pytest.raises(UsageError, match="--resume"):
+        finetune(TASK, Imagined(), options, tmp_path, prepared=ready)
+    with pytest.raises(UsageError, match="another seed"):
+        finetune(dataclasses.replace(TASK, seed=4), Imagined(), options, tmp_path, resume=True)
+    with pytest.raises(UsageError, match="finished"):
+        finetune(TASK, Imagined(), options, tmp_path, resume=True)
+    assert json.loads((tmp_path / "finetune.json").read_text())["on"] == "imagined"
+
+
+def test_a_simulated_outing_tells_what_was_measured_and_keeps_the_truth_apart():
+    twin = load_robot("twin")
+    outing = Simulated(twin, None).hop(POLICY, ((0.3, 2.0),), 1)
+    again = Simulated(twin, None).hop(POLICY, ((0.3, 2.0),), 1)
+    assert outing.trace.table.equals(again.trace.table)
+    assert not {"height_m", "foot_clearance_m"} & set(outing.trace.table.columns)
+    noise = np.diff(outing.trace.column("hip_velocity_rad_s")[:20])
+    assert np.abs(noise).max() > 0.01
+    assert outing.seconds == 2.0
+    assert len(outing.truth) >= 3
+
+
+def test_a_guard_takes_the_leg_away_and_ends_the_outing():
+    narrow = Guard(np.array([-9.0, -9.0]), np.array([9.0, 9.0]), np.array([9.0, 9.0]))
+    outing = Simulated(ROBOT, narrow).hop(POLICY, ((0.3, 2.0),), 1)
+    assert "faster" in outing.complaint
+    assert 0 < outing.seconds < 2.0
+    speed = outing.trace.column("knee_velocity_rad_s")
+    assert np.abs(speed[:-1]).max() <= 9.0

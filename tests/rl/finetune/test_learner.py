@@ -1,0 +1,142 @@
+"""SAC begins as the policy, learns, and is restored exactly."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+
+from hopping_leg.controllers.library import load_policy
+from hopping_leg.rl.export import build_policy
+from hopping_leg.rl.finetune.exploring import EDGE, Exploring
+from hopping_leg.rl.finetune.learner import Learner, LearnerOptions
+from hopping_leg.rl.finetune.replay import CRITIC_SIZE, Rows
+from hopping_leg.rl.network_file import read_network
+from hopping_leg.sim.disturbance import Measurement
+
+TINY = LearnerOptions(critic=(8, 8), batch=16, actor_share=1.0, change=np.inf)
+
+
+def rows(size, count=200, reward=None):
+    rng = np.random.default_rng(0)
+    seen = rng.normal(size=(count, size + CRITIC_SIZE)).astype(np.float32)
+    action = rng.uniform(-0.9, 0.9, (count, 2)).astype(np.float32)
+    given = np.zeros(count) if reward is None else reward(action)
+    done = np.ones(count, np.float32)
+    return Rows(seen, seen, action, given.astype(np.float32), done)
+
+
+def learner(name, reward=None, options=TINY):
+    network = read_network(load_policy(name).content)
+    return Learner(network, rows(len(network.offset), reward=reward), options, 0), network
+
+
+@pytest.mark.parametrize("name", ["fast", "paper"])
+def test_the_actor_gives_the_policys_torques(name):
+    made, network = learner(name)
+    seen = rows(len(network.offset)).observation
+    with torch.no_grad():
+        action = made.model.actor(torch.from_numpy(seen), deterministic=True).numpy()
+    policy = load_policy(name)
+    session = policy._session
+    shapes, at, feeds = policy.inputs, 0, {}
+    raw = seen[:, : len(network.offset)] / network.gain + network.offset
+    for part, shape in shapes.items():
+        width = int(np.prod(shape))
+        feeds[part] = raw[:, at : at + width].reshape(-1, *shape).astype(np.float32)
+        at += width
+    torque = session.run(None, feeds)[0] / np.array(policy.card.torque_scale)
+    wanted = np.clip(torque, -EDGE, EDGE) if network.squash == "clip" else torque
+    np.testing.assert_allclose(action, wanted, atol=2e-4)
+
+
+def test_an_untrained_learner_exports_the_policy_it_was_given():
+    made, _ = learner("fast")
+    policy = load_policy("fast")
+    assert build_policy(made.network(), policy.card) == policy.content
+
+
+def test_actions_move_to_where_the_reward_is():
+    made, network = learner("fast", lambda action: -np.abs(action - 0.5).sum(axis=1))
+    seen = torch.from_numpy(rows(len(network.offset)).observation)
+
+    def off():
+        with torch.no_grad():
+            return float((made.model.actor(seen, deterministic=True) - 0.5).abs().mean())
+
+    before = off()
+    made.learn(300, 1)
+    assert off() < 0.8 * before
+
+
+def test_a_round_changes_actions_no_more_than_it_may():
+    options = dataclasses.replace(TINY, change=0.02)
+    made, network = learner("fast", lambda action: -np.abs(action - 0.5).sum(axis=1), options)
+    real = rows(len(network.offset), 50)
+    seen = torch.from_numpy(real.observation)
+
+    def act():
+        with torch.no_grad():
+            return made.model.actor(seen, deterministic=True)
+
+    for heard in (False, True):
+        before = act()
+        made.learn(100, 1)
+        moved = (act() - before).square().mean().sqrt()
+        assert moved > 1e-4
+        if heard:
+            assert moved <= 0.02
+        made.hear(real)
+
+
+def test_frozen_parts_stay():
+    made, network = learner("fast", lambda action: action.sum(axis=1))
+    made.learn(5, 1, critics_only=True)
+    for (now, _), (then, _) in zip(made.network().layers, network.layers, strict=True):
+        np.testing.assert_array_equal(now, then.astype(np.float32))
+    last = LearnerOptions(critic=(8, 8), batch=16, last_layer=True)
+    made, network = learner("fast", lambda action: action.sum(axis=1), last)
+    made.learn(5, 1)
+    np.testing.assert_array_equal(
+        made.network().layers[0][0], network.layers[0][0].astype(np.float32)
+    )
+    assert (made.network().layers[-1][0] != network.layers[-1][0]).any()
+
+
+def test_learning_goes_on_exactly_from_a_stored_state():
+    whole, _ = learner("fast", lambda action: action.sum(axis=1))
+    whole.learn(4, 1)
+    state = whole.state()
+    whole.learn(4, 2)
+    again, _ = learner("fast", lambda action: action.sum(axis=1))
+    again.restore(state)
+    again.learn(4, 2)
+    for (one, _), (other, _) in zip(whole.network().layers, again.network().layers, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_a_batch_mixes_both_robots_once_the_real_one_is_known():
+    made, network = learner("fast")
+    real = rows(len(network.offset), 50)
+    buffer = made.model.replay_buffer
+    assert len(buffer.sample(16).rewards) == 16
+    made.hear(Rows(real.observation, real.following, real.action, real.reward + 1, real.done))
+    share = buffer.sample(400).rewards.numpy().mean()
+    np.testing.assert_allclose(share, 1 - TINY.believed_share)
+
+
+def test_exploration_without_spread_is_the_policy_and_with_it_stays_within_torque_limits():
+    policy = load_policy("fast")
+    hidden = len(read_network(policy.content).layers[-1][0][0])
+    rng = np.random.default_rng(2)
+    q, qd = rng.normal([0.6, -1.3], 0.3, (4, 3, 2)), rng.normal(0, 2, (4, 3, 2))
+    seen = Measurement(q, qd, np.full((4, 3), 0.3), np.tile([0.0, 0.005, 0.01], (4, 1)))
+    policy.reset(4)
+    wanted = np.clip(policy.act(seen), -6 * EDGE, 6 * EDGE)
+    for spread, same in ((0.0, True), (3.0, False)):
+        matrix = np.full((hidden, 2), spread)
+        explorer = Exploring(policy.content, policy.card, matrix, 4, np.random.default_rng(0))
+        explorer.reset(4)
+        torque = explorer.act(seen)
+        assert np.allclose(torque, wanted, atol=1e-5) == same
+        assert np.abs(torque).max() <= 6.0

@@ -1,0 +1,60 @@
+"""Small recipes that train in a second."""
+
+import dataclasses
+
+import torch
+from stable_baselines3.common.logger import configure
+
+from hopping_leg.rl.adaptive import AdaptiveRecipe
+from hopping_leg.rl.fast import FastRecipe
+from hopping_leg.rl.imitation import Imitation
+from hopping_leg.rl.paper import PaperRecipe
+from hopping_leg.rl.precise import PreciseRecipe
+from hopping_leg.rl.recurrent import RecurrentRecipe
+from hopping_leg.rl.resumable import ResumablePPO
+from hopping_leg.robot import load_robot
+
+ROBOT = load_robot("legv2-paper")
+TINY = PaperRecipe(
+    steps=1200, warmup=300, judge_every=10**9, hidden=(8, 8), legs=2, gradient_steps=4, batch=16
+)
+TINY_FAST = FastRecipe(steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8))
+TINY_PRECISE = PreciseRecipe(
+    judge_commands=(0.3,), teachers=3, exam_at=(1.0,),
+    steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8), student=(8, 8),
+    teaching=0.4, imitation=Imitation(memory=200, updates=4, batch=64),
+)  # fmt: skip
+
+
+TINY_RECURRENT = RecurrentRecipe(
+    steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8), memory=8,
+    teaching=0.4, imitation=Imitation(memory=200, updates=4, batch=64),
+)  # fmt: skip
+
+
+TINY_ADAPTIVE = AdaptiveRecipe(
+    steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8), student=(8, 8),
+    feeling=(8, 8), teaching=0.4, imitation=Imitation(memory=200, updates=4, batch=64),
+)  # fmt: skip
+
+
+@dataclasses.dataclass(frozen=True)
+class TinyPPO(PaperRecipe):
+    name = "ppo"
+    steps: int = 640
+    privileged_critic: bool = False
+    legs: int = 2
+
+    def make_model(self, env, seed):
+        return ResumablePPO(
+            "MlpPolicy", env, n_steps=32, batch_size=32, n_epochs=2, use_sde=True, seed=seed,
+            learning_rate=lambda left: 1e-3 * left, policy_kwargs={"net_arch": [8]}, device="cpu",
+        )  # fmt: skip
+
+
+def learner(recipe, seed=3):
+    torch.set_num_threads(1)
+    env = recipe.make_env(ROBOT, seed)
+    model = recipe.make_model(env, seed)
+    model.set_logger(configure(None, []))
+    return model

@@ -1,0 +1,176 @@
+import dataclasses
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from hopping_leg.errors import UsageError
+from hopping_leg.rl import judge
+from hopping_leg.rl import train as module
+from hopping_leg.rl.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
+from hopping_leg.rl.resumable import restore, state_of
+from hopping_leg.sim.variants import SURPRISES
+from tests.rl.learners import (
+    ROBOT,
+    TINY,
+    TINY_ADAPTIVE,
+    TINY_FAST,
+    TINY_PRECISE,
+    TINY_RECURRENT,
+    TinyPPO,
+    learner,
+)  # fmt: skip
+
+SURPRISED = dataclasses.replace(
+    TINY_PRECISE, task=dataclasses.replace(TINY_PRECISE.task, randomised=SURPRISES)
+)
+
+
+def disturb_all_generators():
+    torch.rand(100)
+    np.random.rand(100)  # noqa: NPY002
+
+
+@pytest.mark.parametrize(
+    "recipe",
+    [
+        TINY,
+        TinyPPO(),
+        TINY_FAST,
+        TINY_PRECISE,
+        SURPRISED,
+        TINY_RECURRENT,
+        TINY_ADAPTIVE,
+    ],
+    ids=["sac", "ppo", "fast", "precise", "surprised", "recurrent", "adaptive"],
+)
+def test_resuming_equals_never_having_stopped(recipe, tmp_path):
+    straight = learner(recipe)
+    trees = []
+
+    def keep():
+        if straight.num_timesteps >= recipe.steps // 2 and not trees:
+            trees.append(write_checkpoint(tmp_path, straight.num_timesteps, state_of(straight)))
+
+    def boundary(model):
+        recipe.anneal(model, model.env, 1 - model._current_progress_remaining)
+
+    straight.on_boundary = lambda: (boundary(straight), keep())
+    straight.learn(recipe.steps)
+    disturb_all_generators()
+    # Which legs there are is drawn from the seed; all else comes from the checkpoint.
+    resumed = learner(recipe, seed=3 if recipe.task.randomised else 99)
+    resumed.on_boundary = lambda: boundary(resumed)
+    restore(resumed, read_checkpoint(trees[0]))
+    assert 0 < resumed.num_timesteps < recipe.steps
+    resumed.learn(recipe.steps - resumed.num_timesteps, reset_num_timesteps=False)
+    assert resumed.num_timesteps == straight.num_timesteps
+    before, after = straight.policy.state_dict(), resumed.policy.state_dict()
+    assert all(torch.equal(before[name], after[name]) for name in before)
+    assert np.array_equal(straight._last_obs, resumed._last_obs)
+
+
+def test_only_whole_checkpoints_count_and_two_are_kept(tmp_path):
+    for steps in (1, 2, 3):
+        write_checkpoint(tmp_path, steps, {"a": np.arange(steps), "b": [steps, None, 2**100]})
+    (tmp_path / "checkpoint-000000000009.tmp").mkdir()
+    found = list_checkpoints(tmp_path)
+    assert [p.name[-1] for p in found] == ["2", "3"]
+    tree = read_checkpoint(found[-1])
+    assert tree["a"].tolist() == [0, 1, 2]
+    assert tree["b"] == [3, None, 2**100]
+
+
+@pytest.mark.parametrize("name", ["arrays.npz", "state.json"])
+def test_damaged_checkpoint_is_named(tmp_path, name):
+    path = write_checkpoint(tmp_path, 1, {"a": np.arange(500)})
+    content = (path / name).read_bytes()
+    (path / name).write_bytes(content[: len(content) // 2])
+    with pytest.raises(UsageError, match="damaged"):
+        read_checkpoint(path)
+
+
+def test_no_checkpoint_holds_a_pickle(tmp_path):
+    with pytest.raises(TypeError):
+        write_checkpoint(tmp_path, 1, {"a": object()})
+    with pytest.raises(TypeError, match="objects"):
+        write_checkpoint(tmp_path, 2, {"a": np.array([object()])})
+    assert list_checkpoints(tmp_path) == []
+
+
+def test_a_run_is_never_overwritten_or_mixed(tmp_path, monkeypatch):
+    monkeypatch.setattr(judge, "_SECONDS", 0.5)
+    out = tmp_path / "run"
+    recipe = dataclasses.replace(TINY, steps=64, judge_every=32, warmup=32)
+    done = module.train(recipe, ROBOT, 0, out, quiet=True)
+    content = done.policy.read_bytes()
+    with pytest.raises(UsageError, match="--resume"):
+        module.train(recipe, ROBOT, 0, out, quiet=True)
+    with pytest.raises(UsageError, match="finished"):
+        module.train(recipe, ROBOT, 0, out, resume=True, quiet=True)
+    with pytest.raises(UsageError, match="another seed"):
+        module.train(recipe, ROBOT, 1, out, resume=True, quiet=True)
+    assert done.policy.read_bytes() == content
+
+
+_KILLED = """
+import sys
+from pathlib import Path
+from tests.rl.learners import ROBOT, TINY
+import dataclasses
+from hopping_leg.rl import judge
+from hopping_leg.rl.train import train
+judge._SECONDS = 0.5
+recipe = dataclasses.replace(TINY, steps=1600, checkpoint_seconds=0.0, judge_every=800)
+train(recipe, ROBOT, 0, Path(sys.argv[1]), resume=True, quiet=True)
+"""
+
+
+def checkpoint_names(run):
+    return {path.name for path in list_checkpoints(run / "checkpoints")}
+
+
+@pytest.mark.slow
+def test_killed_runs_end_like_the_run_that_was_left_alone(tmp_path):
+    alone, killed = tmp_path / "alone", tmp_path / "killed"
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    command = [sys.executable, "-c", _KILLED]
+    subprocess.run([*command, str(alone)], check=True, env=environment)
+    kills = 0
+    for delay in (0.0, 0.05, 0.1):
+        begun = checkpoint_names(killed)
+        process = subprocess.Popen([*command, str(killed)], env=environment)
+        while process.poll() is None and checkpoint_names(killed) <= begun:
+            time.sleep(0.01)
+        time.sleep(delay)
+        kills += process.poll() is None
+        process.kill()
+        process.wait()
+    assert kills > 0
+    if not (killed / "policy.onnx").exists():
+        subprocess.run([*command, str(killed)], check=True, env=environment)
+    assert (killed / "policy.onnx").read_bytes() == (alone / "policy.onnx").read_bytes()
+
+
+def test_a_run_can_begin_where_another_stopped(tmp_path, monkeypatch):
+    monkeypatch.setattr(judge, "_SECONDS", 0.5)
+    first, second = tmp_path / "first", tmp_path / "second"
+    recipe = dataclasses.replace(TINY, steps=128, judge_every=64, warmup=32, checkpoint_seconds=0)
+    module.train(recipe, ROBOT, 0, first, quiet=True)
+    with pytest.raises(UsageError, match="no checkpoint"):
+        module.train(recipe, ROBOT, 0, second, source=tmp_path, quiet=True)
+    longer = dataclasses.replace(recipe, steps=256, learning_rate=1e-4)
+    shares = []
+    monkeypatch.setattr(type(longer), "anneal", lambda *args: shares.append(args[-1]))
+    trained = module.train(longer, ROBOT, 0, second, source=first, quiet=True)
+    assert trained.steps == 256
+    assert shares == [0.25, 0.5, 0.75], "of the longer training, not of the one that is over"
+    history = json.loads((second / "result.json").read_text())["history"]
+    assert min(row["steps"] for row in history) >= 64
+    assert f"--source {first}" in (second / "model_card.md").read_text()

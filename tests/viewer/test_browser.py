@@ -1,0 +1,216 @@
+"""The page in a real browser without a screen; skipped, with the reason, where there is none."""
+
+import io
+import time
+
+import numpy as np
+import pytest
+
+pytest.importorskip("viser", reason="the extra 'view' is not installed")
+pytest.importorskip("playwright", reason="playwright is not installed")
+
+from PIL import Image
+
+from hopping_leg.controllers.library import load_controller
+from hopping_leg.controllers.rollout import Setup, roll_out
+from hopping_leg.deploy.black_box import SUFFIX, BlackBox
+from hopping_leg.robot import load_robot
+from hopping_leg.viewer.browser import (
+    PATIENCE,
+    chromium,
+    find_chromium,
+    new_page,
+    running,
+    wait_for_leg,
+)
+from hopping_leg.viewer.follow import Follow
+from hopping_leg.viewer.live import Live
+from hopping_leg.viewer.live_panel import HEIGHT_STEP, KEY_STEP
+from hopping_leg.viewer.replay import Replay
+from hopping_leg.viewer.viewer import Viewer
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(find_chromium() is None, reason="there is no Chromium on this computer"),
+]
+ROBOT = "legv2-paper"
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as browser:
+        yield browser
+
+
+@pytest.fixture
+def page(browser):
+    """Return an empty page; in the end nothing may have been complained of or loaded from afar."""
+    complaints, far = [], []
+    page = new_page(browser)
+    page.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("requestfailed", lambda request: complaints.append(request.url))
+    page.on("request", lambda r: far.append(r.url) if "127.0.0.1" not in r.url else None)
+    yield page
+    page.close()
+    assert complaints == []
+    assert [url for url in far if not url.startswith(("data:", "blob:"))] == []
+
+
+def until(condition):
+    """Wait until a condition holds; fail if it never does."""
+    end = time.monotonic() + 1e-3 * PATIENCE
+    while not condition():
+        assert time.monotonic() < end, "it did not happen in time"
+        time.sleep(0.05)
+
+
+def slider(page, label):
+    """Return the handle of the slider beside a label."""
+    return page.locator(
+        f"xpath=//label[normalize-space()='{label}']/following::*[@role='slider'][1]"
+    )
+
+
+def value_of(handle):
+    return float(handle.get_attribute("aria-valuenow"))
+
+
+def shown_apex(page, leg=0):
+    return float(page.locator(".apex").nth(leg).inner_text().removesuffix(" m"))
+
+
+def choose(page, label, option):
+    page.get_by_role("combobox", name=label, exact=True).click()
+    page.get_by_role("option", name=option, exact=True).click()
+
+
+def test_the_slider_changes_how_high_the_leg_hops(page):
+    live = Live(("energy-shaping",), ROBOT, 0.26)
+    viewer = Viewer(live, ROBOT, port=0)
+    with running(viewer):
+        wait_for_leg(page, viewer)
+        until(lambda: live.now > 2.5)
+        before = shown_apex(page)
+        handle = slider(page, "Height, m")
+        handle.focus()
+        for _ in range(round(0.08 / HEIGHT_STEP)):
+            page.keyboard.press("ArrowRight")
+        until(lambda: live.height == pytest.approx(0.34))
+        changed = live.now
+        until(lambda: live.now > changed + 2.5)
+        after = shown_apex(page)
+        assert page.locator("#command").inner_text() == "0.340"
+    assert before == pytest.approx(0.26, abs=0.02)
+    assert after == pytest.approx(0.34, abs=0.02)
+
+
+def test_keys_change_height_pause_step_and_push(page):
+    live = Live(("fast",), ROBOT, 0.30)
+    viewer = Viewer(live, ROBOT, port=0)
+    with running(viewer):
+        wait_for_leg(page, viewer)
+        page.keyboard.press("k")
+        until(lambda: live.height == pytest.approx(0.30 + KEY_STEP))
+        assert slider(page, "Height, m").get_attribute("aria-valuenow") is not None
+        page.keyboard.press("j")
+        page.keyboard.press("j")
+        until(lambda: live.height == pytest.approx(0.30 - KEY_STEP))
+        page.keyboard.press("p")
+        until(lambda: live._force > 0)
+        page.keyboard.press("Space")
+        until(lambda: viewer.pace.paused)
+        time.sleep(0.2)
+        still = live.now
+        page.keyboard.press("s")
+        until(lambda: live.now == pytest.approx(still + 1 / 200))
+        page.keyboard.press("Space")
+        until(lambda: live.now > still + 0.3)
+
+
+def test_world_controller_robot_and_a_second_leg_change_while_it_hops(page):
+    live = Live(("fast",), ROBOT, 0.30)
+    viewer = Viewer(live, ROBOT, port=0)
+    with running(viewer):
+        wait_for_leg(page, viewer)
+        for label in ("Payload, kg", "Ground, ms", "Delay, ms"):
+            slider(page, label).focus()
+            page.keyboard.press("ArrowRight")
+        until(lambda: live.world.payload > 0 and live.world.delay > 0)
+        assert live.world.time_constant == pytest.approx(0.0921, abs=1e-4)
+        choose(page, "Controller", "energy-shaping")
+        until(lambda: live.names == ("energy-shaping",))
+        choose(page, "Beside it", "paper")
+        until(lambda: live.names == ("energy-shaping", "paper"))
+        page.locator(".apex").nth(1).wait_for()
+        choose(page, "Robot", "legv2")
+        until(lambda: live.robot.name == "legv2")
+        until(lambda: len(live.tracks[1]) > 20)
+
+
+def test_the_picture_shows_something_and_moves(page):
+    live = Live(("fast",), ROBOT, 0.30)
+    viewer = Viewer(live, ROBOT, port=0)
+    with running(viewer):
+        wait_for_leg(page, viewer)
+        until(lambda: live.now > 2.0)
+        middle = {"x": 330, "y": 60, "width": 520, "height": 700}
+        pictures = []
+        for _ in range(2):
+            shot = Image.open(io.BytesIO(page.screenshot(clip=middle))).convert("RGB")
+            pictures.append(np.asarray(shot, dtype=np.int16))
+            time.sleep(0.37)
+    first, second = pictures
+    blue = (first[..., 2] > 150) & (first[..., 0] < 90)
+    assert blue.mean() > 0.005, "the motors are drawn"
+    assert (np.abs(first - second).max(axis=-1) > 40).mean() > 0.005, "the leg moves"
+
+
+def test_a_trace_is_replayed(page, tmp_path):
+    robot = load_robot(ROBOT)
+    controller = load_controller("energy-shaping", robot)
+    run = roll_out(controller, Setup(robot, threads=1), np.full((600, 1), 0.3), seed=0)
+    path = tmp_path / "run.parquet"
+    run.trace(0).save(path)
+    replay = Replay((path,))
+    viewer = Viewer(replay, port=0)
+    with running(viewer):
+        wait_for_leg(page, viewer)
+        page.keyboard.press("Space")
+        until(lambda: viewer.pace.paused)
+        handle = slider(page, "Time, s")
+        # It shows where the replay stands, also where that stopped between two of its updates.
+        until(lambda: value_of(handle) == pytest.approx(replay.now, abs=0.006))
+        still = replay.now
+        page.keyboard.press("s")
+        until(lambda: replay.now > still)
+        until(lambda: value_of(handle) == pytest.approx(replay.now, abs=0.006))
+        handle.focus()
+        page.keyboard.press("Home")
+        until(lambda: replay.now == 0.0)
+        page.keyboard.press("End")
+        until(lambda: replay.now == pytest.approx(replay.length))
+
+
+def test_a_run_on_the_leg_is_followed(page, tmp_path):
+    columns = ("time_s", "command_m", "hip_position_rad", "knee_position_rad", "hip_torque_nm")
+    header = {"robot": ROBOT, "controller": "fast"}
+    follow = Follow(tmp_path)
+    viewer = Viewer(follow, port=0)
+    with running(viewer):
+        page.goto(viewer.address)
+        box = BlackBox(tmp_path / f"fast-1{SUFFIX}", columns, header)
+        for tick in range(200):
+            box.row((tick / 200, 0.3, 0.8, -1.6, 1.0))
+        box.close()
+        page.get_by_text("the leg is shown standing").wait_for()
+        assert follow.now == pytest.approx(199 / 200)
+
+
+def test_fewer_pixels_are_drawn_where_asked_for(page):
+    viewer = Viewer(Live(("fast",), ROBOT, 0.3), ROBOT, port=0, detail=0.25)
+    with running(viewer):
+        wait_for_leg(page, viewer)
+        canvas = page.locator("canvas[data-engine]")
+        shown = canvas.bounding_box()
+        until(lambda: canvas.evaluate("c => c.height") == pytest.approx(shown["height"] / 4, abs=1))

@@ -1,0 +1,144 @@
+import os
+
+import numpy as np
+import pytest
+
+from hopping_leg.controllers.library import load_controller
+from hopping_leg.deploy.black_box import SUFFIX, BlackBox
+from hopping_leg.deploy.box_tail import BoxTail
+from hopping_leg.deploy.rows import columns
+from hopping_leg.errors import RobotError, TraceError, UsageError
+from hopping_leg.robot import kinematics, load_robot
+from hopping_leg.viewer.follow import Follow
+
+COLUMNS = ("time_s", "command_m", "hip_position_rad", "knee_position_rad", "hip_torque_nm")
+
+
+def box(path, robot="legv2"):
+    return BlackBox(path, COLUMNS, {"robot": robot, "controller": "fast"})
+
+
+def write(writer, first, count, hip=0.8):
+    """Write ticks and wait until they are on disk."""
+    for tick in range(first, first + count):
+        writer.row((tick / 200, 0.3, hip, -1.6, 1.5))
+    writer._queue.put(None)
+    writer._thread.join()
+    writer._thread = type(writer._thread)(target=writer._write, daemon=True)
+    writer._thread.start()
+
+
+def test_a_tail_returns_each_row_once_wherever_the_file_was_cut(tmp_path):
+    source = box(tmp_path / f"whole{SUFFIX}")
+    write(source, 0, 50)
+    source.event(what="a transition")
+    write(source, 50, 50)
+    source.close()
+    content = source.path.read_bytes()
+    growing = tmp_path / f"growing{SUFFIX}"
+    growing.touch()
+    tail, seen = BoxTail(growing), []
+    with growing.open("ab", buffering=0) as file:
+        for start in range(0, len(content), 37):
+            file.write(content[start : start + 37])
+            seen += [row[0] for row in tail.rows() if len(row)]
+    np.testing.assert_allclose(seen, np.arange(100) / 200)
+    assert tail.columns == COLUMNS
+    assert tail.header["controller"] == "fast"
+
+
+def test_a_run_is_shown_as_it_grows_until_it_is_over(tmp_path):
+    path = tmp_path / f"fast-1{SUFFIX}"
+    writer = box(path)
+    follow = Follow(path)
+    follow.advance(1 / 60)
+    assert follow.tracks == []
+    write(writer, 0, 3)
+    follow.advance(1 / 60)
+    write(writer, 3, 4, hip=0.9)
+    follow.advance(1 / 60)
+    (track,) = follow.tracks
+    assert len(track) == 7
+    assert follow.now == pytest.approx(6 / 200)
+    height, q = track.moment(follow.now)
+    np.testing.assert_allclose(q, [0.9, -1.6])
+    assert height == pytest.approx(kinematics.stance_height(load_robot("legv2"), q))
+    assert "standing" in track.note
+    writer.close()
+    path.unlink()
+    follow.advance(1.0)
+    assert follow.notices[-1].startswith("The run is over")
+    assert len(track) == 7
+
+
+def test_what_hop_deploy_records_is_shown_with_the_estimate_of_the_controller(tmp_path):
+    robot = load_robot("legv2-paper")
+    names = columns(load_controller("energy-shaping", robot))
+    writer = BlackBox(tmp_path / f"es-1{SUFFIX}", names, {"robot": robot.name, "controller": "es"})
+    row = dict.fromkeys(names, 0.0) | {
+        "hip_position_rad": 0.7,
+        "knee_position_rad": -1.4,
+        "knee_torque_nm": 3.0,
+        "estimated_height_m": 0.33,
+        "phase": 1.0,
+    }
+    writer.row(list(row.values()))
+    writer.close()
+    follow = Follow(tmp_path)
+    follow.advance(1.0)
+    (track,) = follow.tracks
+    assert track.moment(follow.now)[0] == 0.33
+    assert track.latest("knee_torque_nm", follow.now) == 3.0
+    assert track.latest("phase", follow.now) == 1.0
+    assert "estimate" in track.note
+
+
+def test_joints_without_a_reply_stay_as_they_were(tmp_path):
+    path = tmp_path / f"fast-1{SUFFIX}"
+    writer = box(path)
+    follow = Follow(path)
+    write(writer, 0, 3)
+    follow.advance(1 / 60)
+    write(writer, 3, 3, hip=float("nan"))
+    follow.advance(1 / 60)
+    assert follow.tracks[0].moment(follow.now)[1][0] == 0.8
+    writer.close()
+
+
+def test_of_boxes_written_in_one_tick_the_last_by_name_is_followed(tmp_path):
+    for number in (2, 1):
+        writer = box(tmp_path / f"fast-{number}{SUFFIX}")
+        write(writer, 0, 3)
+        writer.close()
+    for number in (1, 2):
+        os.utime(tmp_path / f"fast-{number}{SUFFIX}", ns=(10**18, 10**18))
+    follow = Follow(tmp_path)
+    follow.advance(1.0)
+    assert follow.notices[-1] == f"Following fast-2{SUFFIX}."
+
+
+def test_a_folder_waits_for_a_run_and_turns_to_a_newer_one(tmp_path):
+    follow = Follow(tmp_path)
+    follow.advance(1.0)
+    assert "Waiting" in follow.notices[0]
+    for number, count in ((1, 3), (2, 5)):
+        writer = box(tmp_path / f"fast-{number}{SUFFIX}")
+        write(writer, 0, count)
+        writer.close()
+        follow.advance(1.0)
+        assert len(follow.tracks[0]) == count
+    assert follow.notices[-1] == f"Following fast-2{SUFFIX}."
+
+
+def test_what_cannot_be_followed_is_refused(tmp_path):
+    with pytest.raises(UsageError, match="There is no"):
+        Follow(tmp_path / "none")
+    foreign = tmp_path / f"foreign{SUFFIX}"
+    foreign.write_bytes(b"something else altogether")
+    with pytest.raises(TraceError, match="no black box"):
+        Follow(foreign).advance(1.0)
+    unknown = box(tmp_path / f"unknown{SUFFIX}", robot="mine")
+    write(unknown, 0, 1)
+    unknown.close()
+    with pytest.raises(RobotError, match="--robot"):
+        Follow(unknown.path).advance(1.0)
