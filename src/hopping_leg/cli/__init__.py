@@ -6,13 +6,18 @@ the docstring under each field is that option's help. Modules are imported only 
 called, so that ``hop --help`` is instant and nothing but training loads torch.
 """
 
+import contextlib
+import dataclasses
 import errno
 import importlib
 import inspect
+import io
 import sys
+import types
 import typing
 from collections.abc import Sequence
 from importlib.metadata import version
+from typing import Annotated, Any, Union
 
 import tyro
 
@@ -36,10 +41,12 @@ VERBS = {
     "doctor": "say what is missing here; check, configure and home a leg's drives",
     "emulate": "stand in for the real leg: two drives behind a real wire",
     "experiment": "run the paper's sim-to-real experiment on twins",
-    "completion": "print a script that completes `hop` in your shell",
     "reproduce": "the main job: train, evaluate, compare and report",
 }
 """Every verb with its line in the overview."""
+
+_SHELLS = ("bash", "zsh", "fish")
+_CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes)
 
 FAILED = 2
 INTERRUPTED = 130
@@ -91,20 +98,43 @@ def _dispatch(arguments: list[str]) -> int:
     if verb == "--version":
         print(f"hop {version('hopping-leg')}")
         return 0
+    if verb == "--tyro-print-completion":
+        return _print_completion(*rest[:1])
     if verb not in VERBS:
         raise UsageError(unknown_name("verb", verb, VERBS) + " Try `hop --help`.")
     _refuse_repeated(rest)
-    module = importlib.import_module(f"hopping_leg.cli.{verb}")
-    options = typing.get_type_hints(module.run, include_extras=True)["args"]
+    module, options = _load_verb(verb)
+    description = inspect.getdoc(module)
     module.run(
-        tyro.cli(
-            options,
-            prog=f"hop {verb}",
-            description=inspect.getdoc(module),
-            args=rest,
-            config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
-        )
+        tyro.cli(options, prog=f"hop {verb}", description=description, args=rest, config=_CONFIG)
     )
+    return 0
+
+
+def _load_verb(verb: str) -> tuple[types.ModuleType, Any]:
+    """Import a verb; return its module and the type of its options."""
+    module = importlib.import_module(f"hopping_leg.cli.{verb}")
+    return module, typing.get_type_hints(module.run, include_extras=True)["args"]
+
+
+def _print_completion(shell: str = "") -> int:
+    """Print tyro's completion script for all verbs, which are subcommands to it."""
+    if shell not in _SHELLS:
+        raise UsageError(unknown_name("shell", shell, _SHELLS))
+    verbs = [
+        Annotated[
+            dataclasses.make_dataclass(verb.capitalize(), [("args", _load_verb(verb)[1])]),
+            tyro.conf.subcommand(name=verb, description=line),
+        ]
+        for verb, line in VERBS.items()
+    ]
+    script = io.StringIO()
+    with contextlib.redirect_stdout(script), contextlib.suppress(SystemExit):
+        words = ["--tyro-print-completion", shell]
+        tyro.cli(Union[tuple(verbs)], prog="hop", args=words, config=_CONFIG)  # type: ignore[call-overload]  # noqa: UP007
+    for line in script.getvalue().splitlines():
+        # A help text of several lines would be offered as words.
+        print(line.replace("\\n", " ") if line.startswith("COMPLETION_SPEC") else line)
     return 0
 
 
@@ -128,7 +158,8 @@ def overview() -> str:
             "",
             *lines,
             "",
-            "`hop VERB --help` explains a verb. Start here:",
+            "`hop VERB --help` explains a verb; `hop --tyro-print-completion bash` prints a script",
+            "that completes them in the shell (or zsh, fish). Start here:",
             "  hop evaluate fast energy-shaping --out runs/first",
         ]
     )
