@@ -22,12 +22,12 @@ class Bouncer:
 
 
 if __name__ == "__main__":
-    from hopping_leg.controllers import Setup, roll_out
-    from hopping_leg.controllers.library import load_controller
+    from hopping_leg.controllers import RolloutConfig, rollout
+    from hopping_leg.controllers.registry import load_controller
     from hopping_leg.robot import load_robot
 
     leg = load_robot("legv2-paper")
     bouncer = load_controller(f"{__file__}:Bouncer", leg)
-    run = roll_out(bouncer, Setup(leg), np.full((600, 2), 0.3), seed=0)
+    run = rollout(bouncer, RolloutConfig(leg), np.full((600, 2), 0.3), seed=0)
     clear = run.data["foot_clearance_m"][200:] > 0.003
     print(f"{bouncer.name}: foot off the ground {100 * clear.mean():.0f} % of the time")

@@ -4,15 +4,15 @@ from pathlib import Path
 
 import numpy as np
 
-from hopping_leg.controllers import Setup, roll_out
-from hopping_leg.controllers.library import load_controller
+from hopping_leg.controllers import RolloutConfig, rollout
+from hopping_leg.controllers.registry import load_controller
 from hopping_leg.hops import find_hops
 from hopping_leg.robot import load_robot
 
 robot = load_robot("legv2-paper")
 controller = load_controller("energy-shaping", robot)
 commands = np.full((2000, 8), 0.30)  # m; 10 s at 200 Hz, eight legs
-run = roll_out(controller, Setup(robot), commands, seed=0)
+run = rollout(controller, RolloutConfig(robot), commands, seed=0)
 
 height, rate = run.data["height_m"], run.data["height_rate_m_s"]
 clearance = run.data["foot_clearance_m"]

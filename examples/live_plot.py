@@ -6,8 +6,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib import get_backend
 
-from hopping_leg.controllers import Setup, roll_out
-from hopping_leg.controllers.library import load_controller
+from hopping_leg.controllers import RolloutConfig, rollout
+from hopping_leg.controllers.registry import load_controller
 from hopping_leg.robot import load_robot
 
 SHOWN_EVERY = 20
@@ -15,7 +15,7 @@ SHOWN_EVERY = 20
 
 leg = load_robot("legv2-paper")
 command = np.repeat([0.25, 0.30, 0.35], 600)  # m; 3 s each
-run = roll_out(load_controller("energy-shaping", leg), Setup(leg), command[:, None], seed=0)
+run = rollout(load_controller("energy-shaping", leg), RolloutConfig(leg), command[:, None], seed=0)
 time, height = run.time, run.data["height_m"][:, 0]
 
 figure, axes = plt.subplots(layout="constrained")

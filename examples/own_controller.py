@@ -3,7 +3,7 @@
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers import Setup, roll_out
+from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.robot import Robot, kinematics, load_robot
 from hopping_leg.sim.disturbance import Measurement
 
@@ -34,7 +34,7 @@ class Spring:
 
 if __name__ == "__main__":
     robot = load_robot("legv2-paper")
-    run = roll_out(Spring(robot), Setup(robot), np.full((600, 4), 0.30), seed=0)
+    run = rollout(Spring(robot), RolloutConfig(robot), np.full((600, 4), 0.30), seed=0)
     height, clearance = run.data["height_m"][200:], run.data["foot_clearance_m"][200:]
     print(f"base between {height.min():.3f} and {height.max():.3f} m")
     print(f"foot off the ground {100 * (clearance > 0.003).mean():.0f} % of the time")

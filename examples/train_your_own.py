@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hopping_leg.controllers import Setup, roll_out
-from hopping_leg.controllers.library import load_controller
+from hopping_leg.controllers import RolloutConfig, rollout
+from hopping_leg.controllers.registry import load_controller
 from hopping_leg.rl.fast import FastRecipe
 from hopping_leg.rl.train import train
 from hopping_leg.robot import load_robot
@@ -29,6 +29,6 @@ else:
     print(f"{trained.steps} steps in {trained.minutes:.1f} minutes: {file}")
 
 policy = load_controller(str(file), leg)
-run = roll_out(policy, Setup(leg), np.full((1000, 4), recipe.task.commands[1]), seed=0)
+run = rollout(policy, RolloutConfig(leg), np.full((1000, 4), recipe.task.commands[1]), seed=0)
 height = run.data["height_m"][400:]
 print(f"base between {height.min():.3f} and {height.max():.3f} m")

@@ -8,8 +8,8 @@ import numpy as np
 import polars.selectors as cs
 
 from hopping_leg import cli
-from hopping_leg.controllers import Setup, roll_out
-from hopping_leg.controllers.library import load_controller
+from hopping_leg.controllers import RolloutConfig, rollout
+from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.black_box import BlackBox
 from hopping_leg.robot import load_robot
 from hopping_leg.sim.twins import draw_twin
@@ -155,7 +155,9 @@ def _trial_and_killed_run() -> None:
 def _trial() -> Trace:
     leg = load_robot("legv2-paper")
     commands = np.full((600, 1), 0.3)
-    return roll_out(load_controller("energy-shaping", leg), Setup(leg), commands, seed=0).trace(0)
+    return rollout(
+        load_controller("energy-shaping", leg), RolloutConfig(leg), commands, seed=0
+    ).trace(0)
 
 
 def _killed_run() -> None:

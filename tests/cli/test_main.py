@@ -98,6 +98,6 @@ def test_version(capsys):
 
 
 def test_an_option_given_twice_is_refused(capsys):
-    arguments = ["train", "--set", "legs=4", "--set", "gamma=0.9"]
+    arguments = ["train", "--set", "num_envs=4", "--set", "gamma=0.9"]
     assert main(arguments) == cli.FAILED
     assert "--set is given twice" in capsys.readouterr().err

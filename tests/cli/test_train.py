@@ -45,7 +45,7 @@ def test_a_training_leaves_policy_card_and_json(tiny, tmp_path, capsys):
         (["--starts", "2", "--minutes", "-1"], "must be positive"),
         (["--set", "learning_rat=1"], "Did you mean 'learning_rate'"),
         (["--set", "learning_rate=fast"], "give e.g. learning_rate="),
-        (["--set", "legs=2.5"], "a whole number"),
+        (["--set", "num_envs=2.5"], "a whole number"),
         (["--heights", "0.4", "0.2"], "the smaller first"),
         (["--robot", "legv9"], "There is no robot"),
         (["--robot", "twin"], "has effects in [reality] that training does not know"),

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hopping_leg.controllers import Setup, roll_out
+from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.baselines import paper_energy_shaping, tuned_energy_shaping
 from hopping_leg.controllers.phases import Phase
 from hopping_leg.errors import UsageError
@@ -17,12 +17,12 @@ COMMANDS = (0.25, 0.30, 0.35)
 
 def hop(controller, setup, commands=COMMANDS, seconds=5.0, seed=1234):
     rows = np.tile(commands, (round(seconds * setup.rate), 1))
-    return roll_out(controller, setup, rows, seed)
+    return rollout(controller, setup, rows, seed)
 
 
 @pytest.fixture(scope="module")
 def tuned():
-    return hop(tuned_energy_shaping(ROBOT), Setup(ROBOT, threads=1), seconds=6.0)
+    return hop(tuned_energy_shaping(ROBOT), RolloutConfig(ROBOT, threads=1), seconds=6.0)
 
 
 def test_tuned_hops_to_the_command_through_noise_and_delay(tuned):
@@ -58,14 +58,14 @@ def test_estimated_apex_is_the_true_one(tuned):
 
 
 def test_legs_do_not_depend_on_their_neighbours():
-    setup = Setup(ROBOT, NOTHING, threads=1)
+    setup = RolloutConfig(ROBOT, NOTHING, threads=1)
     together = hop(tuned_energy_shaping(ROBOT), setup, seconds=2.0)
     alone = hop(tuned_energy_shaping(ROBOT), setup, commands=(0.35,), seconds=2.0)
     np.testing.assert_allclose(together.data["height_m"][:, 2], alone.data["height_m"][:, 0])
 
 
 def test_reset_forgets_everything():
-    setup, controller = Setup(ROBOT, threads=1), tuned_energy_shaping(ROBOT)
+    setup, controller = RolloutConfig(ROBOT, threads=1), tuned_energy_shaping(ROBOT)
     first = hop(controller, setup, seconds=1.5).data["height_m"]
     np.testing.assert_array_equal(hop(controller, setup, seconds=1.5).data["height_m"], first)
 
@@ -73,8 +73,8 @@ def test_reset_forgets_everything():
 @pytest.mark.slow
 def test_gain_rises_on_a_heavier_leg():
     base = replace(ROBOT.base, mass=ROBOT.base.mass + 0.2 * ROBOT.mass)
-    heavy = Setup(replace(ROBOT, base=base), NOTHING, threads=1)
-    light = Setup(ROBOT, NOTHING, threads=1)
+    heavy = RolloutConfig(replace(ROBOT, base=base), NOTHING, threads=1)
+    light = RolloutConfig(ROBOT, NOTHING, threads=1)
     runs = [hop(tuned_energy_shaping(ROBOT), s, (0.3,), 5.0) for s in (light, heavy)]
     gains = [r.data["gain_k"][-1, 0] for r in runs]
     medians = [np.median(measure(r.trace(0))[0].apex) for r in runs]
@@ -84,7 +84,7 @@ def test_gain_rises_on_a_heavier_leg():
 
 def test_literal_law_meets_the_command_when_it_knows_contact_and_height():
     controller = paper_energy_shaping(ROBOT, true_contact=True)
-    setup = Setup(ROBOT, NOTHING, threads=1)
+    setup = RolloutConfig(ROBOT, NOTHING, threads=1)
     run = hop(controller, setup)
     for leg in range(len(COMMANDS)):
         assert abs(np.median(measure(run.trace(leg))[0].error)) < 0.003
@@ -92,7 +92,7 @@ def test_literal_law_meets_the_command_when_it_knows_contact_and_height():
 
 @pytest.mark.slow
 def test_literal_law_with_its_own_estimate_is_worse_than_the_tuned_one(tuned):
-    literal = hop(paper_energy_shaping(ROBOT), Setup(ROBOT, threads=1), seconds=6.0)
+    literal = hop(paper_energy_shaping(ROBOT), RolloutConfig(ROBOT, threads=1), seconds=6.0)
 
     def spread(rollout):
         return np.mean([np.std(measure(rollout.trace(i))[0].apex) for i in range(3)])
@@ -112,7 +112,10 @@ class Blindfolded:
 
 def test_options_that_need_the_truth_say_so():
     with pytest.raises(UsageError, match="simulation only"):
-        hop(Blindfolded(paper_energy_shaping(ROBOT, true_contact=True)), Setup(ROBOT, NOTHING))
+        hop(
+            Blindfolded(paper_energy_shaping(ROBOT, true_contact=True)),
+            RolloutConfig(ROBOT, NOTHING),
+        )
 
 
 @pytest.mark.parametrize(
@@ -120,7 +123,7 @@ def test_options_that_need_the_truth_say_so():
 )
 def test_gains_carry_over_to_other_legs(robot, command):
     leg = load_robot(robot)
-    setup = Setup(leg, threads=1, start_length=0.7 * (leg.thigh.length + leg.shank.length))
+    setup = RolloutConfig(leg, threads=1, start_length=0.7 * (leg.thigh.length + leg.shank.length))
     window = measure(hop(tuned_energy_shaping(leg), setup, (command,)).trace(0))[0]
     assert len(window.apex) >= 4
     assert abs(np.median(window.error)) < 0.02
@@ -129,6 +132,6 @@ def test_gains_carry_over_to_other_legs(robot, command):
 
 @pytest.mark.slow
 def test_runs_at_400_hz():
-    setup = Setup(ROBOT, rate=400.0, threads=1)
+    setup = RolloutConfig(ROBOT, rate=400.0, threads=1)
     run = hop(tuned_energy_shaping(ROBOT, rate=400.0), setup, (0.3,))
     assert abs(np.median(measure(run.trace(0))[0].error)) < 0.01

@@ -8,8 +8,8 @@ import onnx
 import pytest
 from onnx import TensorProto, helper
 
-from hopping_leg.controllers.library import controller_names, load_controller, load_policy
 from hopping_leg.controllers.policy import Card, Policy
+from hopping_leg.controllers.registry import controller_names, load_controller, load_policy
 from hopping_leg.errors import PolicyError, UsageError
 from hopping_leg.rl.export import Network, build_policy, save_policy
 from hopping_leg.robot import load_robot

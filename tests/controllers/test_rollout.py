@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from hopping_leg.controllers import Setup, roll_out
+from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.errors import PhysicsError, RobotError, UsageError
 from hopping_leg.robot import build_model, load_robot
 from hopping_leg.sim import NOTHING
@@ -34,8 +34,8 @@ def with_shank(**changes):
 
 
 def test_a_rollout_records_states_before_and_torques_during_each_tick():
-    setup = Setup(ROBOT, NOTHING, threads=1)
-    run = roll_out(Constant([0.5, -1.0]), setup, np.full((50, 3), 0.3), seed=0)
+    setup = RolloutConfig(ROBOT, NOTHING, threads=1)
+    run = rollout(Constant([0.5, -1.0]), setup, np.full((50, 3), 0.3), seed=0)
     np.testing.assert_allclose(run.data["hip_position_rad"][0], setup.start_posture[0])
     np.testing.assert_array_equal(run.data["knee_command_nm"], -1.0)
     np.testing.assert_array_equal(run.data["tick_torque_nm"], -1.0)
@@ -51,8 +51,8 @@ def test_legs_of_any_size_start_standing(length):
         with_shank(length=length, com=length / 3),
         thigh=dataclasses.replace(ROBOT.thigh, length=length, com=length / 3),
     )
-    setup = Setup(robot, NOTHING, threads=1)
-    run = roll_out(Constant([0, 0]), setup, np.full((2, 1), 0.3), seed=0)
+    setup = RolloutConfig(robot, NOTHING, threads=1)
+    run = rollout(Constant([0, 0]), setup, np.full((2, 1), 0.3), seed=0)
     assert run.data["foot_clearance_m"][0, 0] == pytest.approx(0, abs=1e-9)
     assert np.isfinite(run.data["height_m"]).all()
 
@@ -63,14 +63,14 @@ def test_legs_of_any_size_start_standing(length):
 )
 def test_meaningless_setups_are_refused(field, value):
     with pytest.raises(UsageError, match=field):
-        Setup(ROBOT, **{field: value})
+        RolloutConfig(ROBOT, **{field: value})
 
 
 def test_an_unstable_simulation_is_an_error():
     knee = dataclasses.replace(ROBOT.knee, armature=1e-12, friction=0.0, damping=0.0)
     robot = dataclasses.replace(with_shank(mass=1e-6, inertia=1e-12), knee=knee)
     with pytest.raises(PhysicsError, match="unstable"):
-        roll_out(Constant([5, -20]), Setup(robot, threads=1), np.full((100, 2), 0.3), seed=0)
+        rollout(Constant([5, -20]), RolloutConfig(robot, threads=1), np.full((100, 2), 0.3), seed=0)
 
 
 def test_parameters_that_mujoco_refuses_are_a_robot_error():

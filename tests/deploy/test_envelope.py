@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from hopping_leg.controllers import Setup, roll_out
-from hopping_leg.controllers.library import load_controller
+from hopping_leg.controllers import RolloutConfig, rollout
+from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.envelope import hopping_envelope, recording_envelope
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import NOTHING
@@ -16,7 +16,9 @@ LEG = load_robot("legv2-paper")
 def test_who_hops_as_trained_is_not_stopped_for_it(name):
     limits = hopping_envelope(LEG, 200.0)
     commands = np.tile([0.25, 0.30, 0.35], (800, 1))
-    run = roll_out(load_controller(name, LEG), Setup(LEG, NOTHING, threads=1), commands, seed=0)
+    run = rollout(
+        load_controller(name, LEG), RolloutConfig(LEG, NOTHING, threads=1), commands, seed=0
+    )
     for joint, lower, upper in zip(("hip", "knee"), limits.lower, limits.upper, strict=True):
         angle = run.data[f"{joint}_position_rad"]
         assert lower < angle.min() < angle.max() < upper

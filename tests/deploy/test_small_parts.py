@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hopping_leg.controllers.library import load_controller
+from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy import realtime
 from hopping_leg.deploy.keyboard import LiveHeight, act_on
 from hopping_leg.deploy.observation import Reply

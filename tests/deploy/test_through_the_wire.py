@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hopping_leg.controllers.library import load_controller
+from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.bring_up import judge, require
 from hopping_leg.deploy.configuration import wanted
 from hopping_leg.deploy.envelope import hopping_envelope

@@ -4,10 +4,10 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
-from hopping_leg.envs import ENV_ID, HoppingTask, PaperReward, TaskOptions
+from hopping_leg.envs import ENV_ID, HoppingTask, PaperReward, TaskConfig
 from hopping_leg.robot import load_robot
 
-SHORT = TaskOptions(episode=0.1)
+SHORT = TaskConfig(episode=0.1)
 
 
 @pytest.mark.filterwarnings("error")
@@ -81,7 +81,7 @@ def test_vector_env_is_the_batched_task():
 def test_single_and_vector_agree_on_a_motion_without_noise():
     from hopping_leg.sim import NOTHING
 
-    options = TaskOptions(commands=(0.3,), disturbance=NOTHING)
+    options = TaskConfig(commands=(0.3,), disturbance=NOTHING)
     env = gymnasium.make(ENV_ID, options=options)
     vector = gymnasium.make_vec(ENV_ID, num_envs=2, options=options)
     single, _ = env.reset(seed=0)
@@ -95,7 +95,7 @@ def test_single_and_vector_agree_on_a_motion_without_noise():
 
 
 def test_a_layout_may_be_chosen():
-    options = TaskOptions(observation="dated")
+    options = TaskConfig(observation="dated")
     for env in (
         gymnasium.make(ENV_ID, options=options),
         gymnasium.make_vec(ENV_ID, num_envs=3, options=options),

@@ -66,7 +66,7 @@ def test_every_term_is_as_printed(height, rate, q, qd, command, action, last):
 
 @pytest.mark.parametrize(
     ("barrier", "expected"),
-    [("step", math.exp(0.05)), ("printed", 1 - math.exp(0.05)), ("flipped", math.exp(0.05) - 1)],
+    [("step", math.exp(0.05)), ("printed", 1 - math.exp(0.05))],
 )
 def test_readings_of_the_height_barrier(barrier, expected):
     options = PaperRewardOptions(barrier=barrier)

@@ -4,7 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hopping_leg.envs import HoppingTask, PaperReward, TaskOptions
+from hopping_leg.envs import HoppingTask, PaperReward, TaskConfig
 from hopping_leg.envs.observation import sample_scaling
 from hopping_leg.errors import UsageError
 from hopping_leg.hops import find_hops
@@ -14,7 +14,12 @@ from hopping_leg.sim import NOTHING
 from hopping_leg.sim.variants import SURPRISES
 
 ROBOT = load_robot("legv2-paper")
-BUSY = TaskOptions(episode=0.2, start="mixed", command_hold=(0.05, 0.1), stagger=True)
+BUSY = TaskConfig(
+    episode=0.2,
+    reset_distribution="mixed",
+    command_resampling_time=(0.05, 0.1),
+    random_episode_start=True,
+)
 
 
 def task(options=BUSY, count=6, seed=0, threads=1, **kwargs):
@@ -45,8 +50,7 @@ def test_another_seed_differs():
 
 @pytest.mark.parametrize("ticks", [1, 37, 90])
 def test_a_restored_task_goes_on_exactly(ticks):
-    busy = replace(BUSY, idle=0.15)
-    one, other = task(busy, seed=0), task(busy, seed=5)
+    one, other = task(BUSY, seed=0), task(BUSY, seed=5)
     plan = actions(ticks + 60)
     for action in plan[:ticks]:
         last = one.step(action)
@@ -65,7 +69,7 @@ def test_the_state_is_arrays_and_plain_values():
 
 
 def test_observations_are_newest_first_and_normalised():
-    options = TaskOptions(disturbance=NOTHING)
+    options = TaskConfig(disturbance=NOTHING)
     quiet = task(options, count=2)
     scaling = sample_scaling(ROBOT, options)
     offset, gain = scaling.offset, scaling.gain
@@ -83,7 +87,7 @@ def test_observations_are_newest_first_and_normalised():
 
 
 def test_episodes_end_on_time_and_the_last_observation_is_kept():
-    timed = task(TaskOptions(episode=0.1, disturbance=NOTHING), count=3)
+    timed = task(TaskConfig(episode=0.1, disturbance=NOTHING), count=3)
     for tick in range(1, 41):
         step = timed.step(np.full((3, 2), 0.1))
         assert step.truncated.all() == (tick % 20 == 0)
@@ -98,14 +102,14 @@ def test_episodes_end_on_time_and_the_last_observation_is_kept():
 
 
 def test_staggered_legs_do_not_end_together():
-    spread = task(TaskOptions(episode=0.5, stagger=True), count=50)
+    spread = task(TaskConfig(episode=0.5, random_episode_start=True), count=50)
     ends = [spread.step(np.zeros((50, 2))).truncated.sum() for _ in range(100)]
     assert sum(ends) == 50
     assert max(ends) < 10
 
 
 def test_without_autoreset_a_leg_goes_on():
-    going = task(TaskOptions(episode=0.05), count=1, autoreset=False)
+    going = task(TaskConfig(episode=0.05), count=1, autoreset=False)
     heights = []
     for _ in range(15):
         step = going.step(np.full((1, 2), 0.5))
@@ -116,7 +120,7 @@ def test_without_autoreset_a_leg_goes_on():
 
 
 def test_resetting_some_legs_leaves_the_others_alone():
-    some = task(TaskOptions(disturbance=NOTHING), count=4)
+    some = task(TaskConfig(disturbance=NOTHING), count=4)
     for action in actions(30, count=4):
         some.step(action)
     before = some.legs.batch.state.copy()
@@ -126,9 +130,11 @@ def test_resetting_some_legs_leaves_the_others_alone():
 
 
 def test_commands_come_from_the_paper_or_a_range_and_switch_on_time():
-    paper = task(TaskOptions(), count=200)
+    paper = task(TaskConfig(), count=200)
     assert set(paper.command) == {0.25, 0.30, 0.35}
-    options = TaskOptions(command_range=(0.22, 0.40), command_hold=(0.05, 0.05), episode=10)
+    options = TaskConfig(
+        command_range=(0.22, 0.40), command_resampling_time=(0.05, 0.05), episode=10
+    )
     ranged = task(options, count=200)
     assert len(set(ranged.command)) == 200
     changes = []
@@ -144,7 +150,7 @@ def test_commands_come_from_the_paper_or_a_range_and_switch_on_time():
 def test_low_commands_can_come_more_often():
     low_ones = []
     for skew in (1.0, 2.0):
-        options = TaskOptions(command_range=(0.2, 0.4), command_skew=skew)
+        options = TaskConfig(command_range=(0.2, 0.4), command_skew=skew)
         commands = task(options, count=2000).command
         assert commands.min() >= 0.2
         assert commands.max() <= 0.4
@@ -153,7 +159,7 @@ def test_low_commands_can_come_more_often():
 
 
 def test_drops_begin_above_the_ground_within_the_limits():
-    dropped = task(TaskOptions(start="drop"), count=300)
+    dropped = task(TaskConfig(reset_distribution="drop"), count=300)
     clearance = dropped.legs.foot_clearance()
     assert clearance.min() >= -1e-12
     assert clearance.max() <= 0.1
@@ -163,7 +169,7 @@ def test_drops_begin_above_the_ground_within_the_limits():
 
 
 def test_apexes_are_those_of_the_recorded_heights():
-    hopper = task(TaskOptions(action_torque=(10, 20), disturbance=NOTHING), count=1)
+    hopper = task(TaskConfig(action_torque=(10, 20), disturbance=NOTHING), count=1)
     postures = joint_angles(ROBOT, np.array([[0.15, 0.0], [0.26, 0.0]]))
     rows, apexes = [], []
     for tick in range(400):
@@ -183,13 +189,12 @@ def test_apexes_are_those_of_the_recorded_heights():
 
 def test_a_fall_ends_the_episode_only_if_asked():
     for clearance, falls in ((None, False), (0.05, True)):
-        limp = task(TaskOptions(fall_clearance=clearance, disturbance=NOTHING), count=1)
+        limp = task(TaskConfig(fall_clearance=clearance, disturbance=NOTHING), count=1)
         assert any(limp.step(np.zeros((1, 2))).terminated[0] for _ in range(100)) == falls
 
 
-@pytest.mark.parametrize("end", [{"fall_clearance": 0.05}, {"idle": 0.3}])
-def test_an_end_costs_its_penalty_once(end):
-    options = TaskOptions(disturbance=NOTHING, **end)
+def test_a_fall_costs_its_penalty_once():
+    options = TaskConfig(disturbance=NOTHING, fall_clearance=0.05)
     free, dear = task(options, count=1), task(replace(options, fall_penalty=7.0), count=1)
     for _ in range(100):
         a, b = free.step(np.zeros((1, 2))), dear.step(np.zeros((1, 2)))
@@ -199,24 +204,9 @@ def test_an_end_costs_its_penalty_once(end):
     pytest.fail("the limp leg's episode never ended")
 
 
-def test_what_has_no_apex_for_too_long_ends():
-    idle = task(TaskOptions(start="hop", idle=0.3, episode=1.0, disturbance=NOTHING), count=64)
-    waited, hopped, ended = np.zeros(64), 0, 0
-    for action in actions(300, count=64):
-        step = idle.step(action)
-        apex = ~np.isnan(step.apex_height)
-        waited = np.where(apex, 0, waited + 1)
-        np.testing.assert_array_equal(step.terminated, waited == 60)
-        assert not (step.terminated & step.truncated).any()
-        waited[step.terminated | step.truncated] = 0
-        hopped, ended = hopped + apex.sum(), ended + step.terminated.sum()
-    assert hopped > 10
-    assert ended > 10
-
-
 def test_a_restart_shows_nothing_of_the_last_episode():
     """A leg that begins anew sees as much of its past as one that never did anything."""
-    options = TaskOptions(observation="dated", episode=0.1, disturbance=NOTHING, commands=(0.3,))
+    options = TaskConfig(observation="dated", episode=0.1, disturbance=NOTHING, commands=(0.3,))
     first = task(options, count=2)
     fresh = first.reset()
     for action in actions(20, count=2):
@@ -228,10 +218,10 @@ def test_a_restart_shows_nothing_of_the_last_episode():
 
 def fall_apart(draws, **options):
     """Let legs change; return how high each is after a push each time, (draws, legs)."""
-    one = task(TaskOptions(randomised=SURPRISES, **options), count=6)
+    one = task(TaskConfig(randomised=SURPRISES, **options), count=6)
     heights = []
     for draw in draws:
-        one.diverge(draw)
+        one.randomize(draw)
         one.legs.stand(slice(None), [0.7, -1.4], 0.05)
         for _ in range(40):
             one.legs.step(np.full((6, 2), [1.0, -3.0]))
@@ -247,8 +237,8 @@ def test_a_draw_makes_the_same_legs_again_and_another_one_others():
 
 
 def test_some_legs_stay_the_robot_itself():
-    legs = fall_apart([1], unchanged=0.5, alike_at_first=True)[0]
-    (same,) = fall_apart([0], alike_at_first=True)
+    legs = fall_apart([1], nominal_fraction=0.5, randomize_from_start=False)[0]
+    (same,) = fall_apart([0], randomize_from_start=False)
     np.testing.assert_array_equal(legs == same, [False, True] * 3)
 
 
@@ -260,16 +250,14 @@ def test_some_legs_stay_the_robot_itself():
         {"command_range": (0.4, 0.2)},
         {"command_skew": 0.0},
         {"episode": 0.0},
-        {"start": "flying"},
+        {"reset_distribution": "flying"},
         {"action_torque": (6.0, -1.0)},
         {"start_length": 0.5},
         {"timestep": 3e-3},
-        {"chance": 1.5},
-        {"unchanged": -0.1},
-        {"idle": -1.0},
-        {"idle": float("inf")},
+        {"randomize_probability": 1.5},
+        {"nominal_fraction": -0.1},
     ],
 )
 def test_options_without_meaning_are_refused(wrong):
     with pytest.raises(UsageError):
-        task(TaskOptions(**wrong), count=1)
+        task(TaskConfig(**wrong), count=1)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from hopping_leg.controllers import Setup
+from hopping_leg.controllers import RolloutConfig
 from hopping_leg.evaluate import Candidate, evaluate
 from hopping_leg.robot import kinematics, load_robot
 
@@ -39,7 +39,7 @@ def robot():
 
 @pytest.fixture(scope="session")
 def setup(robot):
-    return Setup(robot, threads=1)
+    return RolloutConfig(robot, threads=1)
 
 
 @pytest.fixture

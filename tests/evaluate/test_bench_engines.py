@@ -3,8 +3,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from hopping_leg.controllers import Setup
-from hopping_leg.controllers.library import load_controller
+from hopping_leg.controllers import RolloutConfig
+from hopping_leg.controllers.registry import load_controller
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Candidate, evaluate
 from hopping_leg.evaluate.bench_engines import (
@@ -45,7 +45,7 @@ def test_without_hops_there_is_neither_error_nor_order():
 
 
 def test_the_stiff_floor_is_the_engines_own():
-    mujoco, bullet = Setup(ROBOT), Setup(ROBOT, engine="pybullet")
+    mujoco, bullet = RolloutConfig(ROBOT), RolloutConfig(ROBOT, engine="pybullet")
     assert on_floor(mujoco, "stiff").robot.contact.time_constant == 0.02
     assert on_floor(bullet, "stiff") == replace(bullet, ground="rigid")
     assert on_floor(bullet, "soft") == bullet
@@ -53,14 +53,14 @@ def test_the_stiff_floor_is_the_engines_own():
 
 def test_a_ground_that_the_engine_lacks_is_refused():
     with pytest.raises(UsageError, match="pybullet"):
-        Setup(ROBOT, ground="rigid")
+        RolloutConfig(ROBOT, ground="rigid")
 
 
 @pytest.mark.slow
 def test_controllers_hop_in_pybullet_without_retraining():
     """At a coarse step, for speed; the results file has the accuracy."""
     pytest.importorskip("pybullet", reason="needs the extra 'bullet'")
-    setup = Setup(ROBOT, engine="pybullet", ground="rigid", timestep=1e-3)
+    setup = RolloutConfig(ROBOT, engine="pybullet", ground="rigid", timestep=1e-3)
     judged = evaluate(
         [Candidate("fast", load_controller("fast", ROBOT))],
         setup,

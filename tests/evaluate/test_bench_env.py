@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from hopping_leg.envs import HoppingTask, PaperReward, TaskOptions
+from hopping_leg.envs import HoppingTask, PaperReward, TaskConfig
 from hopping_leg.evaluate.bench_env import EnvBenchmark, bench_env, record
 from hopping_leg.evaluate.timing import interleave
 from hopping_leg.robot import load_robot
@@ -18,7 +18,7 @@ def test_rounds_alternate_and_the_cold_one_is_left_out():
 
 
 def test_bare_physics_repeats_the_very_same_motion():
-    options = TaskOptions(action_torque=(10, 20), episode=3600)
+    options = TaskConfig(action_torque=(10, 20), episode=3600)
     rng = np.random.default_rng(0)
     task = HoppingTask(ROBOT, 3, options, PaperReward(ROBOT), rng, 1)
     motion = record(task, 100)

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hopping_leg.controllers import Setup
+from hopping_leg.controllers import RolloutConfig
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Candidate, evaluate
 from hopping_leg.evaluate.runner import _note_stopped
@@ -135,7 +135,7 @@ def test_nothing_to_do_is_said(setup, spring):
 
 def test_a_twin_under_the_papers_disturbance_is_noted(spring):
     def notes(robot, disturbance):
-        world = Setup(load_robot(robot), disturbance, threads=1)
+        world = RolloutConfig(load_robot(robot), disturbance, threads=1)
         candidates = [Candidate("spring", spring)]
         found = evaluate(candidates, world, commands=[0.3], repeats=1, kinds=("fixed",))
         return " ".join(found.evaluation.notes)

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hopping_leg.controllers import Setup
+from hopping_leg.controllers import RolloutConfig
 from hopping_leg.controllers.gain_files import load_gains
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import tune_energy_shaping
@@ -13,7 +13,7 @@ from hopping_leg.evaluate.tune_energy_shaping import Search, evaluate, search
 from hopping_leg.robot import load_robot
 
 GAINS = load_gains().gains
-SETUP = Setup(load_robot("legv2-paper"), threads=1)
+SETUP = RolloutConfig(load_robot("legv2-paper"), threads=1)
 
 
 def scores(shift=0.0, scale=1.0, **changed):

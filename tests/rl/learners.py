@@ -16,24 +16,24 @@ from hopping_leg.robot import load_robot
 
 ROBOT = load_robot("legv2-paper")
 TINY = PaperRecipe(
-    steps=1200, warmup=300, judge_every=10**9, hidden=(8, 8), legs=2, gradient_steps=4, batch=16
+    steps=1200, warmup=300, judge_every=10**9, hidden=(8, 8), num_envs=2, gradient_steps=4, batch=16
 )
-TINY_FAST = FastRecipe(steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8))
+TINY_FAST = FastRecipe(steps=768, num_envs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8))
 TINY_PRECISE = PreciseRecipe(
     judge_commands=(0.3,), teachers=3, exam_at=(1.0,),
-    steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8), student=(8, 8),
+    steps=768, num_envs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8), student=(8, 8),
     teaching=0.4, imitation=Imitation(memory=200, updates=4, batch=64),
 )  # fmt: skip
 
 
 TINY_RECURRENT = RecurrentRecipe(
-    steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8), memory=8,
+    steps=768, num_envs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8), memory=8,
     teaching=0.4, imitation=Imitation(memory=200, updates=4, batch=64),
 )  # fmt: skip
 
 
 TINY_ADAPTIVE = AdaptiveRecipe(
-    steps=768, legs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8), student=(8, 8),
+    steps=768, num_envs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8), student=(8, 8),
     feeling=(8, 8), teaching=0.4, imitation=Imitation(memory=200, updates=4, batch=64),
 )  # fmt: skip
 
@@ -43,7 +43,7 @@ class TinyPPO(PaperRecipe):
     name = "ppo"
     steps: int = 640
     privileged_critic: bool = False
-    legs: int = 2
+    num_envs: int = 2
 
     def make_model(self, env, seed):
         return ResumablePPO(

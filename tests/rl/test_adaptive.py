@@ -27,7 +27,9 @@ def test_the_policy_file_acts_as_the_student_and_aims_as_it_does():
     recipe = dataclasses.replace(
         TINY_ADAPTIVE,
         aiming=dataclasses.replace(TINY_ADAPTIVE.aiming, start=0.0, share=5.0),
-        task=dataclasses.replace(TINY_ADAPTIVE.task, start="standing", stagger=False),
+        task=dataclasses.replace(
+            TINY_ADAPTIVE.task, reset_distribution="standing", random_episode_start=False
+        ),
     )
     model = learner(recipe)
     model.policy.student.trust = 1.0
@@ -83,9 +85,9 @@ def test_an_identified_leg_may_differ_too():
     env = TINY_ADAPTIVE.make_env(leg, 0)
     env.reset()
     for draw in (1, 2):
-        env.task.diverge(draw)
+        env.task.randomize(draw)
         for _ in range(10):
-            env.step_async(np.full((TINY_ADAPTIVE.legs, 2), 0.3, np.float32))
+            env.step_async(np.full((TINY_ADAPTIVE.num_envs, 2), 0.3, np.float32))
             seen, reward, _, _ = env.step_wait()
         assert np.isfinite(seen).all()
         assert np.isfinite(reward).all()

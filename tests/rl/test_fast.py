@@ -12,7 +12,7 @@ from hopping_leg.robot import load_robot
 
 @pytest.fixture(scope="module")
 def learner():
-    recipe = dataclasses.replace(FastRecipe(), legs=8, batch=256)
+    recipe = dataclasses.replace(FastRecipe(), num_envs=8, batch=256)
     env = recipe.make_env(load_robot("legv2-paper"), seed=3)
     return recipe, env, recipe.make_model(env, seed=3)
 

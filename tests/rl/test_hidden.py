@@ -6,8 +6,8 @@ import numpy as np
 import onnxruntime
 import pytest
 
-from hopping_leg.controllers.library import load_policy
 from hopping_leg.controllers.policy import Policy
+from hopping_leg.controllers.registry import load_policy
 from hopping_leg.errors import PolicyError
 from hopping_leg.rl.export import Network, build_policy
 from hopping_leg.rl.hidden import expose_hidden

@@ -41,10 +41,10 @@ def test_lessons_go_on_from_their_state():
     assert sorted(first.state()["seen"][:, 0]) == [3, 4, 10, 11, 12, 13, 14, 15]
 
 
-def rollout(number, ticks=4, legs=3):
-    seen = np.full((ticks, legs, 2), number, np.float32)
-    seen[..., 1] = np.arange(legs)
-    nothing = np.zeros((ticks, legs), bool)
+def rollout(number, ticks=4, num_envs=3):
+    seen = np.full((ticks, num_envs, 2), number, np.float32)
+    seen[..., 1] = np.arange(num_envs)
+    nothing = np.zeros((ticks, num_envs), bool)
     return seen, nothing, ~nothing, torch.arange(3.0)[:, None] + 1
 
 

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from hopping_leg.controllers.library import load_policy, shipped_policies
+from hopping_leg.controllers.registry import load_policy, shipped_policies
 from hopping_leg.errors import PolicyError
 from hopping_leg.rl.export import build_policy
 from hopping_leg.rl.network_file import read_network

@@ -13,7 +13,7 @@ from hopping_leg.rl.taught import foresee
 from hopping_leg.sim.variants import SURPRISES
 from tests.rl.learners import ROBOT, TINY_PRECISE, learner
 
-RECIPE = PreciseRecipe(legs=8, batch=512)
+RECIPE = PreciseRecipe(num_envs=8, batch=512)
 
 
 @pytest.fixture(scope="module")

@@ -53,9 +53,6 @@ def test_a_run_from_before_a_number_existed_did_without_it():
     stored = dataclasses.asdict(get_recipe("precise"))
     del stored["task"]["command_skew"]
     assert changes_of("precise", stored) == ["task.command_skew=1.0"]
-    stored = dataclasses.asdict(get_recipe("paper"))
-    del stored["task"]["idle"]
-    assert changes_of("paper", stored) == []
 
 
 @pytest.mark.parametrize(
@@ -75,7 +72,7 @@ def test_changes_without_meaning_get_a_sentence(entry, named):
 
 
 def test_a_randomised_recipe_trains_legs_that_differ():
-    recipe = dataclasses.replace(get_recipe("fast"), legs=3)
+    recipe = dataclasses.replace(get_recipe("fast"), num_envs=3)
     robot = load_robot("legv2")
     plain, mixed = recipe.make_env(robot, 0), randomise(recipe, "twins").make_env(robot, 0)
     for env in (plain, mixed):

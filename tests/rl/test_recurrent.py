@@ -14,7 +14,9 @@ from tests.rl.learners import ROBOT, TINY_RECURRENT, learner
 def test_the_policy_file_acts_as_the_student():
     recipe = dataclasses.replace(
         TINY_RECURRENT,
-        task=dataclasses.replace(TINY_RECURRENT.task, start="standing", stagger=False),
+        task=dataclasses.replace(
+            TINY_RECURRENT.task, reset_distribution="standing", random_episode_start=False
+        ),
     )
     model = learner(recipe)
     task: HoppingTask = model.env.task

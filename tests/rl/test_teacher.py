@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from hopping_leg.controllers import Setup, roll_out
+from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.checkpoint import write_checkpoint
 from hopping_leg.rl.recipes import change, get_recipe
@@ -17,7 +17,7 @@ from tests.rl.learners import ROBOT, learner
 
 def stop_early(folder, name="precise"):
     """Leave a run as it is after its first checkpoint; return its model."""
-    recipe = change(get_recipe(name), ["legs=4"])
+    recipe = change(get_recipe(name), ["num_envs=4"])
     run = RunFolder(folder, recipe, ROBOT, 3, None)
     run.begin(resume=False)
     model = learner(recipe)
@@ -44,9 +44,9 @@ def test_it_acts_as_the_teacher_does_in_training(tmp_path):
 def test_a_rollout_shows_it_the_legs(tmp_path):
     stop_early(tmp_path)
     commands = np.full((20, 3), [0.25, 0.3, 0.35])
-    setup = Setup(ROBOT, threads=1)
+    setup = RolloutConfig(ROBOT, threads=1)
     teachers = [teacher_of_run(tmp_path, ROBOT) for _ in range(2)]
-    first, second = (roll_out(teacher, setup, commands, seed=1) for teacher in teachers)
+    first, second = (rollout(teacher, setup, commands, seed=1) for teacher in teachers)
     np.testing.assert_array_equal(first.data["height_m"], second.data["height_m"])
     assert np.ptp(first.data["hip_command_nm"][-1]) > 0
 

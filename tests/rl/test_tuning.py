@@ -155,7 +155,7 @@ def test_command_line_trains_and_leaves_everything(tmp_path, capsys, monkeypatch
     monkeypatch.setattr(judge, "_SECONDS", 0.5)
     out, study = tmp_path / "out", tmp_path / "deep" / "study.db"
     words = ["tune", "fast", "--trials", "2", "--steps", "256", "--snapshots", "2"]
-    words += ["--set", "legs=2", "--study", str(study), "--out", str(out)]
+    words += ["--set", "num_envs=2", "--study", str(study), "--out", str(out)]
     assert main(words) == 0
     data = json.loads((out / "trials.json").read_text())
     assert [trial["state"] for trial in data["trials"]] == ["complete", "complete"]
@@ -194,7 +194,7 @@ def test_two_processes_share_a_study(tmp_path):
         "--workers",
         "2",
     ]
-    words += ["--set", "legs=2", "--study", str(tmp_path / "study.db"), "--out", str(out)]
+    words += ["--set", "num_envs=2", "--study", str(tmp_path / "study.db"), "--out", str(out)]
     script.write_text(SHARED.format(words=words))
     result = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=900)
     assert result.returncode == 0, result.stderr
@@ -215,7 +215,7 @@ def test_a_ray_cluster_works_on_a_study(tmp_path, monkeypatch):
 
     monkeypatch.chdir(tmp_path)
     words = ["tune", "fast", "--trials", "3", "--steps", "128", "--snapshots", "1"]
-    words += ["--set", "legs=2", "--study", "study.db", "--out", "out", "--ray", "local"]
+    words += ["--set", "num_envs=2", "--study", "study.db", "--out", "out", "--ray", "local"]
     with local(runtime_env={"worker_process_setup_hook": judge_briefly}):
         assert main(words) == 0
     out = tmp_path / "out"

@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 import torch
 
-from hopping_leg.envs import HoppingTask, TaskOptions
+from hopping_leg.envs import HoppingTask, TaskConfig
 from hopping_leg.envs.observation import SIZE
-from hopping_leg.envs.true_state import PRIVILEGED
+from hopping_leg.envs.privileged_observation import PRIVILEGED
 from hopping_leg.rl.asymmetric import AsymmetricPolicy
 from hopping_leg.rl.resumable import ResumablePPO
 from hopping_leg.rl.vecenv import TaskVecEnv
 from tests.rl.learners import ROBOT, TINY
 
 
-def make(privileged=False, episode=0.05, legs=3):
-    options = TaskOptions(episode=episode)
+def make(privileged=False, episode=0.05, num_envs=3):
+    options = TaskConfig(episode=episode)
     rng = np.random.default_rng(0)
-    task = HoppingTask(ROBOT, legs, options, TINY.make_reward(ROBOT), rng, 1)
+    task = HoppingTask(ROBOT, num_envs, options, TINY.make_reward(ROBOT), rng, 1)
     return TaskVecEnv(task, privileged=privileged)
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hopping_leg.controllers.rollout import Setup
+from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.envs import HoppingEnv
 from hopping_leg.errors import RobotError
 from hopping_leg.robot import build_model, load_robot, shipped_robots
@@ -83,7 +83,7 @@ def test_a_pendulum_swings_freely_but_cannot_hop():
     pendulum = load_robot("doublependulum")
     assert pendulum.knee.lower < 0 < pendulum.knee.upper
     with pytest.raises(RobotError, match="is a pendulum and cannot hop"):
-        Setup(pendulum)
+        RolloutConfig(pendulum)
     with pytest.raises(RobotError, match="is a pendulum and cannot hop"):
         HoppingEnv("doublependulum")
 

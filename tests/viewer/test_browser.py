@@ -11,8 +11,8 @@ pytest.importorskip("playwright", reason="playwright is not installed")
 
 from PIL import Image
 
-from hopping_leg.controllers.library import load_controller
-from hopping_leg.controllers.rollout import Setup, roll_out
+from hopping_leg.controllers.registry import load_controller
+from hopping_leg.controllers.rollout import RolloutConfig, rollout
 from hopping_leg.deploy.black_box import SUFFIX, BlackBox
 from hopping_leg.robot import load_robot
 from hopping_leg.viewer.browser import (
@@ -169,7 +169,7 @@ def test_the_picture_shows_something_and_moves(page):
 def test_a_trace_is_replayed(page, tmp_path):
     robot = load_robot(ROBOT)
     controller = load_controller("energy-shaping", robot)
-    run = roll_out(controller, Setup(robot, threads=1), np.full((600, 1), 0.3), seed=0)
+    run = rollout(controller, RolloutConfig(robot, threads=1), np.full((600, 1), 0.3), seed=0)
     path = tmp_path / "run.parquet"
     run.trace(0).save(path)
     replay = Replay((path,))

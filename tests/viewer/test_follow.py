@@ -3,7 +3,7 @@ import os
 import numpy as np
 import pytest
 
-from hopping_leg.controllers.library import load_controller
+from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.black_box import SUFFIX, BlackBox
 from hopping_leg.deploy.box_tail import BoxTail
 from hopping_leg.deploy.rows import columns

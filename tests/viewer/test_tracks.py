@@ -2,8 +2,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from hopping_leg.controllers.library import load_controller
-from hopping_leg.controllers.rollout import Setup, roll_out
+from hopping_leg.controllers.registry import load_controller
+from hopping_leg.controllers.rollout import RolloutConfig, rollout
 from hopping_leg.errors import TraceError
 from hopping_leg.robot import kinematics, load_robot
 from hopping_leg.trace import Trace
@@ -35,7 +35,7 @@ def hardware_trace(**columns):
 @pytest.fixture(scope="module")
 def simulated():
     controller = load_controller("energy-shaping", ROBOT)
-    run = roll_out(controller, Setup(ROBOT, threads=1), np.full((300, 1), 0.3), seed=0)
+    run = rollout(controller, RolloutConfig(ROBOT, threads=1), np.full((300, 1), 0.3), seed=0)
     return run.trace(0)
 
 

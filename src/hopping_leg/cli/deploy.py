@@ -28,9 +28,9 @@ from rich.console import Console
 
 from hopping_leg.cli.motors import ask, check, connect
 from hopping_leg.controllers.joint_pd import JointPD
-from hopping_leg.controllers.library import load_controller
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.protocol import Controller
+from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.envelope import hopping_envelope
 from hopping_leg.deploy.height_page import HeightPage
 from hopping_leg.deploy.keyboard import LiveHeight, keys

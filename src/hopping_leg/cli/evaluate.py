@@ -27,7 +27,7 @@ from hopping_leg.cli.command_line import command_line
 from hopping_leg.cli.options import Heights
 from hopping_leg.cli.robustness import judge_robustness
 from hopping_leg.cli.skills import judge_skills, print_skills
-from hopping_leg.controllers import Setup
+from hopping_leg.controllers import RolloutConfig
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Candidate, Judged, evaluate
 from hopping_leg.evaluate.candidates import load_candidates
@@ -102,7 +102,7 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
     _check(args)
     robot = load_robot(args.robot)
     disturbance = Disturbance() if args.noise else NOTHING
-    setup = Setup(
+    setup = RolloutConfig(
         robot,
         disturbance,
         rate=args.rate,
@@ -166,7 +166,7 @@ def _with_folder(args: Evaluate) -> Evaluate:
     )
 
 
-def judge(candidates: list[Candidate], setup: Setup, args: Evaluate) -> Judged:
+def judge(candidates: list[Candidate], setup: RolloutConfig, args: Evaluate) -> Judged:
     """Run all trials under a progress bar."""
     floors = ("soft", "stiff") if args.floor == "both" else (args.floor,)
     with progress_bar() as bar:
@@ -178,7 +178,7 @@ def judge(candidates: list[Candidate], setup: Setup, args: Evaluate) -> Judged:
 
 
 def _on_floor(
-    candidates: list[Candidate], setup: Setup, args: Evaluate, floor: str, bar: Progress
+    candidates: list[Candidate], setup: RolloutConfig, args: Evaluate, floor: str, bar: Progress
 ) -> Judged:
     whole = floor == "soft" or args.floor != "both"
     return evaluate(

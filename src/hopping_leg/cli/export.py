@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from hopping_leg.controllers.library import load_policy
+from hopping_leg.controllers.registry import load_policy
 from hopping_leg.json_files import write_json
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.urdf import to_urdf

@@ -23,7 +23,7 @@ from rich.console import Console
 
 from hopping_leg.cli.motors import ask, check, connect
 from hopping_leg.cli.options import Heights
-from hopping_leg.controllers.library import load_policy
+from hopping_leg.controllers.registry import load_policy
 from hopping_leg.deploy.envelope import hopping_envelope
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.json_files import write_json
@@ -31,7 +31,7 @@ from hopping_leg.robot import load_robot
 from hopping_leg.robot.parameters import Robot
 
 if TYPE_CHECKING:
-    from hopping_leg.controllers.outing import Outings
+    from hopping_leg.controllers.hardware_trial import TrialRobot
     from hopping_leg.controllers.policy import Policy
     from hopping_leg.rl.finetune.simulated import Guard
 
@@ -154,7 +154,7 @@ def _refuse(args: Finetune, policy: "Policy", robot: Robot) -> None:
             )
 
 
-def _outings(args: Finetune, robot: Robot, policy: "Policy") -> "Outings":
+def _outings(args: Finetune, robot: Robot, policy: "Policy") -> "TrialRobot":
     if args.on is not None:
         from hopping_leg.rl.finetune.simulated import Simulated
 
@@ -163,9 +163,9 @@ def _outings(args: Finetune, robot: Robot, policy: "Policy") -> "Outings":
     return _deployed(args, robot, policy.card.rate, args.transport)
 
 
-def _deployed(args: Finetune, robot: Robot, rate: float, transport: str) -> "Outings":
+def _deployed(args: Finetune, robot: Robot, rate: float, transport: str) -> "TrialRobot":
     envelope = hopping_envelope(robot, rate)
-    deployed: Any = importlib.import_module("hopping_leg.deploy.outings")
+    deployed: Any = importlib.import_module("hopping_leg.deploy.hardware_trials")
 
     def ready(seconds: float) -> None:
         ask(
@@ -173,7 +173,7 @@ def _deployed(args: Finetune, robot: Robot, rate: float, transport: str) -> "Out
             yes=args.yes,
         )
 
-    outings: Outings = deployed.Deployed(
+    outings: TrialRobot = deployed.Deployed(
         robot,
         rate,
         args.out / "traces",

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hopping_leg.cli import evaluate, experiment
-from hopping_leg.controllers.library import ENERGY_SHAPING, shipped_policies
+from hopping_leg.controllers.registry import ENERGY_SHAPING, shipped_policies
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.transfer.methods import DEFAULT, choose_methods
 from hopping_leg.evaluate.transfer.study import SHORTEST, USUAL_FIT, Study, find_twins

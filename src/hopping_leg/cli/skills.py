@@ -14,14 +14,14 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from hopping_leg.cli.evaluate import Evaluate
-    from hopping_leg.controllers import Setup
+    from hopping_leg.controllers import RolloutConfig
     from hopping_leg.evaluate import Candidate
 
 
 def judge_skills(
     args: "Evaluate",
     candidates: "list[Candidate]",
-    setup: "Setup",
+    setup: "RolloutConfig",
     on_progress: "Callable[[str, float], None]",
     command: str,
 ) -> dict[str, Any]:

@@ -94,7 +94,7 @@ class _Recipe:
     seed: int = 0
     """Of the trainings, and of the search."""
     set: tuple[str, ...] = ()
-    """Numbers of the recipe that every trial takes, e.g. `--set legs=256`."""
+    """Numbers of the recipe that every trial takes, e.g. `--set num_envs=256`."""
     out: Path | None = None
     """Folder of the trainings, trials.json and the figures; default: runs/tune/RECIPE."""
     json: Path | None = None

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.controllers.dated_track import DatedTrack
+from hopping_leg.controllers.sample_history import SampleHistory
 from hopping_leg.sim.disturbance import Measurement
 
 WINDOW = 11
@@ -39,7 +39,7 @@ class DatedObserver:
 
     def __init__(self, period: float, gain: float | Array) -> None:
         self.period, self.gain = period, np.asarray(gain, dtype=np.float64)[..., None]
-        self._track = DatedTrack(WINDOW, period)
+        self._track = SampleHistory(WINDOW, period)
 
     def reset(self, count: int) -> None:
         """Forget everything."""

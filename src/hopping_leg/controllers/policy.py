@@ -15,7 +15,7 @@ import numpy as np
 import onnxruntime
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.layouts import Layout, make_layout
+from hopping_leg.controllers.observation_history import Layout, make_layout
 from hopping_leg.errors import PolicyError, UsageError
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.disturbance import Measurement
@@ -44,7 +44,7 @@ class Card:
     recipe: str
     """Training recipe."""
     layout: str
-    """Observation layout, one of ``control.layouts.LAYOUTS``."""
+    """Observation layout, one of ``controllers.observation_history.LAYOUTS``."""
     command_low: float
     """Lowest command of the training, m."""
     command_high: float

@@ -11,7 +11,7 @@ _ROOM = 4
 T = TypeVar("T", bound=np.generic)
 
 
-class Recent(Generic[T]):
+class RingBuffer(Generic[T]):
     """A window of frames that moves through a larger buffer, so that a tick moves no frame.
 
     Args:

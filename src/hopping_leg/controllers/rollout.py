@@ -53,7 +53,7 @@ _STACKED = {
 
 
 @dataclass(frozen=True)
-class Setup:
+class RolloutConfig:
     """Where a controller is tried: robot, disturbances, rates and start."""
 
     robot: Robot
@@ -101,7 +101,7 @@ class Setup:
 
 
 @runtime_checkable
-class Watcher(Protocol):
+class PrivilegedController(Protocol):
     """A controller that looks at the simulated legs themselves: for studies, never for a robot."""
 
     def watch(self, legs: AnyLegs) -> None:
@@ -129,9 +129,9 @@ class Rollout:
         return Trace(pl.DataFrame(columns), {**self.header, **header})
 
 
-def roll_out(
+def rollout(
     controller: Controller,
-    setup: Setup,
+    setup: RolloutConfig,
     commands: Array,
     seed: int,
     on_tick: Callable[[int, int], None] | None = None,
@@ -141,7 +141,7 @@ def roll_out(
     """Let a controller hop from a standing start.
 
     Args:
-        controller: Controls all legs at once; a ``Watcher`` is shown them.
+        controller: Controls all legs at once; a ``PrivilegedController`` is shown them.
         setup: The world it meets.
         commands: Desired height for every tick and leg, m, (ticks, n).
         seed: Of noise and delay.
@@ -164,7 +164,7 @@ def roll_out(
     legs.stand(slice(None), setup.start_posture)
     plant.channel.restart(slice(None), legs.q, legs.qd, commands[0])
     controller.reset(count)
-    if isinstance(controller, Watcher):
+    if isinstance(controller, PrivilegedController):
         controller.watch(legs)
     if on_legs is not None:
         on_legs(legs)
@@ -198,7 +198,7 @@ def roll_out(
     return Rollout(np.arange(ticks) / setup.rate, columns | internals, header)
 
 
-def _make_legs(setup: Setup, count: int) -> AnyLegs:
+def _make_legs(setup: RolloutConfig, count: int) -> AnyLegs:
     return make_legs(
         setup.robot,
         count,
@@ -210,7 +210,7 @@ def _make_legs(setup: Setup, count: int) -> AnyLegs:
     )
 
 
-def _perturb(setup: Setup, perturbation: Perturbation) -> Perturber:
+def _perturb(setup: RolloutConfig, perturbation: Perturbation) -> Perturber:
     """Return what befalls newly made legs, which only MuJoCo's legs can suffer."""
     if setup.engine != "mujoco":
         raise UsageError(f"Perturbations need the engine mujoco, not {setup.engine}.")
@@ -226,7 +226,7 @@ def _perturb(setup: Setup, perturbation: Perturbation) -> Perturber:
     return Perturber(perturbation, legs)
 
 
-def _check_stable(data: Array, setup: Setup) -> None:
+def _check_stable(data: Array, setup: RolloutConfig) -> None:
     """MuJoCo resets an unstable simulation and goes on, so that only its speed tells."""
     speed = np.abs(data[4:6]).max()
     if not speed < _IMPOSSIBLE:

@@ -12,7 +12,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.controllers.joint_pd import JointGains
 from hopping_leg.controllers.protocol import Controller, Measurement
-from hopping_leg.controllers.rollout import Setup
+from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.deploy.observation import Pair
 from hopping_leg.deploy.schedule import Commands
 from hopping_leg.robot import kinematics
@@ -74,7 +74,7 @@ def hopping_poses(robot: Robot) -> Poses:
     folded = kinematics.foot_position(robot, np.array([robot.hip.upper, robot.knee.lower]))
     length = 1.05 * float(np.hypot(*folded))
     rest = kinematics.joint_angles(robot, np.array([length, 0.0]))
-    return Poses(Setup(robot).start_posture, rest)
+    return Poses(RolloutConfig(robot).start_posture, rest)
 
 
 @dataclass(frozen=True)

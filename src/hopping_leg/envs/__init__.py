@@ -1,7 +1,7 @@
 """The learning problem: observation, reward, reset, as a Gymnasium env and vector env."""
 
 from hopping_leg.envs.apex_reward import ApexReward, ApexRewardOptions
-from hopping_leg.envs.options import TaskOptions
+from hopping_leg.envs.options import TaskConfig
 from hopping_leg.envs.registration import ENV_ID, register_envs
 from hopping_leg.envs.reward import PaperReward, PaperRewardOptions
 from hopping_leg.envs.single import HoppingEnv
@@ -21,7 +21,7 @@ __all__ = [
     "PaperRewardOptions",
     "Reward",
     "Step",
-    "TaskOptions",
+    "TaskConfig",
     "Transition",
     "register_envs",
 ]

@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hopping_leg.arrays import Array, IntArray
-from hopping_leg.controllers.layouts import Layout, ThreeSamples, make_layout
-from hopping_leg.envs.options import TaskOptions
+from hopping_leg.controllers.observation_history import Layout, ThreeSamples, make_layout
+from hopping_leg.envs.options import TaskConfig
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import SAMPLES, Channel
 
@@ -149,7 +149,7 @@ class LayoutObservation:
         self._layout.restore(state)
 
 
-def sample_scaling(robot: Robot, options: TaskOptions) -> Scaling:
+def sample_scaling(robot: Robot, options: TaskConfig) -> Scaling:
     """Return the normalisation of (q1, q2, qd1, qd2, command), rad, rad/s, m, (5,)."""
     lower, upper = robot.of_joints("lower"), robot.of_joints("upper")
     low, high = options.command_bounds
@@ -160,7 +160,7 @@ def sample_scaling(robot: Robot, options: TaskOptions) -> Scaling:
     return Scaling(offset, 1 / span)
 
 
-def make_observation(robot: Robot, options: TaskOptions, count: int) -> Observation:
+def make_observation(robot: Robot, options: TaskConfig, count: int) -> Observation:
     """Return the observation that a task asks for."""
     sample = sample_scaling(robot, options)
     if options.observation == ThreeSamples.name:

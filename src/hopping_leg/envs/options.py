@@ -10,13 +10,13 @@ from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.sim import CONTROL_RATE, Disturbance
 from hopping_leg.sim.twins import Range
 
-Start = Literal["standing", "drop", "mixed", "hop"]
+ResetDistribution = Literal["standing", "drop", "mixed", "hop"]
 
 See = Literal["three-samples", "dated", "dated-long"]
 
 
 @dataclass(frozen=True)
-class TaskOptions:
+class TaskConfig:
     """The learning problem around the leg."""
 
     observation: See = "three-samples"
@@ -31,9 +31,9 @@ class TaskOptions:
     command_skew: float = 1.0
     """Draw them as the range's lower end plus a share of its width, the share being a uniform
     number to this power: above 1 low heights come more often."""
-    command_hold: tuple[float, float] | None = None
+    command_resampling_time: tuple[float, float] | None = None
     """Shortest and longest time between new commands, s; none keeps one command per episode."""
-    start: Start = "standing"
+    reset_distribution: ResetDistribution = "standing"
     """Episodes begin standing, with a drop in a random posture, either with equal chance, or mostly
     near the apex of the commanded hop and else standing in a random posture."""
     start_length: float = 0.2
@@ -46,14 +46,12 @@ class TaskOptions:
     """Largest gap between foot and ground at a drop, m."""
     episode: float = 5.0
     """Length of an episode, s."""
-    stagger: bool = False
+    random_episode_start: bool = False
     """Cut the first episode of each leg at a random length, so that a batch does not end as one."""
     fall_clearance: float | None = None
     """Gap between ground and base or knee below which an episode terminates, m; none never does."""
-    idle: float = 0.0
-    """Time without an in-flight apex after which an episode terminates, s; 0 never does it."""
     fall_penalty: float = 0.0
-    """Reward lost by either end: without it a leg with little to win learns to fall, or to idle."""
+    """Reward lost by that end: without it a leg with little to win learns to fall."""
     velocity_scale: float = 10.0
     """Joint velocity that the observation shows as 1, rad/s."""
     rate: float = CONTROL_RATE
@@ -64,11 +62,11 @@ class TaskOptions:
     """Noise and delay; the paper trains with them."""
     randomised: tuple[Range, ...] = ()
     """Where each leg draws its own numbers instead of the robot's; none by default."""
-    chance: float = 1.0
+    randomize_probability: float = 1.0
     """That a leg draws one of those numbers rather than has the robot's."""
-    alike_at_first: bool = False
-    """Let every leg be the robot itself until ``HoppingTask.diverge``."""
-    unchanged: float = 0.0
+    randomize_from_start: bool = True
+    """Let every leg be the robot itself until ``HoppingTask.randomize``."""
+    nominal_fraction: float = 0.0
     """Share of the legs that are the robot itself also where the others differ."""
     soft_limits: SoftLimits | None = field(default_factory=SoftLimits)
     """PD at the joint limits, added to the action's torque."""
@@ -82,12 +80,12 @@ class TaskOptions:
         return self.command_range or (min(self.commands), max(self.commands))
 
 
-def _check(options: TaskOptions) -> None:
+def _check(options: TaskConfig) -> None:
     if not options.commands or not all(math.isfinite(c) and c > 0 for c in options.commands):
         raise UsageError(
             f"Commands must be positive heights in m, not {options.commands}; e.g. 0.25 0.30 0.35."
         )
-    for name in ("command_range", "command_hold", "drop_length"):
+    for name in ("command_range", "command_resampling_time", "drop_length"):
         pair = getattr(options, name)
         if pair is not None and not 0 < pair[0] <= pair[1] < math.inf:
             raise UsageError(
@@ -98,15 +96,16 @@ def _check(options: TaskOptions) -> None:
         value = getattr(options, name)
         if not 0 < value < math.inf:
             raise UsageError(f"'{name}' is {value} but must be positive and finite.")
-    if not 0 <= options.idle < math.inf:
-        raise UsageError(f"'idle' is {options.idle} but must be a time in s, or 0 for never.")
-    for name in ("chance", "unchanged"):
+    for name in ("randomize_probability", "nominal_fraction"):
         if not 0 <= getattr(options, name) <= 1:
             raise UsageError(f"'{name}' is {getattr(options, name)} but must lie between 0 and 1.")
     if not all(0 < t < math.inf for t in options.action_torque):
         raise UsageError(
             f"'action_torque' is {options.action_torque} but both torques must be positive, N m."
         )
-    for name, valid in (("observation", get_args(See)), ("start", get_args(Start))):
+    for name, valid in (
+        ("observation", get_args(See)),
+        ("reset_distribution", get_args(ResetDistribution)),
+    ):
         if getattr(options, name) not in valid:
             raise UsageError(f"'{name}' is '{getattr(options, name)}'; valid: {', '.join(valid)}.")

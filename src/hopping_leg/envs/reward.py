@@ -12,7 +12,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.envs.transition import Transition
 from hopping_leg.robot.parameters import Robot
 
-Barrier = Literal["step", "printed", "flipped"]
+Barrier = Literal["step", "printed"]
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class PaperRewardOptions:
     velocity: float = 0.005
     """w5, of the joint velocity penalty Pjv."""
     barrier: Barrier = "step"
-    """Ph above the desired height: e^(x - xd), or as printed 1 - e^(x - xd), or that flipped."""
+    """Ph above the desired height: e^(x - xd), or as printed 1 - e^(x - xd)."""
     rest_length: float = 0.2
     """Leg length of the initial standing position, m; x_o is the base height standing on it."""
     velocity_limit: float | None = None
@@ -109,6 +109,4 @@ class PaperReward:
     def _barrier(self, excess: Array) -> Array:
         """Return Ph of a base that is ``excess`` >= 0 above the desired height, m, (n,)."""
         growth = np.exp(excess)
-        if self.options.barrier == "printed":
-            return 1 - growth
-        return growth - 1 if self.options.barrier == "flipped" else growth
+        return 1 - growth if self.options.barrier == "printed" else growth

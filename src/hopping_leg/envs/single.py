@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hopping_leg.envs.observation import Array32
-from hopping_leg.envs.options import TaskOptions
+from hopping_leg.envs.options import TaskConfig
 from hopping_leg.envs.render import Camera, Image
 from hopping_leg.envs.reward import PaperReward
 from hopping_leg.envs.step import Step
@@ -25,7 +25,7 @@ def observations(task: HoppingTask) -> "gymnasium.spaces.Box[np.float32]":
 
 
 ACTIONS = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
-"""Hip and knee torque over ``TaskOptions.action_torque``."""
+"""Hip and knee torque over ``TaskConfig.action_torque``."""
 
 
 class HoppingEnv(gymnasium.Env[Array32, npt.NDArray[np.float32]]):
@@ -47,7 +47,7 @@ class HoppingEnv(gymnasium.Env[Array32, npt.NDArray[np.float32]]):
     def __init__(
         self,
         robot: Robot | str = "legv2-paper",
-        options: TaskOptions = TaskOptions(),  # noqa: B008
+        options: TaskConfig = TaskConfig(),  # noqa: B008
         reward: Reward | None = None,
         render_mode: str | None = None,
     ) -> None:

@@ -7,11 +7,11 @@ import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray, IntArray
 from hopping_leg.envs.observation import Array32, make_observation, sample_scaling
-from hopping_leg.envs.options import TaskOptions
-from hopping_leg.envs.start import Starts
+from hopping_leg.envs.options import TaskConfig
+from hopping_leg.envs.privileged_observation import PRIVILEGED, privileged_observation
+from hopping_leg.envs.reset import ResetSampler
 from hopping_leg.envs.step import Step
 from hopping_leg.envs.transition import Reward, Transition
-from hopping_leg.envs.true_state import PRIVILEGED, true_state
 from hopping_leg.hops import CLEAR
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import Legs, Measurement, Plant
@@ -36,7 +36,7 @@ class HoppingTask:
         self,
         robot: Robot,
         count: int,
-        options: TaskOptions,
+        options: TaskConfig,
         reward: Reward,
         rng: np.random.Generator,
         threads: int = 0,
@@ -55,15 +55,14 @@ class HoppingTask:
             timestep=options.timestep,
             threads=threads,
         )
-        if not options.alike_at_first:
-            self.diverge()
+        if options.randomize_from_start:
+            self.randomize()
         self.plant = Plant(self.legs, options.disturbance, options.soft_limits, noise)
         self.observation = make_observation(robot, options, count)
         self._scaling = sample_scaling(robot, options)
-        self._starts = Starts(robot, options)
+        self._reset_sampler = ResetSampler(robot, options)
         self._torque = np.tile(options.action_torque, (count, 1))
         self._lowest, self._highest = np.full((count, 2), -1.0), np.full((count, 2), 1.0)
-        self._patience = max(1, round(options.idle * options.rate)) if options.idle > 0 else 0
         self._horizon = max(1, round(options.episode * options.rate))
         self._never = np.zeros(count, np.bool_)
         self._nan = np.full(count, np.nan)
@@ -73,12 +72,11 @@ class HoppingTask:
         self._tick = 0
         self._end = np.empty(count, np.int64)
         self._switch = np.full(count, np.iinfo(np.int64).max)
-        self._hopped = np.zeros(count, np.int64)
         self._last = np.zeros((count, 2))
         self._rises = np.zeros(count, np.bool_)
         self.reset()
 
-    def diverge(self, draw: int = 1) -> None:
+    def randomize(self, draw: int = 1) -> None:
         """Let every leg go on with numbers of its own, if the task's options let legs differ.
 
         Args:
@@ -88,8 +86,8 @@ class HoppingTask:
         if not ranges or draw == self._draw:
             return
         rng = np.random.default_rng([self._draw_seed, draw])
-        drawn = vary(self.robot, ranges, self.count, rng, self.options.chance)
-        same = np.diff(np.floor(self.options.unchanged * np.arange(self.count + 1))) > 0
+        drawn = vary(self.robot, ranges, self.count, rng, self.options.randomize_probability)
+        same = np.diff(np.floor(self.options.nominal_fraction * np.arange(self.count + 1))) > 0
         variants = [self.robot if s else d for s, d in zip(same, drawn, strict=True)]
         self.legs.become(variants)
         self._numbers, self._draw = places(self.robot, variants, ranges), draw
@@ -116,7 +114,7 @@ class HoppingTask:
         """
         rows = np.arange(self.count) if ids is None else np.asarray(ids)
         self._begin(rows)
-        if ids is None and self.options.stagger:
+        if ids is None and self.options.random_episode_start:
             self._end[:] = self._tick + self._rng.integers(1, self._horizon + 1, self.count)
             self._plan()
         return self._see_anew(rows)
@@ -151,7 +149,6 @@ class HoppingTask:
         if not np.count_nonzero(peaked):
             return self._never, self._nan, self._nan
         apex = peaked & (legs.foot_clearance() >= CLEAR)
-        self._hopped[apex] = self._tick + 1
         height = np.where(apex, np.maximum(height_before, legs.height), np.nan)
         return apex, height, height - self.command
 
@@ -162,7 +159,7 @@ class HoppingTask:
         while they are alike.
         """
         result = np.empty((self.count, self.privileged_size), np.float32)
-        true_state(self.legs, self.command, self._scaling, out=result[:, :PRIVILEGED])
+        privileged_observation(self.legs, self.command, self._scaling, out=result[:, :PRIVILEGED])
         if self._numbers.size:
             result[:, PRIVILEGED:] = self._numbers
         return result
@@ -179,7 +176,6 @@ class HoppingTask:
             "switch": self._switch.copy(),
             "last_action": self._last.copy(),
             "rises": self._rises.copy(),
-            "hopped": self._hopped.copy(),
             "rng": self._rng.bit_generator.state,
             "reward": self.reward.state(),
             "observation": self.observation.state(),
@@ -196,8 +192,6 @@ class HoppingTask:
         self._end[:] = state["end"]
         self._switch[:] = state["switch"]
         self._last, self._rises = np.array(state["last_action"]), np.array(state["rises"])
-        if "hopped" in state:
-            self._hopped = np.array(state["hopped"])
         self._rng.bit_generator.state = state["rng"]
         self.reward.restore(state["reward"])
         self.observation.restore(state["observation"])
@@ -232,9 +226,6 @@ class HoppingTask:
             truncated = ended = self._end <= self._tick
         if self.options.fall_clearance is not None:
             terminated = self._fallen(self.options.fall_clearance)
-        if self._patience > 0:
-            terminated = terminated | (self._tick - self._hopped >= self._patience)
-        if terminated is not self._never:
             reward = reward - self.options.fall_penalty * terminated
             truncated = truncated & ~terminated
             ended = truncated | terminated
@@ -259,12 +250,11 @@ class HoppingTask:
     def _begin(self, rows: IntArray) -> None:
         count = len(rows)
         self.command[rows] = self._draw_commands(count)
-        height, q = self._starts.draw(self.command[rows], self._rng)
+        height, q = self._reset_sampler.draw(self.command[rows], self._rng)
         self.legs.place(rows, height, q)
         self._end[rows] = self._tick + self._horizon
-        self._hopped[rows] = self._tick
         self._last[rows], self._rises[rows] = 0.0, False
-        if self.options.command_hold is not None:
+        if self.options.command_resampling_time is not None:
             self._switch[rows] = self._tick + self._draw_holds(count)
         self.plant.channel.restart(rows, self.legs.q[rows], self.legs.qd[rows], self.command[rows])
         self._plan()
@@ -287,6 +277,6 @@ class HoppingTask:
 
     def _draw_holds(self, count: int) -> IntArray:
         """Return after how many ticks commands change, (count,)."""
-        shortest, longest = self.options.command_hold or (math.inf, math.inf)
+        shortest, longest = self.options.command_resampling_time or (math.inf, math.inf)
         ticks = [max(1, round(time * self.options.rate)) for time in (shortest, longest)]
         return self._rng.integers(ticks[0], ticks[1] + 1, count)

@@ -10,7 +10,7 @@ from gymnasium.vector.utils import batch_space
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.envs.observation import Array32
-from hopping_leg.envs.options import TaskOptions
+from hopping_leg.envs.options import TaskConfig
 from hopping_leg.envs.render import Camera, Image
 from hopping_leg.envs.reward import PaperReward
 from hopping_leg.envs.single import ACTIONS, observations
@@ -46,7 +46,7 @@ class HoppingVectorEnv(gymnasium.vector.VectorEnv[Array32, npt.NDArray[np.float3
         self,
         num_envs: int = 1,
         robot: Robot | str = "legv2-paper",
-        options: TaskOptions = TaskOptions(),  # noqa: B008
+        options: TaskConfig = TaskConfig(),  # noqa: B008
         reward: Reward | None = None,
         threads: int = 0,
         render_mode: str | None = None,

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers import Setup, roll_out
-from hopping_leg.controllers.library import load_controller
+from hopping_leg.controllers import RolloutConfig, rollout
+from hopping_leg.controllers.registry import load_controller
 from hopping_leg.hops import find_hops
 from hopping_leg.robot import Robot
 from hopping_leg.robot.kinematics import joint_angles
@@ -132,10 +132,10 @@ def _hop(
     seeds: int,
 ) -> list[Leg]:
     """Let a controller hop; legs are ordered by command, then seed."""
-    setup = Setup(robot, disturbance, timestep=step, threads=study.threads)
+    setup = RolloutConfig(robot, disturbance, timestep=step, threads=study.threads)
     commands = np.repeat(study.commands, seeds)
     ticks = round(study.duration * setup.rate)
-    run = roll_out(load_controller(name, robot), setup, np.tile(commands, (ticks, 1)), seed=0)
+    run = rollout(load_controller(name, robot), setup, np.tile(commands, (ticks, 1)), seed=0)
     height, rate = run.data["height_m"], run.data["height_rate_m_s"]
     clearance = run.data["foot_clearance_m"]
     legs = []

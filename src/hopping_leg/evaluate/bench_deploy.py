@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers import Setup, roll_out
-from hopping_leg.controllers.library import load_controller
+from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.policy import Policy
+from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.driver import MoteusLink
 from hopping_leg.deploy.envelope import hopping_envelope
 from hopping_leg.deploy.schedule import Schedule
@@ -163,7 +163,7 @@ def _heights(
 def _in_process(study: Study, robot: Robot, height: float) -> float | None:
     controller = load_controller(study.controller, robot)
     commands = np.full((round(study.seconds * CONTROL_RATE), 1), height)
-    trace = roll_out(controller, Setup(robot, NOTHING), commands, seed=0).trace(0)
+    trace = rollout(controller, RolloutConfig(robot, NOTHING), commands, seed=0).trace(0)
     hops = find_hops(
         trace.column("height_m"),
         trace.column("height_rate_m_s"),

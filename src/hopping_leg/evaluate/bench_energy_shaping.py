@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from hopping_leg.controllers import Setup, roll_out
+from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.baselines import paper_energy_shaping, tuned_energy_shaping
 from hopping_leg.controllers.energy_shaping import EnergyShaping
 from hopping_leg.evaluate.estimator import APEX, apex_errors
@@ -169,10 +169,10 @@ def _hop(case: Case, seed: int, runs: int, seconds: float, threads: int) -> list
     """Return one trace per command and run, commands in the outer order."""
     controller = case.controller
     rate = 1 / controller.period
-    setup = Setup(case.robot, case.disturbance, rate=rate, threads=threads)
+    setup = RolloutConfig(case.robot, case.disturbance, rate=rate, threads=threads)
     commands = np.tile(np.repeat(case.commands, runs), (round(seconds * rate), 1))
-    rollout = roll_out(controller, setup, commands, seed)
-    return [rollout.trace(leg) for leg in range(commands.shape[1])]
+    run = rollout(controller, setup, commands, seed)
+    return [run.trace(leg) for leg in range(commands.shape[1])]
 
 
 def _row(case: Case, command: float, windows: Sequence[Window]) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.controllers import Setup
+from hopping_leg.controllers import RolloutConfig
 from hopping_leg.errors import PhysicsError
 from hopping_leg.evaluate.candidates import load_candidates
 from hopping_leg.evaluate.result import Summary
@@ -152,7 +152,7 @@ def _hop(
     rate: float = CONTROL_RATE,
     timestep: float | None = None,
 ) -> list[Summary]:
-    setup = Setup(
+    setup = RolloutConfig(
         study.robot,
         engine=world.engine,
         ground=world.ground,
@@ -198,7 +198,9 @@ def _judge(world: World, name: str, summary: Sequence[Summary]) -> dict[str, Any
 
 def _drop(study: EnginesStudy, world: World) -> dict[str, Any]:
     """Drop the leg from 0.1 m with its joints held at 1 kHz; return how deep the foot sinks."""
-    setup = on_floor(Setup(study.robot, engine=world.engine, ground=world.ground), world.floor)
+    setup = on_floor(
+        RolloutConfig(study.robot, engine=world.engine, ground=world.ground), world.floor
+    )
     legs = make_legs(
         setup.robot,
         1,

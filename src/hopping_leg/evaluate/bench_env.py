@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.envs import HoppingEnv, HoppingTask, PaperReward, TaskOptions
+from hopping_leg.envs import HoppingEnv, HoppingTask, PaperReward, TaskConfig
 from hopping_leg.evaluate.timing import Timed, host, interleave, median_ratio
 from hopping_leg.robot import Robot, build_model
 from hopping_leg.robot.kinematics import joint_angles
@@ -115,9 +115,9 @@ def _setup(benchmark: EnvBenchmark) -> dict[str, Any]:
     }
 
 
-def _options(benchmark: EnvBenchmark) -> TaskOptions:
+def _options(benchmark: EnvBenchmark) -> TaskConfig:
     limits = benchmark.robot.of_joints("torque_limit")
-    return TaskOptions(
+    return TaskConfig(
         action_torque=(float(limits[0]), float(limits[1])),
         timestep=benchmark.timestep,
         episode=3600.0,

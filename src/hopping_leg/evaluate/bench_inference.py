@@ -8,8 +8,8 @@ import numpy as np
 import onnxruntime
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.library import load_policy, shipped_policies
 from hopping_leg.controllers.policy import Policy
+from hopping_leg.controllers.registry import load_policy, shipped_policies
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.timing import host
 from hopping_leg.sim import SAMPLES, Measurement

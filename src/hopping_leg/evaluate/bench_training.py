@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.controllers import Setup
+from hopping_leg.controllers import RolloutConfig
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.evaluate.candidates import Candidate
 from hopping_leg.evaluate.runner import evaluate, software_versions
@@ -131,7 +131,7 @@ def _judge(
         candidates.append(Candidate(label, policy, bounds))
     judged = evaluate(
         candidates,
-        Setup(robot),
+        RolloutConfig(robot),
         commands=recipe.judge_commands,
         repeats=seeds,
         seed=JUDGING_SEED,

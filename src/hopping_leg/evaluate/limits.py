@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.controllers import Setup
+from hopping_leg.controllers import RolloutConfig
 from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range, fingerprint
 from hopping_leg.evaluate.keeper import Keeper
 from hopping_leg.evaluate.result import Summary
@@ -97,7 +97,7 @@ def measure_limits(
     """Let every candidate hop under every condition.
 
     Args:
-        candidates: What is judged, ``Watcher`` controllers among them.
+        candidates: What is judged, ``PrivilegedController`` controllers among them.
         study: Where.
         keeper: Keeps each result.
         on_done: Called with (parts done, parts in all).
@@ -138,7 +138,7 @@ def measure_limits(
 
 def _hop(candidate: Candidate, study: LimitsStudy, condition: Condition) -> dict[str, Any]:
     robot = times(study.robot, condition.slowness, "contact.time_constant")
-    setup = Setup(robot, condition.disturbance, threads=study.threads)
+    setup = RolloutConfig(robot, condition.disturbance, threads=study.threads)
     judged = evaluate(
         [candidate],
         setup,

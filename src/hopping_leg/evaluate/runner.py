@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from typing import Any
 
-from hopping_leg.controllers import Setup
+from hopping_leg.controllers import RolloutConfig
 from hopping_leg.deploy.envelope import hopping_envelope
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range
@@ -30,7 +30,7 @@ class Judged:
 
 def evaluate(
     candidates: Sequence[Candidate],
-    setup: Setup,
+    setup: RolloutConfig,
     *,
     commands: Sequence[float] | None = None,
     repeats: int = 5,
@@ -89,7 +89,10 @@ def evaluate(
 
 
 def _check(
-    candidates: Sequence[Candidate], setup: Setup, commands: Sequence[float] | None, repeats: int
+    candidates: Sequence[Candidate],
+    setup: RolloutConfig,
+    commands: Sequence[float] | None,
+    repeats: int,
 ) -> None:
     check_labels(candidates)
     if repeats < 1:
@@ -117,7 +120,7 @@ def _note_coarse(timestep: float) -> list[str]:
     ]
 
 
-def _note_twice(setup: Setup) -> list[str]:
+def _note_twice(setup: RolloutConfig) -> list[str]:
     """Say so where noise and delay come from two sides."""
     if setup.robot.reality.only_delays or setup.disturbance == NOTHING:
         return []
@@ -140,7 +143,7 @@ def _note_left_out(
     return [f"{candidate.label} was made for {low:g} to {high:g} m; left out: {names}."]
 
 
-def _note_stopped(label: str, runs: Sequence[Run], setup: Setup) -> list[str]:
+def _note_stopped(label: str, runs: Sequence[Run], setup: RolloutConfig) -> list[str]:
     """Say so where the supervisor of the real leg would not let a controller hop on."""
     limits = hopping_envelope(setup.robot, setup.rate)
     stopped = 0
@@ -166,7 +169,9 @@ def _groups(candidates: Sequence[Candidate], summary: Sequence[Summary], seed: i
     return rows
 
 
-def _conditions(world: Setup, setup: Setup, floor: str, repeats: int, seed: int) -> dict[str, Any]:
+def _conditions(
+    world: RolloutConfig, setup: RolloutConfig, floor: str, repeats: int, seed: int
+) -> dict[str, Any]:
     return {
         "robot": setup.robot.name,
         "robot_digest": setup.robot.digest,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hopping_leg.controllers import Controller, Setup, roll_out
+from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.evaluate.trials import Trial
 from hopping_leg.robot.parameters import Contact, Robot
@@ -63,7 +63,7 @@ def floor_robot(robot: Robot, floor: str) -> Robot:
     return replace(robot, contact=Contact(0.02, 1.0, robot.contact.friction), reality=reality)
 
 
-def on_floor(setup: Setup, floor: str) -> Setup:
+def on_floor(setup: RolloutConfig, floor: str) -> RolloutConfig:
     """Return the world with another floor.
 
     Raises:
@@ -77,7 +77,7 @@ def on_floor(setup: Setup, floor: str) -> Setup:
 def run_trials(
     label: str,
     controller: Controller,
-    setup: Setup,
+    setup: RolloutConfig,
     trials: Sequence[Trial],
     *,
     repeats: int,
@@ -121,7 +121,7 @@ def _report(on_progress: Progress, done: float, share: float, tick: int, ticks: 
 def _run_batch(
     label: str,
     controller: Controller,
-    setup: Setup,
+    setup: RolloutConfig,
     trials: list[Trial],
     repeats: int,
     seed: int,
@@ -130,7 +130,7 @@ def _run_batch(
     legs = [(trial, repeat) for trial in trials for repeat in range(repeats)]
     commands = np.stack([trial.commands(setup.rate) for trial, _ in legs], axis=1)
     noise = np.random.SeedSequence([seed, round(1000 * trials[0].seconds)]).generate_state(1)
-    record = roll_out(controller, setup, commands, int(noise[0]), on_tick)
+    record = rollout(controller, setup, commands, int(noise[0]), on_tick)
     return [
         Run(
             label,

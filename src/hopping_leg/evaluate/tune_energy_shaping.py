@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.controllers import Rollout, Setup, roll_out
+from hopping_leg.controllers import Rollout, RolloutConfig, rollout
 from hopping_leg.controllers.energy_shaping import EnergyShaping
 from hopping_leg.controllers.gain_files import GainFile, load_gains, save_gains
 from hopping_leg.controllers.shaping_gains import ROBUST, ShapingGains, scale_gains
@@ -61,7 +61,7 @@ class Search:
 
 
 def evaluate(
-    candidates: list[ShapingGains], setup: Setup, seconds: float, seed: int
+    candidates: list[ShapingGains], setup: RolloutConfig, seconds: float, seed: int
 ) -> list[list[CommandScore]]:
     """Let candidates hop at every command and first gain, all in one rollout.
 
@@ -75,12 +75,9 @@ def evaluate(
     command = np.tile(np.repeat(COMMANDS, len(FIRST_GAINS)), len(candidates))
     ticks = round(seconds * setup.rate)
     controller = EnergyShaping(setup.robot, stacked, ROBUST, rate=setup.rate)
-    rollout = roll_out(controller, setup, np.tile(command, (ticks, 1)), seed)
+    run = rollout(controller, setup, np.tile(command, (ticks, 1)), seed)
     return [
-        [
-            _score_command(rollout, c, i * runs + j * len(FIRST_GAINS))
-            for j, c in enumerate(COMMANDS)
-        ]
+        [_score_command(run, c, i * runs + j * len(FIRST_GAINS)) for j, c in enumerate(COMMANDS)]
         for i in range(len(candidates))
     ]
 
@@ -94,7 +91,7 @@ def stack_gains(candidates: list[ShapingGains], runs: int) -> ShapingGains:
 
 def search(
     start: ShapingGains,
-    setup: Setup,
+    setup: RolloutConfig,
     options: Search,
     seed: int,
     log: Path,
@@ -128,7 +125,9 @@ def search(
     return from_unit(np.asarray(strategy.result.xfavorite), start)
 
 
-def calibrate(gains: ShapingGains, setup: Setup, seconds: float, rounds: int = 2) -> ShapingGains:
+def calibrate(
+    gains: ShapingGains, setup: RolloutConfig, seconds: float, rounds: int = 2
+) -> ShapingGains:
     """Return the gains with the height estimate corrected so that medians meet the commands."""
     for seed in range(rounds):
         scores = evaluate([gains] * 4, setup, seconds, seed)
@@ -190,7 +189,7 @@ def tune(
         out: Folder for the log and the gains.
         report: Called with (generations done, lowest cost so far).
     """
-    setup = Setup(robot, threads=options.threads)
+    setup = RolloutConfig(robot, threads=options.threads)
     found = load_gains(start)
     first = scale_gains(found.gains, load_robot(found.robot), robot)
     best = search(first, setup, options, seed, out / "log.jsonl", report)

@@ -67,7 +67,7 @@ def _of_fast() -> list[Ablation]:
         Ablation(
             "standing-starts",
             "every episode starts standing",
-            replace(base, task=replace(task, start="standing")),
+            replace(base, task=replace(task, reset_distribution="standing")),
         ),
         Ablation(
             "coarse-physics",

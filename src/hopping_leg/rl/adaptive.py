@@ -9,9 +9,13 @@ from typing import Any, ClassVar
 
 from torch import nn
 
-from hopping_leg.controllers.layouts import make_layout
-from hopping_leg.envs import TaskOptions
-from hopping_leg.envs.true_state import PRIVILEGED_CLEARANCE, PRIVILEGED_COMMAND, PRIVILEGED_HEIGHT
+from hopping_leg.controllers.observation_history import make_layout
+from hopping_leg.envs import TaskConfig
+from hopping_leg.envs.privileged_observation import (
+    PRIVILEGED_CLEARANCE,
+    PRIVILEGED_COMMAND,
+    PRIVILEGED_HEIGHT,
+)
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.actor import aiming_network
 from hopping_leg.rl.aiming import Aiming, AimingStudent, Places
@@ -27,14 +31,14 @@ class AdaptiveRecipe(PreciseRecipe):
 
     name: ClassVar[str] = "adaptive"
 
-    task: TaskOptions = field(
+    task: TaskConfig = field(
         default_factory=lambda: replace(
             PreciseRecipe().task,
             command_range=(0.20, 0.42),
             command_skew=1.0,
             randomised=SURPRISES,
-            chance=0.5,
-            unchanged=0.5,
+            randomize_probability=0.5,
+            nominal_fraction=0.5,
         )
     )
     """The learning problem; wider ranges of commands were not tried."""

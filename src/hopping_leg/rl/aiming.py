@@ -16,7 +16,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from hopping_leg.envs.true_state import CLEARANCE_GAIN
+from hopping_leg.envs.privileged_observation import CLEARANCE_GAIN
 from hopping_leg.rl.asymmetric import dense
 from hopping_leg.rl.checkpoint import Tree
 from hopping_leg.rl.hop_watch import FROM, UNTIL, HopWatch

@@ -12,7 +12,7 @@ import onnx
 from onnx import helper
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.layouts import make_layout
+from hopping_leg.controllers.observation_history import make_layout
 from hopping_leg.controllers.policy import MEMORY, METADATA_KEY, NEXT_MEMORY, Card
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.graph import ACTIVATIONS, Graph, Layers, array_info

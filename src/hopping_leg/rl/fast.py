@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import torch
 from torch import nn
 
-from hopping_leg.envs import ApexReward, ApexRewardOptions, TaskOptions
+from hopping_leg.envs import ApexReward, ApexRewardOptions, TaskConfig
 from hopping_leg.rl.asymmetric import AsymmetricPolicy
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.resumable import ResumablePPO
@@ -26,19 +26,19 @@ class FastRecipe(Recipe):
 
     name: ClassVar[str] = "fast"
 
-    task: TaskOptions = field(
-        default_factory=lambda: TaskOptions(
+    task: TaskConfig = field(
+        default_factory=lambda: TaskConfig(
             observation="dated",
             command_range=(0.22, 0.40),
-            command_hold=(1.0, 5.0),
-            start="hop",
-            stagger=True,
+            command_resampling_time=(1.0, 5.0),
+            reset_distribution="hop",
+            random_episode_start=True,
             timestep=1e-3,
         )
     )
     reward: ApexRewardOptions = field(default_factory=ApexRewardOptions)
     """Apex reward."""
-    legs: int = 512
+    num_envs: int = 512
     """Legs that gather experience at once."""
     steps: int = 6_000_000
     """Control steps of experience in all, summed over the legs."""

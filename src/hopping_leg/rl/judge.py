@@ -12,7 +12,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.controllers.protocol import Controller
-from hopping_leg.controllers.rollout import Rollout, Setup, roll_out
+from hopping_leg.controllers.rollout import Rollout, RolloutConfig, rollout
 from hopping_leg.hops import count_skipped, find_bounces, find_hops
 from hopping_leg.robot.parameters import Robot
 
@@ -89,8 +89,8 @@ def judge(
         threads: Worker threads, 0 for one per core.
     """
     schedule = np.tile(np.repeat(commands, _LEGS), (round(_SECONDS * rate), 1))
-    setup = Setup(robot, rate=rate, threads=threads)
-    runs = [roll_out(controller, setup, schedule, seed) for seed in seeds]
+    setup = RolloutConfig(robot, rate=rate, threads=threads)
+    runs = [rollout(controller, setup, schedule, seed) for seed in seeds]
     return [
         _verdict(runs, command, range(index * _LEGS, (index + 1) * _LEGS), rate)
         for index, command in enumerate(commands)

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from torch import nn
 
-from hopping_leg.envs import PaperReward, PaperRewardOptions, TaskOptions
+from hopping_leg.envs import PaperReward, PaperRewardOptions, TaskConfig
 from hopping_leg.rl.asymmetric import AsymmetricSACPolicy
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.resumable import ResumableSAC
@@ -23,9 +23,12 @@ class PaperRecipe(Recipe):
 
     name: ClassVar[str] = "paper"
 
-    task: TaskOptions = field(
-        default_factory=lambda: TaskOptions(
-            start="mixed", stagger=True, fall_clearance=0.01, fall_penalty=20.0
+    task: TaskConfig = field(
+        default_factory=lambda: TaskConfig(
+            reset_distribution="mixed",
+            random_episode_start=True,
+            fall_clearance=0.01,
+            fall_penalty=20.0,
         )
     )
     reward: PaperRewardOptions = field(default_factory=PaperRewardOptions)

@@ -12,9 +12,9 @@ from typing import Any, ClassVar
 import numpy as np
 from torch import nn
 
-from hopping_leg.controllers.layouts import make_layout
-from hopping_leg.envs import ApexRewardOptions, TaskOptions
-from hopping_leg.envs.true_state import PRIVILEGED
+from hopping_leg.controllers.observation_history import make_layout
+from hopping_leg.envs import ApexRewardOptions, TaskConfig
+from hopping_leg.envs.privileged_observation import PRIVILEGED
 from hopping_leg.rl.actor import dense_network
 from hopping_leg.rl.export import Network
 from hopping_leg.rl.fast import FastRecipe, cosine
@@ -36,14 +36,14 @@ class PreciseRecipe(FastRecipe):
 
     name: ClassVar[str] = "precise"
 
-    task: TaskOptions = field(
+    task: TaskConfig = field(
         default_factory=lambda: replace(
             FastRecipe().task,
             observation="dated-long",
             command_range=(0.20, 0.46),
             command_skew=1.5,
             timestep=5e-4,
-            alike_at_first=True,
+            randomize_from_start=False,
         )
     )
     reward: ApexRewardOptions = field(
@@ -191,7 +191,7 @@ class PreciseRecipe(FastRecipe):
         super().anneal(model, env, learnt if taught < 0 else 1.0)
         model.policy.imitating = taught >= 0
         if draw := self.draw(taught):
-            env.task.diverge(draw)
+            env.task.randomize(draw)
         model.policy.guidance = max(0.0, 1 - taught / self.guided)
 
     def _passed(self, exams: Sequence[float]) -> bool:

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from hopping_leg.envs import HoppingTask, TaskOptions
+from hopping_leg.envs import HoppingTask, TaskConfig
 from hopping_leg.envs.transition import Reward
 from hopping_leg.rl.actor import network_of
 from hopping_leg.rl.export import Network
@@ -21,12 +21,12 @@ class Recipe(ABC):
     name: ClassVar[str]
     """As on the command line."""
 
-    task: TaskOptions = field(default_factory=TaskOptions)
+    task: TaskConfig = field(default_factory=TaskConfig)
     """The learning problem."""
     heights: tuple[float, float] | None = None
     """Lowest and highest desired height, m, on whatever leg; none takes the task's, which grow with
     the leg."""
-    legs: int = 16
+    num_envs: int = 16
     """Legs that gather experience at once."""
     steps: int = 1_000_000
     """Control steps of experience in all, summed over the legs."""
@@ -49,7 +49,7 @@ class Recipe(ABC):
     def make_env(self, robot: Robot, seed: int, threads: int = 1) -> TaskVecEnv:
         """Build the training environment."""
         rng = np.random.default_rng(seed)
-        task = HoppingTask(robot, self.legs, self.task, self.make_reward(robot), rng, threads)
+        task = HoppingTask(robot, self.num_envs, self.task, self.make_reward(robot), rng, threads)
         return TaskVecEnv(task, privileged=self.privileged_critic)
 
     @abstractmethod

@@ -31,7 +31,7 @@ _RANGES: dict[Randomise, tuple[Range, ...]] = {
     "surprises": SURPRISES,
 }
 
-_OF_TASK = ("command_skew", "idle", "fall_penalty")
+_OF_TASK = ("command_skew", "fall_penalty")
 """Numbers of a task that can be changed like those of a recipe's other parts."""
 
 _SWITCH = {"true": True, "1": True, "false": False, "0": False}

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from torch import nn
 
-from hopping_leg.envs import TaskOptions
+from hopping_leg.envs import TaskConfig
 from hopping_leg.rl.actor import recurrent_network
 from hopping_leg.rl.export import Network
 from hopping_leg.rl.imitation import Imitation
@@ -24,7 +24,7 @@ class RecurrentRecipe(PreciseRecipe):
 
     name: ClassVar[str] = "recurrent"
 
-    task: TaskOptions = field(
+    task: TaskConfig = field(
         default_factory=lambda: replace(
             PreciseRecipe().task,
             observation="dated",
@@ -35,7 +35,7 @@ class RecurrentRecipe(PreciseRecipe):
     """The learning problem; wider ranges of commands were not tried."""
     judge_commands: tuple[float, ...] = (0.22, 0.25, 0.28, 0.31, 0.34, 0.37, 0.40)
     """Heights of the trials, m."""
-    legs: int = 256
+    num_envs: int = 256
     """Legs that gather experience at once."""
     rollout: int = 128
     """Ticks between updates, each leg: errors are traced back so far, longer than a hop."""
@@ -55,7 +55,7 @@ class RecurrentRecipe(PreciseRecipe):
     def make_student(self, env: TaskVecEnv) -> nn.Module:
         """Build the untrained student."""
         return RecurrentStudent(
-            env.task.observation.size, self.memory, self.imitation.memory, self.legs
+            env.task.observation.size, self.memory, self.imitation.memory, self.num_envs
         )
 
     def network(self, model: Any, env: TaskVecEnv) -> Network:  # noqa: ANN401

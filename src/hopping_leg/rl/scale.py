@@ -5,7 +5,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from hopping_leg.envs import TaskOptions
+from hopping_leg.envs import TaskConfig
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.robot.parameters import Robot
 
@@ -54,7 +54,7 @@ def _grow(recipe: R, robot: Robot) -> R:
         min(_round(torque * moment, 0.5), float(most))
         for torque, most in zip(task.action_torque, limit, strict=True)
     )
-    fitted: TaskOptions = dataclasses.replace(
+    fitted: TaskConfig = dataclasses.replace(
         task,
         commands=tuple(_round(c * ratio) for c in task.commands),
         command_range=task.command_range and (_round(low * ratio), _round(high * ratio)),

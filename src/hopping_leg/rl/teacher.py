@@ -8,9 +8,9 @@ import numpy as np
 import torch
 
 from hopping_leg.arrays import Array
-from hopping_leg.envs import TaskOptions
+from hopping_leg.envs import TaskConfig
 from hopping_leg.envs.observation import sample_scaling
-from hopping_leg.envs.true_state import PRIVILEGED, true_state
+from hopping_leg.envs.privileged_observation import PRIVILEGED, privileged_observation
 from hopping_leg.rl.taught import TaughtPolicy
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import AnyLegs, Measurement
@@ -37,7 +37,7 @@ class Teacher:
         self,
         policy: TaughtPolicy,
         robot: Robot,
-        options: TaskOptions,
+        options: TaskConfig,
         last_torque: Sequence[int],
         erring: float = 0.0,
     ) -> None:
@@ -71,7 +71,9 @@ class Teacher:
         first = self._policy.measured
         seen[:, self._last_torque] = self._last
         told = measurement.command[:, 0]
-        true_state(self._legs, told, self._sample, out=seen[:, first : first + PRIVILEGED])
+        privileged_observation(
+            self._legs, told, self._sample, out=seen[:, first : first + PRIVILEGED]
+        )
         with torch.no_grad():
             self._last = self._policy.teacher_action(torch.from_numpy(seen)).double().numpy()
         if self._erring > 0:

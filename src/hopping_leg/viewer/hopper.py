@@ -5,7 +5,7 @@ from mujoco import batch
 
 from hopping_leg.arrays import Array
 from hopping_leg.controllers.protocol import Controller
-from hopping_leg.controllers.rollout import Setup
+from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.errors import PhysicsError
 from hopping_leg.robot.limits import SoftLimits
 from hopping_leg.robot.parameters import Robot
@@ -40,7 +40,7 @@ class Hopper:
 
     def stand(self, height: float) -> None:
         """Begin anew, standing; ``height`` is what is commanded, m."""
-        self._legs.stand(_ALL, Setup(self.robot).start_posture)
+        self._legs.stand(_ALL, RolloutConfig(self.robot).start_posture)
         self._legs.push(np.zeros(1))
         self._force = 0.0
         self.take(self.controller, height)

@@ -4,7 +4,7 @@ import dataclasses
 
 import viser
 
-from hopping_leg.controllers.library import controller_names
+from hopping_leg.controllers.registry import controller_names
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.files import shipped_robots
 from hopping_leg.viewer import world as ranges

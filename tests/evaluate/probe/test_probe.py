@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from hopping_leg.cli import main
-from hopping_leg.controllers import Setup, roll_out
-from hopping_leg.controllers.library import load_policy
+from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.phases import Phase
+from hopping_leg.controllers.registry import load_policy
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.probe.exposed import Exposed, record
 from hopping_leg.evaluate.probe.fitting import interval, probe
@@ -78,9 +78,9 @@ def test_targets_are_those_of_the_true_state():
 def test_an_exposed_policy_acts_as_ever(robot):
     policy = load_policy("fast")
     commands = np.full((100, 3), 0.3)
-    setup = Setup(robot, threads=1)
-    plain = roll_out(policy, setup, commands, 1)
-    exposed = roll_out(Exposed(policy, expose_hidden(policy.content)), setup, commands, 1)
+    setup = RolloutConfig(robot, threads=1)
+    plain = rollout(policy, setup, commands, 1)
+    exposed = rollout(Exposed(policy, expose_hidden(policy.content)), setup, commands, 1)
     for name, values in plain.data.items():
         np.testing.assert_array_equal(values, exposed.data[name])
 
@@ -113,7 +113,7 @@ def test_what_a_policy_remembers_is_kept_and_shuffled_alike(robot):
     policy = load_policy("adaptive")
     graphs = {"": expose_hidden(policy.content), ", shuffled": expose_hidden(policy.content, 1)}
     commands = np.full((600, 2), 0.3)
-    recording = record(policy, graphs, Setup(robot, threads=1), commands, 1)
+    recording = record(policy, graphs, RolloutConfig(robot, threads=1), commands, 1)
     aims = recording.features["memory"]
     assert aims.shape == (200, 2, 3)
     assert np.abs(np.diff(aims[..., :2], axis=0)).max() > 0

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from hopping_leg.controllers import roll_out
+from hopping_leg.controllers import rollout
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.robustness.axes import AXES, JOINT, NOMINAL, axis_names
 from hopping_leg.evaluate.robustness.case import Case
@@ -35,9 +35,9 @@ def arrays(made):
 @pytest.mark.parametrize("axis", AXES, ids=lambda axis: axis.name)
 def test_a_neutral_level_is_the_plain_rollout_bit_for_bit(setup, robot, spring, axis):
     made = plan(robot, axis.name, levels=[axis.neutral], seconds=2.6)
-    found = roll_out(spring, setup, made.commands, made.seed, perturbation=made.perturbation)
+    found = rollout(spring, setup, made.commands, made.seed, perturbation=made.perturbation)
     asked = np.tile(np.repeat(COMMANDS, 2), (len(found.time), 1))
-    plain = roll_out(spring, setup, asked, made.seed)
+    plain = rollout(spring, setup, asked, made.seed)
     for name, values in plain.data.items():
         np.testing.assert_array_equal(found.data[name], values)
 

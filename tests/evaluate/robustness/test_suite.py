@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from hopping_leg.controllers.library import load_controller
+from hopping_leg.controllers.registry import load_controller
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Candidate
 from hopping_leg.evaluate.candidates import fingerprint

@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 
 from hopping_leg.cli import main
-from hopping_leg.controllers.library import load_controller
+from hopping_leg.controllers.registry import load_controller
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Candidate
 from hopping_leg.evaluate.skills.counted import count_hops

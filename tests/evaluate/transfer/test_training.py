@@ -34,9 +34,11 @@ def test_legs_may_surprise_around_whatever_is_believed(tmp_path):
 
 
 def test_a_study_can_change_the_recipe_but_for_its_steps(tmp_path):
-    one = study(tmp_path, ["cad"], recipe="adaptive", changes=("task.idle=0.7", "steps=3"), steps=5)
+    one = study(
+        tmp_path, ["cad"], recipe="adaptive", changes=("task.fall_penalty=0.7", "steps=3"), steps=5
+    )
     recipe = Train(one, one.twins[0], one.methods[0], 0).recipe()
-    assert recipe.task.idle == 0.7
+    assert recipe.task.fall_penalty == 0.7
     assert recipe.steps == 5
 
 

@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 
-from hopping_leg.controllers.library import load_policy
-from hopping_leg.controllers.outing import Outing, by_tick, measured_table
+from hopping_leg.controllers.hardware_trial import HardwareTrial, by_tick, measured_table
+from hopping_leg.controllers.registry import load_policy
 from hopping_leg.rl.finetune.contact import Contact, ContactOptions
 from hopping_leg.rl.finetune.hindsight import Reckoning
 from hopping_leg.rl.finetune.learner import LearnerOptions
@@ -57,7 +57,7 @@ class Imagined:
         at = command[(time / PERIOD).astype(int)]
         truth = np.stack([time, at, at + self.off], axis=1)
         trace = Trace(table, {"rate_hz": 1 / PERIOD})
-        return Outing(trace, len(command) * PERIOD, complaint, truth)
+        return HardwareTrial(trace, len(command) * PERIOD, complaint, truth)
 
 
 def flying_leg(hops, noise=0.0):

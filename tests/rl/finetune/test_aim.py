@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hopping_leg.controllers.library import load_policy
 from hopping_leg.controllers.policy import Policy
+from hopping_leg.controllers.registry import load_policy
 from hopping_leg.rl.export import build_policy
 from hopping_leg.rl.finetune.aim import Aim, AimOptions
 from hopping_leg.rl.network_file import read_network

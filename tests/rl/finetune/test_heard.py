@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hopping_leg.controllers import Setup, roll_out
-from hopping_leg.controllers.layouts import make_layout
+from hopping_leg.controllers import RolloutConfig, rollout
+from hopping_leg.controllers.observation_history import make_layout
 from hopping_leg.errors import TraceError
 from hopping_leg.rl.finetune.heard import Heard
 from hopping_leg.rl.finetune.simulated import Witness, traces_of
@@ -42,8 +42,8 @@ def run():
     shown = Shown()
     witness = Witness(shown, None)
     commands = np.repeat([[0.25, 0.3], [0.35, 0.28]], 60, axis=0)
-    setup = Setup(ROBOT, NOTHING, threads=1)
-    return shown, traces_of(roll_out(witness, setup, commands, 3, on_legs=witness.watch))
+    setup = RolloutConfig(ROBOT, NOTHING, threads=1)
+    return shown, traces_of(rollout(witness, setup, commands, 3, on_legs=witness.watch))
 
 
 def test_inputs_rebuilt_from_traces_are_those_that_the_network_saw(run):

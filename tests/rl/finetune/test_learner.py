@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from hopping_leg.controllers.library import load_policy
+from hopping_leg.controllers.registry import load_policy
 from hopping_leg.rl.export import build_policy
 from hopping_leg.rl.finetune.exploring import EDGE, Exploring
 from hopping_leg.rl.finetune.learner import Learner, LearnerOptions

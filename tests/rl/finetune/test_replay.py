@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from hopping_leg.controllers import Setup, roll_out
-from hopping_leg.envs import ApexReward, HoppingTask, TaskOptions
+from hopping_leg.controllers import RolloutConfig, rollout
+from hopping_leg.envs import ApexReward, HoppingTask, TaskConfig
 from hopping_leg.hops import find_hops
 from hopping_leg.rl.finetune.heard import Heard
 from hopping_leg.rl.finetune.hindsight import Hindsight
@@ -26,8 +26,8 @@ COMMAND = 0.3
 def run():
     witness = Witness(POLICY, None)
     commands = np.full((TICKS, 1), COMMAND)
-    setup = Setup(ROBOT, NOTHING, threads=1)
-    return roll_out(witness, setup, commands, 3, on_legs=witness.watch)
+    setup = RolloutConfig(ROBOT, NOTHING, threads=1)
+    return rollout(witness, setup, commands, 3, on_legs=witness.watch)
 
 
 def rewriter():
@@ -49,7 +49,7 @@ def truth(run):
 def environment(run):
     """Return observations and rewards of the environment on the same actions."""
     card = POLICY.card
-    options = TaskOptions(
+    options = TaskConfig(
         observation=card.layout,
         action_torque=card.torque_scale,
         commands=(COMMAND,),
@@ -61,7 +61,7 @@ def environment(run):
     _, reward = rewriter()
     task = HoppingTask(ROBOT, 1, options, reward, np.random.default_rng(0), 1, autoreset=False)
     task.command[:] = COMMAND
-    task.legs.stand(slice(None), Setup(ROBOT).start_posture)
+    task.legs.stand(slice(None), RolloutConfig(ROBOT).start_posture)
     q, qd = task.legs.q.copy(), task.legs.qd.copy()
     task.plant.channel.restart(slice(None), q, qd, task.command)
     task.observation.restart(np.arange(1), task.plant.samples(task.command), task.plant.channel)

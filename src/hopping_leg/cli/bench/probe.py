@@ -33,8 +33,8 @@ class Probe:
 
     def measure(self) -> dict[str, Any]:
         """Run it, print a table, return every number."""
-        from hopping_leg.controllers import Setup
-        from hopping_leg.controllers.library import load_policy
+        from hopping_leg.controllers import RolloutConfig
+        from hopping_leg.controllers.registry import load_policy
         from hopping_leg.evaluate.figures import to_svg
         from hopping_leg.evaluate.figures.probe import draw_probe
         from hopping_leg.evaluate.probe.study import run_study
@@ -51,7 +51,7 @@ class Probe:
         rates = {policy.card.rate for policy in policies}
         if len(rates) > 1:
             raise UsageError("The policies run at different control rates; probe them one by one.")
-        setup = Setup(robot, threads=self.threads, rate=rates.pop())
+        setup = RolloutConfig(robot, threads=self.threads, rate=rates.pop())
         with Progress(transient=True) as bar:
             tasks = {policy.name: bar.add_task(policy.name, total=1.0) for policy in policies}
             result = run_study(

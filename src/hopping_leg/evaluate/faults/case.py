@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hopping_leg.controllers.library import load_controller
+from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.bring_up import judge, require
 from hopping_leg.deploy.clock import Clock
 from hopping_leg.deploy.driver import MoteusLink

@@ -8,8 +8,8 @@ import numpy.typing as npt
 import onnxruntime
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers import Setup, roll_out
-from hopping_leg.controllers.layouts import Inputs, make_layout
+from hopping_leg.controllers import RolloutConfig, rollout
+from hopping_leg.controllers.observation_history import Inputs, make_layout
 from hopping_leg.controllers.policy import MEMORY, NEXT_MEMORY, Policy
 from hopping_leg.controllers.protocol import Measurement
 from hopping_leg.evaluate.metrics import START_SECONDS
@@ -102,7 +102,7 @@ class Exposed:
 def record(
     policy: Policy,
     graphs: dict[str, bytes],
-    setup: Setup,
+    setup: RolloutConfig,
     commands: Array,
     seed: int,
 ) -> Recording:
@@ -117,7 +117,7 @@ def record(
         seed: Of noise and delay.
     """
     controller = Exposed(policy, graphs[""])
-    run = roll_out(controller, setup, commands, seed)
+    run = rollout(controller, setup, commands, seed)
     seen, count = controller.seen, commands.shape[1]
     first = round(START_SECONDS * setup.rate)
     flat = [[v.reshape(count, -1) for v in inputs.values()] for inputs in seen[first:]]

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.controllers import Setup
+from hopping_leg.controllers import RolloutConfig
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.metrics import START_SECONDS
@@ -71,7 +71,7 @@ class Row:
 def run_study(
     policies: Sequence[Policy],
     expose: Expose,
-    setup: Setup,
+    setup: RolloutConfig,
     study: Study,
     on_progress: Callable[[str, float], None] = lambda _label, _share: None,
 ) -> dict[str, Any]:
@@ -106,7 +106,7 @@ def run_study(
 def _probe_policy(
     policy: Policy,
     expose: Expose,
-    setup: Setup,
+    setup: RolloutConfig,
     study: Study,
     on_progress: Callable[[str, float], None],
 ) -> list[Row]:

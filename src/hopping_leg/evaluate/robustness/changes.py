@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers import Controller, Setup, roll_out
+from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.evaluate.metrics import START_SECONDS
 from hopping_leg.evaluate.robustness.axes import axis_named
 from hopping_leg.evaluate.robustness.case import Case, times, with_numbers
@@ -61,7 +61,7 @@ class _Run:
 
 def study_changes(
     controller: Controller,
-    setup: Setup,
+    setup: RolloutConfig,
     commands: Sequence[float],
     repeats: int,
     seed: int,
@@ -91,7 +91,7 @@ def study_changes(
     late = np.arange(ticks)[:, None] >= change
     asked = np.where(late, [run.after for run in legs], [run.before for run in legs])
     nothing = np.zeros((ticks, len(legs)))
-    record = roll_out(
+    record = rollout(
         controller,
         setup,
         asked,

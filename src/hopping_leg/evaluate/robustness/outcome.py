@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hopping_leg.controllers import Controller, Setup, roll_out
+from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.evaluate.metrics import Window, measure, pooled_apexes
 from hopping_leg.evaluate.robustness.plan import Plan, Trial
 from hopping_leg.trace import Trace
@@ -43,7 +43,7 @@ class Outcome:
 
 def run_plan(
     controller: Controller,
-    setup: Setup,
+    setup: RolloutConfig,
     plan: Plan,
     on_tick: Callable[[int, int], None] | None = None,
 ) -> list[Outcome]:
@@ -55,7 +55,7 @@ def run_plan(
         plan: What it meets.
         on_tick: Called with (ticks done, ticks in all).
     """
-    run = roll_out(
+    run = rollout(
         controller, setup, plan.commands, plan.seed, on_tick, perturbation=plan.perturbation
     )
     return [judge(trial, run.trace(leg)) for leg, trial in enumerate(plan.trials)]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from hopping_leg.controllers import Controller, Setup
+from hopping_leg.controllers import Controller, RolloutConfig
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range, fingerprint
 from hopping_leg.evaluate.keeper import Keeper
@@ -37,7 +37,7 @@ SCHEMA = 1
 class Suite:
     """What is run."""
 
-    setup: Setup
+    setup: RolloutConfig
     """What controllers believe, with the paper's noise and delay."""
     axes: tuple[str, ...]
     """Names of axes."""
@@ -75,7 +75,7 @@ class Suite:
 
 
 def make_suite(
-    setup: Setup,
+    setup: RolloutConfig,
     *,
     axes: Sequence[str] = (),
     commands: Sequence[float] | None = None,

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers import Controller, Setup, roll_out
-from hopping_leg.controllers.supervised import STAND_SECONDS, Supervised
+from hopping_leg.controllers import Controller, RolloutConfig, rollout
+from hopping_leg.controllers.stand_hop_land import STAND_SECONDS, StandHopLand
 from hopping_leg.evaluate.metrics import measure
 from hopping_leg.evaluate.skills.impact import last_touchdown, peak_force
 from hopping_leg.hops import find_hops
@@ -52,7 +52,7 @@ class Counted:
 def count_hops(
     label: str,
     controller: Controller,
-    setup: Setup,
+    setup: RolloutConfig,
     commands: Sequence[float],
     *,
     repeats: int,
@@ -74,8 +74,8 @@ def count_hops(
     for asked in COUNTS:
         seconds = STAND_SECONDS + asked * _HOP_SECONDS + _END_SECONDS
         each = np.repeat(np.asarray(commands, float), repeats)
-        supervised = Supervised(controller, setup.robot, asked, rate=setup.rate)
-        run = roll_out(supervised, setup, np.tile(each, (round(seconds * setup.rate), 1)), seed)
+        supervised = StandHopLand(controller, setup.robot, asked, rate=setup.rate)
+        run = rollout(supervised, setup, np.tile(each, (round(seconds * setup.rate), 1)), seed)
         traces = [run.trace(leg) for leg in range(len(each))]
         for k, command in enumerate(commands):
             own = traces[k * repeats : (k + 1) * repeats]

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers import Controller, Setup, roll_out
+from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.controllers.joint_pd import JointPD
 from hopping_leg.controllers.landing import landing_posture
-from hopping_leg.controllers.supervised import Supervised
+from hopping_leg.controllers.stand_hop_land import StandHopLand
 from hopping_leg.evaluate.metrics import measure
 from hopping_leg.evaluate.skills.impact import peak_force, rebound
 from hopping_leg.robot import kinematics
@@ -46,7 +46,7 @@ class Landed:
 
 
 def land(
-    setup: Setup, *, drop: float, repeats: int, seed: int, floor: str = "soft"
+    setup: RolloutConfig, *, drop: float, repeats: int, seed: int, floor: str = "soft"
 ) -> list[Landed]:
     """Drop legs in the landing posture.
 
@@ -59,7 +59,7 @@ def land(
     """
     robot = setup.robot
     posture = landing_posture(robot)
-    landing = Supervised(None, robot, 0, rate=setup.rate, dropped=True)
+    landing = StandHopLand(None, robot, 0, rate=setup.rate, dropped=True)
     ways: list[Controller] = [landing, JointPD(posture[None])]
     return [
         _row(robot, drop, floor, _drop(way, setup, posture, drop, repeats, seed)) for way in ways
@@ -67,12 +67,12 @@ def land(
 
 
 def _drop(
-    way: Controller, setup: Setup, posture: Array, drop: float, repeats: int, seed: int
+    way: Controller, setup: RolloutConfig, posture: Array, drop: float, repeats: int, seed: int
 ) -> list[Trace]:
     robot = setup.robot
     length = float(kinematics.foot_position(robot, posture)[0])
     height = float(kinematics.stance_height(robot, posture)) + drop
-    run = roll_out(
+    run = rollout(
         way,
         replace(setup, start_length=length),
         np.full((round(_SECONDS * setup.rate), repeats), height),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers import Controller, Setup, roll_out
+from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.evaluate.metrics import START_SECONDS, measure, skipped_in_run
 from hopping_leg.hops import find_hops
 from hopping_leg.sim.perturbation import Perturbation
@@ -58,7 +58,7 @@ class Stairs:
 def climb(
     label: str,
     controller: Controller,
-    setup: Setup,
+    setup: RolloutConfig,
     commands: Sequence[float],
     *,
     stairs: Sequence[float],
@@ -88,7 +88,7 @@ def climb(
         calm,
         np.repeat(ground[:, None], count, axis=1),
     )
-    run = roll_out(
+    run = rollout(
         controller, setup, np.tile(each, (len(ground), 1)), seed, perturbation=perturbation
     )
     traces = [run.trace(leg) for leg in range(count)]

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from hopping_leg.controllers import Setup
+from hopping_leg.controllers import RolloutConfig
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range
 from hopping_leg.evaluate.runner import software_versions
@@ -20,7 +20,7 @@ SCHEMA = 1
 
 def run_skills(
     candidates: Sequence[Candidate],
-    setup: Setup,
+    setup: RolloutConfig,
     *,
     floors: Sequence[str] = ("soft", "stiff"),
     commands: Sequence[float] | None = None,

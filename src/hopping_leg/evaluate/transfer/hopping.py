@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.controllers import Setup
+from hopping_leg.controllers import RolloutConfig
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.candidates import Candidate
@@ -158,7 +158,7 @@ def hop(content: bytes, robot: Robot, study: Study) -> list[dict[str, Any]]:
     """
     policy = Policy(content, "the trained policy", "policy")
     bounds = (policy.card.command_low, policy.card.command_high)
-    setup = Setup(robot, disturbance_of(robot), threads=study.threads)
+    setup = RolloutConfig(robot, disturbance_of(robot), threads=study.threads)
     judged = evaluate(
         [Candidate("policy", policy, bounds)],
         setup,

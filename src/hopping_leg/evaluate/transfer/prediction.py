@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.controllers.library import load_policy
+from hopping_leg.controllers.registry import load_policy
 from hopping_leg.evaluate.statistics import median_interval
 from hopping_leg.evaluate.transfer.hopping import Tried
 from hopping_leg.evaluate.transfer.methods import Method

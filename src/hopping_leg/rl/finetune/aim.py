@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.layouts import make_layout
+from hopping_leg.controllers.observation_history import make_layout
 from hopping_leg.controllers.policy import Card
 from hopping_leg.rl.export import Network
 from hopping_leg.rl.finetune.lines import robust_line

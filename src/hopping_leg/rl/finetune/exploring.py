@@ -8,7 +8,7 @@ import numpy as np
 import onnxruntime
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.layouts import make_layout
+from hopping_leg.controllers.observation_history import make_layout
 from hopping_leg.controllers.policy import Card
 from hopping_leg.controllers.protocol import Measurement
 from hopping_leg.rl.hidden import PREFIX, expose_hidden

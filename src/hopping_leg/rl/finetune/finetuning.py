@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.controllers.outing import Outing, Outings, Steps
+from hopping_leg.controllers.hardware_trial import HardwareTrial, Steps, TrialRobot
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.envs import ApexReward
@@ -69,7 +69,7 @@ class Finetuning:
     def __init__(
         self,
         task: Task,
-        robot: Outings,
+        robot: TrialRobot,
         options: FinetuneOptions,
         folder: Path,
         prepared: Path | None = None,
@@ -145,7 +145,7 @@ class Finetuning:
         card = self._task.policy.card
         return Exploring(content, card, self._learner.spread, self._options.noise_hold, rng)
 
-    def _take(self, outing: Outing, steps: Steps, *, check: bool) -> None:
+    def _take(self, outing: HardwareTrial, steps: Steps, *, check: bool) -> None:
         """Judge an outing, learn from it, note it."""
         heard = Heard.of([outing.trace])
         hindsight = self._reckon(heard)
@@ -182,7 +182,7 @@ class Finetuning:
             if self._learner is not None:
                 self._learner.take_back(self._network)
 
-    def _learn(self, outing: Outing, ticks: int, *, explored: bool) -> None:
+    def _learn(self, outing: HardwareTrial, ticks: int, *, explored: bool) -> None:
         if self._learner is None:
             self._network, self._aim = self._best
             self._begin_learning()

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.outing import Outing, Steps
+from hopping_leg.controllers.hardware_trial import HardwareTrial, Steps
 from hopping_leg.rl.finetune.hindsight import Hindsight
 
 SETTLING = 1.0
@@ -32,7 +32,7 @@ class Score:
     error: float
 
 
-def estimated(outing: Outing, hindsight: Hindsight) -> Array:
+def estimated(outing: HardwareTrial, hindsight: Hindsight) -> Array:
     """Return time, command and estimated height of an outing's apexes, s, m, m, (hops, 3)."""
     tick, height = hindsight.apexes[0].T
     rows = tick.astype(np.int64)

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.layouts import make_layout
+from hopping_leg.controllers.observation_history import make_layout
 from hopping_leg.controllers.policy import Card
 from hopping_leg.envs import ApexReward
 from hopping_leg.envs.observation import Array32

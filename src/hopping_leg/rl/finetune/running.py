@@ -6,7 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from hopping_leg.controllers.outing import Outings
+from hopping_leg.controllers.hardware_trial import TrialRobot
 from hopping_leg.errors import UsageError
 from hopping_leg.json_files import write_json
 from hopping_leg.rl.finetune.finetuning import Finetuned, Finetuning, Row
@@ -21,7 +21,7 @@ POLICY = "policy.onnx"
 
 def finetune(
     task: Task,
-    robot: Outings,
+    robot: TrialRobot,
     options: FinetuneOptions,
     out: Path,
     *,
@@ -100,7 +100,7 @@ def card(result: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _asked(task: Task, robot: Outings, options: FinetuneOptions) -> dict[str, Any]:
+def _asked(task: Task, robot: TrialRobot, options: FinetuneOptions) -> dict[str, Any]:
     asked: dict[str, Any] = json.loads(
         json.dumps(
             {

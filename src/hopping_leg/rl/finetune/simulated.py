@@ -1,7 +1,7 @@
 """A simulated leg that is reached like a real one: by outings that return what it measured.
 
 The leg is stepped by the code that ``hop evaluate`` hops on. What the twin brings of latency and
-noise is all there is; its true state goes nowhere but into ``Outing.truth``.
+noise is all there is; its true state goes nowhere but into ``HardwareTrial.truth``.
 """
 
 from collections.abc import Sequence
@@ -10,9 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.outing import MEASURED, Outing, Steps, by_tick, measured_table
+from hopping_leg.controllers.hardware_trial import (
+    MEASURED,
+    HardwareTrial,
+    Steps,
+    by_tick,
+    measured_table,
+)
 from hopping_leg.controllers.protocol import Controller, Measurement
-from hopping_leg.controllers.rollout import Rollout, Setup, roll_out
+from hopping_leg.controllers.rollout import Rollout, RolloutConfig, rollout
 from hopping_leg.hops import find_hops
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import NOTHING, AnyLegs
@@ -44,7 +50,7 @@ class Guard:
 
 
 class Simulated:
-    """A simulated leg; implements ``Outings``.
+    """A simulated leg; implements ``TrialRobot``.
 
     Args:
         robot: The leg that plays the real one.
@@ -54,17 +60,17 @@ class Simulated:
 
     def __init__(self, robot: Robot, guard: Guard | None, threads: int = 1) -> None:
         self.name, self._robot, self._guard = robot.name, robot, guard
-        self._setup = Setup(robot, NOTHING, threads=threads)
+        self._setup = RolloutConfig(robot, NOTHING, threads=threads)
 
-    def hop(self, controller: Controller, steps: Steps, seed: int) -> Outing:
+    def hop(self, controller: Controller, steps: Steps, seed: int) -> HardwareTrial:
         """Let a controller hop from standing."""
         commands = by_tick(steps, self._setup.rate)[:, None]
         witness = Witness(controller, self._guard)
-        run = roll_out(witness, self._setup, commands, seed)
+        run = rollout(witness, self._setup, commands, seed)
         ended = int(witness.ended[0])
         trace = traces_of(run)[0]
         table = trace.table[: ended + 1] if ended >= 0 else trace.table
-        return Outing(
+        return HardwareTrial(
             Trace(table, trace.header),
             table.height / self._setup.rate,
             witness.complaints[0],
@@ -94,8 +100,8 @@ def hop_many(
     calm = np.zeros((ticks, count))
     differ = Perturbation(tuple(robots), np.zeros((ticks, count, 2)), calm, calm)
     witness = Witness(controller, None)
-    setup = Setup(robot, NOTHING, timestep=timestep, threads=1)
-    return roll_out(witness, setup, commands, seed, perturbation=differ)
+    setup = RolloutConfig(robot, NOTHING, timestep=timestep, threads=1)
+    return rollout(witness, setup, commands, seed, perturbation=differ)
 
 
 def traces_of(run: Rollout) -> list[Trace]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.controllers.outing import Steps
+from hopping_leg.controllers.hardware_trial import Steps
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.json_files import write_json
 from hopping_leg.rl.finetune.finetuning import Row

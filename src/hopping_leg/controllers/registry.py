@@ -6,9 +6,9 @@ from importlib import resources
 from pathlib import Path
 
 from hopping_leg.controllers.baselines import paper_energy_shaping, tuned_energy_shaping
-from hopping_leg.controllers.plug_in import is_plug_in, load_plug_in
 from hopping_leg.controllers.policy import OtherRobot, Policy
 from hopping_leg.controllers.protocol import Controller
+from hopping_leg.controllers.user_controllers import is_user_controller, load_user_controller
 from hopping_leg.errors import PolicyError, UsageError, unknown_name
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import CONTROL_RATE
@@ -88,8 +88,8 @@ def load_controller(
         return factory(robot, rate=rate)
     if str(name_or_path).endswith(".toml"):
         return tuned_energy_shaping(robot, rate=rate, gains=str(name_or_path))
-    if is_plug_in(str(name_or_path)):
-        return load_plug_in(str(name_or_path), robot, rate)
+    if is_user_controller(str(name_or_path)):
+        return load_user_controller(str(name_or_path), robot, rate)
     policy = load_policy(name_or_path)
     policy.check_robot(robot, rate, other=other)
     return policy

@@ -3,7 +3,7 @@
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.envs.options import TaskOptions
+from hopping_leg.envs.options import TaskConfig
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
@@ -15,7 +15,7 @@ _NEAR_APEX = (-0.06, 0.03)
 """Where the other starts ``hop`` begin, relative to the commanded apex, m."""
 
 
-class Starts:
+class ResetSampler:
     """Draws initial states.
 
     Raises:
@@ -23,7 +23,7 @@ class Starts:
         UsageError: A start asks for a leg length that the robot does not reach.
     """
 
-    def __init__(self, robot: Robot, options: TaskOptions) -> None:
+    def __init__(self, robot: Robot, options: TaskConfig) -> None:
         robot.require_leg()
         self.robot, self.options = robot, options
         lengths = (options.start_length, *options.drop_length)
@@ -46,13 +46,13 @@ class Starts:
             Base heights, m, (k,), and joint angles, rad, (k, 2).
         """
         count = len(command)
-        if self.options.start == "hop":
+        if self.options.reset_distribution == "hop":
             return self._hop(command, rng)
-        if self.options.start == "standing":
+        if self.options.reset_distribution == "standing":
             q, gap = np.tile(self._standing, (count, 1)), np.zeros(count)
         else:
             q, gap = self._drop(count, rng)
-        if self.options.start == "mixed":
+        if self.options.reset_distribution == "mixed":
             stands = rng.random(count) < 0.5
             q[stands], gap[stands] = self._standing, 0.0
         return kinematics.stance_height(self.robot, q) + gap, q

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from hopping_leg.controllers import Setup, roll_out
+from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.landing import LandingGains
-from hopping_leg.controllers.library import load_controller
-from hopping_leg.controllers.supervised import STAND_SECONDS, Mode, Supervised
+from hopping_leg.controllers.registry import load_controller
+from hopping_leg.controllers.stand_hop_land import STAND_SECONDS, Mode, StandHopLand
 from hopping_leg.errors import UsageError
 from hopping_leg.hops import find_hops
 from hopping_leg.robot import load_robot
@@ -18,8 +18,8 @@ COLUMNS = ("height_m", "height_rate_m_s", "foot_clearance_m")
 
 @pytest.fixture(scope="module")
 def hopped():
-    supervised = Supervised(load_controller("energy-shaping", ROBOT), ROBOT, 2)
-    return roll_out(supervised, Setup(ROBOT, threads=1), np.full((900, 4), 0.3), seed=11)
+    supervised = StandHopLand(load_controller("energy-shaping", ROBOT), ROBOT, 2)
+    return rollout(supervised, RolloutConfig(ROBOT, threads=1), np.full((900, 4), 0.3), seed=11)
 
 
 def test_it_hops_as_often_as_asked_and_ends_at_rest(hopped):
@@ -30,7 +30,7 @@ def test_it_hops_as_often_as_asked_and_ends_at_rest(hopped):
         assert hops.tick[0] > STAND_SECONDS * 200
     end = hopped.data["height_m"][-60:]
     assert np.ptp(end) < 0.002
-    np.testing.assert_allclose(end, Setup(ROBOT).standing_length + 0.01, atol=0.015)
+    np.testing.assert_allclose(end, RolloutConfig(ROBOT).standing_length + 0.01, atol=0.015)
     assert hopped.data["base_clearance_m"].min() > 0
 
 
@@ -46,8 +46,8 @@ def test_modes_follow_each_other_and_the_catch_is_in_the_air(hopped):
 
 
 def test_same_seed_same_run(hopped):
-    supervised = Supervised(load_controller("energy-shaping", ROBOT), ROBOT, 2)
-    again = roll_out(supervised, Setup(ROBOT, threads=1), np.full((900, 4), 0.3), seed=11)
+    supervised = StandHopLand(load_controller("energy-shaping", ROBOT), ROBOT, 2)
+    again = rollout(supervised, RolloutConfig(ROBOT, threads=1), np.full((900, 4), 0.3), seed=11)
     for name, values in hopped.data.items():
         np.testing.assert_array_equal(values, again.data[name])
 
@@ -55,7 +55,7 @@ def test_same_seed_same_run(hopped):
 @pytest.mark.parametrize("hops", [1, 3])
 def test_it_feels_nothing_but_joints(hops):
     """The same joint samples give the same torques, whatever the height was."""
-    supervised = Supervised(Spring(ROBOT), ROBOT, hops)
+    supervised = StandHopLand(Spring(ROBOT), ROBOT, hops)
     seen = []
 
     class Spy:
@@ -71,7 +71,7 @@ def test_it_feels_nothing_but_joints(hops):
         def internals(self):
             return {}
 
-    roll_out(Spy(), Setup(ROBOT, threads=1), np.full((500, 2), 0.3), seed=1)
+    rollout(Spy(), RolloutConfig(ROBOT, threads=1), np.full((500, 2), 0.3), seed=1)
     supervised.reset(2)
     for measurement, torque in seen:
         np.testing.assert_array_equal(supervised.act(measurement), torque)
@@ -82,7 +82,7 @@ def test_what_makes_no_sense_is_refused():
     spring = Spring(ROBOT)
     for controller, hops in ((spring, 0), (spring, -1), (None, 3)):
         with pytest.raises(UsageError, match="make no sense"):
-            Supervised(controller, ROBOT, hops)
+            StandHopLand(controller, ROBOT, hops)
     for wrong in ({"length": 1.2}, {"damping": -1.0}, {"stiffness": float("nan")}):
         with pytest.raises(UsageError, match=next(iter(wrong))):
             LandingGains(**wrong)
@@ -92,8 +92,10 @@ def test_what_makes_no_sense_is_refused():
 @pytest.mark.parametrize("name", ["fast", "energy-shaping"])
 def test_liftoffs_are_counted_under_noise_and_delay(name):
     hopper = load_controller(name, ROBOT)
-    supervised = Supervised(hopper, ROBOT, 1000)
-    run = roll_out(supervised, Setup(ROBOT, threads=1), np.tile([0.3, 0.35], (1600, 4)), seed=2)
+    supervised = StandHopLand(hopper, ROBOT, 1000)
+    run = rollout(
+        supervised, RolloutConfig(ROBOT, threads=1), np.tile([0.3, 0.35], (1600, 4)), seed=2
+    )
     made = [
         len(find_hops(*(run.data[column][:, leg] for column in COLUMNS)).apex) for leg in range(8)
     ]

@@ -5,8 +5,8 @@ import contextlib
 import numpy as np
 import pytest
 
-from hopping_leg.controllers.library import load_policy
-from hopping_leg.deploy.outings import Deployed
+from hopping_leg.controllers.registry import load_policy
+from hopping_leg.deploy.hardware_trials import Deployed
 from hopping_leg.emulator.lockstep import Lockstep
 from hopping_leg.emulator.start import Start
 from hopping_leg.errors import HardwareError

@@ -17,7 +17,7 @@ from hopping_leg.controllers.leg_view import LegView, view_leg
 from hopping_leg.controllers.liftoff_detector import LiftoffDetector
 from hopping_leg.controllers.posture import retraction
 from hopping_leg.controllers.protocol import Controller, Measurement
-from hopping_leg.controllers.rollout import Setup
+from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.errors import UsageError
 from hopping_leg.robot.model import GRAVITY
 from hopping_leg.robot.parameters import Robot
@@ -46,7 +46,7 @@ class Mode(IntEnum):
     """On the ground, giving way."""
 
 
-class Supervised:
+class StandHopLand:
     """Implements ``Controller`` around another one.
 
     Args:
@@ -76,7 +76,7 @@ class Supervised:
         self.name = "landing" if controller is None else controller.name
         self.robot, self.hops, self._controller, self._period = robot, hops, controller, 1 / rate
         self._dropped, self._gains = dropped, landing
-        setup = Setup(robot)
+        setup = RolloutConfig(robot)
         self._standing, self._posture = setup.standing_length, setup.start_posture
         self._stiffness, self._damping = (np.array(g) for g in vars(JointGains()).values())
         self._observer = DatedObserver(self._period, load_gains().gains.position_pull)

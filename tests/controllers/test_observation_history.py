@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hopping_leg.controllers.dated_track import DatedTrack
-from hopping_leg.controllers.layouts import Dated
+from hopping_leg.controllers.observation_history import Dated
+from hopping_leg.controllers.sample_history import SampleHistory
 from hopping_leg.sim.disturbance import Channel, Disturbance
 
 PERIOD = 0.005
@@ -26,7 +26,7 @@ def measurements(ticks, count=4, seed=0, disturbance=LATE):
 
 @given(seed=st.integers(0, 2**32 - 1))
 def test_every_known_sample_stands_at_its_tick(seed):
-    track = DatedTrack(15, PERIOD)
+    track = SampleHistory(15, PERIOD)
     track.reset(4)
     for tick, measurement in measurements(40, seed=seed):
         if tick == 0:
@@ -40,7 +40,7 @@ def test_every_known_sample_stands_at_its_tick(seed):
 
 
 def test_what_has_not_arrived_holds_the_sample_before():
-    track = DatedTrack(15, PERIOD)
+    track = SampleHistory(15, PERIOD)
     track.reset(4)
     for tick, measurement in measurements(60):
         if tick == 0:

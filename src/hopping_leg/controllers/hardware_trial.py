@@ -19,7 +19,7 @@ Steps = tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True)
-class Outing:
+class HardwareTrial:
     """What came back.
 
     Attributes:
@@ -38,13 +38,13 @@ class Outing:
     truth: Array | None = None
 
 
-class Outings(Protocol):
+class TrialRobot(Protocol):
     """A robot that can be sent on outings."""
 
     name: str
     """Of the robot."""
 
-    def hop(self, controller: Controller, steps: Steps, seed: int) -> Outing:
+    def hop(self, controller: Controller, steps: Steps, seed: int) -> HardwareTrial:
         """Let a controller hop from standing.
 
         Args:

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from hopping_leg.cli import main
-from hopping_leg.controllers import Setup, roll_out
-from hopping_leg.controllers.library import load_controller
-from hopping_leg.controllers.plug_in import is_plug_in
+from hopping_leg.controllers import RolloutConfig, rollout
+from hopping_leg.controllers.registry import load_controller
+from hopping_leg.controllers.user_controllers import is_user_controller
 from hopping_leg.errors import ControllerError, UsageError
 from hopping_leg.hops import find_hops
 from hopping_leg.robot import load_robot
@@ -65,7 +65,7 @@ def test_example_hops_with_every_leg_on_its_own():
     assert len(BOUNCER.read_text().splitlines()) <= 40
     controller = load_controller(f"{BOUNCER}:Bouncer", ROBOT)
     commands = np.tile([0.30, 0.35], (800, 1))
-    run = roll_out(controller, Setup(ROBOT, threads=1), commands, seed=3)
+    run = rollout(controller, RolloutConfig(ROBOT, threads=1), commands, seed=3)
     columns = [run.data[c] for c in ("height_m", "height_rate_m_s", "foot_clearance_m")]
     low, high = (find_hops(*(column[200:, leg] for column in columns)) for leg in (0, 1))
     assert len(low.apex) > 5
@@ -194,7 +194,7 @@ def test_an_edited_file_is_another_controller(tmp_path):
 
 def test_other_names_are_no_classes():
     assert not any(
-        is_plug_in(n) for n in ("fast", "a/b.onnx", "my.toml", "energy-shaping", "a b:c")
+        is_user_controller(n) for n in ("fast", "a/b.onnx", "my.toml", "energy-shaping", "a b:c")
     )
     with pytest.raises(UsageError, match=r"path/to/file\.py:CLASS"):
         load_controller("energy-shapin", ROBOT)

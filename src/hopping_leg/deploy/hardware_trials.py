@@ -12,7 +12,7 @@ from typing import Any
 
 import polars as pl
 
-from hopping_leg.controllers.outing import Outing, Steps
+from hopping_leg.controllers.hardware_trial import HardwareTrial, Steps
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.deploy.clock import Clock
 from hopping_leg.deploy.driver import MoteusLink
@@ -30,7 +30,7 @@ from hopping_leg.trace import Trace
 
 @dataclass(frozen=True)
 class Deployed:
-    """A leg behind a wire; implements ``Outings``.
+    """A leg behind a wire; implements ``TrialRobot``.
 
     Attributes:
         robot: As its file says.
@@ -55,7 +55,7 @@ class Deployed:
         """Of the robot."""
         return self.robot.name
 
-    def hop(self, controller: Controller, steps: Steps, seed: int) -> Outing:
+    def hop(self, controller: Controller, steps: Steps, seed: int) -> HardwareTrial:
         """Let a controller hop from standing.
 
         Raises:
@@ -90,4 +90,4 @@ class Deployed:
         if hopped.height < self.rate:
             raise HardwareError(f"The leg was stopped before it hopped: {cause}")
         complaint = "" if cause.reason is Reason.FINISHED else str(cause)
-        return Outing(Trace(hopped, done.trace.header), table.height / self.rate, complaint)
+        return HardwareTrial(Trace(hopped, done.trace.header), table.height / self.rate, complaint)

@@ -14,7 +14,7 @@ CLEARANCE_GAIN = 10.0
 """Scale of clearances, 1/m."""
 
 
-def true_state(legs: AnyLegs, command: Array, sample: Scaling, out: Array32) -> None:
+def privileged_observation(legs: AnyLegs, command: Array, sample: Scaling, out: Array32) -> None:
     """Write the normalised true state.
 
     Base height and rate, q (2), qd (2), command, clearance of foot, knee and base.

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hopping_leg.arrays import Array, IntArray
-from hopping_leg.controllers.dated_track import DatedTrack
-from hopping_leg.controllers.recent import Recent
+from hopping_leg.controllers.recent import RingBuffer
+from hopping_leg.controllers.sample_history import SampleHistory
 from hopping_leg.errors import PolicyError, unknown_name
 from hopping_leg.sim.disturbance import SAMPLES, Measurement
 
@@ -127,14 +127,14 @@ class Dated:
     shapes: ClassVar[dict[str, tuple[int, ...]]] = _dated_shapes(LAGS, TORQUE_LAGS)
 
     def __init__(self, period: float) -> None:
-        self._track = DatedTrack(max(*self.LAGS, LATEST) + 1, period)
+        self._track = SampleHistory(max(*self.LAGS, LATEST) + 1, period)
         self._lags, self._torque_lags = list(self.LAGS), list(self.TORQUE_LAGS)
         self.reset(0)
 
     def reset(self, count: int) -> None:
         """Forget everything."""
         self._track.reset(count)
-        self._torques = Recent(np.zeros((max(self.TORQUE_LAGS) + 1, count, 2)))
+        self._torques = RingBuffer(np.zeros((max(self.TORQUE_LAGS) + 1, count, 2)))
         self._command = np.zeros(count)
         self._fresh = True
 
@@ -184,7 +184,7 @@ class Dated:
     def restore(self, state: dict[str, Any]) -> None:
         """Go on from a ``state``."""
         self._track.restore(state["track"])
-        self._torques, self._command = Recent(state["torques"]), np.array(state["command"])
+        self._torques, self._command = RingBuffer(state["torques"]), np.array(state["command"])
         self._fresh = False
 
 

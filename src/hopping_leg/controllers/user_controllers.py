@@ -108,14 +108,14 @@ class PlugIn:
             ) from error
 
 
-def is_plug_in(name: str) -> bool:
+def is_user_controller(name: str) -> bool:
     """Tell whether a name means a Python class (or a Python file whose class was forgotten)."""
     source, _, wanted = name.rpartition(":")
     dotted = all(part.isidentifier() for part in source.split("."))
     return name.endswith(".py") or (wanted.isidentifier() and (source.endswith(".py") or dotted))
 
 
-def load_plug_in(name: str, robot: Robot, rate: float) -> PlugIn:
+def load_user_controller(name: str, robot: Robot, rate: float) -> PlugIn:
     """Make a controller from a Python class.
 
     Args:

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray, IntArray
-from hopping_leg.controllers.recent import Recent
+from hopping_leg.controllers.recent import RingBuffer
 from hopping_leg.sim.disturbance import Measurement
 
 
-class DatedTrack:
+class SampleHistory:
     """Joint samples of n legs by tick, newest first; a measurement's ages tell their places.
 
     Args:
@@ -24,9 +24,9 @@ class DatedTrack:
     def reset(self, count: int) -> None:
         """Forget everything; ``count`` legs follow."""
         self._legs = np.arange(count)[:, None]
-        self._known = Recent(np.zeros((self.length, count), np.bool_))
-        self._q = Recent(np.zeros((self.length, count, 2)))
-        self._qd = Recent(np.zeros((self.length, count, 2)))
+        self._known = RingBuffer(np.zeros((self.length, count), np.bool_))
+        self._q = RingBuffer(np.zeros((self.length, count, 2)))
+        self._qd = RingBuffer(np.zeros((self.length, count, 2)))
 
     @property
     def known(self) -> BoolArray:
