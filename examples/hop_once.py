@@ -6,7 +6,7 @@ import numpy as np
 
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.hops import find_hops
+from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import load_robot
 
 robot = load_robot("legv2-paper")

@@ -8,7 +8,7 @@ from hopping_leg.controllers.landing import LandingGains
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.controllers.stand_hop_land import STAND_SECONDS, Mode, StandHopLand
 from hopping_leg.errors import UsageError
-from hopping_leg.hops import find_hops
+from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import load_robot
 from tests.evaluate.conftest import Spring
 

@@ -11,7 +11,7 @@ from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.controllers.user_controllers import is_user_controller
 from hopping_leg.errors import ControllerError, UsageError
-from hopping_leg.hops import find_hops
+from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import load_robot
 from hopping_leg.sim.disturbance import Measurement
 

@@ -7,7 +7,7 @@ import pytest
 from hopping_leg.envs import HoppingTask, PaperReward, TaskConfig
 from hopping_leg.envs.observation import sample_scaling
 from hopping_leg.errors import UsageError
-from hopping_leg.hops import find_hops
+from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.kinematics import joint_angles
 from hopping_leg.sim import NOTHING

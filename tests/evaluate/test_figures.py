@@ -13,7 +13,7 @@ from hopping_leg.evaluate.figures import (
 )
 from hopping_leg.evaluate.gallery import draw_gallery, run_of
 from hopping_leg.evaluate.metrics import START_SECONDS
-from hopping_leg.hops import CLEAR, find_hops
+from hopping_leg.hop_detection import FLIGHT_CLEARANCE, find_hops
 from hopping_leg.trace import Trace
 
 
@@ -56,7 +56,7 @@ def test_phase_space_shows_flight_and_stance_of_ten_seconds(fixed):
     points = [len(axes.collections[0].get_offsets()) for axes in (flight, stance)]
     time = fixed.column("time_s")
     shown = (time >= START_SECONDS) & (time < START_SECONDS + 10)
-    in_flight = int((fixed.column("foot_clearance_m")[shown] >= CLEAR).sum())
+    in_flight = int((fixed.column("foot_clearance_m")[shown] >= FLIGHT_CLEARANCE).sum())
     assert points == [in_flight, int(shown.sum()) - in_flight]
 
 

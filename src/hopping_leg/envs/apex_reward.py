@@ -16,7 +16,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.envs.transition import Transition
-from hopping_leg.hops import CLEAR
+from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
 
@@ -122,7 +122,7 @@ class ApexReward:
     def __call__(self, transition: Transition) -> tuple[Array, Array]:
         """Return the reward, (n,), and its weighted parts before scaling, (n, 8)."""
         t, o = transition, self.options
-        flying = t.foot_clearance >= CLEAR
+        flying = t.foot_clearance >= FLIGHT_CLEARANCE
         if len(self._air) != len(flying):
             self._air, self._since = np.zeros(len(flying)), np.zeros(len(flying))
         self._air = np.where(flying, self._air + 1 / self._rate, 0.0)

@@ -12,7 +12,7 @@ from hopping_leg.envs.privileged_observation import PRIVILEGED, privileged_obser
 from hopping_leg.envs.reset import ResetSampler
 from hopping_leg.envs.step import Step
 from hopping_leg.envs.transition import Reward, Transition
-from hopping_leg.hops import CLEAR
+from hopping_leg.hop_detection import at_apex
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import Legs, Measurement, Plant
 from hopping_leg.sim.variants import places, vary
@@ -145,10 +145,9 @@ class HoppingTask:
         """Return which legs passed an in-flight apex, its height and error, m, (n,) each."""
         legs = self.legs
         rose, self._rises = self._rises, legs.height_rate > 0
-        peaked = rose > self._rises
-        if not np.count_nonzero(peaked):
+        if not np.count_nonzero(rose > self._rises):
             return self._never, self._nan, self._nan
-        apex = peaked & (legs.foot_clearance() >= CLEAR)
+        apex = at_apex(rose, self._rises, legs.foot_clearance())
         height = np.where(apex, np.maximum(height_before, legs.height), np.nan)
         return apex, height, height - self.command
 

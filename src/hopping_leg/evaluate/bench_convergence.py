@@ -13,7 +13,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.hops import find_hops
+from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import Robot
 from hopping_leg.robot.kinematics import joint_angles
 from hopping_leg.sim import NOTHING, Disturbance, Legs

@@ -31,7 +31,7 @@ from hopping_leg.evaluate.bench_inference import bench_inference
 from hopping_leg.evaluate.emulated_truth import Truth, apexes_of, watched
 from hopping_leg.evaluate.metrics import START_SECONDS
 from hopping_leg.evaluate.timing import host
-from hopping_leg.hops import find_hops
+from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.limits import SoftLimiter, SoftLimits
 from hopping_leg.robot.parameters import Robot

@@ -11,7 +11,7 @@ from scipy.signal import find_peaks
 from hopping_leg.deploy.sequence import Phase
 from hopping_leg.emulator.process import EmulatorProcess
 from hopping_leg.evaluate.metrics import START_SECONDS
-from hopping_leg.hops import BOUNCE, CLEAR
+from hopping_leg.hop_detection import BOUNCE, FLIGHT_CLEARANCE
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import Trace
@@ -59,7 +59,7 @@ def apexes_of(trace: Trace, truth: Truth) -> list[tuple[float, float]]:
         return []
     height, clearance = np.array(truth.height), np.array(truth.clearance)
     peaks, _ = find_peaks(height, prominence=BOUNCE)
-    peaks = peaks[clearance[peaks] >= CLEAR]
+    peaks = peaks[clearance[peaks] >= FLIGHT_CLEARANCE]
     time, part, command = (trace.column(name) for name in ("time_s", "part", "command_m"))
     at = np.array(truth.time)[peaks] - truth.time[-1] + time[-1]
     tick = np.clip(np.searchsorted(time, at), 0, len(time) - 1)

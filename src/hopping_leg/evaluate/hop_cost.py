@@ -8,7 +8,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import Rollout
 from hopping_leg.controllers.shaping_gains import ShapingGains
-from hopping_leg.hops import find_hops
+from hopping_leg.hop_detection import measure_hops
 
 SETTLED = 2.0
 """Hops before this do not count, s."""
@@ -49,18 +49,18 @@ class CommandScore:
 def score(rollout: Rollout, command: float, legs: slice) -> CommandScore:
     """Score the legs of a rollout that have one command."""
     data, kept = rollout.data, rollout.time >= SETTLED
+    period = rollout.time[1] - rollout.time[0]
     names = ("height_m", "height_rate_m_s", "foot_clearance_m")
-    columns = [data[name][kept, legs] for name in names]
-    count = columns[0].shape[1]
-    hops = [find_hops(*(c[:, i] for c in columns)) for i in range(count)]
+    columns = (data[name][kept, legs].T for name in names)
+    hops = [measure_hops(h, v, c, 1 / period) for h, v, c in zip(*columns, strict=True)]
     apex = np.concatenate([h.apex for h in hops])
-    settled = count * kept.sum() * (rollout.time[1] - rollout.time[0])
+    settled = len(hops) * kept.sum() * period
     return CommandScore(
         command,
         float(np.median(apex)) if len(apex) else float("nan"),
         float(np.std(apex)) if len(apex) else float("nan"),
         len(apex) / settled,
-        float(np.mean([h.in_flight for h in hops])),
+        sum(h.flight_ticks for h in hops) / sum(h.ticks for h in hops),
         float(data["knee_clearance_m"][kept, legs].min()),
         float(data["base_clearance_m"][kept, legs].min()),
     )

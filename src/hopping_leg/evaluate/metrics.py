@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.hops import count_skipped, find_bounces, find_hops
+from hopping_leg.hop_detection import measure_hops
 from hopping_leg.trace import Trace
 
 START_SECONDS = 2.0
@@ -75,17 +75,15 @@ def _window(trace: Trace, start: int, end: int, rate: float, drop: float) -> Win
     clearance = trace.column("foot_clearance_m")
     torque = np.stack([trace.column(f"{j}_torque_nm")[start:end] for j in ("hip", "knee")])
     first = min(start + round(drop * rate), end)
-    hops = find_hops(height[:end], trace.column("height_rate_m_s")[:end], clearance[:end])
-    counted = hops.tick >= first
-    bounces = find_bounces(height[:end], clearance[:end])
-    bounces = bounces[bounces >= first]
+    velocity = trace.column("height_rate_m_s")
+    hops = measure_hops(height[:end], velocity[:end], clearance[:end], rate, first)
     return Window(
         command=float(trace.column("command_m")[start]),
-        apex=hops.apex[counted],
-        settled=(end - first) / rate,
-        flight=float(hops.in_flight[first:].sum()) / rate,
-        skipped=count_skipped(hops.tick[counted], bounces, first, end, rate),
-        bounces=len(bounces),
+        apex=hops.apex,
+        settled=hops.ticks / rate,
+        flight=hops.flight_ticks / rate,
+        skipped=hops.skipped,
+        bounces=hops.bounces,
         min_height=float(height[start:end].min()),
         max_sink=max(0.0, float(-clearance[start:end].min())),
         base_contacts=_events(trace.column("base_clearance_m")[start:end] <= 0),
@@ -110,11 +108,9 @@ def _events(touching: BoolArray) -> int:
 def skipped_in_run(trace: Trace) -> int:
     """Count skipped hops of a whole run after its start, switches of command included."""
     rate = _rate(trace)
-    first = round(START_SECONDS * rate)
-    height, clearance = trace.column("height_m"), trace.column("foot_clearance_m")
-    ticks = find_hops(height, trace.column("height_rate_m_s"), clearance).tick
-    bounces = find_bounces(height, clearance)
-    return count_skipped(ticks[ticks >= first], bounces[bounces >= first], first, len(height), rate)
+    names = ("height_m", "height_rate_m_s", "foot_clearance_m")
+    height, velocity, clearance = map(trace.column, names)
+    return measure_hops(height, velocity, clearance, rate, round(START_SECONDS * rate)).skipped
 
 
 def pooled_apexes(windows: Sequence[Window]) -> Array:

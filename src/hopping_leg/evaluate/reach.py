@@ -16,7 +16,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.evaluate.keeper import Keeper
-from hopping_leg.hops import CLEAR
+from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.identify.cma import seeded_strategy
 from hopping_leg.robot.kinematics import foot_position, joint_angles
 from hopping_leg.robot.parameters import Robot
@@ -219,7 +219,7 @@ def hop(study: ReachStudy, ways: Array, limit: Array) -> list[Trial]:
     shortest = round(_SHORTEST_FLIGHT * legs.rate)
     trials = []
     for leg in range(count):
-        flying = clearance[first:, leg] >= CLEAR
+        flying = clearance[first:, leg] >= FLIGHT_CLEARANCE
         tops = flight_tops(height[first:, leg], flying, shortest)
         trials.append(
             Trial(

@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.arrays import Array
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.controllers.rollout import Rollout, RolloutConfig, rollout
-from hopping_leg.hops import count_skipped, find_bounces, find_hops
+from hopping_leg.hop_detection import HopMeasurement, measure_hops
 from hopping_leg.robot.parameters import Robot
 
 FIRST_SEED = 500
@@ -138,34 +137,27 @@ def as_rows(verdicts: list[Verdict]) -> list[dict[str, Any]]:
 
 def _verdict(runs: list[Rollout], command: float, legs: range, rate: float) -> Verdict:
     start = round(SETTLE * _SECONDS * rate)
-    apexes: list[Array] = []
-    skipped = contacts = ticks = flight = 0
-    lowest = np.inf
+    columns = ("height_m", "height_rate_m_s", "foot_clearance_m")
+    hops: list[HopMeasurement] = []
+    contacts, lowest = 0, np.inf
     for run in runs:
         for leg in legs:
             data = {name: values[:, leg] for name, values in run.data.items()}
-            height, clearance = data["height_m"], data["foot_clearance_m"]
-            found = find_hops(height, data["height_rate_m_s"], clearance)
-            counts = found.tick >= start
-            bounces = find_bounces(height, clearance)
-            apexes.append(found.apex[counts])
-            skipped += count_skipped(
-                found.tick[counts], bounces[bounces >= start], start, len(height), rate
-            )
+            height, velocity, clearance = (data[name] for name in columns)
+            hops.append(measure_hops(height, velocity, clearance, rate, start))
             body = np.minimum(data["base_clearance_m"], data["knee_clearance_m"])
             contacts += int((body <= 0).sum())
-            ticks += len(height) - start
-            flight += int(found.in_flight[start:].sum())
             lowest = min(lowest, float(height.min()))
-    apex = np.concatenate(apexes)
+    apex = np.concatenate([h.apex for h in hops])
+    ticks = sum(h.ticks for h in hops)
     return Verdict(
         command_m=command,
         median_error_m=float(np.median(apex) - command) if len(apex) else float("nan"),
         std_m=float(apex.std()) if len(apex) else float("nan"),
         hops=len(apex),
         hops_per_s=len(apex) * rate / ticks,
-        flight_fraction=flight / ticks,
-        skipped_hops=skipped,
+        flight_fraction=sum(h.flight_ticks for h in hops) / ticks,
+        skipped_hops=sum(h.skipped for h in hops),
         body_contact_ticks=contacts,
         min_height_m=lowest,
     )

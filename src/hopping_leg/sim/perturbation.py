@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.hops import CLEAR
+from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.legs import Legs
 
@@ -59,7 +59,7 @@ class Perturber:
             legs.push(self._force)
         rise = plan.ground[tick] - self.ground
         if rise.any():
-            room = legs.foot_clearance() >= CLEAR + np.maximum(rise, 0)
+            room = legs.foot_clearance() >= FLIGHT_CLEARANCE + np.maximum(rise, 0)
             rise = np.where(room, rise, 0.0)
             self.ground += rise
             legs.raise_ground(rise)

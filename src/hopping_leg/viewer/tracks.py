@@ -11,7 +11,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import TraceError
-from hopping_leg.hops import CLEAR, find_hops
+from hopping_leg.hop_detection import FLIGHT_CLEARANCE, find_hops
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import Trace
@@ -184,7 +184,9 @@ def load_track(path: Path, robot: Robot) -> Track:
 
 def in_flight(clearance: Array) -> Array:
     """Return 1 where the foot is in the air, 0 where it is not, NaN where that is unknown."""
-    return np.where(np.isfinite(clearance), (clearance >= CLEAR).astype(np.float64), np.nan)
+    return np.where(
+        np.isfinite(clearance), (clearance >= FLIGHT_CLEARANCE).astype(np.float64), np.nan
+    )
 
 
 def _filled(values: Array, before: float | None) -> Array:

@@ -7,7 +7,7 @@ import pytest
 
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.envs import ApexReward, HoppingTask, TaskConfig
-from hopping_leg.hops import find_hops
+from hopping_leg.hop_detection import find_hops
 from hopping_leg.rl.finetune.heard import Heard
 from hopping_leg.rl.finetune.hindsight import Hindsight
 from hopping_leg.rl.finetune.options import FinetuneOptions

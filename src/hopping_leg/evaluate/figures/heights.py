@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from hopping_leg.arrays import Array
 from hopping_leg.evaluate.figures.style import COMMAND_COLOUR, colour, panels, styled
 from hopping_leg.evaluate.metrics import START_SECONDS, SWITCH_SECONDS
-from hopping_leg.hops import find_hops
+from hopping_leg.hop_detection import find_hops
 from hopping_leg.trace import Trace
 
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.evaluate.figures.style import TORQUE_MAP, WIDTH, styled
 from hopping_leg.evaluate.metrics import START_SECONDS
-from hopping_leg.hops import CLEAR
+from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.trace import Trace
 
 SECONDS = 10.0
@@ -36,7 +36,7 @@ def draw_phase_space(trace: Trace, title: str = "") -> Figure:
         trace.column(f"knee_{name}")[chosen]
         for name in ("position_rad", "velocity_rad_s", "command_nm")
     )
-    flight = trace.column("foot_clearance_m")[chosen] >= CLEAR
+    flight = trace.column("foot_clearance_m")[chosen] >= FLIGHT_CLEARANCE
     figure = Figure(figsize=(WIDTH, 3.6), layout="constrained")
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
     limit = float(np.nanmax(np.abs(torque), initial=0.0)) or 1.0

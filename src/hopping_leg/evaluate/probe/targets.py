@@ -7,7 +7,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.controllers.phases import Phase
-from hopping_leg.hops import CLEAR
+from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 
 Truth = dict[str, Array]
 
@@ -33,7 +33,7 @@ class Target:
 
 
 def _flying(truth: Truth) -> BoolArray:
-    flying: BoolArray = truth["foot_clearance_m"] >= CLEAR
+    flying: BoolArray = truth["foot_clearance_m"] >= FLIGHT_CLEARANCE
     return flying
 
 

@@ -14,7 +14,7 @@ from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.evaluate.metrics import START_SECONDS
 from hopping_leg.evaluate.robustness.axes import axis_named
 from hopping_leg.evaluate.robustness.case import Case, times, with_numbers
-from hopping_leg.hops import Hops, find_hops
+from hopping_leg.hop_detection import Hops, find_hops
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.perturbation import Perturbation
 from hopping_leg.trace import Trace

@@ -10,7 +10,7 @@ from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.controllers.stand_hop_land import STAND_SECONDS, StandHopLand
 from hopping_leg.evaluate.metrics import measure
 from hopping_leg.evaluate.skills.impact import last_touchdown, peak_force
-from hopping_leg.hops import find_hops
+from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import Trace
 

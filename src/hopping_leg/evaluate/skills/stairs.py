@@ -8,7 +8,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.evaluate.metrics import START_SECONDS, measure, skipped_in_run
-from hopping_leg.hops import find_hops
+from hopping_leg.hop_detection import find_hops
 from hopping_leg.sim.perturbation import Perturbation
 from hopping_leg.trace import Trace
 

@@ -13,7 +13,7 @@ import numpy as np
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.controllers.height_estimate import flight_time_apex
 from hopping_leg.controllers.rollout import Rollout
-from hopping_leg.hops import find_hops
+from hopping_leg.hop_detection import find_hops
 from hopping_leg.rl.finetune.contact import Contact
 from hopping_leg.rl.finetune.heard import Heard
 from hopping_leg.rl.finetune.lines import robust_line

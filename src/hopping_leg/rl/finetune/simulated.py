@@ -19,7 +19,7 @@ from hopping_leg.controllers.hardware_trial import (
 )
 from hopping_leg.controllers.protocol import Controller, Measurement
 from hopping_leg.controllers.rollout import Rollout, RolloutConfig, rollout
-from hopping_leg.hops import find_hops
+from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import NOTHING, AnyLegs
 from hopping_leg.sim.perturbation import Perturbation

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from hopping_leg.hops import (
-    CLEAR,
+from hopping_leg.hop_detection import (
+    FLIGHT_CLEARANCE,
     USUAL_PERIOD,
     count_skipped,
     find_bounces,
@@ -42,7 +42,7 @@ def test_every_apex_is_found_within_a_tenth_of_a_millimetre():
 
 def test_a_maximum_with_the_foot_on_the_ground_is_no_apex_but_a_bounce():
     height, rate, gap = hopping([0.3] * 6)
-    grounded = np.minimum(gap, CLEAR / 2)
+    grounded = np.minimum(gap, FLIGHT_CLEARANCE / 2)
     assert len(find_hops(height, rate, grounded).apex) == 0
     assert len(find_bounces(height, grounded)) == 6
     assert len(find_bounces(height, gap)) == 0

@@ -11,7 +11,7 @@ from scipy.signal import find_peaks
 
 from hopping_leg.arrays import Array, BoolArray, IntArray
 
-CLEAR = 0.003
+FLIGHT_CLEARANCE = 0.003
 """Foot clearance that counts as flight, m."""
 
 BOUNCE = 0.01
@@ -29,6 +29,25 @@ base rise and fall more than once. Each of them counts as an apex, all of them a
 
 
 @dataclass(frozen=True)
+class HopMeasurement:
+    """What is measured of the hops in a stretch of a run.
+
+    Attributes:
+        apex: Base height at each apex, m, (hops,).
+        ticks: Length of the stretch.
+        flight_ticks: Ticks with the foot clear of the ground.
+        skipped: Hops that should have happened and did not.
+        bounces: Bounces that never left the ground.
+    """
+
+    apex: Array
+    ticks: int
+    flight_ticks: int
+    skipped: int
+    bounces: int
+
+
+@dataclass(frozen=True)
 class Hops:
     """Hops of one run.
 
@@ -43,29 +62,55 @@ class Hops:
     in_flight: BoolArray
 
 
-def at_apex(rate_before: Array, rate: Array, clearance: Array) -> BoolArray:
-    """Tell which legs have just passed an apex in flight.
+def at_apex(rose: BoolArray, rises: BoolArray, clearance: Array) -> BoolArray:
+    """Return where a leg has just passed an apex in flight, (...).
 
     Args:
-        rate_before: Base velocity one tick ago, m/s, (...).
-        rate: Base velocity now, m/s, (...).
+        rose: Whether the base rose one tick ago, (...).
+        rises: Whether it rises now, (...).
         clearance: Foot clearance now, m, (...).
     """
-    return (rate_before > 0) & (rate <= 0) & (clearance >= CLEAR)
+    apex: BoolArray = (rose > rises) & (clearance >= FLIGHT_CLEARANCE)
+    return apex
 
 
-def find_hops(height: Array, rate: Array, clearance: Array) -> Hops:
+def find_hops(height: Array, velocity: Array, clearance: Array) -> Hops:
     """Find every in-flight apex of a run.
 
     Args:
         height: Base height, m, (ticks,).
-        rate: Base velocity, m/s, (ticks,).
+        velocity: Base velocity, m/s, (ticks,).
         clearance: Foot clearance, m, (ticks,).
     """
-    passed = at_apex(rate[:-1], rate[1:], clearance[1:])
-    tick = np.flatnonzero(passed) + 1
+    rises = velocity > 0
+    tick = np.flatnonzero(at_apex(rises[:-1], rises[1:], clearance[1:])) + 1
     apex = np.maximum(height[tick], height[tick - 1])
-    return Hops(tick, apex, clearance >= CLEAR)
+    return Hops(tick, apex, clearance >= FLIGHT_CLEARANCE)
+
+
+def measure_hops(
+    height: Array, velocity: Array, clearance: Array, rate: float, first: int = 0
+) -> HopMeasurement:
+    """Measure the hops of a run from a tick on.
+
+    Args:
+        height: Base height, m, (ticks,).
+        velocity: Base velocity, m/s, (ticks,).
+        clearance: Foot clearance, m, (ticks,).
+        rate: Ticks per second, Hz.
+        first: Apexes and bounces before this tick do not count.
+    """
+    hops = find_hops(height, velocity, clearance)
+    counted = hops.tick >= first
+    bounces = find_bounces(height, clearance)
+    bounces = bounces[bounces >= first]
+    return HopMeasurement(
+        hops.apex[counted],
+        len(height) - first,
+        int(hops.in_flight[first:].sum()),
+        count_skipped(hops.tick[counted], bounces, first, len(height), rate),
+        len(bounces),
+    )
 
 
 def find_bounces(height: Array, clearance: Array) -> IntArray:
@@ -79,7 +124,7 @@ def find_bounces(height: Array, clearance: Array) -> IntArray:
         Index of each maximum that stands at least ``BOUNCE`` out of its surroundings, (bounces,).
     """
     peaks, _ = find_peaks(height, prominence=BOUNCE)
-    grounded: IntArray = peaks[clearance[peaks] < CLEAR]
+    grounded: IntArray = peaks[clearance[peaks] < FLIGHT_CLEARANCE]
     return grounded
 
 
