@@ -10,7 +10,7 @@ from hopping_leg.emulator.faults import KINDS
 from hopping_leg.evaluate.faults.families import FAMILIES
 from hopping_leg.evaluate.robustness.axes import AXES
 from hopping_leg.robot import load_robot
-from hopping_leg.robot.files import load_tree
+from hopping_leg.robot.robot_files import load_tree
 from hopping_leg.sim.twins import TWIN_RANGES
 from hopping_leg.trace import COLUMNS
 

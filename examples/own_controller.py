@@ -5,7 +5,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.robot import Robot, kinematics, load_robot
-from hopping_leg.sim.disturbance import Measurement
+from hopping_leg.sim.channel import Measurement
 
 
 class Spring:

@@ -9,7 +9,7 @@ from hopping_leg.controllers.phases import Phase
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.metrics import measure
 from hopping_leg.robot import load_robot
-from hopping_leg.sim import NOTHING
+from hopping_leg.sim import NO_NOISE
 
 ROBOT = load_robot("legv2-paper")
 COMMANDS = (0.25, 0.30, 0.35)
@@ -58,7 +58,7 @@ def test_estimated_apex_is_the_true_one(tuned):
 
 
 def test_legs_do_not_depend_on_their_neighbours():
-    setup = RolloutConfig(ROBOT, NOTHING, threads=1)
+    setup = RolloutConfig(ROBOT, NO_NOISE, threads=1)
     together = hop(tuned_energy_shaping(ROBOT), setup, seconds=2.0)
     alone = hop(tuned_energy_shaping(ROBOT), setup, commands=(0.35,), seconds=2.0)
     np.testing.assert_allclose(together.data["height_m"][:, 2], alone.data["height_m"][:, 0])
@@ -73,8 +73,8 @@ def test_reset_forgets_everything():
 @pytest.mark.slow
 def test_gain_rises_on_a_heavier_leg():
     base = replace(ROBOT.base, mass=ROBOT.base.mass + 0.2 * ROBOT.mass)
-    heavy = RolloutConfig(replace(ROBOT, base=base), NOTHING, threads=1)
-    light = RolloutConfig(ROBOT, NOTHING, threads=1)
+    heavy = RolloutConfig(replace(ROBOT, base=base), NO_NOISE, threads=1)
+    light = RolloutConfig(ROBOT, NO_NOISE, threads=1)
     runs = [hop(tuned_energy_shaping(ROBOT), s, (0.3,), 5.0) for s in (light, heavy)]
     gains = [r.data["gain_k"][-1, 0] for r in runs]
     medians = [np.median(measure(r.trace(0))[0].apex) for r in runs]
@@ -84,7 +84,7 @@ def test_gain_rises_on_a_heavier_leg():
 
 def test_literal_law_meets_the_command_when_it_knows_contact_and_height():
     controller = paper_energy_shaping(ROBOT, true_contact=True)
-    setup = RolloutConfig(ROBOT, NOTHING, threads=1)
+    setup = RolloutConfig(ROBOT, NO_NOISE, threads=1)
     run = hop(controller, setup)
     for leg in range(len(COMMANDS)):
         assert abs(np.median(measure(run.trace(leg))[0].error)) < 0.003
@@ -114,7 +114,7 @@ def test_options_that_need_the_truth_say_so():
     with pytest.raises(UsageError, match="simulation only"):
         hop(
             Blindfolded(paper_energy_shaping(ROBOT, true_contact=True)),
-            RolloutConfig(ROBOT, NOTHING),
+            RolloutConfig(ROBOT, NO_NOISE),
         )
 
 

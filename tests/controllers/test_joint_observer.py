@@ -1,7 +1,7 @@
 import numpy as np
 
 from hopping_leg.controllers.joint_observer import DatedObserver, LatestObserver
-from hopping_leg.sim.disturbance import Channel, Disturbance
+from hopping_leg.sim.channel import Channel, NoiseAndDelay
 
 PERIOD = 0.005
 
@@ -31,27 +31,27 @@ def swing(time, count):
 
 
 def test_undisturbed_state_passes_through():
-    q, qd = errors(Disturbance(0.0, 0.0, 0.0), gain=0.1)
+    q, qd = errors(NoiseAndDelay(0.0, 0.0, 0.0), gain=0.1)
     assert np.abs(q).max() < 1e-3
     assert np.abs(qd).max() < 1e-12
 
 
 def test_noise_of_positions_is_reduced_at_least_threefold():
-    noisy = Disturbance(delay_probability=0.0)
+    noisy = NoiseAndDelay(delay_probability=0.0)
     filtered, _ = errors(noisy, gain=0.06)
     raw, _ = errors(noisy, gain=0.06, observer=LatestObserver())
     assert filtered.std() < raw.std() / 3
 
 
 def test_late_samples_do_not_make_the_state_late():
-    late = Disturbance(0.0, 0.0, 0.5)
+    late = NoiseAndDelay(0.0, 0.0, 0.5)
     dated, _ = errors(late, gain=0.1)
     latest, _ = errors(late, gain=0.1, observer=LatestObserver())
     assert np.abs(dated).mean() < 0.25 * np.abs(latest).mean()
 
 
 def test_gain_may_differ_between_legs():
-    noisy = Disturbance(delay_probability=0.0)
+    noisy = NoiseAndDelay(delay_probability=0.0)
     gains = np.where(np.arange(50) < 25, 0.05, 1.0)
     q, _ = errors(noisy, gain=gains)
     assert q[:, :25].std() < 0.5 * q[:, 25:].std()

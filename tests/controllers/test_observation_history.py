@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from hopping_leg.controllers.observation_history import Dated
 from hopping_leg.controllers.sample_history import SampleHistory
-from hopping_leg.sim.disturbance import Channel, Disturbance
+from hopping_leg.sim.channel import Channel, NoiseAndDelay
 
 PERIOD = 0.005
-LATE = Disturbance(joint_noise=0.0, torque_noise=0.0)
+LATE = NoiseAndDelay(joint_noise=0.0, torque_noise=0.0)
 
 
 def measurements(ticks, count=4, seed=0, disturbance=LATE):
@@ -59,7 +59,7 @@ def test_what_has_not_arrived_holds_the_sample_before():
 def test_without_delay_the_lags_are_exact():
     layout = Dated(PERIOD)
     layout.reset(4)
-    quiet = Disturbance(0.0, 0.0, 0.0)
+    quiet = NoiseAndDelay(0.0, 0.0, 0.0)
     for tick, measurement in measurements(40, disturbance=quiet):
         layout.update(measurement, np.full((4, 2), tick - 1.0))
         inputs = layout.inputs()

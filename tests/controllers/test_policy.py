@@ -13,7 +13,7 @@ from hopping_leg.controllers.registry import controller_names, load_controller, 
 from hopping_leg.errors import PolicyError, UsageError
 from hopping_leg.rl.export import Network, build_policy, save_policy
 from hopping_leg.robot import load_robot
-from hopping_leg.sim.disturbance import Measurement
+from hopping_leg.sim.channel import Measurement
 
 ROBOT = load_robot("legv2-paper")
 CARD = Card("test", "three-samples", 0.22, 0.4, (8.0, 6.0), ROBOT.name, ROBOT.digest, 200.0)

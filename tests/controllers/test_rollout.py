@@ -6,7 +6,7 @@ import pytest
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.errors import PhysicsError, RobotError, UsageError
 from hopping_leg.robot import build_model, load_robot
-from hopping_leg.sim import NOTHING
+from hopping_leg.sim import NO_NOISE
 
 ROBOT = load_robot("legv2")
 
@@ -34,7 +34,7 @@ def with_shank(**changes):
 
 
 def test_a_rollout_records_states_before_and_torques_during_each_tick():
-    setup = RolloutConfig(ROBOT, NOTHING, threads=1)
+    setup = RolloutConfig(ROBOT, NO_NOISE, threads=1)
     run = rollout(Constant([0.5, -1.0]), setup, np.full((50, 3), 0.3), seed=0)
     np.testing.assert_allclose(run.data["hip_position_rad"][0], setup.start_posture[0])
     np.testing.assert_array_equal(run.data["knee_command_nm"], -1.0)
@@ -51,7 +51,7 @@ def test_legs_of_any_size_start_standing(length):
         with_shank(length=length, com=length / 3),
         thigh=dataclasses.replace(ROBOT.thigh, length=length, com=length / 3),
     )
-    setup = RolloutConfig(robot, NOTHING, threads=1)
+    setup = RolloutConfig(robot, NO_NOISE, threads=1)
     run = rollout(Constant([0, 0]), setup, np.full((2, 1), 0.3), seed=0)
     assert run.data["foot_clearance_m"][0, 0] == pytest.approx(0, abs=1e-9)
     assert np.isfinite(run.data["height_m"]).all()

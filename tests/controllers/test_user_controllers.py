@@ -13,7 +13,7 @@ from hopping_leg.controllers.user_controllers import is_user_controller
 from hopping_leg.errors import ControllerError, UsageError
 from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import load_robot
-from hopping_leg.sim.disturbance import Measurement
+from hopping_leg.sim.channel import Measurement
 
 ROBOT = load_robot("legv2-paper")
 BOUNCER = Path(__file__).parents[2] / "examples" / "bouncer.py"

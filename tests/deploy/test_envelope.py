@@ -5,7 +5,7 @@ from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.envelope import hopping_envelope, recording_envelope
 from hopping_leg.robot import load_robot
-from hopping_leg.sim import NOTHING
+from hopping_leg.sim import NO_NOISE
 
 LEG = load_robot("legv2-paper")
 
@@ -17,7 +17,7 @@ def test_who_hops_as_trained_is_not_stopped_for_it(name):
     limits = hopping_envelope(LEG, 200.0)
     commands = np.tile([0.25, 0.30, 0.35], (800, 1))
     run = rollout(
-        load_controller(name, LEG), RolloutConfig(LEG, NOTHING, threads=1), commands, seed=0
+        load_controller(name, LEG), RolloutConfig(LEG, NO_NOISE, threads=1), commands, seed=0
     )
     for joint, lower, upper in zip(("hip", "knee"), limits.lower, limits.upper, strict=True):
         angle = run.data[f"{joint}_position_rad"]

@@ -83,7 +83,7 @@ def test_a_stop_is_latched_until_the_operator_arms(course, state):
     for observation in course:
         observation = replace(
             observation,
-            operator=Operator.STOP if observation.operator is Operator.ARM else Operator.NOTHING,
+            operator=Operator.STOP if observation.operator is Operator.ARM else Operator.NO_NOISE,
         )
         memory, out = supervise(LIMITS, memory, observation)
         assert memory.state in (State.DAMPING, State.STOPPED)

@@ -79,9 +79,9 @@ def test_vector_env_is_the_batched_task():
 
 
 def test_single_and_vector_agree_on_a_motion_without_noise():
-    from hopping_leg.sim import NOTHING
+    from hopping_leg.sim import NO_NOISE
 
-    options = TaskConfig(commands=(0.3,), disturbance=NOTHING)
+    options = TaskConfig(commands=(0.3,), disturbance=NO_NOISE)
     env = gymnasium.make(ENV_ID, options=options)
     vector = gymnasium.make_vec(ENV_ID, num_envs=2, options=options)
     single, _ = env.reset(seed=0)

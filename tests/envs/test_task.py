@@ -10,8 +10,8 @@ from hopping_leg.errors import UsageError
 from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.kinematics import joint_angles
-from hopping_leg.sim import NOTHING
-from hopping_leg.sim.variants import SURPRISES
+from hopping_leg.sim import NO_NOISE
+from hopping_leg.sim.randomization import WIDE_RANGES
 
 ROBOT = load_robot("legv2-paper")
 BUSY = TaskConfig(
@@ -69,7 +69,7 @@ def test_the_state_is_arrays_and_plain_values():
 
 
 def test_observations_are_newest_first_and_normalised():
-    options = TaskConfig(disturbance=NOTHING)
+    options = TaskConfig(disturbance=NO_NOISE)
     quiet = task(options, count=2)
     scaling = sample_scaling(ROBOT, options)
     offset, gain = scaling.offset, scaling.gain
@@ -87,7 +87,7 @@ def test_observations_are_newest_first_and_normalised():
 
 
 def test_episodes_end_on_time_and_the_last_observation_is_kept():
-    timed = task(TaskConfig(episode=0.1, disturbance=NOTHING), count=3)
+    timed = task(TaskConfig(episode=0.1, disturbance=NO_NOISE), count=3)
     for tick in range(1, 41):
         step = timed.step(np.full((3, 2), 0.1))
         assert step.truncated.all() == (tick % 20 == 0)
@@ -120,7 +120,7 @@ def test_without_autoreset_a_leg_goes_on():
 
 
 def test_resetting_some_legs_leaves_the_others_alone():
-    some = task(TaskConfig(disturbance=NOTHING), count=4)
+    some = task(TaskConfig(disturbance=NO_NOISE), count=4)
     for action in actions(30, count=4):
         some.step(action)
     before = some.legs.batch.state.copy()
@@ -169,7 +169,7 @@ def test_drops_begin_above_the_ground_within_the_limits():
 
 
 def test_apexes_are_those_of_the_recorded_heights():
-    hopper = task(TaskConfig(action_torque=(10, 20), disturbance=NOTHING), count=1)
+    hopper = task(TaskConfig(action_torque=(10, 20), disturbance=NO_NOISE), count=1)
     postures = joint_angles(ROBOT, np.array([[0.15, 0.0], [0.26, 0.0]]))
     rows, apexes = [], []
     for tick in range(400):
@@ -189,12 +189,12 @@ def test_apexes_are_those_of_the_recorded_heights():
 
 def test_a_fall_ends_the_episode_only_if_asked():
     for clearance, falls in ((None, False), (0.05, True)):
-        limp = task(TaskConfig(fall_clearance=clearance, disturbance=NOTHING), count=1)
+        limp = task(TaskConfig(fall_clearance=clearance, disturbance=NO_NOISE), count=1)
         assert any(limp.step(np.zeros((1, 2))).terminated[0] for _ in range(100)) == falls
 
 
 def test_a_fall_costs_its_penalty_once():
-    options = TaskConfig(disturbance=NOTHING, fall_clearance=0.05)
+    options = TaskConfig(disturbance=NO_NOISE, fall_clearance=0.05)
     free, dear = task(options, count=1), task(replace(options, fall_penalty=7.0), count=1)
     for _ in range(100):
         a, b = free.step(np.zeros((1, 2))), dear.step(np.zeros((1, 2)))
@@ -206,7 +206,7 @@ def test_a_fall_costs_its_penalty_once():
 
 def test_a_restart_shows_nothing_of_the_last_episode():
     """A leg that begins anew sees as much of its past as one that never did anything."""
-    options = TaskConfig(observation="dated", episode=0.1, disturbance=NOTHING, commands=(0.3,))
+    options = TaskConfig(observation="dated", episode=0.1, disturbance=NO_NOISE, commands=(0.3,))
     first = task(options, count=2)
     fresh = first.reset()
     for action in actions(20, count=2):
@@ -218,7 +218,7 @@ def test_a_restart_shows_nothing_of_the_last_episode():
 
 def fall_apart(draws, **options):
     """Let legs change; return how high each is after a push each time, (draws, legs)."""
-    one = task(TaskConfig(randomised=SURPRISES, **options), count=6)
+    one = task(TaskConfig(randomised=WIDE_RANGES, **options), count=6)
     heights = []
     for draw in draws:
         one.randomize(draw)

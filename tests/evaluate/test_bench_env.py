@@ -5,7 +5,7 @@ from hopping_leg.envs import HoppingTask, PaperReward, TaskConfig
 from hopping_leg.evaluate.bench_env import EnvBenchmark, bench_env, record
 from hopping_leg.evaluate.timing import interleave
 from hopping_leg.robot import load_robot
-from hopping_leg.sim import Legs
+from hopping_leg.sim import MujocoSimulator
 
 ROBOT = load_robot("legv2-paper")
 
@@ -24,7 +24,7 @@ def test_bare_physics_repeats_the_very_same_motion():
     motion = record(task, 100)
     end = task.legs.state.copy()
     assert end[:, 0].max() > 0.15
-    bare = Legs(ROBOT, 3, threads=1)
+    bare = MujocoSimulator(ROBOT, 3, threads=1)
     bare.batch.state[:] = motion.start["physics"]
     for controls in motion.controls:
         bare.batch.ctrl = controls

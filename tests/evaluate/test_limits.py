@@ -9,7 +9,7 @@ from hopping_leg.evaluate import Candidate
 from hopping_leg.evaluate import limits as module
 from hopping_leg.evaluate.keeper import Keeper
 from hopping_leg.evaluate.limits import CONDITIONS, LimitsStudy, condense, measure_limits
-from hopping_leg.sim import NOTHING, Disturbance
+from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 
 OF = {"joint noise": "joint_noise", "torque noise": "torque_noise", "delay": "delay_probability"}
 
@@ -21,7 +21,7 @@ def by_name(name):
 
 @pytest.mark.parametrize(("words", "number"), OF.items())
 def test_one_disturbance_is_taken_away_or_left_alone(words, number):
-    everything, nothing = asdict(Disturbance()), asdict(NOTHING)
+    everything, nothing = asdict(NoiseAndDelay()), asdict(NO_NOISE)
     assert asdict(by_name(f"no {words}").disturbance) == {**everything, number: 0.0}
     alone = by_name(f"{words} alone").disturbance
     assert asdict(alone) == {**nothing, number: everything[number]}
@@ -42,7 +42,7 @@ def test_a_slow_ground_is_the_robots_own_but_slower(robot, spring, tmp_path, mon
     ground = robot.contact
     slow = (2 * ground.time_constant, ground.damping_ratio)
     assert grounds == [(ground.time_constant, ground.damping_ratio), slow, slow]
-    assert by_name("nothing, ground twice as slow").disturbance == NOTHING
+    assert by_name("nothing, ground twice as slow").disturbance == NO_NOISE
 
 
 def test_a_leg_that_nothing_disturbs_repeats_its_hops(robot, spring, tmp_path):

@@ -12,7 +12,7 @@ from hopping_leg.evaluate.runner import _note_stopped
 from hopping_leg.evaluate.runs import floor_robot, run_trials, save_traces
 from hopping_leg.evaluate.trials import Trial
 from hopping_leg.robot import load_robot
-from hopping_leg.sim import NOTHING, Disturbance
+from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 from hopping_leg.trace import Trace
 
 
@@ -140,9 +140,9 @@ def test_a_twin_under_the_papers_disturbance_is_noted(spring):
         found = evaluate(candidates, world, commands=[0.3], repeats=1, kinds=("fixed",))
         return " ".join(found.evaluation.notes)
 
-    assert "came on top" in notes("twin", Disturbance())
-    assert "came on top" not in notes("twin", NOTHING)
-    assert "came on top" not in notes("legv2-paper", Disturbance())
+    assert "came on top" in notes("twin", NoiseAndDelay())
+    assert "came on top" not in notes("twin", NO_NOISE)
+    assert "came on top" not in notes("legv2-paper", NoiseAndDelay())
 
 
 @pytest.mark.parametrize(("knee", "stopped"), [(-1.0, 0), (-0.05, 2), (-2.71, 2)])

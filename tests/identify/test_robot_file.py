@@ -7,7 +7,7 @@ import pytest
 from hopping_leg.errors import RobotError
 from hopping_leg.identify.robot_file import save_robot
 from hopping_leg.robot import load_robot
-from hopping_leg.robot.files import load_tree
+from hopping_leg.robot.robot_files import load_tree
 from tests.identify.fitting import TRUTH, identified
 
 

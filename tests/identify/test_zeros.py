@@ -10,7 +10,7 @@ from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.validate import open_loop
 from hopping_leg.identify.windows import cut
 from hopping_leg.identify.zeros import Zeros
-from hopping_leg.robot.files import load_robot
+from hopping_leg.robot.robot_files import load_robot
 from tests.identify.twin import STEP, record, swing
 
 PENDULUM = load_robot("doublependulum")

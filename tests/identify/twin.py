@@ -9,8 +9,8 @@ from hopping_leg.identify.recording import make_recording
 from hopping_leg.identify.rig_model import build_rig_model
 from hopping_leg.identify.setup import RecordingSetup
 from hopping_leg.robot import kinematics
-from hopping_leg.robot.files import load_robot
 from hopping_leg.robot.limits import MotorLimit
+from hopping_leg.robot.robot_files import load_robot
 
 STEP = 1e-3
 LEG = load_robot("legv2")

@@ -10,8 +10,8 @@ from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.export import build_policy
 from hopping_leg.rl.hop_watch import FROM, UNTIL
-from hopping_leg.robot.reality import Latency, Reality
-from hopping_leg.sim.variants import SURPRISES
+from hopping_leg.robot.model_mismatch import Latency, ModelMismatch
+from hopping_leg.sim.randomization import WIDE_RANGES
 from tests.rl.learners import ROBOT, TINY_ADAPTIVE, learner
 
 
@@ -80,7 +80,7 @@ def test_an_identified_leg_may_differ_too():
     leg = dataclasses.replace(
         ROBOT,
         knee=dataclasses.replace(ROBOT.knee, load_friction=0.1),
-        reality=Reality(latency=Latency(command=4.56e-3)),
+        reality=ModelMismatch(latency=Latency(command=4.56e-3)),
     )
     env = TINY_ADAPTIVE.make_env(leg, 0)
     env.reset()
@@ -91,7 +91,7 @@ def test_an_identified_leg_may_differ_too():
             seen, reward, _, _ = env.step_wait()
         assert np.isfinite(seen).all()
         assert np.isfinite(reward).all()
-        assert np.ptp(seen[:, -len(SURPRISES) :], axis=0).max() > 0
+        assert np.ptp(seen[:, -len(WIDE_RANGES) :], axis=0).max() > 0
 
 
 def test_what_a_student_learns_from_is_what_it_was_told():

@@ -10,7 +10,7 @@ import torch
 from hopping_leg.rl import precise
 from hopping_leg.rl.precise import PreciseRecipe
 from hopping_leg.rl.taught import foresee
-from hopping_leg.sim.variants import SURPRISES
+from hopping_leg.sim.randomization import WIDE_RANGES
 from tests.rl.learners import ROBOT, TINY_PRECISE, learner
 
 RECIPE = PreciseRecipe(num_envs=8, batch=512)
@@ -257,7 +257,7 @@ def test_the_papers_observation_can_be_taught_too():
 
 
 def test_legs_differ_for_the_policy_but_not_for_its_teacher():
-    task = dataclasses.replace(TINY_PRECISE.task, randomised=SURPRISES)
+    task = dataclasses.replace(TINY_PRECISE.task, randomised=WIDE_RANGES)
     recipe = dataclasses.replace(TINY_PRECISE, task=task)
     model = learner(recipe)
     apart = []

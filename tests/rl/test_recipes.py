@@ -20,7 +20,7 @@ from hopping_leg.rl.recipes import (
 from hopping_leg.rl.run_folder import RunFolder
 from hopping_leg.rl.scale import fit
 from hopping_leg.robot import load_robot
-from hopping_leg.sim.twins import Range
+from hopping_leg.sim.randomization import Range
 
 
 @given(

@@ -15,7 +15,7 @@ from hopping_leg.rl import judge
 from hopping_leg.rl import train as module
 from hopping_leg.rl.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
 from hopping_leg.rl.resumable import restore, state_of
-from hopping_leg.sim.variants import SURPRISES
+from hopping_leg.sim.randomization import WIDE_RANGES
 from tests.rl.learners import (
     ROBOT,
     TINY,
@@ -28,7 +28,7 @@ from tests.rl.learners import (
 )  # fmt: skip
 
 SURPRISED = dataclasses.replace(
-    TINY_PRECISE, task=dataclasses.replace(TINY_PRECISE.task, randomised=SURPRISES)
+    TINY_PRECISE, task=dataclasses.replace(TINY_PRECISE.task, randomised=WIDE_RANGES)
 )
 
 

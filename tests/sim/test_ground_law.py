@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.robot import build_model, kinematics, load_robot
-from hopping_leg.sim.ground_law import GroundLaw
+from hopping_leg.sim.pybullet.ground_law import GroundLaw
 
 
 def without_joint_friction(robot):

@@ -7,8 +7,8 @@ import pytest
 
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot
-from hopping_leg.robot.reality import Drive, Latency, Reality, Sensor
-from hopping_leg.sim import Legs
+from hopping_leg.robot.model_mismatch import Drive, Latency, ModelMismatch, Sensor
+from hopping_leg.sim import MujocoSimulator
 from hopping_leg.sim.perturbation import Perturbation, Perturber
 
 LEG = load_robot("legv2")
@@ -16,7 +16,7 @@ POSTURE = np.array([0.7, -1.4])
 
 
 def real(**parts):
-    return dataclasses.replace(LEG, reality=Reality(**parts))
+    return dataclasses.replace(LEG, reality=ModelMismatch(**parts))
 
 
 def both(**numbers):
@@ -44,13 +44,13 @@ def moved(legs, ticks=40, start=0):
 
 
 def standing(robot, count=1, **options):
-    legs = Legs(robot, count, threads=1, **options)
+    legs = MujocoSimulator(robot, count, threads=1, **options)
     legs.stand(slice(None), POSTURE, 0.05)
     return legs
 
 
 def test_legs_with_realities_of_their_own_move_as_each_does_alone():
-    together = moved(standing(LEG, len(DIFFERENT), variants=DIFFERENT))
+    together = moved(standing(LEG, len(DIFFERENT), robots=DIFFERENT))
     for index, robot in enumerate(DIFFERENT):
         alone = moved(standing(robot, detailed=True))
         np.testing.assert_allclose(together[:, index], alone[:, 0], atol=1e-9)
@@ -59,22 +59,22 @@ def test_legs_with_realities_of_their_own_move_as_each_does_alone():
 
 def test_backlash_of_different_width_but_not_beside_none():
     loose = [real(**both(backlash=width)) for width in (0.01, 0.05)]
-    together = moved(standing(LEG, 2, variants=loose))
+    together = moved(standing(LEG, 2, robots=loose))
     for index, robot in enumerate(loose):
         np.testing.assert_array_equal(together[:, index], moved(standing(robot))[:, 0])
     with pytest.raises(UsageError, match="backlash"):
-        Legs(LEG, 2, variants=[loose[0], LEG])
+        MujocoSimulator(LEG, 2, robots=[loose[0], LEG])
     with pytest.raises(UsageError, match="stiction"):
-        Legs(LEG, 2, variants=[LEG, real(**both(stiction=1.5))])
+        MujocoSimulator(LEG, 2, robots=[LEG, real(**both(stiction=1.5))])
 
 
 @pytest.mark.parametrize("detailed", [False, True])
 def test_becoming_the_same_changes_nothing_and_another_only_what_follows(detailed):
     plain = standing(LEG, 2, detailed=detailed)
     before = moved(plain, 20)
-    changed = standing(LEG, 2, variants=[LEG, LEG], detailed=detailed)
+    changed = standing(LEG, 2, robots=[LEG, LEG], detailed=detailed)
     np.testing.assert_array_equal(moved(changed, 20), before)
-    changed.become([LEG, DIFFERENT[4]])
+    changed.set_robots([LEG, DIFFERENT[4]])
     after, otherwise = moved(changed, 20, start=20), moved(plain, 20, start=20)
     np.testing.assert_array_equal(after[:, 0], otherwise[:, 0])
     assert np.abs(after[-1, 1] - otherwise[-1, 1]).max() > 1e-6
@@ -83,11 +83,11 @@ def test_becoming_the_same_changes_nothing_and_another_only_what_follows(detaile
 def test_a_delay_that_begins_keeps_the_command_under_way():
     legs = standing(LEG, detailed=True)
     legs.step(np.full((1, 2), 2.0))
-    legs.become([real(latency=Latency(command=0.005))])
+    legs.set_robots([real(latency=Latency(command=0.005))])
     np.testing.assert_allclose(legs.step(np.full((1, 2), -3.0)), 2.0)
     np.testing.assert_allclose(legs.step(np.zeros((1, 2))), -3.0)
     with pytest.raises(UsageError, match="detailed"):
-        standing(LEG).become(DIFFERENT[:1])
+        standing(LEG).set_robots(DIFFERENT[:1])
 
 
 def perturbed(legs, force=0.0, ground=0.0, ticks=40):
@@ -106,7 +106,9 @@ def test_a_push_changes_the_base_speed_by_impulse_over_mass(detailed):
     frictionless = dataclasses.replace(
         LEG, rail=dataclasses.replace(LEG.rail, friction=0, damping=0)
     )
-    pushed, free = (Legs(frictionless, 1, threads=1, detailed=detailed) for _ in range(2))
+    pushed, free = (
+        MujocoSimulator(frictionless, 1, threads=1, detailed=detailed) for _ in range(2)
+    )
     force, ticks = 20.0, 4
     perturber = perturbed(pushed, force)
     for legs in (pushed, free):
@@ -123,7 +125,7 @@ def test_a_push_changes_the_base_speed_by_impulse_over_mass(detailed):
 @pytest.mark.parametrize("detailed", [False, True])
 @pytest.mark.parametrize("rise", [0.03, -0.03])
 def test_ground_steps_shift_floor_and_clearance_once_the_foot_is_clear(detailed, rise):
-    legs = Legs(LEG, 2, threads=1, detailed=detailed)
+    legs = MujocoSimulator(LEG, 2, threads=1, detailed=detailed)
     legs.stand(slice(None), POSTURE, np.array([0.05, 0.0]))
     height, clearance = legs.height.copy(), legs.foot_clearance()
     perturber = perturbed(legs, ground=rise)

@@ -2,10 +2,11 @@ import pytest
 
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot
-from hopping_leg.robot.files import load_tree
+from hopping_leg.robot.robot_files import load_tree
 from hopping_leg.robot.writing import robot_text
-from hopping_leg.sim import Legs
-from hopping_leg.sim.twins import TWIN_RANGES, Range, draw_twin
+from hopping_leg.sim import MujocoSimulator
+from hopping_leg.sim.randomization import Range
+from hopping_leg.sim.twins import TWIN_RANGES, draw_twin
 
 
 def entry(tree, path):
@@ -45,7 +46,7 @@ def test_a_twin_can_extend_a_users_file(tmp_path):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_drawn_twins_are_simulated(seed):
-    legs = Legs(draw_twin(seed).robot, 1, threads=1)
+    legs = MujocoSimulator(draw_twin(seed).robot, 1, threads=1)
     legs.stand(slice(None), [0.7, -1.4])
     for _ in range(20):
         legs.step(10 * ([0.7, -1.4] - legs.measured_q) - 0.2 * legs.measured_qd)

@@ -5,7 +5,7 @@ import pytest
 
 from hopping_leg.errors import PhysicsError, RobotError, UsageError
 from hopping_leg.robot import load_robot
-from hopping_leg.robot.reality import Ground
+from hopping_leg.robot.model_mismatch import Ground
 from hopping_leg.viewer.live import Live
 from hopping_leg.viewer.world import World, usual_world
 

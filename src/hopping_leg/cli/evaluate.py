@@ -37,7 +37,7 @@ from hopping_leg.evaluate.runs import save_traces
 from hopping_leg.evaluate.terminal import print_tables
 from hopping_leg.evaluate.trials import KINDS
 from hopping_leg.robot import load_robot
-from hopping_leg.sim import CONTROL_RATE, NOTHING, Disturbance, Engine
+from hopping_leg.sim import CONTROL_RATE, NO_NOISE, Engine, NoiseAndDelay
 from hopping_leg.trace import write_atomically
 
 
@@ -101,7 +101,7 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
         args = _with_folder(args)
     _check(args)
     robot = load_robot(args.robot)
-    disturbance = Disturbance() if args.noise else NOTHING
+    disturbance = NoiseAndDelay() if args.noise else NO_NOISE
     setup = RolloutConfig(
         robot,
         disturbance,

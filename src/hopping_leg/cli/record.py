@@ -26,8 +26,8 @@ from hopping_leg.identify.excitation import load_excitation
 from hopping_leg.identify.playing import play
 from hopping_leg.identify.setup import Pair
 from hopping_leg.robot import load_robot
-from hopping_leg.robot.files import parent_robot
 from hopping_leg.robot.model import TIMESTEP
+from hopping_leg.robot.robot_files import parent_robot
 
 
 @dataclass(frozen=True)

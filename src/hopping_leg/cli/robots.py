@@ -20,7 +20,7 @@ from rich.table import Table
 from hopping_leg.json_files import write_json
 from hopping_leg.robot import Robot, build_model, load_robot, shipped_robots
 from hopping_leg.robot.fields import Tree
-from hopping_leg.robot.files import load_tree
+from hopping_leg.robot.robot_files import load_tree
 
 Target = tyro.conf.Positional[str]
 

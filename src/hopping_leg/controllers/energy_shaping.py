@@ -20,7 +20,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import CONTROL_RATE
-from hopping_leg.sim.disturbance import Measurement
+from hopping_leg.sim.channel import Measurement
 
 _BLIND_TICKS = 4
 """Ticks after a change of phase in which true contact still flickers."""

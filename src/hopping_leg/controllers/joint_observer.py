@@ -6,7 +6,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.controllers.sample_history import SampleHistory
-from hopping_leg.sim.disturbance import Measurement
+from hopping_leg.sim.channel import Measurement
 
 WINDOW = 11
 """Ticks in which a late sample may still arrive."""

@@ -13,7 +13,7 @@ from hopping_leg.arrays import Array, IntArray
 from hopping_leg.controllers.recent import RingBuffer
 from hopping_leg.controllers.sample_history import SampleHistory
 from hopping_leg.errors import PolicyError, unknown_name
-from hopping_leg.sim.disturbance import SAMPLES, Measurement
+from hopping_leg.sim.channel import SAMPLES, Measurement
 
 Inputs = dict[str, npt.NDArray[np.float32]]
 """Graph input to its array, (n, ...)."""

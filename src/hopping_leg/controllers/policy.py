@@ -18,7 +18,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.controllers.observation_history import Layout, make_layout
 from hopping_leg.errors import PolicyError, UsageError
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim.disturbance import Measurement
+from hopping_leg.sim.channel import Measurement
 
 SCHEMA = 1
 """Version of the policy file's layout."""

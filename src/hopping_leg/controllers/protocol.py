@@ -3,7 +3,7 @@
 from typing import Protocol
 
 from hopping_leg.arrays import Array
-from hopping_leg.sim.disturbance import Measurement
+from hopping_leg.sim.channel import Measurement
 
 __all__ = ["Controller", "Measurement"]
 

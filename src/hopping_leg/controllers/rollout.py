@@ -16,14 +16,14 @@ from hopping_leg.robot.limits import SoftLimits
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import (
     CONTROL_RATE,
-    AnyLegs,
-    Disturbance,
     Engine,
     Ground,
-    Legs,
+    MujocoSimulator,
+    NoiseAndDelay,
     Plant,
+    Simulator,
     check_ground,
-    make_legs,
+    make_simulator,
 )
 from hopping_leg.sim.perturbation import Perturbation, Perturber
 from hopping_leg.trace import Trace
@@ -57,7 +57,7 @@ class RolloutConfig:
     """Where a controller is tried: robot, disturbances, rates and start."""
 
     robot: Robot
-    disturbance: Disturbance = field(default_factory=Disturbance)
+    disturbance: NoiseAndDelay = field(default_factory=NoiseAndDelay)
     soft_limits: SoftLimits | None = field(default_factory=SoftLimits)
     rate: float = CONTROL_RATE
     """Control rate, Hz."""
@@ -104,7 +104,7 @@ class RolloutConfig:
 class PrivilegedController(Protocol):
     """A controller that looks at the simulated legs themselves: for studies, never for a robot."""
 
-    def watch(self, legs: AnyLegs) -> None:
+    def watch(self, legs: Simulator) -> None:
         """Take the legs, live; called before their first tick."""
         ...
 
@@ -135,7 +135,7 @@ def rollout(
     commands: Array,
     seed: int,
     on_tick: Callable[[int, int], None] | None = None,
-    on_legs: Callable[[AnyLegs], None] | None = None,
+    on_legs: Callable[[Simulator], None] | None = None,
     perturbation: Perturbation | None = None,
 ) -> Rollout:
     """Let a controller hop from a standing start.
@@ -198,8 +198,8 @@ def rollout(
     return Rollout(np.arange(ticks) / setup.rate, columns | internals, header)
 
 
-def _make_legs(setup: RolloutConfig, count: int) -> AnyLegs:
-    return make_legs(
+def _make_legs(setup: RolloutConfig, count: int) -> Simulator:
+    return make_simulator(
         setup.robot,
         count,
         engine=setup.engine,
@@ -214,13 +214,13 @@ def _perturb(setup: RolloutConfig, perturbation: Perturbation) -> Perturber:
     """Return what befalls newly made legs, which only MuJoCo's legs can suffer."""
     if setup.engine != "mujoco":
         raise UsageError(f"Perturbations need the engine mujoco, not {setup.engine}.")
-    legs = Legs(
+    legs = MujocoSimulator(
         setup.robot,
         len(perturbation.robots),
         rate=setup.rate,
         timestep=setup.timestep,
         threads=setup.threads,
-        variants=perturbation.robots,
+        robots=perturbation.robots,
         detailed=bool(perturbation.later),
     )
     return Perturber(perturbation, legs)
@@ -236,7 +236,7 @@ def _check_stable(data: Array, setup: RolloutConfig) -> None:
         )
 
 
-def _record_state(row: Array, legs: AnyLegs, command: Array) -> None:
+def _record_state(row: Array, legs: Simulator, command: Array) -> None:
     row[0], row[1] = legs.height, legs.height_rate
     row[2:4], row[4:6] = legs.q.T, legs.qd.T
     row[10], row[11], row[12] = legs.foot_clearance(), legs.knee_clearance(), legs.base_clearance()

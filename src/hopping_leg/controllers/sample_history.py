@@ -6,7 +6,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray, IntArray
 from hopping_leg.controllers.recent import RingBuffer
-from hopping_leg.sim.disturbance import Measurement
+from hopping_leg.sim.channel import Measurement
 
 
 class SampleHistory:

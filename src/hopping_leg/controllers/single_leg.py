@@ -16,7 +16,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.errors import ControllerError
 from hopping_leg.sim import CONTROL_RATE
-from hopping_leg.sim.disturbance import Measurement
+from hopping_leg.sim.channel import Measurement
 
 METHOD = "get_control_output"
 """What a controller of one leg is called by."""

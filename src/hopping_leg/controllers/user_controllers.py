@@ -22,7 +22,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.controllers.single_leg import METHOD, SingleLeg
 from hopping_leg.errors import ControllerError, HoppingLegError, unknown_name
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim.disturbance import Measurement
+from hopping_leg.sim.channel import Measurement
 from hopping_leg.trace import COLUMNS
 
 T = TypeVar("T")

@@ -162,7 +162,7 @@ class ControlLoop:
             return Operator.STOP
         if memory.state is State.DISARMED and tick >= _WARM_TICKS:
             return Operator.ARM
-        return Operator.NOTHING
+        return Operator.NO_NOISE
 
     def _note(self, memory: Memory, time: float) -> None:
         """Record a transition; begin the sequence with it."""

@@ -52,7 +52,7 @@ Replies = tuple[Reply | None, Reply | None]
 class Operator(Enum):
     """What the operator asked for since the last tick."""
 
-    NOTHING = 0
+    NO_NOISE = 0
     ARM = 1
     STOP = 2
 
@@ -74,7 +74,7 @@ class Observation:
     late: float
     replies: Replies
     wanted: Pair | None
-    operator: Operator = Operator.NOTHING
+    operator: Operator = Operator.NO_NOISE
     finished: bool = False
 
 

@@ -7,8 +7,8 @@ from typing import Literal, get_args
 from hopping_leg.errors import UsageError
 from hopping_leg.robot.limits import SoftLimits
 from hopping_leg.robot.model import TIMESTEP
-from hopping_leg.sim import CONTROL_RATE, Disturbance
-from hopping_leg.sim.twins import Range
+from hopping_leg.sim import CONTROL_RATE, NoiseAndDelay
+from hopping_leg.sim.randomization import Range
 
 ResetDistribution = Literal["standing", "drop", "mixed", "hop"]
 
@@ -58,7 +58,7 @@ class TaskConfig:
     """Control rate, Hz."""
     timestep: float = TIMESTEP
     """Physics step, s."""
-    disturbance: Disturbance = field(default_factory=Disturbance)
+    disturbance: NoiseAndDelay = field(default_factory=NoiseAndDelay)
     """Noise and delay; the paper trains with them."""
     randomised: tuple[Range, ...] = ()
     """Where each leg draws its own numbers instead of the robot's; none by default."""

@@ -2,7 +2,7 @@
 
 from hopping_leg.arrays import Array
 from hopping_leg.envs.observation import Array32, Scaling
-from hopping_leg.sim import AnyLegs
+from hopping_leg.sim import Simulator
 
 PRIVILEGED = 10
 """Entries of the true state, where all legs are the same."""
@@ -14,7 +14,7 @@ CLEARANCE_GAIN = 10.0
 """Scale of clearances, 1/m."""
 
 
-def privileged_observation(legs: AnyLegs, command: Array, sample: Scaling, out: Array32) -> None:
+def privileged_observation(legs: Simulator, command: Array, sample: Scaling, out: Array32) -> None:
     """Write the normalised true state.
 
     Base height and rate, q (2), qd (2), command, clearance of foot, knee and base.

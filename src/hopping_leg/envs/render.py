@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import build_model
-from hopping_leg.sim import Legs
+from hopping_leg.sim import MujocoSimulator
 
 Image = npt.NDArray[np.uint8]
 
@@ -25,7 +25,7 @@ class Camera:
         UsageError: This computer offers no OpenGL.
     """
 
-    def __init__(self, legs: Legs, width: int = 640, height: int = 480) -> None:
+    def __init__(self, legs: MujocoSimulator, width: int = 640, height: int = 480) -> None:
         self.legs = legs
         self._model = build_model(legs.robot)
         self._data = mujoco.MjData(self._model)

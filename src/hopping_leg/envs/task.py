@@ -14,8 +14,7 @@ from hopping_leg.envs.step import Step
 from hopping_leg.envs.transition import Reward, Transition
 from hopping_leg.hop_detection import at_apex
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim import Legs, Measurement, Plant
-from hopping_leg.sim.variants import places, vary
+from hopping_leg.sim import Measurement, MujocoSimulator, Plant, randomization
 
 
 class HoppingTask:
@@ -48,7 +47,7 @@ class HoppingTask:
         noise, self._rng, draws = rng.spawn(3)
         self._draw_seed, self._draw = int(draws.integers(2**62)), 0
         self._numbers = np.zeros((count, len(options.randomised)))
-        self.legs = Legs(
+        self.legs = MujocoSimulator(
             robot,
             count,
             rate=options.rate,
@@ -86,11 +85,13 @@ class HoppingTask:
         if not ranges or draw == self._draw:
             return
         rng = np.random.default_rng([self._draw_seed, draw])
-        drawn = vary(self.robot, ranges, self.count, rng, self.options.randomize_probability)
+        drawn = randomization.sample(
+            self.robot, ranges, self.count, rng, self.options.randomize_probability
+        )
         same = np.diff(np.floor(self.options.nominal_fraction * np.arange(self.count + 1))) > 0
         variants = [self.robot if s else d for s, d in zip(same, drawn, strict=True)]
-        self.legs.become(variants)
-        self._numbers, self._draw = places(self.robot, variants, ranges), draw
+        self.legs.set_robots(variants)
+        self._numbers, self._draw = randomization.normalized(self.robot, variants, ranges), draw
 
     @property
     def privileged_size(self) -> int:
@@ -167,7 +168,7 @@ class HoppingTask:
         """Return everything needed to go on exactly from here, as arrays and plain values."""
         return {
             "physics": self.legs.batch.state.copy(),
-            "waiting": self.legs.waiting.copy(),
+            "waiting": self.legs.pending_torque.copy(),
             "channel": self.plant.channel.state(),
             "command": self.command.copy(),
             "tick": self._tick,
@@ -184,7 +185,7 @@ class HoppingTask:
         """Go on from a ``state``; return the observations, (n, size)."""
         self.legs.batch.state[:] = state["physics"]
         if "waiting" in state:
-            self.legs.waiting = state["waiting"].copy()
+            self.legs.pending_torque = state["waiting"].copy()
         self.plant.channel.restore(state["channel"])
         self.command[:] = state["command"]
         self._tick = int(state["tick"])

@@ -16,7 +16,7 @@ from hopping_leg.controllers.registry import load_controller
 from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import Robot
 from hopping_leg.robot.kinematics import joint_angles
-from hopping_leg.sim import NOTHING, Disturbance, Legs
+from hopping_leg.sim import NO_NOISE, MujocoSimulator, NoiseAndDelay
 
 REFERENCE = 6.25e-5
 """Physics step that the others are compared with, s."""
@@ -108,8 +108,8 @@ def _motions(study: ConvergenceStudy, robot: Robot, step: float) -> _Motions:
     apexes: dict[str, dict[str, list[Array]]] = {}
     first: dict[str, Array] = {}
     for name in study.controllers:
-        quiet = _hop(study, robot, step, name, NOTHING, seeds=1)
-        noisy = _hop(study, robot, step, name, Disturbance(), study.seeds)
+        quiet = _hop(study, robot, step, name, NO_NOISE, seeds=1)
+        noisy = _hop(study, robot, step, name, NoiseAndDelay(), study.seeds)
         first[name] = np.array([_padded(leg[0], _FIRST_HOPS) for leg in quiet])
         settled = {"quiet": quiet, "noisy": noisy}
         apexes[name] = {
@@ -128,7 +128,7 @@ def _hop(
     robot: Robot,
     step: float,
     name: str,
-    disturbance: Disturbance,
+    disturbance: NoiseAndDelay,
     seeds: int,
 ) -> list[Leg]:
     """Let a controller hop; legs are ordered by command, then seed."""
@@ -174,7 +174,7 @@ def _held(
     robot: Robot, step: float, length: Callable[[float], float], clearance: float, seconds: float
 ) -> Array:
     """Track leg lengths (over the straight leg's) by joint PD; return the height, (ticks,)."""
-    legs = Legs(robot, 1, timestep=step, threads=1)
+    legs = MujocoSimulator(robot, 1, timestep=step, threads=1)
     reach = robot.thigh.length + robot.shank.length
     legs.stand(slice(None), joint_angles(robot, np.array([length(0.0) * reach, 0.0])), clearance)
     heights = np.empty(round(seconds * legs.rate))

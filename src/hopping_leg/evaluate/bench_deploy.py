@@ -35,7 +35,7 @@ from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.limits import SoftLimiter, SoftLimits
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim import CONTROL_RATE, NOTHING
+from hopping_leg.sim import CONTROL_RATE, NO_NOISE
 from hopping_leg.trace import Trace
 
 HEIGHTS = (0.25, 0.30, 0.35)
@@ -163,7 +163,7 @@ def _heights(
 def _in_process(study: Study, robot: Robot, height: float) -> float | None:
     controller = load_controller(study.controller, robot)
     commands = np.full((round(study.seconds * CONTROL_RATE), 1), height)
-    trace = rollout(controller, RolloutConfig(robot, NOTHING), commands, seed=0).trace(0)
+    trace = rollout(controller, RolloutConfig(robot, NO_NOISE), commands, seed=0).trace(0)
     hops = find_hops(
         trace.column("height_m"),
         trace.column("height_rate_m_s"),

@@ -13,7 +13,7 @@ from hopping_leg.controllers.energy_shaping import EnergyShaping
 from hopping_leg.evaluate.estimator import APEX, apex_errors
 from hopping_leg.evaluate.metrics import Window, measure, pooled_apexes
 from hopping_leg.robot import Robot, load_robot
-from hopping_leg.sim import CONTROL_RATE, NOTHING, Disturbance
+from hopping_leg.sim import CONTROL_RATE, NO_NOISE, NoiseAndDelay
 from hopping_leg.trace import Trace
 
 COMMANDS = (0.25, 0.30, 0.35)
@@ -41,7 +41,7 @@ class Case:
     name: str
     controller: EnergyShaping
     robot: Robot
-    disturbance: Disturbance = field(default_factory=Disturbance)
+    disturbance: NoiseAndDelay = field(default_factory=NoiseAndDelay)
     commands: Sequence[float] = COMMANDS
 
 
@@ -55,13 +55,13 @@ def cases(robot: Robot) -> list[Case]:
     fast = 2 * CONTROL_RATE
     return [
         Case("tuned", tuned, robot, commands=RANGE),
-        Case("tuned, undisturbed", tuned, robot, NOTHING, RANGE),
+        Case("tuned, undisturbed", tuned, robot, NO_NOISE, RANGE),
         Case("tuned, 400 Hz", tuned_energy_shaping(robot, rate=fast), robot),
-        Case("paper, true contact and height", knowing, robot, NOTHING),
+        Case("paper, true contact and height", knowing, robot, NO_NOISE),
         Case("paper, true contact and height, disturbed", knowing, robot),
-        Case("paper, push until contact is lost", waiting, robot, NOTHING),
+        Case("paper, push until contact is lost", waiting, robot, NO_NOISE),
         Case("paper", paper, robot),
-        Case("paper, undisturbed", paper, robot, NOTHING),
+        Case("paper, undisturbed", paper, robot, NO_NOISE),
         Case("paper, 400 Hz", paper_energy_shaping(robot, rate=fast), robot),
         *_noise_shares(tuned, robot),
         *_ablations(tuned, robot),
@@ -70,9 +70,9 @@ def cases(robot: Robot) -> list[Case]:
 
 
 def _noise_shares(tuned: EnergyShaping, robot: Robot) -> list[Case]:
-    joint = replace(NOTHING, joint_noise=Disturbance.joint_noise)
-    torque = replace(NOTHING, torque_noise=Disturbance.torque_noise)
-    delay = replace(NOTHING, delay_probability=Disturbance.delay_probability)
+    joint = replace(NO_NOISE, joint_noise=NoiseAndDelay.joint_noise)
+    torque = replace(NO_NOISE, torque_noise=NoiseAndDelay.torque_noise)
+    delay = replace(NO_NOISE, delay_probability=NoiseAndDelay.delay_probability)
     return [
         Case("tuned, joint noise only", tuned, robot, joint),
         Case("tuned, torque noise only", tuned, robot, torque),

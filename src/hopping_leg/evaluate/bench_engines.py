@@ -25,8 +25,8 @@ from hopping_leg.evaluate.trials import FIXED_SECONDS
 from hopping_leg.robot import Robot
 from hopping_leg.robot.kinematics import joint_angles
 from hopping_leg.robot.model import TIMESTEP
-from hopping_leg.sim import CONTROL_RATE, Engine, Ground, make_legs
-from hopping_leg.sim.bullet_world import import_pybullet
+from hopping_leg.sim import CONTROL_RATE, Engine, Ground, make_simulator
+from hopping_leg.sim.pybullet.world import import_pybullet
 
 BAR = 0.015
 """Largest median error that a controller may have in the other engine, m."""
@@ -201,7 +201,7 @@ def _drop(study: EnginesStudy, world: World) -> dict[str, Any]:
     setup = on_floor(
         RolloutConfig(study.robot, engine=world.engine, ground=world.ground), world.floor
     )
-    legs = make_legs(
+    legs = make_simulator(
         setup.robot,
         1,
         engine=setup.engine,

@@ -18,7 +18,7 @@ from hopping_leg.envs import HoppingEnv, HoppingTask, PaperReward, TaskConfig
 from hopping_leg.evaluate.timing import Timed, host, interleave, median_ratio
 from hopping_leg.robot import Robot, build_model
 from hopping_leg.robot.kinematics import joint_angles
-from hopping_leg.sim import Legs
+from hopping_leg.sim import MujocoSimulator
 
 _BENT, _STRETCHED = 0.55, 0.8
 """Leg lengths of the recorded motion over the straight leg's."""
@@ -134,8 +134,10 @@ def _functions(benchmark: EnvBenchmark) -> tuple[Mapping[str, Timed], Mapping[st
     env = HoppingEnv(robot, options)
     env.reset(seed=benchmark.seed)
     one = record(env.task, benchmark.single_ticks)
-    bare = Legs(robot, benchmark.count, timestep=benchmark.timestep, threads=benchmark.threads)
-    lone = Legs(robot, 1, timestep=benchmark.timestep, threads=1)
+    bare = MujocoSimulator(
+        robot, benchmark.count, timestep=benchmark.timestep, threads=benchmark.threads
+    )
+    lone = MujocoSimulator(robot, 1, timestep=benchmark.timestep, threads=1)
     hopper = gymnasium.make(
         "Hopper-v5", frame_skip=bare.substeps, terminate_when_unhealthy=False
     ).unwrapped
@@ -185,7 +187,7 @@ def _run_env(env: HoppingEnv, motion: Motion) -> None:
         env.step(action)
 
 
-def _run_batch(legs: Legs, motion: Motion) -> None:
+def _run_batch(legs: MujocoSimulator, motion: Motion) -> None:
     legs.batch.state[:] = motion.start["physics"]
     control, substeps = legs.batch.bind("ctrl"), legs.substeps
     for row in motion.controls:
@@ -193,7 +195,7 @@ def _run_batch(legs: Legs, motion: Motion) -> None:
         legs.batch.step(nstep=substeps)
 
 
-def _mj_step(legs: Legs, motion: Motion) -> Timed:
+def _mj_step(legs: MujocoSimulator, motion: Motion) -> Timed:
     """Return the plainest physics there is: MuJoCo's own step on one leg."""
     model = build_model(legs.robot, legs.timestep)
     data = mujoco.MjData(model)

@@ -20,7 +20,7 @@ from hopping_leg.identify.overlay import RESTART, Overlay, overlays
 from hopping_leg.identify.result import Identified, as_json, parameters_json, quality_json
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.fields import Tree
-from hopping_leg.robot.files import load_tree
+from hopping_leg.robot.robot_files import load_tree
 
 _CAD, _PAPER = "legv2", "legv2-paper"
 _UNITS = {"rad": ("mrad", 1e3), "N m": ("N m", 1.0)}

@@ -20,9 +20,9 @@ from hopping_leg.evaluate.robustness.case import times
 from hopping_leg.evaluate.runner import evaluate, software_versions
 from hopping_leg.evaluate.runs import safe_name
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim import NOTHING, Disturbance
+from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 
-_FULL = Disturbance()
+_FULL = NoiseAndDelay()
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Condition:
     """
 
     name: str
-    disturbance: Disturbance
+    disturbance: NoiseAndDelay
     floor: str = "soft"
     slowness: float = 1.0
 
@@ -47,13 +47,13 @@ CONDITIONS = (
     Condition("no joint noise", replace(_FULL, joint_noise=0.0)),
     Condition("no torque noise", replace(_FULL, torque_noise=0.0)),
     Condition("no delay", replace(_FULL, delay_probability=0.0)),
-    Condition("joint noise alone", replace(NOTHING, joint_noise=_FULL.joint_noise)),
-    Condition("torque noise alone", replace(NOTHING, torque_noise=_FULL.torque_noise)),
-    Condition("delay alone", replace(NOTHING, delay_probability=_FULL.delay_probability)),
-    Condition("nothing", NOTHING),
+    Condition("joint noise alone", replace(NO_NOISE, joint_noise=_FULL.joint_noise)),
+    Condition("torque noise alone", replace(NO_NOISE, torque_noise=_FULL.torque_noise)),
+    Condition("delay alone", replace(NO_NOISE, delay_probability=_FULL.delay_probability)),
+    Condition("nothing", NO_NOISE),
     Condition("all of it, stiff ground", _FULL, floor="stiff"),
     Condition("all of it, ground twice as slow", _FULL, slowness=2.0),
-    Condition("nothing, ground twice as slow", NOTHING, slowness=2.0),
+    Condition("nothing, ground twice as slow", NO_NOISE, slowness=2.0),
 )
 """The paper's noise and delay, with one less, one alone, none, and on other ground."""
 

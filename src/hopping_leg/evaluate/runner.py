@@ -17,7 +17,7 @@ from hopping_leg.evaluate.runs import FLOORS, Run, on_floor, run_trials
 from hopping_leg.evaluate.tables import tabulate
 from hopping_leg.evaluate.trials import KINDS, Trial, check_reach, paper_trials, within
 from hopping_leg.robot.model import TIMESTEP
-from hopping_leg.sim import NOTHING, Engine
+from hopping_leg.sim import NO_NOISE, Engine
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ def _note_coarse(timestep: float) -> list[str]:
 
 def _note_twice(setup: RolloutConfig) -> list[str]:
     """Say so where noise and delay come from two sides."""
-    if setup.robot.reality.only_delays or setup.disturbance == NOTHING:
+    if setup.robot.reality.only_delays or setup.disturbance == NO_NOISE:
         return []
     return [
         f"{setup.robot.name} brings latency, noise and losses of its own, and the paper's noise and"

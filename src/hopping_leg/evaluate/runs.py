@@ -11,8 +11,8 @@ import numpy as np
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.evaluate.trials import Trial
+from hopping_leg.robot.model_mismatch import Ground
 from hopping_leg.robot.parameters import Contact, Robot
-from hopping_leg.robot.reality import Ground
 from hopping_leg.trace import Trace
 
 FLOORS = {"soft": "the robot's own contact", "stiff": "MuJoCo's default contact, solref 0.02 1"}

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from hopping_leg.errors import RecordingError, RobotError, UsageError
 from hopping_leg.identify.recording import Recording
-from hopping_leg.robot.files import load_robot
 from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.robot_files import load_robot
 
 _TOLERANCE = 0.2
 """Share by which link lengths may differ between files of one leg."""

@@ -33,8 +33,8 @@ from hopping_leg.identify.setup import Rig
 from hopping_leg.identify.validate import Validation
 from hopping_leg.identify.windows import cut
 from hopping_leg.robot.fields import check_physics
+from hopping_leg.robot.model_mismatch import NO_MISMATCH
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.robot.reality import NEUTRAL
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def identify(
     options = options or IdentifyOptions()
     if seed < 0 or options.threads < 0:
         raise UsageError("The seed and the number of threads must not be negative.")
-    robot = dataclasses.replace(robot, reality=NEUTRAL)
+    robot = dataclasses.replace(robot, reality=NO_MISMATCH)
     check_owner([*recordings, *validate], robot)
     check_commands([*recordings, *validate])
     plan = make_plan(

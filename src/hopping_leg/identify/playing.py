@@ -13,7 +13,7 @@ from hopping_leg.identify.recording import Recording, make_recording
 from hopping_leg.identify.setup import Quantisation, RecordingSetup
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim import NOTHING, Legs, Plant
+from hopping_leg.sim import NO_NOISE, MujocoSimulator, Plant
 
 _IMPOSSIBLE = 1e4
 """Joint speed that no leg reaches, rad/s."""
@@ -49,8 +49,10 @@ def play(
     """
     gains = gains or JointGains()
     fixed = excitation.rig == "fixed-base"
-    legs = Legs(robot, 1, rate=excitation.rate, timestep=timestep, threads=1, clamped=fixed)
-    plant = Plant(legs, NOTHING, None, np.random.default_rng(seed))
+    legs = MujocoSimulator(
+        robot, 1, rate=excitation.rate, timestep=timestep, threads=1, clamped=fixed
+    )
+    plant = Plant(legs, NO_NOISE, None, np.random.default_rng(seed))
     controller = JointPD(excitation.position, excitation.velocity, gains)
     start = excitation.position[0]
     if fixed:

@@ -11,7 +11,7 @@ from hopping_leg.identify.result import (
     software_versions,
 )
 from hopping_leg.robot.fields import Tree
-from hopping_leg.robot.files import load_tree, robot_from_tree
+from hopping_leg.robot.robot_files import load_tree, robot_from_tree
 from hopping_leg.robot.writing import robot_text
 from hopping_leg.trace import write_atomically
 

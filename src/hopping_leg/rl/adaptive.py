@@ -22,7 +22,7 @@ from hopping_leg.rl.aiming import Aiming, AimingStudent, Places
 from hopping_leg.rl.export import Network
 from hopping_leg.rl.precise import PreciseRecipe
 from hopping_leg.rl.vecenv import TaskVecEnv
-from hopping_leg.sim.variants import SURPRISES
+from hopping_leg.sim.randomization import WIDE_RANGES
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class AdaptiveRecipe(PreciseRecipe):
             PreciseRecipe().task,
             command_range=(0.20, 0.42),
             command_skew=1.0,
-            randomised=SURPRISES,
+            randomised=WIDE_RANGES,
             randomize_probability=0.5,
             nominal_fraction=0.5,
         )

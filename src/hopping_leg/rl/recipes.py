@@ -12,8 +12,7 @@ from hopping_leg.rl.paper import PaperRecipe
 from hopping_leg.rl.precise import PreciseRecipe
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recurrent import RecurrentRecipe
-from hopping_leg.sim.twins import IDENTIFIABLE, Range
-from hopping_leg.sim.variants import SURPRISES
+from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES, Range
 
 RECIPES: dict[str, type[Recipe]] = {
     recipe.name: recipe
@@ -27,8 +26,8 @@ Randomise = Literal["none", "twins", "surprises"]
 
 _RANGES: dict[Randomise, tuple[Range, ...]] = {
     "none": (),
-    "twins": IDENTIFIABLE,
-    "surprises": SURPRISES,
+    "twins": IDENTIFIABLE_RANGES,
+    "surprises": WIDE_RANGES,
 }
 
 _OF_TASK = ("command_skew", "fall_penalty")

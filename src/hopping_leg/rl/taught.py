@@ -153,7 +153,7 @@ class TaughtPPO(ResumablePPO):
         buffer = self.rollout_buffer
         begun = buffer.episode_starts.astype(np.bool_)
         seen, known = foresee(
-            buffer.observations, begun, self.env.task.legs.late_ticks, policy.measured
+            buffer.observations, begun, self.env.task.legs.delay_ticks, policy.measured
         )
         policy.student.take_in(seen, begun, known)
         losses = [self._imitate(policy) for _ in range(self._imitation.updates)]

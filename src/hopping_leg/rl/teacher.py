@@ -13,7 +13,7 @@ from hopping_leg.envs.observation import sample_scaling
 from hopping_leg.envs.privileged_observation import PRIVILEGED, privileged_observation
 from hopping_leg.rl.taught import TaughtPolicy
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim import AnyLegs, Measurement
+from hopping_leg.sim import Measurement, Simulator
 
 _LASTING = 0.8
 """Share of an error that is left after a tick: a policy that has misjudged the state goes on to."""
@@ -55,7 +55,7 @@ class Teacher:
             weights.update(value.numpy().tobytes())
         return weights.hexdigest()[:16]
 
-    def watch(self, legs: AnyLegs) -> None:
+    def watch(self, legs: Simulator) -> None:
         """Take the legs whose state it sees."""
         self._legs = legs
 

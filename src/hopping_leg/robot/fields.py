@@ -83,7 +83,7 @@ def check_physics(robot: Robot, origin: str) -> None:
             " because a leg's knee bends to the negative side;"
             " for a robot that only swings write kind = 'pendulum'."
         )
-    _check_reality(robot, origin)
+    _check_mismatch(robot, origin)
     wiring = hardware.mistake(robot.hardware)
     if wiring is not None:
         raise RobotError(f"{origin}: {wiring}")
@@ -95,7 +95,7 @@ def check_physics(robot: Robot, origin: str) -> None:
         )
 
 
-def _check_reality(robot: Robot, origin: str) -> None:
+def _check_mismatch(robot: Robot, origin: str) -> None:
     """Check what no single field of ``[reality]`` can tell."""
     reality = robot.reality
     for name, joint, drive in (("hip", robot.hip, reality.hip), ("knee", robot.knee, reality.knee)):

@@ -11,7 +11,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RobotError
 from hopping_leg.robot.hardware import Hardware
-from hopping_leg.robot.reality import Reality
+from hopping_leg.robot.model_mismatch import ModelMismatch
 
 KINDS = ("leg", "pendulum")
 """What a robot may be."""
@@ -139,7 +139,7 @@ class Robot:
     description: str = ""
     kind: str = "leg"
     """``leg``, whose knee bends to the negative side, or ``pendulum``, which swings freely."""
-    reality: Reality = field(default_factory=Reality)
+    reality: ModelMismatch = field(default_factory=ModelMismatch)
     """What the real leg does beyond this; simulated by ``hopping_leg.sim``, unknown to control."""
     hardware: Hardware = field(default_factory=Hardware)
     """How the drives are wired; used by ``hopping_leg.deploy`` alone."""

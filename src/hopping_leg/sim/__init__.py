@@ -1,23 +1,23 @@
 """The leg simulated: many legs at once at the control rate, with noise and delay."""
 
-from hopping_leg.sim.any_legs import AnyLegs, Engine, Ground
-from hopping_leg.sim.disturbance import NOTHING, SAMPLES, Channel, Disturbance, Measurement
-from hopping_leg.sim.engines import check_ground, make_legs
-from hopping_leg.sim.legs import CONTROL_RATE, Legs
+from hopping_leg.sim.channel import NO_NOISE, SAMPLES, Channel, Measurement, NoiseAndDelay
+from hopping_leg.sim.engines import check_ground, make_simulator
+from hopping_leg.sim.mujoco_simulator import MujocoSimulator
 from hopping_leg.sim.plant import Plant
+from hopping_leg.sim.simulator import CONTROL_RATE, Engine, Ground, Simulator
 
 __all__ = [
     "CONTROL_RATE",
-    "NOTHING",
+    "NO_NOISE",
     "SAMPLES",
-    "AnyLegs",
     "Channel",
-    "Disturbance",
     "Engine",
     "Ground",
-    "Legs",
     "Measurement",
+    "MujocoSimulator",
+    "NoiseAndDelay",
     "Plant",
+    "Simulator",
     "check_ground",
-    "make_legs",
+    "make_simulator",
 ]

@@ -3,11 +3,11 @@
 from hopping_leg.errors import UsageError
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim.any_legs import AnyLegs, Engine, Ground
-from hopping_leg.sim.legs import CONTROL_RATE, Legs
+from hopping_leg.sim.mujoco_simulator import MujocoSimulator
+from hopping_leg.sim.simulator import CONTROL_RATE, Engine, Ground, Simulator
 
 
-def make_legs(
+def make_simulator(
     robot: Robot,
     count: int,
     *,
@@ -16,7 +16,7 @@ def make_legs(
     rate: float = CONTROL_RATE,
     timestep: float = TIMESTEP,
     threads: int = 0,
-) -> AnyLegs:
+) -> Simulator:
     """Return legs in the engine asked for.
 
     Args:
@@ -33,11 +33,11 @@ def make_legs(
     """
     check_ground(engine, ground)
     if engine == "mujoco":
-        return Legs(robot, count, rate=rate, timestep=timestep, threads=threads)
+        return MujocoSimulator(robot, count, rate=rate, timestep=timestep, threads=threads)
     # What runs on the robot shall not import what only PyBullet needs.
-    from hopping_leg.sim.bullet_legs import BulletLegs
+    from hopping_leg.sim.pybullet.simulator import PyBulletSimulator
 
-    return BulletLegs(robot, count, rate=rate, timestep=timestep, ground=ground)
+    return PyBulletSimulator(robot, count, rate=rate, timestep=timestep, ground=ground)
 
 
 def check_ground(engine: Engine, ground: Ground) -> None:

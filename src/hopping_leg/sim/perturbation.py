@@ -10,7 +10,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim.legs import Legs
+from hopping_leg.sim.mujoco_simulator import MujocoSimulator
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Perturber:
         legs: To whom; made of the perturbation's robots.
     """
 
-    def __init__(self, perturbation: Perturbation, legs: Legs) -> None:
+    def __init__(self, perturbation: Perturbation, legs: MujocoSimulator) -> None:
         self.perturbation, self.legs = perturbation, legs
         self.ground = np.zeros(legs.count)
         """Where the ground is under each leg, m above where it was, (n,)."""
@@ -53,7 +53,7 @@ class Perturber:
         """Let happen what happens at the beginning of a tick."""
         plan, legs = self.perturbation, self.legs
         if plan.later and tick == plan.change:
-            legs.become(plan.later)
+            legs.set_robots(plan.later)
         if (plan.force[tick] != self._force).any():
             self._force = plan.force[tick].copy()
             legs.push(self._force)

@@ -4,9 +4,8 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.robot.limits import SoftLimiter, SoftLimits
-from hopping_leg.sim.any_legs import AnyLegs
-from hopping_leg.sim.disturbance import Channel, Disturbance, Measurement
-from hopping_leg.sim.real_channel import RealChannel
+from hopping_leg.sim.channel import Channel, Measurement, MismatchChannel, NoiseAndDelay
+from hopping_leg.sim.simulator import Simulator
 
 
 class Plant:
@@ -24,16 +23,16 @@ class Plant:
 
     def __init__(
         self,
-        legs: AnyLegs,
-        disturbance: Disturbance,
+        legs: Simulator,
+        disturbance: NoiseAndDelay,
         soft_limits: SoftLimits | None,
         rng: np.random.Generator,
     ) -> None:
         self.legs = legs
         self.channel = (
             Channel(legs.count, disturbance, legs.period, rng)
-            if legs.real is None
-            else RealChannel(legs.real, disturbance, legs.period, rng)
+            if legs.mismatch is None
+            else MismatchChannel(legs.mismatch, disturbance, legs.period, rng)
         )
         self._limiter = SoftLimiter(legs.robot, soft_limits, legs.count) if soft_limits else None
 

@@ -9,7 +9,7 @@ from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.errors import PhysicsError
 from hopping_leg.robot.limits import SoftLimits
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim import CONTROL_RATE, Legs, Plant
+from hopping_leg.sim import CONTROL_RATE, MujocoSimulator, Plant
 from hopping_leg.viewer.tracks import FIELDS
 from hopping_leg.viewer.world import World
 
@@ -91,5 +91,5 @@ class Hopper:
         return row
 
     def _make(self) -> None:
-        self._legs = Legs(self.world.of(self.robot), 1, rate=CONTROL_RATE, threads=1)
+        self._legs = MujocoSimulator(self.world.of(self.robot), 1, rate=CONTROL_RATE, threads=1)
         self._plant = Plant(self._legs, self.world.disturbance, SoftLimits(), self._rng)

@@ -6,7 +6,7 @@ import viser
 
 from hopping_leg.controllers.registry import controller_names
 from hopping_leg.robot import load_robot
-from hopping_leg.robot.files import shipped_robots
+from hopping_leg.robot.robot_files import shipped_robots
 from hopping_leg.viewer import world as ranges
 from hopping_leg.viewer.inbox import Inbox, put_value
 from hopping_leg.viewer.live import Live

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from hopping_leg.errors import UsageError
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim import NOTHING, Disturbance
+from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 
 Range = tuple[float, float]
 
@@ -49,9 +49,9 @@ class World:
                 )
 
     @property
-    def disturbance(self) -> Disturbance:
+    def disturbance(self) -> NoiseAndDelay:
         """What befalls measurements and torques."""
-        return Disturbance() if self.noise else NOTHING
+        return NoiseAndDelay() if self.noise else NO_NOISE
 
     def of(self, robot: Robot) -> Robot:
         """Return what a robot is in this world."""

@@ -10,7 +10,7 @@ from hopping_leg.evaluate.transfer import hopping
 from hopping_leg.evaluate.transfer.effects import EFFECTS, HopWithout
 from hopping_leg.evaluate.transfer.hopping import Hop
 from hopping_leg.robot import load_robot
-from hopping_leg.sim import NOTHING
+from hopping_leg.sim import NO_NOISE
 from tests.evaluate.transfer.studies import study
 
 
@@ -41,7 +41,7 @@ def test_without_all_effects_nothing_is_left(tmp_path):
 
 
 def test_a_twin_is_met_with_its_own_effects_alone():
-    assert hopping.disturbance_of(load_robot("twin")) == NOTHING
+    assert hopping.disturbance_of(load_robot("twin")) == NO_NOISE
     assert hopping.disturbance_of(load_robot("legv2")).torque_noise > 0
 
 

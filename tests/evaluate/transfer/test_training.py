@@ -3,8 +3,7 @@
 from hopping_leg.evaluate.transfer.run import fits
 from hopping_leg.evaluate.transfer.training import Train
 from hopping_leg.robot import load_robot
-from hopping_leg.sim.twins import IDENTIFIABLE
-from hopping_leg.sim.variants import SURPRISES
+from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES
 from tests.evaluate.transfer.studies import study
 
 
@@ -14,7 +13,7 @@ def test_no_method_trains_on_what_the_twin_alone_knows(tmp_path):
     cad, paper, mixed, truth = (Train(one, twin, method, 0) for method in one.methods)
     assert cad.robot == mixed.robot == load_robot("legv2")
     assert paper.robot == load_robot("legv2-paper")
-    assert mixed.recipe().task.randomised == IDENTIFIABLE
+    assert mixed.recipe().task.randomised == IDENTIFIABLE_RANGES
     assert truth.robot.reality.only_delays
     assert truth.robot.rail == twin.robot.rail
     assert truth.robot.reality.latency.command == twin.robot.reality.latency.command
@@ -26,7 +25,7 @@ def test_legs_may_surprise_around_whatever_is_believed(tmp_path):
     cad, surprising, *_ = trains = [Train(one, twin, method, 0) for method in one.methods]
     assert cad.robot == surprising.robot
     assert cad.recipe().task.randomised == ()
-    assert surprising.recipe().task.randomised == SURPRISES
+    assert surprising.recipe().task.randomised == WIDE_RANGES
     assert len({one.training(twin, train.method, 0) for train in trains}) == 4
     fit, shared = (one.fitted(twin, method) for method in one.methods[2:])
     assert fit == shared

@@ -8,7 +8,7 @@ from hopping_leg.controllers.registry import load_policy
 from hopping_leg.rl.export import build_policy
 from hopping_leg.rl.finetune.aim import Aim, AimOptions
 from hopping_leg.rl.network_file import read_network
-from hopping_leg.sim.disturbance import Measurement
+from hopping_leg.sim.channel import Measurement
 
 
 @pytest.mark.parametrize("name", ["fast", "paper", "precise"])

@@ -8,7 +8,7 @@ from hopping_leg.controllers.observation_history import make_layout
 from hopping_leg.errors import TraceError
 from hopping_leg.rl.finetune.heard import Heard
 from hopping_leg.rl.finetune.simulated import Witness, traces_of
-from hopping_leg.sim import NOTHING
+from hopping_leg.sim import NO_NOISE
 from hopping_leg.trace import Trace
 
 from .outings import PERIOD, POLICY, ROBOT
@@ -42,7 +42,7 @@ def run():
     shown = Shown()
     witness = Witness(shown, None)
     commands = np.repeat([[0.25, 0.3], [0.35, 0.28]], 60, axis=0)
-    setup = RolloutConfig(ROBOT, NOTHING, threads=1)
+    setup = RolloutConfig(ROBOT, NO_NOISE, threads=1)
     return shown, traces_of(rollout(witness, setup, commands, 3, on_legs=witness.watch))
 
 

@@ -12,7 +12,7 @@ from hopping_leg.rl.finetune.exploring import EDGE, Exploring
 from hopping_leg.rl.finetune.learner import Learner, LearnerOptions
 from hopping_leg.rl.finetune.replay import CRITIC_SIZE, Rows
 from hopping_leg.rl.network_file import read_network
-from hopping_leg.sim.disturbance import Measurement
+from hopping_leg.sim.channel import Measurement
 
 TINY = LearnerOptions(critic=(8, 8), batch=16, actor_share=1.0, change=np.inf)
 

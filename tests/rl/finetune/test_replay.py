@@ -14,7 +14,7 @@ from hopping_leg.rl.finetune.options import FinetuneOptions
 from hopping_leg.rl.finetune.replay import CRITIC_SIZE, Rewriter
 from hopping_leg.rl.finetune.simulated import Witness, traces_of
 from hopping_leg.rl.network_file import read_network
-from hopping_leg.sim import NOTHING
+from hopping_leg.sim import NO_NOISE
 
 from .outings import POLICY, ROBOT
 
@@ -26,7 +26,7 @@ COMMAND = 0.3
 def run():
     witness = Witness(POLICY, None)
     commands = np.full((TICKS, 1), COMMAND)
-    setup = RolloutConfig(ROBOT, NOTHING, threads=1)
+    setup = RolloutConfig(ROBOT, NO_NOISE, threads=1)
     return rollout(witness, setup, commands, 3, on_legs=witness.watch)
 
 
@@ -54,7 +54,7 @@ def environment(run):
         action_torque=card.torque_scale,
         commands=(COMMAND,),
         command_range=(card.command_low, card.command_high),
-        disturbance=NOTHING,
+        disturbance=NO_NOISE,
         timestep=5e-4,
         episode=60.0,
     )

@@ -6,7 +6,7 @@ from functools import reduce
 from operator import attrgetter
 
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim.variants import with_value
+from hopping_leg.sim.randomization import with_value
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ import numpy as np
 
 from hopping_leg.evaluate.statistics import median_interval
 from hopping_leg.evaluate.transfer.hopping import Hop
+from hopping_leg.robot.model_mismatch import Drive, Ground, Latency, MassScale, ModelMismatch
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.robot.reality import Drive, Ground, Latency, MassScale, Reality
 
-Without = Callable[[Reality], Reality]
+Without = Callable[[ModelMismatch], ModelMismatch]
 
 _SEED = 0
 """Of the bootstrap."""
@@ -22,7 +22,7 @@ def _drives(*names: str) -> Without:
     """Return what makes attributes of both drives neutral."""
     neutral = {name: getattr(Drive(), name) for name in names}
 
-    def without(reality: Reality) -> Reality:
+    def without(reality: ModelMismatch) -> ModelMismatch:
         hip, knee = (dataclasses.replace(d, **neutral) for d in (reality.hip, reality.knee))
         return dataclasses.replace(reality, hip=hip, knee=knee)
 

@@ -23,7 +23,7 @@ from hopping_leg.evaluate.transfer.methods import Method
 from hopping_leg.evaluate.transfer.study import Study, TwinFile
 from hopping_leg.json_files import write_json
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim import NOTHING, Disturbance
+from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 
 FIRST_SEED = 1000
 """Of the trials; no seed from here on has chosen anything."""
@@ -140,9 +140,9 @@ class Hop(Tried):
         return [{**where, **row} for row in self.measured()]
 
 
-def disturbance_of(robot: Robot) -> Disturbance:
+def disturbance_of(robot: Robot) -> NoiseAndDelay:
     """Return what a leg is tried with on top of what it brings: nothing, if it brings anything."""
-    return Disturbance() if robot.reality.neutral else NOTHING
+    return NoiseAndDelay() if robot.reality.neutral else NO_NOISE
 
 
 def hop(content: bytes, robot: Robot, study: Study) -> list[dict[str, Any]]:

@@ -8,9 +8,9 @@ from pathlib import Path
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.transfer.methods import Method
 from hopping_leg.identify.least_squares import LeastSquaresOptions
-from hopping_leg.robot.files import load_robot, parent_robot, shipped_robots
+from hopping_leg.robot.model_mismatch import NO_MISMATCH, Latency
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.robot.reality import NEUTRAL, Latency
+from hopping_leg.robot.robot_files import load_robot, parent_robot, shipped_robots
 from hopping_leg.sim.twins import draw_twin
 
 SHORTEST = 30.0
@@ -44,7 +44,7 @@ class TwinFile:
         """The twin as the simulator for training could know it at best."""
         robot = self.robot
         latency = Latency(command=robot.reality.latency.command)
-        known = dataclasses.replace(NEUTRAL, latency=latency)
+        known = dataclasses.replace(NO_MISMATCH, latency=latency)
         return dataclasses.replace(robot, name=f"{self.name}-truth", reality=known)
 
 
@@ -103,7 +103,7 @@ class Study:
             return twin.without_surprises
         if method.fit is not None:
             return load_robot(self.fitted(twin, method))
-        return dataclasses.replace(load_robot(method.robot or twin.believed), reality=NEUTRAL)
+        return dataclasses.replace(load_robot(method.robot or twin.believed), reality=NO_MISMATCH)
 
     def fitted(self, twin: TwinFile, method: Method) -> Path:
         """Return the robot file that a method fits; beside it, as .json, stands the fit."""

@@ -20,13 +20,13 @@ from hopping_leg.rl.checkpoint import Tree
 from hopping_leg.rl.finetune.heard import Heard
 from hopping_leg.rl.finetune.simulated import hop_many, traces_of
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim.twins import IDENTIFIABLE, TWIN_RANGES, Range
-from hopping_leg.sim.variants import vary
+from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, Range, sample
+from hopping_leg.sim.twins import TWIN_RANGES
 
 _CHOSEN = "[C]"
 
 DOUBTS = (
-    *(spread for spread in IDENTIFIABLE if not spread.path.endswith("armature")),
+    *(spread for spread in IDENTIFIABLE_RANGES if not spread.path.endswith("armature")),
     Range("hip.armature", "kg m2", 2e-5, 3.8e-3, "Table I to the lab's", "logarithmic"),
     Range("knee.armature", "kg m2", 5e-5, 1.5e-2, "Table I to the lab's", "logarithmic"),
     Range("hip.torque_gain", "1", 0.8, 1.05, f"{_CHOSEN} motors and gears that give less"),
@@ -150,7 +150,7 @@ def doubtful_legs(
         o: How many and how long.
     """
     rng = np.random.default_rng(seed)
-    robots = vary(robot, DOUBTS, o.legs, rng)
+    robots = sample(robot, DOUBTS, o.legs, rng)
     held = round(o.hold * 200)
     steps = rng.uniform(*commands, (round(o.seconds / o.hold), o.legs))
     return hop_many(controller, robot, robots, np.repeat(steps, held, axis=0), seed)

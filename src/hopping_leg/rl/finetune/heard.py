@@ -8,7 +8,7 @@ import numpy as np
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.controllers.hardware_trial import MEASURED
 from hopping_leg.errors import TraceError
-from hopping_leg.sim.disturbance import SAMPLES, Measurement
+from hopping_leg.sim.channel import SAMPLES, Measurement
 from hopping_leg.trace import Trace
 
 

@@ -21,7 +21,7 @@ from hopping_leg.controllers.protocol import Controller, Measurement
 from hopping_leg.controllers.rollout import Rollout, RolloutConfig, rollout
 from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim import NOTHING, AnyLegs
+from hopping_leg.sim import NO_NOISE, Simulator
 from hopping_leg.sim.perturbation import Perturbation
 from hopping_leg.trace import Trace
 
@@ -60,7 +60,7 @@ class Simulated:
 
     def __init__(self, robot: Robot, guard: Guard | None, threads: int = 1) -> None:
         self.name, self._robot, self._guard = robot.name, robot, guard
-        self._setup = RolloutConfig(robot, NOTHING, threads=threads)
+        self._setup = RolloutConfig(robot, NO_NOISE, threads=threads)
 
     def hop(self, controller: Controller, steps: Steps, seed: int) -> HardwareTrial:
         """Let a controller hop from standing."""
@@ -100,7 +100,7 @@ def hop_many(
     calm = np.zeros((ticks, count))
     differ = Perturbation(tuple(robots), np.zeros((ticks, count, 2)), calm, calm)
     witness = Witness(controller, None)
-    setup = RolloutConfig(robot, NOTHING, timestep=timestep, threads=1)
+    setup = RolloutConfig(robot, NO_NOISE, timestep=timestep, threads=1)
     return rollout(witness, setup, commands, seed, perturbation=differ)
 
 
@@ -137,7 +137,7 @@ class Witness:
     def __init__(self, controller: Controller, guard: Guard | None) -> None:
         self.name, self._controller, self._guard = controller.name, controller, guard
 
-    def watch(self, legs: AnyLegs) -> None:
+    def watch(self, legs: Simulator) -> None:
         """Take the legs whose motors' torque is read."""
         self._legs = legs
 

@@ -15,13 +15,13 @@ import numpy as np
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.robot.limits import MotorLimit
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim.real_model import real_parameters
+from hopping_leg.sim.mismatch_model import true_parameters
 
 _REST = 0.1
 """Joint speed below which the gear's loss fades, as power has no direction at rest, rad/s."""
 
 
-class RealDrive:
+class MotorEffects:
     """Both drives of n legs.
 
     Args:
@@ -39,12 +39,12 @@ class RealDrive:
         self.motor_torque = np.zeros((count, 2))
         """What the motors give, N m at the joint, (n, 2); their current shows it."""
         self._command = 0.0
-        self.adopt(robots)
+        self.set_robots(robots)
 
-    def adopt(self, robots: Sequence[Robot]) -> None:
+    def set_robots(self, robots: Sequence[Robot]) -> None:
         """Go on as the drives of other robots; commands under way stay under way."""
         realities = [robot.reality for robot in robots]
-        self._limit = MotorLimit([real_parameters(robot) for robot in robots])
+        self._limit = MotorLimit([true_parameters(robot) for robot in robots])
         latencies = [(r.latency.command, r.latency.jitter) for r in realities]
         self._late, self._jitter = np.round(np.array(latencies).T / self._timestep)
         self._look_ahead(self._substeps + int((self._late + self._jitter).max()))

@@ -96,7 +96,7 @@ class Ground:
 
 
 @dataclass(frozen=True)
-class Reality:
+class ModelMismatch:
     """Every effect that the simulator for training does not know."""
 
     voltage: float = _positive(1.0, "1")
@@ -110,12 +110,12 @@ class Reality:
     @property
     def neutral(self) -> bool:
         """Whether the leg behaves as the simulator for training has it."""
-        return self == NEUTRAL
+        return self == NO_MISMATCH
 
     @property
     def only_delays(self) -> bool:
         """Whether nothing but a constant delay of commands is left, which training can simulate."""
-        return self == replace(NEUTRAL, latency=Latency(command=self.latency.command))
+        return self == replace(NO_MISMATCH, latency=Latency(command=self.latency.command))
 
     def of_drives(self, attribute: str) -> Array:
         """Return an attribute of both drives, (2,); NaN where it is None."""
@@ -126,5 +126,5 @@ class Reality:
         return np.array([getattr(d.sensor, attribute) for d in (self.hip, self.knee)])
 
 
-NEUTRAL = Reality()
+NO_MISMATCH = ModelMismatch()
 """Nothing that the simulator for training does not know."""

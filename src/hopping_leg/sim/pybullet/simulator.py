@@ -10,18 +10,17 @@ from hopping_leg.robot import kinematics
 from hopping_leg.robot.limits import MotorLimit
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim.any_legs import AnyLegs, Ground
-from hopping_leg.sim.bullet_world import BulletWorld
-from hopping_leg.sim.ground_law import GroundLaw
-from hopping_leg.sim.legs import CONTROL_RATE
+from hopping_leg.sim.pybullet.ground_law import GroundLaw
+from hopping_leg.sim.pybullet.world import PyBulletWorld
+from hopping_leg.sim.simulator import CONTROL_RATE, Ground, Simulator
 
 
-class BulletLegs(AnyLegs):
+class PyBulletSimulator(Simulator):
     """Legs in PyBullet, each in a world of its own, one after the other.
 
-    Dynamics, motors' limits, friction and damping are those of ``Legs``, see ``bullet_urdf``; for
-    the ground see ``ground_law``. Knee and base meet PyBullet's rigid ground where the foot meets
-    the robot's, and else the foot's.
+    Dynamics, motors' limits, friction and damping are those of ``MujocoSimulator``, see
+    ``pybullet_urdf``; for the ground see ``ground_law``. Knee and base meet PyBullet's rigid ground
+    where the foot meets the robot's, and else the foot's.
 
     Args:
         robot: The leg.
@@ -58,7 +57,7 @@ class BulletLegs(AnyLegs):
         law = GroundLaw(robot)
         self._law = law if ground == "robot" else None
         self._worlds = [
-            BulletWorld(
+            PyBulletWorld(
                 robot,
                 timestep,
                 spring=law.spring if ground == "spring" else None,
@@ -125,6 +124,6 @@ class BulletLegs(AnyLegs):
             self._worlds[leg].push(force[leg], np.array([height[row], foot[row, 1]]))
 
 
-def _close(worlds: list[BulletWorld]) -> None:
+def _close(worlds: list[PyBulletWorld]) -> None:
     for world in worlds:
         world.close()

@@ -10,13 +10,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from hopping_leg.arrays import Array, IntArray
-from hopping_leg.robot.reality import Reality
+from hopping_leg.robot.model_mismatch import ModelMismatch
 
 DRAWS = 6
 """Normal random numbers per leg and reading: position, velocity, torque of both joints."""
 
 
-class RealSensors:
+class EncoderEffects:
     """Sensors of n legs; ``q``, ``qd`` and ``torque`` (n, 2) are the latest readings, live.
 
     Args:
@@ -24,16 +24,16 @@ class RealSensors:
         timestep: Physics step, s; the measurement's latency is rounded to it.
     """
 
-    def __init__(self, realities: Sequence[Reality], timestep: float) -> None:
+    def __init__(self, realities: Sequence[ModelMismatch], timestep: float) -> None:
         count = len(realities)
         self._timestep, self._legs = timestep, np.arange(count)
         self._past = np.zeros((1, count, DRAWS))
         self._newest = 0
-        self.adopt(realities)
+        self.set_robots(realities)
         self._reading = np.zeros((count, DRAWS))
         self.q, self.qd, self.torque = (self._reading[:, k : k + 2] for k in (0, 2, 4))
 
-    def adopt(self, realities: Sequence[Reality]) -> None:
+    def set_robots(self, realities: Sequence[ModelMismatch]) -> None:
         """Go on as the sensors of other realities; a longer past begins with the oldest known."""
         latency = np.array([reality.latency.measurement for reality in realities])
         self._late = np.round(latency / self._timestep).astype(np.int64)
@@ -91,7 +91,7 @@ class RealSensors:
         self._reading[:] = memory["reading"]
 
 
-def _of_sensors(realities: Sequence[Reality], what: str) -> Array:
+def _of_sensors(realities: Sequence[ModelMismatch], what: str) -> Array:
     """Return noise or step of position, velocity and torque of both joints, (n, 6)."""
     kinds = ("position", "velocity", "torque")
     return np.array(

@@ -2,7 +2,7 @@ import pytest
 
 from hopping_leg.errors import RobotError
 from hopping_leg.robot import load_robot
-from hopping_leg.robot.reality import NEUTRAL
+from hopping_leg.robot.model_mismatch import NO_MISMATCH
 
 
 def twin_file(tmp_path, text):
@@ -12,7 +12,7 @@ def twin_file(tmp_path, text):
 
 
 def test_shipped_legs_are_what_the_simulator_for_training_knows():
-    assert load_robot("legv2").reality == NEUTRAL
+    assert load_robot("legv2").reality == NO_MISMATCH
     assert load_robot("legv2-paper").reality.neutral
     assert not load_robot("twin").reality.neutral
 
@@ -21,8 +21,8 @@ def test_a_part_may_be_left_out_and_stays_neutral(tmp_path):
     text = '[reality.knee]\nbacklash = { value = 0.002, unit = "rad", source = "[C]" }\n'
     reality = load_robot(twin_file(tmp_path, text)).reality
     assert reality.knee.backlash == 0.002
-    assert reality.hip == NEUTRAL.hip
-    assert reality.latency == NEUTRAL.latency
+    assert reality.hip == NO_MISMATCH.hip
+    assert reality.latency == NO_MISMATCH.latency
 
 
 @pytest.mark.parametrize(

@@ -11,27 +11,23 @@ from hopping_leg.errors import UsageError
 from hopping_leg.robot.limits import MotorLimit
 from hopping_leg.robot.model import TIMESTEP, build_model
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim.any_legs import AnyLegs
-from hopping_leg.sim.joint_friction import JointFriction, rubs_under_load
-from hopping_leg.sim.own_models import take_models
-from hopping_leg.sim.reality import RealLegs
-
-CONTROL_RATE = 200.0
-"""Control rate of the paper, Hz."""
+from hopping_leg.sim.mismatch_simulator import MismatchSimulator
+from hopping_leg.sim.model_fields import JointFriction, rubs_under_load, set_model_fields
+from hopping_leg.sim.simulator import CONTROL_RATE, Simulator
 
 _JOINTS = np.array([1, 2])
 """Degrees of freedom of hip and knee; the base comes first."""
 
 
-class Legs(AnyLegs):
+class MujocoSimulator(Simulator):
     """Legs in MuJoCo; results do not depend on the number of threads.
 
     ``measured_q`` and ``measured_qd`` are the true state, unless the robot's ``reality`` says
     otherwise.
 
     Commands that are late by a constant time are all of a ``reality`` that is simulated here, and
-    if legs differ in it, by whole control periods; the rest is left to ``RealLegs``, which is
-    slower.
+    if legs differ in it, by whole control periods; the rest is left to ``MismatchSimulator``,
+    which is slower.
 
     Attributes:
         threads: Worker threads, 0 for one per core.
@@ -43,13 +39,14 @@ class Legs(AnyLegs):
         timestep: Physics step, s; must divide the control period.
         threads: Worker threads, 0 for one per core.
         clamped: Fix the base where it is placed, for fixed-base runs.
-        variants: One robot per simulation, which may differ from ``robot`` in what ``sim.variants``
-            lets vary and in ``reality``; none simulates ``robot`` n times.
-        detailed: Leave everything to ``RealLegs``, also what it is not needed for, so that legs may
-            ``become`` robots with any ``reality``.
+        robots: One robot per simulation, which may differ from ``robot`` in what
+            ``RANDOMIZABLE`` of ``sim.randomization`` names and in ``reality``;
+            none simulates ``robot`` n times.
+        detailed: Leave everything to ``MismatchSimulator``, also what it is not needed for, so that
+            ``set_robots`` takes robots with any ``reality``.
 
     Raises:
-        UsageError: The physics step does not divide the control period, or the variants do not fit.
+        UsageError: The physics step does not divide the control period, or the robots do not fit.
     """
 
     def __init__(
@@ -61,110 +58,112 @@ class Legs(AnyLegs):
         timestep: float = TIMESTEP,
         threads: int = 0,
         clamped: bool = False,
-        variants: Sequence[Robot] = (),
+        robots: Sequence[Robot] = (),
         detailed: bool = False,
     ) -> None:
         super().__init__(robot, count, rate, timestep)
         self.threads = threads
-        if variants and (clamped or len(variants) != count):
+        if robots and (clamped or len(robots) != count):
             raise UsageError(
-                f"{len(variants)} variants were given for {count} legs"
-                f"{' that are clamped; variants hop' if clamped else '; give one for each'}."
+                f"{len(robots)} robots were given for {count} legs"
+                f"{' that are clamped; robots hop' if clamped else '; give one for each'}."
             )
-        if self._is_plain(variants) and not clamped and not detailed:
-            self._take_model(threads, variants)
+        if self._is_plain(robots) and not clamped and not detailed:
+            self._take_model(threads, robots)
         else:
-            self._take_reality(variants or [robot] * count, clamped, threads)
-        sensors = self if self.real is None else self.real.sensors
+            self._use_mismatch(robots or [robot] * count, clamped, threads)
+        sensors = self if self.mismatch is None else self.mismatch.sensors
         self.measured_q, self.measured_qd = sensors.q, sensors.qd
-        self._motors = MotorLimit(variants or robot, count)
+        self._motors = MotorLimit(robots or robot, count)
         self._inverse_belt = np.tile(1 / robot.of_joints("belt_ratio"), (count, 1))
         self._applied = np.zeros((count, 2))
         self._rows = np.arange(count)
-        self.waiting = np.zeros((1, count, 2))
+        self.pending_torque = np.zeros((1, count, 2))
         """What the motors give until a late command arrives, and the commands under way, N m."""
-        self._come_late(variants or [robot] * count)
+        self._set_command_delay(robots or [robot] * count)
 
-    def _take_model(self, threads: int, variants: Sequence[Robot]) -> None:
+    def _take_model(self, threads: int, robots: Sequence[Robot]) -> None:
         model = build_model(self.robot, self.timestep)
         self.batch = batch.Batch(model, self.count, threads)
-        if variants:
-            self._take_models(variants)
-        self._let_rub(variants or [self.robot] * self.count)
+        if robots:
+            self._set_models(robots)
+        self._set_load_friction(robots or [self.robot] * self.count)
         self._ctrl = self.batch.bind("ctrl")
         first = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_TIME)
         self._show(self.batch.state[:, first : first + 6])
 
-    def _take_models(self, variants: Sequence[Robot]) -> None:
+    def _set_models(self, robots: Sequence[Robot]) -> None:
         """Build every robot's model, once where legs share a robot."""
-        distinct = {id(robot): robot for robot in variants}
+        distinct = {id(robot): robot for robot in robots}
         models = {key: build_model(robot, self.timestep) for key, robot in distinct.items()}
-        take_models(self.batch, [models[id(robot)] for robot in variants])
+        set_model_fields(self.batch, [models[id(robot)] for robot in robots])
 
-    def _let_rub(self, robots: Sequence[Robot]) -> None:
+    def _set_load_friction(self, robots: Sequence[Robot]) -> None:
         """Let friction change with torque where it does for some leg."""
         self._friction: JointFriction | None = None
         if rubs_under_load(robots):
             self._friction = JointFriction(robots, self.batch, _JOINTS)
 
-    def _is_plain(self, variants: Sequence[Robot]) -> bool:
+    def _is_plain(self, robots: Sequence[Robot]) -> bool:
         """Tell whether delays are all that is beyond the model, if they differ by whole ticks."""
-        robots = variants or [self.robot]
-        rests = self._lateness(robots) % self.substeps
+        robots = robots or [self.robot]
+        rests = self._command_delays(robots) % self.substeps
         return not np.ptp(rests) and all(r.reality.only_delays for r in robots)
 
-    def _lateness(self, robots: Sequence[Robot]) -> IntArray:
+    def _command_delays(self, robots: Sequence[Robot]) -> IntArray:
         """Return by how many physics steps robots' commands are late, (n,)."""
         return np.array([round(r.reality.latency.command / self.timestep) for r in robots])
 
-    def _take_reality(self, robots: Sequence[Robot], clamped: bool, threads: int) -> None:
-        self.real = RealLegs(
+    def _use_mismatch(self, robots: Sequence[Robot], clamped: bool, threads: int) -> None:
+        self.mismatch = MismatchSimulator(
             robots,
             timestep=self.timestep,
             substeps=self.substeps,
             threads=threads,
             clamped=clamped,
         )
-        self.batch = self.real.batch
-        self._show(self.real.state)
+        self.batch = self.mismatch.batch
+        self._show(self.mismatch.state)
 
     @property
     def measured_torque(self) -> Array:
         """What the motors' torque measurement reports now, N m at the joints, (n, 2)."""
-        return self._applied if self.real is None else self.real.sensors.torque
+        return self._applied if self.mismatch is None else self.mismatch.sensors.torque
 
-    def become(self, variants: Sequence[Robot]) -> None:
+    def set_robots(self, robots: Sequence[Robot]) -> None:
         """Go on as other robots, one per leg, in the present state.
 
         Raises:
             UsageError: They have effects that these legs cannot take on while they move.
         """
-        if self.real is not None:
-            self.real.adopt(variants)
-        elif self._is_plain(variants):
-            self._take_models(variants)
-            self._let_rub(variants)
-            self._motors = MotorLimit(variants, self.count)
-            self._come_late(variants)
+        if self.mismatch is not None:
+            self.mismatch.set_robots(robots)
+        elif self._is_plain(robots):
+            self._set_models(robots)
+            self._set_load_friction(robots)
+            self._motors = MotorLimit(robots, self.count)
+            self._set_command_delay(robots)
         else:
             raise UsageError(
                 f"Legs of {self.robot.name} cannot take on another [reality] while they move; make"
                 " them with 'detailed'."
             )
 
-    def _come_late(self, robots: Sequence[Robot]) -> None:
+    def _set_command_delay(self, robots: Sequence[Robot]) -> None:
         """Let each leg's commands arrive as late as its robot's; none that is under way is lost."""
-        late = self._lateness(robots)
+        late = self._command_delays(robots)
         self._late = int(late[0]) % self.substeps
         """Physics steps by which every command is late, on top of the ticks of each leg."""
         self._ticks = late // self.substeps
         """Control periods by which each leg's are, (n,)."""
-        missing = int(self._ticks.max()) + 1 - len(self.waiting)
+        missing = int(self._ticks.max()) + 1 - len(self.pending_torque)
         if missing > 0:
-            self.waiting = np.concatenate([self.waiting, np.zeros((missing, self.count, 2))])
+            self.pending_torque = np.concatenate(
+                [self.pending_torque, np.zeros((missing, self.count, 2))]
+            )
 
     @property
-    def late_ticks(self) -> IntArray:
+    def delay_ticks(self) -> IntArray:
         """Whole control periods by which each leg's commands are late, (n,)."""
         return self._ticks
 
@@ -185,11 +184,11 @@ class Legs(AnyLegs):
             q: Joint angles, rad, (k, 2) or (2,).
         """
         rows = np.arange(self.count)[ids]
-        if self.real is not None:
-            self.real.place(rows, height, q)
+        if self.mismatch is not None:
+            self.mismatch.place(rows, height, q)
             return
         self._applied = np.zeros((self.count, 2))
-        self.waiting[:, rows] = 0
+        self.pending_torque[:, rows] = 0
         self.batch.reset(np.sort(rows), stage=0)
         self.height[ids] = height
         self.q[ids] = q
@@ -203,9 +202,9 @@ class Legs(AnyLegs):
         Raises:
             mujoco.batch.SimulationError: Physics failed in some simulations.
         """
-        if self.real is not None:
-            return self.real.step(torque)
-        if self._late or len(self.waiting) > 1:
+        if self.mismatch is not None:
+            return self.mismatch.step(torque)
+        if self._late or len(self.pending_torque) > 1:
             return self._step_late(torque)
         self._applied = applied = self._motors.give(torque, self.qd)
         self._give(applied, self.substeps)
@@ -220,13 +219,13 @@ class Legs(AnyLegs):
 
     def _step_late(self, torque: Array) -> Array:
         """Go on with the torques of before until later ones arrive; return their mean."""
-        before = self.waiting[0]
-        under_way = np.concatenate([self.waiting[1:], np.zeros((1, self.count, 2))])
+        before = self.pending_torque[0]
+        under_way = np.concatenate([self.pending_torque[1:], np.zeros((1, self.count, 2))])
         under_way[self._ticks, self._rows] = torque
         if self._late:
             self._give(before, self._late)
         after = self._motors.give(under_way[0], self.qd)
         self._give(after, self.substeps - self._late)
         self._applied = after + self._late / self.substeps * (before - after)
-        self.waiting = np.concatenate([after[None], under_way[1:]])
+        self.pending_torque = np.concatenate([after[None], under_way[1:]])
         return self._applied

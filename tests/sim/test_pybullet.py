@@ -9,8 +9,8 @@ from hopping_leg.robot import dynamics, load_robot
 from hopping_leg.robot.kinematics import joint_angles
 from hopping_leg.robot.limits import SoftLimits
 from hopping_leg.robot.model import GRAVITY
-from hopping_leg.sim import Disturbance, Legs, Plant
-from hopping_leg.sim.bullet_legs import BulletLegs
+from hopping_leg.sim import MujocoSimulator, NoiseAndDelay, Plant
+from hopping_leg.sim.pybullet.simulator import PyBulletSimulator
 from tests.robot.legs import random_state
 
 pybullet = pytest.importorskip("pybullet", reason="needs the extra 'bullet'")
@@ -31,7 +31,7 @@ def frictionless(robot):
 @pytest.mark.parametrize("robot", [PAPER, CAD], ids=lambda r: r.name)
 def test_torques_in_the_air_accelerate_as_the_closed_form_with_armature(robot):
     robot, step = frictionless(robot), 1e-5
-    legs = BulletLegs(robot, 10, rate=1 / step, timestep=step)
+    legs = PyBulletSimulator(robot, 10, rate=1 / step, timestep=step)
     rng = np.random.default_rng(0)
     height, rate, q, qd = random_state(rng, 10)
     qd *= 0.3  # within what the motors can drive at
@@ -48,7 +48,7 @@ def test_torques_in_the_air_accelerate_as_the_closed_form_with_armature(robot):
 
 def test_energy_is_conserved_without_friction():
     robot, timestep = frictionless(CAD), 5e-4
-    legs = BulletLegs(robot, 4, timestep=timestep)
+    legs = PyBulletSimulator(robot, 4, timestep=timestep)
     rng = np.random.default_rng(0)
     legs.place(slice(None), 3.0, rng.uniform(-2, 2, (4, 2)))
     legs.qd[:] = rng.normal(0, 5, (4, 2))
@@ -66,7 +66,7 @@ def test_energy_is_conserved_without_friction():
 
 
 def test_free_fall_follows_the_parabola():
-    legs = BulletLegs(frictionless(CAD), 1)
+    legs = PyBulletSimulator(frictionless(CAD), 1)
     legs.place(slice(None), 3.0, np.array([0.4, -1.0]))
     for _ in range(60):
         legs.step(np.zeros((1, 2)))
@@ -77,7 +77,7 @@ def test_free_fall_follows_the_parabola():
 
 
 def test_drop_on_the_rail_follows_friction_and_damping():
-    legs = BulletLegs(PAPER, 1)
+    legs = PyBulletSimulator(PAPER, 1)
     legs.place(slice(None), 3.0, np.zeros(2))
     damping, force = PAPER.rail.damping, PAPER.mass * GRAVITY - PAPER.rail.friction
     for _ in range(60):
@@ -88,7 +88,7 @@ def test_drop_on_the_rail_follows_friction_and_damping():
 
 @pytest.mark.parametrize(("share", "moves"), [(0.9, False), (1.2, True)])
 def test_coulomb_friction_holds_a_joint_against_smaller_torques(share, moves):
-    legs = BulletLegs(PAPER, 1)
+    legs = PyBulletSimulator(PAPER, 1)
     legs.place(slice(None), 3.0, np.zeros(2))
     for _ in range(20):
         legs.step(np.array([[share * PAPER.hip.friction, 0.0]]))
@@ -107,20 +107,20 @@ def sink_and_rest(legs):
 
 @pytest.mark.slow
 def test_a_drop_sinks_into_the_robots_ground_as_in_mujoco():
-    deepest, last = sink_and_rest(Legs(PAPER, 1, rate=1000, threads=1))
-    in_bullet = sink_and_rest(BulletLegs(PAPER, 1, rate=1000))
+    deepest, last = sink_and_rest(MujocoSimulator(PAPER, 1, rate=1000, threads=1))
+    in_bullet = sink_and_rest(PyBulletSimulator(PAPER, 1, rate=1000))
     assert in_bullet == pytest.approx((deepest, last), abs=2e-3)
     assert deepest > 0.03
 
 
 def test_pybullets_own_ground_is_rigid():
-    legs = BulletLegs(PAPER, 1, rate=1000, ground="rigid")
+    legs = PyBulletSimulator(PAPER, 1, rate=1000, ground="rigid")
     assert sink_and_rest(legs)[0] < 1e-4
 
 
 def hop(count, ground):
-    legs = BulletLegs(PAPER, count, timestep=1e-3, ground=ground)
-    plant = Plant(legs, Disturbance(), SoftLimits(), np.random.default_rng(3))
+    legs = PyBulletSimulator(PAPER, count, timestep=1e-3, ground=ground)
+    plant = Plant(legs, NoiseAndDelay(), SoftLimits(), np.random.default_rng(3))
     legs.stand(slice(None), CROUCH, clearance=0.01)
     command = np.full(count, 0.3)
     plant.channel.restart(slice(None), legs.q, legs.qd, command)
@@ -136,7 +136,10 @@ def test_same_seed_same_bytes(ground):
 
 
 def test_legs_do_not_meet_each_other():
-    together, alone = BulletLegs(PAPER, 3, ground="rigid"), BulletLegs(PAPER, 1, ground="rigid")
+    together, alone = (
+        PyBulletSimulator(PAPER, 3, ground="rigid"),
+        PyBulletSimulator(PAPER, 1, ground="rigid"),
+    )
     for legs in (together, alone):
         legs.stand(slice(None), joint_angles(PAPER, np.array([0.2, 0.0])))
         for _ in range(20):
@@ -146,7 +149,7 @@ def test_legs_do_not_meet_each_other():
 
 def test_a_leg_with_a_reality_is_refused():
     with pytest.raises(UsageError, match="only MuJoCo"):
-        BulletLegs(load_robot("twin"), 1)
+        PyBulletSimulator(load_robot("twin"), 1)
 
 
 def test_worlds_are_freed_with_their_legs():
@@ -156,7 +159,7 @@ def test_worlds_are_freed_with_their_legs():
         return world
 
     before = next_world()
-    legs = BulletLegs(PAPER, 3, ground="rigid")
+    legs = PyBulletSimulator(PAPER, 3, ground="rigid")
     assert next_world() > before
     del legs
     assert next_world() == before
@@ -165,4 +168,4 @@ def test_worlds_are_freed_with_their_legs():
 def test_without_pybullet_there_is_a_sentence(monkeypatch):
     monkeypatch.setitem(sys.modules, "pybullet", None)
     with pytest.raises(UsageError, match=r"hopping-leg\[bullet\]"):
-        BulletLegs(PAPER, 1)
+        PyBulletSimulator(PAPER, 1)

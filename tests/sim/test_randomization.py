@@ -9,17 +9,22 @@ import pytest
 from hopping_leg.envs import HoppingTask, PaperReward, TaskConfig
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.robot import load_robot
-from hopping_leg.robot.reality import Latency, Reality
-from hopping_leg.sim import Legs
-from hopping_leg.sim.twins import IDENTIFIABLE, Range
-from hopping_leg.sim.variants import SURPRISES, places, vary
+from hopping_leg.robot.model_mismatch import Latency, ModelMismatch
+from hopping_leg.sim import MujocoSimulator
+from hopping_leg.sim.randomization import (
+    IDENTIFIABLE_RANGES,
+    WIDE_RANGES,
+    Range,
+    normalized,
+    sample,
+)
 
 LEG = load_robot("legv2")
 POSTURE = np.array([0.7, -1.4])
 
 
-def drawn(count, seed=0, ranges=IDENTIFIABLE):
-    return vary(LEG, ranges, count, np.random.default_rng(seed))
+def drawn(count, seed=0, ranges=IDENTIFIABLE_RANGES):
+    return sample(LEG, ranges, count, np.random.default_rng(seed))
 
 
 def states(legs, ticks=60):
@@ -35,45 +40,45 @@ def states(legs, ticks=60):
 
 def test_every_leg_moves_as_its_own_robot_does_alone():
     robots = drawn(4)
-    together = states(Legs(LEG, 4, threads=1, variants=robots))
+    together = states(MujocoSimulator(LEG, 4, threads=1, robots=robots))
     for index, robot in enumerate(robots):
-        alone = states(Legs(robot, 1, threads=1))
+        alone = states(MujocoSimulator(robot, 1, threads=1))
         np.testing.assert_array_equal(together[:, index], alone[:, 0])
     assert np.ptp(together[-1, :, 0]) > 1e-3
 
 
 def test_gears_that_rub_under_load_do_so_in_every_leg_as_alone():
     loads = [Range("hip.load_friction", "1", v, v, "test") for v in (0.02, 0.1)]
-    robots = [vary(LEG, [load], 1, np.random.default_rng(0))[0] for load in loads]
-    together = states(Legs(LEG, 2, threads=1, variants=robots))
+    robots = [sample(LEG, [load], 1, np.random.default_rng(0))[0] for load in loads]
+    together = states(MujocoSimulator(LEG, 2, threads=1, robots=robots))
     for index, robot in enumerate(robots):
-        alone = states(Legs(robot, 1, threads=1))
+        alone = states(MujocoSimulator(robot, 1, threads=1))
         np.testing.assert_array_equal(together[:, index], alone[:, 0])
 
 
 def test_motors_that_give_less_do_so_in_every_leg_as_alone():
     gains = [Range("knee.torque_gain", "1", v, v, "test") for v in (0.7, 1.2)]
-    robots = [vary(LEG, [gain], 1, np.random.default_rng(0))[0] for gain in gains]
-    legs = Legs(LEG, 2, threads=1, variants=robots[::-1])
-    legs.become(robots)
-    for together in (states(Legs(LEG, 2, threads=1, variants=robots)), states(legs)):
+    robots = [sample(LEG, [gain], 1, np.random.default_rng(0))[0] for gain in gains]
+    legs = MujocoSimulator(LEG, 2, threads=1, robots=robots[::-1])
+    legs.set_robots(robots)
+    for together in (states(MujocoSimulator(LEG, 2, threads=1, robots=robots)), states(legs)):
         for index, robot in enumerate(robots):
-            alone = states(Legs(robot, 1, threads=1))
+            alone = states(MujocoSimulator(robot, 1, threads=1))
             np.testing.assert_array_equal(together[:, index], alone[:, 0])
 
 
-@pytest.mark.parametrize("spread", IDENTIFIABLE, ids=lambda spread: spread.path)
+@pytest.mark.parametrize("spread", IDENTIFIABLE_RANGES, ids=lambda spread: spread.path)
 def test_every_range_of_the_twins_reaches_the_physics(spread):
     low, high = (dataclasses.replace(spread, low=v, high=v) for v in (spread.low, spread.high))
-    robots = [vary(LEG, [end], 1, np.random.default_rng(0))[0] for end in (low, high)]
-    one, other = np.moveaxis(states(Legs(LEG, 2, threads=1, variants=robots)), 1, 0)
+    robots = [sample(LEG, [end], 1, np.random.default_rng(0))[0] for end in (low, high)]
+    one, other = np.moveaxis(states(MujocoSimulator(LEG, 2, threads=1, robots=robots)), 1, 0)
     assert np.abs(one - other).max() > 1e-6
 
 
 def test_places_tell_where_numbers_lie_in_their_ranges():
-    ranges = (Range("rail.friction", "N", 0.5, 1.5, "test"), IDENTIFIABLE[2])
-    robots = [vary(LEG, ranges, 1, np.random.default_rng(seed))[0] for seed in range(20)]
-    found = places(LEG, robots, ranges)
+    ranges = (Range("rail.friction", "N", 0.5, 1.5, "test"), IDENTIFIABLE_RANGES[2])
+    robots = [sample(LEG, ranges, 1, np.random.default_rng(seed))[0] for seed in range(20)]
+    found = normalized(LEG, robots, ranges)
     assert found.shape == (20, 2)
     np.testing.assert_allclose(found[:, 0], 2 * (np.array([r.rail.friction for r in robots]) - 1))
     assert (np.abs(found) <= 1).all()
@@ -82,20 +87,20 @@ def test_places_tell_where_numbers_lie_in_their_ranges():
 
 def test_a_relative_range_is_of_what_the_robot_has():
     spread = Range("base.mass", "1", 0.5, 2.0, "test", "logarithmic", "factors")
-    robots = vary(LEG, [spread], 200, np.random.default_rng(0))
+    robots = sample(LEG, [spread], 200, np.random.default_rng(0))
     shares = np.array([robot.base.mass for robot in robots]) / LEG.base.mass
     assert 0.5 <= shares.min() < 0.55
     assert 1.8 < shares.max() <= 2.0
-    np.testing.assert_allclose(places(LEG, robots, [spread])[:, 0], np.log2(shares), atol=1e-9)
+    np.testing.assert_allclose(normalized(LEG, robots, [spread])[:, 0], np.log2(shares), atol=1e-9)
 
 
 def test_additions_are_to_what_the_robot_has():
     spread = Range("reality.latency.command", "s", 0.0, 1e-2, "test", bounds="additions")
-    robots = vary(late(3e-3), [spread], 200, np.random.default_rng(0))
+    robots = sample(late(3e-3), [spread], 200, np.random.default_rng(0))
     delays = np.array([robot.reality.latency.command for robot in robots])
     assert 3e-3 <= delays.min() < 3.5e-3
     assert 1.25e-2 < delays.max() <= 1.3e-2
-    found = places(late(3e-3), robots, [spread])[:, 0]
+    found = normalized(late(3e-3), robots, [spread])[:, 0]
     np.testing.assert_allclose(found, (delays - 8e-3) / 5e-3, atol=1e-9)
 
 
@@ -108,15 +113,15 @@ def test_whatever_a_leg_is_like_it_can_be_surprised(delay, rubs):
         rail=dataclasses.replace(LEG.rail, friction=rubs),
         knee=dataclasses.replace(LEG.knee, load_friction=rubs),
     )
-    robots = vary(robot, SURPRISES, 60, np.random.default_rng(0), chance=0.5)
-    found = places(robot, robots, SURPRISES)
+    robots = sample(robot, WIDE_RANGES, 60, np.random.default_rng(0), probability=0.5)
+    found = normalized(robot, robots, WIDE_RANGES)
     assert np.isfinite(found).all()
-    assert (np.abs(found).max(axis=0) > 0.5).sum() >= len(SURPRISES) - 2
-    legs = Legs(robot, 60, threads=1)
+    assert (np.abs(found).max(axis=0) > 0.5).sum() >= len(WIDE_RANGES) - 2
+    legs = MujocoSimulator(robot, 60, threads=1)
     legs.stand(slice(None), POSTURE, 0.05)
     legs.step(np.full((60, 2), 3.0))
-    legs.become(robots)
-    assert set(legs.late_ticks) == {0, 1, 2, 3}
+    legs.set_robots(robots)
+    assert set(legs.delay_ticks) == {0, 1, 2, 3}
     for _ in range(20):
         legs.step(np.full((60, 2), 3.0))
     assert np.ptp(legs.height) > 1e-3
@@ -136,13 +141,13 @@ def test_what_controllers_believe_may_not_vary():
         drawn(2, ranges=[Range("thigh.length", "m", 0.1, 0.2, "test")])
     with pytest.raises(RobotError, match="time_constant"):
         drawn(2, ranges=[Range("contact.time_constant", "s", 1e-4, 1e-4, "test")])
-    with pytest.raises(UsageError, match="3 variants were given for 2 legs"):
-        Legs(LEG, 2, variants=drawn(3))
+    with pytest.raises(UsageError, match="3 robots were given for 2 legs"):
+        MujocoSimulator(LEG, 2, robots=drawn(3))
     with pytest.raises(UsageError, match="clamped"):
-        Legs(LEG, 2, variants=drawn(2), clamped=True)
+        MujocoSimulator(LEG, 2, robots=drawn(2), clamped=True)
 
 
-def task(seed, ranges=IDENTIFIABLE):
+def task(seed, ranges=IDENTIFIABLE_RANGES):
     options = TaskConfig(randomised=tuple(ranges), reset_distribution="mixed", episode=0.2)
     return HoppingTask(LEG, 5, options, PaperReward(LEG), np.random.default_rng(seed), 1)
 
@@ -170,7 +175,7 @@ def test_a_critic_may_see_in_which_leg_it_is():
     one, plain = task(0), task(0, [])
     seen = one.privileged()
     assert seen.shape == (5, one.privileged_size)
-    assert one.privileged_size == plain.privileged_size + len(IDENTIFIABLE)
+    assert one.privileged_size == plain.privileged_size + len(IDENTIFIABLE_RANGES)
     assert plain.privileged().shape == (5, plain.privileged_size)
     numbers = seen[:, plain.privileged_size :]
     assert (np.abs(numbers) <= 1).all()
@@ -178,40 +183,45 @@ def test_a_critic_may_see_in_which_leg_it_is():
 
 
 def late(delay, **effects):
-    return dataclasses.replace(LEG, reality=Reality(latency=Latency(command=delay), **effects))
+    return dataclasses.replace(
+        LEG, reality=ModelMismatch(latency=Latency(command=delay), **effects)
+    )
 
 
 @pytest.mark.parametrize("delay", [5e-4, 2e-3, 5e-3, 7.5e-3, 1.2e-2])
 def test_a_constant_delay_is_the_one_that_twins_have(delay):
-    fast, slow = Legs(late(delay), 3, threads=1), Legs(late(delay, voltage=1 - 1e-12), 3, threads=1)
-    assert fast.real is None
-    assert slow.real is not None
+    fast, slow = (
+        MujocoSimulator(late(delay), 3, threads=1),
+        MujocoSimulator(late(delay, voltage=1 - 1e-12), 3, threads=1),
+    )
+    assert fast.mismatch is None
+    assert slow.mismatch is not None
     np.testing.assert_allclose(states(fast), states(slow), atol=1e-8)
-    assert np.abs(states(fast) - states(Legs(LEG, 3, threads=1))).max() > 1e-3
+    assert np.abs(states(fast) - states(MujocoSimulator(LEG, 3, threads=1))).max() > 1e-3
 
 
 @pytest.mark.parametrize("rest", [0.0, 2e-3])
 def test_every_leg_is_as_late_as_alone(rest):
     robots = [late(rest + ticks * 5e-3) for ticks in (2, 0, 3)]
-    legs = Legs(LEG, 3, threads=1, variants=robots)
-    assert legs.real is None
+    legs = MujocoSimulator(LEG, 3, threads=1, robots=robots)
+    assert legs.mismatch is None
     together = states(legs)
     for index, robot in enumerate(robots):
-        alone = states(Legs(robot, 1, threads=1))
+        alone = states(MujocoSimulator(robot, 1, threads=1))
         np.testing.assert_array_equal(together[:, index], alone[:, 0])
 
 
 def test_delays_that_differ_by_parts_of_a_tick_are_left_to_the_twins_physics():
     robots = [late(5e-3), late(7e-3)]
-    assert Legs(LEG, 2, threads=1, variants=robots).real is not None
+    assert MujocoSimulator(LEG, 2, threads=1, robots=robots).mismatch is not None
 
 
 def test_legs_in_motion_become_later_without_losing_a_command():
-    legs, same = Legs(LEG, 2, threads=1), Legs(LEG, 2, threads=1)
+    legs, same = MujocoSimulator(LEG, 2, threads=1), MujocoSimulator(LEG, 2, threads=1)
     for one in (legs, same):
         one.stand(slice(None), POSTURE, 0.05)
         one.step(np.full((2, 2), 2.0))
-    legs.become([LEG, late(1e-2)])
+    legs.set_robots([LEG, late(1e-2)])
     given = np.stack([legs.step(np.full((2, 2), float(k))) for k in range(4)])
     same.step(np.zeros((2, 2)))
     np.testing.assert_allclose(given[:, 0, 0], [0, 1, 2, 3])
@@ -238,7 +248,7 @@ def test_a_late_task_goes_on_exactly(delay):
 
 
 def test_a_leg_that_begins_anew_has_no_command_under_way():
-    legs = Legs(late(2e-3), 2, threads=1)
+    legs = MujocoSimulator(late(2e-3), 2, threads=1)
     legs.stand(slice(None), POSTURE, 0.1)
     legs.step(np.full((2, 2), 5.0))
     legs.stand(np.array([0]), POSTURE, 0.1)
@@ -248,9 +258,9 @@ def test_a_leg_that_begins_anew_has_no_command_under_way():
 
 def test_a_number_is_drawn_by_chance_and_is_the_robots_otherwise():
     rng = np.random.default_rng(0)
-    robots = vary(LEG, IDENTIFIABLE, 200, rng, chance=0.3)
-    for spread in IDENTIFIABLE:
+    robots = sample(LEG, IDENTIFIABLE_RANGES, 200, rng, probability=0.3)
+    for spread in IDENTIFIABLE_RANGES:
         number = attrgetter(spread.path)
         own = np.array([number(robot) == number(LEG) for robot in robots])
         assert 0.55 < own.mean() < 0.85
-    assert vary(LEG, IDENTIFIABLE, 3, rng, chance=0.0) == (LEG,) * 3
+    assert sample(LEG, IDENTIFIABLE_RANGES, 3, rng, probability=0.0) == (LEG,) * 3

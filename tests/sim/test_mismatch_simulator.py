@@ -5,9 +5,16 @@ import pytest
 
 from hopping_leg.errors import RobotError
 from hopping_leg.robot import load_robot
-from hopping_leg.robot.reality import Drive, Ground, Latency, MassScale, Reality, Sensor
-from hopping_leg.sim import NOTHING, Disturbance, Legs, Plant
-from hopping_leg.sim.real_model import real_model
+from hopping_leg.robot.model_mismatch import (
+    Drive,
+    Ground,
+    Latency,
+    MassScale,
+    ModelMismatch,
+    Sensor,
+)
+from hopping_leg.sim import NO_NOISE, MujocoSimulator, NoiseAndDelay, Plant
+from hopping_leg.sim.mismatch_model import mismatch_model
 
 CAD = load_robot("legv2")
 POSTURE = np.array([0.7, -1.4])
@@ -16,19 +23,19 @@ IDLE = Drive(stiction_speed=1.0)
 
 
 def with_reality(robot=CAD, **parts):
-    return dataclasses.replace(robot, reality=Reality(**parts))
+    return dataclasses.replace(robot, reality=ModelMismatch(**parts))
 
 
 def hanging(robot, count=1):
     """Legs with a clamped base, hanging straight down."""
-    legs = Legs(robot, count, threads=1, clamped=True)
+    legs = MujocoSimulator(robot, count, threads=1, clamped=True)
     legs.place(slice(None), 1.0, np.zeros(2))
     return legs
 
 
-def tracked(robot, ticks=120, seed=0, disturbance=NOTHING, threads=1):
+def tracked(robot, ticks=120, seed=0, disturbance=NO_NOISE, threads=1):
     """Return all that happened while a PD shook a standing leg."""
-    legs = Legs(robot, 3, threads=threads)
+    legs = MujocoSimulator(robot, 3, threads=threads)
     plant = Plant(legs, disturbance, None, np.random.default_rng(seed))
     legs.stand(slice(None), POSTURE, clearance=0.02)
     plant.channel.restart(slice(None), legs.measured_q, legs.measured_qd, np.zeros(3))
@@ -43,7 +50,7 @@ def tracked(robot, ticks=120, seed=0, disturbance=NOTHING, threads=1):
 
 def steps_until_motion(robot):
     """Return how many physics steps pass before a torque moves the hip."""
-    legs = Legs(robot, 1, rate=2000, threads=1, clamped=True)
+    legs = MujocoSimulator(robot, 1, rate=2000, threads=1, clamped=True)
     legs.place(slice(None), 1.0, np.zeros(2))
     for step in range(60):
         legs.step(np.array([[3.0, 0.0]]))
@@ -56,11 +63,11 @@ def steps_until_motion(robot):
 def test_effects_without_effect_leave_every_byte(name):
     robot = load_robot(name)
     idle = with_reality(robot, hip=IDLE)
-    assert Legs(idle, 1, threads=1).real is not None
-    assert Legs(robot, 1, threads=1).real is None
+    assert MujocoSimulator(idle, 1, threads=1).mismatch is not None
+    assert MujocoSimulator(robot, 1, threads=1).mismatch is None
     assert (
-        tracked(idle, disturbance=Disturbance()).tobytes()
-        == tracked(robot, disturbance=Disturbance()).tobytes()
+        tracked(idle, disturbance=NoiseAndDelay()).tobytes()
+        == tracked(robot, disturbance=NoiseAndDelay()).tobytes()
     )
 
 
@@ -81,9 +88,9 @@ def test_a_run_goes_on_exactly_from_its_state(name):
     robot = load_robot(name)
 
     def plant(seed):
-        legs = Legs(robot, 2, threads=1)
+        legs = MujocoSimulator(robot, 2, threads=1)
         legs.stand(slice(None), POSTURE)
-        made = Plant(legs, Disturbance(), None, np.random.default_rng(seed))
+        made = Plant(legs, NoiseAndDelay(), None, np.random.default_rng(seed))
         made.channel.restart(slice(None), legs.measured_q, legs.measured_qd, np.zeros(2))
         return made
 
@@ -112,7 +119,9 @@ def test_latency_shifts_the_response_by_the_stated_time(late):
 
 
 def test_a_late_measurement_is_the_state_of_that_time():
-    legs = Legs(with_reality(latency=Latency(measurement=3 * 5e-4)), 1, rate=2000, threads=1)
+    legs = MujocoSimulator(
+        with_reality(latency=Latency(measurement=3 * 5e-4)), 1, rate=2000, threads=1
+    )
     legs.place(slice(None), 2.0, POSTURE)
     past = []
     for _ in range(30):
@@ -124,12 +133,12 @@ def test_a_late_measurement_is_the_state_of_that_time():
 
 def test_jitter_spreads_over_its_range_and_never_reorders():
     robot = with_reality(latency=Latency(command=0.002, jitter=0.002))
-    legs = Legs(robot, 200, threads=1)
+    legs = MujocoSimulator(robot, 200, threads=1)
     legs.place(slice(None), 5.0, POSTURE)
     for tick in range(6):
         # The command counts up, so that a falling torque would be a command overtaken.
         torque = np.full((200, 2), 0.1 * (tick + 1))
-        before = legs.real.drive.motor_torque.copy()
+        before = legs.mismatch.drive.motor_torque.copy()
         given = legs.step(torque)
         assert (given >= before - 1e-12).all()
     share = (0.6 - given[:, 0]) / 0.1
@@ -176,7 +185,7 @@ def test_a_belt_yields_by_torque_over_stiffness():
 
 def test_a_belt_too_stiff_for_the_step_is_refused():
     with pytest.raises(RobotError, match=r"reality.knee.stiffness"):
-        Legs(with_reality(knee=Drive(stiffness=1e6)), 1, threads=1)
+        MujocoSimulator(with_reality(knee=Drive(stiffness=1e6)), 1, threads=1)
 
 
 def test_gain_lag_and_limits_shape_the_motor_torque():
@@ -195,7 +204,7 @@ def test_gain_lag_and_limits_shape_the_motor_torque():
 
 
 def test_a_lower_voltage_lowers_the_speed_line():
-    legs = Legs(with_reality(voltage=0.5), 1, threads=1)
+    legs = MujocoSimulator(with_reality(voltage=0.5), 1, threads=1)
     legs.place(slice(None), 5.0, np.zeros(2))
     legs.qd[0, 1] = 0.5 * CAD.knee.no_load_speed
     assert legs.step(np.array([[0.0, 9.0]]))[0, 1] == 0.0
@@ -204,7 +213,7 @@ def test_a_lower_voltage_lowers_the_speed_line():
 
 
 def test_a_gear_takes_from_driving_and_adds_to_braking():
-    legs = Legs(with_reality(knee=Drive(efficiency=0.8)), 2, threads=1)
+    legs = MujocoSimulator(with_reality(knee=Drive(efficiency=0.8)), 2, threads=1)
     legs.place(slice(None), 5.0, np.zeros(2))
     legs.qd[:, 1] = [5.0, -5.0]
     given = legs.step(np.array([[0.0, 1.0], [0.0, 1.0]]))[:, 1]
@@ -215,7 +224,7 @@ def test_a_gear_takes_from_driving_and_adds_to_braking():
 
 def test_ripple_repeats_with_the_motor_angle_and_has_its_amplitude():
     drive = with_reality(hip=Drive(ripple=0.1, ripple_periods=8.0))
-    legs = Legs(drive, 64, rate=2000, threads=1, clamped=True)
+    legs = MujocoSimulator(drive, 64, rate=2000, threads=1, clamped=True)
     angles = np.linspace(0, 2 * np.pi / 8, 64, endpoint=False)
     legs.place(slice(None), 1.0, np.stack([angles, np.zeros(64)], axis=1))
     given = legs.step(np.ones((64, 2)))[:, 0]
@@ -238,7 +247,9 @@ def test_stiction_holds_up_to_its_share_of_friction(torque, moves):
 
 def test_readings_are_multiples_of_the_sensors_steps():
     sensor = Sensor(0.003, 0.02, 0.01, position_noise=1e-3, velocity_noise=0.1, torque_noise=0.05)
-    legs = Legs(with_reality(hip=Drive(sensor=sensor), knee=Drive(sensor=sensor)), 4, threads=1)
+    legs = MujocoSimulator(
+        with_reality(hip=Drive(sensor=sensor), knee=Drive(sensor=sensor)), 4, threads=1
+    )
     legs.stand(slice(None), POSTURE)
     for _ in range(10):
         legs.step(np.full((4, 2), 1.234))
@@ -250,7 +261,7 @@ def test_readings_are_multiples_of_the_sensors_steps():
 
 def test_noise_has_the_stated_spread_and_leaves_the_physics_alone():
     noisy = Sensor(position_noise=2e-3, velocity_noise=0.1, torque_noise=0.05)
-    legs = Legs(with_reality(hip=Drive(sensor=noisy)), 2000, threads=1)
+    legs = MujocoSimulator(with_reality(hip=Drive(sensor=noisy)), 2000, threads=1)
     legs.place(slice(None), 5.0, POSTURE)
     legs.step(np.ones((2000, 2)))
     error = legs.measured_q - legs.q
@@ -263,7 +274,7 @@ def test_noise_has_the_stated_spread_and_leaves_the_physics_alone():
 
 def test_true_masses_and_ground_reach_the_physics_alone():
     robot = with_reality(mass=MassScale(thigh=1.2), ground=Ground(time_constant=0.05))
-    model = real_model(robot, 5e-4, clamped=False).model
+    model = mismatch_model(robot, 5e-4, clamped=False).model
     assert model.body("thigh").mass[0] == pytest.approx(1.2 * CAD.thigh.mass)
     assert model.body("thigh").inertia.max() == pytest.approx(1.2 * CAD.thigh.inertia)
     np.testing.assert_allclose(model.geom("floor").solref, [0.05, CAD.contact.damping_ratio])
@@ -272,7 +283,7 @@ def test_true_masses_and_ground_reach_the_physics_alone():
 
 
 def test_a_clamped_base_stays_and_its_leg_swings():
-    legs = Legs(load_robot("legv2-paper"), 2, threads=1, clamped=True)
+    legs = MujocoSimulator(load_robot("legv2-paper"), 2, threads=1, clamped=True)
     legs.place(slice(None), 0.1, POSTURE)
     for _ in range(100):
         legs.step(np.zeros((2, 2)))
@@ -282,7 +293,7 @@ def test_a_clamped_base_stays_and_its_leg_swings():
 
 
 def test_what_is_written_to_the_state_moves_motor_and_link():
-    legs = Legs(load_robot("twin"), 2, threads=1)
+    legs = MujocoSimulator(load_robot("twin"), 2, threads=1)
     legs.place(slice(None), 3.0, POSTURE)
     legs.qd[0] = [3.0, -2.0]
     legs.step(np.zeros((2, 2)))

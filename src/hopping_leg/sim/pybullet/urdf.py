@@ -25,7 +25,7 @@ _ROTOR_MASS = 1e-3
 """Any small share of the base's, kg: PyBullet takes a massless link for a fixed one."""
 
 
-def bullet_urdf(robot: Robot, *, foot_collides: bool = True) -> str:
+def pybullet_urdf(robot: Robot, *, foot_collides: bool = True) -> str:
     """Return the URDF to be loaded with ``URDF_USE_INERTIA_FROM_FILE``.
 
     The fixed frame ``foot`` is left out (a link without inertia weighs 1 kg in PyBullet), and so

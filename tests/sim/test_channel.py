@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hopping_leg.errors import UsageError
-from hopping_leg.sim import NOTHING, Channel, Disturbance
+from hopping_leg.sim import NO_NOISE, Channel, NoiseAndDelay
 
 PERIOD = 0.005
-QUIET = Disturbance(joint_noise=0.0, torque_noise=0.0)
+QUIET = NoiseAndDelay(joint_noise=0.0, torque_noise=0.0)
 
 
 def channel(count, disturbance, seed=0):
@@ -51,7 +51,7 @@ def test_half_of_all_ticks_are_delayed():
 
 @given(st.floats(0, 1), st.floats(0, 1))
 def test_noise_stays_within_its_share_of_the_value(joint_noise, torque_noise):
-    noisy = channel(50, Disturbance(joint_noise, torque_noise, 0.0))
+    noisy = channel(50, NoiseAndDelay(joint_noise, torque_noise, 0.0))
     q, qd, torque = (np.random.default_rng(k).normal(0, 5, (50, 2)) for k in range(3))
     seen = noisy.sense(q, qd, np.full(50, 0.3))
     for sample, truth in ((seen.q[:, 0], q), (seen.qd[:, 0], qd)):
@@ -62,7 +62,7 @@ def test_noise_stays_within_its_share_of_the_value(joint_noise, torque_noise):
 
 
 def test_noise_fills_its_range_evenly():
-    noisy = channel(2000, Disturbance(delay_probability=0.0))
+    noisy = channel(2000, NoiseAndDelay(delay_probability=0.0))
     ones = np.ones((2000, 2))
     share = (noisy.sense(ones, ones, np.ones(2000)).q[:, 0] - 1) / 0.05
     torque = (noisy.actuate(ones) - 1) / 0.15
@@ -72,7 +72,7 @@ def test_noise_fills_its_range_evenly():
 
 
 def test_no_disturbance_passes_everything_unchanged():
-    clean = channel(3, NOTHING)
+    clean = channel(3, NO_NOISE)
     for tick in range(30):
         q, qd, command = at(tick, 3)
         seen = clean.sense(q, qd, command)
@@ -82,7 +82,7 @@ def test_no_disturbance_passes_everything_unchanged():
 
 
 def test_sensing_twice_in_a_tick_sees_the_same():
-    noisy = channel(4, Disturbance())
+    noisy = channel(4, NoiseAndDelay())
     for tick in range(1200):
         first = noisy.sense(*at(tick, 4))
         again = noisy.sense(*at(tick, 4))
@@ -104,7 +104,7 @@ def test_a_restarted_leg_has_no_past():
 
 @pytest.mark.parametrize("ticks", [3, 511, 512, 700])
 def test_a_restored_channel_goes_on_exactly(ticks):
-    one, other = channel(1, Disturbance(), 1), channel(1, Disturbance(), 2)
+    one, other = channel(1, NoiseAndDelay(), 1), channel(1, NoiseAndDelay(), 2)
     for tick in range(ticks):
         one.sense(*at(tick, 1))
         one.actuate(np.ones((1, 2)))
@@ -126,4 +126,4 @@ def test_a_restored_channel_goes_on_exactly(ticks):
 )
 def test_a_meaningless_disturbance_is_refused(field, value):
     with pytest.raises(UsageError, match=field):
-        Disturbance(**{field: value})
+        NoiseAndDelay(**{field: value})

@@ -1,12 +1,12 @@
 """Legs that are more than the simulator for training knows: the physics behind ``[reality]``.
 
-Backlash, belts    a further hinge with limit or spring (``real_model``); both together a spring
+Backlash, belts    a further hinge with limit or spring (``mismatch_model``); both together a spring
                    with a dead band, numpy at each physics step
 Masses, ground     other numbers of the same model
 Friction           Stribeck's curve and the gears' load set MuJoCo's friction loss at each physics
                    step: its solver holds a joint at rest, which a torque computed before cannot
-Motor, latency     numpy at each physics step, where order matters (``real_drive``)
-Encoders           numpy once per control period; the physics never sees them (``real_sensors``)
+Motor, latency     numpy at each physics step, where order matters (``motor_effects``)
+Encoders           numpy once per control period; the physics never sees them (``encoder_effects``)
 """
 
 from collections.abc import Sequence
@@ -19,19 +19,18 @@ from mujoco import batch
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import UsageError
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim.joint_friction import JointFriction, rubs_under_load
-from hopping_leg.sim.own_models import take_models
-from hopping_leg.sim.real_drive import RealDrive
-from hopping_leg.sim.real_model import real_model
-from hopping_leg.sim.real_sensors import DRAWS, RealSensors
+from hopping_leg.sim.encoder_effects import DRAWS, EncoderEffects
+from hopping_leg.sim.mismatch_model import mismatch_model
+from hopping_leg.sim.model_fields import JointFriction, rubs_under_load, set_model_fields
+from hopping_leg.sim.motor_effects import MotorEffects
 
 
-class RealLegs:
+class MismatchSimulator:
     """Simulations of a leg with its ``reality``, stepped by one physics step at a time.
 
-    ``state`` (n, 6) is (x, q1, q2 and rates) of base and links, as in ``Legs``. It is a copy of
-    the physics', renewed after each control period; what is written to it moves motor and link
-    alike before the next.
+    ``state`` (n, 6) is (x, q1, q2 and rates) of base and links, as in ``MujocoSimulator``. It is
+    a copy of the physics', renewed after each control period; what is written to it moves motor and
+    link alike before the next.
 
     Args:
         robots: The leg of each simulation, n of them; those that differ must agree in which joints
@@ -55,22 +54,22 @@ class RealLegs:
         clamped: bool,
     ) -> None:
         self.count, self.substeps, self._timestep = len(robots), substeps, timestep
-        real = real_model(robots[0], timestep, clamped=clamped)
+        real = mismatch_model(robots[0], timestep, clamped=clamped)
         self.batch = batch.Batch(real.model, self.count, threads)
         self._ctrl = self.batch.bind("ctrl")
         self._q, self._qd = self.batch.bind("qpos"), self.batch.bind("qvel")
         self._motor, self._flexible, self._clamped = real.motor, real.flexible, clamped
         self.state = np.zeros((self.count, 6))
         self._shown = np.zeros((self.count, 6))
-        self.drive = RealDrive(robots, timestep, substeps)
-        self.sensors = RealSensors([robot.reality for robot in robots], timestep)
+        self.drive = MotorEffects(robots, timestep, substeps)
+        self.sensors = EncoderEffects([robot.reality for robot in robots], timestep)
         self._inverse_belt = np.tile(1 / robots[0].of_joints("belt_ratio"), (self.count, 1))
         self._layout = _layout(robots[0])
         self._note(robots)
-        self._take_models(robots, differ=_differ(robots))
+        self._set_models(robots, differ=_differ(robots))
         self.reseed(np.random.default_rng(0))
 
-    def adopt(self, robots: Sequence[Robot]) -> None:
+    def set_robots(self, robots: Sequence[Robot]) -> None:
         """Go on as other robots, in the present state; commands under way stay under way.
 
         Raises:
@@ -78,14 +77,14 @@ class RealLegs:
                 or one of them has stiction.
         """
         self._note(robots)
-        self._take_models(robots, differ=True)
-        self.drive.adopt(robots)
-        self.sensors.adopt([robot.reality for robot in robots])
+        self._set_models(robots, differ=True)
+        self.drive.set_robots(robots)
+        self.sensors.set_robots([robot.reality for robot in robots])
 
-    def _take_models(self, robots: Sequence[Robot], *, differ: bool) -> None:
+    def _set_models(self, robots: Sequence[Robot], *, differ: bool) -> None:
         """Take on the robots' models, if they differ, and their friction, if it changes."""
         if differ:
-            take_models(self.batch, self._models(robots))
+            set_model_fields(self.batch, self._models(robots))
         self._friction: JointFriction | None = None
         if self._excess.any() or rubs_under_load(robots):
             self._friction = JointFriction(robots, self.batch, self._motor)
@@ -103,7 +102,7 @@ class RealLegs:
                 "Legs with stiction cannot differ or become others; leave 'stiction' at 1."
             )
         models = {
-            key: real_model(robot, self._timestep, clamped=self._clamped).model
+            key: mismatch_model(robot, self._timestep, clamped=self._clamped).model
             for key, robot in distinct.items()
         }
         return [models[id(robot)] for robot in robots]

@@ -4,12 +4,11 @@ import numpy as np
 from mujoco import batch
 
 from hopping_leg.robot import build_model, load_robot
-from hopping_leg.sim.own_models import take_models
-from hopping_leg.sim.twins import IDENTIFIABLE
-from hopping_leg.sim.variants import SURPRISES, vary
+from hopping_leg.sim.model_fields import set_model_fields
+from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES, sample
 
 LEG = load_robot("legv2-paper")
-OTHERS = vary(LEG, (*IDENTIFIABLE, *SURPRISES), 3, np.random.default_rng(0))
+OTHERS = sample(LEG, (*IDENTIFIABLE_RANGES, *WIDE_RANGES), 3, np.random.default_rng(0))
 
 
 def models(robots):
@@ -27,7 +26,7 @@ def fall(simulation, count=400):
 def test_each_simulation_goes_by_its_own_model():
     own = models(OTHERS)
     simulation = batch.Batch(own[0], 3, 1)
-    take_models(simulation, own)
+    set_model_fields(simulation, own)
     given = batch.Batch(own[0], 3, 1)
     given.set_models(own)
     np.testing.assert_array_equal(fall(simulation), fall(given))
@@ -37,9 +36,9 @@ def test_each_simulation_goes_by_its_own_model():
 def test_what_was_taken_on_can_be_given_up():
     simulation = batch.Batch(models([LEG])[0], 3, 1)
     before = fall(simulation)
-    take_models(simulation, models(OTHERS))
+    set_model_fields(simulation, models(OTHERS))
     assert not np.array_equal(fall(simulation), before)
-    take_models(simulation, models([LEG] * 3))
+    set_model_fields(simulation, models([LEG] * 3))
     np.testing.assert_array_equal(fall(simulation), before)
 
 

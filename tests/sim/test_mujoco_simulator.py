@@ -8,7 +8,7 @@ from hopping_leg.robot import load_robot
 from hopping_leg.robot.dynamics import kinetic_energy, potential_energy
 from hopping_leg.robot.limits import SoftLimits
 from hopping_leg.robot.model import GRAVITY
-from hopping_leg.sim import Disturbance, Legs, Plant
+from hopping_leg.sim import MujocoSimulator, NoiseAndDelay, Plant
 
 PAPER = load_robot("legv2-paper")
 CAD = load_robot("legv2")
@@ -32,7 +32,7 @@ def energy(robot, legs):
 @pytest.mark.parametrize("timestep", [5e-4, 1.25e-4])
 def test_energy_is_conserved_without_friction(timestep):
     robot = frictionless()
-    legs = Legs(robot, 8, timestep=timestep, threads=1)
+    legs = MujocoSimulator(robot, 8, timestep=timestep, threads=1)
     rng = np.random.default_rng(0)
     legs.place(slice(None), 3.0, rng.uniform(-2, 2, (8, 2)))
     legs.qd[:] = rng.normal(0, 5, (8, 2))
@@ -45,7 +45,7 @@ def test_energy_is_conserved_without_friction(timestep):
 
 
 def test_free_fall_follows_the_parabola():
-    legs = Legs(frictionless(), 1, threads=1)
+    legs = MujocoSimulator(frictionless(), 1, threads=1)
     legs.place(slice(None), 3.0, np.array([0.4, -1.0]))
     for tick in range(1, 101):
         legs.step(np.zeros((1, 2)))
@@ -58,7 +58,7 @@ def test_free_fall_follows_the_parabola():
 
 def test_drop_on_the_rail_follows_friction_and_damping():
     """A straight leg falls as a point mass: m v' = -m g + Fc - b v, the closed form beside it."""
-    legs = Legs(PAPER, 1, threads=1)
+    legs = MujocoSimulator(PAPER, 1, threads=1)
     legs.place(slice(None), 3.0, np.zeros(2))
     damping, force = PAPER.rail.damping, PAPER.mass * GRAVITY - PAPER.rail.friction
     for _ in range(100):
@@ -69,7 +69,7 @@ def test_drop_on_the_rail_follows_friction_and_damping():
 
 
 def test_a_standing_leg_rests_on_the_ground():
-    legs = Legs(CAD, 1, threads=1)
+    legs = MujocoSimulator(CAD, 1, threads=1)
     legs.stand(slice(None), np.array([0.7, -1.4]))
     np.testing.assert_allclose(legs.foot_clearance(), 0.0, atol=1e-12)
     legs.stand(slice(None), np.array([0.7, -1.4]), clearance=0.05)
@@ -78,7 +78,7 @@ def test_a_standing_leg_rests_on_the_ground():
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_a_motor_never_drives_beyond_its_no_load_speed(sign):
-    legs = Legs(frictionless(), 1, threads=1)
+    legs = MujocoSimulator(frictionless(), 1, threads=1)
     legs.place(slice(None), 50.0, np.zeros(2))
     limit, speed = CAD.of_joints("torque_limit"), CAD.of_joints("no_load_speed")
     fastest = 0.0
@@ -100,7 +100,7 @@ def test_a_gear_under_load_takes_its_share_of_the_torque(detailed):
     """1.2 N m against 0.2 + 0.3 x 1.2 N m of friction move the hip as 0.84 N m without load do."""
     moved = []
     for robot, torque in ((with_gears(load_friction=0.3), 1.2), (with_gears(), 0.84)):
-        legs = Legs(robot, 1, threads=1, detailed=detailed)
+        legs = MujocoSimulator(robot, 1, threads=1, detailed=detailed)
         legs.place(slice(None), 3.0, np.zeros(2))
         for _ in range(4):
             legs.step(np.array([[torque, 0.0]]))
@@ -112,7 +112,7 @@ def test_a_gear_under_load_takes_its_share_of_the_torque(detailed):
 def test_a_loaded_gear_holds_a_joint_that_would_move_without():
     speeds = []
     for robot in (with_gears(load_friction=0.9), with_gears()):
-        legs = Legs(robot, 1, threads=1)
+        legs = MujocoSimulator(robot, 1, threads=1)
         legs.place(slice(None), 3.0, np.zeros(2))
         legs.step(np.array([[1.0, 0.0]]))
         speeds.append(abs(float(legs.qd[0, 0])))
@@ -120,8 +120,8 @@ def test_a_loaded_gear_holds_a_joint_that_would_move_without():
 
 
 def run_plant(threads):
-    legs = Legs(PAPER, 5, threads=threads)
-    plant = Plant(legs, Disturbance(), SoftLimits(), np.random.default_rng(3))
+    legs = MujocoSimulator(PAPER, 5, threads=threads)
+    plant = Plant(legs, NoiseAndDelay(), SoftLimits(), np.random.default_rng(3))
     legs.stand(slice(None), np.array([0.7, -1.4]), clearance=0.05)
     command = np.full(5, 0.3)
     plant.channel.restart(slice(None), legs.q, legs.qd, command)
@@ -138,8 +138,8 @@ def test_same_seed_same_bytes_at_any_thread_count():
 
 
 def test_soft_limits_hold_a_pushed_joint_near_its_bounds():
-    legs = Legs(CAD, 2, threads=1)
-    plant = Plant(legs, Disturbance(0.0, 0.0, 0.0), SoftLimits(), np.random.default_rng(0))
+    legs = MujocoSimulator(CAD, 2, threads=1)
+    plant = Plant(legs, NoiseAndDelay(0.0, 0.0, 0.0), SoftLimits(), np.random.default_rng(0))
     legs.place(slice(None), 20.0, np.array([0.7, -1.4]))
     for _ in range(150):
         plant.drive(np.array([[2.0, 2.0], [-2.0, -2.0]]))
@@ -151,4 +151,4 @@ def test_soft_limits_hold_a_pushed_joint_near_its_bounds():
 @pytest.mark.parametrize("timestep", [3e-3, 0.0, -1e-3, float("nan")])
 def test_a_physics_step_that_cannot_be_is_refused(timestep):
     with pytest.raises(UsageError, match="physics step"):
-        Legs(CAD, 1, timestep=timestep, threads=1)
+        MujocoSimulator(CAD, 1, timestep=timestep, threads=1)

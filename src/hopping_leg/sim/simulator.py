@@ -9,17 +9,20 @@ from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim.reality import RealLegs
+from hopping_leg.sim.mismatch_simulator import MismatchSimulator
 
 Engine = Literal["mujoco", "pybullet"]
 """What computes the physics."""
+
+CONTROL_RATE = 200.0
+"""Control rate of the paper, Hz."""
 
 Ground = Literal["robot", "spring", "rigid"]
 """What the foot stands on: the robot's ground; in PyBullet, where that comes as a force, also its
 spring and damper as the contact's, or PyBullet's own rigid contact."""
 
 
-class AnyLegs(ABC):
+class Simulator(ABC):
     """Simulations of one robot, advanced by one control period at a time.
 
     ``state`` (n, 6) is a live view of the true state (x, q1, q2 and their rates), and so are its
@@ -44,7 +47,7 @@ class AnyLegs(ABC):
     qd: Array
     measured_q: Array
     measured_qd: Array
-    real: RealLegs | None = None
+    mismatch: MismatchSimulator | None = None
     """Where the robot's ``reality`` is simulated, if it is."""
 
     def __init__(self, robot: Robot, count: int, rate: float, timestep: float) -> None:

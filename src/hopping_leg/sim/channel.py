@@ -8,6 +8,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import UsageError
+from hopping_leg.sim.mismatch_simulator import MismatchSimulator
 
 SAMPLES = 3
 """Joint samples a controller sees at a tick: t, t-1, t-2."""
@@ -20,7 +21,7 @@ _BLOCK_SIZE = 16384
 
 
 @dataclass(frozen=True)
-class Disturbance:
+class NoiseAndDelay:
     """How a leg's sensors and motors deceive its controller; the defaults are the paper's.
 
     Raises:
@@ -47,7 +48,7 @@ class Disturbance:
             )
 
 
-NOTHING = Disturbance(joint_noise=0.0, torque_noise=0.0, delay_probability=0.0)
+NO_NOISE = NoiseAndDelay(joint_noise=0.0, torque_noise=0.0, delay_probability=0.0)
 """Perfect sensing and actuation."""
 
 
@@ -83,7 +84,7 @@ class Channel:
     """
 
     def __init__(
-        self, count: int, disturbance: Disturbance, period: float, rng: np.random.Generator
+        self, count: int, disturbance: NoiseAndDelay, period: float, rng: np.random.Generator
     ) -> None:
         self.count, self.disturbance, self.period, self.rng = count, disturbance, period, rng
         depth = disturbance.delay_buffer
@@ -186,3 +187,47 @@ class Channel:
         ticks = np.arange(first, first + self._block)[:, None, None]
         slots = (ticks - self._back) % len(self._buffer)
         self._rows = slots * self.count + np.arange(self.count)[:, None]
+
+
+class MismatchChannel(Channel):
+    """Carries the legs' own memory and randomness along, so that runs repeat and go on exactly.
+
+    The disturbance acts on top of what the legs' sensors report; judge a twin with ``NO_NOISE`` to
+    meet it as it is.
+
+    Args:
+        simulator: The legs behind the channel.
+        disturbance: How strong.
+        period: Control period, s.
+        rng: Source of all randomness.
+    """
+
+    def __init__(
+        self,
+        simulator: MismatchSimulator,
+        disturbance: NoiseAndDelay,
+        period: float,
+        rng: np.random.Generator,
+    ) -> None:
+        super().__init__(simulator.count, disturbance, period, rng)
+        self._simulator = simulator
+        simulator.reseed(rng.spawn(1)[0])
+
+    def reseed(self, rng: np.random.Generator) -> None:
+        """Take all randomness from here on from another source."""
+        super().reseed(rng)
+        self._simulator.reseed(rng.spawn(1)[0])
+
+    def restart(self, ids: IntArray | slice, q: Array, qd: Array, command: Array) -> None:
+        """Forget the past of some legs, on the way to the motors, too."""
+        self._simulator.forget(np.arange(self.count)[ids])
+        super().restart(ids, q, qd, command)
+
+    def state(self) -> dict[str, Any]:
+        """Return everything needed to go on exactly from here, as arrays and plain values."""
+        return super().state() | self._simulator.memory()
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a ``state``; the legs' physics must have been restored."""
+        super().restore(state)
+        self._simulator.restore(state)

@@ -4,7 +4,8 @@ Backlash is a second hinge on the joint's axis that moves freely within its limi
 with a spring. Motor, armature, friction and encoder stay at the first hinge, the link hangs on the
 second, so that the link's angle is the sum. MuJoCo's limits and springs keep this stable at the
 step at which training runs. Where a belt has backlash, too, one hinge does for both: its spring,
-with a dead band, is a torque from ``sim.reality``, as between two hinges nothing had inertia.
+with a dead band, is a torque from ``sim.mismatch_simulator``, as between two hinges nothing had
+inertia.
 """
 
 import math
@@ -16,8 +17,8 @@ import numpy as np
 from hopping_leg.arrays import IntArray
 from hopping_leg.errors import RobotError
 from hopping_leg.robot.model import compile_spec, get_spec
+from hopping_leg.robot.model_mismatch import Drive
 from hopping_leg.robot.parameters import Contact, Joint, Link, Robot
-from hopping_leg.robot.reality import Drive
 
 _HARD = (0.99, 0.999, 1e-4, 0.5, 2.0)
 """``solimp`` of hard limits and of friction that holds."""
@@ -27,7 +28,7 @@ _BODIES = {"hip": "thigh", "knee": "shank"}
 
 
 @dataclass(frozen=True)
-class RealModel:
+class MismatchModel:
     """A compiled model and where the leg's coordinates are in it.
 
     Attributes:
@@ -42,7 +43,7 @@ class RealModel:
     flexible: tuple[int | None, int | None]
 
 
-def real_model(robot: Robot, timestep: float, *, clamped: bool) -> RealModel:
+def mismatch_model(robot: Robot, timestep: float, *, clamped: bool) -> MismatchModel:
     """Build the model of a leg as it really is.
 
     Args:
@@ -53,7 +54,7 @@ def real_model(robot: Robot, timestep: float, *, clamped: bool) -> RealModel:
     Raises:
         RobotError: A belt is too stiff for the physics step, or MuJoCo refuses a number.
     """
-    spec = get_spec(real_parameters(robot), timestep)
+    spec = get_spec(true_parameters(robot), timestep)
     if clamped:
         spec.delete(spec.joint("rail"))
         spec.geom("floor").contype = 0
@@ -72,10 +73,10 @@ def real_model(robot: Robot, timestep: float, *, clamped: bool) -> RealModel:
         int(model.joint(between).qposadr[0]) if between in names else None
         for between in map(_between, _BODIES)
     )
-    return RealModel(model, motor, (hip, knee))
+    return MismatchModel(model, motor, (hip, knee))
 
 
-def real_parameters(robot: Robot) -> Robot:
+def true_parameters(robot: Robot) -> Robot:
     """Return the leg with true masses, ground and motor limits in place of the believed ones."""
     reality = robot.reality
     scale, ground, believed = reality.mass, reality.ground, robot.contact

@@ -10,7 +10,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
 from hopping_leg.robot.model import GRAVITY
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim.bullet_urdf import ROTOR, bullet_urdf
+from hopping_leg.sim.pybullet.urdf import ROTOR, pybullet_urdf
 
 _ITERATIONS = 50
 """Of the constraint solver, which is not let off before: the same work, the same bytes."""
@@ -22,7 +22,7 @@ Spring = tuple[float, float]
 """Stiffness, N/m, and damping, N s/m, of the ground."""
 
 
-class BulletWorld:
+class PyBulletWorld:
     """A leg, its ground and nothing else; coordinates are (rail height, hip, knee).
 
     Coulomb friction is a motor that holds the joint's speed at zero with that much torque at most;
@@ -57,7 +57,7 @@ class BulletWorld:
             solverResidualThreshold=0,
             physicsClientId=self._id,
         )
-        self._leg = self._load(bullet_urdf(robot, foot_collides=foot_collides))
+        self._leg = self._load(pybullet_urdf(robot, foot_collides=foot_collides))
         self._joints = self._find_joints()
         self._make_free(robot)
         self._add_ground(robot, spring)

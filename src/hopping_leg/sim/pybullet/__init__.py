@@ -1,0 +1,1 @@
+"""The leg in PyBullet, the second engine."""

@@ -1,0 +1,198 @@
+"""Legs that differ: the same robot with numbers drawn anew for each, for domain randomisation.
+
+The paper fits one simulation to the robot and rejects the alternative, training on many; this is
+that alternative. Controllers and rewards go on believing the robot itself, so only what the physics
+alone reads may vary: sizes, motors' speeds and joint limits may not.
+"""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from operator import attrgetter
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.errors import UsageError, unknown_name
+from hopping_leg.robot.fields import check_physics
+from hopping_leg.robot.parameters import Robot
+
+RANDOMIZABLE = (
+    "base.mass",
+    "rail.friction",
+    "rail.damping",
+    *(f"{link}.{name}" for link in ("thigh", "shank") for name in ("mass", "com", "inertia")),
+    *(f"contact.{name}" for name in ("time_constant", "damping_ratio", "friction")),
+    *(
+        f"{joint}.{name}"
+        for joint in ("hip", "knee")
+        for name in ("friction", "damping", "armature", "load_friction", "torque_gain")
+    ),
+    "reality.latency.command",
+)
+"""Numbers of a robot that may differ from leg to leg; the latency by whole control periods."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """Where a number of a robot file may lie.
+
+    Raises:
+        UsageError: The range is empty, or logarithmic and not positive.
+    """
+
+    path: str
+    """Dotted path in the file."""
+    unit: str
+    low: float
+    high: float
+    source: str
+    """Why these bounds."""
+    scale: Literal["uniform", "logarithmic"] = "uniform"
+    bounds: Literal["values", "factors", "additions"] = "values"
+    """Whether the bounds are the number's own, or factors of or additions to what a robot has."""
+    step: float = 0.0
+    """Only whole multiples of this are drawn, 0 for any number."""
+
+    def __post_init__(self) -> None:
+        least = 0.0 if self.scale == "logarithmic" else -math.inf
+        if not least < self.low <= self.high < math.inf:
+            raise UsageError(
+                f"The {self.scale} range of '{self.path}' is {self.low:g} to {self.high:g}"
+                f" {self.unit}; its bounds must rise and be finite, and positive if logarithmic."
+            )
+
+    def sample(self, rng: np.random.Generator, own: float = 0.0) -> float:
+        """Return one value.
+
+        Args:
+            rng: Source of randomness.
+            own: What the robot itself has.
+        """
+        drawn = self._sample(rng)
+        if self.bounds == "values":
+            return drawn
+        return own * drawn if self.bounds == "factors" else own + drawn
+
+    def _sample(self, rng: np.random.Generator) -> float:
+        if self.scale == "uniform":
+            drawn = float(rng.uniform(self.low, self.high))
+        else:
+            drawn = float(math.exp(rng.uniform(math.log(self.low), math.log(self.high))))
+        return round(drawn / self.step) * self.step if self.step else drawn
+
+    def normalize(self, value: float, own: float = 0.0) -> float:
+        """Return where a value lies in the range, -1 at its lower and 1 at its upper bound.
+
+        Args:
+            value: As drawn.
+            own: What the robot itself has; no factor of zero lies anywhere but in the middle.
+        """
+        if self.bounds == "factors":
+            if own == 0:
+                return 0.0
+            value = value / own
+        elif self.bounds == "additions":
+            value = value - own
+        ends = (self.low, value, self.high)
+        low, at, high = ends if self.scale == "uniform" else map(math.log, ends)
+        return 2 * (at - low) / (high - low) - 1 if high > low else 0.0
+
+
+_TABLE = "[P] Table I"
+_LAB = "[V2] lab's least squares"
+
+IDENTIFIABLE_RANGES = (
+    Range("rail.friction", "N", 0.3, 1.2, f"around {_TABLE}"),
+    Range("rail.damping", "N s/m", 0.5, 1.6, f"around {_TABLE}"),
+    Range("thigh.inertia", "kg m2", 1.2e-3, 4.1e-3, f"CAD to {_TABLE}", "logarithmic"),
+    Range("shank.inertia", "kg m2", 1e-4, 1e-3, f"CAD to {_LAB}", "logarithmic"),
+    Range("contact.time_constant", "s", 0.02, 0.09, f"MuJoCo's to {_TABLE}", "logarithmic"),
+    Range("contact.damping_ratio", "1", 0.65, 1.0, f"{_TABLE} to MuJoCo's"),
+    Range("hip.friction", "N m", 0.04, 0.44, f"{_LAB} to {_TABLE}", "logarithmic"),
+    Range("hip.damping", "N m s/rad", 5e-4, 1e-2, f"{_TABLE} to {_LAB}", "logarithmic"),
+    Range("hip.armature", "kg m2", 1.8e-3, 3.8e-3, f"CAD to {_LAB}; {_TABLE} is below the rotor's"),
+    Range("knee.friction", "N m", 1.5e-3, 5e-2, f"{_TABLE} to twice {_LAB}", "logarithmic"),
+    Range("knee.damping", "N m s/rad", 0.03, 0.15, f"{_LAB} to {_TABLE}", "logarithmic"),
+    Range("knee.armature", "kg m2", 7e-3, 1.5e-2, "as hip.armature, behind the belt"),
+)
+"""What the simulator for training knows and a fit can find."""
+
+
+def _times(path: str, low: float, high: float) -> Range:
+    return Range(path, "1", low, high, "[C]", "logarithmic", "factors")
+
+
+def _both(name: str, unit: str, low: float, high: float) -> tuple[Range, ...]:
+    return tuple(Range(f"{joint}.{name}", unit, low, high, "[C]") for joint in ("hip", "knee"))
+
+
+WIDE_RANGES = (
+    _times("base.mass", 0.7, 1.6),
+    *(_times(f"{link}.{n}", 0.6, 2.0) for link in ("thigh", "shank") for n in ("mass", "inertia")),
+    _times("rail.friction", 0.3, 6.0),
+    _times("rail.damping", 0.3, 6.0),
+    _times("contact.time_constant", 0.22, 2.8),
+    _times("contact.damping_ratio", 0.4, 2.5),
+    _times("hip.torque_gain", 1 / 1.3, 1.3),
+    _times("knee.torque_gain", 1 / 1.3, 1.3),
+    *_both("friction", "N m", 0.0, 1.4),
+    Range("reality.latency.command", "s", 0.0, 0.0149, "[C]", bounds="additions", step=5e-3),
+)
+"""What may surprise any leg: a payload, heavy links, a worn or dry rail, hard and soft ground,
+motors that give less or more than they should, joints that rub, commands that come later."""
+
+Part = TypeVar("Part")
+
+
+def sample(
+    robot: Robot,
+    ranges: Sequence[Range],
+    count: int,
+    rng: np.random.Generator,
+    probability: float = 1.0,
+) -> tuple[Robot, ...]:
+    """Return a robot as often as asked for, each with its own numbers.
+
+    Args:
+        robot: What is not drawn.
+        ranges: What is drawn, in this order, leg by leg.
+        count: How many.
+        rng: Source of randomness.
+        probability: That a number is drawn rather than the robot's own.
+
+    Raises:
+        UsageError: A range's number may not differ from leg to leg.
+        RobotError: A drawn number contradicts the robot.
+    """
+    for spread in ranges:
+        if spread.path not in RANDOMIZABLE:
+            raise UsageError(unknown_name("number that may vary", spread.path, RANDOMIZABLE))
+    variants = []
+    for number in range(count):
+        variant = robot
+        for spread in ranges:
+            value = spread.sample(rng, attrgetter(spread.path)(robot))
+            if probability == 1 or rng.random() < probability:
+                variant = with_value(variant, spread.path.split("."), value)
+        check_physics(variant, f"variant {number} of {robot.name}")
+        variants.append(variant)
+    return tuple(variants)
+
+
+def normalized(robot: Robot, variants: Sequence[Robot], ranges: Sequence[Range]) -> Array:
+    """Return where the numbers of a robot's variants lie in their ranges, -1 to 1, (n, ranges)."""
+    found = np.empty((len(variants), len(ranges)))
+    for column, spread in enumerate(ranges):
+        number = attrgetter(spread.path)
+        found[:, column] = [spread.normalize(number(v), number(robot)) for v in variants]
+    return found
+
+
+def with_value(part: Part, path: list[str], value: float) -> Part:
+    """Return a nested dataclass with the entry at a path replaced."""
+    name, *rest = path
+    entry: Any = with_value(getattr(part, name), rest, value) if rest else value
+    return dataclasses.replace(part, **{name: entry})  # type: ignore[type-var]
