@@ -11,7 +11,7 @@ from pathlib import Path
 from hopping_leg.identify.excitation import make_excitation
 from hopping_leg.identify.multisine import Multisine
 from hopping_leg.identify.pipeline import identify
-from hopping_leg.identify.playing import play
+from hopping_leg.identify.play_excitation import play
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.identify.result import parameters_json
 from hopping_leg.identify.robot_file import save_robot
@@ -53,7 +53,7 @@ file = Path(sys.argv[1] if len(sys.argv) > 1 else "runs/lab.csv")
 if len(sys.argv) == 1:
     record(file)
 recording = load_recording(file)
-found = identify([recording], load_robot(recording.setup.robot))
+found = identify([recording], load_robot(recording.metadata.robot))
 for row in parameters_json(found):
     print("{name}: {value:.4g} in [{interval_low:.4g}, {interval_high:.4g}] {unit}".format(**row))
-save_robot(found, Path("runs/lab-leg.toml"), recording.setup.robot)
+save_robot(found, Path("runs/lab-leg.toml"), recording.metadata.robot)

@@ -141,9 +141,9 @@ def test_a_recording_from_motors_is_one_that_identification_takes(emulate, tmp_p
     words = ["record", str(file), "--transport", "/dev/leg", "--yes", "--out", str(tmp_path / "r")]
     assert main(words) == 0
     recording = load_recording(tmp_path / "r" / "legv2-sine.parquet")
-    assert recording.setup.rig == rig
-    assert recording.setup.robot == "legv2"
-    assert recording.setup.onboard == "zoh"
+    assert recording.metadata.rig == rig
+    assert recording.metadata.robot == "legv2"
+    assert recording.metadata.onboard == "zoh"
     assert len(recording) == 400
     np.testing.assert_allclose(recording.array("position_command"), position)
     measured = recording.array("position")
@@ -151,8 +151,8 @@ def test_a_recording_from_motors_is_one_that_identification_takes(emulate, tmp_p
     assert np.nanmax(np.abs(measured - position)) < 0.4
     torque = recording.array("torque")
     assert np.nanstd(torque) > 0.1
-    stiffness, damping = recording.setup.stiffness, recording.setup.damping
-    assert load_robot(recording.setup.robot).name == "legv2"
+    stiffness, damping = recording.metadata.stiffness, recording.metadata.damping
+    assert load_robot(recording.metadata.robot).name == "legv2"
     asked = np.array(stiffness) * (position - measured) - np.array(damping) * recording.array(
         "velocity"
     )

@@ -13,7 +13,7 @@ import pytest
 
 from hopping_leg.cli import FAILED, INTERRUPTED, identify, main
 from hopping_leg.identify.excitation import Excitation
-from hopping_leg.identify.playing import play
+from hopping_leg.identify.play_excitation import play
 from hopping_leg.robot import load_robot
 from hopping_leg.trace import Trace
 from tests.identify.fitting import TRUTH, TWIN, run

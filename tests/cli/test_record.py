@@ -31,11 +31,15 @@ def test_a_recording_holds_what_was_played_and_measured(excitation, tmp_path):
     assert content == (tmp_path / "again" / name).read_bytes()
     assert content != (tmp_path / "other" / name).read_bytes()
     recording = load_recording(out / name)
-    setup = recording.setup
-    assert (setup.rig, setup.onboard, setup.sample) == (played.rig, "zoh", "before-command")
-    assert setup.stiffness == (25.0, 15.0)
-    assert setup.damping == JointGains().damping
-    assert setup.robot == "legv2-paper"
+    metadata = recording.metadata
+    assert (metadata.rig, metadata.onboard, metadata.sample) == (
+        played.rig,
+        "zoh",
+        "before-command",
+    )
+    assert metadata.stiffness == (25.0, 15.0)
+    assert metadata.damping == JointGains().damping
+    assert metadata.robot == "legv2-paper"
     assert len(recording) == len(TIME)
     np.testing.assert_array_equal(recording.array("position_command"), played.position)
     np.testing.assert_array_equal(recording.array("velocity_command"), 0.0)

@@ -14,7 +14,7 @@ from hopping_leg.evaluate.bench_identify.run import bench_identify
 from hopping_leg.evaluate.bench_identify.study import Keeper, Study
 from hopping_leg.evaluate.bench_identify.synthetic import FIXED, identify_twin
 from hopping_leg.evaluate.bench_identify.twin import AIR, GROUND, record, twin
-from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
 from hopping_leg.identify.plan import make_plan
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import cut
@@ -32,7 +32,7 @@ def test_twins_are_recorded_with_the_step_that_fits_take():
 def test_plain_loop_and_batch_simulate_the_same(motion):
     recordings = [record(GROUND, motion, 16.0)]
     windows = cut(recordings, 0.25)[4::12]
-    candidate = Candidate(load_robot("legv2"))
+    candidate = LegHypothesis(load_robot("legv2"))
     loop = PlainLoop(recordings, windows, TIMESTEP)
     plain = loop.run(candidate)
     batch = WindowSimulator(recordings, windows, timestep=TIMESTEP, threads=1)

@@ -18,7 +18,7 @@ def page():
 
 def drawn(recordings):
     found = identified()
-    return overlays(recordings, (found.start, found.candidate), found.plan.timestep)
+    return overlays(recordings, (found.start, found.hypothesis), found.plan.timestep)
 
 
 def test_the_page_holds_every_part_and_needs_nothing(page):
@@ -77,7 +77,7 @@ def test_a_long_recording_is_drawn_where_it_fits_worst():
             run().trace,
             table=table.with_columns(hip_position_rad=bent, time_s=3 * table["time_s"].to_numpy()),
         ),
-        setup=dataclasses.replace(run().setup, rate_hz=100 / 3),
+        metadata=dataclasses.replace(run().metadata, rate_hz=100 / 3),
     )
     (overlay,) = drawn([long])
     rows = worst_stretch(overlay)

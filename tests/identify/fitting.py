@@ -2,15 +2,15 @@
 
 import functools
 
-from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.cma import CmaOptions
 from hopping_leg.identify.least_squares import LeastSquaresOptions
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.optimizers import SearchOptions
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
-from hopping_leg.identify.searching import SearchOptions
 from tests.identify.twin import LEG, record, swing
 
 TRUTH = {"hip.friction": 0.12, "knee.damping": 0.06}
-TWIN = Candidate(LEG).replace(TRUTH).robot
+TWIN = LegHypothesis(LEG).replace(TRUTH).robot
 EFFORT = SearchOptions(
     cma=CmaOptions(generations=4, population=4),
     least_squares=LeastSquaresOptions(rounds=2, evaluations=3),

@@ -7,7 +7,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from hopping_leg.identify.setup import RecordingSetup
+from hopping_leg.identify.recording_format import RecordingMetadata
 
 RECORDINGS = Path(
     os.environ.get(
@@ -20,7 +20,7 @@ needs_recordings = pytest.mark.skipif(
     reason=f"no real recordings in {RECORDINGS}; set HOPPING_LEG_RECORDINGS",
 )
 
-SETUP = RecordingSetup(rig="fixed-base", rate_hz=200.0, robot="legv2", source="made up")
+METADATA = RecordingMetadata(rig="fixed-base", rate_hz=200.0, robot="legv2", source="made up")
 
 SIDECAR = """
 rig = "fixed-base"

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.cost import Scoring
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
 from hopping_leg.identify.objective import Objective
 from hopping_leg.identify.parameters import choose
 from hopping_leg.identify.windows import cut
 from tests.identify.twin import LEG, STEP, record, swing
 
-CAD = Candidate(LEG)
+CAD = LegHypothesis(LEG)
 TRUTH = {"hip.friction": 0.12, "hip.damping": 0.05, "knee.friction": 0.08, "knee.damping": 0.02}
 RUN = record(CAD.replace(TRUTH).robot, swing(2.0))
 SCORING = Scoring(position=0.001, torque=0.05)

@@ -8,7 +8,7 @@ import pytest
 
 from hopping_leg.errors import RecordingError
 from hopping_leg.identify.recording import make_recording
-from tests.identify.runs import SETUP, swinging
+from tests.identify.runs import METADATA, swinging
 
 
 def set_rows(table, column, rows, value):
@@ -21,8 +21,8 @@ def scaled(table, columns, factor):
     return table.with_columns(pl.col(columns) * factor)
 
 
-def load(table, **setup):
-    return make_recording(table, dataclasses.replace(SETUP, **setup), "log.csv")
+def load(table, **metadata):
+    return make_recording(table, dataclasses.replace(METADATA, **metadata), "log.csv")
 
 
 def one_warning(recording):

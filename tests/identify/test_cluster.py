@@ -3,9 +3,9 @@ import pickle
 import numpy as np
 import pytest
 
-from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.cluster import Cluster, split_population
 from hopping_leg.identify.cost import Scoring
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
 from hopping_leg.identify.objective import Objective
 from hopping_leg.identify.parameters import choose
 from hopping_leg.identify.windows import cut
@@ -13,7 +13,7 @@ from tests.clusters import two_machines
 from tests.identify.twin import LEG, STEP, record, swing
 
 RUN = record(LEG, swing(0.5))
-PARAMETERS = choose(Candidate(LEG), ["hip.friction", "knee.damping"])
+PARAMETERS = choose(LegHypothesis(LEG), ["hip.friction", "knee.damping"])
 VECTORS = np.random.default_rng(0).uniform(0, 1, (5, 2))
 
 

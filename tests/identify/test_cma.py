@@ -5,10 +5,10 @@ from hopping_leg.errors import UsageError
 from hopping_leg.identify.cma import CmaOptions, cma_es
 from hopping_leg.identify.cost import Scoring
 from hopping_leg.identify.objective import Objective
+from hopping_leg.identify.optimizers import Searcher, SearchOptions
 from hopping_leg.identify.parameters import choose
 from hopping_leg.identify.plan import make_plan
 from hopping_leg.identify.recording import make_recording
-from hopping_leg.identify.searching import Searcher, SearchOptions
 from hopping_leg.identify.windows import cut
 from tests.identify.searches import BOTTOM, CAD, RUN, TRUTH, TWO, bowl, killed
 from tests.identify.twin import LEG, STEP
@@ -71,7 +71,7 @@ def noisy(run):
         run.trace.table[f"{joint}_position_rad"] + rng.normal(scale=1e-3, size=len(run))
         for joint in ("hip", "knee")
     )
-    return make_recording(table, run.setup, "noisy")
+    return make_recording(table, run.metadata, "noisy")
 
 
 def test_shares_of_the_windows_find_more_in_the_same_time():
@@ -82,7 +82,7 @@ def test_shares_of_the_windows_find_more_in_the_same_time():
     ends = []
     for generations, seconds in ((5, np.inf), (20, 0.5)):
         options = SearchOptions(cma=CmaOptions(generations, 10, seconds=seconds))
-        searcher = Searcher(plan, goal, options, 0, None, lambda *told: None, None, {})
+        searcher = Searcher(plan, goal, options, 0, None, lambda *progress: None, None, {})
         ends.append(searcher.run(["fixed-base"])[0].found)
     whole, shared = ends
     assert shared.cost == goal(shared.vector[None])[0]

@@ -28,14 +28,14 @@ def test_a_robust_cost_counts_small_errors_alike_and_large_ones_less():
 
 def test_unmeasured_samples_do_not_count():
     table = RUN.trace.table.with_columns(hip_torque_nm=None)
-    run = RUN.__class__(RUN.trace.__class__(table), RUN.setup, "partial")
+    run = RUN.__class__(RUN.trace.__class__(table), RUN.metadata, "partial")
     both, one = (
         Cost(WindowSimulator([r], cut([r], None), timestep=STEP), Scoring(None, None, 1.0)).size
         for r in (RUN, run)
     )
     assert one == both / 2
     gone = run.__class__(
-        run.trace.__class__(table.with_columns(knee_torque_nm=None)), run.setup, "none"
+        run.trace.__class__(table.with_columns(knee_torque_nm=None)), run.metadata, "none"
     )
     simulator = WindowSimulator([gone], cut([gone], None), timestep=STEP)
     with pytest.raises(RecordingError, match="no measured sample"):
@@ -59,10 +59,10 @@ def test_a_window_counts_in_full_below_the_level_and_the_same_far_beyond():
     cost = Cost(simulator, Scoring(0.1, unexplained=0.5))
     plain = cost.residuals([CAD])[0]
     squares = np.square(plain).sum()
-    assert cost.levels.cost(1e-4 * plain) == pytest.approx(1e-8 * squares, rel=1e-3)
-    assert cost.levels.cost(1e5 * plain) == pytest.approx(plain.size, rel=1e-3)
-    weighted = cost.levels.weights(plain) * plain
-    rest = cost.levels.rest(plain)
+    assert cost.loss.cost(1e-4 * plain) == pytest.approx(1e-8 * squares, rel=1e-3)
+    assert cost.loss.cost(1e5 * plain) == pytest.approx(plain.size, rel=1e-3)
+    weighted = cost.loss.weights(plain) * plain
+    rest = cost.loss.rest(plain)
     expected = np.square(plain.reshape(4, -1, 2)).mean(axis=1)
     expected = (1 - 1 / np.sqrt(1 + expected / 0.5)).sum() * plain.size / 8
     assert np.sum(weighted**2) + np.sum(rest**2) == pytest.approx(expected, rel=1e-12)

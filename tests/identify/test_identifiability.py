@@ -13,10 +13,10 @@ def test_only_the_sum_of_armature_and_inertia_is_identifiable():
     goal = objective(parameters, recordings=[run])
     noise = np.random.default_rng(0).normal(size=goal.cost.size)
     slopes = jacobian(goal.residuals, np.zeros(3), parameters.bounds, 1e-3)
-    told = identifiability(parameters, np.zeros(3), noise, slopes)
-    assert abs(told.correlation[1, 2]) > 0.99
-    assert any("hip.armature" in s and "thigh.inertia" in s for s in told.statements)
-    assert not any("hip.friction" in s for s in told.statements)
+    known = identifiability(parameters, np.zeros(3), noise, slopes)
+    assert abs(known.correlation[1, 2]) > 0.99
+    assert any("hip.armature" in s and "thigh.inertia" in s for s in known.statements)
+    assert not any("hip.friction" in s for s in known.statements)
 
 
 def test_intervals_cover_the_truth_as_often_as_they_say():
@@ -26,14 +26,14 @@ def test_intervals_cover_the_truth_as_often_as_they_say():
     for _ in range(300):
         noise = rng.normal(size=200)
         vector = np.linalg.lstsq(slopes, noise, rcond=None)[0]
-        told = identifiability(TWO, vector, noise - slopes @ vector, slopes)
-        covered += int((np.abs(told.values - TWO.start) <= told.half_width).sum())
+        known = identifiability(TWO, vector, noise - slopes @ vector, slopes)
+        covered += int((np.abs(known.values - TWO.start) <= known.half_width).sum())
     assert 0.91 < covered / 600 < 0.99
 
 
 def test_what_the_data_do_not_touch_is_said():
     slopes = np.zeros((50, 2))
     slopes[:, 0] = 1.0
-    told = identifiability(TWO, np.ones(2), np.random.default_rng(0).normal(size=50), slopes)
-    assert told.half_width[1] == np.inf
-    assert "These data say nothing about 'knee.friction'." in told.statements
+    known = identifiability(TWO, np.ones(2), np.random.default_rng(0).normal(size=50), slopes)
+    assert known.half_width[1] == np.inf
+    assert "These data say nothing about 'knee.friction'." in known.statements

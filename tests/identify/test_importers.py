@@ -30,14 +30,14 @@ def test_a_rig_is_recognised_by_its_own_columns_only(name):
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
 def test_real_recordings_are_believed(path):
     recording = load_recording(path)
-    assert load_robot(recording.setup.robot).name == recording.setup.robot
+    assert load_robot(recording.metadata.robot).name == recording.metadata.robot
     assert len(recording) > 700
     assert recording.has("position")
     assert recording.has("velocity")
     known = ("stall", "start-up rows", "kept as a command of zero")
     assert all(any(word in warning for word in known) for warning in recording.warnings)
     period = np.median(np.diff(recording.time))
-    assert period * recording.setup.rate_hz == pytest.approx(1, rel=0.02)
+    assert period * recording.metadata.rate_hz == pytest.approx(1, rel=0.02)
 
 
 @needs_recordings
@@ -46,10 +46,11 @@ def test_folders_are_recognised_as_their_rig(folder, name):
     path = next((RECORDINGS / folder).glob("*.csv.gz"))
     importer = IMPORTERS[name]
     recording = load_recording(path)
-    assert recording.setup.robot == {"legv1_rail": "legv1", "doublependulum": "doublependulum"}.get(
-        name, "legv2"
-    )
-    assert recording.setup.source in importer.read.__globals__["SETUP"].source
+    assert recording.metadata.robot == {
+        "legv1_rail": "legv1",
+        "doublependulum": "doublependulum",
+    }.get(name, "legv2")
+    assert recording.metadata.source in importer.read.__globals__["METADATA"].source
 
 
 @needs_recordings
@@ -67,8 +68,8 @@ def test_interpolated_samples_never_count_as_measured():
 @needs_recordings
 def test_the_boom_says_what_the_base_did():
     recording = load_recording(next((RECORDINGS / "legv2_boom").glob("one_hurdle_big*")))
-    assert recording.setup.rig == "boom"
-    assert recording.setup.effective_gravity == 4.5
+    assert recording.metadata.rig == "boom"
+    assert recording.metadata.effective_gravity == 4.5
     assert 0.1 < np.nanmax(recording.trace.column("base_rise_m")) < 1.0
     assert np.nanmax(np.abs(recording.array("torque_command"))) < 13
     assert recording.trace.table["row"][0] == 3

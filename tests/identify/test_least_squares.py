@@ -100,7 +100,7 @@ def test_a_recording_that_the_model_cannot_explain_hardly_moves_the_estimate():
 
     def errors(scoring):
         goal = objective(parameters, scoring, [RUN, weak])
-        found = least_squares(goal.residuals, parameters, levels=goal.levels)
+        found = least_squares(goal.residuals, parameters, loss=goal.loss)
         return np.abs(parameters.values(found.vector) / list(TRUTH.values()) - 1)
 
     assert errors(SCORING).max() > 0.5
@@ -111,7 +111,7 @@ def test_steps_follow_the_slope_of_the_levelled_cost():
     goal = objective(TWO, dataclasses.replace(SCORING, unexplained=1.0))
     vector, shift = np.array([0.5, -0.5]), 1e-4 * np.eye(2)
     residuals = goal.residuals(vector[None])[0]
-    weights = goal.levels.weights(residuals)
+    weights = goal.loss.weights(residuals)
     assert weights.min() < 0.1
     slopes = jacobian(goal.residuals, vector, TWO.bounds, 1e-4)
     expected = (goal(vector + shift) - goal(vector - shift)) / 2e-4

@@ -24,5 +24,5 @@ def test_parameters_that_make_no_sense_get_a_sentence(names, bounds, sentence):
 def test_vectors_and_values_are_inverse():
     values = np.array([0.3, 0.2])
     np.testing.assert_allclose(TWO.values(TWO.vector(values)), values)
-    (candidate,) = TWO.candidates(TWO.vector(values)[None])
-    assert candidate.get("hip.friction") == pytest.approx(0.3)
+    (hypothesis,) = TWO.hypotheses(TWO.vector(values)[None])
+    assert hypothesis.get("hip.friction") == pytest.approx(0.3)

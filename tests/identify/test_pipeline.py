@@ -8,10 +8,10 @@ import pytest
 
 from hopping_leg.errors import PhysicsError, RecordingError, RobotError, UsageError
 from hopping_leg.identify import pipeline
-from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.optimizers import SearchOptions
 from hopping_leg.identify.pipeline import identify
 from hopping_leg.identify.result import as_json
-from hopping_leg.identify.searching import SearchOptions
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.fields import check_physics
 from tests.identify.fitting import EFFORT, RATE, TRUTH, TWIN, identified, options, run
@@ -24,7 +24,7 @@ STEPS_APART = 5e-4
 def test_the_twin_is_found_and_predicted():
     found = identified()
     for name, value in TRUTH.items():
-        assert found.candidate.get(name) == pytest.approx(value, rel=5e-3)
+        assert found.hypothesis.get(name) == pytest.approx(value, rel=5e-3)
     assert max(found.validation.closed_loop_position) < STEPS_APART
     assert max(found.start_validation.closed_loop_position) > 1e-3
     assert found.split == "held-out stretches"
@@ -50,7 +50,7 @@ def test_each_rig_is_judged_for_itself():
     few = SearchOptions(cma=dataclasses.replace(EFFORT.cma, generations=1))
     found = identify([run(), stand], LEG, options=options(search="cma", effort=few))
     assert set(found.by_rig) == {"fixed-base", "rail"}
-    errors = [told.closed_loop_position[0] for told in found.by_rig.values()]
+    errors = [v.closed_loop_position[0] for v in found.by_rig.values()]
     assert min(errors) < found.validation.closed_loop_position[0] < max(errors)
     assert "rail" in as_json(found)["validation_by_rig"]
     assert identified().by_rig == {}
@@ -135,7 +135,7 @@ def test_the_paper_search_has_two_passes_over_its_table():
     first, second = found.passes
     assert "thigh.inertia" not in first.parameters.names
     assert "thigh.inertia" in second.parameters.names
-    assert found.told.names == second.parameters.names
+    assert found.identifiability.names == second.parameters.names
     once = identify([run()], LEG, options=options(search="one-pass", parameters=None, effort=few))
     (only,) = once.passes
     assert set(only.parameters.names) == set(second.parameters.names)
@@ -172,10 +172,10 @@ def test_a_fit_that_breaks_down_is_no_result(tmp_path, monkeypatch):
         parameters=("drive.hip.stiffness",),
         bounds={"drive.hip.stiffness": (0.0, 1e12)},
     )
-    setup = dataclasses.replace(
-        run().setup, gains_exact=False, onboard="continuous", torque_limit=(1e12, 1e12)
+    metadata = dataclasses.replace(
+        run().metadata, gains_exact=False, onboard="continuous", torque_limit=(1e12, 1e12)
     )
-    strong = dataclasses.replace(run(), setup=setup)
+    strong = dataclasses.replace(run(), metadata=metadata)
     motor = dataclasses.replace(LEG.hip.motor, peak_torque=1e12, no_load_speed=1e12)
     robot = dataclasses.replace(LEG, hip=dataclasses.replace(LEG.hip, motor=motor))
     folder = tmp_path / "run"
@@ -226,9 +226,9 @@ def test_data_without_meaning_get_a_sentence():
     for onboard, what in (("torque", "commanded torques"), ("continuous", "targets of its")):
         table = run().trace.table
         table = table.drop([c for c in table.columns if "command" in c])
-        setup = dataclasses.replace(run().setup, onboard=onboard)
+        metadata = dataclasses.replace(run().metadata, onboard=onboard)
         trace = dataclasses.replace(run().trace, table=table)
-        mute = dataclasses.replace(run(), trace=trace, setup=setup)
+        mute = dataclasses.replace(run(), trace=trace, metadata=metadata)
         with pytest.raises(RecordingError, match=f"has no {what}"):
             identify([mute], LEG, options=options())
     known = dataclasses.replace(run(), digest="abc")
@@ -246,7 +246,7 @@ def test_the_twin_is_another_than_where_the_fit_begins():
 def test_a_motor_is_never_found_weaker_than_its_own_limit(joint):
     name = f"{joint}.motor.peak_torque"
     least, most = pipeline._file_bounds(LEG)[name]
-    check_physics(Candidate(LEG).replace({name: least}).robot, "the weakest")
+    check_physics(LegHypothesis(LEG).replace({name: least}).robot, "the weakest")
     with pytest.raises(RobotError, match="must not exceed"):
-        check_physics(Candidate(LEG).replace({name: 0.99 * least}).robot, "weaker still")
-    assert least < Candidate(LEG).get(name) < most
+        check_physics(LegHypothesis(LEG).replace({name: 0.99 * least}).robot, "weaker still")
+    assert least < LegHypothesis(LEG).get(name) < most

@@ -6,7 +6,7 @@ import pytest
 
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.plan import make_plan
-from hopping_leg.identify.recording import with_setup
+from hopping_leg.identify.recording import with_metadata
 from hopping_leg.robot.model import TIMESTEP
 from tests.identify.twin import LEG, record, swing
 
@@ -24,11 +24,11 @@ def test_a_fixed_base_says_nothing_about_rail_and_contact():
 
 def test_known_gains_are_kept_and_unknown_ones_are_fitted():
     assert "drive.knee.stiffness" not in make_plan([FIXED], LEG).parameters.names
-    unknown = with_setup(FIXED, stiffness=None)
+    unknown = with_metadata(FIXED, stiffness=None)
     assert "drive.knee.stiffness" in make_plan([unknown], LEG).parameters.names
-    doubtful = with_setup(FIXED, gains_exact=False)
+    doubtful = with_metadata(FIXED, gains_exact=False)
     plan = make_plan([doubtful], LEG)
-    assert plan.start.get("drive.knee.stiffness") == FIXED.setup.stiffness[1]
+    assert plan.start.get("drive.knee.stiffness") == FIXED.metadata.stiffness[1]
 
 
 def test_windows_are_short_where_nothing_holds_the_leg():
@@ -68,8 +68,8 @@ def test_held_commands_are_simulated_with_the_step_of_training():
 
 
 def test_a_drive_at_its_limit_has_its_torque_speed_line_fitted():
-    weak = with_setup(FIXED, onboard="continuous", gains_exact=False)
-    strong = with_setup(weak, stiffness=(800.0, 800.0), damping=(0.0, 0.0))
+    weak = with_metadata(FIXED, onboard="continuous", gains_exact=False)
+    strong = with_metadata(weak, stiffness=(800.0, 800.0), damping=(0.0, 0.0))
     lines = {"hip.motor.peak_torque", "knee.motor.no_load_speed"}
     assert not lines & set(make_plan([weak], LEG).parameters.names)
     assert lines <= set(make_plan([strong], LEG).parameters.names)
@@ -96,8 +96,8 @@ def test_friction_that_grows_with_load_shows_where_torques_are_known_and_carry_w
         return "knee.load_friction" in make_plan(recordings, LEG).parameters.names
 
     def on(rig, onboard):
-        setup = dataclasses.replace(FIXED.setup, rig=rig, onboard=onboard)
-        return dataclasses.replace(FIXED, setup=setup)
+        metadata = dataclasses.replace(FIXED.metadata, rig=rig, onboard=onboard)
+        return dataclasses.replace(FIXED, metadata=metadata)
 
     assert fitted(TORQUES)
     assert not fitted(FIXED)

@@ -7,16 +7,16 @@ import pytest
 
 from hopping_leg.errors import HoppingLegError, RecordingError, UsageError
 from hopping_leg.identify.columns import COLUMNS, PAIRS
-from hopping_leg.identify.recording import load_recording, make_recording, with_setup
+from hopping_leg.identify.recording import load_recording, make_recording, with_metadata
 from hopping_leg.trace import Trace
-from tests.identify.runs import SETUP, SIDECAR, swinging, write_run
+from tests.identify.runs import METADATA, SIDECAR, swinging, write_run
 
 
 def test_a_clean_run_is_read_without_a_word(tmp_path):
     table = swinging()
     recording = load_recording(write_run(tmp_path, table))
     assert recording.warnings == ()
-    assert recording.setup == SETUP
+    assert recording.metadata == METADATA
     assert recording.name == "run.csv"
     np.testing.assert_allclose(recording.time, table["time_s"])
     np.testing.assert_allclose(
@@ -32,11 +32,11 @@ def test_a_clean_run_is_read_without_a_word(tmp_path):
 
 def test_the_native_form_keeps_everything(tmp_path):
     first = load_recording(write_run(tmp_path, swinging()))
-    first = with_setup(first, stiffness=(2.0, 30.0), torque_limit=(10.0, 20.0), startup_rows=4)
+    first = with_metadata(first, stiffness=(2.0, 30.0), torque_limit=(10.0, 20.0), startup_rows=4)
     path = tmp_path / "native.parquet"
     first.save(path)
     back = load_recording(path)
-    assert back.setup == first.setup
+    assert back.metadata == first.metadata
     assert back.trace.table.equals(first.trace.table[4:])
     assert back.digest == hashlib.sha256(path.read_bytes()).hexdigest()
     back.save(tmp_path / "again.parquet")
@@ -121,20 +121,20 @@ def test_missing_empty_and_truncated_files_get_a_sentence(tmp_path):
 
 
 def test_quantities_that_do_not_exist_are_named():
-    recording = make_recording(swinging(), SETUP, "made up")
+    recording = make_recording(swinging(), METADATA, "made up")
     with pytest.raises(UsageError, match="Did you mean 'position'"):
         recording.array("positon")
 
 
 def test_segments_end_where_rows_are_missing():
     table = swinging().filter(~pl.int_range(pl.len()).is_in([100, 101, 102, 300]))
-    recording = make_recording(table, SETUP, "made up")
+    recording = make_recording(table, METADATA, "made up")
     assert recording.segments() == [slice(0, 100), slice(100, 596)]
     assert any("stall of 20.0 ms" in warning for warning in recording.warnings)
 
 
 def test_a_log_that_keeps_every_fourth_row_has_no_stalls():
-    recording = make_recording(swinging(2400)[::4], SETUP, "made up")
+    recording = make_recording(swinging(2400)[::4], METADATA, "made up")
     assert recording.segments() == [slice(0, 600)]
     assert recording.warnings == ()
 

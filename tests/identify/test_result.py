@@ -39,21 +39,21 @@ def test_intervals_hold_their_values():
 
 
 def test_what_does_not_exist_is_null():
-    told = dataclasses.replace(identified().told, half_width=np.array([np.inf, 1.0]))
-    tree = as_json(dataclasses.replace(identified(), told=told))
+    known = dataclasses.replace(identified().identifiability, half_width=np.array([np.inf, 1.0]))
+    tree = as_json(dataclasses.replace(identified(), identifiability=known))
     assert tree["parameters"][0]["interval_high"] is None
     assert json.loads(json.dumps(tree, allow_nan=False)) == tree
 
 
 def test_without_a_closed_loop_its_pairs_are_null_and_nobody_tells_of_it():
     nothing = (np.nan, np.nan)
-    told = {
+    known = {
         when: dataclasses.replace(
             getattr(identified(), when), closed_loop_position=nothing, closed_loop_torque=nothing
         )
         for when in ("validation", "start_validation")
     }
-    tree = as_json(dataclasses.replace(identified(), **told))
+    tree = as_json(dataclasses.replace(identified(), **known))
     assert tree["validation"]["closed_loop_position_rms_rad"] == [None, None]
     assert tree["validation"]["closed_loop_torque_rms_nm"] == [None, None]
     assert [row["error"] for row in tree["quality"]] == [

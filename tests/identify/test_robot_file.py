@@ -49,15 +49,15 @@ def test_provenance_stands_above_the_numbers(tmp_path):
 def found_of(name, unit, value):
     """Return the identification as if its second parameter had been another."""
     found = identified()
-    values = np.array([found.told.values[0], value])
-    told = dataclasses.replace(found.told, names=["hip.friction", name], values=values)
+    values = np.array([found.identifiability.values[0], value])
+    known = dataclasses.replace(found.identifiability, names=["hip.friction", name], values=values)
     start = found.passes[-1].parameters.parameters[0]
     parameters = dataclasses.replace(
         found.passes[-1].parameters,
         parameters=(start, dataclasses.replace(start, name=name, unit=unit)),
     )
     last = dataclasses.replace(found.passes[-1], parameters=parameters)
-    return dataclasses.replace(found, told=told, passes=(last,))
+    return dataclasses.replace(found, identifiability=known, passes=(last,))
 
 
 def test_what_belongs_to_the_rig_stays_out_of_the_robot(tmp_path):
@@ -82,7 +82,8 @@ def test_an_impossible_robot_is_not_written(tmp_path):
     path.write_text("old")
     values = np.array([-1.0, 0.1])
     found = dataclasses.replace(
-        identified(), told=dataclasses.replace(identified().told, values=values)
+        identified(),
+        identifiability=dataclasses.replace(identified().identifiability, values=values),
     )
     with pytest.raises(RobotError, match=r"hip\.friction"):
         save_robot(found, path, "legv2")

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from hopping_leg.errors import RecordingError
-from hopping_leg.identify.candidate import Candidate
-from hopping_leg.identify.recording import with_setup
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.recording import with_metadata
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import cut
 from tests.identify.twin import LEG, STEP, record, swing
 
-TRUE = Candidate(LEG)
+TRUE = LegHypothesis(LEG)
 OTHER = TRUE.replace({"hip.friction": 0.3, "shank.inertia": 4e-4, "contact.time_constant": 0.05})
 
 
@@ -19,10 +19,10 @@ def simulator(recordings, duration=None, **options):
 
 
 @pytest.mark.parametrize("rig", ["fixed-base", "rail"])
-@pytest.mark.parametrize("candidate", [TRUE, OTHER], ids=["true", "other"])
-def test_the_batch_repeats_a_plain_loop_over_mj_step(rig, candidate):
-    run = record(candidate.robot, swing(1.0, rig), rig)
-    got = simulator([run]).run([TRUE, candidate])
+@pytest.mark.parametrize("hypothesis", [TRUE, OTHER], ids=["true", "other"])
+def test_the_batch_repeats_a_plain_loop_over_mj_step(rig, hypothesis):
+    run = record(hypothesis.robot, swing(1.0, rig), rig)
+    got = simulator([run]).run([TRUE, hypothesis])
     np.testing.assert_allclose(got.position[1, 0], run.array("position"), atol=1e-9)
     np.testing.assert_allclose(got.velocity[1, 0], run.array("velocity"), atol=1e-6)
     np.testing.assert_allclose(got.torque[1, 0], run.array("torque"), atol=1e-6)
@@ -52,7 +52,7 @@ def test_a_candidate_does_not_depend_on_its_company_nor_on_threads():
 
 def test_a_continuous_pd_is_the_limit_of_a_fast_sampled_one():
     run = record(LEG, swing(1.0))
-    continuous = simulator([with_setup(run, onboard="continuous")]).run([TRUE]).position
+    continuous = simulator([with_metadata(run, onboard="continuous")]).run([TRUE]).position
     sampled = simulator([run]).run([TRUE]).position
     fast = record(LEG, np.repeat(swing(1.0), 5, axis=0), rate=1000.0)
     exact = fast.array("position")[::5]
@@ -67,7 +67,7 @@ def test_delay_shifts_the_answer():
 
 def test_rows_between_ticks_are_met():
     run = record(LEG, swing(1.0), onboard="torque")
-    jitter = np.random.default_rng(0).uniform(-0.4, 0.4, len(run)) * run.setup.period
+    jitter = np.random.default_rng(0).uniform(-0.4, 0.4, len(run)) * run.metadata.period
     jitter[0] = 0.0
     time = run.time + jitter
     table = run.trace.table.with_columns(time_s=time)
@@ -87,7 +87,7 @@ def test_friction_that_grows_with_load_slows_the_leg():
 
 
 def test_a_lagging_velocity_makes_a_stiff_drive_ring():
-    run = with_setup(record(LEG, swing(1.0)), onboard="continuous", damping=(0.3, 3.2))
+    run = with_metadata(record(LEG, swing(1.0)), onboard="continuous", damping=(0.3, 3.2))
     lagging = TRUE.replace({"drive.velocity_window": 0.012})
     torque = simulator([run]).run([TRUE, lagging]).torque[:, 0, 50:, 1]
     rough = np.abs(np.diff(torque, n=2, axis=1)).mean(axis=1)
@@ -95,7 +95,7 @@ def test_a_lagging_velocity_makes_a_stiff_drive_ring():
 
 
 def test_an_unknown_gain_gets_a_sentence():
-    run = with_setup(record(LEG, swing(0.5)), stiffness=None)
+    run = with_metadata(record(LEG, swing(0.5)), stiffness=None)
     with pytest.raises(RecordingError, match="does not say the stiffness"):
         simulator([run]).run([TRUE])
     fitted = TRUE.replace({"drive.hip.stiffness": 8.0, "drive.knee.stiffness": 8.0})

@@ -20,7 +20,7 @@ def noisy(run, seed=0):
         for joint in ("hip", "knee")
         for name, scale in columns.items()
     )
-    return make_recording(table, run.setup, "noisy")
+    return make_recording(table, run.metadata, "noisy")
 
 
 def test_states_start_from_what_was_measured():
@@ -50,7 +50,7 @@ def base_speed(run):
     for torque in run.array("torque_command"):
         speeds.append(data.qvel[0])
         data.ctrl[:] = torque
-        mujoco.mj_step(model, data, round(run.setup.period / STEP))
+        mujoco.mj_step(model, data, round(run.metadata.period / STEP))
     return np.array(speeds)
 
 
@@ -73,7 +73,7 @@ def test_no_difference_is_taken_across_a_touchdown():
     standing = kinematics.stance_height(LEG, run.array("position")) - 1e-3
     height = np.where(time < 0.2, falling, standing)
     table = run.trace.table.with_columns(height_m=height)
-    rate = base_rate(make_recording(table, run.setup, "falls"), LEG)
+    rate = base_rate(make_recording(table, run.metadata, "falls"), LEG)
     np.testing.assert_allclose(rate[time < 0.2][2:], -9.81 * time[time < 0.2][2:], atol=1e-9)
     legs = kinematics.foot_velocity(LEG, run.array("position"), run.array("velocity"))[:, 0]
     np.testing.assert_allclose(rate[time >= 0.2], legs[time >= 0.2], atol=1e-9)

@@ -6,8 +6,8 @@ import polars as pl
 
 from hopping_leg.identify.columns import PAIRS
 from hopping_leg.identify.recording import make_recording
+from hopping_leg.identify.recording_format import RecordingMetadata
 from hopping_leg.identify.rig_model import build_rig_model
-from hopping_leg.identify.setup import RecordingSetup
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.limits import MotorLimit
 from hopping_leg.robot.robot_files import load_robot
@@ -57,5 +57,5 @@ def record(robot, targets, rig="fixed-base", rate=200.0, onboard="zoh", name="tw
         columns |= dict(zip(PAIRS[quantity], values.T, strict=True))
     if rig != "fixed-base":
         columns["height_m"] = height
-    setup = RecordingSetup(rig, rate, "legv2", "simulated", onboard=onboard, **GAINS)
-    return make_recording(pl.DataFrame(columns), setup, name)
+    metadata = RecordingMetadata(rig, rate, "legv2", "simulated", onboard=onboard, **GAINS)
+    return make_recording(pl.DataFrame(columns), metadata, name)

@@ -17,11 +17,11 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from hopping_leg.identify import multisine, strokes
+from hopping_leg.identify import multisine, paper_excitation
 from hopping_leg.identify.excitation import RATE, Excitation, adapt, make_excitation
 from hopping_leg.identify.feasibility import HardwareRange, demand
-from hopping_leg.identify.setup import Pair
-from hopping_leg.identify.strokes import DURATION, Bend, Strokes
+from hopping_leg.identify.paper_excitation import DURATION, Bend, Strokes
+from hopping_leg.identify.recording_format import Pair
 from hopping_leg.identify.templates import Template
 from hopping_leg.json_files import write_json
 from hopping_leg.robot import Robot, load_robot
@@ -126,7 +126,7 @@ def _template(args: FixedBase | MovingBase | Multisine) -> Template:
         sines = (args.centre, args.amplitude, args.lowest, args.highest, args.duration)
         return multisine.Multisine(*sines)
     if isinstance(args, FixedBase):
-        return strokes.fixed_base(
+        return paper_excitation.fixed_base(
             args.amplitudes,
             args.periods,
             args.swings,
@@ -135,7 +135,7 @@ def _template(args: FixedBase | MovingBase | Multisine) -> Template:
             bend=args.bend,
             every_pair=args.every_pair,
         )
-    return strokes.moving_base(
+    return paper_excitation.moving_base(
         args.amplitudes,
         args.periods,
         duration=args.duration,

@@ -28,12 +28,12 @@ from hopping_leg.cli.fit_progress import FitProgress
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.fit_report import write_fit_report
 from hopping_leg.identify.cma import CmaOptions
+from hopping_leg.identify.optimizers import SearchOptions
 from hopping_leg.identify.ownership import robot_of
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import Recording, load_recording, sidecar_path
 from hopping_leg.identify.result import Identified, as_json, parameters_json, quality_json
 from hopping_leg.identify.robot_file import save_robot
-from hopping_leg.identify.searching import SearchOptions
 from hopping_leg.json_files import write_json
 from hopping_leg.robot import load_robot
 from hopping_leg.trace import write_atomically
@@ -195,8 +195,8 @@ def _show_recordings(
         for r in group:
             seconds = r.time[-1] - r.time[0]
             console.print(
-                f"{use}: {r.name}, {r.setup.rig}, {seconds:.4g} s at {r.setup.rate_hz:g} Hz,"
-                f" {r.setup.source}",
+                f"{use}: {r.name}, {r.metadata.rig}, {seconds:.4g} s at {r.metadata.rate_hz:g} Hz,"
+                f" {r.metadata.source}",
                 highlight=False,
                 markup=False,
             )
@@ -225,5 +225,5 @@ def _show(console: Console, identified: Identified) -> None:
         shown = (f"{n:.3g}" if math.isfinite(n) else "-" for n in numbers)
         quality.add_row(row["error"], *shown, unit)
     console.print(quality)
-    for sentence in identified.told.statements:
+    for sentence in identified.identifiability.statements:
         console.print(sentence, highlight=False, markup=False)

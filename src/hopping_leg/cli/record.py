@@ -23,8 +23,8 @@ from hopping_leg.cli import record_motors
 from hopping_leg.controllers.joint_pd import JointGains
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.excitation import load_excitation
-from hopping_leg.identify.playing import play
-from hopping_leg.identify.setup import Pair
+from hopping_leg.identify.play_excitation import play
+from hopping_leg.identify.recording_format import Pair
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.robot.robot_files import parent_robot

@@ -37,9 +37,9 @@ def write_fit_report(identified: Identified, command: str = "", threads: int = 0
         command: That made it.
         threads: Worker threads of the simulations to draw, 0 for one per core.
     """
-    candidates = (identified.start, identified.candidate)
+    candidates = (identified.start, identified.hypothesis)
     drawn = overlays(identified.held, candidates, identified.plan.timestep, threads)
-    told = identified.told
+    known = identified.identifiability
     page = page_template("fit_report.html.j2").render(
         title=f"{identified.robot.name} identified",
         subtitle=_subtitle(identified),
@@ -47,8 +47,8 @@ def write_fit_report(identified: Identified, command: str = "", threads: int = 0
         split=identified.split,
         quality=quality_table(identified),
         parameters=parameter_table(identified),
-        statements=told.statements,
-        correlations=_picture(draw_correlations(told.names, told.correlation)),
+        statements=known.statements,
+        correlations=_picture(draw_correlations(known.names, known.correlation)),
         recordings=recording_table(drawn),
         fits=[_fit(overlay) for overlay in _worst(drawn)],
         left_out=max(0, len(drawn) - _MOST),
@@ -88,7 +88,7 @@ def recording_table(drawn: list[Overlay]) -> Markup:
     """Return each held-out recording's errors before and after the fit."""
     columns = [
         Column("recording", lambda o: o.recording.name),
-        Column("rig", lambda o: o.recording.setup.rig),
+        Column("rig", lambda o: o.recording.metadata.rig),
     ]
     for quantity, unit, factor in (("position", "mrad", 1e3), ("torque", "N m", 1.0)):
         for index, when in enumerate(("before", "after")):
@@ -108,7 +108,7 @@ def _references(identified: Identified) -> dict[str, Mapping[str, float]]:
     found: dict[str, Mapping[str, float]] = {}
     if robot.digest != cad.digest:
         start = identified.start
-        names = [n for n in identified.told.names if not n.startswith("drive.")]
+        names = [n for n in identified.identifiability.names if not n.startswith("drive.")]
         own = type(start)(cad)
         found[f"CAD ({_CAD})"] = {name: own.get(name) for name in names}
     return found | {f"paper's Table I ({_PAPER})": _table_one(load_tree(_PAPER))}
@@ -141,13 +141,13 @@ def _fit(overlay: Overlay) -> dict[str, str]:
     )
     return {
         "title": overlay.recording.name,
-        "caption": f"{overlay.recording.setup.source}; simulated {how}.",
+        "caption": f"{overlay.recording.metadata.source}; simulated {how}.",
         "source": _picture(draw_overlay(overlay)),
     }
 
 
 def _subtitle(identified: Identified) -> str:
-    rigs = ", ".join(dict.fromkeys(r.setup.rig for r in (*identified.fit, *identified.held)))
+    rigs = ", ".join(dict.fromkeys(r.metadata.rig for r in (*identified.fit, *identified.held)))
     seconds = [sum(float(r.time[-1] - r.time[0]) for r in p) for p in _sides(identified)]
     return (
         f"{identified.start.robot.name} on {rigs}; {seconds[0]:.0f} s fitted, {seconds[1]:.0f} s"

@@ -48,7 +48,7 @@ def check_clock(inspection: Inspection) -> pl.DataFrame:
 def warn_of_stalls(inspection: Inspection) -> pl.DataFrame:
     """Say where rows are missing; windows do not reach across."""
     time = inspection.floats("time_s")
-    steps, period = np.diff(time), row_period(time, inspection.setup.period)
+    steps, period = np.diff(time), row_period(time, inspection.metadata.period)
     stalls = np.flatnonzero(steps > STALL * period) + 1
     for index in stalls[:3]:
         gap = time[index] - time[index - 1]
@@ -65,13 +65,13 @@ def warn_of_stalls(inspection: Inspection) -> pl.DataFrame:
 
 
 def _check_unit(inspection: Inspection, step: float) -> None:
-    periods = step * inspection.setup.rate_hz
+    periods = step * inspection.metadata.rate_hz
     if 0.5 <= periods <= _SPARSEST:
         return
     unit = next((u for u, f in _UNITS.items() if 0.8 < periods / f < 1.25), None)
     guess = f"the time seems to be in {unit}" if unit else "one of the two is wrong"
     raise RecordingError(
         f"{inspection.origin}: {inspection.named('time_s')} steps by {step:.3g} from row to row"
-        f" but the setup's rate_hz = {inspection.setup.rate_hz:g} means"
-        f" {inspection.setup.period:.3g} s; {guess}."
+        f" but the metadata's rate_hz = {inspection.metadata.rate_hz:g} means"
+        f" {inspection.metadata.period:.3g} s; {guess}."
     )

@@ -14,7 +14,7 @@ def check_commands(recordings: Sequence[Recording]) -> None:
         RecordingError: Naming file and columns.
     """
     for recording in recordings:
-        torques = recording.setup.onboard == "torque"
+        torques = recording.metadata.onboard == "torque"
         wanted = "torque_command" if torques else "position_command"
         if not recording.has(wanted):
             what = "commanded torques" if torques else "targets of its on-board PD"

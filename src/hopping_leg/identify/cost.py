@@ -6,8 +6,8 @@ import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.errors import RecordingError, UsageError
-from hopping_leg.identify.candidate import Candidate
-from hopping_leg.identify.levels import Levels, grouping, total_costs
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.robust_loss import RobustLoss, grouping, total_costs
 from hopping_leg.identify.simulate import Simulated, WindowSimulator
 
 _QUANTITIES = ("position", "velocity", "torque", "height")
@@ -49,7 +49,7 @@ class Scoring:
 
 
 class Cost:
-    """Residuals of candidates on a simulator's windows.
+    """Residuals of hypotheses on a simulator's windows.
 
     Only measured samples with an exact time stamp count, after each window's unscored rows.
 
@@ -74,12 +74,12 @@ class Cost:
         self.groups = grouping(list(self._counts.values()))
         """Number of each residual's window, quantity and joint, (size,)."""
         level = self.scoring.unexplained
-        self.levels = None if level is None else Levels(self.groups, level)
+        self.loss = None if level is None else RobustLoss(self.groups, level)
         """What windows that no parameters explain are worth; None counts every one in full."""
 
-    def residuals(self, candidates: list[Candidate]) -> Array:
-        """Return residuals in units of the scales, robust if so chosen, (candidates, size)."""
-        raw = self.errors(self.simulator.run(candidates))
+    def residuals(self, hypotheses: list[LegHypothesis]) -> Array:
+        """Return residuals in units of the scales, robust if so chosen, (hypotheses, size)."""
+        raw = self.errors(self.simulator.run(hypotheses))
         bound = self.scoring.robust
         if bound is None:
             return raw
@@ -88,7 +88,7 @@ class Cost:
         return robust
 
     def errors(self, simulated: Simulated) -> Array:
-        """Return scaled errors of a simulation, (candidates, size)."""
+        """Return scaled errors of a simulation, (hypotheses, size)."""
         parts = []
         for name, mask in self._counts.items():
             error = getattr(simulated, name) - self._measured[name]
@@ -98,9 +98,9 @@ class Cost:
         bounded: Array = np.clip(finite, -_FAILED, _FAILED)
         return bounded
 
-    def values(self, candidates: list[Candidate]) -> Array:
-        """Return the costs, by default sums of squared residuals, the paper's J, (candidates,)."""
-        return total_costs(self.residuals(candidates), self.levels)
+    def values(self, hypotheses: list[LegHypothesis]) -> Array:
+        """Return the costs, by default sums of squared residuals, the paper's J, (hypotheses,)."""
+        return total_costs(self.residuals(hypotheses), self.loss)
 
     def _scale(self, name: str) -> float | None:
         scale: float | None = getattr(self.scoring, name)
@@ -119,7 +119,7 @@ def measured(simulator: WindowSimulator, quantity: str) -> Array:
         rows = slice(w.start + w.unscored, w.start + w.length)
         if quantity != "height":
             sampled = recording.array(quantity)[rows]
-        elif recording.setup.rig != "fixed-base" and recording.has_column("height_m"):
+        elif recording.metadata.rig != "fixed-base" and recording.has_column("height_m"):
             sampled = recording.trace.column("height_m")[rows].copy()
         else:
             continue

@@ -6,25 +6,25 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RecordingError
-from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
 from hopping_leg.identify.recording import Recording
 
 _UNLIMITED = 1e9
 
 
-def drive_values(candidates: Sequence[Candidate], name: str) -> Array:
-    """Return an attribute of both drives, (candidates, 2)."""
-    return np.array([[getattr(c.drive.hip, name), getattr(c.drive.knee, name)] for c in candidates])
+def drive_values(hypotheses: Sequence[LegHypothesis], name: str) -> Array:
+    """Return an attribute of both drives, (hypotheses, 2)."""
+    return np.array([[getattr(c.drive.hip, name), getattr(c.drive.knee, name)] for c in hypotheses])
 
 
 def recorded_gains(recording: Recording, name: str) -> Array:
     """Return what a recording says about a gain of its on-board PD, (rows, 2), NaN if unknown.
 
     Args:
-        recording: Rows win over the setup.
+        recording: Rows win over the metadata.
         name: ``stiffness``, ``damping`` or ``integral``.
     """
-    pair = getattr(recording.setup, name)
+    pair = getattr(recording.metadata, name)
     values: Array = np.tile((np.nan, np.nan) if pair is None else pair, (len(recording), 1))
     if name == "integral":
         return np.nan_to_num(values)
@@ -36,7 +36,7 @@ def require_gains(gains: Array, name: str, recording: Recording) -> Array:
     """Return the gains.
 
     Raises:
-        RecordingError: Neither the recording nor the candidate says what a gain is.
+        RecordingError: Neither the recording nor the hypothesis says what a gain is.
     """
     if np.isnan(gains).any():
         raise RecordingError(
@@ -50,20 +50,22 @@ class MotorBounds:
     """Smallest and largest torque of each joint at its speed, as ``robot.limits.MotorLimit``.
 
     Args:
-        candidates: Whose motors and drive limits.
-        recordings: One per window; a limit in the setup replaces the robot's software limit.
+        hypotheses: Whose motors and drive limits.
+        recordings: One per window; a limit in the metadata replaces the robot's software limit.
     """
 
-    def __init__(self, candidates: Sequence[Candidate], recordings: Sequence[Recording]) -> None:
-        robots = [c.robot for c in candidates]
+    def __init__(
+        self, hypotheses: Sequence[LegHypothesis], recordings: Sequence[Recording]
+    ) -> None:
+        robots = [c.robot for c in hypotheses]
         belt = np.array([r.of_joints("belt_ratio") for r in robots])
         peak = np.array([[j.motor.peak_torque for j in (r.hip, r.knee)] for r in robots]) * belt
         speed = np.array([r.of_joints("no_load_speed") for r in robots])
         own = np.array([r.of_joints("torque_limit") for r in robots])
-        fitted = drive_values(candidates, "torque_limit")
+        fitted = drive_values(hypotheses, "torque_limit")
         limits = []
         for recording in recordings:
-            pair = recording.setup.torque_limit
+            pair = recording.metadata.torque_limit
             known = own if pair is None else np.broadcast_to(np.array(pair), own.shape)
             limits.append(np.where(np.isnan(fitted), known, fitted))
         self._limit = np.stack(limits, axis=1).reshape(-1, 2)

@@ -11,8 +11,8 @@ from hopping_leg.arrays import Array
 from hopping_leg.errors import TraceError, UsageError
 from hopping_leg.identify.columns import PAIRS
 from hopping_leg.identify.feasibility import HardwareRange, check_demand, demand
-from hopping_leg.identify.setup import Rig
-from hopping_leg.identify.strokes import LAB_MARGIN, Stroke, Strokes
+from hopping_leg.identify.paper_excitation import LAB_MARGIN, Stroke, Strokes
+from hopping_leg.identify.recording_format import Rig
 from hopping_leg.identify.templates import Template
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import Trace

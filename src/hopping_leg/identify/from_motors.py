@@ -8,7 +8,7 @@ from hopping_leg.errors import RecordingError
 from hopping_leg.identify.columns import MEASURED, PAIRS
 from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.recording import Recording, make_recording
-from hopping_leg.identify.setup import RecordingSetup
+from hopping_leg.identify.recording_format import RecordingMetadata
 from hopping_leg.trace import Trace
 
 
@@ -40,7 +40,7 @@ def recording_of(
     first = float(table["time_s"][0])
     time = np.round(table["time_s"].to_numpy() - first, 9)
     columns = [table[column] for column in (*MEASURED, *targets)]
-    setup = RecordingSetup(
+    metadata = RecordingMetadata(
         rig=excitation.rig,
         rate_hz=excitation.rate,
         robot=believed,
@@ -55,5 +55,5 @@ def recording_of(
         "run": {k: v for k, v in trace.header.items() if k != "events"},
     }
     return make_recording(
-        pl.DataFrame([pl.Series("time_s", time), *columns]), setup, name, header=facts
+        pl.DataFrame([pl.Series("time_s", time), *columns]), metadata, name, header=facts
     )

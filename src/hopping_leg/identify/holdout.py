@@ -20,7 +20,7 @@ SHORTEST = 1.0
 
 def duration(recording: Recording) -> float:
     """Return how long a recording is, s."""
-    return float(recording.time[-1] - recording.time[0]) + recording.setup.period
+    return float(recording.time[-1] - recording.time[0]) + recording.metadata.period
 
 
 def hold_out(
@@ -43,7 +43,7 @@ def hold_out(
     held: list[Recording] = []
     for recording in recordings:
         whole = duration(recording)
-        least = max(SHARE * SHORTEST, window * SHARE / (SHARE - 1) + 2 * recording.setup.period)
+        least = max(SHARE * SHORTEST, window * SHARE / (SHARE - 1) + 2 * recording.metadata.period)
         if whole < least:
             raise RecordingError(
                 f"{recording.name} is too short: {whole:.3g} s, but {least:.3g} s are needed to"
@@ -56,7 +56,7 @@ def hold_out(
         chosen = [i for i in range(count) if i % SHARE == begin]
         held += [part(recording, edges[i], edges[i + 1]) for i in chosen]
         for first, last in zip([-1, *chosen], [*chosen, count], strict=True):
-            if edges[last] - edges[first + 1] >= round(window * recording.setup.rate_hz) + 2:
+            if edges[last] - edges[first + 1] >= round(window * recording.metadata.rate_hz) + 2:
                 fit.append(part(recording, edges[first + 1], edges[last]))
     return fit, held
 

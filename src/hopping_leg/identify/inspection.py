@@ -7,7 +7,7 @@ import numpy as np
 import polars as pl
 
 from hopping_leg.arrays import Array
-from hopping_leg.identify.setup import RecordingSetup
+from hopping_leg.identify.recording_format import RecordingMetadata
 
 
 @dataclass
@@ -16,14 +16,14 @@ class Inspection:
 
     Attributes:
         table: In a recording's columns and types; null where nothing was recorded.
-        setup: How it was recorded.
+        metadata: How it was recorded.
         origin: The file, for messages.
         names: The file's own column for a recording's column, where they differ.
         warnings: What was strange so far, a sentence each.
     """
 
     table: pl.DataFrame
-    setup: RecordingSetup
+    metadata: RecordingMetadata
     origin: str
     names: Mapping[str, str] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)

@@ -16,8 +16,8 @@ from scipy import optimize
 
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.identify.checkpoint import load_state, save_state
-from hopping_leg.identify.levels import Levels
 from hopping_leg.identify.parameters import ParameterSet
+from hopping_leg.identify.robust_loss import RobustLoss
 
 Residuals = Callable[[Array], Array]
 """Search vectors (n, k) to residuals (n, m)."""
@@ -100,7 +100,7 @@ def least_squares(
     parameters: ParameterSet,
     options: LeastSquaresOptions | None = None,
     *,
-    levels: Levels | None = None,
+    loss: RobustLoss | None = None,
     groups: IntArray | None = None,
     start: Array | None = None,
     about: Mapping[str, object] | None = None,
@@ -113,7 +113,7 @@ def least_squares(
         residuals: Function of search vectors.
         parameters: Bounds and scales.
         options: How.
-        levels: Of residuals that no parameters explain; None counts every one in full.
+        loss: Of residuals that no parameters explain; None counts every one in full.
         groups: Of residuals that jump now and then, as ``jacobian`` takes them.
         start: Search vector to start from, (k,); None takes the parameters' start.
         about: What else tells this search from others, e.g. the recordings' hashes.
@@ -139,7 +139,7 @@ def least_squares(
         vector, evaluations = np.array(saved["vector"]), int(saved["evaluations"])
         history = list(saved["history"])
     while len(history) < options.rounds and not _settled(history, options.tolerance):
-        problem = _Problem(residuals, (low, high), options.step, levels, groups)
+        problem = _Problem(residuals, (low, high), options.step, loss, groups)
         result = optimize.least_squares(
             problem.values,
             vector,
@@ -205,29 +205,29 @@ class _Problem:
         residuals: Residuals,
         bounds: tuple[Array, Array],
         step: float,
-        levels: Levels | None,
+        loss: RobustLoss | None,
         groups: IntArray | None,
     ) -> None:
         self._residuals, self._bounds, self._step = residuals, bounds, step
-        self._levels, self._groups = levels, groups
+        self._loss, self._groups = loss, groups
         self._at: Array = np.empty(0)
         self.count = 0
 
     def values(self, vector: Array) -> Array:
-        """Return residuals, (m,), and with levels what each group costs beside them."""
+        """Return residuals, (m,), and with a robust loss what each group costs beside them."""
         residuals: Array = self._counted(vector[None])[0]
-        if self._levels is None:
+        if self._loss is None:
             return residuals
-        weights, rest = self._levels.weights(residuals), self._levels.rest(residuals)
+        weights, rest = self._loss.weights(residuals), self._loss.rest(residuals)
         return np.concatenate([weights * residuals, rest])
 
     def slopes(self, vector: Array) -> Array:
         """Return the slopes of what ``values`` returns, (m, k)."""
         slopes = jacobian(self._counted, vector, self._bounds, self._step, self._groups)
-        if self._levels is None:
+        if self._loss is None:
             return slopes
-        still = np.zeros((len(self._levels.sizes), len(vector)))
-        return np.concatenate([self._levels.weights(self._at)[:, None] * slopes, still])
+        still = np.zeros((len(self._loss.sizes), len(vector)))
+        return np.concatenate([self._loss.weights(self._at)[:, None] * slopes, still])
 
     def _counted(self, vectors: Array) -> Array:
         self.count += len(vectors)

@@ -7,7 +7,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.setup import Pair, Rig
+from hopping_leg.identify.recording_format import Pair, Rig
 from hopping_leg.identify.templates import require_positive
 from hopping_leg.robot.parameters import Robot
 

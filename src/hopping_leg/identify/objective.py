@@ -6,9 +6,9 @@ from typing import Any
 
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.identify.cost import Cost, Scoring
-from hopping_leg.identify.levels import Levels, total_costs
 from hopping_leg.identify.parameters import ParameterSet
 from hopping_leg.identify.recording import Recording
+from hopping_leg.identify.robust_loss import RobustLoss, total_costs
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import Window
 from hopping_leg.robot.model import TIMESTEP
@@ -46,22 +46,24 @@ class Objective:
 
     def residuals(self, vectors: Array) -> Array:
         """Return residuals of search vectors (n, k), (n, m)."""
-        return self.cost.residuals(self.parameters.candidates(vectors))
+        return self.cost.residuals(self.parameters.hypotheses(vectors))
 
     @property
-    def levels(self) -> Levels | None:
+    def loss(self) -> RobustLoss | None:
         """What windows that no parameters explain are worth; None counts every one in full."""
-        return self.cost.levels
+        return self.cost.loss
 
     @property
     def jumping(self) -> IntArray | None:
         """Groups of the residuals, (m,), if feet touch down, which makes them jump; else None."""
-        grounded = any(self.recordings[w.recording].setup.rig != "fixed-base" for w in self.windows)
+        grounded = any(
+            self.recordings[w.recording].metadata.rig != "fixed-base" for w in self.windows
+        )
         return self.cost.groups if grounded else None
 
     def __call__(self, vectors: Array) -> Array:
         """Return the costs of search vectors (n, k), (n,)."""
-        return total_costs(self.residuals(vectors), self.levels)
+        return total_costs(self.residuals(vectors), self.loss)
 
     def about(self) -> dict[str, Any]:
         """Return what tells this objective from others, for checkpoints."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.cost import measured
 from hopping_leg.identify.judging import unscored
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import Window, cut
@@ -27,8 +27,8 @@ class Overlay:
         restarted: Whether the simulation was started anew every ``RESTART``.
         position: Measured, and counted, rad, (rows, 2).
         torque: Likewise, N m, (rows, 2).
-        simulated_position: By each candidate, rad, (candidates, rows, 2).
-        simulated_torque: Likewise, N m, (candidates, rows, 2).
+        simulated_position: By each hypothesis, rad, (hypotheses, rows, 2).
+        simulated_torque: Likewise, N m, (hypotheses, rows, 2).
     """
 
     recording: Recording
@@ -39,7 +39,7 @@ class Overlay:
     simulated_torque: Array
 
     def errors(self, quantity: str) -> Array:
-        """Return simulated minus measured, (candidates, rows, 2).
+        """Return simulated minus measured, (hypotheses, rows, 2).
 
         Args:
             quantity: ``position`` or ``torque``.
@@ -50,35 +50,35 @@ class Overlay:
 
 def overlays(
     recordings: Sequence[Recording],
-    candidates: Sequence[Candidate],
+    hypotheses: Sequence[LegHypothesis],
     timestep: float,
     threads: int = 0,
 ) -> list[Overlay]:
-    """Simulate recordings with candidates.
+    """Simulate recordings with hypotheses.
 
     Args:
         recordings: Best those that no fit has seen.
-        candidates: To compare.
+        hypotheses: To compare.
         timestep: Physics step, s.
         threads: Worker threads, 0 for one per core.
     """
     skip = unscored(recordings)
-    return [_overlay(r, candidates, timestep, threads, skip) for r in recordings]
+    return [_overlay(r, hypotheses, timestep, threads, skip) for r in recordings]
 
 
 def _overlay(
     recording: Recording,
-    candidates: Sequence[Candidate],
+    hypotheses: Sequence[LegHypothesis],
     timestep: float,
     threads: int,
     skip: float,
 ) -> Overlay:
-    restarted = recording.setup.onboard == "torque"
+    restarted = recording.metadata.onboard == "torque"
     windows: list[Window] = (
         cut([recording], RESTART) if restarted else cut([recording], None, unscored=skip)
     )
     simulator = WindowSimulator([recording], windows, timestep=timestep, threads=threads)
-    simulated = simulator.run(candidates)
+    simulated = simulator.run(hypotheses)
     rows = len(recording)
     filled = {}
     for name in ("position", "torque"):

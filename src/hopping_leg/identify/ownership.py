@@ -17,7 +17,7 @@ def robot_of(recordings: Sequence[Recording]) -> str:
     Raises:
         UsageError: There is no recording, or they name several robots.
     """
-    names = list(dict.fromkeys(r.setup.robot for r in recordings))
+    names = list(dict.fromkeys(r.metadata.robot for r in recordings))
     if not names:
         raise UsageError("No recording was given; name at least one file.")
     if len(names) > 1:
@@ -36,19 +36,19 @@ def check_owner(recordings: Sequence[Recording], robot: Robot) -> None:
     """
     for recording in recordings:
         try:
-            own = load_robot(recording.setup.robot)
+            own = load_robot(recording.metadata.robot)
         except RobotError:
             continue  # filed under a robot that is not here: nothing to compare with
         if own.kind != robot.kind:
             raise RecordingError(
-                f"{recording.name} is of '{recording.setup.robot}', a {own.kind}, but"
+                f"{recording.name} is of '{recording.metadata.robot}', a {own.kind}, but"
                 f" '{robot.name}' is a {robot.kind}; give its robot file with --robot."
             )
         for link in ("thigh", "shank"):
             measured, given = getattr(own, link).length, getattr(robot, link).length
             if abs(given / measured - 1) > _TOLERANCE:
                 raise RecordingError(
-                    f"{recording.name} is of '{recording.setup.robot}', whose {link} is"
+                    f"{recording.name} is of '{recording.metadata.robot}', whose {link} is"
                     f" {measured:g} m long, but that of '{robot.name}' is {given:g} m: another"
                     " leg's robot file; leave --robot out or give this leg's."
                 )

@@ -1,4 +1,4 @@
-"""What is searched: named parameters with bounds, and the candidate that a vector stands for."""
+"""What is searched: named parameters with bounds, and the hypothesis that a vector stands for."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -9,7 +9,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.candidate import Candidate, parameter_units
+from hopping_leg.identify.leg_hypothesis import LegHypothesis, parameter_units
 from hopping_leg.robot.model import TIMESTEP
 
 _RANGES = {
@@ -74,12 +74,12 @@ class Parameter:
 
 @dataclass(frozen=True)
 class ParameterSet:
-    """Parameters in a fixed order, and everything else about the candidate that stays.
+    """Parameters in a fixed order, and everything else about the hypothesis that stays.
 
     A search's vector is dimensionless: values in units of their scale, counted from the start.
     """
 
-    base: Candidate
+    base: LegHypothesis
     parameters: tuple[Parameter, ...]
 
     def __post_init__(self) -> None:
@@ -120,15 +120,15 @@ class ParameterSet:
         """Return the search vector of physical values, (..., k)."""
         return np.asarray((values - self.start) / self.scale)
 
-    def candidates(self, vectors: Array) -> list[Candidate]:
-        """Return the candidates that search vectors stand for; ``vectors`` is (n, k)."""
+    def hypotheses(self, vectors: Array) -> list[LegHypothesis]:
+        """Return the hypotheses that search vectors stand for; ``vectors`` is (n, k)."""
         low, high = (self.values(b) for b in self.bounds)
         values = np.clip(self.values(vectors), low, high)
         return [self.base.replace(dict(zip(self.names, row, strict=True))) for row in values]
 
 
 def choose(
-    base: Candidate,
+    base: LegHypothesis,
     names: Sequence[str],
     *,
     bounds: Mapping[str, tuple[float, float]] | None = None,
@@ -137,11 +137,11 @@ def choose(
     """Return a set of parameters with sensible bounds and scales.
 
     Args:
-        base: Candidate with the starting values; a drive's gain that it leaves to the recording
+        base: LegHypothesis with the starting values; a drive's gain that it leaves to the recording
             needs a ``start``.
         names: What to fit.
         bounds: Bounds that differ from the widest ones.
-        start: Starting values that differ from the candidate's.
+        start: Starting values that differ from the hypothesis's.
 
     Raises:
         UsageError: A name does not exist, or bounds exclude the start.

@@ -15,22 +15,22 @@ from hopping_leg.errors import (
     UsageError,
     unknown_name,
 )
-from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.commands import check_commands
 from hopping_leg.identify.holdout import SHORTEST, duration, hold_out
 from hopping_leg.identify.identifiability import Identifiability, identifiability
 from hopping_leg.identify.judging import judge
 from hopping_leg.identify.least_squares import jacobian
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
 from hopping_leg.identify.objective import Objective
+from hopping_leg.identify.optimizers import Pass, Report, Searcher, SearchOptions
 from hopping_leg.identify.ownership import check_owner
 from hopping_leg.identify.parameters import ParameterSet
 from hopping_leg.identify.plan import Plan, make_plan
 from hopping_leg.identify.recording import Recording
+from hopping_leg.identify.recording_format import Rig
 from hopping_leg.identify.result import Identified, as_json, software_versions
 from hopping_leg.identify.run_folder import RunFolder
-from hopping_leg.identify.searching import Pass, Report, Searcher, SearchOptions
-from hopping_leg.identify.setup import Rig
-from hopping_leg.identify.validate import Validation
+from hopping_leg.identify.validation import Validation
 from hopping_leg.identify.windows import cut
 from hopping_leg.robot.fields import check_physics
 from hopping_leg.robot.model_mismatch import NO_MISMATCH
@@ -79,7 +79,7 @@ def identify(
         folder: For checkpoints and the result; None keeps none.
         resume: Go on with the folder's run, if there is one.
         seed: Of all randomness.
-        report: Told of progress.
+        report: Called with the progress.
 
     Raises:
         UsageError: An option has no meaning.
@@ -110,29 +110,29 @@ def identify(
     if run is not None:
         run.begin(resume=resume)
     searcher = Searcher(plan, objective, options.effort, seed, folder, report, options.ray, about)
-    passes = searcher.run([r.setup.rig for r in recordings])
+    passes = searcher.run([r.metadata.rig for r in recordings])
     report("finding intervals", 1.0, passes[-1].found.cost)
     try:
-        candidate, told = _conclude(objective, passes[-1], options)
+        hypothesis, known = _conclude(objective, passes[-1], options)
     except PhysicsError as error:
         if run is not None:
             run.finish({"failed": str(error)})
         raise
     report("judging", 1.0, passes[-1].found.cost)
-    candidates, step = (plan.start, candidate), plan.timestep
-    before, after = (judge(held, c, step, options.threads) for c in candidates)
+    hypotheses, step = (plan.start, hypothesis), plan.timestep
+    before, after = (judge(held, c, step, options.threads) for c in hypotheses)
     identified = Identified(
-        candidate=candidate,
+        hypothesis=hypothesis,
         start=plan.start,
         plan=plan,
         passes=tuple(passes),
-        told=told,
+        identifiability=known,
         fit=tuple(fit),
         held=tuple(held),
         split=split,
         validation=after,
         start_validation=before,
-        by_rig=_judge_rigs(held, candidate, step, options.threads),
+        by_rig=_judge_rigs(held, hypothesis, step, options.threads),
         seed=seed,
     )
     if run is not None:
@@ -141,14 +141,14 @@ def identify(
 
 
 def _judge_rigs(
-    held: Sequence[Recording], candidate: Candidate, timestep: float, threads: int
+    held: Sequence[Recording], hypothesis: LegHypothesis, timestep: float, threads: int
 ) -> dict[Rig, Validation]:
-    """Return what a candidate is worth on each rig, if there are several."""
-    rigs = list(dict.fromkeys(r.setup.rig for r in held))
+    """Return what a hypothesis is worth on each rig, if there are several."""
+    rigs = list(dict.fromkeys(r.metadata.rig for r in held))
     if len(rigs) == 1:
         return {}
-    groups = {rig: [r for r in held if r.setup.rig == rig] for rig in rigs}
-    return {rig: judge(group, candidate, timestep, threads) for rig, group in groups.items()}
+    groups = {rig: [r for r in held if r.metadata.rig == rig] for rig in rigs}
+    return {rig: judge(group, hypothesis, timestep, threads) for rig, group in groups.items()}
 
 
 def _file_bounds(robot: Robot) -> dict[str, tuple[float, float]]:
@@ -200,20 +200,20 @@ def _split(
 
 def _conclude(
     objective: Objective, last: Pass, options: IdentifyOptions
-) -> tuple[Candidate, Identifiability]:
-    """Return the best candidate and what is known of it.
+) -> tuple[LegHypothesis, Identifiability]:
+    """Return the best hypothesis and what is known of it.
 
     Raises:
         PhysicsError: It breaks down in simulation, so that nothing was identified.
     """
     objective = dataclasses.replace(objective, parameters=last.parameters)
     vector = last.found.vector
-    (candidate,) = last.parameters.candidates(vector[None])
-    simulated = objective.cost.simulator.run([candidate]).position[0]
+    (hypothesis,) = last.parameters.hypotheses(vector[None])
+    simulated = objective.cost.simulator.run([hypothesis]).position[0]
     lengths = [w.length for w in objective.windows]
     broken = sum(not np.isfinite(p[:n]).all() for p, n in zip(simulated, lengths, strict=True))
     try:
-        check_physics(candidate.robot, "its result")
+        check_physics(hypothesis.robot, "its result")
     except RobotError as error:
         raise PhysicsError(
             f"The fit failed: {str(error).removeprefix('its result: ')} Bound that parameter with"
@@ -228,10 +228,10 @@ def _conclude(
     residuals = objective.residuals(vector[None])[0]
     bounds, jumping = last.parameters.bounds, objective.jumping
     slopes = jacobian(objective.residuals, vector, bounds, step, jumping)
-    if objective.levels is not None:
-        weights = objective.levels.weights(residuals)
+    if objective.loss is not None:
+        weights = objective.loss.weights(residuals)
         residuals, slopes = weights * residuals, weights[:, None] * slopes
-    return candidate, identifiability(last.parameters, vector, residuals, slopes)
+    return hypothesis, identifiability(last.parameters, vector, residuals, slopes)
 
 
 def _config(

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.errors import UsageError, unknown_name
-from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.columns import JOINTS
 from hopping_leg.identify.cost import Scoring
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
 from hopping_leg.identify.parameters import ParameterSet, choose
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.states import full_states
@@ -48,7 +48,7 @@ class Plan:
         search: One of ``SEARCHES``.
     """
 
-    start: Candidate
+    start: LegHypothesis
     parameters: ParameterSet
     scoring: Scoring
     window: float
@@ -105,7 +105,7 @@ def make_plan(
 
 def _names(recordings: Sequence[Recording], *, paper: bool) -> list[str]:
     """Return what these recordings can tell, or Table I; and drives' gains nobody knows."""
-    first, second = pass_names([r.setup.rig for r in recordings])
+    first, second = pass_names([r.metadata.rig for r in recordings])
     names = [*first, *second] if paper else [*first, *(n for n in second if n not in INERTIAS)]
     if not paper:
         names += ["thigh.com", "shank.com", *INERTIAS, "drive.delay"]
@@ -125,33 +125,33 @@ def _tell_load(recordings: Sequence[Recording]) -> bool:
     the air such a loop asks for torque where it meets damping, and the two cannot be told apart;
     on the ground the leg's weight asks for it.
     """
-    if all(r.setup.onboard == "torque" for r in recordings):
+    if all(r.metadata.onboard == "torque" for r in recordings):
         return True
-    grounded = any(r.setup.rig != "fixed-base" for r in recordings)
-    return grounded and all(_tells_gain(r) or r.setup.onboard == "torque" for r in recordings)
+    grounded = any(r.metadata.rig != "fixed-base" for r in recordings)
+    return grounded and all(_tells_gain(r) or r.metadata.onboard == "torque" for r in recordings)
 
 
 def _tells_gain(recording: Recording) -> bool:
     """Return whether a recording shows what motors gave beside what they were asked for."""
-    return recording.setup.onboard == "zoh" and recording.has("torque")
+    return recording.metadata.onboard == "zoh" and recording.has("torque")
 
 
 def _open_gains(recordings: Sequence[Recording]) -> list[str]:
     """Return gains of the on-board loop that a recording leaves open."""
     found = []
     for gain in ("stiffness", "damping", "integral"):
-        if any(r.setup.onboard != "torque" and _is_open(r, gain) for r in recordings):
+        if any(r.metadata.onboard != "torque" and _is_open(r, gain) for r in recordings):
             found += [f"drive.{joint}.{gain}" for joint in JOINTS]
     return found
 
 
 def _is_open(recording: Recording, gain: str) -> bool:
     """Return whether a recording leaves a gain to the fit; an unnamed integral is none."""
-    stated = getattr(recording.setup, gain) is not None
+    stated = getattr(recording.metadata, gain) is not None
     if gain == "integral":
-        return stated and not recording.setup.gains_exact
+        return stated and not recording.metadata.gains_exact
     rows = bool(np.isfinite(recording.array(gain)).any())
-    return not rows and not (stated and recording.setup.gains_exact)
+    return not rows and not (stated and recording.metadata.gains_exact)
 
 
 def _limits(recordings: Sequence[Recording]) -> list[str]:
@@ -162,14 +162,14 @@ def _limits(recordings: Sequence[Recording]) -> list[str]:
     """
     beyond = np.zeros(2, dtype=bool)
     for recording in recordings:
-        setup, torque = recording.setup, recording.array("torque")
-        if setup.onboard != "continuous" or None in (setup.stiffness, setup.damping):
+        metadata, torque = recording.metadata, recording.array("torque")
+        if metadata.onboard != "continuous" or None in (metadata.stiffness, metadata.damping):
             continue
         if not np.isfinite(torque).any(axis=0).all():
             continue
         q, qd = full_states(recording)
-        spring = np.array(setup.stiffness) * (recording.array("position_command") - q)
-        damper = np.array(setup.damping) * (recording.array("velocity_command") - qd)
+        spring = np.array(metadata.stiffness) * (recording.array("position_command") - q)
+        damper = np.array(metadata.damping) * (recording.array("velocity_command") - qd)
         wanted = np.minimum(np.abs(spring), np.abs(spring + damper))
         asked, given = (
             np.nanquantile(values, _OFTEN, axis=0) for values in (wanted, np.abs(torque))
@@ -192,35 +192,35 @@ def _speed_bounds(recordings: Sequence[Recording], robot: Robot) -> dict[str, tu
     return found
 
 
-def _start(recordings: Sequence[Recording], robot: Robot) -> Candidate:
+def _start(recordings: Sequence[Recording], robot: Robot) -> LegHypothesis:
     """Return the robot with the drives that the recordings tell of."""
     values = {}
     for name in _open_gains(recordings):
         _, joint, gain = name.split(".")
-        pairs = [getattr(r.setup, gain) for r in recordings]
+        pairs = [getattr(r.metadata, gain) for r in recordings]
         known = next((p for p in pairs if p is not None), None)
         values[name] = _GAINS[gain] if known is None else known[joint == "knee"]
-    if any(r.setup.onboard == "continuous" and r.has("velocity_command") for r in recordings):
+    if any(r.metadata.onboard == "continuous" and r.has("velocity_command") for r in recordings):
         values["drive.ramp"] = 1.0
-    return Candidate(robot).replace(values)
+    return LegHypothesis(robot).replace(values)
 
 
 def _scoring(recordings: Sequence[Recording], *, paper: bool) -> Scoring:
     if paper:
         return Scoring()
-    if all(r.setup.onboard == "torque" for r in recordings):
+    if all(r.metadata.onboard == "torque" for r in recordings):
         return Scoring(position=0.02, robust=2.0, unexplained=0.4)
     torque = 0.2 if any(r.has("torque") for r in recordings) else None
     if torque is not None and _open_gains(recordings):
         return Scoring(position=0.003, torque=0.5, robust=1.0, unexplained=0.4)
-    rails = [r for r in recordings if r.setup.rig == "rail"]
+    rails = [r for r in recordings if r.metadata.rig == "rail"]
     height = 0.002 if any(r.has_column("height_m") for r in rails) else None
     return Scoring(position=0.005, torque=torque, height=height, robust=3.0, unexplained=0.4)
 
 
 def _timestep(recordings: Sequence[Recording]) -> float:
     """Return training's physics step wherever its errors could pass for parameters."""
-    rough = all(r.setup.rig == "fixed-base" and r.setup.onboard != "zoh" for r in recordings)
+    rough = all(r.metadata.rig == "fixed-base" and r.metadata.onboard != "zoh" for r in recordings)
     return _COARSE if rough else TIMESTEP
 
 
@@ -230,9 +230,9 @@ def _window(recordings: Sequence[Recording]) -> tuple[float, float]:
     On the ground a longer window is rugged: whether and when the foot lifts off or lands decides
     all that follows, so that a search from far off is caught long before the truth.
     """
-    if any(r.setup.rig != "fixed-base" for r in recordings):
+    if any(r.metadata.rig != "fixed-base" for r in recordings):
         return 0.25, 0.0
-    if any(r.setup.onboard == "torque" for r in recordings):
+    if any(r.metadata.onboard == "torque" for r in recordings):
         return 0.4, 0.0
     if _open_gains(recordings):
         return 2.0, 0.5

@@ -1,7 +1,7 @@
 """A recording: measured joints and commands over time, and how they were recorded.
 
-Native files are traces (Parquet) whose header holds the setup; CSV and foreign Parquet files need
-a sidecar, or come from one of the known rigs.
+Native files are traces (Parquet) whose header holds the metadata; CSV and foreign Parquet files
+need a sidecar, or come from one of the known rigs.
 """
 
 import dataclasses
@@ -23,7 +23,11 @@ from hopping_leg.identify.clock import STALL, row_period
 from hopping_leg.identify.columns import COLUMNS, PAIRS
 from hopping_leg.identify.importers import IMPORTERS, recognise
 from hopping_leg.identify.inspection import Inspection
-from hopping_leg.identify.setup import RecordingSetup, setup_from_tree, setup_to_tree
+from hopping_leg.identify.recording_format import (
+    RecordingMetadata,
+    metadata_from_tree,
+    metadata_to_tree,
+)
 from hopping_leg.identify.tables import as_numbers, is_parquet, read_bytes, read_csv
 from hopping_leg.trace import Trace
 
@@ -36,14 +40,14 @@ class Recording:
 
     Attributes:
         trace: Table in the columns of ``COLUMNS`` and the header.
-        setup: How it was recorded.
+        metadata: How it was recorded.
         name: The file's name.
         digest: SHA-256 of the file's bytes, hex.
         warnings: What the loader found strange but could live with, a sentence each.
     """
 
     trace: Trace
-    setup: RecordingSetup
+    metadata: RecordingMetadata
     name: str
     digest: str = ""
     warnings: tuple[str, ...] = ()
@@ -88,7 +92,7 @@ class Recording:
 
     def segments(self) -> list[slice]:
         """Return the stretches of rows without a stall, in order."""
-        longest = STALL * row_period(self.time, self.setup.period)
+        longest = STALL * row_period(self.time, self.metadata.period)
         stalls = np.flatnonzero(np.diff(self.time) > longest) + 1
         edges = [0, *stalls.tolist(), len(self)]
         return [slice(a, b) for a, b in pairwise(edges)]
@@ -99,7 +103,7 @@ class Recording:
         Raises:
             TraceError: The file cannot be written.
         """
-        header = {**self.trace.header, _KEY: setup_to_tree(self.setup)}
+        header = {**self.trace.header, _KEY: metadata_to_tree(self.metadata)}
         Trace(self.trace.table, header).save(path)
 
     def _floats(self, column: str) -> Array:
@@ -111,7 +115,7 @@ class Recording:
 
 def make_recording(
     table: pl.DataFrame,
-    setup: RecordingSetup,
+    metadata: RecordingMetadata,
     name: str,
     *,
     names: Mapping[str, str] | None = None,
@@ -122,7 +126,7 @@ def make_recording(
 
     Args:
         table: Columns as in ``COLUMNS``.
-        setup: How it was recorded.
+        metadata: How it was recorded.
         name: The file, for messages.
         names: The file's own column for a recording's column, where they differ.
         header: Further entries for the file's header.
@@ -131,9 +135,9 @@ def make_recording(
     Raises:
         RecordingError: The table cannot be believed; names file, column and row.
     """
-    inspection = Inspection(_typed(table, name), setup, name, names or {})
+    inspection = Inspection(_typed(table, name), metadata, name, names or {})
     table, warnings = check_table(inspection)
-    return Recording(Trace(table, header or {}), setup, Path(name).name, digest, tuple(warnings))
+    return Recording(Trace(table, header or {}), metadata, Path(name).name, digest, tuple(warnings))
 
 
 def load_recording(path: str | Path) -> Recording:
@@ -152,9 +156,9 @@ def load_recording(path: str | Path) -> Recording:
     sidecar = _sidecar(path)
     names: dict[str, str] = {}
     if sidecar is not None:
-        table, setup, names = _apply(sidecar, table, origin)
+        table, metadata, names = _apply(sidecar, table, origin)
     elif _KEY in header:
-        setup = setup_from_tree(header.pop(_KEY), origin)
+        metadata = metadata_from_tree(header.pop(_KEY), origin)
     else:
         importer = recognise(table.columns)
         if importer is None:
@@ -163,9 +167,9 @@ def load_recording(path: str | Path) -> Recording:
                 f" {sidecar_path(path).name} beside it; its columns are:"
                 f" {', '.join(table.columns[:12])}."
             )
-        table, setup = importer.read(table)
+        table, metadata = importer.read(table)
         names = {new: old for old, new in importer.NAMES.items()}
-    return make_recording(table, setup, origin, names=names, header=header, digest=digest)
+    return make_recording(table, metadata, origin, names=names, header=header, digest=digest)
 
 
 def sidecar_path(path: Path) -> Path:
@@ -198,8 +202,8 @@ def _sidecar(path: Path) -> tuple[str, dict[str, Any]] | None:
 
 def _apply(
     sidecar: tuple[str, dict[str, Any]], table: pl.DataFrame, origin: str
-) -> tuple[pl.DataFrame, RecordingSetup, dict[str, str]]:
-    """Name a table's columns as its sidecar says; return it, the setup and the file's names."""
+) -> tuple[pl.DataFrame, RecordingMetadata, dict[str, str]]:
+    """Name a table's columns as its sidecar says; return it, the metadata and the file's names."""
     file, tree = sidecar
     names = tree.pop("columns", {})
     if not isinstance(names, dict) or not all(isinstance(v, str) for v in names.values()):
@@ -214,7 +218,7 @@ def _apply(
     table = table.with_columns(pl.col(old).alias(new) for new, old in names.items())
     if "row" not in table.columns:
         table = table.with_columns(pl.int_range(pl.len()).alias("row"))
-    return table, setup_from_tree(tree, file), names
+    return table, metadata_from_tree(tree, file), names
 
 
 def _typed(table: pl.DataFrame, origin: str) -> pl.DataFrame:
@@ -232,6 +236,8 @@ def _typed(table: pl.DataFrame, origin: str) -> pl.DataFrame:
     return pl.DataFrame(series).with_columns(pl.selectors.float().fill_nan(None))
 
 
-def with_setup(recording: Recording, **changes: Any) -> Recording:  # noqa: ANN401
-    """Return the recording with other facts in its setup, e.g. gains known from elsewhere."""
-    return dataclasses.replace(recording, setup=dataclasses.replace(recording.setup, **changes))
+def with_metadata(recording: Recording, **changes: Any) -> Recording:  # noqa: ANN401
+    """Return the recording with other facts in its metadata, e.g. gains known from elsewhere."""
+    return dataclasses.replace(
+        recording, metadata=dataclasses.replace(recording.metadata, **changes)
+    )

@@ -47,7 +47,7 @@ def drop_garbage(inspection: Inspection) -> pl.DataFrame:
 
 def drop_zeros(inspection: Inspection) -> pl.DataFrame:
     """Leave out measured columns that are zero throughout; a command may well be zero."""
-    joints = "torque_command" if inspection.setup.onboard == "torque" else "position_command"
+    joints = "torque_command" if inspection.metadata.onboard == "torque" else "position_command"
     for column in (*MEASURED, *PAIRS[joints]):
         values = inspection.floats(column)
         if np.isnan(values).all() or np.nanmax(np.abs(values)) > 0:
@@ -63,7 +63,7 @@ def drop_zeros(inspection: Inspection) -> pl.DataFrame:
 
 def drop_startup(inspection: Inspection) -> pl.DataFrame:
     """Leave out first rows in which sensors slept or commands were not applied."""
-    known = inspection.setup.startup_rows
+    known = inspection.metadata.startup_rows
     rows, reason = max(
         (min(known, inspection.table.height), "the rig's start-up"),
         (_asleep(inspection), "all joints read zero, then jump"),
@@ -100,7 +100,7 @@ def _asleep(inspection: Inspection) -> int:
 
 def _unapplied(inspection: Inspection) -> int:
     """Return the rows up to the last command that nothing followed, and its answer's delay."""
-    if inspection.setup.onboard != "torque":
+    if inspection.metadata.onboard != "torque":
         return 0
     last = 0
     for commanded, measured in zip(PAIRS["torque_command"], PAIRS["torque"], strict=True):

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
 
-from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.identifiability import Identifiability
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.optimizers import Pass
 from hopping_leg.identify.parameters import ParameterSet
 from hopping_leg.identify.plan import Plan
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.searching import Pass
-from hopping_leg.identify.setup import Rig
-from hopping_leg.identify.validate import Validation
+from hopping_leg.identify.recording_format import Rig
+from hopping_leg.identify.validation import Validation
 from hopping_leg.json_files import plain
 from hopping_leg.robot.parameters import Robot
 
@@ -27,11 +27,11 @@ class Identified:
     """What came out.
 
     Attributes:
-        candidate: Robot and drives with the identified values.
+        hypothesis: Robot and drives with the identified values.
         start: Robot and drives before the fit.
         plan: All decisions.
         passes: Searches in order; the last one's end is the result.
-        told: Values, intervals, correlations, and what the data cannot tell.
+        identifiability: Values, intervals, correlations, and what the data cannot tell.
         fit: Recordings, or parts of them, that were fitted.
         held: Recordings, or parts of them, that judge; the fit has not seen them.
         split: ``held-out stretches`` or ``validation recordings``.
@@ -41,11 +41,11 @@ class Identified:
         seed: Of all randomness.
     """
 
-    candidate: Candidate
-    start: Candidate
+    hypothesis: LegHypothesis
+    start: LegHypothesis
     plan: Plan
     passes: tuple[Pass, ...]
-    told: Identifiability
+    identifiability: Identifiability
     fit: tuple[Recording, ...]
     held: tuple[Recording, ...]
     split: str
@@ -57,7 +57,7 @@ class Identified:
     @property
     def robot(self) -> Robot:
         """The robot with the identified values."""
-        return self.candidate.robot
+        return self.hypothesis.robot
 
     @property
     def parameters(self) -> ParameterSet:
@@ -67,7 +67,7 @@ class Identified:
 
 def as_json(identified: Identified) -> dict[str, Any]:
     """Return every number of an identification as JSON values; what does not exist is null."""
-    told, plan = identified.told, identified.plan
+    known, plan = identified.identifiability, identified.plan
     tree = {
         "robot": identified.start.robot.name,
         "robot_digest_before": identified.start.robot.digest,
@@ -77,8 +77,8 @@ def as_json(identified: Identified) -> dict[str, Any]:
         "validation_by_rig": {r: validation_json(v) for r, v in identified.by_rig.items()},
         "quality": quality_json(identified),
         "parameters": parameters_json(identified),
-        "correlations": {"names": told.names, "matrix": told.correlation.tolist()},
-        "cannot_tell": told.statements,
+        "correlations": {"names": known.names, "matrix": known.correlation.tolist()},
+        "cannot_tell": known.statements,
         "search": {
             "method": plan.search,
             "scoring": dataclasses.asdict(plan.scoring),
@@ -140,12 +140,12 @@ def quality_json(identified: Identified) -> list[dict[str, Any]]:
 
 def parameters_json(identified: Identified) -> list[dict[str, Any]]:
     """Return a record per parameter: value, 95 % interval, start and bounds, SI."""
-    told = identified.told
+    known = identified.identifiability
     bounds = {p.name: p for p in identified.parameters.parameters}
     first = {p.name: p.start for p in identified.plan.parameters.parameters}
     rows = []
-    for index, name in enumerate(told.names):
-        value, half = float(told.values[index]), float(told.half_width[index])
+    for index, name in enumerate(known.names):
+        value, half = float(known.values[index]), float(known.half_width[index])
         rows.append(
             {
                 "name": name,
@@ -156,7 +156,7 @@ def parameters_json(identified: Identified) -> list[dict[str, Any]]:
                 "start": first.get(name, identified.start.get(name)),
                 "bound_low": bounds[name].low,
                 "bound_high": bounds[name].high,
-                "at_bound": bool(told.at_bound[index]),
+                "at_bound": bool(known.at_bound[index]),
             }
         )
     return rows
@@ -187,9 +187,9 @@ def _recordings_json(recordings: Iterable[Recording], use: str) -> Sequence[dict
             "rows": len(r),
             "first_s": float(r.time[0]),
             "last_s": float(r.time[-1]),
-            "rig": r.setup.rig,
-            "rate_hz": r.setup.rate_hz,
-            "source": r.setup.source,
+            "rig": r.metadata.rig,
+            "rate_hz": r.metadata.rate_hz,
+            "source": r.metadata.source,
             "warnings": list(r.warnings),
         }
         for r in recordings

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 from hopping_leg.errors import RobotError
-from hopping_leg.identify.setup import Rig
+from hopping_leg.identify.recording_format import Rig
 from hopping_leg.robot.model import GRAVITY, get_spec
 from hopping_leg.robot.parameters import Robot
 
@@ -29,7 +29,7 @@ FIELDS = (
     "geom_solref",
     "opt.gravity",
 )
-"""Fields of a model in which candidates may differ."""
+"""Fields of a model in which hypotheses may differ."""
 
 
 def build_rig_model(

@@ -78,9 +78,9 @@ def _comment(identified: Identified, origin: str) -> str:
     if drives:
         lines.append("Of the recordings' drives, which are no part of the robot:")
         lines += [f"  {r['name']} = {r['value']:.6g} {r['unit']} ({_source(r)})" for r in drives]
-    if identified.told.statements:
+    if identified.identifiability.statements:
         lines.append("What these data cannot tell:")
-        lines += [f"  {sentence}" for sentence in identified.told.statements]
+        lines += [f"  {sentence}" for sentence in identified.identifiability.statements]
     return "\n".join(lines)
 
 

@@ -1,4 +1,4 @@
-"""All candidates times all windows simulated at once, under the controller of the recording."""
+"""All hypotheses times all windows simulated at once, under the controller of the recording."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.window_group import WindowGroup
 from hopping_leg.identify.windows import Window
@@ -19,10 +19,10 @@ class Simulated:
     """What recordings would have been, row by row; NaN beyond a window's end or a failure.
 
     Attributes:
-        position: rad, (candidates, windows, rows, 2).
-        velocity: rad/s, (candidates, windows, rows, 2).
-        torque: As the rig would have measured it, N m, (candidates, windows, rows, 2).
-        height: Of the base, m, (candidates, windows, rows); NaN where it is fixed.
+        position: rad, (hypotheses, windows, rows, 2).
+        velocity: rad/s, (hypotheses, windows, rows, 2).
+        torque: As the rig would have measured it, N m, (hypotheses, windows, rows, 2).
+        height: Of the base, m, (hypotheses, windows, rows); NaN where it is fixed.
     """
 
     position: Array
@@ -32,10 +32,10 @@ class Simulated:
 
 
 class WindowSimulator:
-    """Simulates windows of recordings for any number of candidates at once.
+    """Simulates windows of recordings for any number of hypotheses at once.
 
     Windows of the same rig, rate and on-board controller share one ``mujoco.batch.Batch``; results
-    do not depend on the number of threads, nor on what else is simulated beside a candidate.
+    do not depend on the number of threads, nor on what else is simulated beside a hypothesis.
 
     Args:
         recordings: What was recorded.
@@ -62,26 +62,26 @@ class WindowSimulator:
         self.rows = max(w.length for w in windows)
         kinds: dict[tuple[object, ...], list[int]] = {}
         for index, window in enumerate(windows):
-            setup = recordings[window.recording].setup
-            kind = (setup.rig, setup.rate_hz, setup.onboard, setup.effective_gravity)
+            metadata = recordings[window.recording].metadata
+            kind = (metadata.rig, metadata.rate_hz, metadata.onboard, metadata.effective_gravity)
             kinds.setdefault(kind, []).append(index)
         self._groups = [
             (ids, WindowGroup(recordings, [windows[i] for i in ids], timestep, threads))
             for ids in kinds.values()
         ]
 
-    def run(self, candidates: Sequence[Candidate]) -> Simulated:
-        """Simulate every window with every candidate.
+    def run(self, hypotheses: Sequence[LegHypothesis]) -> Simulated:
+        """Simulate every window with every hypothesis.
 
         Raises:
-            RecordingError: A recording and its candidate leave a needed gain open.
-            RobotError: A candidate's robot is impossible.
+            RecordingError: A recording and its hypothesis leave a needed gain open.
+            RobotError: A hypothesis's robot is impossible.
         """
-        shape = (len(candidates), len(self.windows), self.rows, 2)
+        shape = (len(hypotheses), len(self.windows), self.rows, 2)
         position, velocity, torque = (np.full(shape, np.nan) for _ in range(3))
         height = np.full(shape[:3], np.nan)
         for ids, group in self._groups:
-            parts = group.run(candidates)
+            parts = group.run(hypotheses)
             for whole, part in zip((position, velocity, torque, height), parts, strict=True):
                 whole[:, ids, : part.shape[2]] = part
         return Simulated(position, velocity, torque, height)

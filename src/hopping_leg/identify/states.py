@@ -32,7 +32,7 @@ def start_states(recording: Recording) -> tuple[Array, Array]:
         RecordingError: A joint has no measured position at all.
     """
     position, velocity = full_states(recording)
-    if recording.setup.rig != "fixed-base":
+    if recording.metadata.rig != "fixed-base":
         return position, velocity
     for joint in range(2):
         measured = np.stack([recording.array(n)[:, joint] for n in ("position", "velocity")])

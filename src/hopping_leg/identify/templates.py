@@ -5,7 +5,7 @@ from typing import Protocol
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.setup import Rig
+from hopping_leg.identify.recording_format import Rig
 from hopping_leg.robot.parameters import Robot
 
 

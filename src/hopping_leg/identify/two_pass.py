@@ -9,10 +9,10 @@ from the first pass."
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.least_squares import Found
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
 from hopping_leg.identify.parameters import ParameterSet, choose, narrowed
-from hopping_leg.identify.setup import Rig
+from hopping_leg.identify.recording_format import Rig
 
 JOINT_PARAMETERS = tuple(
     f"{joint}.{name}" for joint in ("hip", "knee") for name in ("friction", "damping", "armature")
@@ -39,9 +39,9 @@ class TwoPass:
     second: Found
 
     @property
-    def best(self) -> Candidate:
+    def best(self) -> LegHypothesis:
         """What the second pass found."""
-        return self.second_parameters.candidates(self.second.vector[None])[0]
+        return self.second_parameters.hypotheses(self.second.vector[None])[0]
 
 
 def pass_names(rigs: Sequence[Rig]) -> tuple[list[str], list[str]]:
@@ -56,7 +56,7 @@ def pass_names(rigs: Sequence[Rig]) -> tuple[list[str], list[str]]:
 
 
 def two_pass(
-    base: Candidate,
+    base: LegHypothesis,
     rigs: Sequence[Rig],
     search: Search,
     *,
@@ -72,7 +72,7 @@ def two_pass(
         rigs: Of the recordings.
         search: CMA-ES, least squares or both; called as ``search("first", parameters)``.
         further: Parameters beyond Table I that both passes fit, e.g. the drives' gains.
-        start: Starting values that differ from the candidate's.
+        start: Starting values that differ from the hypothesis's.
         bounds: Bounds that differ from the widest ones.
         factor: The second pass keeps the first one's parameters within this factor.
 

@@ -81,7 +81,7 @@ def _at_most(
 
 def _peak_torques(inspection: Inspection) -> list[float]:
     try:
-        robot = load_robot(inspection.setup.robot)
+        robot = load_robot(inspection.metadata.robot)
     except (RobotError, OSError):
         return [_COMMON_PEAK for _ in JOINTS]
     return [j.motor.peak_torque * j.belt_ratio for j in (robot.hip, robot.knee)]

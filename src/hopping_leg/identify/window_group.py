@@ -7,7 +7,6 @@ from mujoco import batch
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.drive_loop import (
     DelayLine,
     MotorBounds,
@@ -16,13 +15,14 @@ from hopping_leg.identify.drive_loop import (
     recorded_gains,
     require_gains,
 )
-from hopping_leg.identify.held import Held
+from hopping_leg.identify.encoder_offsets import OffsetFinder, find_offsets, has_encoder_offsets
+from hopping_leg.identify.held_signal import HeldSignal
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
 from hopping_leg.identify.recording import Recording
+from hopping_leg.identify.resampling import RowResampling
 from hopping_leg.identify.rig_model import FIELDS, build_rig_model, model_field
-from hopping_leg.identify.row_places import RowPlaces
 from hopping_leg.identify.states import base_rate, start_states
 from hopping_leg.identify.windows import Window
-from hopping_leg.identify.zeros import Zeros, find_zeros, has_own_zeros
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
 
@@ -64,43 +64,45 @@ class WindowGroup:
     ) -> None:
         self._timestep, self._threads = timestep, threads
         self._recordings = [recordings[w.recording] for w in windows]
-        self._setup = self._recordings[0].setup
-        period = self._setup.period
+        self._metadata = self._recordings[0].metadata
+        period = self._metadata.period
         if timestep > period * 1.001:
             raise UsageError(
                 f"A physics step of {timestep} s is longer than the recordings' period of"
                 f" {period:g} s; take {period:g} s or less."
             )
-        parts = _TICKS_PER_PERIOD if self._setup.onboard == "continuous" else 1
+        parts = _TICKS_PER_PERIOD if self._metadata.onboard == "continuous" else 1
         self._substeps = max(1, round(period / timestep / parts))
         self._tick = self._substeps * timestep
-        self._zoh = self._setup.onboard == "zoh"
+        self._zoh = self._metadata.onboard == "zoh"
         self._numbers = sorted({w.recording for w in windows})
         self._of_window = np.array([self._numbers.index(w.recording) for w in windows])
         self._prepare_rows(recordings, windows)
         self._distinct = [recordings[n] for n in self._numbers]
         self._start_rows = np.array([w.start for w in windows])
         self._prepare_commands()
-        self._zeros = [Zeros(r) if has_own_zeros(r.setup) else None for r in self._distinct]
+        self._offsets = [
+            OffsetFinder(r) if has_encoder_offsets(r.metadata) else None for r in self._distinct
+        ]
         self._base_rates: dict[tuple[float, ...], Array] = {}
         self._batches: dict[int, batch.Batch] = {}
 
-    def run(self, candidates: Sequence[Candidate]) -> tuple[Array, Array, Array, Array]:
+    def run(self, hypotheses: Sequence[LegHypothesis]) -> tuple[Array, Array, Array, Array]:
         """Return position, velocity and measured torque of the joints, and the base's height.
 
-        Of shape (candidates, windows, rows, 2) the first three, (candidates, windows, rows) the
+        Of shape (hypotheses, windows, rows, 2) the first three, (hypotheses, windows, rows) the
         last, which is NaN where the base is fixed.
         """
-        zeros = find_zeros(self._zeros, candidates)[:, self._of_window]
-        simulation = self._start(candidates, zeros)
-        *history, heights = self._advance(simulation, candidates)
-        shape = (self._rows.ticks, len(candidates), -1, 2)
+        offsets = find_offsets(self._offsets, hypotheses)[:, self._of_window]
+        simulation = self._start(hypotheses, offsets)
+        *history, heights = self._advance(simulation, hypotheses)
+        shape = (self._rows.ticks, len(hypotheses), -1, 2)
         q, qd, torque = (values.reshape(shape) for values in history)
         height = self._rows.linear(heights.reshape(*shape[:3], 1))[..., 0]
         position, velocity = self._rows.cubic(q, qd)
-        position += zeros[:, :, None]
-        gain = drive_values(candidates, "sensor_gain")[:, None, None]
-        offset = drive_values(candidates, "torque_offset")[:, None, None]
+        position += offsets[:, :, None]
+        gain = drive_values(hypotheses, "sensor_gain")[:, None, None]
+        offset = drive_values(hypotheses, "torque_offset")[:, None, None]
         measured = gain * self._rows.linear(torque) + offset
         for values in (position, velocity, measured, height):
             values[:, self._rows.padding] = np.nan
@@ -122,7 +124,7 @@ class WindowGroup:
             self._q0[i], self._qd0[i] = (values[w.start] for values in states[w.recording])
             if recording.has_column("height_m"):
                 self._height0[i] = recording.trace.column("height_m")[w.start]
-        self._rows = RowPlaces(times, self._tick)
+        self._rows = RowResampling(times, self._tick)
 
     def _prepare_commands(self) -> None:
         self._held, self._ramps, self._gains = [], [], []
@@ -132,19 +134,19 @@ class WindowGroup:
                 for name in ("position", "velocity", "torque")
             ]
             time = recording.time
-            self._held.append(Held(time, np.concatenate(columns, axis=1)))
-            self._ramps.append(Held(time, np.zeros_like(columns[1]), columns[1]))
+            self._held.append(HeldSignal(time, np.concatenate(columns, axis=1)))
+            self._ramps.append(HeldSignal(time, np.zeros_like(columns[1]), columns[1]))
             rows = [recorded_gains(recording, n) for n in ("stiffness", "damping", "integral")]
-            self._gains.append(Held(time, np.concatenate(rows, axis=1)))
+            self._gains.append(HeldSignal(time, np.concatenate(rows, axis=1)))
 
-    def _start(self, candidates: Sequence[Candidate], zeros: Array) -> batch.Batch:
+    def _start(self, hypotheses: Sequence[LegHypothesis], offsets: Array) -> batch.Batch:
         """Return the batch with each simulation's model and initial state set."""
-        setup, windows = self._setup, len(self._begin)
+        metadata, windows = self._metadata, len(self._begin)
         models = [
-            build_rig_model(c.robot, setup.rig, self._timestep, setup.effective_gravity)
-            for c in candidates
+            build_rig_model(c.robot, metadata.rig, self._timestep, metadata.effective_gravity)
+            for c in hypotheses
         ]
-        count = len(candidates) * windows
+        count = len(hypotheses) * windows
         if count not in self._batches:
             self._batches[count] = batch.Batch(models[0], count, self._threads)
         simulation = self._batches[count]
@@ -153,13 +155,13 @@ class WindowGroup:
             simulation.expand(name)[...] = np.repeat(values, windows, axis=0)
         simulation.reset(stage=0)
         q, qd = simulation.bind("qpos"), simulation.bind("qvel")
-        q[:, -2:] = (self._q0 - zeros).reshape(-1, 2)
-        qd[:, -2:] = np.tile(self._qd0, (len(candidates), 1))
-        if setup.rig != "fixed-base":
-            standing = [kinematics.stance_height(c.robot, self._q0) for c in candidates]
+        q[:, -2:] = (self._q0 - offsets).reshape(-1, 2)
+        qd[:, -2:] = np.tile(self._qd0, (len(hypotheses), 1))
+        if metadata.rig != "fixed-base":
+            standing = [kinematics.stance_height(c.robot, self._q0) for c in hypotheses]
             height = np.where(np.isnan(self._height0), np.stack(standing), self._height0)
             q[:, 0] = height.ravel()
-            qd[:, 0] = np.concatenate([self._base_rate(c.robot) for c in candidates])
+            qd[:, 0] = np.concatenate([self._base_rate(c.robot) for c in hypotheses])
         return simulation
 
     def _base_rate(self, robot: Robot) -> Array:
@@ -175,7 +177,7 @@ class WindowGroup:
         return self._base_rates[lengths]
 
     def _advance(
-        self, simulation: batch.Batch, candidates: Sequence[Candidate]
+        self, simulation: batch.Batch, hypotheses: Sequence[LegHypothesis]
     ) -> tuple[Array, Array, Array, Array]:
         """Run all ticks; return joint position, velocity and torque, base height at each.
 
@@ -186,18 +188,18 @@ class WindowGroup:
         positions, velocities, torques = history
         heights = np.full((self._rows.ticks, count), np.nan)
         q, qd = simulation.bind("qpos")[:, -2:], simulation.bind("qvel")[:, -2:]
-        base = simulation.bind("qpos")[:, 0] if self._setup.rig != "fixed-base" else np.nan
+        base = simulation.bind("qpos")[:, 0] if self._metadata.rig != "fixed-base" else np.nan
         ctrl = simulation.bind("ctrl")
         bias = simulation.expand("actuator_biasprm")
         force = simulation.expand("actuator_forcerange")
         friction = simulation.expand("dof_frictionloss")[:, -2:]
         still = friction.copy()
-        bounds = MotorBounds(candidates, self._recordings)
-        gain = np.repeat([c.robot.of_joints("torque_gain") for c in candidates], windows, axis=0)
-        load = np.repeat([c.robot.of_joints("load_friction") for c in candidates], windows, axis=0)
-        delay = np.repeat([c.drive.delay for c in candidates], windows)
+        bounds = MotorBounds(hypotheses, self._recordings)
+        gain = np.repeat([c.robot.of_joints("torque_gain") for c in hypotheses], windows, axis=0)
+        load = np.repeat([c.robot.of_joints("load_friction") for c in hypotheses], windows, axis=0)
+        delay = np.repeat([c.drive.delay for c in hypotheses], windows)
         line = DelayLine(delay / self._tick)
-        window = np.repeat([c.drive.velocity_window for c in candidates], windows)
+        window = np.repeat([c.drive.velocity_window for c in hypotheses], windows)
         lagging = (window > 0)[:, None]
         windowed = bool(lagging.any()) and not self._zoh
         seen = VelocityWindow(window, self._tick, q, qd)
@@ -205,7 +207,7 @@ class WindowGroup:
         alive = np.arange(count)
         for tick in range(self._rows.ticks):
             if tick % _BLOCK == 0:
-                commands, gains = self._block(tick, delay, candidates)
+                commands, gains = self._block(tick, delay, hypotheses)
             target, rate, feed = np.split(commands[tick % _BLOCK], 3, axis=-1)
             kp, kd, ki = gains[tick % _BLOCK]
             lower, upper = bounds.at(qd)
@@ -240,18 +242,18 @@ class WindowGroup:
         return positions, velocities, torques, heights
 
     def _block(
-        self, tick: int, delay: Array, candidates: Sequence[Candidate]
+        self, tick: int, delay: Array, hypotheses: Sequence[LegHypothesis]
     ) -> tuple[Array, Array]:
         """Return a block of ticks' commands, (ticks, n, 6), and gains, (ticks, 3, n, 2)."""
-        windows, number = len(self._begin), len(candidates)
+        windows, number = len(self._begin), len(hypotheses)
         ticks = np.arange(tick, min(tick + _BLOCK, self._rows.ticks))[:, None, None] * self._tick
         late = np.zeros(number) if self._zoh else delay[::windows]
         late = late[:1] if (late == late[0]).all() else late
-        ramp = np.array([[c.drive.ramp] for c in candidates])
+        ramp = np.array([[c.drive.ramp] for c in hypotheses])
         commands = np.empty((len(ticks), number, windows, 6))
         gains = np.empty((len(ticks), 3, number, windows, 2))
         fitted = np.array(
-            [drive_values(candidates, n) for n in ("stiffness", "damping", "integral")]
+            [drive_values(hypotheses, n) for n in ("stiffness", "damping", "integral")]
         )[:, :, None]
         for n in range(len(self._numbers)):
             mine = self._of_window == n
@@ -264,7 +266,7 @@ class WindowGroup:
             rows = self._gains[n].at(start + 1e-9)
             rows = np.moveaxis(rows.reshape(*start.shape, 3, 2), 3, 1)
             gains[:, :, :, mine] = np.where(np.isnan(fitted), rows, fitted)
-        if self._setup.onboard == "torque":
+        if self._metadata.onboard == "torque":
             gains[...] = 0.0
         for index, name in enumerate(("stiffness", "damping")):
             require_gains(gains[:, index], name, self._recordings[0])

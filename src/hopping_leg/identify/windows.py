@@ -50,7 +50,7 @@ def cut(
             raise UsageError(f"The windows' {name} is {value} s but must be positive and finite.")
     windows: list[Window] = []
     for index, recording in enumerate(recordings):
-        rate = recording.setup.rate_hz
+        rate = recording.metadata.rate_hz
         skip = max(1, round(unscored * rate))
         found = False
         for segment in recording.segments():

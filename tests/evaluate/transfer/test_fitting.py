@@ -4,14 +4,14 @@ import pytest
 
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.transfer import fitting, tables
-from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.robot import load_robot
 from tests.evaluate.transfer.studies import study
 from tests.identify.twin import record, swing
 
-LEG = Candidate(load_robot("legv2"))
+LEG = LegHypothesis(load_robot("legv2"))
 
 
 @pytest.fixture(scope="module")

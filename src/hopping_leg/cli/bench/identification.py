@@ -12,7 +12,7 @@ from rich.table import Table
 from hopping_leg.cli.bench.shared import at_least
 from hopping_leg.cli.fit_progress import FitProgress
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.searching import Report
+from hopping_leg.identify.optimizers import Report
 
 _VARIABLE = "HOPPING_LEG_RECORDINGS"
 

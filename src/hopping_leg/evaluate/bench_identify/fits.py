@@ -7,12 +7,12 @@ import numpy as np
 
 from hopping_leg.evaluate.bench_identify.study import Clock, Keeper, Study
 from hopping_leg.evaluate.bench_identify.twin import believed
-from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.cma import CmaOptions
 from hopping_leg.identify.judging import judge
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.optimizers import SearchOptions
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.searching import SearchOptions
 from hopping_leg.robot.model import TIMESTEP
 
 METHODS = {
@@ -62,16 +62,26 @@ def fit(
             seed=study.seed,
             report=keeper.report,
         )
-    said = identified.told.statements
-    told = [n for n in identified.told.names if not any(f"'{n}'" in sentence for sentence in said)]
-    values = dict(zip(identified.told.names, identified.told.values.tolist(), strict=True))
+    said = identified.identifiability.statements
+    told = [
+        n
+        for n in identified.identifiability.names
+        if not any(f"'{n}'" in sentence for sentence in said)
+    ]
+    values = dict(
+        zip(
+            identified.identifiability.names,
+            identified.identifiability.values.tolist(),
+            strict=True,
+        )
+    )
     rows = compare(values, truth, told)
     for row, searched in zip(rows, identified.parameters.parameters, strict=True):
         row |= {"low": searched.low, "high": searched.high}
     return {
         "method": METHODS[method],
         **summary(rows),
-        **unseen_errors(identified.candidate, unseen, study.threads),
+        **unseen_errors(identified.hypothesis, unseen, study.threads),
         "wall_s": clock.wall,
         "cpu_s": clock.cpu,
         "resumed": resumed,
@@ -92,7 +102,7 @@ def compare(
         truth: What differs from where the fit began.
         told: Which ones the fit claims to tell; None if it makes no claims.
     """
-    start = Candidate(believed())
+    start = LegHypothesis(believed())
     rows = []
     for name, value in values.items():
         true = truth.get(name, start.get(name))
@@ -127,7 +137,7 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def unseen_errors(
-    candidate: Candidate, unseen: Mapping[str, Recording], threads: int
+    candidate: LegHypothesis, unseen: Mapping[str, Recording], threads: int
 ) -> dict[str, Any]:
     """Return the rms error of joint positions in closed loop on each recording, rad."""
     found = {}

@@ -13,7 +13,7 @@ from hopping_leg.evaluate.bench_identify.fits import compare, summary, unseen_er
 from hopping_leg.evaluate.bench_identify.study import Clock, Keeper, Study
 from hopping_leg.evaluate.bench_identify.synthetic import CASES, FIXED, RAIL
 from hopping_leg.evaluate.bench_identify.twin import believed, record
-from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
 from hopping_leg.identify.recording import Recording
 
 ITERATIONS = 60
@@ -115,7 +115,7 @@ def _fit(
             )
     values = dict(zip(names, best.as_vector().tolist(), strict=True))
     rows = compare(values, truth, None)
-    candidate = Candidate(believed()).replace(values)
+    candidate = LegHypothesis(believed()).replace(values)
     unseen: dict[str, Recording] = {
         motion: record(truth, motion, study.seconds) for motion in judged
     }

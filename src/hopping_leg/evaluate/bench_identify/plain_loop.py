@@ -7,7 +7,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RecordingError
-from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.rig_model import build_rig_model
 from hopping_leg.identify.states import base_rate, start_states
@@ -29,12 +29,12 @@ class PlainLoop:
         self, recordings: Sequence[Recording], windows: Sequence[Window], timestep: float
     ) -> None:
         self._windows, self._timestep = windows, timestep
-        self._setups = [recording.setup for recording in recordings]
+        self._setups = [recording.metadata for recording in recordings]
         self._targets = [recording.array("position_command") for recording in recordings]
         self._states = [start_states(recording) for recording in recordings]
         self._recordings = recordings
 
-    def run(self, candidate: Candidate, *, whole_ticks: bool = False) -> list[Array]:
+    def run(self, candidate: LegHypothesis, *, whole_ticks: bool = False) -> list[Array]:
         """Return the joint positions of each window, rad, (rows, 2).
 
         Args:
@@ -80,7 +80,7 @@ class PlainLoop:
 
 def _heights(recording: Recording, robot: Robot) -> tuple[Array, Array]:
     """Return the base's height and its rate at every row, m and m/s, (rows,) each."""
-    if recording.setup.rig == "fixed-base":
+    if recording.metadata.rig == "fixed-base":
         return np.empty(0), np.empty(0)
     if not recording.has_column("height_m"):
         raise RecordingError(

@@ -79,7 +79,7 @@ def _split(
     return {
         **after,
         "before": before,
-        "fitted": len(identified.told.names),
+        "fitted": len(identified.identifiability.names),
         "candidates": sum(one.found.evaluations for one in identified.passes),
         "wall_s": clock.wall,
         "cpu_s": clock.cpu,

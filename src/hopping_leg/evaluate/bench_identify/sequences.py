@@ -11,7 +11,7 @@ from mujoco import sysid
 
 from hopping_leg.arrays import Array
 from hopping_leg.evaluate.bench_identify.twin import believed
-from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.rig_model import build_rig_model
 from hopping_leg.identify.states import base_rate, start_states
@@ -62,18 +62,18 @@ def sequences(recording: Recording, way: Way) -> Sequences:
 def _build(
     recording: Recording, way: Way, names: Sequence[str], values: Sequence[float]
 ) -> mujoco.MjModel:
-    robot = Candidate(believed()).replace(dict(zip(names, values, strict=True))).robot
-    model = build_rig_model(robot, recording.setup.rig, TIMESTEP)
+    robot = LegHypothesis(believed()).replace(dict(zip(names, values, strict=True))).robot
+    model = build_rig_model(robot, recording.metadata.rig, TIMESTEP)
     if way == "whole":
-        model.actuator_biasprm[:, 1] = -np.array(recording.setup.stiffness)
-        model.actuator_biasprm[:, 2] = -np.array(recording.setup.damping)
+        model.actuator_biasprm[:, 1] = -np.array(recording.metadata.stiffness)
+        model.actuator_biasprm[:, 2] = -np.array(recording.metadata.damping)
     return model
 
 
 def _states(recording: Recording) -> tuple[Array, Array]:
     """Return the model's positions and velocities at every row."""
     q, qd = start_states(recording)
-    if recording.setup.rig == "fixed-base":
+    if recording.metadata.rig == "fixed-base":
         return q, qd
     height = recording.trace.column("height_m")
     return np.column_stack([height, q]), np.column_stack([base_rate(recording, believed()), qd])
@@ -81,12 +81,12 @@ def _states(recording: Recording) -> tuple[Array, Array]:
 
 def _control(recording: Recording, way: Way) -> Array:
     """Return what the actuators get at every row, N m, (rows, 2)."""
-    spring = np.array(recording.setup.stiffness) * recording.array("position_command")
+    spring = np.array(recording.metadata.stiffness) * recording.array("position_command")
     if way == "whole":
         return spring
     q, qd = recording.array("position"), recording.array("velocity")
-    torque = spring - np.array(recording.setup.stiffness) * q
-    torque -= np.array(recording.setup.damping) * qd
+    torque = spring - np.array(recording.metadata.stiffness) * q
+    torque -= np.array(recording.metadata.damping) * qd
     return MotorLimit(believed()).clip(torque, qd)
 
 
@@ -98,9 +98,9 @@ def _trajectory(
     window: Window,
 ) -> Any:  # noqa: ANN401
     rows = slice(window.start, window.start + window.length)
-    substeps = round(recording.setup.period / TIMESTEP)
+    substeps = round(recording.metadata.period / TIMESTEP)
     held = np.repeat(control[rows], substeps, axis=0)
-    seconds = np.arange(window.length) * recording.setup.period
+    seconds = np.arange(window.length) * recording.metadata.period
     kind = sysid.SignalType.MjStateQPos
     mapping = {"hip_qpos": (kind, np.array([0])), "knee_qpos": (kind, np.array([1]))}
     angles = recording.array("position")[rows]

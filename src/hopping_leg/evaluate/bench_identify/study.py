@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, Self
 
 from hopping_leg.evaluate import keeper
+from hopping_leg.identify.optimizers import Report
 from hopping_leg.identify.result import software_versions
-from hopping_leg.identify.searching import Report
 from hopping_leg.json_files import write_json
 
 

@@ -6,7 +6,7 @@ from typing import Any
 from hopping_leg.evaluate.bench_identify.fits import fit, unseen_errors
 from hopping_leg.evaluate.bench_identify.study import Keeper, Study
 from hopping_leg.evaluate.bench_identify.twin import AIR, GROUND, Motion, believed, record
-from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
 from hopping_leg.identify.recording import Recording
 
 Case = tuple[str, dict[str, float], tuple[Motion, ...], tuple[Motion, ...], tuple[str, ...]]
@@ -78,7 +78,7 @@ def synthetic(study: Study, keeper: Keeper) -> dict[str, Any]:
         unseen: dict[str, Recording] = {
             motion: record(truth, motion, study.seconds) for motion in judged
         }
-        errors = unseen_errors(Candidate(believed()), unseen, study.threads)
+        errors = unseen_errors(LegHypothesis(believed()), unseen, study.threads)
         start.append({"case": case, **_NOT_JUDGED, **errors})
     return {"rows": rows, "start": start}
 

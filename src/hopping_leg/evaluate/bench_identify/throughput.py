@@ -10,7 +10,7 @@ from hopping_leg.evaluate.bench_identify.plain_loop import PlainLoop
 from hopping_leg.evaluate.bench_identify.study import Study
 from hopping_leg.evaluate.bench_identify.twin import believed, record_paper
 from hopping_leg.evaluate.timing import Timed, host, interleave, median_ratio
-from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
 from hopping_leg.identify.plan import make_plan
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import cut
@@ -38,7 +38,7 @@ def throughput(
     rng = np.random.default_rng(study.seed)
     low, high = (np.clip(bound, -1, 1) for bound in plan.parameters.bounds)
     vectors = rng.uniform(low, high, (study.population, len(low)))
-    candidates = plan.parameters.candidates(vectors)
+    candidates = plan.parameters.hypotheses(vectors)
     loop = PlainLoop(recordings, windows, TIMESTEP)
     batches = {
         threads: WindowSimulator(recordings, windows, timestep=TIMESTEP, threads=threads)
@@ -82,15 +82,15 @@ def _row(what: str, seconds: Array, loop: Array) -> dict[str, Any]:
     }
 
 
-def _run_loop(loop: PlainLoop, candidate: Candidate, *, whole_ticks: bool) -> None:
+def _run_loop(loop: PlainLoop, candidate: LegHypothesis, *, whole_ticks: bool) -> None:
     loop.run(candidate, whole_ticks=whole_ticks)
 
 
-def _run_batch(batch: WindowSimulator, candidates: list[Candidate]) -> None:
+def _run_batch(batch: WindowSimulator, candidates: list[LegHypothesis]) -> None:
     batch.run(candidates)
 
 
-def _difference(loop: PlainLoop, batch: WindowSimulator, candidate: Candidate) -> float:
+def _difference(loop: PlainLoop, batch: WindowSimulator, candidate: LegHypothesis) -> float:
     """Return the largest difference of a joint position between the two ways, rad."""
     plain, batched = loop.run(candidate), batch.run([candidate]).position[0]
     pairs = zip(plain, batched, strict=True)

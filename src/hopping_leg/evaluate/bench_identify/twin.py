@@ -3,11 +3,11 @@
 from functools import cache
 from typing import Literal
 
-from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.excitation import adapt, make_excitation
-from hopping_leg.identify.playing import play
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.paper_excitation import DURATION, Stroke, Strokes, fixed_base, moving_base
+from hopping_leg.identify.play_excitation import play
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.strokes import DURATION, Stroke, Strokes, fixed_base, moving_base
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.robot.parameters import Robot
@@ -58,7 +58,7 @@ def believed() -> Robot:
 
 def twin(truth: dict[str, float]) -> Robot:
     """Return the leg as it is."""
-    return Candidate(believed()).replace(truth).robot
+    return LegHypothesis(believed()).replace(truth).robot
 
 
 def record(truth: dict[str, float], motion: Motion, seconds: float) -> Recording:

@@ -9,8 +9,8 @@ from scipy.signal import lombscargle
 
 from hopping_leg.arrays import Array
 from hopping_leg.evaluate.figures.style import TORQUE_MAP, WIDTH, colour, styled
+from hopping_leg.identify.optimizers import Pass
 from hopping_leg.identify.overlay import Overlay
-from hopping_leg.identify.searching import Pass
 
 JOINTS = ("hip", "knee")
 LABELS = {"position": "position / rad", "torque": "torque / N m"}
@@ -96,17 +96,17 @@ def draw_spectra(overlays: Sequence[Overlay]) -> Figure:
 
 
 def residual_spectrum(
-    overlays: Sequence[Overlay], quantity: str, joint: int, candidate: int
+    overlays: Sequence[Overlay], quantity: str, joint: int, hypothesis: int
 ) -> tuple[Array, Array]:
     """Return frequencies, Hz, and rms amplitudes of residuals over recordings.
 
     By Lomb and Scargle, as samples are sparse and their times jitter; empty where there is none.
     """
-    powers, rate = [], max(o.recording.setup.rate_hz for o in overlays)
+    powers, rate = [], max(o.recording.metadata.rate_hz for o in overlays)
     longest = max(float(o.recording.time[-1] - o.recording.time[0]) for o in overlays)
     frequency = np.geomspace(max(0.2, 2 / longest), rate / 2, _FREQUENCIES)
     for overlay in overlays:
-        residual = overlay.errors(quantity)[candidate, :, joint]
+        residual = overlay.errors(quantity)[hypothesis, :, joint]
         known = np.flatnonzero(np.isfinite(residual))[:_SAMPLES]
         if len(known) < 50:
             continue

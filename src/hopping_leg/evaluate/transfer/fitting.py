@@ -9,13 +9,13 @@ from typing import Any
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.transfer.methods import Fit, Method
 from hopping_leg.evaluate.transfer.study import USUAL_FIT, Study, TwinFile
-from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.cma import CmaOptions
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.optimizers import SearchOptions
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.identify.result import Identified, as_json
 from hopping_leg.identify.robot_file import save_robot
-from hopping_leg.identify.searching import SearchOptions
 from hopping_leg.json_files import write_json
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.parameters import Robot
@@ -106,7 +106,7 @@ class Identify:
 
     def _truth(self, identified: Identified) -> dict[str, float]:
         """Return the twin's own values of what was fitted, where it has them."""
-        truth = Candidate(self.twin.without_surprises)
+        truth = LegHypothesis(self.twin.without_surprises)
         names = identified.parameters.names
         values = {name: truth.get(name) for name in names if not name.startswith("drive.")}
         if "drive.delay" in names:

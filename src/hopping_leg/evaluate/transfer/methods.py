@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from hopping_leg.errors import UsageError, unknown_name
-from hopping_leg.identify.setup import Rig
+from hopping_leg.identify.recording_format import Rig
 
 Search = Literal["least-squares", "two-pass", "one-pass"]
 

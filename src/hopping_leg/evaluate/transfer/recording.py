@@ -6,9 +6,9 @@ from pathlib import Path
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.transfer.study import Study, TwinFile
 from hopping_leg.identify.excitation import adapt, make_excitation
-from hopping_leg.identify.playing import play
-from hopping_leg.identify.setup import Rig
-from hopping_leg.identify.strokes import Strokes, fixed_base, moving_base
+from hopping_leg.identify.paper_excitation import Strokes, fixed_base, moving_base
+from hopping_leg.identify.play_excitation import play
+from hopping_leg.identify.recording_format import Rig
 from hopping_leg.robot import load_robot
 from hopping_leg.trace import Trace
 

@@ -1,7 +1,7 @@
 """Recordings of other loggers, recognised by their columns; a module per rig.
 
 Each rig's module has ``COLUMNS``, by which it is recognised, ``NAMES``, its columns and what a
-recording calls them, and ``read(table)``, which returns a recording's table and setup.
+recording calls them, and ``read(table)``, which returns a recording's table and metadata.
 """
 
 from typing import Protocol
@@ -14,9 +14,9 @@ from hopping_leg.identify.importers import (
     legv2_boom,
     legv2_fixed_base,
 )
-from hopping_leg.identify.setup import RecordingSetup
+from hopping_leg.identify.recording_format import RecordingMetadata
 
-Imported = tuple[pl.DataFrame, RecordingSetup]
+Imported = tuple[pl.DataFrame, RecordingMetadata]
 
 
 class Importer(Protocol):
@@ -26,7 +26,7 @@ class Importer(Protocol):
     NAMES: dict[str, str]
 
     def read(self, table: pl.DataFrame) -> Imported:
-        """Return a recording's table and setup from the rig's own table."""
+        """Return a recording's table and metadata from the rig's own table."""
         ...
 
 

@@ -5,7 +5,7 @@ import dataclasses
 import polars as pl
 
 from hopping_leg.identify.importers.renaming import joint_columns, median_rate, take
-from hopping_leg.identify.setup import Quantisation, RecordingSetup
+from hopping_leg.identify.recording_format import Quantisation, RecordingMetadata
 
 COLUMNS = frozenset({"t", "pos_meas1", "pos_meas2", "tau_con1", "tau_con2"})
 
@@ -19,7 +19,7 @@ NAMES = {"t": "time_s"} | joint_columns(
     ("1", "2"),
 )
 
-SETUP = RecordingSetup(
+METADATA = RecordingMetadata(
     rig="fixed-base",
     rate_hz=500.0,
     robot="doublependulum",
@@ -33,6 +33,6 @@ SETUP = RecordingSetup(
 begin at zero to within one."""
 
 
-def read(table: pl.DataFrame) -> tuple[pl.DataFrame, RecordingSetup]:
-    """Return the recording's table and setup; the rate is the clock's own."""
-    return take(table, NAMES), dataclasses.replace(SETUP, rate_hz=median_rate(table["t"]))
+def read(table: pl.DataFrame) -> tuple[pl.DataFrame, RecordingMetadata]:
+    """Return the recording's table and metadata; the rate is the clock's own."""
+    return take(table, NAMES), dataclasses.replace(METADATA, rate_hz=median_rate(table["t"]))

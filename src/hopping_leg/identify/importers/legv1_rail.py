@@ -5,7 +5,7 @@ import dataclasses
 import polars as pl
 
 from hopping_leg.identify.importers.renaming import joint_columns, median_rate, take
-from hopping_leg.identify.setup import Quantisation, RecordingSetup
+from hopping_leg.identify.recording_format import Quantisation, RecordingMetadata
 
 COLUMNS = frozenset({"t", "hip_pos", "hip_tau_ff_cmd", "knee_pos", "knee_tau_ff_cmd"})
 
@@ -21,7 +21,7 @@ NAMES = {"t": "time_s"} | joint_columns(
     ("hip", "knee"),
 )
 
-SETUP = RecordingSetup(
+METADATA = RecordingMetadata(
     rig="rail",
     rate_hz=630.0,
     robot="legv1",
@@ -35,6 +35,6 @@ SETUP = RecordingSetup(
 )
 
 
-def read(table: pl.DataFrame) -> tuple[pl.DataFrame, RecordingSetup]:
-    """Return the recording's table and setup; the rate is the clock's own."""
-    return take(table, NAMES), dataclasses.replace(SETUP, rate_hz=median_rate(table["t"]))
+def read(table: pl.DataFrame) -> tuple[pl.DataFrame, RecordingMetadata]:
+    """Return the recording's table and metadata; the rate is the clock's own."""
+    return take(table, NAMES), dataclasses.replace(METADATA, rate_hz=median_rate(table["t"]))

@@ -3,7 +3,7 @@
 import polars as pl
 
 from hopping_leg.identify.importers.renaming import joint_columns, take
-from hopping_leg.identify.setup import RecordingSetup
+from hopping_leg.identify.recording_format import RecordingMetadata
 
 COLUMNS = frozenset({"t", "phase", "hip_pos", "hip_vel", "knee_pos", "knee_vel"})
 
@@ -20,7 +20,7 @@ NAMES = {"t": "time_s", "phase": "phase"} | joint_columns(
     ("hip", "knee"),
 )
 
-SETUP = RecordingSetup(
+METADATA = RecordingMetadata(
     rig="boom",
     rate_hz=130.0,
     robot="legv2",
@@ -36,10 +36,10 @@ SETUP = RecordingSetup(
 flight, with the boom's inertia and counterweight."""
 
 
-def read(table: pl.DataFrame) -> tuple[pl.DataFrame, RecordingSetup]:
-    """Return the recording's table and setup."""
+def read(table: pl.DataFrame) -> tuple[pl.DataFrame, RecordingMetadata]:
+    """Return the recording's table and metadata."""
     recording = take(table, NAMES)
     if "boom_pitch" in table.columns:
         rise = BOOM_RADIUS * table["boom_pitch"].sin()
         recording = recording.with_columns(rise.alias("base_rise_m"))
-    return recording, SETUP
+    return recording, METADATA

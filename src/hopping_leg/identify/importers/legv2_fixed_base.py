@@ -16,7 +16,7 @@ import polars as pl
 
 from hopping_leg.identify.columns import PAIRS
 from hopping_leg.identify.importers.renaming import joint_columns, take
-from hopping_leg.identify.setup import RecordingSetup
+from hopping_leg.identify.recording_format import RecordingMetadata
 
 COLUMNS = frozenset({"n", "t", "t_exact", "hip_pos", "knee_pos", "hip_pos_cmd", "knee_pos_cmd"})
 
@@ -33,7 +33,7 @@ NAMES = {"t": "time_s", "t_exact": "exact_time"} | joint_columns(
     ("hip", "knee"),
 )
 
-SETUP = RecordingSetup(
+METADATA = RecordingMetadata(
     rig="fixed-base",
     rate_hz=200.0,
     robot="legv2",
@@ -48,10 +48,10 @@ SETUP = RecordingSetup(
 """Row n is in the reply to command n; the motors track at tens of kHz, without feed-forward."""
 
 
-def read(table: pl.DataFrame) -> tuple[pl.DataFrame, RecordingSetup]:
-    """Return the recording's table and setup."""
+def read(table: pl.DataFrame) -> tuple[pl.DataFrame, RecordingMetadata]:
+    """Return the recording's table and metadata."""
     hip, knee = PAIRS["velocity_command"]
     taken = take(table, NAMES).with_columns(pl.col("exact_time") > 0)
     if knee in taken.columns:
         taken = taken.with_columns((-0.5 * pl.col(knee)).alias(hip))
-    return taken, SETUP
+    return taken, METADATA

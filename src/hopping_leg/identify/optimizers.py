@@ -1,6 +1,6 @@
 """A plan's search carried out: every candidate with every window in one batch, on disk as it goes.
 
-Cost is the sum of squared residuals throughout, as the objective's levels weigh it.
+Cost is the sum of squared residuals throughout, as the objective's robust loss weighs it.
 """
 
 import dataclasses
@@ -21,19 +21,19 @@ from hopping_leg.identify.least_squares import (
     least_squares,
     multi_start,
 )
-from hopping_leg.identify.levels import Levels, total_costs
 from hopping_leg.identify.objective import Objective
 from hopping_leg.identify.parameters import ParameterSet
 from hopping_leg.identify.plan import Plan
-from hopping_leg.identify.setup import Rig
+from hopping_leg.identify.recording_format import Rig
+from hopping_leg.identify.robust_loss import RobustLoss, total_costs
 from hopping_leg.identify.two_pass import pass_names, two_pass
 from hopping_leg.identify.windows import deal
 
-Told = Callable[[float, float], None]
+Progress = Callable[[float, float], None]
 """Called with the share done (0 to 1) and the lowest cost so far."""
 
-Search = Callable[[Array, Path | None, Told], Found]
-"""From a start, the checkpoint and who is told, to where the search ended."""
+Search = Callable[[Array, Path | None, Progress], Found]
+"""From a start, the checkpoint and its progress report, to where the search ended."""
 
 Report = Callable[[str, float, float], None]
 """Called with what is being done, its share done (0 to 1) and the lowest cost so far."""
@@ -87,7 +87,7 @@ class Searcher:
         options: How hard.
         seed: Of all randomness.
         folder: For checkpoints; None keeps none.
-        report: Told of progress.
+        report: Called with the progress.
         ray: Address of a Ray cluster that simulates, ``local`` for one on this machine; None
             simulates here.
         about: What else makes this run this run.
@@ -153,26 +153,26 @@ class Searcher:
             stage = name if starts == 1 else f"{name}, start {number + 1} of {starts}"
             file = f"search-{name.replace(', ', '-')}-{number}.json"
 
-            def told(done: float, cost: float) -> None:
+            def progress(done: float, cost: float) -> None:
                 self._report(stage, begin + share * (number + done) / starts, cost)
 
             checkpoint = None if self._folder is None else self._folder / file
-            return searched(start, checkpoint, told)
+            return searched(start, checkpoint, progress)
 
         ends = multi_start(search, parameters, starts, self._seed)
         return Pass(name, parameters, ends[0], tuple(end.cost for end in ends[1:]))
 
     def _least_squares(self, objective: Objective, about: Mapping[str, object]) -> Search:
-        residuals, levels = self._spread(objective.residuals), objective.levels
+        residuals, loss = self._spread(objective.residuals), objective.loss
         options = self._options.least_squares
 
-        def search(start: Array, checkpoint: Path | None, told: Told) -> Found:
-            rounds = _Rounds(residuals, levels, options, told)
+        def search(start: Array, checkpoint: Path | None, progress: Progress) -> Found:
+            rounds = _Rounds(residuals, loss, options, progress)
             return least_squares(
                 rounds,
                 objective.parameters,
                 options,
-                levels=levels,
+                loss=loss,
                 groups=objective.jumping,
                 start=start,
                 about=about,
@@ -187,7 +187,7 @@ class Searcher:
         values = self._spread(objective)
         shares = [self._spread(share) for share in self._shares(objective)]
 
-        def search(start: Array, checkpoint: Path | None, told: Told) -> Found:
+        def search(start: Array, checkpoint: Path | None, progress: Progress) -> Found:
             return cma_es(
                 values,
                 objective.parameters,
@@ -197,14 +197,14 @@ class Searcher:
                 shares=shares,
                 about=about,
                 checkpoint=checkpoint,
-                report=lambda index, cost: told(index / options.generations, cost),
+                report=lambda index, cost: progress(index / options.generations, cost),
             )
 
         return search
 
     def _shares(self, objective: Objective) -> list[Objective]:
         """Return what judges generations in turn; nothing if all windows can judge each."""
-        rates = [r.setup.rate_hz for r in objective.recordings]
+        rates = [r.metadata.rate_hz for r in objective.recordings]
         simulated = sum(w.length / rates[w.recording] for w in objective.windows)
         count = max(1, round(simulated / self._options.cma.seconds))
         hands = deal(objective.windows, count, np.random.default_rng(self._seed))
@@ -223,18 +223,18 @@ class _Rounds:
     def __init__(
         self,
         residuals: Residuals,
-        levels: Levels | None,
+        loss: RobustLoss | None,
         options: LeastSquaresOptions,
-        told: Told,
+        progress: Progress,
     ) -> None:
-        self._residuals, self._levels = residuals, levels
-        self._options, self._told = options, told
+        self._residuals, self._loss = residuals, loss
+        self._options, self._progress = options, progress
         self._round, self._tried, self._least = 0, 0, np.inf
 
     def __call__(self, vectors: Array) -> Array:
         """Return residuals of search vectors (n, k), (n, m)."""
         values = self._residuals(vectors)
-        self._least = min(self._least, float(total_costs(values, self._levels).min()))
+        self._least = min(self._least, float(total_costs(values, self._loss).min()))
         self._tried += len(vectors) == 1
         self._tell()
         return values
@@ -246,4 +246,4 @@ class _Rounds:
 
     def _tell(self) -> None:
         within = min(self._tried / self._options.evaluations, 1.0)
-        self._told(min((self._round + within) / self._options.rounds, 1.0), self._least)
+        self._progress(min((self._round + within) / self._options.rounds, 1.0), self._least)

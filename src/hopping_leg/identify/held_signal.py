@@ -5,7 +5,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 
 
-class Held:
+class HeldSignal:
     """Values that hold or ramp from their row to the next, averaged over any interval.
 
     The average is exact for jittered time stamps and differentiable in the interval's position,

@@ -29,7 +29,7 @@ class Quantisation:
 
 
 @dataclass(frozen=True)
-class RecordingSetup:
+class RecordingMetadata:
     """How a recording was made; pairs are (hip, knee).
 
     Raises:
@@ -87,38 +87,40 @@ class RecordingSetup:
         return 1 / self.rate_hz
 
 
-def setup_to_tree(setup: RecordingSetup) -> dict[str, Any]:
-    """Return a setup as nested tables for TOML or JSON; what is none is left out."""
-    return {k: v for k, v in dataclasses.asdict(setup).items() if v is not None}
+def metadata_to_tree(metadata: RecordingMetadata) -> dict[str, Any]:
+    """Return a metadata as nested tables for TOML or JSON; what is none is left out."""
+    return {k: v for k, v in dataclasses.asdict(metadata).items() if v is not None}
 
 
-def setup_from_tree(tree: object, origin: str) -> RecordingSetup:
-    """Read a setup from the tables of a sidecar or a header.
+def metadata_from_tree(tree: object, origin: str) -> RecordingMetadata:
+    """Read a metadata from the tables of a sidecar or a header.
 
     Args:
-        tree: Field names to values as in ``RecordingSetup``; pairs are lists of two numbers.
+        tree: Field names to values as in ``RecordingMetadata``; pairs are lists of two numbers.
         origin: The file, for messages.
 
     Raises:
         RecordingError: Naming file and field.
     """
-    setup = _build(RecordingSetup, tree, "", origin)
-    assert isinstance(setup, RecordingSetup)
-    return setup
+    metadata = _build(RecordingMetadata, tree, "", origin)
+    assert isinstance(metadata, RecordingMetadata)
+    return metadata
 
 
 def _build(kind: type, tree: object, prefix: str, origin: str) -> object:
     if not isinstance(tree, dict):
-        raise RecordingError(f"{origin}: '{prefix or 'the setup'}' must be a table, not {tree!r}.")
+        raise RecordingError(
+            f"{origin}: '{prefix or 'the metadata'}' must be a table, not {tree!r}."
+        )
     hints = typing.get_type_hints(kind)
     for key in tree:
         if key not in hints:
-            raise RecordingError(f"{origin}: {unknown_name('setup field', str(key), hints)}")
+            raise RecordingError(f"{origin}: {unknown_name('metadata field', str(key), hints)}")
     required = [f.name for f in dataclasses.fields(kind) if _is_required(f)]
     for name in required:
         if name not in tree:
             raise RecordingError(
-                f"{origin}: the setup lacks '{name}'; it needs {', '.join(required)}."
+                f"{origin}: the metadata lacks '{name}'; it needs {', '.join(required)}."
             )
     values = {k: _value(hints[k], v, f"{prefix}{k}", origin) for k, v in tree.items()}
     try:

@@ -1,4 +1,4 @@
-"""Judging a candidate on recordings: in closed loop, and predicting open-loop from torques."""
+"""Judging a hypothesis on recordings: in closed loop, and predicting open-loop from torques."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.cost import measured
+from hopping_leg.identify.encoder_offsets import SETTLING, has_encoder_offsets
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import Window, cut
-from hopping_leg.identify.zeros import SETTLING, has_own_zeros
 from hopping_leg.robot.model import TIMESTEP
 
 HORIZONS = (0.2, 0.5, 1.0)
@@ -42,18 +42,18 @@ class Validation:
 
 def validate(
     recordings: Sequence[Recording],
-    candidate: Candidate,
+    hypothesis: LegHypothesis,
     *,
     timestep: float = TIMESTEP,
     threads: int = 0,
     unscored: float = 1.0,
     horizons: Sequence[float] = HORIZONS,
 ) -> Validation:
-    """Judge a candidate on recordings.
+    """Judge a hypothesis on recordings.
 
     Args:
         recordings: Best those that no fit has seen.
-        candidate: What to judge.
+        hypothesis: What to judge.
         timestep: Physics step, s.
         threads: Worker threads, 0 for one per core.
         unscored: Beginning of each recording that does not count in closed loop, s.
@@ -62,18 +62,18 @@ def validate(
     Raises:
         RecordingError: A recording is too short.
     """
-    controlled = [r for r in recordings if r.setup.onboard != "torque"]
-    position, torque = _closed_loop(controlled, candidate, timestep, threads, unscored)
+    controlled = [r for r in recordings if r.metadata.onboard != "torque"]
+    position, torque = _closed_loop(controlled, hypothesis, timestep, threads, unscored)
     return Validation(
         position,
         torque,
-        {h: open_loop(recordings, candidate, h, timestep, threads) for h in horizons},
+        {h: open_loop(recordings, hypothesis, h, timestep, threads) for h in horizons},
     )
 
 
 def _closed_loop(
     recordings: Sequence[Recording],
-    candidate: Candidate,
+    hypothesis: LegHypothesis,
     timestep: float,
     threads: int,
     unscored: float,
@@ -83,7 +83,7 @@ def _closed_loop(
         return _NOTHING, _NOTHING
     windows = cut(recordings, None, unscored=unscored)
     simulator = WindowSimulator(recordings, windows, timestep=timestep, threads=threads)
-    simulated = simulator.run([candidate])
+    simulated = simulator.run([hypothesis])
     position, torque = (
         _rms(getattr(simulated, name)[0] - measured(simulator, name))
         for name in ("position", "torque")
@@ -93,7 +93,7 @@ def _closed_loop(
 
 def open_loop(
     recordings: Sequence[Recording],
-    candidate: Candidate,
+    hypothesis: LegHypothesis,
     horizon: float,
     timestep: float = TIMESTEP,
     threads: int = 0,
@@ -101,7 +101,7 @@ def open_loop(
     """Return the rms position error of predictions restarted every half horizon, rad.
 
     The motors get the measured torque, or the commanded one where the rig drives torques itself;
-    every measured row of a horizon counts. The beginning of a recording from which its own zeros
+    every measured row of a horizon counts. The beginning of a recording from which its own offsets
     are found predicts nothing.
     """
     driven = [d for d in map(as_torque_driven, recordings) if d.has("torque_command")]
@@ -111,7 +111,7 @@ def open_loop(
     if not windows:
         return _NOTHING
     simulator = WindowSimulator(driven, windows, timestep=timestep, threads=threads)
-    return _rms(simulator.run([candidate]).position[0] - measured(simulator, "position"))
+    return _rms(simulator.run([hypothesis]).position[0] - measured(simulator, "position"))
 
 
 def as_torque_driven(recording: Recording) -> Recording:
@@ -120,9 +120,9 @@ def as_torque_driven(recording: Recording) -> Recording:
     A row's torque is the one before its command acts: what a ``zoh`` PD held until then, so the
     next row's is this row's command; between rows of a ``continuous`` PD the mean of both acted.
     """
-    setup = dataclasses.replace(recording.setup, onboard="torque")
-    if recording.setup.onboard == "torque":
-        return dataclasses.replace(recording, setup=setup)
+    metadata = dataclasses.replace(recording.metadata, onboard="torque")
+    if recording.metadata.onboard == "torque":
+        return dataclasses.replace(recording, metadata=metadata)
     table = recording.trace.table
     columns = {"hip_command_nm": "hip_torque_nm", "knee_command_nm": "knee_torque_nm"}
     acted = {
@@ -130,24 +130,24 @@ def as_torque_driven(recording: Recording) -> Recording:
         for command, measured_ in columns.items()
         if measured_ in table.columns
     }
-    share = 1.0 if recording.setup.onboard == "zoh" else 0.5
+    share = 1.0 if recording.metadata.onboard == "zoh" else 0.5
     table = table.with_columns(
         ((1 - share) * now + share * now.shift(-1).fill_null(strategy="forward")).alias(command)
         for command, now in acted.items()
     )
     trace = dataclasses.replace(recording.trace, table=table)
-    return dataclasses.replace(recording, trace=trace, setup=setup)
+    return dataclasses.replace(recording, trace=trace, metadata=metadata)
 
 
 def _starts_known(recordings: Sequence[Recording], window: Window) -> bool:
     """Return whether a window starts where the state is known.
 
-    That is in a row that was measured or is at least next to measured ones, and where zeros have
+    That is in a row that was measured or is at least next to measured ones, and where offsets have
     to be found, after the rows that tell them.
     """
     recording = recordings[window.recording]
     since = recording.time[window.start] - recording.time[0]
-    if has_own_zeros(recording.setup) and since < SETTLING:
+    if has_encoder_offsets(recording.metadata) and since < SETTLING:
         return False
     state = recording.array("position")[window.start], recording.array("velocity")[window.start]
     return bool(np.isfinite(state).all()) or recording.has("position_estimate")

@@ -11,7 +11,7 @@ _DRIVE = "drive"
 
 
 @dataclass(frozen=True)
-class Drive:
+class ActuatorParameters:
     """One joint's drive at the joint's side; NaN takes what the recording says."""
 
     stiffness: float = field(default=float("nan"), metadata={"unit": "N m/rad"})
@@ -25,11 +25,11 @@ class Drive:
 
 
 @dataclass(frozen=True)
-class Drives:
+class Actuators:
     """Both drives and what they share."""
 
-    hip: Drive = field(default_factory=Drive)
-    knee: Drive = field(default_factory=Drive)
+    hip: ActuatorParameters = field(default_factory=ActuatorParameters)
+    knee: ActuatorParameters = field(default_factory=ActuatorParameters)
     delay: float = field(default=0.0, metadata={"unit": "s"})
     """From a command's time stamp to its effect."""
     velocity_window: float = field(default=0.0, metadata={"unit": "s"})
@@ -41,7 +41,7 @@ class Drives:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class LegHypothesis:
     """A robot and its drives: all that a simulation of a recording needs.
 
     Parameters are named by their path: ``"hip.friction"`` as in the robot file,
@@ -49,7 +49,7 @@ class Candidate:
     """
 
     robot: Robot
-    drive: Drives = field(default_factory=Drives)
+    drive: Actuators = field(default_factory=Actuators)
 
     def get(self, name: str) -> float:
         """Return a parameter's value.
@@ -63,23 +63,23 @@ class Candidate:
             value = getattr(value, part)
         return float(value)
 
-    def replace(self, values: dict[str, float]) -> "Candidate":
-        """Return the candidate with some parameters' values changed.
+    def replace(self, values: dict[str, float]) -> "LegHypothesis":
+        """Return the hypothesis with some parameters' values changed.
 
         Raises:
             UsageError: There is no such parameter.
         """
-        candidate = self
+        hypothesis = self
         for name, value in values.items():
             _check(self, name)
-            candidate = _replaced(candidate, _path(name), float(value))
-        return candidate
+            hypothesis = _replaced(hypothesis, _path(name), float(value))
+        return hypothesis
 
 
-def parameter_units(candidate: Candidate) -> dict[str, str]:
+def parameter_units(hypothesis: LegHypothesis) -> dict[str, str]:
     """Return every parameter's name and unit."""
-    names = {f"{_DRIVE}.{name}": unit for name, unit in _leaves(candidate.drive)}
-    return dict(_leaves(candidate.robot)) | names
+    names = {f"{_DRIVE}.{name}": unit for name, unit in _leaves(hypothesis.drive)}
+    return dict(_leaves(hypothesis.robot)) | names
 
 
 def _path(name: str) -> list[str]:
@@ -98,8 +98,8 @@ def _leaves(owner: Any, prefix: str = "") -> list[tuple[str, str]]:  # noqa: ANN
     return found
 
 
-def _check(candidate: Candidate, name: str) -> None:
-    units = parameter_units(candidate)
+def _check(hypothesis: LegHypothesis, name: str) -> None:
+    units = parameter_units(hypothesis)
     if name not in units:
         raise UsageError(unknown_name("parameter", name, units))
 

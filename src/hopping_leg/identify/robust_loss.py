@@ -19,7 +19,7 @@ from hopping_leg.arrays import Array, BoolArray, IntArray
 
 
 @dataclass(frozen=True)
-class Levels:
+class RobustLoss:
     """What residuals are worth beside others of their window.
 
     Attributes:
@@ -36,7 +36,7 @@ class Levels:
         return np.bincount(self.groups)
 
     def weights(self, residuals: Array) -> Array:
-        """Return factors of one candidate's residuals at its own levels, (size,)."""
+        """Return factors of one hypothesis's residuals at its own levels, (size,)."""
         share: Array = ((1 + self._squares(residuals)) ** -0.75)[self.groups]
         return share
 
@@ -50,7 +50,7 @@ class Levels:
         return rest
 
     def cost(self, residuals: Array) -> float:
-        """Return the cost of one candidate's residuals, (size,)."""
+        """Return the cost of one hypothesis's residuals, (size,)."""
         weighted = self.weights(residuals) * residuals
         return float(np.sum(weighted**2) + np.sum(self.rest(residuals) ** 2))
 
@@ -76,14 +76,14 @@ def grouping(counts: Sequence[BoolArray]) -> IntArray:
     return np.concatenate(parts)
 
 
-def total_costs(residuals: Array, levels: Levels | None) -> Array:
-    """Return the costs of candidates' residuals (n, size), (n,).
+def total_costs(residuals: Array, loss: RobustLoss | None) -> Array:
+    """Return the costs of hypotheses' residuals (n, size), (n,).
 
     Args:
-        residuals: Of every candidate.
-        levels: None counts every residual in full.
+        residuals: Of every hypothesis.
+        loss: None counts every residual in full.
     """
-    if levels is None:
+    if loss is None:
         total: Array = np.square(residuals).sum(axis=1)
         return total
-    return np.array([levels.cost(r) for r in residuals])
+    return np.array([loss.cost(r) for r in residuals])

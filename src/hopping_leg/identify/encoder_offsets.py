@@ -1,11 +1,11 @@
 """Encoders that were zeroed with the leg at rest: off by as much as friction held it from hanging.
 
-The zeros follow from the balance of momentum. With the Lagrangian L = T - V of the leg on a fixed
+The offsets follow from the balance of momentum. With the Lagrangian L = T - V of the leg on a fixed
 base, p = dT/dq' and the torque tau less friction f,
 
     p(t + h) - p(t) = integral of (dT/dq - dV/dq + tau - f) from t to t + h,
 
-which needs velocities but no accelerations. Zeros that are wrong tilt gravity and bend the leg:
+which needs velocities but no accelerations. Wrong offsets tilt gravity and bend the leg:
 two numbers of each recording, found by Gauss-Newton steps from its first second.
 """
 
@@ -14,15 +14,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.identify.candidate import Candidate
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.setup import RecordingSetup
+from hopping_leg.identify.recording_format import RecordingMetadata
 from hopping_leg.identify.states import start_states
 from hopping_leg.robot import dynamics
 from hopping_leg.robot.model import GRAVITY
 
 SETTLING = 1.0
-"""Beginning of a recording from which its zeros are found, s."""
+"""Beginning of a recording from which its offsets are found, s."""
 
 _SPAN = 0.2
 """Over which momentum is balanced, s."""
@@ -32,18 +32,18 @@ _DRAG = 0.05
 """Speed at which friction is fully there, rad/s."""
 _STEP = 1e-3
 _LIKELY = 0.2
-"""Deviation of zeros beforehand, rad, so that a leg that did not move says zero."""
+"""Deviation of offsets beforehand, rad, so that a leg that did not move says zero."""
 _LEAST = 0.02
 """Error of torques that is always there, N m."""
 _ITERATIONS = 3
 
 
-def has_own_zeros(setup: RecordingSetup) -> bool:
-    """Return whether the zeros of a recording have to be found from it."""
-    return setup.zeroed and setup.rig == "fixed-base" and setup.onboard == "torque"
+def has_encoder_offsets(metadata: RecordingMetadata) -> bool:
+    """Return whether the offsets of a recording have to be found from it."""
+    return metadata.zeroed and metadata.rig == "fixed-base" and metadata.onboard == "torque"
 
 
-class Zeros:
+class OffsetFinder:
     """What the encoders of one recording show when the leg hangs straight down.
 
     Args:
@@ -60,42 +60,42 @@ class Zeros:
             np.stack([np.interp(self._grid, time, column) for column in values.T], axis=1)
             for values in (position, velocity)
         )
-        self._gravity = recording.setup.effective_gravity / GRAVITY
+        self._gravity = recording.metadata.effective_gravity / GRAVITY
 
-    def find(self, candidate: Candidate) -> Array:
-        """Return the zeros of hip and knee if the leg is as the candidate, rad, (2,)."""
-        zeros = np.zeros(2)
+    def find(self, hypothesis: LegHypothesis) -> Array:
+        """Return the offsets of hip and knee if the leg is as the hypothesis, rad, (2,)."""
+        offsets = np.zeros(2)
         if len(self._grid) <= 2 * _ROWS:
-            return zeros
-        torque = self._torque(candidate)
+            return offsets
+        torque = self._torque(hypothesis)
         for _ in range(_ITERATIONS):
-            error = self._imbalance(candidate, zeros, torque)
+            error = self._imbalance(hypothesis, offsets, torque)
             slopes = [
-                (self._imbalance(candidate, zeros + shift, torque) - error) / _STEP
+                (self._imbalance(hypothesis, offsets + shift, torque) - error) / _STEP
                 for shift in _STEP * np.eye(2)
             ]
             # Balances that overlap tell the same again: _ROWS of them count as one.
             weight = 1 / np.sqrt(_ROWS * (np.mean(error**2, axis=0) + _LEAST**2))
             design = np.stack([(weight * s).ravel() for s in slopes], axis=1)
-            pull = design.T @ (weight * error).ravel() + zeros / _LIKELY**2
-            zeros = zeros - np.linalg.solve(design.T @ design + np.eye(2) / _LIKELY**2, pull)
-        return zeros
+            pull = design.T @ (weight * error).ravel() + offsets / _LIKELY**2
+            offsets = offsets - np.linalg.solve(design.T @ design + np.eye(2) / _LIKELY**2, pull)
+        return offsets
 
-    def _torque(self, candidate: Candidate) -> Array:
+    def _torque(self, hypothesis: LegHypothesis) -> Array:
         """Return what the joints felt on the grid, N m, (n, 2)."""
-        late = self._grid - candidate.drive.delay
+        late = self._grid - hypothesis.drive.delay
         row = np.searchsorted(self._time, late, side="right") - 1
-        felt: Array = candidate.robot.of_joints("torque_gain") * self._command[np.maximum(row, 0)]
+        felt: Array = hypothesis.robot.of_joints("torque_gain") * self._command[np.maximum(row, 0)]
         return felt
 
-    def _imbalance(self, candidate: Candidate, zeros: Array, torque: Array) -> Array:
+    def _imbalance(self, hypothesis: LegHypothesis, offsets: Array, torque: Array) -> Array:
         """Return the mean torque over each span that momentum misses, N m, (n, 2)."""
-        robot, q, qd = candidate.robot, self._q - zeros, self._qd
+        robot, q, qd = hypothesis.robot, self._q - offsets, self._qd
         momentum = np.einsum("nij,nj->ni", dynamics.mass_matrix(robot, q)[:, 1:, 1:], qd)
         lever = robot.shank.mass * robot.shank.com * robot.thigh.length
         force = torque - self._gravity * dynamics.gravity_force(robot, q)[:, 1:]
         force[:, 1] -= lever * np.sin(q[:, 1]) * qd[:, 0] * (qd[:, 0] + qd[:, 1])
-        load = candidate.robot.of_joints("load_friction") * np.abs(torque)
+        load = hypothesis.robot.of_joints("load_friction") * np.abs(torque)
         force -= (robot.of_joints("friction") + load) * np.tanh(qd / _DRAG)
         force -= robot.of_joints("damping") * qd
         impulse = np.cumsum(force, axis=0) * _GRID
@@ -103,13 +103,15 @@ class Zeros:
         return excess[_ROWS:] - excess[:-_ROWS]
 
 
-def find_zeros(finders: Sequence[Zeros | None], candidates: Sequence[Candidate]) -> Array:
-    """Return the zeros of every candidate in every recording, rad, (candidates, recordings, 2).
+def find_offsets(
+    finders: Sequence[OffsetFinder | None], hypotheses: Sequence[LegHypothesis]
+) -> Array:
+    """Return the offsets of every hypothesis in every recording, rad, (hypotheses, recordings, 2).
 
     Args:
-        finders: One per recording; None where the encoders' zeros are the leg's.
-        candidates: Each finds its own zeros.
+        finders: One per recording; None where the encoders' offsets are the leg's.
+        hypotheses: Each finds its own offsets.
     """
     return np.array(
-        [[np.zeros(2) if f is None else f.find(c) for f in finders] for c in candidates]
-    ).reshape(len(candidates), len(finders), 2)
+        [[np.zeros(2) if f is None else f.find(c) for f in finders] for c in hypotheses]
+    ).reshape(len(hypotheses), len(finders), 2)

@@ -10,7 +10,7 @@ from hopping_leg.errors import PhysicsError
 from hopping_leg.identify.columns import PAIRS
 from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.recording import Recording, make_recording
-from hopping_leg.identify.setup import Quantisation, RecordingSetup
+from hopping_leg.identify.recording_format import Quantisation, RecordingMetadata
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import NO_NOISE, MujocoSimulator, Plant
@@ -74,7 +74,7 @@ def play(
             f"The simulation of {robot.name} became unstable at a physics step of {timestep:g} s;"
             " take a smaller one, weaker gains or a gentler excitation."
         )
-    setup = RecordingSetup(
+    metadata = RecordingMetadata(
         rig=excitation.rig,
         rate_hz=excitation.rate,
         robot=believed,
@@ -92,7 +92,7 @@ def play(
         "excitation": excitation.description,
         "excitation_digest": excitation.digest,
     }
-    return make_recording(_table(excitation, rows), setup, robot.name, header=header)
+    return make_recording(_table(excitation, rows), metadata, robot.name, header=header)
 
 
 def _table(excitation: Excitation, rows: np.ndarray) -> pl.DataFrame:

@@ -1,6 +1,6 @@
 import numpy as np
 
-from hopping_leg.identify.held import Held
+from hopping_leg.identify.held_signal import HeldSignal
 
 TIME = np.array([0.0, 0.1, 0.25, 0.3])
 VALUES = np.array([[1.0], [2.0], [-1.0], [4.0]])
@@ -14,7 +14,7 @@ def numeric(time):
 
 
 def test_averages_equal_fine_sums():
-    held = Held(TIME, VALUES, SLOPES)
+    held = HeldSignal(TIME, VALUES, SLOPES)
     for start in (-0.05, 0.03, 0.08, 0.22, 0.29, 0.4):
         fine = start + (np.arange(20000) + 0.5) / 20000 * 0.07
         got = held.average(np.array(start), 0.07)[0]
@@ -22,5 +22,5 @@ def test_averages_equal_fine_sums():
 
 
 def test_values_hold_until_the_next_row():
-    at = Held(TIME, VALUES).at(np.array([-1.0, 0.0999, 0.1, 0.27, 9.0]))[:, 0]
+    at = HeldSignal(TIME, VALUES).at(np.array([-1.0, 0.0999, 0.1, 0.27, 9.0]))[:, 0]
     np.testing.assert_array_equal(at, [1.0, 1.0, 2.0, -1.0, 4.0])

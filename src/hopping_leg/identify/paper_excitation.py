@@ -11,7 +11,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.setup import Rig
+from hopping_leg.identify.recording_format import Rig
 from hopping_leg.identify.templates import require_positive
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot

@@ -7,11 +7,11 @@ import numpy as np
 from hopping_leg.arrays import Array
 
 
-class RowPlaces:
+class RowResampling:
     """Where the rows of every window lie among the ticks.
 
-    Values at the ticks have shape (ticks, candidates, windows, k), those at the rows
-    (candidates, windows, rows, k). Windows with fewer rows than the longest repeat their last.
+    Values at the ticks have shape (ticks, hypotheses, windows, k), those at the rows
+    (hypotheses, windows, rows, k). Windows with fewer rows than the longest repeat their last.
 
     Args:
         times: Of each window's rows since its first, s, (rows of that window,).
@@ -57,7 +57,7 @@ class RowPlaces:
         return between
 
     def _ends(self, values: Array) -> tuple[Array, Array]:
-        """Return what stands at the ticks around each row, (candidates, windows, rows, k)."""
+        """Return what stands at the ticks around each row, (hypotheses, windows, rows, k)."""
         windows = np.arange(len(self._before))[:, None]
         moved = np.moveaxis(values, 0, 2)
         return moved[:, windows, self._before], moved[:, windows, self._before + 1]

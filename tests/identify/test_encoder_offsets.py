@@ -3,54 +3,54 @@ import dataclasses
 import numpy as np
 import pytest
 
-from hopping_leg.identify.candidate import Candidate
 from hopping_leg.identify.columns import PAIRS
-from hopping_leg.identify.recording import with_setup
+from hopping_leg.identify.encoder_offsets import OffsetFinder
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.recording import with_metadata
 from hopping_leg.identify.simulate import WindowSimulator
-from hopping_leg.identify.validate import open_loop
+from hopping_leg.identify.validation import open_loop
 from hopping_leg.identify.windows import cut
-from hopping_leg.identify.zeros import Zeros
 from hopping_leg.robot.robot_files import load_robot
 from tests.identify.twin import STEP, record, swing
 
 PENDULUM = load_robot("doublependulum")
-TRUE = Candidate(PENDULUM)
+TRUE = LegHypothesis(PENDULUM)
 OFF = np.array([0.04, -0.07])
 
 
 def off_zero(run):
-    """Return the run as encoders show it whose zeros are off, and which the setup says so of."""
+    """Return the run as encoders with offsets show it; the metadata says so."""
     columns = [
         (run.trace.table[name] + off).alias(name)
         for name, off in zip(PAIRS["position"], OFF, strict=True)
     ]
     table = run.trace.table.with_columns(columns)
     moved = dataclasses.replace(run, trace=dataclasses.replace(run.trace, table=table))
-    return with_setup(moved, zeroed=True)
+    return with_metadata(moved, zeroed=True)
 
 
 RUN = off_zero(record(PENDULUM, swing(3.0, rate=500.0), rate=500.0, onboard="torque"))
 
 
 def test_zeros_follow_from_the_balance_of_momentum():
-    np.testing.assert_allclose(Zeros(RUN).find(TRUE), OFF, atol=4e-3)
+    np.testing.assert_allclose(OffsetFinder(RUN).find(TRUE), OFF, atol=4e-3)
 
 
 def test_a_wrong_robot_finds_about_the_same_zeros():
     heavy = TRUE.replace({"shank.com": 0.18, "knee.friction": 0.1, "thigh.inertia": 4e-3})
-    np.testing.assert_allclose(Zeros(RUN).find(heavy), OFF, atol=0.03)
+    np.testing.assert_allclose(OffsetFinder(RUN).find(heavy), OFF, atol=0.03)
 
 
 def test_simulations_show_what_the_encoders_show():
     got = WindowSimulator([RUN], cut([RUN], 0.25), timestep=STEP).run([TRUE]).position
     measured = RUN.array("position").reshape(12, 125, 2)
-    believed = with_setup(RUN, zeroed=False)
+    believed = with_metadata(RUN, zeroed=False)
     wrong = WindowSimulator([believed], cut([believed], 0.25), timestep=STEP).run([TRUE]).position
     assert np.abs(got[0] - measured).max() < 0.2 * np.abs(wrong[0] - measured).max()
 
 
 def test_what_tells_the_zeros_is_not_predicted():
-    short = with_setup(RUN, zeroed=True)
+    short = with_metadata(RUN, zeroed=True)
     first = dataclasses.replace(
         short, trace=dataclasses.replace(short.trace, table=short.trace.table[:550])
     )
@@ -60,8 +60,8 @@ def test_what_tells_the_zeros_is_not_predicted():
 
 @pytest.mark.parametrize("onboard", ["zoh", "continuous"])
 def test_a_drive_that_tracks_positions_is_believed(onboard):
-    run = with_setup(record(PENDULUM, swing(1.0)), onboard=onboard, zeroed=True)
-    plain = with_setup(run, zeroed=False)
+    run = with_metadata(record(PENDULUM, swing(1.0)), onboard=onboard, zeroed=True)
+    plain = with_metadata(run, zeroed=False)
     pair = [
         WindowSimulator([r], cut([r]), timestep=STEP).run([TRUE]).position for r in (run, plain)
     ]

@@ -1,0 +1,50 @@
+import numpy as np
+import pytest
+
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.validation import validate
+from tests.identify.twin import LEG, STEP, record, swing
+
+TRUE = LegHypothesis(LEG)
+WRONG = TRUE.replace({"hip.friction": 0.4})
+
+
+def judge(hypothesis, onboard="zoh"):
+    run = record(LEG, swing(2.0), onboard=onboard)
+    return validate([run], hypothesis, timestep=STEP, unscored=0.5, horizons=(0.2, 0.5))
+
+
+@pytest.mark.parametrize("onboard", ["zoh", "torque"])
+def test_the_true_robot_predicts_its_own_recording(onboard):
+    validation = judge(TRUE, onboard)
+    if onboard == "zoh":
+        assert max(validation.closed_loop_position) < 1e-6
+        assert max(validation.closed_loop_torque) < 1e-6
+    assert all(max(pair) < 1e-6 for pair in validation.open_loop_position.values())
+
+
+def test_a_wrong_robot_errs_the_more_the_longer_it_predicts():
+    validation = judge(WRONG)
+    assert validation.closed_loop_position[0] > 1e-3
+    assert validation.open_loop_position[0.5][0] > validation.open_loop_position[0.2][0] > 1e-3
+
+
+def test_without_torques_there_is_no_open_loop():
+    run = record(LEG, swing(2.0))
+    table = run.trace.table.with_columns(hip_torque_nm=None, knee_torque_nm=None)
+    bare = run.__class__(run.trace.__class__(table), run.metadata, "bare")
+    validation = validate([bare], TRUE, timestep=STEP, unscored=0.5, horizons=(0.2,))
+    assert np.isnan(validation.closed_loop_torque).all()
+    assert np.isnan(validation.open_loop_position[0.2]).all()
+
+
+def test_where_torques_are_commanded_no_loop_is_closed():
+    validation = judge(WRONG, "torque")
+    assert np.isnan([*validation.closed_loop_position, *validation.closed_loop_torque]).all()
+    assert validation.open_loop_position[0.2][0] > 1e-3
+    closed, commanded = (record(LEG, swing(2.0), onboard=name) for name in ("zoh", "torque"))
+    pairs = [
+        validate(runs, WRONG, timestep=STEP, unscored=0.5, horizons=()).closed_loop_position
+        for runs in ([closed], [closed, commanded])
+    ]
+    assert pairs[0] == pairs[1]
