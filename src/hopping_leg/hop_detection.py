@@ -1,7 +1,8 @@
 """Hops in a run: flights, apexes, bounces that never left the ground, skipped hops.
 
-An apex is a maximum of the base height with the foot at least 3 mm clear of the ground; every one
-counts.
+A flight is a stretch of time with the foot at least 3 mm clear of the ground, an apex a maximum of
+the base height in it. A hop is a flight with an apex; of several apexes in one flight, as a leg
+that is swung hard at the top has them, the highest is that of the hop.
 """
 
 from dataclasses import dataclass
@@ -22,10 +23,6 @@ SKIP_RATIO = 1.6
 
 USUAL_PERIOD = 0.5
 """Period assumed where a run has too few hops to tell its own, s."""
-
-SHORTEST_PERIOD = 0.1
-"""Apexes closer than this belong to one flight, s: a leg that is swung hard at the top makes the
-base rise and fall more than once. Each of them counts as an apex, all of them as one hop."""
 
 
 @dataclass(frozen=True)
@@ -52,8 +49,8 @@ class Hops:
     """Hops of one run.
 
     Attributes:
-        tick: Index of each apex, (hops,).
-        apex: Base height at each apex, m, (hops,).
+        tick: Index of the apex of each hop, (hops,).
+        apex: Base height there, m, (hops,).
         in_flight: Whether the foot is clear of the ground, (ticks,).
     """
 
@@ -75,17 +72,20 @@ def at_apex(rose: BoolArray, rises: BoolArray, clearance: Array) -> BoolArray:
 
 
 def find_hops(height: Array, velocity: Array, clearance: Array) -> Hops:
-    """Find every in-flight apex of a run.
+    """Find the hops of a run, one per flight.
 
     Args:
         height: Base height, m, (ticks,).
         velocity: Base velocity, m/s, (ticks,).
         clearance: Foot clearance, m, (ticks,).
     """
-    rises = velocity > 0
+    rises, flying = velocity > 0, clearance >= FLIGHT_CLEARANCE
     tick = np.flatnonzero(at_apex(rises[:-1], rises[1:], clearance[1:])) + 1
     apex = np.maximum(height[tick], height[tick - 1])
-    return Hops(tick, apex, clearance >= FLIGHT_CLEARANCE)
+    flight = np.cumsum(flying & ~np.concatenate([[False], flying[:-1]]))[tick]
+    highest = np.lexsort((-apex, flight))
+    highest = highest[np.diff(flight[highest], prepend=-1) > 0]
+    return Hops(tick[highest], apex[highest], flying)
 
 
 def measure_hops(
@@ -135,16 +135,9 @@ def hop_period(apex_tick: IntArray, rate: float) -> float:
         apex_tick: Index of each apex, (hops,).
         rate: Ticks per second, Hz.
     """
-    tick = _one_per_flight(apex_tick, rate)
-    if len(tick) < 3:
+    if len(apex_tick) < 3:
         return USUAL_PERIOD
-    return float(np.median(np.diff(tick))) / rate
-
-
-def _one_per_flight(apex_tick: IntArray, rate: float) -> IntArray:
-    """Return the first apex of every flight."""
-    first: IntArray = apex_tick[np.diff(apex_tick, prepend=-np.inf) >= SHORTEST_PERIOD * rate]
-    return first
+    return float(np.median(np.diff(apex_tick))) / rate
 
 
 def count_skipped(
@@ -152,7 +145,7 @@ def count_skipped(
 ) -> int:
     """Count hops that should have happened between two ticks and did not.
 
-    The apexes, those of one flight taken as one, cut the window into gaps. A gap longer than
+    The apexes cut the window into gaps. A gap longer than
     ``SKIP_RATIO`` median periods misses ``round(gap / period) - 1`` apexes between two apexes and
     ``floor(gap / period)`` at the ends of the window; a bounce misses one. Each gap counts the
     larger of the two, so that a bounce in a long gap is one skipped hop, not two.
@@ -165,7 +158,7 @@ def count_skipped(
         rate: Ticks per second, Hz.
     """
     period = hop_period(apex_tick, rate) * rate
-    edges = np.concatenate([[start], _one_per_flight(apex_tick, rate), [end]])
+    edges = np.concatenate([[start], apex_tick, [end]])
     periods = np.diff(edges) / period
     apexes = np.round(periods) - 1
     apexes[[0, -1]] = np.floor(periods[[0, -1]])

@@ -9,7 +9,6 @@ import torch
 from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.export import build_policy
-from hopping_leg.rl.hop_watch import FROM, UNTIL
 from hopping_leg.robot.model_mismatch import Latency, ModelMismatch
 from hopping_leg.sim.randomization import WIDE_RANGES
 from tests.rl.learners import ROBOT, TINY_ADAPTIVE, learner
@@ -68,11 +67,10 @@ def test_an_aim_follows_the_truth_by_its_share_of_every_hop(command):
             student.act(seen, nobody)
 
     pass_by(command - 0.1, 1.0, 40)
-    pass_by(command - 0.5, 0.0, UNTIL + 5)
+    pass_by(command - 0.5, 0.0, 22 + 5)
     shares = np.array([(1 - command) / 2, (1 + command) / 2])
     aim = student._memory[0, :2].numpy() @ shares
     assert aim == pytest.approx(0.1 * TINY_ADAPTIVE.aiming.share, rel=1e-4)
-    assert FROM > 0
 
 
 def test_an_identified_leg_may_differ_too():

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from hopping_leg.rl.hop_watch import FROM, UNTIL, HopWatch
+from hopping_leg.rl.hop_watch import HopWatch
 
 FLIGHT, STANCE = 40, 30
 
 
 def watch(apexes, commands=None, one=None):
     """Let one leg hop; return what is told in every tick of every hop, (hops, ticks)."""
-    one = one or HopWatch(1)
+    one = one or HopWatch(1, 0.005)
     commands = commands or [0.3] * len(apexes)
     told = []
     for apex, command in zip(apexes, commands, strict=True):
@@ -29,7 +29,7 @@ def watch(apexes, commands=None, one=None):
 def test_the_last_hops_error_is_told_while_the_foot_stands():
     told = watch([0.31, 0.28])
     landed = FLIGHT - 1
-    shown = slice(landed + FROM, landed + UNTIL)
+    shown = slice(landed + 6, landed + 22)
     np.testing.assert_allclose(told[0, shown], 0.01, atol=1e-3)
     np.testing.assert_allclose(told[1, shown], -0.02, atol=1e-3)
     told[:, shown] = 0.0
@@ -37,7 +37,7 @@ def test_the_last_hops_error_is_told_while_the_foot_stands():
 
 
 def test_nothing_is_told_once_the_command_has_changed():
-    one = HopWatch(1)
+    one = HopWatch(1, 0.005)
     watch([0.31], one=one)
     assert watch([0.31], [0.25], one).any()
     for _ in range(FLIGHT):
@@ -51,7 +51,7 @@ def test_nothing_is_told_once_the_command_has_changed():
 
 @pytest.mark.parametrize("ticks", [1, 10])
 def test_a_bounce_is_no_hop(ticks):
-    one = HopWatch(1)
+    one = HopWatch(1, 0.005)
     nobody = np.zeros(1, bool)
     for _ in range(ticks):
         one.see(np.array([0.25]), np.array([0.01]), np.array([0.3]), nobody)
@@ -60,7 +60,7 @@ def test_a_bounce_is_no_hop(ticks):
 
 
 def test_a_new_episode_knows_of_no_hop():
-    one = HopWatch(1)
+    one = HopWatch(1, 0.005)
     for tick in range(FLIGHT):
         one.see(np.array([0.3]), np.array([0.1]), np.array([0.25]), np.array([tick == FLIGHT - 1]))
     told = [
@@ -71,7 +71,7 @@ def test_a_new_episode_knows_of_no_hop():
 
 
 def test_it_goes_on_from_its_state():
-    first, second = HopWatch(1), HopWatch(1)
+    first, second = HopWatch(1, 0.005), HopWatch(1, 0.005)
     watch([0.31], one=first)
     second.restore(first.state())
     np.testing.assert_array_equal(watch([0.28], one=first), watch([0.28], one=second))

@@ -19,7 +19,7 @@ from torch.nn import functional
 from hopping_leg.envs.privileged_observation import CLEARANCE_GAIN
 from hopping_leg.rl.asymmetric import dense
 from hopping_leg.rl.checkpoint import Tree
-from hopping_leg.rl.hop_watch import FROM, UNTIL, HopWatch
+from hopping_leg.rl.hop_watch import HopWatch
 from hopping_leg.rl.lessons import Lessons
 from hopping_leg.rl.students import Bools, Wanted
 
@@ -98,13 +98,13 @@ class AimingStudent(nn.Module):
         self.layers.append(nn.Linear(hidden[-1], 2))
         self.feeling = dense(places.measured + 1, feeling, nn.Tanh)
         self.feeling.append(nn.Linear(feeling[-1], 1))
-        self.rate = aiming.share / (UNTIL - FROM)
+        self._watch = HopWatch(legs, period)
+        self.rate = aiming.share / (self._watch.last - self._watch.first)
         """Share of what is felt in a tick by which the aim moves."""
         self.follow = 1 - math.exp(-period / aiming.late)
         """Share of its distance by which the command of late follows in a tick."""
         self.trust = 0.0
         self._memory = torch.zeros(legs, 3)
-        self._watch = HopWatch(legs)
         self._notes: list[torch.Tensor] = []
         self._lessons = Lessons(room, places.size + _NOTES)
 
