@@ -10,7 +10,7 @@ import polars.selectors as cs
 from hopping_leg import cli
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.deploy.black_box import BlackBox
+from hopping_leg.deploy.flight_recorder import FlightRecorder
 from hopping_leg.robot import load_robot
 from hopping_leg.sim.twins import draw_twin
 from hopping_leg.trace import Trace
@@ -164,7 +164,7 @@ def _killed_run() -> None:
     """Leave what `hop deploy` leaves when it is killed."""
     trace = _trial()
     table = trace.table.select(cs.exclude("height_m", "height_rate_m_s", cs.contains("clearance")))
-    box = BlackBox(Path(KILLED), tuple(table.columns), trace.header)
+    box = FlightRecorder(Path(KILLED), tuple(table.columns), trace.header)
     for row in table.iter_rows():
         box.row(row)
     box.close()

@@ -5,7 +5,7 @@ import functools
 
 from hopping_leg.cli import deploy, motors, record_motors
 from hopping_leg.deploy import driver, session
-from hopping_leg.deploy.sequence import Timing
+from hopping_leg.deploy.motion_sequence import SequenceTiming
 from hopping_leg.emulator.lockstep import Lockstep
 from hopping_leg.emulator.start import Start
 
@@ -16,9 +16,9 @@ def put_behind(monkeypatch, **start):
     monkeypatch.setattr(motors, "opener", lambda name: None)
     monkeypatch.setattr(driver, "MoteusLink", lambda robot, opener: lockstep.link)
     monkeypatch.setattr(session, "RealClock", lambda: lockstep)
-    quick = functools.partial(Timing, rise=0.4, settle=0.1, sink=0.5)
+    quick = functools.partial(SequenceTiming, rise=0.4, settle=0.1, sink=0.5)
     for verb in (deploy, record_motors):
-        monkeypatch.setattr(verb, "Timing", quick)
+        monkeypatch.setattr(verb, "SequenceTiming", quick)
     quiet = contextlib.nullcontext(())
     monkeypatch.setattr(session, "keeping_time", lambda **_: quiet)
     return lockstep

@@ -4,21 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from hopping_leg.deploy.black_box import BlackBox
-from hopping_leg.deploy.envelope import hopping_envelope
-from hopping_leg.deploy.link import Exchange
+from hopping_leg.deploy.drive_link import Action, DriveMode, Exchange, Reply
+from hopping_leg.deploy.flight_recorder import FlightRecorder
 from hopping_leg.deploy.loop import ControlLoop
-from hopping_leg.deploy.observation import Action, DriveMode, Reply
-from hopping_leg.deploy.rows import columns
+from hopping_leg.deploy.motion_sequence import MotionSequence, Poses, SequenceTiming
+from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.schedule import Schedule
-from hopping_leg.deploy.sequence import Poses, Sequence, Timing
+from hopping_leg.deploy.telemetry import columns
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.limits import SoftLimiter, SoftLimits
 
 LEG = load_robot("legv2")
 RATE = 200.0
 POSES = Poses(np.array([0.8, -1.6]), np.array([1.0, -2.0]))
-SHORT = Timing(hop=0.5, rise=0.3, settle=0.1, sink=0.3, fade=0.1)
+SHORT = SequenceTiming(hop=0.5, rise=0.3, settle=0.1, sink=0.3, fade=0.1)
 
 
 class FakeClock:
@@ -116,14 +115,14 @@ def make_loop(tmp_path, controller=None, *, link=None, timing=SHORT, soft=None, 
     clock = link.clock if link else FakeClock()
     link = link or FakeLink(clock)
     controller = controller or Still()
-    sequence = Sequence(
+    sequence = MotionSequence(
         controller,
         Schedule(((0.3, 100.0),)),
         POSES,
         SoftLimiter(LEG, soft or SoftLimits()),
         timing,
     )
-    envelope = replace(hopping_envelope(LEG, RATE), **limits)
+    limits = replace(hopping_limits(LEG, RATE), **limits)
     header = {"robot": LEG.name, "controller": controller.name}
-    box = BlackBox(tmp_path / "run.blackbox", columns(controller), header)
-    return ControlLoop(link, sequence, envelope, box, clock), link, box
+    box = FlightRecorder(tmp_path / "run.blackbox", columns(controller), header)
+    return ControlLoop(link, sequence, limits, box, clock), link, box

@@ -8,11 +8,11 @@ import tty
 
 import pytest
 
-from hopping_leg.deploy.bring_up import judge, require
+from hopping_leg.deploy.drive_info import inspect
+from hopping_leg.deploy.drive_link import LIMP, STOP
 from hopping_leg.deploy.driver import MoteusLink
-from hopping_leg.deploy.envelope import hopping_envelope
-from hopping_leg.deploy.inspection import inspect
-from hopping_leg.deploy.observation import LIMP, STOP
+from hopping_leg.deploy.preflight import judge, require
+from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.transport import opener
 from hopping_leg.emulator.frames import Frame
 from hopping_leg.emulator.line_protocol import LineProtocol, received_line
@@ -68,7 +68,7 @@ class Adapter:
     def _answers(self, frame: Frame):
         self.robot.advance(time.monotonic() - self._begin)
         self.robot.receive(frame)
-        replies = [i.frame for i in self.robot.outbox.take(self.robot.time)]
+        replies = [i.frame for i in self.robot.reply_queue.take(self.robot.time)]
         lines = [self._protocol.line(received_line(reply)) for reply in replies]
         self.frames += 1
         return self.spoil(self.frames, lines)
@@ -197,5 +197,5 @@ def test_a_can_bus_without_drives_is_silence_and_named_so():
     facts = inspect(link)
     assert not any(drive.answers for drive in facts)
     with pytest.raises(HardwareError, match=r"id 1\) does not answer"):
-        require(judge(LEG, hopping_envelope(LEG, 200.0), facts))
+        require(judge(LEG, hopping_limits(LEG, 200.0), facts))
     link.close()

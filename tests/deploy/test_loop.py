@@ -4,10 +4,10 @@ import math
 import numpy as np
 import pytest
 
-from hopping_leg.deploy.black_box import recover
-from hopping_leg.deploy.observation import BRAKE, STOP, Action
-from hopping_leg.deploy.reasons import Reason
-from hopping_leg.deploy.sequence import Phase
+from hopping_leg.deploy.drive_link import BRAKE, STOP, Action
+from hopping_leg.deploy.flight_recorder import recover
+from hopping_leg.deploy.motion_sequence import Part
+from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.supervisor import State
 from tests.deploy.fakes import LEG, POSES, FakeClock, FakeLink, Still, make_loop
 
@@ -26,12 +26,12 @@ def states(trace):
 def test_a_run_rises_hops_sinks_brakes_and_stops(tmp_path):
     outcome, link, trace = run(tmp_path)
     assert states(trace) == ["arming", "running", "damping", "stopped"]
-    assert outcome.memory.state is State.STOPPED
-    assert outcome.memory.stop_cause.reason is Reason.FINISHED
+    assert outcome.supervisor.state is State.STOPPED
+    assert outcome.supervisor.stop_cause.reason is Reason.FINISHED
     parts = trace.column("part")
     order = [int(parts[0]), *(int(b) for a, b in itertools.pairwise(parts) if a != b)]
-    assert order[: order.index(Phase.DONE) + 1] == list(Phase)
-    settled = parts == Phase.SETTLE
+    assert order[: order.index(Part.DONE) + 1] == list(Part)
+    settled = parts == Part.SETTLE
     for joint, target in zip(("hip", "knee"), POSES.start, strict=True):
         angle = trace.column(f"{joint}_position_rad")[settled]
         assert angle[-1] == pytest.approx(target, abs=0.1)
@@ -58,23 +58,23 @@ def test_an_operator_may_stop_before_and_after_arming(tmp_path):
         )
         outcome = loop.run()
         box.close()
-        assert outcome.memory.state is State.STOPPED
+        assert outcome.supervisor.state is State.STOPPED
         assert link.told[-1] == STOP
         assert (BRAKE in link.told) is not early
         if not early:
-            assert outcome.memory.stop_cause.reason is Reason.OPERATOR_STOP
+            assert outcome.supervisor.stop_cause.reason is Reason.OPERATOR_STOP
 
 
 def test_a_controller_that_raises_damps_the_leg_and_its_words_are_kept(tmp_path):
     outcome, _, trace = run(tmp_path, Still(fail_after=10))
-    assert outcome.memory.stop_cause.reason is Reason.CONTROLLER_FAILED
+    assert outcome.supervisor.stop_cause.reason is Reason.CONTROLLER_FAILED
     errors = [e["controller_error"] for e in trace.header["events"] if "controller_error" in e]
     assert errors == ["ArithmeticError: lost the thread"]
 
 
 def test_a_controller_that_asks_for_nan_sends_none(tmp_path):
     outcome, link, _ = run(tmp_path, Still((math.nan, 0.0)))
-    assert outcome.memory.stop_cause.reason is Reason.TORQUE_NOT_FINITE
+    assert outcome.supervisor.stop_cause.reason is Reason.TORQUE_NOT_FINITE
     assert np.isfinite([out.torque for out in link.told]).all()
 
 
@@ -82,7 +82,7 @@ def test_a_silent_drive_ends_the_run_and_the_loop_keeps_its_pace(tmp_path):
     clock = FakeClock()
     link = FakeLink(clock, lambda tick, joint, reply: None if joint and tick > 100 else reply)
     outcome, link, trace = run(tmp_path, link=link)
-    assert outcome.memory.stop_cause.reason is Reason.REPLIES_MISSING
+    assert outcome.supervisor.stop_cause.reason is Reason.REPLIES_MISSING
     assert outcome.skipped == 0
     braked = trace.column("time_s")[trace.column("state") == State.DAMPING][0]
     lost = trace.column("time_s")[trace.column("knee_fresh") == 0][0]
@@ -94,7 +94,7 @@ def test_a_lost_reply_shows_the_controller_an_older_sample_with_its_age(tmp_path
     clock, controller = FakeClock(), Still()
     link = FakeLink(clock, lambda tick, joint, reply: None if joint and tick == 120 else reply)
     outcome, _, trace = run(tmp_path, controller, link=link)
-    assert outcome.memory.stop_cause.reason is Reason.FINISHED
+    assert outcome.supervisor.stop_cause.reason is Reason.FINISHED
     ages = np.array(controller.ages)
     first = np.flatnonzero(ages[:, 0] > 0)
     assert len(first) == 1
@@ -108,7 +108,7 @@ def test_a_stalled_loop_skips_ticks_and_stops(tmp_path):
     link.clock.hiccups = {round(100.005 + 0.005 * 150, 4): 0.1}
     outcome = loop.run()
     box.close()
-    assert outcome.memory.stop_cause.reason is Reason.LOOP_STALLED
+    assert outcome.supervisor.stop_cause.reason is Reason.LOOP_STALLED
     assert outcome.skipped == 19
     steps = np.diff(recover(box.path).column("time_s"))
     assert steps.max() == pytest.approx(0.1)
@@ -116,13 +116,13 @@ def test_a_stalled_loop_skips_ticks_and_stops(tmp_path):
 
 def test_soft_limits_pull_a_joint_back(tmp_path):
     outcome, _, trace = run(tmp_path, Still((0.6, 0.0)))
-    hopping = trace.column("part") == Phase.HOP
+    hopping = trace.column("part") == Part.HOP
     angle, sent = trace.column("hip_position_rad")[hopping], trace.column("hip_sent_nm")[hopping]
     outside = angle > LEG.hip.upper
     assert outside.any()
     assert (sent[outside] < 0.6).all()
     assert (sent[~outside] == 0.6).all()
-    assert outcome.memory.stop_cause.reason is Reason.FINISHED
+    assert outcome.supervisor.stop_cause.reason is Reason.FINISHED
 
 
 def test_a_crash_of_the_loop_itself_brakes(tmp_path):

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from hopping_leg.cli import main
-from hopping_leg.deploy.black_box import recover
-from hopping_leg.deploy.observation import DriveMode
+from hopping_leg.deploy.drive_link import DriveMode
+from hopping_leg.deploy.flight_recorder import recover
 from hopping_leg.deploy.supervisor import State
 from hopping_leg.emulator.process import EmulatorProcess
 from hopping_leg.emulator.start import Start

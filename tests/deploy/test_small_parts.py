@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy import realtime
+from hopping_leg.deploy.drive_link import Reply
 from hopping_leg.deploy.keyboard import LiveHeight, act_on
-from hopping_leg.deploy.observation import Reply
-from hopping_leg.deploy.samples import Samples
+from hopping_leg.deploy.motion_sequence import Part, SequenceTiming, hopping_poses
+from hopping_leg.deploy.sample_buffer import SampleBuffer
 from hopping_leg.deploy.schedule import (
     Schedule,
     check_schedule,
@@ -21,7 +22,6 @@ from hopping_leg.deploy.schedule import (
     parse_schedule,
     robot_range,
 )
-from hopping_leg.deploy.sequence import Phase, Timing, hopping_poses
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import kinematics, load_robot, shipped_robots
 
@@ -74,7 +74,7 @@ def test_keys_raise_lower_and_stop():
 
 
 def test_a_late_reply_is_put_where_it_belongs():
-    samples = Samples(0.005)
+    samples = SampleBuffer(0.005)
     for tick in range(5):
         samples.put(tick, 0, reply(tick))
         if tick != 3:
@@ -91,7 +91,7 @@ def test_a_late_reply_is_put_where_it_belongs():
 
 
 def test_one_sample_stands_for_the_past_and_none_is_an_error():
-    samples = Samples(0.005)
+    samples = SampleBuffer(0.005)
     with pytest.raises(ValueError, match="both joints"):
         samples.measurement(0, 0.3)
     samples.put(0, 0, reply(1))
@@ -103,21 +103,21 @@ def test_one_sample_stands_for_the_past_and_none_is_an_error():
 
 
 def test_the_parts_of_a_sequence_follow_each_other():
-    timing = Timing(hop=10, rise=2, settle=0.5, sink=1.5)
+    timing = SequenceTiming(hop=10, rise=2, settle=0.5, sink=1.5)
     times = [0, 1.9, 2, 2.4, 2.5, 12.4, 12.5, 13.9, 14.0, 99]
     parts = [timing.phase(t)[0] for t in times]
     assert parts == [
-        *(Phase.RISE, Phase.RISE, Phase.SETTLE, Phase.SETTLE, Phase.HOP),
-        *(Phase.HOP, Phase.SINK, Phase.SINK, Phase.DONE, Phase.DONE),
+        *(Part.RISE, Part.RISE, Part.SETTLE, Part.SETTLE, Part.HOP),
+        *(Part.HOP, Part.SINK, Part.SINK, Part.DONE, Part.DONE),
     ]
 
 
 @given(st.integers(1, 3000), st.floats(0, 1e6))
 def test_a_hop_of_some_ticks_lasts_so_many_wherever_time_began(ticks, began):
-    timing = Timing(hop=ticks / 200, rise=0.4, settle=0.1)
+    timing = SequenceTiming(hop=ticks / 200, rise=0.4, settle=0.1)
     times = began + np.arange(ticks + 200) * 0.005 - began
     parts = [timing.phase(time)[0] for time in times]
-    assert parts.count(Phase.HOP) == ticks
+    assert parts.count(Part.HOP) == ticks
 
 
 @pytest.mark.parametrize("name", [n for n in shipped_robots() if load_robot(n).kind == "leg"])

@@ -6,14 +6,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hopping_leg.deploy.envelope import hopping_envelope, recording_envelope
-from hopping_leg.deploy.observation import Action, DriveMode, Observation, Operator, Reply
-from hopping_leg.deploy.reasons import Reason
-from hopping_leg.deploy.supervisor import Memory, State, supervise
+from hopping_leg.deploy.drive_link import Action, DriveMode, Reply
+from hopping_leg.deploy.safety_limits import hopping_limits, recording_limits
+from hopping_leg.deploy.stop_reasons import Operator, Reason, SupervisorInput
+from hopping_leg.deploy.supervisor import State, SupervisorState, supervise
 from hopping_leg.robot import load_robot
 
 LEG = load_robot("legv2")
-LIMITS = hopping_envelope(LEG, 200.0)
+LIMITS = hopping_limits(LEG, 200.0)
 PERIOD = LIMITS.period
 
 ANYTHING = st.floats(allow_nan=True, allow_infinity=True)
@@ -31,7 +31,7 @@ REPLIES = st.builds(
     taken=NUMBERS,
 )
 OBSERVATIONS = st.builds(
-    Observation,
+    SupervisorInput,
     time=st.floats(0, 100),
     late=st.just(0.0) | ANYTHING,
     replies=st.tuples(st.none() | REPLIES, st.none() | REPLIES),
@@ -47,14 +47,14 @@ def good(index=0, **changes):
 
 
 def seen(tick, **changes):
-    calm = Observation(
+    calm = SupervisorInput(
         tick * PERIOD, 0.0, (good(0, taken=tick * PERIOD), good(1, taken=tick * PERIOD)), (1.0, 2.0)
     )
     return replace(calm, **changes)
 
 
 def running():
-    memory, _ = supervise(LIMITS, Memory(), seen(0, operator=Operator.ARM))
+    memory, _ = supervise(LIMITS, SupervisorState(), seen(0, operator=Operator.ARM))
     memory, out = supervise(LIMITS, memory, seen(1))
     assert memory.state is State.RUNNING
     assert out.torque == (1.0, 2.0)
@@ -63,7 +63,7 @@ def running():
 
 @given(st.lists(OBSERVATIONS, min_size=1, max_size=30), st.booleans())
 def test_whatever_is_seen_what_leaves_is_finite_and_within_limits(course, already_running):
-    memory = running() if already_running else Memory()
+    memory = running() if already_running else SupervisorState()
     for observation in course:
         before = memory
         memory, out = supervise(LIMITS, before, observation)
@@ -79,11 +79,11 @@ def test_whatever_is_seen_what_leaves_is_finite_and_within_limits(course, alread
 
 @given(st.lists(OBSERVATIONS, min_size=1, max_size=30), st.sampled_from([3, 4]))
 def test_a_stop_is_latched_until_the_operator_arms(course, state):
-    memory = Memory(State(state), 0.0)
+    memory = SupervisorState(State(state), 0.0)
     for observation in course:
         observation = replace(
             observation,
-            operator=Operator.STOP if observation.operator is Operator.ARM else Operator.NO_NOISE,
+            operator=Operator.STOP if observation.operator is Operator.ARM else Operator.NOTHING,
         )
         memory, out = supervise(LIMITS, memory, observation)
         assert memory.state in (State.DAMPING, State.STOPPED)
@@ -92,7 +92,7 @@ def test_a_stop_is_latched_until_the_operator_arms(course, state):
 
 @given(OBSERVATIONS)
 def test_nothing_but_the_operator_arms(observation):
-    memory, out = supervise(LIMITS, Memory(), observation)
+    memory, out = supervise(LIMITS, SupervisorState(), observation)
     if observation.operator is Operator.ARM:
         assert memory.state is State.ARMING
         assert out.torque == (0.0, 0.0)
@@ -175,7 +175,7 @@ def test_torque_beyond_the_limit_for_several_ticks_is_caught():
 
 
 def test_arming_waits_for_both_drives_but_not_for_ever():
-    memory, _ = supervise(LIMITS, Memory(), seen(0, operator=Operator.ARM))
+    memory, _ = supervise(LIMITS, SupervisorState(), seen(0, operator=Operator.ARM))
     for tick in range(1, 90):
         memory, out = supervise(LIMITS, memory, at(tick, 1, mode=2))
         assert memory.state is State.ARMING
@@ -200,7 +200,7 @@ def test_damping_ends_at_rest_or_after_its_time():
 
 
 def test_recording_uses_the_mechanical_range_and_hopping_a_part_of_it():
-    wide = recording_envelope(LEG, 200.0)
+    wide = recording_limits(LEG, 200.0)
     for index, joint in enumerate((LEG.hip, LEG.knee)):
         assert wide.lower[index] < LIMITS.lower[index] < joint.lower
         assert joint.upper < LIMITS.upper[index] < wide.upper[index]

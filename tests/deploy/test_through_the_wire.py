@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.deploy.bring_up import judge, require
 from hopping_leg.deploy.configuration import wanted
-from hopping_leg.deploy.envelope import hopping_envelope
-from hopping_leg.deploy.inspection import configure, home, inspect
+from hopping_leg.deploy.drive_info import configure, home, inspect
+from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
+from hopping_leg.deploy.preflight import judge, require
+from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.schedule import Schedule
-from hopping_leg.deploy.sequence import Phase, Sequence, Timing, hopping_poses
 from hopping_leg.deploy.session import header_of, perform
 from hopping_leg.deploy.supervisor import State
 from hopping_leg.emulator.faults import Fault
@@ -21,7 +21,7 @@ from hopping_leg.robot.limits import SoftLimiter, SoftLimits
 from hopping_leg.trace import Trace
 
 LEG = load_robot("legv2-paper")
-LIMITS = hopping_envelope(LEG, 200.0)
+LIMITS = hopping_limits(LEG, 200.0)
 
 
 def emulated(**start):
@@ -30,12 +30,12 @@ def emulated(**start):
 
 def run(lockstep, path, *, controller="energy-shaping", hop=0.5, rise=0.5):
     controller = load_controller(controller, LEG)
-    sequence = Sequence(
+    sequence = MotionSequence(
         controller,
         Schedule(((0.3, 100.0),)),
         hopping_poses(LEG),
         SoftLimiter(LEG, SoftLimits()),
-        Timing(hop=hop, rise=rise, settle=0.2, sink=0.6),
+        SequenceTiming(hop=hop, rise=rise, settle=0.2, sink=0.6),
     )
     header = header_of(LEG, controller, 200.0)
     try:
@@ -102,13 +102,13 @@ def test_configuring_and_homing_make_a_delivered_drive_fit():
 def test_a_run_is_a_trace_like_any_other(tmp_path):
     lockstep = emulated()
     done = run(lockstep, tmp_path / "run.parquet", hop=1.0)
-    assert done.outcome.memory.stop_cause.reason.name == "FINISHED"
+    assert done.outcome.supervisor.stop_cause.reason.name == "FINISHED"
     assert done.outcome.skipped == 0
     trace = Trace.load(tmp_path / "run.parquet")
     assert list(tmp_path.iterdir()) == [tmp_path / "run.parquet"]
     assert trace.header["robot_digest"] == LEG.digest
     assert trace.header["codes"]["state"]["2"] == "running"
-    hopping = trace.column("part") == Phase.HOP
+    hopping = trace.column("part") == Part.HOP
     assert hopping.sum() == pytest.approx(200, abs=1)
     assert (trace.column("phase")[hopping] >= 0).all()
     assert np.isnan(trace.column("phase")[~hopping]).all()
@@ -121,7 +121,7 @@ def test_a_run_is_a_trace_like_any_other(tmp_path):
 
 def test_the_motors_give_what_was_sent(tmp_path):
     trace = run(emulated(), tmp_path / "run.parquet").trace
-    hopping = trace.column("part") == Phase.HOP
+    hopping = trace.column("part") == Part.HOP
     for joint in ("hip", "knee"):
         sent, given = trace.column(f"{joint}_sent_nm"), trace.column(f"{joint}_torque_nm")
         difference = (given[1:] - sent[:-1])[hopping[1:]]
@@ -158,7 +158,7 @@ def test_each_fault_ends_the_run_for_its_reason_and_nothing_starts_again(
 ):
     lockstep = emulated(faults=(fault,))
     done = run(lockstep, tmp_path / "run.parquet", controller=controller)
-    assert done.outcome.memory.stop_cause.reason.name == reason
+    assert done.outcome.supervisor.stop_cause.reason.name == reason
     trace = done.trace
     states = trace.column("state")
     assert (np.diff(states) >= 0).all()

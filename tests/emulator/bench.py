@@ -6,7 +6,7 @@ import math
 import moteus
 import numpy as np
 
-from hopping_leg.emulator.in_process import InProcessDevice
+from hopping_leg.emulator.memory_transport import MemoryTransport
 from hopping_leg.emulator.robot import EmulatedRobot
 from hopping_leg.robot import load_robot
 
@@ -19,7 +19,7 @@ class Bench:
     def __init__(self, q=(0.6, -1.3), robot="legv2", **options):
         loaded = load_robot(robot) if isinstance(robot, str) else robot
         self.robot = EmulatedRobot(loaded, np.array(q), **options)
-        self.transport = moteus.Transport([InProcessDevice(self.robot)])
+        self.transport = moteus.Transport([MemoryTransport(self.robot)])
         self.drives = [moteus.Controller(id=n, transport=self.transport) for n in (1, 2)]
 
     def wait(self, seconds):

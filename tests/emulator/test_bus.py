@@ -56,7 +56,7 @@ def test_identity_is_read_as_words_and_cannot_be_written(bench):
     assert serials[0] != serials[1]
     writing = Frame(0x8001, bytes([0x09, 0x81, 0x02, 1, 0, 0, 0]))
     bench.robot.receive(writing)
-    (item,) = bench.robot.outbox.take(bench.robot.time)
+    (item,) = bench.robot.reply_queue.take(bench.robot.time)
     assert moteus.protocol.parse_registers(item.frame.data).errors == [(0x101, 2)]
 
 
@@ -71,12 +71,12 @@ def test_discovery_finds_both_drives_and_a_uuid_means_one(bench):
 
 def test_other_destinations_are_not_answered(bench):
     bench.robot.receive(Frame(0x8003, b"\x11\x00"))
-    assert bench.robot.outbox.take(bench.robot.time) == []
+    assert bench.robot.reply_queue.take(bench.robot.time) == []
 
 
 @given(st.binary(max_size=64))
 def test_no_payload_breaks_a_drive(bench, data):
     bench.robot.receive(Frame(0x807F, data))
     bench.wait(5e-4)
-    assert len(bench.robot.outbox.take(bench.robot.time)) <= 2
+    assert len(bench.robot.reply_queue.take(bench.robot.time)) <= 2
     assert np.isfinite(bench.robot.leg.q).all()

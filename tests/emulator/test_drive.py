@@ -4,7 +4,7 @@ import moteus
 import numpy as np
 import pytest
 
-from hopping_leg.emulator.codes import Fault, Notice
+from hopping_leg.emulator.moteus_codes import FaultCode, Notice
 from tests.emulator.bench import Bench, R
 
 
@@ -93,7 +93,7 @@ def test_a_drive_outside_its_limits_refuses_to_start():
     bench.torque(0.0, 0.0)
     bench.wait(0.01)
     assert bench.modes() == [1, 1]
-    assert bench.faults() == [Fault.START_OUTSIDE_LIMIT] * 2
+    assert bench.faults() == [FaultCode.START_OUTSIDE_LIMIT] * 2
 
 
 def test_torque_is_limited_by_the_frame_and_by_the_current():
@@ -124,10 +124,12 @@ def test_heat_derates_then_faults():
     assert torques[0] > torques[1] > torques[2] >= 0.0
     drive.disturbances.temperature = 50.0
     bench.wait(0.001)
-    assert (bench.modes()[0], bench.faults()[0]) == (1, Fault.OVER_TEMPERATURE)
+    assert (bench.modes()[0], bench.faults()[0]) == (1, FaultCode.OVER_TEMPERATURE)
 
 
-@pytest.mark.parametrize(("volts", "fault"), [(47, Fault.OVER_VOLTAGE), (3, Fault.UNDER_VOLTAGE)])
+@pytest.mark.parametrize(
+    ("volts", "fault"), [(47, FaultCode.OVER_VOLTAGE), (3, FaultCode.UNDER_VOLTAGE)]
+)
 def test_voltage_faults_only_where_power_is_on(volts, fault):
     bench = Bench(held=False)
     for drive in bench.robot.drives:

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from moteus.fdcanusb_device import _strip_and_validate_checksum
 
-from hopping_leg.emulator.codes import Fault as Code
-from hopping_leg.emulator.codes import Mode
 from hopping_leg.emulator.faults import KINDS, Fault, load_faults
 from hopping_leg.emulator.frames import Frame
 from hopping_leg.emulator.line_protocol import LineProtocol
-from hopping_leg.emulator.outbox import Outgoing
+from hopping_leg.emulator.moteus_codes import FaultCode, MoteusMode
+from hopping_leg.emulator.reply_queue import QueuedReply
 from hopping_leg.errors import UsageError
 from tests.emulator.bench import Bench, R
 
@@ -67,7 +66,7 @@ def test_a_corrupted_line_fails_its_checksum_or_means_something_else(checksums):
     port._protocol.checksums = checksums
     frame = Frame(0x100, bytes.fromhex("20040001020304"))
     for flip in (-1, 0, 5, 77, 4711, 65535):
-        port.send(Outgoing(frame, flip=flip))
+        port.send(QueuedReply(frame, flip=flip))
     port.close()
     good, *broken = (_strip_and_validate_checksum(line.strip()) for line in lines)
     assert good[2] == checksums
@@ -85,38 +84,38 @@ def test_an_encoder_jump_moves_what_is_reported_not_the_leg():
     jumps = np.abs(np.diff(positions)) * math.tau / 2
     assert (jumps > 0.4).sum() == 1
     assert jumps.max() == pytest.approx(0.5, abs=0.1)
-    truth = bench.robot.leg.wires[1].motor_position(bench.robot.leg.q[1])
+    truth = bench.robot.leg.transforms[1].motor_position(bench.robot.leg.q[1])
     assert bench.read(R.POSITION, drive=1) - truth == pytest.approx(0.5 * 2 / math.tau, abs=1e-6)
 
 
 @pytest.mark.parametrize(
     ("fault", "code"),
     [
-        (Fault("drive_fault", at=0.03, value=33, drive="hip"), Code.MOTOR_DRIVER),
-        (Fault("over_temperature", at=0.0, value=1000, drive="hip"), Code.OVER_TEMPERATURE),
-        (Fault("over_voltage", at=0.03, drive="hip"), Code.OVER_VOLTAGE),
-        (Fault("under_voltage", at=0.03, value=3, drive="hip"), Code.UNDER_VOLTAGE),
+        (Fault("drive_fault", at=0.03, value=33, drive="hip"), FaultCode.MOTOR_DRIVER),
+        (Fault("over_temperature", at=0.0, value=1000, drive="hip"), FaultCode.OVER_TEMPERATURE),
+        (Fault("over_voltage", at=0.03, drive="hip"), FaultCode.OVER_VOLTAGE),
+        (Fault("under_voltage", at=0.03, value=3, drive="hip"), FaultCode.UNDER_VOLTAGE),
     ],
 )
 def test_drive_faults_switch_off_and_stay(fault, code):
     _, ticks = hopping(fault)
-    assert ticks[-1][0].values[R.MODE] == Mode.FAULT
+    assert ticks[-1][0].values[R.MODE] == MoteusMode.FAULT
     assert ticks[-1][0].values[R.FAULT] == code
     assert ticks[-1][0].values[R.TORQUE] == 0.0
-    assert ticks[-1][1].values[R.MODE] == Mode.POSITION
+    assert ticks[-1][1].values[R.MODE] == MoteusMode.POSITION
 
 
 def test_a_notice_changes_nothing_but_the_register():
     _, ticks = hopping(Fault("limit_notice", at=0.03, value=100))
     assert {replies[0].values[R.FAULT] for replies in ticks} == {0, 100}
-    assert {replies[0].values[R.MODE] for replies in ticks} == {Mode.POSITION}
+    assert {replies[0].values[R.MODE] for replies in ticks} == {MoteusMode.POSITION}
 
 
 def test_power_loss_stops_the_drive_and_forgets_its_home():
     bench, ticks = hopping(Fault("power_loss", at=0.03, drive="hip"), seconds=0.035)
     modes = [replies[0].values[R.MODE] for replies in ticks]
-    assert modes[0] == Mode.POSITION
-    assert Mode.STOPPED in modes or modes[-1] in (Mode.ENABLING, Mode.CALIBRATING)
+    assert modes[0] == MoteusMode.POSITION
+    assert MoteusMode.STOPPED in modes or modes[-1] in (MoteusMode.ENABLING, MoteusMode.CALIBRATING)
     assert bench.read(R.HOME_STATE) == 1
 
 
@@ -125,7 +124,7 @@ def test_a_pulled_plug_silences_the_host_and_trips_the_watchdogs():
     gone = [n for n, ids in enumerate(answered(ticks)) if not ids]
     assert 11 <= len(gone) <= 13
     back = ticks[gone[-1] + 1]
-    assert [reply.values[R.MODE] for reply in back] == [Mode.TIMEOUT, Mode.TIMEOUT]
+    assert [reply.values[R.MODE] for reply in back] == [MoteusMode.TIMEOUT, MoteusMode.TIMEOUT]
 
 
 def test_a_wrong_start_is_there_from_the_start():
@@ -135,7 +134,7 @@ def test_a_wrong_start_is_there_from_the_start():
             Fault("configuration", name="servo.timeout_mode", value=12, drive="knee"),
         )
     )
-    truth = bench.robot.leg.wires[0].motor_position(bench.robot.leg.q[0])
+    truth = bench.robot.leg.transforms[0].motor_position(bench.robot.leg.q[0])
     assert bench.read(R.POSITION) == pytest.approx(truth + 2 / 6)
     assert bench.read(R.HOME_STATE) == 1
     assert [d.settings["servo.timeout_mode"] for d in bench.robot.drives] == [15, 12]
@@ -147,7 +146,7 @@ def test_a_fault_waits_for_its_phase(phase):
     bench.power()
     bench.robot.leg._legs.place(slice(None), 0.5, np.array([0.6, -1.3]))
     states = []
-    while not bench.robot.misfortune.log:
+    while not bench.robot.fault_injector.log:
         leg = bench.robot.leg
         states.append((leg.foot_clearance, leg.height_rate))
         bench.wait(5e-4)

@@ -4,7 +4,7 @@ import time
 import moteus
 import pytest
 
-from hopping_leg.deploy.observation import LIMP, STOP
+from hopping_leg.deploy.drive_link import LIMP, STOP
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.lockstep import Lockstep
 from hopping_leg.emulator.start import Start

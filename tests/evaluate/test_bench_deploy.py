@@ -5,14 +5,14 @@ import polars as pl
 import pytest
 
 from hopping_leg.cli import main
-from hopping_leg.deploy.sequence import Phase
+from hopping_leg.deploy.motion_sequence import Part
 from hopping_leg.evaluate.emulated_truth import Truth, apexes_of
 from hopping_leg.trace import Trace
 
 
 def test_apexes_are_matched_with_what_was_commanded():
     time = np.arange(0, 12, 0.005)
-    part = np.where(time < 1, Phase.RISE, np.where(time < 11, Phase.HOP, Phase.SINK))
+    part = np.where(time < 1, Part.RISE, np.where(time < 11, Part.HOP, Part.SINK))
     command = np.where(time < 6, 0.25, 0.35)
     trace = Trace(pl.DataFrame({"time_s": time, "part": part, "command_m": command}))
     watched = np.arange(0, 12, 0.01)

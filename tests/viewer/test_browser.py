@@ -13,7 +13,7 @@ from PIL import Image
 
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.controllers.rollout import RolloutConfig, rollout
-from hopping_leg.deploy.black_box import SUFFIX, BlackBox
+from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorder
 from hopping_leg.robot import load_robot
 from hopping_leg.viewer.browser import (
     PATIENCE,
@@ -199,7 +199,7 @@ def test_a_run_on_the_leg_is_followed(page, tmp_path):
     viewer = Viewer(follow, port=0)
     with running(viewer):
         page.goto(viewer.address)
-        box = BlackBox(tmp_path / f"fast-1{SUFFIX}", columns, header)
+        box = FlightRecorder(tmp_path / f"fast-1{SUFFIX}", columns, header)
         for tick in range(200):
             box.row((tick / 200, 0.3, 0.8, -1.6, 1.0))
         box.close()

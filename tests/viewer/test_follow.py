@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.deploy.black_box import SUFFIX, BlackBox
-from hopping_leg.deploy.box_tail import BoxTail
-from hopping_leg.deploy.rows import columns
+from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorder, FlightRecorderTail
+from hopping_leg.deploy.telemetry import columns
 from hopping_leg.errors import RobotError, TraceError, UsageError
 from hopping_leg.robot import kinematics, load_robot
 from hopping_leg.viewer.follow import Follow
@@ -15,7 +14,7 @@ COLUMNS = ("time_s", "command_m", "hip_position_rad", "knee_position_rad", "hip_
 
 
 def box(path, robot="legv2"):
-    return BlackBox(path, COLUMNS, {"robot": robot, "controller": "fast"})
+    return FlightRecorder(path, COLUMNS, {"robot": robot, "controller": "fast"})
 
 
 def write(writer, first, count, hip=0.8):
@@ -37,7 +36,7 @@ def test_a_tail_returns_each_row_once_wherever_the_file_was_cut(tmp_path):
     content = source.path.read_bytes()
     growing = tmp_path / f"growing{SUFFIX}"
     growing.touch()
-    tail, seen = BoxTail(growing), []
+    tail, seen = FlightRecorderTail(growing), []
     with growing.open("ab", buffering=0) as file:
         for start in range(0, len(content), 37):
             file.write(content[start : start + 37])
@@ -74,7 +73,9 @@ def test_a_run_is_shown_as_it_grows_until_it_is_over(tmp_path):
 def test_what_hop_deploy_records_is_shown_with_the_estimate_of_the_controller(tmp_path):
     robot = load_robot("legv2-paper")
     names = columns(load_controller("energy-shaping", robot))
-    writer = BlackBox(tmp_path / f"es-1{SUFFIX}", names, {"robot": robot.name, "controller": "es"})
+    writer = FlightRecorder(
+        tmp_path / f"es-1{SUFFIX}", names, {"robot": robot.name, "controller": "es"}
+    )
     row = dict.fromkeys(names, 0.0) | {
         "hip_position_rad": 0.7,
         "knee_position_rad": -1.4,

@@ -31,10 +31,10 @@ from hopping_leg.controllers.joint_pd import JointPD
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.deploy.envelope import hopping_envelope
 from hopping_leg.deploy.height_page import HeightPage
 from hopping_leg.deploy.keyboard import LiveHeight, keys
-from hopping_leg.deploy.reasons import Reason
+from hopping_leg.deploy.motion_sequence import MotionSequence, SequenceTiming, hopping_poses
+from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.schedule import (
     Range,
     Schedule,
@@ -42,7 +42,7 @@ from hopping_leg.deploy.schedule import (
     command_range,
     parse_schedule,
 )
-from hopping_leg.deploy.sequence import Sequence, Timing, hopping_poses
+from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.identify.excitation import load_excitation
 from hopping_leg.robot import load_robot
@@ -108,7 +108,7 @@ def run(args: Deploy) -> None:
     console = Console()
     for notice in done.notices:
         console.print(notice, soft_wrap=True)
-    cause = done.outcome.memory.stop_cause
+    cause = done.outcome.supervisor.stop_cause
     console.print(f"{cause} {done.outcome.ticks} ticks, {done.outcome.skipped} left out.")
     console.print(f"Wrote {done.path}", highlight=False, soft_wrap=True)
     if cause.reason not in _WILLED:
@@ -153,14 +153,14 @@ def _perform(args: Deploy, robot: Robot, plan: Plan) -> "Performance":
     poses = hopping_poses(robot)
     if isinstance(plan.controller, JointPD):
         poses = replace(poses, start=plan.controller.position[0])
-    sequence = Sequence(
+    sequence = MotionSequence(
         plan.controller,
         height or plan.schedule,
         poses,
         SoftLimiter(robot, SoftLimits()) if args.soft_limits else None,
-        Timing(hop=plan.seconds),
+        SequenceTiming(hop=plan.seconds),
     )
-    envelope, console = hopping_envelope(robot, plan.rate), Console()
+    envelope, console = hopping_limits(robot, plan.rate), Console()
 
     @contextlib.contextmanager
     def beside(loop: "ControlLoop") -> Iterator[None]:

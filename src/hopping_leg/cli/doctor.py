@@ -17,15 +17,15 @@ from rich.console import Console
 
 from hopping_leg.cli.extras import show_extras, survey
 from hopping_leg.deploy.configuration import wanted
-from hopping_leg.deploy.envelope import hopping_envelope
-from hopping_leg.deploy.wire import JOINTS
+from hopping_leg.deploy.joint_transform import JOINTS
+from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import CONTROL_RATE
 
 if TYPE_CHECKING:
-    from hopping_leg.deploy.bring_up import Finding
+    from hopping_leg.deploy.preflight import Finding
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def run(args: Doctor) -> None:
     from hopping_leg.cli.motors import connect, find, show
 
     robot, console = load_robot(args.robot), Console()
-    envelope = hopping_envelope(robot, CONTROL_RATE)
+    envelope = hopping_limits(robot, CONTROL_RATE)
     with connect(robot, args.transport) as link:
         findings = find(link, robot, envelope)
         if args.write:
@@ -81,7 +81,7 @@ def _write(
     """Write the settings that were found wrong."""
     from hopping_leg.cli.motors import ask
 
-    inspection: Any = importlib.import_module("hopping_leg.deploy.inspection")
+    inspection: Any = importlib.import_module("hopping_leg.deploy.drive_info")
     for joint, name in enumerate(JOINTS):
         wrong = {f.setting for f in findings if f.joint == joint and f.setting}
         settings = [setting for setting in wanted(robot, joint) if setting.name in wrong]
@@ -98,5 +98,5 @@ def _home(link: Any, angles: tuple[float, float], *, yes: bool) -> None:  # noqa
 
     hip, knee = angles
     ask(f"The drives will take the hip for {hip:g} and the knee for {knee:g} rad.", yes=yes)
-    inspection: Any = importlib.import_module("hopping_leg.deploy.inspection")
+    inspection: Any = importlib.import_module("hopping_leg.deploy.drive_info")
     inspection.home(link, angles)

@@ -24,7 +24,7 @@ from rich.console import Console
 from hopping_leg.cli.motors import ask, check, connect
 from hopping_leg.cli.options import Heights
 from hopping_leg.controllers.registry import load_policy
-from hopping_leg.deploy.envelope import hopping_envelope
+from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.json_files import write_json
 from hopping_leg.robot import load_robot
@@ -118,7 +118,7 @@ def guard_of(robot: Robot, rate: float) -> "Guard":
 
     from hopping_leg.rl.finetune.simulated import Guard
 
-    limits = hopping_envelope(robot, rate)
+    limits = hopping_limits(robot, rate)
     return Guard(*(np.array(pair) for pair in (limits.lower, limits.upper, limits.speed)))
 
 
@@ -164,7 +164,7 @@ def _outings(args: Finetune, robot: Robot, policy: "Policy") -> "TrialRobot":
 
 
 def _deployed(args: Finetune, robot: Robot, rate: float, transport: str) -> "TrialRobot":
-    envelope = hopping_envelope(robot, rate)
+    envelope = hopping_limits(robot, rate)
     deployed: Any = importlib.import_module("hopping_leg.deploy.hardware_trials")
 
     def ready(seconds: float) -> None:

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.table import Table
 
-from hopping_leg.deploy.bring_up import Finding, judge, require
-from hopping_leg.deploy.envelope import Envelope
+from hopping_leg.deploy.joint_transform import JOINTS
+from hopping_leg.deploy.preflight import Finding, judge, require
+from hopping_leg.deploy.safety_limits import SafetyLimits
 from hopping_leg.deploy.transport import opener
-from hopping_leg.deploy.wire import JOINTS
 from hopping_leg.errors import UsageError
 from hopping_leg.robot.parameters import Robot
 
@@ -41,13 +41,13 @@ def connect(robot: Robot, transport: str) -> "Iterator[MoteusLink]":
         link.close()
 
 
-def find(link: "MoteusLink", robot: Robot, envelope: Envelope) -> list[Finding]:
+def find(link: "MoteusLink", robot: Robot, envelope: SafetyLimits) -> list[Finding]:
     """Return all checks of both drives."""
-    inspection: Any = importlib.import_module("hopping_leg.deploy.inspection")
+    inspection: Any = importlib.import_module("hopping_leg.deploy.drive_info")
     return judge(robot, envelope, inspection.inspect(link))
 
 
-def check(link: "MoteusLink", robot: Robot, envelope: Envelope) -> dict[str, dict[str, str]]:
+def check(link: "MoteusLink", robot: Robot, envelope: SafetyLimits) -> dict[str, dict[str, str]]:
     """Refuse drives that are not fit; return what was found, for the trace.
 
     Raises:

@@ -18,7 +18,7 @@ from pathlib import Path
 import tyro
 from rich.console import Console
 
-from hopping_leg.deploy.black_box import SUFFIX, recover
+from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.figures.paper import Format, Width, encode
 from hopping_leg.evaluate.gallery import draw_gallery, run_of

@@ -1,7 +1,7 @@
 """`hop record --transport`: excitations played on real motors."""
 
 import importlib
-from collections.abc import Sequence as Several
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,11 +10,11 @@ from rich.console import Console
 
 from hopping_leg.cli.motors import ask, check, connect
 from hopping_leg.controllers.joint_pd import JointGains, JointPD
-from hopping_leg.deploy.envelope import recording_envelope
 from hopping_leg.deploy.keyboard import keys
-from hopping_leg.deploy.reasons import Reason
+from hopping_leg.deploy.motion_sequence import MotionSequence, Poses, SequenceTiming, hopping_poses
+from hopping_leg.deploy.safety_limits import recording_limits
 from hopping_leg.deploy.schedule import Schedule
-from hopping_leg.deploy.sequence import Poses, Sequence, Timing, hopping_poses
+from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.from_motors import recording_of
@@ -28,7 +28,7 @@ _HANGING = np.zeros(2)
 
 
 def record(
-    excitations: Several[tuple[str, Excitation]],
+    excitations: Sequence[tuple[str, Excitation]],
     robot: Robot,
     *,
     transport: str,
@@ -55,7 +55,7 @@ def record(
     rates = {excitation.rate for _, excitation in excitations}
     if len(rates) > 1:
         raise UsageError("The excitations have different rates; record them one by one.")
-    envelope, console = recording_envelope(robot, rates.pop()), Console()
+    envelope, console = recording_limits(robot, rates.pop()), Console()
     with connect(robot, transport) as link:
         found = check(link, robot, envelope)
         for name, excitation in excitations:
@@ -66,7 +66,7 @@ def record(
             )
             facts = {"transport": transport, "drives": found}
             done = _play(link, robot, excitation, gains, out / "traces", facts, name)
-            cause = done.outcome.memory.stop_cause
+            cause = done.outcome.supervisor.stop_cause
             if cause.reason is not Reason.FINISHED:
                 raise HardwareError(f"{name} was stopped: {cause} Its trace is {done.path}.")
             file = out / f"{robot.name}-{name}.parquet"
@@ -92,19 +92,19 @@ def _play(
     controller = JointPD(excitation.position, excitation.velocity, gains)
     fixed = excitation.rig == "fixed-base"
     rest = _HANGING if fixed else hopping_poses(robot).rest
-    sequence = Sequence(
+    sequence = MotionSequence(
         controller,
         Schedule(((float("nan"), 1.0),)),
         Poses(excitation.position[0], rest),
         None,
-        Timing(hop=len(excitation) / excitation.rate),
+        SequenceTiming(hop=len(excitation) / excitation.rate),
         gains,
     )
     header = session.header_of(robot, controller, excitation.rate, **facts)
     performance: Performance = session.perform(
         link,
         sequence,
-        recording_envelope(robot, excitation.rate),
+        recording_limits(robot, excitation.rate),
         session.new_path(folder, name),
         header,
         beside=lambda loop: keys(None, loop.stop, Console().print),

@@ -6,7 +6,7 @@ Names are those of the firmware's ``conf get`` and ``conf set``.
 import math
 from dataclasses import dataclass
 
-from hopping_leg.deploy.wire import JOINTS, wires
+from hopping_leg.deploy.joint_transform import JOINTS, joint_transforms
 from hopping_leg.robot.parameters import Robot
 
 BRAKE_MODE = 15
@@ -46,9 +46,9 @@ def wanted(robot: Robot, joint: int) -> tuple[Setting, ...]:
         robot: Whose drives.
         joint: 0 for the hip, 1 for the knee.
     """
-    servo, wire = robot.hardware.servos[joint], wires(robot)[joint]
+    servo, transform = robot.hardware.servos[joint], joint_transforms(robot)[joint]
     motor = getattr(robot, JOINTS[joint]).motor
-    ends = sorted(wire.motor_position(angle) for angle in (servo.lower, servo.upper))
+    ends = sorted(transform.motor_position(angle) for angle in (servo.lower, servo.upper))
     return (
         Setting("motor_position.rotor_to_output_ratio", 1 / motor.gear_ratio, "gear ratio"),
         Setting("servopos.position_min", ends[0], "mechanical stop"),

@@ -1,4 +1,4 @@
-"""Both drives through the ``moteus`` client: a ``Link`` in pure torque mode.
+"""Both drives through the ``moteus`` client: a ``DriveLink`` in pure torque mode.
 
 The client waits for a lost reply without bound, loses the healthy drive's reply when it is
 cancelled, and takes late replies as fresh. Here its event loop has a thread of its own; frames are
@@ -17,11 +17,10 @@ from moteus.protocol import Register
 from hopping_leg.deploy.client_thread import Client, ClientThread
 from hopping_leg.deploy.clock import Clock, RealClock
 from hopping_leg.deploy.drive_clock import DriveClock
-from hopping_leg.deploy.link import Exchange
-from hopping_leg.deploy.observation import Action, Outgoing
+from hopping_leg.deploy.drive_link import Action, DriveCommand, Exchange
+from hopping_leg.deploy.joint_transform import joint_transforms
 from hopping_leg.deploy.replies import Question
 from hopping_leg.deploy.transport import Opener
-from hopping_leg.deploy.wire import wires
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot.parameters import Robot
 
@@ -57,7 +56,7 @@ class MoteusLink:
         client: Callable[[Callable[[str], None]], Client] = ClientThread,
     ) -> None:
         self._clock = clock or RealClock()
-        self.robot, self.wires = robot, wires(robot)
+        self.robot, self.transforms = robot, joint_transforms(robot)
         self.trouble = ""
         joints, servos = (robot.hip, robot.knee), robot.hardware.servos
         self._limits = [joint.motor.torque_limit for joint in joints]
@@ -74,9 +73,9 @@ class MoteusLink:
             for servo in servos
         ]
 
-    def exchange(self, outgoing: Outgoing, until: float) -> Exchange:
+    def exchange(self, outgoing: DriveCommand, until: float) -> Exchange:
         """Tell both drives what to do and ask for their state in the same frames."""
-        question = Question(self.wires, self._clocks, self._clock.now())
+        question = Question(self.transforms, self._clocks, self._clock.now())
         commands = self._commands(outgoing, query=True)
         for joint, command in enumerate(commands):
             self._listen(command, joint, question)
@@ -84,7 +83,7 @@ class MoteusLink:
         question.done.wait(self._clock.patience(until))
         return question.result()
 
-    def send(self, outgoing: Outgoing) -> None:
+    def send(self, outgoing: DriveCommand) -> None:
         """Tell both drives what to do; returns at once."""
         commands = self._commands(outgoing, query=False)
         until = self._clock.now() + _SEND_SECONDS
@@ -124,8 +123,8 @@ class MoteusLink:
             # The client and the serial port raise many types when the adapter is gone.
             self._note(str(error))
 
-    def _commands(self, outgoing: Outgoing, *, query: bool) -> list[Any]:
-        pairs = zip(self.controllers, self.wires, outgoing.torque, self._limits, strict=True)
+    def _commands(self, outgoing: DriveCommand, *, query: bool) -> list[Any]:
+        pairs = zip(self.controllers, self.transforms, outgoing.torque, self._limits, strict=True)
         match outgoing.action:
             case Action.TORQUE:
                 return [
@@ -135,12 +134,12 @@ class MoteusLink:
                         kp_scale=0.0,
                         kd_scale=0.0,
                         ilimit_scale=0.0,
-                        feedforward_torque=wire.motor_torque(torque),
+                        feedforward_torque=transform.motor_torque(torque),
                         maximum_torque=limit,
                         watchdog_timeout=self._watchdog,
                         query=query,
                     )
-                    for controller, wire, torque, limit in pairs
+                    for controller, transform, torque, limit in pairs
                 ]
             case Action.BRAKE:
                 return [controller.make_brake(query=query) for controller in self.controllers]

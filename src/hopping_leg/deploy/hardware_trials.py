@@ -16,11 +16,11 @@ from hopping_leg.controllers.hardware_trial import HardwareTrial, Steps
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.deploy.clock import Clock
 from hopping_leg.deploy.driver import MoteusLink
-from hopping_leg.deploy.envelope import hopping_envelope
-from hopping_leg.deploy.reasons import Reason
+from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
+from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.schedule import Schedule
-from hopping_leg.deploy.sequence import Phase, Sequence, Timing, hopping_poses
 from hopping_leg.deploy.session import header_of, new_path, perform
+from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.supervisor import State
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot.limits import SoftLimiter, SoftLimits
@@ -62,12 +62,12 @@ class Deployed:
             HardwareError: The operator stopped the leg, or it was stopped before it hopped.
         """
         schedule = Schedule(steps)
-        sequence = Sequence(
+        sequence = MotionSequence(
             controller,
             schedule,
             hopping_poses(self.robot),
             SoftLimiter(self.robot, SoftLimits()),
-            Timing(hop=schedule.seconds),
+            SequenceTiming(hop=schedule.seconds),
         )
         with self.connect() as link:
             found = self.check(link)
@@ -75,17 +75,17 @@ class Deployed:
             done = perform(
                 link,
                 sequence,
-                hopping_envelope(self.robot, self.rate),
+                hopping_limits(self.robot, self.rate),
                 new_path(self.folder, controller.name),
                 header_of(self.robot, controller, self.rate, drives=found, outing_seed=seed),
                 clock=self.clock,
                 realtime=self.clock is None,
             )
-        cause = done.outcome.memory.stop_cause
+        cause = done.outcome.supervisor.stop_cause
         if cause.reason is Reason.OPERATOR_STOP:
             raise HardwareError("You stopped the leg; the same command with --resume goes on.")
         table = done.trace.table
-        hopping = (pl.col("part") == Phase.HOP) & (pl.col("state") == State.RUNNING)
+        hopping = (pl.col("part") == Part.HOP) & (pl.col("state") == State.RUNNING)
         hopped = table.filter(hopping)
         if hopped.height < self.rate:
             raise HardwareError(f"The leg was stopped before it hopped: {cause}")

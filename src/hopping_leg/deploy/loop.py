@@ -11,15 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hopping_leg.deploy import rows
-from hopping_leg.deploy.black_box import BlackBox
+from hopping_leg.deploy import telemetry
 from hopping_leg.deploy.clock import Clock
-from hopping_leg.deploy.envelope import Envelope
-from hopping_leg.deploy.link import Exchange, Link
-from hopping_leg.deploy.observation import BRAKE, STOP, Observation, Operator, Outgoing
-from hopping_leg.deploy.samples import Samples
-from hopping_leg.deploy.sequence import Phase, Sequence, Step
-from hopping_leg.deploy.supervisor import Memory, State, supervise
+from hopping_leg.deploy.drive_link import BRAKE, STOP, DriveCommand, DriveLink, Exchange
+from hopping_leg.deploy.flight_recorder import FlightRecorder
+from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceStep
+from hopping_leg.deploy.safety_limits import SafetyLimits
+from hopping_leg.deploy.sample_buffer import SampleBuffer
+from hopping_leg.deploy.stop_reasons import Operator, SupervisorInput
+from hopping_leg.deploy.supervisor import State, SupervisorState, supervise
 
 REPLY_SHARE = 0.7
 """Share of the period after which a tick goes on without the replies that are not in."""
@@ -35,16 +35,16 @@ _STOP_TICKS = 10
 
 
 @dataclass(frozen=True)
-class Outcome:
+class LoopOutcome:
     """How a run ended.
 
     Attributes:
-        memory: Of the supervisor.
+        supervisor: Its last state.
         ticks: Done.
         skipped: Left out because the loop was late.
     """
 
-    memory: Memory
+    supervisor: SupervisorState
     ticks: int
     skipped: int
 
@@ -55,34 +55,39 @@ class ControlLoop:
     Args:
         link: To the drives.
         sequence: What the leg does.
-        envelope: The supervisor's limits.
+        limits: The supervisor's limits.
         box: Where everything is recorded.
         clock: The time; shared with the link.
     """
 
     def __init__(
-        self, link: Link, sequence: Sequence, envelope: Envelope, box: BlackBox, clock: Clock
+        self,
+        link: DriveLink,
+        sequence: MotionSequence,
+        limits: SafetyLimits,
+        box: FlightRecorder,
+        clock: Clock,
     ) -> None:
-        self._link, self._sequence, self._envelope = link, sequence, envelope
+        self._link, self._sequence, self._envelope = link, sequence, limits
         self._box, self._clock = box, clock
-        self._samples = Samples(envelope.period)
-        self._internals = rows.internal_names(sequence.controller)
+        self._samples = SampleBuffer(limits.period)
+        self._internals = telemetry.internal_names(sequence.controller)
         self._stop, self._complaint = threading.Event(), ""
 
     def stop(self) -> None:
         """Ask for a stop on the operator's behalf; may be called from anywhere."""
         self._stop.set()
 
-    def run(self) -> Outcome:
+    def run(self) -> LoopOutcome:
         """Arm, run the sequence, damp, stop; return when the drives have been told to stop."""
         start = self._clock.now() + self._envelope.period
-        memory, held = Memory(since=start), STOP
+        state, held = SupervisorState(since=start), STOP
         tick = ticks = skipped = told = 0
         stepped = 1
         try:
             while told < _STOP_TICKS:
-                memory, held = self._tick(start, tick, stepped - 1, memory, held)
-                told = told + 1 if memory.state is State.STOPPED else 0
+                state, held = self._tick(start, tick, stepped - 1, state, held)
+                told = told + 1 if state.state is State.STOPPED else 0
                 ticks, skipped = ticks + 1, skipped + stepped - 1
                 behind = (self._clock.now() - start) / self._envelope.period
                 following = max(tick + 1, math.floor(behind))
@@ -90,11 +95,11 @@ class ControlLoop:
         finally:
             if told < _STOP_TICKS:
                 self._link.send(BRAKE)
-        return Outcome(memory, ticks, skipped)
+        return LoopOutcome(state, ticks, skipped)
 
     def _tick(
-        self, start: float, tick: int, skipped: int, memory: Memory, held: Outgoing
-    ) -> tuple[Memory, Outgoing]:
+        self, start: float, tick: int, skipped: int, state: SupervisorState, held: DriveCommand
+    ) -> tuple[SupervisorState, DriveCommand]:
         period, clock = self._envelope.period, self._clock
         deadline = start + tick * period
         woke = clock.wait_until(deadline)
@@ -103,25 +108,25 @@ class ControlLoop:
         replied = clock.now()
         self._remember(tick, deadline, exchange)
         step = self._step(tick, deadline)
-        seen = Observation(
+        seen = SupervisorInput(
             deadline,
             woke - deadline + skipped * period,
             exchange.replies,
             None if self._complaint else step.torque,
-            self._operator(tick, memory),
+            self._operator(tick, state),
             self._sequence.finished,
         )
-        after, outgoing = supervise(self._envelope, memory, seen)
+        after, outgoing = supervise(self._envelope, state, seen)
         if outgoing != held:
             self._link.send(outgoing)
         sent = clock.now()
-        if after.state is not memory.state:
+        if after.state is not state.state:
             self._note(after, deadline - start)
-        timings = rows.Timings(
+        timings = telemetry.Timings(
             woke - deadline, replied - woke, sent - replied, sent - deadline, skipped
         )
         self._box.row(
-            rows.row(
+            telemetry.row(
                 deadline - start,
                 step,
                 after,
@@ -142,11 +147,11 @@ class ControlLoop:
             if ago > 0:
                 self._samples.put(tick - ago, joint, reply)
 
-    def _step(self, tick: int, time: float) -> Step:
+    def _step(self, tick: int, time: float) -> SequenceStep:
         """Ask the sequence; an error of the controller becomes a complaint, never a crash."""
         sequence = self._sequence
         if self._complaint:
-            return Step((0.0, 0.0), sequence.command(time), Phase.DONE)
+            return SequenceStep((0.0, 0.0), sequence.command(time), Part.DONE)
         try:
             measurement = None
             if self._samples.complete():
@@ -155,29 +160,29 @@ class ControlLoop:
         except Exception as error:
             self._complaint = f"{type(error).__name__}: {error}"
             self._box.event(time_s=time, controller_error=self._complaint)
-            return Step((0.0, 0.0), sequence.command(time), Phase.DONE)
+            return SequenceStep((0.0, 0.0), sequence.command(time), Part.DONE)
 
-    def _operator(self, tick: int, memory: Memory) -> Operator:
+    def _operator(self, tick: int, state: SupervisorState) -> Operator:
         if self._stop.is_set():
             return Operator.STOP
-        if memory.state is State.DISARMED and tick >= _WARM_TICKS:
+        if state.state is State.DISARMED and tick >= _WARM_TICKS:
             return Operator.ARM
-        return Operator.NO_NOISE
+        return Operator.NOTHING
 
-    def _note(self, memory: Memory, time: float) -> None:
+    def _note(self, state: SupervisorState, time: float) -> None:
         """Record a transition; begin the sequence with it."""
         self._box.event(
             time_s=time,
-            state=memory.state.name.lower(),
-            reason=memory.cause.reason.name.lower(),
-            sentence=str(memory.cause),
+            state=state.state.name.lower(),
+            reason=state.cause.reason.name.lower(),
+            sentence=str(state.cause),
         )
-        if memory.state is State.RUNNING:
-            posture = np.array([reply.position for reply in memory.counts.last if reply])
-            self._sequence.begin(memory.since, posture)
+        if state.state is State.RUNNING:
+            posture = np.array([reply.position for reply in state.counts.last if reply])
+            self._sequence.begin(state.since, posture)
 
-    def _own_columns(self, step: Step) -> list[float]:
-        if step.phase is not Phase.HOP or self._complaint:
+    def _own_columns(self, step: SequenceStep) -> list[float]:
+        if step.phase is not Part.HOP or self._complaint:
             return [math.nan] * len(self._internals)
         internals = self._sequence.controller.internals()
         return [float(internals[name][0]) for name in self._internals]

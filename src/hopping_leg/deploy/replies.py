@@ -7,9 +7,8 @@ from typing import Any
 from moteus.protocol import Register, parse_reply
 
 from hopping_leg.deploy.drive_clock import DriveClock
-from hopping_leg.deploy.link import Exchange
-from hopping_leg.deploy.observation import Reply
-from hopping_leg.deploy.wire import JointWire
+from hopping_leg.deploy.drive_link import Exchange, Reply
+from hopping_leg.deploy.joint_transform import JointTransform
 
 
 class Question:
@@ -18,15 +17,18 @@ class Question:
     Lives between two threads: the client's puts frames in, the loop's waits for ``done``.
 
     Args:
-        wires: Of both joints.
+        transforms: Of both joints.
         clocks: Of both drives; shared from tick to tick.
         asked: When it leaves, s.
     """
 
     def __init__(
-        self, wires: tuple[JointWire, JointWire], clocks: tuple[DriveClock, ...], asked: float
+        self,
+        transforms: tuple[JointTransform, JointTransform],
+        clocks: tuple[DriveClock, ...],
+        asked: float,
     ) -> None:
-        self._wires, self._clocks, self._asked = wires, clocks, asked
+        self._transforms, self._clocks, self._asked = transforms, clocks, asked
         self._fresh: list[Reply | None] = [None, None]
         self._late: list[tuple[int, Reply]] = []
         self.done = threading.Event()
@@ -41,7 +43,7 @@ class Question:
         """
         if self._fresh[joint] is not None:
             return False
-        reply = read_reply(frame.data, self._wires[joint], self._clocks[joint], now)
+        reply = read_reply(frame.data, self._transforms[joint], self._clocks[joint], now)
         if reply is None:
             return False
         if not DriveClock.fresh(reply.taken, self._asked):
@@ -58,12 +60,14 @@ class Question:
         return Exchange((hip, knee), tuple(self._late))
 
 
-def read_reply(data: bytes, wire: JointWire, clock: DriveClock, now: float) -> Reply | None:
+def read_reply(
+    data: bytes, transform: JointTransform, clock: DriveClock, now: float
+) -> Reply | None:
     """Return the state that a frame reports.
 
     Args:
         data: The frame's payload.
-        wire: Of the joint.
+        transform: Of the joint.
         clock: Of the drive.
         now: When the frame arrived, s.
 
@@ -84,9 +88,9 @@ def read_reply(data: bytes, wire: JointWire, clock: DriveClock, now: float) -> R
     if taken is None or not math.isfinite(taken):
         return None
     return Reply(
-        wire.joint_position(position),
-        wire.joint_velocity(velocity),
-        wire.joint_torque(torque),
+        transform.joint_position(position),
+        transform.joint_velocity(velocity),
+        transform.joint_torque(torque),
         mode,
         fault,
         float(voltage),

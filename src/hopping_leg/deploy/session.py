@@ -14,17 +14,17 @@ from typing import Any
 
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.protocol import Controller
-from hopping_leg.deploy.black_box import SUFFIX, BlackBox, recover
 from hopping_leg.deploy.clock import Clock, RealClock
+from hopping_leg.deploy.drive_link import Action
 from hopping_leg.deploy.driver import MoteusLink
-from hopping_leg.deploy.envelope import Envelope
-from hopping_leg.deploy.loop import ControlLoop, Outcome
-from hopping_leg.deploy.observation import Action
+from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorder, recover
+from hopping_leg.deploy.loop import ControlLoop, LoopOutcome
+from hopping_leg.deploy.motion_sequence import MotionSequence, Part
 from hopping_leg.deploy.realtime import keeping_time
-from hopping_leg.deploy.reasons import Reason
-from hopping_leg.deploy.rows import columns
-from hopping_leg.deploy.sequence import Phase, Sequence
+from hopping_leg.deploy.safety_limits import SafetyLimits
+from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.supervisor import State
+from hopping_leg.deploy.telemetry import columns
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import Trace
 
@@ -42,7 +42,7 @@ class Performance:
         notices: What the computer did not permit.
     """
 
-    outcome: Outcome
+    outcome: LoopOutcome
     trace: Trace
     path: Path
     notices: tuple[str, ...]
@@ -50,8 +50,8 @@ class Performance:
 
 def perform(
     link: MoteusLink,
-    sequence: Sequence,
-    envelope: Envelope,
+    sequence: MotionSequence,
+    limits: SafetyLimits,
     path: Path,
     header: dict[str, Any],
     *,
@@ -64,7 +64,7 @@ def perform(
     Args:
         link: To drives that were found fit.
         sequence: What the leg does.
-        envelope: The supervisor's limits.
+        limits: The supervisor's limits.
         path: Of the trace; the black box lies beside it as long as the run lasts.
         header: Of the trace.
         clock: The time; none takes the computer's.
@@ -75,8 +75,8 @@ def perform(
         TraceError: The black box cannot be written.
     """
     box_path = path.with_suffix(SUFFIX)
-    box = BlackBox(box_path, columns(sequence.controller), header)
-    loop = ControlLoop(link, sequence, envelope, box, clock or RealClock())
+    box = FlightRecorder(box_path, columns(sequence.controller), header)
+    loop = ControlLoop(link, sequence, limits, box, clock or RealClock())
     notices: tuple[str, ...] = ()
     try:
         with _stopped_by_signals(loop), beside(loop), keeping_time(realtime=realtime) as notices:
@@ -104,7 +104,7 @@ def header_of(robot: Robot, controller: Controller, rate: float, **facts: Any) -
         "versions": _versions(),
         "codes": {
             "state": _names(State),
-            "part": _names(Phase),
+            "part": _names(Part),
             "action": _names(Action),
             "reason": _names(Reason),
         },
@@ -123,7 +123,7 @@ def new_path(folder: Path, name: str) -> Path:
     return path
 
 
-def _run(loop: ControlLoop) -> Outcome:
+def _run(loop: ControlLoop) -> LoopOutcome:
     """Run a loop in a thread of its own; hand its result, or its error, on."""
     with concurrent.futures.ThreadPoolExecutor(1, "control-loop") as threads:
         future = threads.submit(loop.run)

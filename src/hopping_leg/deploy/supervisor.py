@@ -12,20 +12,16 @@ latched.
 from dataclasses import dataclass
 from enum import IntEnum
 
-from hopping_leg.deploy.checks import Cause, Counts, find_cause
-from hopping_leg.deploy.envelope import Envelope
-from hopping_leg.deploy.observation import (
-    BRAKE,
-    LIMP,
-    STOP,
-    Action,
-    DriveMode,
-    Observation,
+from hopping_leg.deploy.drive_link import BRAKE, LIMP, STOP, Action, DriveCommand, DriveMode, Pair
+from hopping_leg.deploy.safety_limits import SafetyLimits
+from hopping_leg.deploy.stop_reasons import (
+    Cause,
+    Counts,
     Operator,
-    Outgoing,
-    Pair,
+    Reason,
+    SupervisorInput,
+    find_cause,
 )
-from hopping_leg.deploy.reasons import Reason
 
 
 class State(IntEnum):
@@ -43,7 +39,7 @@ _NO_COUNTS = Counts()
 
 
 @dataclass(frozen=True, slots=True)
-class Memory:
+class SupervisorState:
     """All that the supervisor remembers from tick to tick.
 
     Attributes:
@@ -61,79 +57,85 @@ class Memory:
     counts: Counts = _NO_COUNTS
 
 
-def supervise(envelope: Envelope, memory: Memory, seen: Observation) -> tuple[Memory, Outgoing]:
+def supervise(
+    limits: SafetyLimits, before: SupervisorState, seen: SupervisorInput
+) -> tuple[SupervisorState, DriveCommand]:
     """Decide a tick.
 
     Args:
-        envelope: The limits.
-        memory: From the last tick.
+        limits: The limits.
+        before: From the last tick.
         seen: At this tick.
 
     Returns:
         What to remember and what may leave: always finite and within the limits.
     """
-    counts = memory.counts.after(envelope, seen)
-    state, cause = _next(envelope, memory, counts, seen)
-    if state is memory.state:
-        memory = Memory(state, memory.since, memory.cause, memory.stop_cause, counts)
+    counts = before.counts.after(limits, seen)
+    state, cause = _next(limits, before, counts, seen)
+    if state is before.state:
+        before = SupervisorState(state, before.since, before.cause, before.stop_cause, counts)
     else:
-        stop_cause = cause if state is State.DAMPING else memory.stop_cause
-        memory = Memory(state, seen.time, cause, stop_cause, counts)
-    return memory, _outgoing(envelope, state, seen)
+        stop_cause = cause if state is State.DAMPING else before.stop_cause
+        before = SupervisorState(state, seen.time, cause, stop_cause, counts)
+    return before, _outgoing(limits, state, seen)
 
 
 def _next(
-    envelope: Envelope, memory: Memory, counts: Counts, seen: Observation
+    limits: SafetyLimits, before: SupervisorState, counts: Counts, seen: SupervisorInput
 ) -> tuple[State, Cause]:
     """Return the state after a tick and the cause of the change, if it is one."""
-    match memory.state:
+    match before.state:
         case State.DISARMED | State.STOPPED:
             if seen.operator is Operator.ARM:
                 return State.ARMING, Cause(Reason.OPERATOR_ARMED)
-            if seen.operator is Operator.STOP and memory.state is State.DISARMED:
+            if seen.operator is Operator.STOP and before.state is State.DISARMED:
                 return State.STOPPED, Cause(Reason.OPERATOR_STOP)
         case State.DAMPING:
-            return _calm_down(envelope, memory, seen)
+            return _calm_down(limits, before, seen)
         case State.ARMING | State.RUNNING:
-            arming = memory.state is State.ARMING
+            arming = before.state is State.ARMING
             if seen.operator is Operator.STOP:
                 return State.DAMPING, Cause(Reason.OPERATOR_STOP)
-            found = find_cause(envelope, memory.counts, counts, seen, arming=arming)
+            found = find_cause(limits, before.counts, counts, seen, arming=arming)
             if found is not None:
                 return State.DAMPING, found
             if arming:
-                return _arm(envelope, memory, seen)
+                return _arm(limits, before, seen)
             if seen.finished:
                 return State.DAMPING, Cause(Reason.FINISHED)
-    return memory.state, memory.cause
+    return before.state, before.cause
 
 
-def _arm(envelope: Envelope, memory: Memory, seen: Observation) -> tuple[State, Cause]:
+def _arm(
+    limits: SafetyLimits, before: SupervisorState, seen: SupervisorInput
+) -> tuple[State, Cause]:
     if all(reply is not None and reply.mode == DriveMode.TORQUE for reply in seen.replies):
         return State.RUNNING, Cause(Reason.DRIVES_READY)
-    if not seen.time - memory.since <= envelope.arming_time:
+    if not seen.time - before.since <= limits.arming_time:
         return State.DAMPING, Cause(Reason.ARMING_TOOK_TOO_LONG)
-    return State.ARMING, memory.cause
+    return State.ARMING, before.cause
 
 
-def _calm_down(envelope: Envelope, memory: Memory, seen: Observation) -> tuple[State, Cause]:
-    elapsed = seen.time - memory.since
+def _calm_down(
+    limits: SafetyLimits, before: SupervisorState, seen: SupervisorInput
+) -> tuple[State, Cause]:
+    elapsed = seen.time - before.since
     resting = all(
-        reply is not None and abs(reply.velocity) <= envelope.rest_speed for reply in seen.replies
+        reply is not None and abs(reply.velocity) <= limits.rest_speed for reply in seen.replies
     )
-    if resting and elapsed >= envelope.damping_least:
+    if resting and elapsed >= limits.damping_least:
         return State.STOPPED, Cause(Reason.CAME_TO_REST)
-    if not elapsed <= envelope.damping_most:
+    if not elapsed <= limits.damping_most:
         return State.STOPPED, Cause(Reason.DAMPED_LONG_ENOUGH)
-    return State.DAMPING, memory.cause
+    return State.DAMPING, before.cause
 
 
-def _outgoing(envelope: Envelope, state: State, seen: Observation) -> Outgoing:
+def _outgoing(limits: SafetyLimits, state: State, seen: SupervisorInput) -> DriveCommand:
     match state:
         case State.ARMING:
             return LIMP
         case State.RUNNING if seen.wanted is not None:
-            return Outgoing(Action.TORQUE, _clip(seen.wanted, envelope.torque))
+            return DriveCommand(Action.TORQUE, _clip(seen.wanted, limits.torque))
         case State.DAMPING:
             return BRAKE
     return STOP

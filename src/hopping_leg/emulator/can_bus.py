@@ -7,7 +7,7 @@ as well where there is one.
 import can
 
 from hopping_leg.emulator.frames import Frame
-from hopping_leg.emulator.outbox import Outgoing
+from hopping_leg.emulator.reply_queue import QueuedReply
 from hopping_leg.errors import UsageError
 
 UDP_MULTICAST = "udp_multicast"
@@ -81,7 +81,7 @@ class CanPort:
             frames.append(Frame(message.arbitration_id, bytes(message.data)))
         return frames
 
-    def send(self, item: Outgoing) -> None:
+    def send(self, item: QueuedReply) -> None:
         """Send a frame; noise and corrupted frames are discarded by CAN controllers."""
         if self._bus is None or item.frame is None or item.flip >= 0:
             return

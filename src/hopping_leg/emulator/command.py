@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from moteus.protocol import Register
 
-from hopping_leg.emulator.codes import Mode
+from hopping_leg.emulator.moteus_codes import MoteusMode
 
 _FIELDS = {
     Register.COMMAND_POSITION: "position",
@@ -41,7 +41,7 @@ COMMAND_FIELDS = {int(register): name for register, name in _FIELDS.items()}
 class Command:
     """One command; a mode write starts from these defaults. Units are the drive's: rev, s, N m."""
 
-    mode: Mode = Mode.STOPPED
+    mode: MoteusMode = MoteusMode.STOPPED
     position: float = 0.0
     """NaN leaves position alone."""
     velocity: float = 0.0

@@ -9,11 +9,11 @@ from dataclasses import dataclass, fields
 from moteus.multiplex import F32
 from moteus.protocol import Register, scale_register
 
-from hopping_leg.emulator.codes import CONTROLLING, MODES, Fault, Mode, Notice
 from hopping_leg.emulator.command import COMMAND_FIELDS, Command
 from hopping_leg.emulator.diagnostic import Diagnostic
 from hopping_leg.emulator.identity import Identity
 from hopping_leg.emulator.mode_machine import ModeMachine
+from hopping_leg.emulator.moteus_codes import CONTROLLING, MODES, FaultCode, MoteusMode, Notice
 from hopping_leg.emulator.rotor_encoder import RotorEncoder
 from hopping_leg.emulator.settings import Settings
 from hopping_leg.emulator.torque_law import TORQUE_CONSTANT, WITH_BOUNDS, TorqueLaw
@@ -43,7 +43,7 @@ class Disturbances:
     notice: int = 0
     """Limit notice shown whatever happens."""
     fault: int = 0
-    """Fault code that comes up as soon as the drive is powered."""
+    """FaultCode code that comes up as soon as the drive is powered."""
 
 
 class Drive:
@@ -127,7 +127,7 @@ class Drive:
     def _write_mode(self, mode: int) -> int:
         if mode not in MODES:
             return INVALID_VALUE
-        self.command = Command(Mode(mode))
+        self.command = Command(MoteusMode(mode))
         self._commanded = True
         return 0
 
@@ -141,7 +141,7 @@ class Drive:
 
     def stop(self, time: float) -> None:
         """Stop, as ``d stop`` does."""
-        self._write_mode(Mode.STOPPED)
+        self._write_mode(MoteusMode.STOPPED)
         self.commit(time)
 
     def sense(self, output: float, velocity: float, torque: float) -> None:
@@ -186,16 +186,16 @@ class Drive:
     def _control(self, dt: float) -> float:
         mode, command, law = self.machine.mode, self.command, self.law
         position, velocity = self.encoder.position, self._velocity
-        if mode is Mode.TIMEOUT:
-            mode = Mode(int(self.settings["servo.timeout_mode"]))
+        if mode is MoteusMode.TIMEOUT:
+            mode = MoteusMode(int(self.settings["servo.timeout_mode"]))
             command = Command(mode, position=math.nan, kd_scale=command.kd_scale)
-        if mode is Mode.POSITION:
+        if mode is MoteusMode.POSITION:
             torque = law.position(command, position, velocity, dt)
-        elif mode is Mode.ZERO_VELOCITY:
+        elif mode is MoteusMode.ZERO_VELOCITY:
             torque = law.zero_velocity(command.kd_scale, velocity)
-        elif mode is Mode.STAY_WITHIN:
+        elif mode is MoteusMode.STAY_WITHIN:
             torque = law.stay_within(command, position, velocity)
-        elif mode is Mode.BRAKE:
+        elif mode is MoteusMode.BRAKE:
             return -self._brake * velocity
         else:
             return 0.0
@@ -208,11 +208,11 @@ class Drive:
         if self.disturbances.fault:
             machine.trip(self.disturbances.fault)
         if self.voltage > float(settings["servo.max_voltage"]):
-            machine.trip(Fault.OVER_VOLTAGE)
+            machine.trip(FaultCode.OVER_VOLTAGE)
         if self.voltage < _LOWEST_VOLTAGE:
-            machine.trip(Fault.UNDER_VOLTAGE)
+            machine.trip(FaultCode.UNDER_VOLTAGE)
         if self.temperature > float(settings["servo.fault_temperature"]):
-            machine.trip(Fault.OVER_TEMPERATURE)
+            machine.trip(FaultCode.OVER_TEMPERATURE)
 
     def _outside_limits(self) -> bool:
         low, high = (float(self.settings[f"servopos.position_{end}"]) for end in ("min", "max"))

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hopping_leg.deploy.wire import JOINTS
+from hopping_leg.deploy.joint_transform import JOINTS
 from hopping_leg.emulator.settings import DEFAULTS
 from hopping_leg.errors import UsageError, unknown_name
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.deploy.wire import JointWire, wires
+from hopping_leg.deploy.joint_transform import JointTransform, joint_transforms
 from hopping_leg.robot.parameters import Joint, Robot
 from hopping_leg.sim import MujocoSimulator
 
@@ -32,7 +32,7 @@ class EmulatedLeg:
     def __init__(
         self, robot: Robot, q: Array, *, seed: int = 0, timestep: float = TIMESTEP
     ) -> None:
-        self.wires = wires(robot)
+        self.transforms = joint_transforms(robot)
         free = replace(robot, hip=_unlimited(robot.hip), knee=_unlimited(robot.knee))
         immediate = replace(robot.reality.latency, command=0.0, jitter=0.0)
         free = replace(free, reality=replace(robot.reality, latency=immediate))
@@ -74,12 +74,12 @@ class EmulatedLeg:
 
     def sensed(self, joint: int) -> tuple[float, float, float]:
         """Return what one motor's sensors see: position, rev, velocity, rev/s, torque, N m."""
-        wire: JointWire = self.wires[joint]
+        transform: JointTransform = self.transforms[joint]
         legs = self._legs
         return (
-            wire.motor_position(float(legs.measured_q[0, joint])),
-            wire.motor_velocity(float(legs.measured_qd[0, joint])),
-            wire.motor_torque(float(legs.measured_torque[0, joint])),
+            transform.motor_position(float(legs.measured_q[0, joint])),
+            transform.motor_velocity(float(legs.measured_qd[0, joint])),
+            transform.motor_torque(float(legs.measured_torque[0, joint])),
         )
 
     def step(self, motor_torque: tuple[float, float]) -> None:
@@ -91,8 +91,10 @@ class EmulatedLeg:
         Raises:
             mujoco.batch.SimulationError: Physics failed.
         """
-        for joint, (wire, torque) in enumerate(zip(self.wires, motor_torque, strict=True)):
-            self._torque[0, joint] = wire.joint_torque(torque)
+        for joint, (transform, torque) in enumerate(
+            zip(self.transforms, motor_torque, strict=True)
+        ):
+            self._torque[0, joint] = transform.joint_torque(torque)
         self._legs.step(self._torque)
 
 

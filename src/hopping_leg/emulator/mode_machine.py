@@ -8,7 +8,7 @@ timeout and fault leave only through stop
 
 import math
 
-from hopping_leg.emulator.codes import BETWEEN, CONTROLLING, Fault, Mode
+from hopping_leg.emulator.moteus_codes import BETWEEN, CONTROLLING, FaultCode, MoteusMode
 
 ENABLING_TIME = 0.001
 """From stopped to calibrating, s."""
@@ -16,22 +16,22 @@ ENABLING_TIME = 0.001
 STARTING_TIME = 0.0085
 """From stopped to the commanded mode, s."""
 
-_WATCHED = (Mode.POSITION, Mode.STAY_WITHIN)
+_WATCHED = (MoteusMode.POSITION, MoteusMode.STAY_WITHIN)
 
 
 class ModeMachine:
-    """Mode, fault and watchdog of one drive."""
+    """MoteusMode, fault and watchdog of one drive."""
 
     def __init__(self) -> None:
-        self.mode = Mode.STOPPED
+        self.mode = MoteusMode.STOPPED
         self.fault = 0
-        """Fault code; in other modes than fault, the notice of the last step."""
-        self.wanted = Mode.STOPPED
+        """FaultCode code; in other modes than fault, the notice of the last step."""
+        self.wanted = MoteusMode.STOPPED
         """What was commanded last."""
         self._started = 0.0
         self._deadline = math.inf
 
-    def command(self, mode: Mode, time: float, timeout: float) -> None:
+    def command(self, mode: MoteusMode, time: float, timeout: float) -> None:
         """Take a command.
 
         Args:
@@ -44,10 +44,10 @@ class ModeMachine:
         self.wanted = mode
         self._deadline = math.inf if math.isnan(timeout) else time + timeout
 
-    def trip(self, fault: Fault | int) -> None:
+    def trip(self, fault: FaultCode | int) -> None:
         """Go to fault; a drive that is stopped or in fault already takes no notice."""
-        if self.mode not in (Mode.STOPPED, Mode.FAULT):
-            self.mode, self.fault = Mode.FAULT, int(fault)
+        if self.mode not in (MoteusMode.STOPPED, MoteusMode.FAULT):
+            self.mode, self.fault = MoteusMode.FAULT, int(fault)
 
     def advance(self, time: float, *, outside_limits: bool = False) -> bool:
         """Let time pass.
@@ -62,25 +62,27 @@ class ModeMachine:
         before = self.mode
         if self.wanted != self.mode:
             self._change(time, outside_limits)
-        if self.mode is Mode.ENABLING and time >= self._started + ENABLING_TIME:
-            self.mode = Mode.CALIBRATING
-        if self.mode is Mode.CALIBRATING and time >= self._started + STARTING_TIME:
-            self.mode = Mode.CALIBRATED
+        if self.mode is MoteusMode.ENABLING and time >= self._started + ENABLING_TIME:
+            self.mode = MoteusMode.CALIBRATING
+        if self.mode is MoteusMode.CALIBRATING and time >= self._started + STARTING_TIME:
+            self.mode = MoteusMode.CALIBRATED
             self._change(time, outside_limits)
         if self.mode in _WATCHED and time >= self._deadline:
-            self.mode = Mode.TIMEOUT
-        if self.mode is not Mode.FAULT:
+            self.mode = MoteusMode.TIMEOUT
+        if self.mode is not MoteusMode.FAULT:
             self.fault = 0
-        return self.mode is not before and self.mode in CONTROLLING and self.mode != Mode.TIMEOUT
+        return (
+            self.mode is not before and self.mode in CONTROLLING and self.mode != MoteusMode.TIMEOUT
+        )
 
     def _change(self, time: float, outside_limits: bool) -> None:
-        if self.wanted is Mode.STOPPED:
-            self.mode = Mode.STOPPED
-        elif self.mode is Mode.STOPPED:
-            self.mode, self._started = Mode.ENABLING, time
-        elif self.mode is Mode.CALIBRATED or (
-            self.mode in CONTROLLING and self.mode is not Mode.TIMEOUT
+        if self.wanted is MoteusMode.STOPPED:
+            self.mode = MoteusMode.STOPPED
+        elif self.mode is MoteusMode.STOPPED:
+            self.mode, self._started = MoteusMode.ENABLING, time
+        elif self.mode is MoteusMode.CALIBRATED or (
+            self.mode in CONTROLLING and self.mode is not MoteusMode.TIMEOUT
         ):
             self.mode = self.wanted
             if self.wanted in _WATCHED and outside_limits:
-                self.trip(Fault.START_OUTSIDE_LIMIT)
+                self.trip(FaultCode.START_OUTSIDE_LIMIT)

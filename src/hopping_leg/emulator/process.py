@@ -159,9 +159,9 @@ def _obey(pipe: Connection, robot: EmulatedRobot, server: Server) -> bool:
         while pipe.poll():
             wish = pipe.recv()
             if isinstance(wish, Fault):
-                robot.misfortune.add(wish)
+                robot.fault_injector.add(wish)
             if wish == "record":
-                pipe.send(Record(robot.log, tuple(robot.misfortune.log)))
+                pipe.send(Record(robot.log, tuple(robot.fault_injector.log)))
             else:
                 pipe.send(_state(robot, server))
     except (EOFError, OSError):
@@ -180,5 +180,5 @@ def _state(robot: EmulatedRobot, server: Server) -> State:
         qd=(float(qd[0]), float(qd[1])),
         height=robot.leg.height,
         lost=server.lost,
-        flown=robot.misfortune.flown,
+        flown=robot.fault_injector.flown,
     )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from hopping_leg.emulator.frames import Frame
 from hopping_leg.emulator.line_protocol import LineProtocol, received_line
-from hopping_leg.emulator.outbox import Outgoing
+from hopping_leg.emulator.reply_queue import QueuedReply
 
 
 class PtyPort:
@@ -72,7 +72,7 @@ class PtyPort:
                 self._write(item)
         return frames
 
-    def send(self, item: Outgoing) -> None:
+    def send(self, item: QueuedReply) -> None:
         """Send what is due as a line."""
         if item.frame is None:
             self._write(item.noise + b"\r\n")

@@ -11,15 +11,15 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.deploy.configuration import wanted
-from hopping_leg.deploy.wire import JOINTS
+from hopping_leg.deploy.joint_transform import JOINTS
 from hopping_leg.emulator import bus
 from hopping_leg.emulator.drive import Drive
+from hopping_leg.emulator.fault_injection import FaultInjector
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.frames import Frame
 from hopping_leg.emulator.identity import Identity
 from hopping_leg.emulator.leg import TIMESTEP, EmulatedLeg
-from hopping_leg.emulator.misfortune import Misfortune
-from hopping_leg.emulator.outbox import Outbox
+from hopping_leg.emulator.reply_queue import ReplyQueue
 from hopping_leg.emulator.settings import Settings
 from hopping_leg.emulator.wire_log import WireLog
 from hopping_leg.robot.parameters import Robot
@@ -69,14 +69,14 @@ class EmulatedRobot:
             drive.boot(position)
             if homed:
                 drive.encoder.set_nearest(position)
-        self.outbox = Outbox()
+        self.reply_queue = ReplyQueue()
         """What is on its way to the host."""
         self.wire_time = 0.0
         """What a reply takes at least, s."""
         self.log = WireLog()
         """What went over the wire."""
         self._sense()
-        self.misfortune = Misfortune(self, faults, self._rng)
+        self.fault_injector = FaultInjector(self, faults, self._rng)
 
     def advance(self, until: float) -> None:
         """Simulate whole steps up to a time, s."""
@@ -84,7 +84,7 @@ class EmulatedRobot:
             self._step()
 
     def receive(self, frame: Frame) -> None:
-        """Take a frame from the host now; the drives' answers go to the outbox.
+        """Take a frame from the host now; the drives' answers go to the reply_queue.
 
         Where the robot's ``reality`` has a latency of commands, the frame acts later but is
         answered at once.
@@ -101,10 +101,10 @@ class EmulatedRobot:
             self.log.told(self.time, joint, message, drive)
             if answer is not None:
                 self.log.answered(self.time, joint, answer)
-                self.misfortune.send(answer, joint, self.outbox)
+                self.fault_injector.send(answer, joint, self.reply_queue)
 
     def _step(self) -> None:
-        self.misfortune.step()
+        self.fault_injector.step()
         while self._due and self._due[0][0] <= self.time:
             message = heapq.heappop(self._due)[2]
             for drive in self.drives:

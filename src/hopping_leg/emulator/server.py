@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from hopping_leg.emulator.frames import Frame
-from hopping_leg.emulator.outbox import Outgoing
+from hopping_leg.emulator.reply_queue import QueuedReply
 from hopping_leg.emulator.robot import EmulatedRobot
 
 _IDLE = 0.001
@@ -36,7 +36,7 @@ class Port(Protocol):
         """Return frames that the host sent."""
         ...
 
-    def send(self, item: Outgoing) -> None:
+    def send(self, item: QueuedReply) -> None:
         """Send to the host."""
         ...
 
@@ -83,7 +83,7 @@ class Server:
         self.on_turn()
 
     def _patience(self) -> float:
-        due = self.robot.outbox.next_due()
+        due = self.robot.reply_queue.next_due()
         return _IDLE if due is None else min(max(due - self.robot.time, 0.0), _IDLE)
 
     def _catch_up(self) -> None:
@@ -110,11 +110,11 @@ def serve(robot: EmulatedRobot, port: Port, *, ready: bool) -> bool:
     if ready and port.plugged:
         for frame in port.receive():
             robot.receive(frame)
-    items = robot.outbox.take(robot.time)
+    items = robot.reply_queue.take(robot.time)
     for item in items:
         if port.plugged:
             port.send(item)
-    plugged = robot.misfortune.plugged
+    plugged = robot.fault_injector.plugged
     if plugged == port.plugged:
         return bool(items)
     if plugged:

@@ -2,10 +2,10 @@
 
 import math
 
-from hopping_leg.deploy.wire import JOINTS
-from hopping_leg.emulator.codes import Fault, Mode, Notice
+from hopping_leg.deploy.joint_transform import JOINTS
 from hopping_leg.emulator.drive import Drive
 from hopping_leg.emulator.faults import KINDS
+from hopping_leg.emulator.moteus_codes import FaultCode, MoteusMode, Notice
 from hopping_leg.emulator.robot import EmulatedRobot
 
 
@@ -18,9 +18,9 @@ def status_line(robot: EmulatedRobot, lost: float) -> str:
     """
     parts = [f"{robot.time:7.1f} s"]
     for joint, (name, drive) in enumerate(zip(JOINTS, robot.drives, strict=True)):
-        wire = robot.leg.wires[joint]
+        transform = robot.leg.transforms[joint]
         _, _, torque = robot.leg.sensed(joint)
-        given = wire.joint_torque(torque) if drive.active else 0.0
+        given = transform.joint_torque(torque) if drive.active else 0.0
         angle = math.degrees(robot.leg.q[joint])
         parts.append(f"{name} {mode_text(drive):<12} {angle:+7.1f} deg {given:+6.2f} N m")
     held = " held" if robot.held else ""
@@ -33,13 +33,13 @@ def status_line(robot: EmulatedRobot, lost: float) -> str:
 def mode_text(drive: Drive) -> str:
     """Return a drive's mode, with its fault or notice."""
     mode, code = drive.machine.mode, drive.machine.fault
-    text = Mode(mode).name.lower().replace("_", " ")
+    text = MoteusMode(mode).name.lower().replace("_", " ")
     return f"{text} {code}" if code else text
 
 
 def code_text(code: int) -> str:
     """Return what a fault code or notice means."""
-    for kind in (Fault, Notice):
+    for kind in (FaultCode, Notice):
         if code in set(kind):
             return kind(code).name.lower().replace("_", " ")
     return "unknown"
@@ -61,15 +61,15 @@ class Events:
         """Return a line for all that happened since the last call."""
         robot = self._robot
         lines = []
-        for time, fault in robot.misfortune.log[self._told :]:
+        for time, fault in robot.fault_injector.log[self._told :]:
             who = "" if fault.kind == "unplug" else f" ({fault.drive})"
             lines.append(f"{time:7.3f} s  fault: {KINDS[fault.kind].text}{who}")
-        self._told = len(robot.misfortune.log)
+        self._told = len(robot.fault_injector.log)
         for joint, drive in enumerate(robot.drives):
             mode = drive.machine.mode
             if mode is not self._modes[joint]:
                 self._modes[joint] = mode
                 code = drive.machine.fault
-                why = f": {code_text(code)}" if mode is Mode.FAULT else ""
+                why = f": {code_text(code)}" if mode is MoteusMode.FAULT else ""
                 lines.append(f"{robot.time:7.3f} s  {JOINTS[joint]}: {mode_text(drive)}{why}")
         return lines

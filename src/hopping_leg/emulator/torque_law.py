@@ -5,8 +5,8 @@ The integral term, flux braking and power limits are left out: a qdd100 has none
 
 import math
 
-from hopping_leg.emulator.codes import Mode, Notice
 from hopping_leg.emulator.command import Command
+from hopping_leg.emulator.moteus_codes import MoteusMode, Notice
 from hopping_leg.emulator.settings import Settings
 
 TORQUE_CONSTANT = 0.0275
@@ -140,5 +140,11 @@ class TorqueLaw:
             self.control_position = max(self.control_position, low)
 
 
-WITH_BOUNDS = (Mode.POSITION, Mode.STAY_WITHIN, Mode.ZERO_VELOCITY, Mode.TIMEOUT, Mode.CURRENT)
+WITH_BOUNDS = (
+    MoteusMode.POSITION,
+    MoteusMode.STAY_WITHIN,
+    MoteusMode.ZERO_VELOCITY,
+    MoteusMode.TIMEOUT,
+    MoteusMode.CURRENT,
+)
 """Modes in which the position limits take outward torque away."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from moteus.multiplex import RegisterSubframe, SubframeType
 from moteus.protocol import Register, parse_reply
 
-from hopping_leg.emulator.codes import MODES, Mode
+from hopping_leg.emulator.moteus_codes import MODES, MoteusMode
 
 if TYPE_CHECKING:
     from hopping_leg.emulator.bus import Message
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class CommandEvent:
     """A command that wrote a drive's mode.
 
     Attributes:
@@ -33,13 +33,13 @@ class Told:
 
     time: float
     joint: int
-    mode: Mode
+    mode: MoteusMode
     torque: float
     most: float
 
 
 @dataclass(frozen=True, slots=True)
-class Answered:
+class ReplyEvent:
     """The state that a drive's answer tells, rounded as it travels.
 
     Attributes:
@@ -53,14 +53,14 @@ class Answered:
 
     time: float
     joint: int
-    mode: Mode
+    mode: MoteusMode
     fault: int
     voltage: float
     temperature: float
 
 
 @dataclass(frozen=True, slots=True)
-class Changed:
+class ModeChange:
     """A drive's change of mode.
 
     Attributes:
@@ -71,7 +71,7 @@ class Changed:
 
     time: float
     joint: int
-    mode: Mode
+    mode: MoteusMode
 
 
 _TOLD = (Register.MODE, Register.FAULT, Register.VOLTAGE, Register.TEMPERATURE)
@@ -86,10 +86,10 @@ class WireLog:
     """Commands, answers and changes of mode in the order of time; the oldest are forgotten."""
 
     def __init__(self) -> None:
-        self.commands: deque[Told] = deque(maxlen=_REMEMBERED)
-        self.answers: deque[Answered] = deque(maxlen=_REMEMBERED)
-        self.changes: deque[Changed] = deque(maxlen=_REMEMBERED)
-        self._modes = [Mode.STOPPED, Mode.STOPPED]
+        self.commands: deque[CommandEvent] = deque(maxlen=_REMEMBERED)
+        self.answers: deque[ReplyEvent] = deque(maxlen=_REMEMBERED)
+        self.changes: deque[ModeChange] = deque(maxlen=_REMEMBERED)
+        self._modes = [MoteusMode.STOPPED, MoteusMode.STOPPED]
 
     def told(self, time: float, joint: int, message: "Message", drive: "Drive") -> None:
         """Note what a message commands a drive, if it does."""
@@ -98,13 +98,13 @@ class WireLog:
             if not isinstance(s, RegisterSubframe) or s.type is not SubframeType.WRITE:
                 continue
             if s.register == Register.MODE and s.value in MODES:
-                mode = Mode(int(s.value or 0))
+                mode = MoteusMode(int(s.value or 0))
             elif s.register == Register.COMMAND_FEEDFORWARD_TORQUE:
                 torque = float(s.value or 0.0)
             elif s.register == Register.COMMAND_POSITION_MAX_TORQUE:
                 most = float(s.value or 0.0)
         if mode is not None:
-            self.commands.append(Told(time, joint, mode, torque, most))
+            self.commands.append(CommandEvent(time, joint, mode, torque, most))
 
     def answered(self, time: float, joint: int, answer: "Frame") -> None:
         """Note a drive's answer, if it tells the drive's state."""
@@ -112,7 +112,7 @@ class WireLog:
         if values.keys() >= _STATE:
             mode, fault, voltage, temperature = (values[register] for register in _TOLD)
             self.answers.append(
-                Answered(time, joint, Mode(int(mode)), int(fault), voltage, temperature)
+                ReplyEvent(time, joint, MoteusMode(int(mode)), int(fault), voltage, temperature)
             )
 
     def stepped(self, time: float, joint: int, drive: "Drive") -> None:
@@ -120,4 +120,4 @@ class WireLog:
         mode = drive.machine.mode
         if mode is not self._modes[joint]:
             self._modes[joint] = mode
-            self.changes.append(Changed(time, joint, mode))
+            self.changes.append(ModeChange(time, joint, mode))

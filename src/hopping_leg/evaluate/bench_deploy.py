@@ -19,9 +19,9 @@ from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.driver import MoteusLink
-from hopping_leg.deploy.envelope import hopping_envelope
+from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
+from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.schedule import Schedule
-from hopping_leg.deploy.sequence import Phase, Sequence, Timing, hopping_poses
 from hopping_leg.deploy.session import Performance, header_of, perform
 from hopping_leg.deploy.transport import opener
 from hopping_leg.emulator.lockstep import Lockstep
@@ -125,7 +125,7 @@ def _real_time(study: Study, robot: Robot, on_progress: Callable[[str], None]) -
         traces.append(hopping)
         rows += apexes_of(performance.trace, truth)
         done += hopping.table.height / CONTROL_RATE
-        cause = performance.outcome.memory.stop_cause
+        cause = performance.outcome.supervisor.stop_cause
         if cause.reason.name != "FINISHED":
             stops.append(str(cause))
     return {
@@ -187,26 +187,28 @@ def _in_lockstep(study: Study, robot: Robot, height: float) -> float | None:
     return _median([apex for _, apex in apexes_of(performance.trace, truth)])
 
 
-def _sequence(study: Study, robot: Robot, schedule: Schedule, seconds: float) -> Sequence:
+def _sequence(study: Study, robot: Robot, schedule: Schedule, seconds: float) -> MotionSequence:
     controller = load_controller(study.controller, robot)
     limiter = SoftLimiter(robot, SoftLimits())
-    return Sequence(controller, schedule, hopping_poses(robot), limiter, Timing(hop=seconds))
+    return MotionSequence(
+        controller, schedule, hopping_poses(robot), limiter, SequenceTiming(hop=seconds)
+    )
 
 
 def _perform(
     link: MoteusLink,
-    sequence: Sequence,
+    sequence: MotionSequence,
     robot: Robot,
     path: Path,
     **options: Any,  # noqa: ANN401
 ) -> Performance:
-    envelope = hopping_envelope(robot, CONTROL_RATE)
+    envelope = hopping_limits(robot, CONTROL_RATE)
     header = header_of(robot, sequence.controller, CONTROL_RATE)
     return perform(link, sequence, envelope, path, header, **options)
 
 
 def _hopping(trace: Trace) -> Trace:
-    return Trace(trace.table.filter(trace.table["part"] == Phase.HOP), trace.header)
+    return Trace(trace.table.filter(trace.table["part"] == Part.HOP), trace.header)
 
 
 def _ticks(traces: list[Trace]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.signal import find_peaks
 
-from hopping_leg.deploy.sequence import Phase
+from hopping_leg.deploy.motion_sequence import Part
 from hopping_leg.emulator.process import EmulatorProcess
 from hopping_leg.evaluate.metrics import START_SECONDS
 from hopping_leg.hop_detection import BOUNCE, FLIGHT_CLEARANCE
@@ -63,10 +63,10 @@ def apexes_of(trace: Trace, truth: Truth) -> list[tuple[float, float]]:
     time, part, command = (trace.column(name) for name in ("time_s", "part", "command_m"))
     at = np.array(truth.time)[peaks] - truth.time[-1] + time[-1]
     tick = np.clip(np.searchsorted(time, at), 0, len(time) - 1)
-    switches = time[np.flatnonzero(np.diff(np.where(part == Phase.HOP, command, 0.0)))]
+    switches = time[np.flatnonzero(np.diff(np.where(part == Part.HOP, command, 0.0)))]
     found = []
     for peak, index in zip(peaks, tick, strict=True):
         since = time[index] - switches[switches <= time[index]]
-        if part[index] == Phase.HOP and len(since) and since.min() >= START_SECONDS:
+        if part[index] == Part.HOP and len(since) and since.min() >= START_SECONDS:
             found.append((float(command[index]), float(height[peak])))
     return found

@@ -8,7 +8,7 @@ from importlib.metadata import version
 from typing import Any
 
 from hopping_leg.controllers import RolloutConfig
-from hopping_leg.deploy.envelope import hopping_envelope
+from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range
 from hopping_leg.evaluate.pooling import pool_group
@@ -145,7 +145,7 @@ def _note_left_out(
 
 def _note_stopped(label: str, runs: Sequence[Run], setup: RolloutConfig) -> list[str]:
     """Say so where the supervisor of the real leg would not let a controller hop on."""
-    limits = hopping_envelope(setup.robot, setup.rate)
+    limits = hopping_limits(setup.robot, setup.rate)
     stopped = 0
     for run in runs:
         angles = [run.trace.column(f"{joint}_position_rad") for joint in ("hip", "knee")]

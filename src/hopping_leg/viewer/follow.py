@@ -4,8 +4,7 @@ from pathlib import Path
 
 import polars as pl
 
-from hopping_leg.deploy.black_box import SUFFIX
-from hopping_leg.deploy.box_tail import BoxTail
+from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorderTail
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import CONTROL_RATE
@@ -44,7 +43,7 @@ class Follow:
         self.notices: list[str] = []
         self.now = 0.0
         self._path, self._robot = path, robot
-        self._tail: BoxTail | None = None
+        self._tail: FlightRecorderTail | None = None
         self._over = False
         self._wait = 0.0
         if path.is_dir():
@@ -85,7 +84,7 @@ class Follow:
             return
         if self._tail is not None:
             self._tail.close()
-        self._tail, self._over, self.tracks, self.now = BoxTail(newest), False, [], 0.0
+        self._tail, self._over, self.tracks, self.now = FlightRecorderTail(newest), False, [], 0.0
         self.notices.append(f"Following {newest.name}.")
 
     def _newest(self) -> Path | None:
@@ -95,7 +94,7 @@ class Follow:
         boxes = [(box.stat().st_mtime_ns, box) for box in self._path.glob(f"*{SUFFIX}")]
         return max(boxes)[1] if boxes else None
 
-    def _track(self, tail: BoxTail) -> Track:
+    def _track(self, tail: FlightRecorderTail) -> Track:
         name = self._robot or str(tail.header.get("robot", ""))
         try:
             robot = load_robot(name)

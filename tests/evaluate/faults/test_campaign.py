@@ -5,7 +5,7 @@ import pytest
 
 from hopping_leg.cli import main
 from hopping_leg.deploy import loop
-from hopping_leg.deploy.observation import Action, Outgoing
+from hopping_leg.deploy.drive_link import Action, DriveCommand
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.faults.campaign import Campaign, play_case, run_campaign
 from hopping_leg.evaluate.faults.case import Case
@@ -104,7 +104,7 @@ def test_an_unsafe_host_is_found_out(monkeypatch, torque, word):
         ticks.append(memory.state)
         stopped = outgoing.action is not Action.TORQUE and len(ticks) > 100
         if stopped and len(ticks) % 3 == 0:
-            return Outgoing(Action.TORQUE, torque)
+            return DriveCommand(Action.TORQUE, torque)
         return outgoing
 
     unsafe(monkeypatch, change)

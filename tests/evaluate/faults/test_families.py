@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from hopping_leg.deploy.reasons import Reason
+from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.emulator.faults import KINDS
 from hopping_leg.evaluate.faults.families import FAMILIES, HOP_SECONDS
 from hopping_leg.evaluate.faults.live import LIVE

@@ -2,7 +2,7 @@
 
 import pytest
 
-from hopping_leg.deploy.black_box import SUFFIX, BlackBox
+from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorder
 from hopping_leg.evaluate.faults.live import _gave_up
 
 
@@ -10,7 +10,7 @@ from hopping_leg.evaluate.faults.live import _gave_up
     ("reason", "slow"), [("loop_stalled", True), ("drive_fault", False), (None, False)]
 )
 def test_a_host_that_was_too_slow_had_given_up_before_its_death(tmp_path, reason, slow):
-    box = BlackBox(tmp_path / f"run{SUFFIX}", ("time_s",), {})
+    box = FlightRecorder(tmp_path / f"run{SUFFIX}", ("time_s",), {})
     box.row((0.0,))
     if reason:
         box.event(reason=reason)

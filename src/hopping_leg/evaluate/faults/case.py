@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.deploy.bring_up import judge, require
 from hopping_leg.deploy.clock import Clock
+from hopping_leg.deploy.drive_info import inspect
 from hopping_leg.deploy.driver import MoteusLink
-from hopping_leg.deploy.envelope import hopping_envelope
-from hopping_leg.deploy.inspection import inspect
-from hopping_leg.deploy.reasons import Reason
+from hopping_leg.deploy.motion_sequence import MotionSequence, SequenceTiming, hopping_poses
+from hopping_leg.deploy.preflight import judge, require
+from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.schedule import Schedule
-from hopping_leg.deploy.sequence import Sequence, Timing, hopping_poses
 from hopping_leg.deploy.session import Performance, header_of, perform
+from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.start import Start
 from hopping_leg.evaluate.faults.families import Family, Mishap
@@ -28,7 +28,7 @@ from hopping_leg.sim import CONTROL_RATE
 HEIGHTS = (0.25, 0.30, 0.35)
 """Commanded heights, m; each trial takes one."""
 
-_TIMING = Timing(hop=0.0, rise=0.3, settle=0.1, sink=0.3, fade=0.1)
+_TIMING = SequenceTiming(hop=0.0, rise=0.3, settle=0.1, sink=0.3, fade=0.1)
 _FIRST_HOP = 0.6
 """Time that the first lift-off may take, s."""
 _AFTERWARDS = 0.3
@@ -107,7 +107,7 @@ class Scene:
             robot=case.robot,
             seed=int(rng.integers(1 << 30)),
         )
-        self.envelope = hopping_envelope(robot, CONTROL_RATE)
+        self.envelope = hopping_limits(robot, CONTROL_RATE)
         self.limits = Limits.of(robot, self.envelope)
         self.height = float(rng.choice(HEIGHTS))
         self.checksums = bool(rng.random() < 0.5)
@@ -132,7 +132,7 @@ class Scene:
             KeyboardInterrupt: A signal stopped the leg.
         """
         controller = load_controller(self.case.controller, self.robot)
-        sequence = Sequence(
+        sequence = MotionSequence(
             controller,
             Schedule(((self.height, 100.0),)),
             hopping_poses(self.robot),
@@ -149,7 +149,7 @@ class Scene:
             clock=clock,
             realtime=realtime,
         )
-        memory = done.outcome.memory
+        memory = done.outcome.supervisor
         if Reason.OPERATOR_STOP in (memory.cause.reason, memory.stop_cause.reason):
             raise KeyboardInterrupt
         return done

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hopping_leg.deploy.reasons import FAULTS, Reason
+from hopping_leg.deploy.stop_reasons import FAULTS, Reason
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.start import Start
 

@@ -5,9 +5,9 @@ import signal
 import threading
 import time
 
-from hopping_leg.emulator.codes import CONTROLLING, Mode
 from hopping_leg.emulator.drive import Drive
 from hopping_leg.emulator.lockstep import Lockstep
+from hopping_leg.emulator.moteus_codes import CONTROLLING, MoteusMode
 
 _WATCHED = 0.1
 """How long the drives are watched after the host's death, s."""
@@ -63,7 +63,7 @@ class StruckClock:
         """
         robot = self._lockstep.robot
         struck = self._stall or self._dies or self._killed_after is not None
-        if struck and self.began is None and deadline >= robot.misfortune.flown + self._at:
+        if struck and self.began is None and deadline >= robot.fault_injector.flown + self._at:
             self.began = robot.time
             if self._killed_after is not None:
                 threading.Thread(target=_kill, args=(self._killed_after,), daemon=True).start()
@@ -88,9 +88,9 @@ class StruckClock:
 def _braking(drive: Drive) -> bool:
     """Whether a drive brakes by itself, or has no power on its windings."""
     machine, settings = drive.machine, drive.settings
-    if machine.mode is Mode.TIMEOUT:
-        return int(settings["servo.timeout_mode"]) == Mode.BRAKE
-    return machine.mode is Mode.BRAKE or machine.mode not in CONTROLLING
+    if machine.mode is MoteusMode.TIMEOUT:
+        return int(settings["servo.timeout_mode"]) == MoteusMode.BRAKE
+    return machine.mode is MoteusMode.BRAKE or machine.mode not in CONTROLLING
 
 
 def _kill(seconds: float) -> None:

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from hopping_leg.deploy.black_box import SUFFIX, recover
-from hopping_leg.deploy.reasons import Reason
+from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.deploy.session import Performance
+from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.supervisor import State
-from hopping_leg.emulator.codes import Mode
+from hopping_leg.emulator.moteus_codes import MoteusMode
 from hopping_leg.emulator.wire_log import WireLog
 from hopping_leg.errors import TraceError
 from hopping_leg.evaluate.faults.case import Result, Scene
@@ -37,7 +37,7 @@ def judge_wire(result: Result, scene: Scene, log: WireLog, modes: Sequence[int])
     result.reaction = reaction(log, scene.limits, result.began, jumped=jumped)
     if result.reaction is not None and math.isinf(result.reaction):
         result.problems.append("no safe command followed a bad answer")
-    if Mode.POSITION in modes:
+    if MoteusMode.POSITION in modes:
         result.problems.append("a drive is still in torque mode at the end")
 
 
@@ -49,7 +49,7 @@ def judge_trace(result: Result, done: Performance, reasons: Collection[Reason]) 
         done: The run.
         reasons: That are correct; any if empty.
     """
-    cause = done.outcome.memory.stop_cause
+    cause = done.outcome.supervisor.stop_cause
     result.reason, result.sentence = cause.reason.name, str(cause)
     if reasons and cause.reason not in reasons:
         valid = ", ".join(sorted(reason.name for reason in reasons))

@@ -5,8 +5,8 @@ import signal
 import tempfile
 from pathlib import Path
 
-from hopping_leg.emulator.codes import Mode
 from hopping_leg.emulator.lockstep import Lockstep
+from hopping_leg.emulator.moteus_codes import MoteusMode
 from hopping_leg.errors import HardwareError
 from hopping_leg.evaluate.faults.case import Case, Result, Scene, words
 from hopping_leg.evaluate.faults.families import Family
@@ -46,7 +46,7 @@ def _refused(scene: Scene) -> Result:
         result.reason, result.sentence = "NOT_ARMED", str(error)
     finally:
         lockstep.link.close()
-    if any(told.mode is not Mode.STOPPED for told in lockstep.robot.log.commands):
+    if any(told.mode is not MoteusMode.STOPPED for told in lockstep.robot.log.commands):
         result.problems.append("a drive was powered")
     return result
 
@@ -64,7 +64,7 @@ def _hop(scene: Scene) -> Result:
             done = None
         finally:
             lockstep.link.close()
-    faults = lockstep.robot.misfortune.log
+    faults = lockstep.robot.fault_injector.log
     result.began = faults[0][0] if faults else clock.began
     if result.began is None:
         result.problems.append("the mishap did not happen")

@@ -4,12 +4,12 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from hopping_leg.deploy.envelope import Envelope
-from hopping_leg.emulator.codes import Mode
-from hopping_leg.emulator.wire_log import Answered, Told, WireLog
+from hopping_leg.deploy.safety_limits import SafetyLimits
+from hopping_leg.emulator.moteus_codes import MoteusMode
+from hopping_leg.emulator.wire_log import CommandEvent, ReplyEvent, WireLog
 from hopping_leg.robot.parameters import Robot
 
-SAFE = (Mode.STOPPED, Mode.BRAKE)
+SAFE = (MoteusMode.STOPPED, MoteusMode.BRAKE)
 """Commands that cannot move the leg."""
 
 _ROUNDING = 1e-5
@@ -25,21 +25,21 @@ class Limits:
     temperature: float
 
     @staticmethod
-    def of(robot: Robot, envelope: Envelope) -> "Limits":
+    def of(robot: Robot, envelope: SafetyLimits) -> "Limits":
         """Return the limits of a robot."""
         motors = robot.hip.motor.torque_limit, robot.knee.motor.torque_limit
         voltage = envelope.voltage_low, envelope.voltage_high
         return Limits(motors, voltage, envelope.temperature)
 
-    def bad(self, answer: Answered) -> bool:
+    def bad(self, answer: ReplyEvent) -> bool:
         """Tell whether an answer shows by itself that something is wrong."""
         low, high = self.voltage
-        healthy = answer.mode is Mode.POSITION
+        healthy = answer.mode is MoteusMode.POSITION
         healthy &= low <= answer.voltage <= high and answer.temperature <= self.temperature
         return not healthy
 
 
-def problems_of_commands(commands: Iterable[Told], limits: Limits) -> list[str]:
+def problems_of_commands(commands: Iterable[CommandEvent], limits: Limits) -> list[str]:
     """Return what was wrong with commands: torque that is no number, or beyond the limits."""
     problems = []
     for told in commands:
@@ -54,7 +54,7 @@ def problems_of_commands(commands: Iterable[Told], limits: Limits) -> list[str]:
     return problems[:3]
 
 
-def restarts(commands: Iterable[Told], since: float) -> list[str]:
+def restarts(commands: Iterable[CommandEvent], since: float) -> list[str]:
     """Return whether torque was commanded again after a stop, from a time on."""
     stopped = False
     for told in commands:

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import polars as pl
 
 from hopping_leg.errors import TraceError
@@ -38,7 +39,7 @@ _LARGEST = 1 << 24
 """Content that no frame exceeds, bytes; a length beyond it is damage."""
 
 
-class BlackBox:
+class FlightRecorder:
     """Writes one run; rows and events never wait for the disk.
 
     Args:
@@ -106,7 +107,7 @@ class BlackBox:
 
 
 @dataclass(frozen=True)
-class Contents:
+class FlightRecording:
     """What a black box holds.
 
     Attributes:
@@ -128,7 +129,7 @@ class Contents:
         return pl.DataFrame(dict(zip(self.columns, self.rows.T, strict=True)))
 
 
-def read_box(path: Path) -> Contents:
+def read_recording(path: Path) -> FlightRecording:
     """Read a black box, also of a process that was killed.
 
     Raises:
@@ -140,13 +141,13 @@ def read_box(path: Path) -> Contents:
         raise TraceError(f"Cannot read {path}: {error.strerror}.") from error
     if not content.startswith(MAGIC):
         raise TraceError(f"{path} is no black box of `hop deploy`.")
-    found = list(frames(content, len(MAGIC)))
+    found = list(_frames(content, len(MAGIC)))
     if not found or found[0][0] != HEADER:
         raise TraceError(f"{path} ends before its header; the run had not begun.")
     first = json.loads(found[0][1])
     columns = tuple(first["columns"])
     body = b"".join(data for kind, data, _ in found if kind == ROW)
-    return Contents(
+    return FlightRecording(
         columns=columns,
         header=first["header"],
         rows=np.frombuffer(body, "<f8").reshape(-1, len(columns)),
@@ -163,7 +164,7 @@ def recover(path: Path) -> Trace:
     Raises:
         TraceError: The file is missing, no black box, or holds no tick.
     """
-    box = read_box(path)
+    box = read_recording(path)
     if not len(box.rows):
         raise TraceError(f"{path} holds no tick; the run had not begun.")
     unknown = ("height_m", "height_rate_m_s")
@@ -173,12 +174,71 @@ def recover(path: Path) -> Trace:
     return Trace(table, {**box.header, "events": box.events})
 
 
+class FlightRecorderTail:
+    """Reads what is new in a black box.
+
+    Attributes:
+        path: Of the file.
+        columns: Of the rows; empty until the header is there.
+        header: Facts about the run; empty until the header is there.
+
+    Args:
+        path: As above.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.columns: tuple[str, ...] = ()
+        self.header: dict[str, Any] = {}
+        self._rest = b""
+        self._begun = False
+        try:
+            self._file = path.open("rb", buffering=0)
+        except OSError as error:
+            raise TraceError(f"Cannot read {path}: {error.strerror}.") from error
+
+    @property
+    def over(self) -> bool:
+        """Whether the file is gone: the run has ended and left its trace."""
+        return os.fstat(self._file.fileno()).st_nlink == 0
+
+    def rows(self) -> npt.NDArray[np.float64]:
+        """Return the rows that were written since the last call, (ticks, columns).
+
+        Raises:
+            TraceError: The file is no black box.
+        """
+        content = self._rest + self._file.read()
+        at = 0
+        if not self._begun:
+            if len(content) < len(MAGIC):
+                self._rest = content
+                return np.empty((0, 0))
+            if not content.startswith(MAGIC):
+                raise TraceError(f"{self.path} is no black box of `hop deploy`.")
+            at, self._begun = len(MAGIC), True
+        found = []
+        for kind, data, end in _frames(content, at):
+            at = end
+            if kind == HEADER:
+                first = json.loads(data)
+                self.columns, self.header = tuple(first["columns"]), first["header"]
+            elif kind == ROW:
+                found.append(data)
+        self._rest = content[at:]
+        return np.frombuffer(b"".join(found), "<f8").reshape(len(found), len(self.columns))
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
 def _frame(kind: int, content: bytes) -> bytes:
     head = _FRAME.pack(kind, len(content))
     return head + content + _CRC.pack(zlib.crc32(content, zlib.crc32(head)))
 
 
-def frames(content: bytes, at: int) -> Iterator[tuple[int, bytes, int]]:
+def _frames(content: bytes, at: int) -> Iterator[tuple[int, bytes, int]]:
     """Yield kind, content and end of every whole frame from ``at`` to the first that is not."""
     while at + _FRAME.size <= len(content):
         kind, length = _FRAME.unpack_from(content, at)

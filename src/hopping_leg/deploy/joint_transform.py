@@ -17,7 +17,7 @@ JOINTS = ("hip", "knee")
 
 
 @dataclass(frozen=True)
-class JointWire:
+class JointTransform:
     """The way from one drive to its joint and back.
 
     Attributes:
@@ -57,11 +57,11 @@ class JointWire:
         return self.sign * torque / self.belt_ratio
 
 
-def wires(robot: Robot) -> tuple[JointWire, JointWire]:
-    """Return the wires of hip and knee."""
+def joint_transforms(robot: Robot) -> tuple[JointTransform, JointTransform]:
+    """Return the transforms of hip and knee."""
     pairs = zip(robot.hardware.servos, (robot.hip, robot.knee), strict=True)
     hip, knee = (
-        JointWire(int(servo.id), servo.sign, joint.belt_ratio, servo.zero_offset)
+        JointTransform(int(servo.id), servo.sign, joint.belt_ratio, servo.zero_offset)
         for servo, joint in pairs
     )
     return hip, knee

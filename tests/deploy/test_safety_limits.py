@@ -3,7 +3,7 @@ import pytest
 
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.deploy.envelope import hopping_envelope, recording_envelope
+from hopping_leg.deploy.safety_limits import hopping_limits, recording_limits
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import NO_NOISE
 
@@ -14,7 +14,7 @@ LEG = load_robot("legv2-paper")
     "name", ["fast", "precise", "adaptive", "recurrent", "paper", "energy-shaping"]
 )
 def test_who_hops_as_trained_is_not_stopped_for_it(name):
-    limits = hopping_envelope(LEG, 200.0)
+    limits = hopping_limits(LEG, 200.0)
     commands = np.tile([0.25, 0.30, 0.35], (800, 1))
     run = rollout(
         load_controller(name, LEG), RolloutConfig(LEG, NO_NOISE, threads=1), commands, seed=0
@@ -25,10 +25,10 @@ def test_who_hops_as_trained_is_not_stopped_for_it(name):
 
 
 def test_no_leg_may_go_where_its_mechanism_ends():
-    limits = hopping_envelope(LEG, 200.0)
+    limits = hopping_limits(LEG, 200.0)
     stops = [(servo.lower, servo.upper) for servo in LEG.hardware.servos]
     for (low, high), lower, upper in zip(stops, limits.lower, limits.upper, strict=True):
         assert low <= lower < upper <= high
-    recording = recording_envelope(LEG, 200.0)
+    recording = recording_limits(LEG, 200.0)
     assert (np.array(recording.lower) <= limits.lower).all()
     assert (np.array(recording.upper) >= limits.upper).all()

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hopping_leg.deploy.black_box import BlackBox, read_box, recover
+from hopping_leg.deploy.flight_recorder import FlightRecorder, read_recording, recover
 from hopping_leg.errors import TraceError
 from hopping_leg.trace import Trace
 
@@ -17,8 +17,8 @@ COLUMNS = ("time_s", "command_m", "hip_position_rad")
 WRITER = """
 import sys, time
 from pathlib import Path
-from hopping_leg.deploy.black_box import BlackBox
-box = BlackBox(Path(sys.argv[1]), ("time_s", "command_m", "hip_position_rad"), {"robot": "t"})
+from hopping_leg.deploy.flight_recorder import FlightRecorder
+box = FlightRecorder(Path(sys.argv[1]), ("time_s", "command_m", "hip_position_rad"), {"robot": "t"})
 tick = 0
 while True:
     box.row([tick * 0.005, 0.3, float(tick)])
@@ -28,7 +28,7 @@ while True:
 
 
 def write(path, rows=5):
-    box = BlackBox(path, COLUMNS, {"robot": "legv2"})
+    box = FlightRecorder(path, COLUMNS, {"robot": "legv2"})
     for tick in range(rows):
         box.row([tick * 0.005, 0.3, 1.0 + tick])
     box.event(time_s=0.01, state="damping", reason="operator_stop")
@@ -54,7 +54,7 @@ def test_cut_anywhere_it_gives_all_whole_rows_before_the_cut(tmp_path):
     size = 5 + 8 * len(COLUMNS) + 4
     for cut in range(first, len(content)):
         path.write_bytes(content[:cut])
-        box = read_box(path)
+        box = read_recording(path)
         assert len(box.rows) == min((cut - first) // size, 5)
         assert box.whole is (cut in {first + n * size for n in range(6)})
 
@@ -65,7 +65,7 @@ def test_damage_ends_the_record_and_is_never_data(tmp_path):
     content = bytearray(path.read_bytes())
     content[content.index(b"}}") + 6 + 20] ^= 1
     path.write_bytes(content)
-    assert len(read_box(path).rows) == 0
+    assert len(read_recording(path).rows) == 0
     with pytest.raises(TraceError, match="no tick"):
         recover(path)
 
@@ -76,7 +76,7 @@ def test_a_killed_process_leaves_what_it_recorded(tmp_path):
         [sys.executable, "-c", WRITER, str(path)], stdout=subprocess.DEVNULL
     ) as process:
         deadline = time.monotonic() + 60
-        while not path.exists() or not path.stat().st_size or len(read_box(path).rows) < 50:
+        while not path.exists() or not path.stat().st_size or len(read_recording(path).rows) < 50:
             assert time.monotonic() < deadline, "rows reach the file only when it is closed"
             time.sleep(0.01)
         os.kill(process.pid, signal.SIGKILL)
@@ -88,7 +88,7 @@ def test_a_killed_process_leaves_what_it_recorded(tmp_path):
 def test_a_full_disk_never_stops_the_loop(tmp_path):
     if not Path("/dev/full").exists():
         pytest.skip("no /dev/full")
-    box = BlackBox(tmp_path / "a.blackbox", COLUMNS, {})
+    box = FlightRecorder(tmp_path / "a.blackbox", COLUMNS, {})
     full = os.open("/dev/full", os.O_WRONLY)
     os.dup2(full, box._file)
     start = time.monotonic()
@@ -104,7 +104,7 @@ def test_foreign_and_missing_files_get_a_sentence(tmp_path):
     (tmp_path / "b.blackbox").write_text("hello")
     for name, sentence in (("b", "is no black box"), ("c", "Cannot read")):
         with pytest.raises(TraceError, match=sentence):
-            read_box(tmp_path / f"{name}.blackbox")
+            read_recording(tmp_path / f"{name}.blackbox")
     write(tmp_path / "d.blackbox")
     with pytest.raises(TraceError, match="Cannot create"):
         write(tmp_path / "d.blackbox")

@@ -6,14 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hopping_leg.deploy.configuration import wanted
-from hopping_leg.deploy.wire import JointWire, wires
+from hopping_leg.deploy.joint_transform import JointTransform, joint_transforms
 from hopping_leg.errors import RobotError
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.hardware import Hardware, Servo
 
 ANGLES = st.floats(-10, 10)
 WIRES = st.builds(
-    JointWire, st.integers(1, 126), st.sampled_from([1.0, -1.0]), st.floats(0.5, 4), ANGLES
+    JointTransform, st.integers(1, 126), st.sampled_from([1.0, -1.0]), st.floats(0.5, 4), ANGLES
 )
 
 
@@ -28,15 +28,17 @@ def entry(value, unit):
 
 
 @given(WIRES, ANGLES, ANGLES)
-def test_there_and_back_is_the_identity_and_power_is_kept(wire, angle, torque):
-    assert wire.joint_position(wire.motor_position(angle)) == pytest.approx(angle, abs=1e-9)
-    assert wire.joint_torque(wire.motor_torque(torque)) == pytest.approx(torque, abs=1e-9)
-    at_motor = wire.motor_torque(torque) * math.tau * wire.motor_velocity(angle)
+def test_there_and_back_is_the_identity_and_power_is_kept(transform, angle, torque):
+    assert transform.joint_position(transform.motor_position(angle)) == pytest.approx(
+        angle, abs=1e-9
+    )
+    assert transform.joint_torque(transform.motor_torque(torque)) == pytest.approx(torque, abs=1e-9)
+    at_motor = transform.motor_torque(torque) * math.tau * transform.motor_velocity(angle)
     assert at_motor == pytest.approx(torque * angle, abs=1e-9)
 
 
 def test_the_knee_turns_half_as_fast_as_its_motor():
-    hip, knee = wires(load_robot("legv2"))
+    hip, knee = joint_transforms(load_robot("legv2"))
     assert (hip.id, knee.id) == (1, 2)
     assert hip.joint_velocity(1.0) == pytest.approx(math.tau)
     assert knee.joint_velocity(1.0) == pytest.approx(math.pi)
@@ -46,8 +48,8 @@ def test_the_knee_turns_half_as_fast_as_its_motor():
 def test_the_wiring_is_no_part_of_the_physics(tmp_path):
     text = f"[hardware.knee]\nid = {entry(7, '1')}\nsign = {entry(-1, '1')}\n"
     robot = load_robot(wired(tmp_path, text))
-    assert wires(robot)[1].id == 7
-    assert wires(robot)[1].sign == -1
+    assert joint_transforms(robot)[1].id == 7
+    assert joint_transforms(robot)[1].sign == -1
     assert robot.digest == load_robot("legv2").digest
 
 

@@ -13,7 +13,7 @@ from hopping_leg.emulator.frames import Frame, padded
 from hopping_leg.emulator.robot import EmulatedRobot
 
 
-class InProcessDevice(TransportDevice):  # type: ignore[misc]
+class MemoryTransport(TransportDevice):  # type: ignore[misc]
     """A device whose transactions take no time; replies that are late or lost stay away.
 
     Args:
@@ -48,12 +48,12 @@ class InProcessDevice(TransportDevice):  # type: ignore[misc]
                 await self._handle_received_frame(reply)
 
     def _send(self, frame: ClientFrame) -> None:
-        if self.robot.misfortune.plugged:
+        if self.robot.fault_injector.plugged:
             self.robot.receive(Frame(frame.arbitration_id, padded(bytes(frame.data))))
 
     def _replies(self) -> list[ClientFrame]:
         """Return what arrives now; a CAN controller discards what was corrupted."""
-        items = self.robot.outbox.take(self.robot.time)
+        items = self.robot.reply_queue.take(self.robot.time)
         return [
             ClientFrame(
                 arbitration_id=item.frame.arbitration_id,
@@ -65,5 +65,5 @@ class InProcessDevice(TransportDevice):  # type: ignore[misc]
                 channel=self,
             )
             for item in items
-            if item.frame is not None and item.flip < 0 and self.robot.misfortune.plugged
+            if item.frame is not None and item.flip < 0 and self.robot.fault_injector.plugged
         ]

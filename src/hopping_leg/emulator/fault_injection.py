@@ -9,7 +9,7 @@ import numpy as np
 
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.frames import Frame
-from hopping_leg.emulator.outbox import Outbox, Outgoing
+from hopping_leg.emulator.reply_queue import QueuedReply, ReplyQueue
 
 if TYPE_CHECKING:
     from hopping_leg.emulator.robot import EmulatedRobot
@@ -42,7 +42,7 @@ class _Running:
         return self.left <= 0 or (not math.isnan(lasts) and time >= self.begun + lasts)
 
 
-class Misfortune:
+class FaultInjector:
     """The faults of one emulated robot.
 
     Args:
@@ -92,8 +92,8 @@ class Misfortune:
             elif running.fault.kind == "over_temperature":
                 self._feel(running)
 
-    def send(self, frame: Frame, joint: int, outbox: Outbox) -> None:
-        """Put a drive's reply in the outbox, or what becomes of it."""
+    def send(self, frame: Frame, joint: int, reply_queue: ReplyQueue) -> None:
+        """Put a drive's reply in the reply_queue, or what becomes of it."""
         time = self._robot.time
         due, copies, flip = time + self._robot.wire_time, 1, -1
         for running in self._running:
@@ -109,7 +109,7 @@ class Misfortune:
             if fault.kind in ("drop_reply", "silence"):
                 copies = 0
         for _ in range(copies):
-            outbox.put(due, Outgoing(frame, flip=flip))
+            reply_queue.put(due, QueuedReply(frame, flip=flip))
 
     def _watch(self) -> set[str]:
         """Return the phases of this moment; the first lift-off and power are noted."""
@@ -140,7 +140,7 @@ class Misfortune:
         if fault.kind == "garbage_line":
             running.left = 0
             for _ in range(fault.count):
-                self._robot.outbox.put(self._robot.time, Outgoing(noise=_NOISE))
+                self._robot.reply_queue.put(self._robot.time, QueuedReply(noise=_NOISE))
 
     def _feel(self, running: _Running, *, ending: bool = False) -> None:
         """Let the drives feel a fault, or no longer."""
@@ -151,7 +151,7 @@ class Misfortune:
             drive = robot.drives[joint]
             felt = drive.disturbances
             if fault.kind == "encoder_jump":
-                jump = robot.leg.wires[joint].motor_velocity(fault.amount)
+                jump = robot.leg.transforms[joint].motor_velocity(fault.amount)
                 drive.encoder.jump = 0.0 if ending else jump * drive.encoder.gear_ratio
             elif fault.kind == "drive_fault":
                 felt.fault = 0 if ending else int(fault.amount)

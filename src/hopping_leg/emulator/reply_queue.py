@@ -8,7 +8,7 @@ from hopping_leg.emulator.frames import Frame
 
 
 @dataclass(frozen=True)
-class Outgoing:
+class QueuedReply:
     """One thing that arrives at the host.
 
     Attributes:
@@ -23,18 +23,18 @@ class Outgoing:
     flip: int = -1
 
 
-class Outbox:
+class ReplyQueue:
     """Things in the order in which they are due; equal times keep their order."""
 
     def __init__(self) -> None:
-        self._heap: list[tuple[float, int, Outgoing]] = []
+        self._heap: list[tuple[float, int, QueuedReply]] = []
         self._numbers = itertools.count()
 
-    def put(self, due: float, item: Outgoing) -> None:
+    def put(self, due: float, item: QueuedReply) -> None:
         """Add something that is due at a time, s."""
         heapq.heappush(self._heap, (due, next(self._numbers), item))
 
-    def take(self, time: float) -> list[Outgoing]:
+    def take(self, time: float) -> list[QueuedReply]:
         """Remove and return what is due at a time, s."""
         items = []
         while self._heap and self._heap[0][0] <= time:

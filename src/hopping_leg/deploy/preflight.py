@@ -5,16 +5,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from hopping_leg.deploy.configuration import wanted
-from hopping_leg.deploy.envelope import Envelope
-from hopping_leg.deploy.observation import DriveMode
-from hopping_leg.deploy.reasons import fault_text
-from hopping_leg.deploy.wire import JOINTS, wires
+from hopping_leg.deploy.drive_link import DriveMode
+from hopping_leg.deploy.joint_transform import JOINTS, joint_transforms
+from hopping_leg.deploy.safety_limits import SafetyLimits
+from hopping_leg.deploy.stop_reasons import fault_text
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot.hardware import REGISTER_MAP
 from hopping_leg.robot.parameters import Robot
 
 if TYPE_CHECKING:
-    from hopping_leg.deploy.inspection import DriveFacts
+    from hopping_leg.deploy.drive_info import DriveInfo
 
 HOMED = 2
 """Home state of a drive that knows where its output is (register 0x00c)."""
@@ -39,17 +39,17 @@ class Finding:
     setting: str = ""
 
 
-def judge(robot: Robot, envelope: Envelope, drives: "Sequence[DriveFacts]") -> list[Finding]:
+def judge(robot: Robot, limits: SafetyLimits, drives: "Sequence[DriveInfo]") -> list[Finding]:
     """Return all checks of both drives.
 
     Args:
         robot: What the drives should belong to.
-        envelope: Where the leg may start, and at which voltage and temperature.
+        limits: Where the leg may start, and at which voltage and temperature.
         drives: Hip and knee.
     """
     findings: list[Finding] = []
     for joint, facts in enumerate(drives):
-        findings += _of_drive(robot, envelope, joint, facts)
+        findings += _of_drive(robot, limits, joint, facts)
     return findings
 
 
@@ -65,8 +65,8 @@ def require(findings: Sequence[Finding]) -> None:
         raise HardwareError(f"Not armed: {complaints[0]}{more}")
 
 
-def _of_drive(robot: Robot, envelope: Envelope, joint: int, facts: "DriveFacts") -> list[Finding]:
-    name, address = JOINTS[joint], wires(robot)[joint].id
+def _of_drive(robot: Robot, limits: SafetyLimits, joint: int, facts: "DriveInfo") -> list[Finding]:
+    name, address = JOINTS[joint], joint_transforms(robot)[joint].id
     if not facts.answers:
         complaint = (
             f"the {name}'s drive (id {address}) does not answer; check its power, the CAN cable"
@@ -76,14 +76,18 @@ def _of_drive(robot: Robot, envelope: Envelope, joint: int, facts: "DriveFacts")
     return [
         Finding(joint, "answers", f"id {address}"),
         *_of_identity(robot, joint, facts),
-        *_of_power(envelope, joint, facts),
+        *_of_power(limits, joint, facts),
         *_of_configuration(robot, joint, facts),
-        *_of_pose(envelope, joint, facts),
+        *_of_pose(limits, joint, facts),
     ]
 
 
-def _of_identity(robot: Robot, joint: int, facts: "DriveFacts") -> list[Finding]:
-    name, servo, address = JOINTS[joint], robot.hardware.servos[joint], wires(robot)[joint].id
+def _of_identity(robot: Robot, joint: int, facts: "DriveInfo") -> list[Finding]:
+    name, servo, address = (
+        JOINTS[joint],
+        robot.hardware.servos[joint],
+        joint_transforms(robot)[joint].id,
+    )
     serial = (
         f"the drive with id {address} has serial number {facts.serial} but the robot's file"
         f" expects {servo.serial} at the {name}; are two drives swapped?"
@@ -104,22 +108,22 @@ def _of_identity(robot: Robot, joint: int, facts: "DriveFacts") -> list[Finding]
     ]
 
 
-def _of_power(envelope: Envelope, joint: int, facts: "DriveFacts") -> list[Finding]:
-    name, low, high = JOINTS[joint], envelope.voltage_low, envelope.voltage_high
+def _of_power(limits: SafetyLimits, joint: int, facts: "DriveInfo") -> list[Finding]:
+    name, low, high = JOINTS[joint], limits.voltage_low, limits.voltage_high
     volts, heat = f"{facts.voltage:.1f} V", f"{facts.temperature:.0f} deg C"
     supply = (
         f"the bus voltage at the {name} is {volts} but must lie between {low:g} and {high:g} V;"
         " check the supply."
     )
-    hot = f"the {name}'s drive has {heat}; let it cool below {envelope.temperature:g}."
+    hot = f"the {name}'s drive has {heat}; let it cool below {limits.temperature:g}."
     return [
         _finding(joint, "bus voltage", volts, low <= facts.voltage <= high, supply),
-        _finding(joint, "temperature", heat, facts.temperature <= envelope.temperature, hot),
+        _finding(joint, "temperature", heat, facts.temperature <= limits.temperature, hot),
     ]
 
 
-def _of_pose(envelope: Envelope, joint: int, facts: "DriveFacts") -> list[Finding]:
-    name, low, high = JOINTS[joint], envelope.lower[joint], envelope.upper[joint]
+def _of_pose(limits: SafetyLimits, joint: int, facts: "DriveInfo") -> list[Finding]:
+    name, low, high = JOINTS[joint], limits.lower[joint], limits.upper[joint]
     homed = facts.home == HOMED
     lost = (
         f"the {name} is not homed: after power-up its encoder is absolute only within a turn of"
@@ -136,7 +140,7 @@ def _of_pose(envelope: Envelope, joint: int, facts: "DriveFacts") -> list[Findin
     ]
 
 
-def _of_configuration(robot: Robot, joint: int, facts: "DriveFacts") -> list[Finding]:
+def _of_configuration(robot: Robot, joint: int, facts: "DriveInfo") -> list[Finding]:
     findings = []
     for setting in wanted(robot, joint):
         found = facts.settings.get(setting.name, float("nan"))

@@ -1,7 +1,8 @@
-"""What the supervisor sees at a tick and what it lets out; joint side, SI."""
+"""What goes between the loop and the drives, and the way there; joint side, SI."""
 
 from dataclasses import dataclass
 from enum import Enum, IntEnum
+from typing import Protocol
 
 Pair = tuple[float, float]
 """Of hip and knee."""
@@ -49,35 +50,6 @@ Replies = tuple[Reply | None, Reply | None]
 """Of hip and knee; None where no fresh reply came."""
 
 
-class Operator(Enum):
-    """What the operator asked for since the last tick."""
-
-    NO_NOISE = 0
-    ARM = 1
-    STOP = 2
-
-
-@dataclass(frozen=True, slots=True)
-class Observation:
-    """Everything that a decision of the supervisor depends on.
-
-    Attributes:
-        time: Of the tick, s.
-        late: How long after its deadline the tick began, s.
-        replies: Fresh in this tick.
-        wanted: Joint torques that the sequence asks for, N m; None if the controller failed.
-        operator: Since the last tick.
-        finished: Whether the sequence is over.
-    """
-
-    time: float
-    late: float
-    replies: Replies
-    wanted: Pair | None
-    operator: Operator = Operator.NO_NOISE
-    finished: bool = False
-
-
 class Action(Enum):
     """What the drives are told."""
 
@@ -89,7 +61,7 @@ class Action(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Outgoing:
+class DriveCommand:
     """What leaves for the drives.
 
     Attributes:
@@ -101,7 +73,41 @@ class Outgoing:
     torque: Pair = (0.0, 0.0)
 
 
-STOP = Outgoing(Action.STOP)
-BRAKE = Outgoing(Action.BRAKE)
-LIMP = Outgoing(Action.TORQUE)
+STOP = DriveCommand(Action.STOP)
+BRAKE = DriveCommand(Action.BRAKE)
+LIMP = DriveCommand(Action.TORQUE)
 """Torque control at zero torque."""
+
+
+@dataclass(frozen=True, slots=True)
+class Exchange:
+    """What came back in a tick.
+
+    Attributes:
+        replies: Fresh ones: measured after this tick's question was asked.
+        late: Drive (0 hip, 1 knee) and reply to an earlier tick that arrived now.
+    """
+
+    replies: Replies
+    late: tuple[tuple[int, Reply], ...] = ()
+
+
+class DriveLink(Protocol):
+    """The way to both drives; nothing of it ever waits beyond what the caller allows."""
+
+    def exchange(self, outgoing: DriveCommand, until: float) -> Exchange:
+        """Tell both drives what to do and ask for their state in the same frames.
+
+        Args:
+            outgoing: What they shall do.
+            until: When to stop waiting, s on the loop's clock.
+        """
+        ...
+
+    def send(self, outgoing: DriveCommand) -> None:
+        """Tell both drives what to do; returns at once."""
+        ...
+
+    def close(self) -> None:
+        """Give the adapter back."""
+        ...

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hopping_leg.controllers.protocol import Controller
-from hopping_leg.deploy.observation import Outgoing, Pair, Replies
-from hopping_leg.deploy.sequence import Step
-from hopping_leg.deploy.supervisor import Memory
-from hopping_leg.deploy.wire import JOINTS
+from hopping_leg.deploy.drive_link import DriveCommand, Pair, Replies
+from hopping_leg.deploy.joint_transform import JOINTS
+from hopping_leg.deploy.motion_sequence import SequenceStep
+from hopping_leg.deploy.supervisor import SupervisorState
 
 _LOOP = ("time_s", "command_m", "state", "reason", "part", "action")
 _TIMES = ("wake_late_s", "exchange_s", "control_s", "tick_s", "skipped_ticks")
@@ -52,9 +52,9 @@ def internal_names(controller: Controller) -> tuple[str, ...]:
 
 def row(
     time: float,
-    step: Step,
-    memory: Memory,
-    outgoing: Outgoing,
+    step: SequenceStep,
+    state: SupervisorState,
+    outgoing: DriveCommand,
     fresh: Replies,
     timings: Timings,
     internals: Sequence[float],
@@ -63,8 +63,8 @@ def row(
     values: list[float] = [
         time,
         step.command,
-        memory.state,
-        memory.cause.reason,
+        state.state,
+        state.cause.reason,
         step.phase,
         outgoing.action.value,
         timings.late,
@@ -73,7 +73,7 @@ def row(
         timings.tick,
         timings.skipped,
     ]
-    last = memory.counts.last
+    last = state.counts.last
     for name in ("position", "velocity", "torque"):
         values += [math.nan if reply is None else getattr(reply, name) for reply in fresh]
     for name in ("mode", "fault", "voltage", "temperature"):

@@ -11,7 +11,7 @@ from moteus.protocol import Register
 
 from hopping_leg.deploy.configuration import Setting, wanted
 from hopping_leg.deploy.driver import MoteusLink
-from hopping_leg.deploy.wire import JOINTS
+from hopping_leg.deploy.joint_transform import JOINTS
 
 _ANSWER_SECONDS = 1.0
 _TRIES = 3
@@ -37,7 +37,7 @@ Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
-class DriveFacts:
+class DriveInfo:
     """One drive before arming; joint side, SI.
 
     Attributes:
@@ -67,7 +67,7 @@ class DriveFacts:
     settings: dict[str, float] = field(default_factory=dict)
 
 
-def inspect(link: MoteusLink) -> tuple[DriveFacts, DriveFacts]:
+def inspect(link: MoteusLink) -> tuple[DriveInfo, DriveInfo]:
     """Ask both drives everything that arming depends on.
 
     Raises:
@@ -102,34 +102,34 @@ def home(link: MoteusLink, angles: Sequence[float]) -> None:
         HardwareError: A drive does not answer.
     """
     for joint, angle in enumerate(angles):
-        position = link.wires[joint].motor_position(angle)
+        position = link.transforms[joint].motor_position(angle)
         controller = link.controllers[joint]
         work = controller.set_output_nearest(position=position, query=True)
         link.call(asyncio.wait_for(work, _ANSWER_SECONDS), _TALK_SECONDS)
 
 
-async def _inspect_both(link: MoteusLink) -> list[DriveFacts]:
+async def _inspect_both(link: MoteusLink) -> list[DriveInfo]:
     return [await _inspect(link, joint) for joint in range(len(JOINTS))]
 
 
-async def _inspect(link: MoteusLink, joint: int) -> DriveFacts:
+async def _inspect(link: MoteusLink, joint: int) -> DriveInfo:
     controller = link.controllers[joint]
     state = await _asked(lambda: controller.custom_query(_STATE))
     if state is None:
-        return DriveFacts(answers=False)
+        return DriveInfo(answers=False)
     identity = await _asked(lambda: controller.custom_query(_IDENTITY))
     serial = await _asked(lambda: controller.custom_query(_SERIAL))
     if identity is None or serial is None:
-        return DriveFacts(answers=False)
+        return DriveInfo(answers=False)
     state, identity = state.values, identity.values
     words = [int(serial.values.get(register, 0)) & 0xFFFFFFFF for register in _SERIAL]
-    return DriveFacts(
+    return DriveInfo(
         answers=True,
         firmware=int(identity.get(Register.FIRMWARE_VERSION, 0)),
         register_map=int(identity.get(Register.REGISTER_MAP_VERSION, 0)),
         serial="".join(f"{word:08x}" for word in words),
         home=int(state.get(Register.HOME_STATE, 0)),
-        position=link.wires[joint].joint_position(state.get(Register.POSITION, math.nan)),
+        position=link.transforms[joint].joint_position(state.get(Register.POSITION, math.nan)),
         mode=int(state.get(Register.MODE, 0)),
         fault=int(state.get(Register.FAULT, 0)),
         voltage=float(state.get(Register.VOLTAGE, math.nan)),

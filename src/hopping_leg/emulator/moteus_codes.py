@@ -3,7 +3,7 @@
 from enum import IntEnum
 
 
-class Mode(IntEnum):
+class MoteusMode(IntEnum):
     """State of a drive, register 0x000; 2 to 4 cannot be asked for."""
 
     STOPPED = 0
@@ -24,7 +24,7 @@ class Mode(IntEnum):
     BRAKE = 15
 
 
-class Fault(IntEnum):
+class FaultCode(IntEnum):
     """Why a drive is in fault, register 0x00f."""
 
     NONE = 0
@@ -64,11 +64,11 @@ class Notice(IntEnum):
     FLUX_BRAKING = 105
 
 
-BETWEEN = (Mode.FAULT, Mode.ENABLING, Mode.CALIBRATING, Mode.CALIBRATED)
+BETWEEN = (MoteusMode.FAULT, MoteusMode.ENABLING, MoteusMode.CALIBRATING, MoteusMode.CALIBRATED)
 """Modes that no command can ask for."""
 
-MODES = frozenset(Mode)
+MODES = frozenset(MoteusMode)
 """All that a register may hold."""
 
-CONTROLLING = MODES - {Mode.STOPPED, *BETWEEN}
+CONTROLLING = MODES - {MoteusMode.STOPPED, *BETWEEN}
 """Modes in which the output stage is powered."""

@@ -3,20 +3,20 @@ from dataclasses import replace
 
 import pytest
 
-from hopping_leg.deploy.bring_up import judge, require
 from hopping_leg.deploy.configuration import wanted
-from hopping_leg.deploy.envelope import hopping_envelope
-from hopping_leg.deploy.inspection import DriveFacts
+from hopping_leg.deploy.drive_info import DriveInfo
+from hopping_leg.deploy.preflight import judge, require
+from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.hardware import REGISTER_MAP, Servo
 
 LEG = load_robot("legv2")
-LIMITS = hopping_envelope(LEG, 200.0)
+LIMITS = hopping_limits(LEG, 200.0)
 
 
 def healthy(joint, **changes):
-    facts = DriveFacts(
+    facts = DriveInfo(
         answers=True,
         firmware=0x10D,
         register_map=REGISTER_MAP,

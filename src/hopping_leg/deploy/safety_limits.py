@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from hopping_leg.deploy.observation import Pair
+from hopping_leg.deploy.drive_link import Pair
 from hopping_leg.robot.parameters import Robot
 
 MARGINS = (0.9, 0.5)
@@ -15,7 +15,7 @@ RECORDING_MARGIN = 0.1
 
 
 @dataclass(frozen=True)
-class Envelope:
+class SafetyLimits:
     """Limits of one run; pairs are (hip, knee) at the joint."""
 
     lower: Pair
@@ -57,7 +57,7 @@ class Envelope:
     """Joint speed that counts as rest, rad/s."""
 
 
-def hopping_envelope(robot: Robot, rate: float) -> Envelope:
+def hopping_limits(robot: Robot, rate: float) -> SafetyLimits:
     """Return the limits for a hopping leg: its soft limits and a margin.
 
     Args:
@@ -73,7 +73,7 @@ def hopping_envelope(robot: Robot, rate: float) -> Envelope:
     return _envelope(robot, rate, ranges)
 
 
-def recording_envelope(robot: Robot, rate: float) -> Envelope:
+def recording_limits(robot: Robot, rate: float) -> SafetyLimits:
     """Return the limits for excitations, which use the whole mechanical range.
 
     Args:
@@ -87,10 +87,10 @@ def recording_envelope(robot: Robot, rate: float) -> Envelope:
     return _envelope(robot, rate, ranges)
 
 
-def _envelope(robot: Robot, rate: float, ranges: list[Pair]) -> Envelope:
+def _envelope(robot: Robot, rate: float, ranges: list[Pair]) -> SafetyLimits:
     (hip_lower, hip_upper), (knee_lower, knee_upper) = ranges
     hip, knee, hardware = robot.hip, robot.knee, robot.hardware
-    return Envelope(
+    return SafetyLimits(
         lower=(hip_lower, knee_lower),
         upper=(hip_upper, knee_upper),
         torque=(hip.torque_limit, knee.torque_limit),

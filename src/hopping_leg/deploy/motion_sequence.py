@@ -13,7 +13,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.controllers.joint_pd import JointGains
 from hopping_leg.controllers.protocol import Controller, Measurement
 from hopping_leg.controllers.rollout import RolloutConfig
-from hopping_leg.deploy.observation import Pair
+from hopping_leg.deploy.drive_link import Pair
 from hopping_leg.deploy.schedule import Commands
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.limits import SoftLimiter
@@ -23,7 +23,7 @@ _ROUNDING = 1e-6
 """Of times of ticks, s; far less than a tick."""
 
 
-class Phase(IntEnum):
+class Part(IntEnum):
     """Part of the sequence."""
 
     WAIT = 0
@@ -35,7 +35,7 @@ class Phase(IntEnum):
 
 
 @dataclass(frozen=True)
-class Timing:
+class SequenceTiming:
     """How long each part lasts, s."""
 
     hop: float = 10.0
@@ -45,18 +45,18 @@ class Timing:
     fade: float = 0.3
     """Of the gains at the end of the sinking."""
 
-    def phase(self, elapsed: float) -> tuple[Phase, float]:
+    def phase(self, elapsed: float) -> tuple[Part, float]:
         """Return the part at a time since the start, and how long it has lasted."""
         for phase, seconds in (
-            (Phase.RISE, self.rise),
-            (Phase.SETTLE, self.settle),
-            (Phase.HOP, self.hop),
-            (Phase.SINK, self.sink),
+            (Part.RISE, self.rise),
+            (Part.SETTLE, self.settle),
+            (Part.HOP, self.hop),
+            (Part.SINK, self.sink),
         ):
             if elapsed < seconds - _ROUNDING:
                 return phase, elapsed
             elapsed -= seconds
-        return Phase.DONE, elapsed
+        return Part.DONE, elapsed
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def hopping_poses(robot: Robot) -> Poses:
 
 
 @dataclass(frozen=True)
-class Step:
+class SequenceStep:
     """What the sequence asks for at a tick.
 
     Attributes:
@@ -90,12 +90,12 @@ class Step:
 
     torque: Pair
     command: float
-    phase: Phase
+    phase: Part
     controller: Pair = (float("nan"), float("nan"))
 
 
 @dataclass
-class Sequence:
+class MotionSequence:
     """Runs from the moment that the drives follow torques; steps once a tick.
 
     Args:
@@ -111,13 +111,13 @@ class Sequence:
     commands: Commands
     poses: Poses
     limiter: SoftLimiter | None
-    timing: Timing = field(default_factory=Timing)
+    timing: SequenceTiming = field(default_factory=SequenceTiming)
     gains: JointGains = field(default_factory=JointGains)
 
     def __post_init__(self) -> None:
         self._began: float | None = None
         self._from = np.zeros(2)
-        self._phase = Phase.WAIT
+        self._phase = Part.WAIT
         self._stop_at: float | None = None
         self.controller.reset(1)
 
@@ -129,7 +129,7 @@ class Sequence:
     @property
     def finished(self) -> bool:
         """Whether the leg has sunk down."""
-        return self._phase is Phase.DONE
+        return self._phase is Part.DONE
 
     def begin(self, time: float, q: Array) -> None:
         """Start to rise from a posture.
@@ -140,23 +140,23 @@ class Sequence:
         """
         self._began, self._from = time, q.copy()
 
-    def step(self, time: float, measurement: Measurement | None) -> Step:
+    def step(self, time: float, measurement: Measurement | None) -> SequenceStep:
         """Return what to do at a tick; ``measurement`` is None as long as there is none."""
         if self._began is None or measurement is None:
-            return Step((0.0, 0.0), self.commands.at(0.0), Phase.WAIT)
+            return SequenceStep((0.0, 0.0), self.commands.at(0.0), Part.WAIT)
         phase, lasted = self.timing.phase(time - self._began)
         q, qd = measurement.q[0, 0], measurement.qd[0, 0]
-        if phase is not self._phase and phase in (Phase.SINK, Phase.DONE):
+        if phase is not self._phase and phase in (Part.SINK, Part.DONE):
             self._from = q.copy()
-        if phase is Phase.HOP and self._phase is not Phase.HOP:
+        if phase is Part.HOP and self._phase is not Part.HOP:
             self.controller.reset(1)
         self._phase = phase
         command = self.commands.at(self._hopped(time))
-        if phase is Phase.HOP:
+        if phase is Part.HOP:
             asked = self.controller.act(measurement)[0]
-            return Step(_pair(self._limit(asked, q, qd)), command, phase, _pair(asked))
+            return SequenceStep(_pair(self._limit(asked, q, qd)), command, phase, _pair(asked))
         asked = self._hold(phase, lasted, q, qd)
-        return Step(_pair(self._limit(asked, q, qd)), command, phase)
+        return SequenceStep(_pair(self._limit(asked, q, qd)), command, phase)
 
     def command(self, time: float) -> float:
         """Return the height commanded at a time, m."""
@@ -167,15 +167,15 @@ class Sequence:
             return 0.0
         return max(time - self._began - self.timing.rise - self.timing.settle, 0.0)
 
-    def _hold(self, phase: Phase, lasted: float, q: Array, qd: Array) -> Array:
+    def _hold(self, phase: Part, lasted: float, q: Array, qd: Array) -> Array:
         """Return the torque of rising, standing or sinking."""
         timing, gains = self.timing, self.gains
-        if phase is Phase.DONE:
+        if phase is Part.DONE:
             return np.zeros(2)
         strength = 1.0
-        if phase is Phase.SETTLE:
+        if phase is Part.SETTLE:
             target = self.poses.start
-        elif phase is Phase.RISE:
+        elif phase is Part.RISE:
             target = _between(self._from, self.poses.start, lasted / timing.rise)
         else:
             target = _between(self._from, self.poses.rest, lasted / (timing.sink - timing.fade))

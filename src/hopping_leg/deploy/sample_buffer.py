@@ -1,20 +1,20 @@
-"""Samples of both joints by tick, and what a controller sees of them."""
+"""SampleBuffer of both joints by tick, and what a controller sees of them."""
 
 import numpy as np
 
 from hopping_leg.controllers.protocol import Measurement
-from hopping_leg.deploy.observation import Reply
+from hopping_leg.deploy.drive_link import Reply
 
 REMEMBERED = 16
 """Ticks; older samples are forgotten."""
 
 _SEEN = 3
-"""Samples that a controller sees at a tick."""
+"""SampleBuffer that a controller sees at a tick."""
 
 _Sample = list[Reply | None]
 
 
-class Samples:
+class SampleBuffer:
     """The recent past of both joints.
 
     A sample counts once both drives have sent it. Its age is that of the tick that asked for it,

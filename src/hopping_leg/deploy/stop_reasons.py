@@ -1,0 +1,242 @@
+"""Why the supervisor changes its state: the reasons, and the checks that find one at a tick."""
+
+import math
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+
+from hopping_leg.deploy.drive_link import DriveMode, Pair, Replies, Reply
+from hopping_leg.deploy.joint_transform import JOINTS
+from hopping_leg.deploy.safety_limits import SafetyLimits
+
+
+class Reason(IntEnum):
+    """A code for the trace and a sentence for people."""
+
+    sentence: str
+
+    def __new__(cls, code: int, sentence: str) -> "Reason":
+        """Attach the sentence to the code."""
+        member = int.__new__(cls, code)
+        member._value_ = code
+        member.sentence = sentence
+        return member
+
+    NONE = 0, "Nothing has happened yet."
+    OPERATOR_ARMED = 1, "The operator armed the drives."
+    DRIVES_READY = 2, "Both drives follow torques."
+    FINISHED = 3, "The sequence is over."
+    CAME_TO_REST = 4, "The joints are at rest."
+    DAMPED_LONG_ENOUGH = 5, "The drives braked for the whole time that they are given."
+    OPERATOR_STOP = 10, "The operator asked for a stop."
+    ARMING_TOOK_TOO_LONG = 11, "A drive did not begin to follow torques in time."
+    DRIVE_FAULT = 12, "A drive reports a fault."
+    DRIVE_TIMEOUT = 13, "A drive's own watchdog tripped: it had no command in time."
+    DRIVE_LEFT_MODE = 14, "A drive left torque control by itself, e.g. because it restarted."
+    REPLIES_MISSING = 15, "A drive did not answer in several ticks."
+    MEASUREMENT_NOT_FINITE = 16, "A drive reports a position, velocity or torque that is no number."
+    ENCODER_JUMP = 17, "A position changed by more than its velocity allows."
+    POSITION_LIMIT = 18, "A joint left its range."
+    SPEED_LIMIT = 19, "A joint is faster than its motor can turn it."
+    TORQUE_LIMIT = 20, "A motor gives more torque than it may."
+    TOO_HOT = 21, "A drive is too hot."
+    VOLTAGE_LOW = 22, "The bus voltage is too low."
+    VOLTAGE_HIGH = 23, "The bus voltage is too high."
+    LOOP_OVERRUN = 24, "The control loop missed several ticks in a row."
+    LOOP_STALLED = 25, "The control loop stood still for longer than the drives wait."
+    CONTROLLER_FAILED = 26, "The controller raised an error."
+    TORQUE_NOT_FINITE = 27, "The controller asked for a torque that is no number."
+
+
+FAULTS: dict[int, str] = {
+    32: "calibration fault",
+    33: "motor driver fault",
+    34: "over-voltage",
+    35: "encoder fault",
+    36: "motor not configured",
+    37: "control cycle overrun",
+    38: "over-temperature",
+    39: "start outside of its position limits",
+    40: "under-voltage",
+    41: "configuration changed while running",
+    42: "theta invalid",
+    43: "position invalid",
+    44: "driver not enabled",
+    45: "wrong stop position",
+    46: "timing violation",
+    47: "feedforward without ratio",
+    48: "invalid limits",
+    49: "position error too large",
+    50: "velocity error too large",
+}
+"""Fault codes of the drives' firmware; 96 to 105 are notices that a limit acts, not faults."""
+
+
+def fault_text(code: int) -> str:
+    """Return a fault code with its meaning."""
+    return f"fault {code} ({FAULTS.get(code, 'unknown to this version')})"
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """A reason with what was seen.
+
+    Attributes:
+        reason: Which.
+        detail: Joint and number, or nothing.
+    """
+
+    reason: Reason
+    detail: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.reason.sentence} ({self.detail})" if self.detail else self.reason.sentence
+
+
+class Operator(Enum):
+    """What the operator asked for since the last tick."""
+
+    NOTHING = 0
+    ARM = 1
+    STOP = 2
+
+
+@dataclass(frozen=True, slots=True)
+class SupervisorInput:
+    """Everything that a decision of the supervisor depends on.
+
+    Attributes:
+        time: Of the tick, s.
+        late: How long after its deadline the tick began, s.
+        replies: Fresh in this tick.
+        wanted: Joint torques that the sequence asks for, N m; None if the controller failed.
+        operator: Since the last tick.
+        finished: Whether the sequence is over.
+    """
+
+    time: float
+    late: float
+    replies: Replies
+    wanted: Pair | None
+    operator: Operator = Operator.NOTHING
+    finished: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """What only several ticks together can tell.
+
+    Attributes:
+        last: Latest reply of each drive.
+        missing: Ticks since then.
+        excess: Ticks in a row with too much torque.
+        overruns: Ticks in a row that began too late.
+    """
+
+    last: Replies = (None, None)
+    missing: tuple[int, int] = (0, 0)
+    excess: tuple[int, int] = (0, 0)
+    overruns: int = 0
+
+    def after(self, limits: SafetyLimits, seen: SupervisorInput) -> "Counts":
+        """Return the counts after a tick."""
+        hip, knee = (
+            self._of_drive(i, limits, reply, self.last[i]) for i, reply in enumerate(seen.replies)
+        )
+        late = seen.late > limits.period
+        return Counts(
+            (hip[0], knee[0]),
+            (hip[1], knee[1]),
+            (hip[2], knee[2]),
+            self.overruns + 1 if late else 0,
+        )
+
+    def _of_drive(
+        self, index: int, limits: SafetyLimits, reply: Reply | None, last: Reply | None
+    ) -> tuple[Reply | None, int, int]:
+        if reply is None:
+            return last, self.missing[index] + 1, self.excess[index]
+        much = abs(reply.torque) > limits.excess_torque * limits.torque[index]
+        return reply, 0, self.excess[index] + 1 if much else 0
+
+
+def find_cause(
+    limits: SafetyLimits, before: Counts, now: Counts, seen: SupervisorInput, *, arming: bool
+) -> Cause | None:
+    """Return the gravest thing that is wrong at a tick, or None.
+
+    Args:
+        limits: The limits.
+        before: Counts before the tick.
+        now: Counts after it.
+        seen: At the tick.
+        arming: Whether the drives are still on their way into torque control.
+    """
+    for index, reply in enumerate(seen.replies):
+        if reply is not None:
+            found = _of_drive(reply, arming=arming) or _of_joint(
+                limits, index, before.last[index], reply
+            )
+            if found is not None:
+                return Cause(found.reason, f"{JOINTS[index]}: {found.detail}")
+    for index, joint in enumerate(JOINTS):
+        if now.excess[index] > limits.excess_ticks:
+            return Cause(Reason.TORQUE_LIMIT, f"{joint}: limit {limits.torque[index]:g} N m")
+        if now.missing[index] > limits.missing_ticks:
+            return Cause(Reason.REPLIES_MISSING, f"{joint}: {now.missing[index]} ticks")
+    return _of_loop(limits, now, seen)
+
+
+def _of_drive(reply: Reply, *, arming: bool) -> Cause | None:
+    if reply.mode == DriveMode.TORQUE:
+        return None
+    if reply.mode == DriveMode.FAULT:
+        return Cause(Reason.DRIVE_FAULT, fault_text(reply.fault))
+    if reply.mode == DriveMode.TIMEOUT:
+        return Cause(Reason.DRIVE_TIMEOUT, "mode 11")
+    if arming and reply.mode <= DriveMode.CALIBRATED:
+        return None
+    return Cause(Reason.DRIVE_LEFT_MODE, f"mode {reply.mode}")
+
+
+def _of_joint(limits: SafetyLimits, index: int, last: Reply | None, reply: Reply) -> Cause | None:
+    """The comparisons are written so that NaN fails them."""
+    if not (math.isfinite(reply.position + reply.velocity + reply.torque)):
+        values = f"{reply.position:g} rad, {reply.velocity:g} rad/s, {reply.torque:g} N m"
+        return Cause(Reason.MEASUREMENT_NOT_FINITE, values)
+    if last is not None:
+        elapsed = max(reply.taken - last.taken, 0.0)
+        predicted = last.position + elapsed * (last.velocity + reply.velocity) / 2
+        error = abs(reply.position - predicted)
+        if not error <= limits.jump * max(1.0, elapsed / limits.period):
+            return Cause(Reason.ENCODER_JUMP, f"{error:.3g} rad off")
+    if not limits.lower[index] <= reply.position <= limits.upper[index]:
+        return Cause(
+            Reason.POSITION_LIMIT,
+            f"{reply.position:.3g} rad, valid"
+            f" {limits.lower[index]:.3g} to {limits.upper[index]:.3g} rad",
+        )
+    if not abs(reply.velocity) <= limits.speed[index]:
+        return Cause(
+            Reason.SPEED_LIMIT, f"{reply.velocity:.3g} rad/s, limit {limits.speed[index]:.3g}"
+        )
+    if not reply.temperature <= limits.temperature:
+        return Cause(Reason.TOO_HOT, f"{reply.temperature:.0f} deg C, limit {limits.temperature:g}")
+    if not reply.voltage >= limits.voltage_low:
+        return Cause(Reason.VOLTAGE_LOW, f"{reply.voltage:.1f} V, least {limits.voltage_low:g} V")
+    if not reply.voltage <= limits.voltage_high:
+        return Cause(Reason.VOLTAGE_HIGH, f"{reply.voltage:.1f} V, most {limits.voltage_high:g} V")
+    return None
+
+
+def _of_loop(limits: SafetyLimits, now: Counts, seen: SupervisorInput) -> Cause | None:
+    if not seen.late <= limits.stall:
+        return Cause(Reason.LOOP_STALLED, f"{seen.late * 1e3:.1f} ms late")
+    if now.overruns > limits.overrun_ticks:
+        return Cause(Reason.LOOP_OVERRUN, f"{now.overruns} ticks")
+    if seen.wanted is None:
+        return Cause(Reason.CONTROLLER_FAILED)
+    if not math.isfinite(seen.wanted[0] + seen.wanted[1]):
+        return Cause(
+            Reason.TORQUE_NOT_FINITE, f"hip {seen.wanted[0]:g}, knee {seen.wanted[1]:g} N m"
+        )
+    return None
