@@ -10,8 +10,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from hopping_leg.io import write_atomically
 from hopping_leg.rl.checkpoint import list_checkpoints
-from hopping_leg.trace import write_atomically
 
 
 def history(run: Path) -> list[dict[str, Any]]:

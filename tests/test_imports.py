@@ -24,7 +24,7 @@ ORDER = [
     "viewer",
     "cli",
 ]
-FOUNDATION = {"", "arrays", "cluster", "errors", "hop_detection", "json_files", "progress", "trace"}
+FOUNDATION = {"", "arrays", "cluster", "errors", "hop_detection", "io", "progress", "trace"}
 TRAINING = {"torch", "stable_baselines3", "onnx", "tensorboard"}
 BESIDE = {("evaluate", "rl"), ("viewer", "rl"), ("emulator", "rl")} | {
     ("deploy", room) for room in ("sim", "identify", "envs", "rl")

@@ -3,7 +3,8 @@ import polars as pl
 import pytest
 
 from hopping_leg.errors import TraceError
-from hopping_leg.trace import COLUMNS, Trace, write_atomically
+from hopping_leg.io import write_atomically
+from hopping_leg.trace import COLUMNS, Trace
 
 
 def some_trace():

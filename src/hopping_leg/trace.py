@@ -3,10 +3,8 @@
 Stored as Parquet with the header in the file's metadata; nothing is ever unpickled.
 """
 
-import contextlib
 import io
 import json
-import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,6 +14,7 @@ import polars as pl
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import TraceError
+from hopping_leg.io import write_atomically
 
 SCHEMA = 1
 """Version of the layout, stored in every header."""
@@ -97,32 +96,3 @@ class Trace:
                 f"{path} has trace schema {schema}; this version reads schema {SCHEMA}."
             )
         return Trace(table, header)
-
-
-def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file so that a killed process or a full disk leaves the old one whole.
-
-    Raises:
-        TraceError: The file cannot be written.
-    """
-    path = path.resolve()
-    part = path.with_name(path.name + ".part")
-    try:
-        if path.exists() and not path.is_file():
-            path.write_bytes(content)  # a device or pipe must not be replaced by a file
-            return
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with part.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
-    except OSError as error:
-        _remove(part)
-        raise TraceError(f"Cannot write {path}: {error.strerror}; nothing was changed.") from error
-
-
-def _remove(path: Path) -> None:
-    """Remove what may not be there, even where nothing can be removed."""
-    with contextlib.suppress(OSError):
-        path.unlink(missing_ok=True)

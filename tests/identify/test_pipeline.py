@@ -13,7 +13,7 @@ from hopping_leg.identify.optimizers import SearchOptions
 from hopping_leg.identify.pipeline import identify
 from hopping_leg.identify.result import as_json
 from hopping_leg.robot import load_robot
-from hopping_leg.robot.fields import check_physics
+from hopping_leg.robot.robot_files import check_physics
 from tests.identify.fitting import EFFORT, RATE, TRUTH, TWIN, identified, options, run
 from tests.identify.twin import LEG, record, swing
 

@@ -69,7 +69,7 @@ def test_a_sidecar_may_name_the_columns(tmp_path):
         (SIDECAR + "[columns]\nheight = 'x'", "no recording column 'height'"),
         (SIDECAR + "[columns]\nheight_m = 'x'", "no column 'x'"),
         (SIDECAR + "columns = 3", r"\[columns\] must name"),
-        ('rig = "rail"', "lacks 'rate_hz'"),
+        ('rig = "rail"', "'rate_hz' is missing"),
         (SIDECAR.replace("fixed-base", "fixed base"), "Did you mean 'fixed-base'"),
         (SIDECAR.replace("200.0", "0"), "'rate_hz' is 0.0 but must be positive"),
         (SIDECAR.replace("200.0", '"fast"'), "'rate_hz' is 'fast' but must be a finite number"),
@@ -79,7 +79,7 @@ def test_a_sidecar_may_name_the_columns(tmp_path):
         (SIDECAR + "startup_rows = -1", "'startup_rows' is -1 but must be 0 or more"),
         (SIDECAR + "startup_rows = true", "'startup_rows' is True but must be a whole number"),
         (SIDECAR + "gains_exact = 1", "'gains_exact' is 1 but must be true or false"),
-        (SIDECAR + "quantisation = 1", "'quantisation.' must be a table"),
+        (SIDECAR + "quantisation = 1", "'quantisation' must be a table"),
         (SIDECAR.replace('"made up"', "1"), "'source' is 1 but must be a text"),
     ],
 )

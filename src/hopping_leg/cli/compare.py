@@ -21,8 +21,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.compare import set_beside
 from hopping_leg.evaluate.compare_report import write_comparison
 from hopping_leg.evaluate.stored import read_runs
-from hopping_leg.json_files import write_json
-from hopping_leg.trace import write_atomically
+from hopping_leg.io import write_atomically, write_json
 
 
 @dataclass(frozen=True)

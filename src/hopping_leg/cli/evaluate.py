@@ -36,9 +36,9 @@ from hopping_leg.evaluate.robustness.tables import print_robustness
 from hopping_leg.evaluate.runs import save_traces
 from hopping_leg.evaluate.terminal import print_tables
 from hopping_leg.evaluate.trials import KINDS
+from hopping_leg.io import write_atomically
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, Engine, NoiseAndDelay
-from hopping_leg.trace import write_atomically
 
 
 @dataclass(frozen=True)

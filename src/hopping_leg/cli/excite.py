@@ -23,7 +23,7 @@ from hopping_leg.identify.feasibility import HardwareRange, demand
 from hopping_leg.identify.paper_excitation import DURATION, Bend, Strokes
 from hopping_leg.identify.recording_format import Pair
 from hopping_leg.identify.templates import Template
-from hopping_leg.json_files import write_json
+from hopping_leg.io import write_json
 from hopping_leg.robot import Robot, load_robot
 
 

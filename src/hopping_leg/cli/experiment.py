@@ -29,7 +29,7 @@ from hopping_leg.cli.options import Heights
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.transfer.methods import DEFAULT, FORETOLD, choose_methods
 from hopping_leg.evaluate.transfer.study import Study, find_twins
-from hopping_leg.json_files import write_json
+from hopping_leg.io import write_json
 
 
 @dataclass(frozen=True)

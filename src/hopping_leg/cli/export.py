@@ -16,10 +16,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from hopping_leg.controllers.registry import load_policy
-from hopping_leg.json_files import write_json
+from hopping_leg.io import write_atomically, write_json
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.urdf import to_urdf
-from hopping_leg.trace import write_atomically
 
 
 @dataclass(frozen=True)

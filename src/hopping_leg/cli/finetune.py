@@ -26,7 +26,7 @@ from hopping_leg.cli.options import Heights
 from hopping_leg.controllers.registry import load_policy
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.errors import RobotError, UsageError
-from hopping_leg.json_files import write_json
+from hopping_leg.io import write_json
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.parameters import Robot
 

@@ -34,9 +34,8 @@ from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import Recording, load_recording, sidecar_path
 from hopping_leg.identify.result import Identified, as_json, parameters_json, quality_json
 from hopping_leg.identify.robot_file import save_robot
-from hopping_leg.json_files import write_json
+from hopping_leg.io import write_atomically, write_json
 from hopping_leg.robot import load_robot
-from hopping_leg.trace import write_atomically
 
 _FILES = {"out": "Robot", "json": "Numbers", "report": "Report"}
 

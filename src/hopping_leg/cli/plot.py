@@ -22,11 +22,11 @@ from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.figures.paper import Format, Width, encode
 from hopping_leg.evaluate.gallery import draw_gallery, run_of
-from hopping_leg.evaluate.runs import Run, safe_name
+from hopping_leg.evaluate.runs import Run
 from hopping_leg.evaluate.tables import tabulate
 from hopping_leg.evaluate.video import Animation, fixed_traces, render_video
+from hopping_leg.io import safe_file_name, write_atomically
 from hopping_leg.robot import load_robot
-from hopping_leg.trace import write_atomically
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def run(args: Plot) -> None:
         console.print(f"{picture.title}: {path}", highlight=False)
     if args.animation is not None:
         for name in controllers:
-            path = args.out / f"hops-{safe_name(name)}.{args.animation}"
+            path = args.out / f"hops-{safe_file_name(name)}.{args.animation}"
             write_atomically(path, _animation(runs, name, args.animation))
             console.print(f"Hops of {name}: {path}", highlight=False)
 

@@ -23,8 +23,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.transfer.methods import DEFAULT, choose_methods
 from hopping_leg.evaluate.transfer.study import SHORTEST, USUAL_FIT, Study, find_twins
 from hopping_leg.identify.least_squares import LeastSquaresOptions
-from hopping_leg.json_files import write_json
-from hopping_leg.trace import write_atomically
+from hopping_leg.io import write_atomically, write_json
 
 _MINIATURE = ("identified", "cad")
 _PAPER = (*DEFAULT, "rail-only", "fixed-base-only", "two-pass", "one-pass")

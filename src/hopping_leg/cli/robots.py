@@ -17,9 +17,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from hopping_leg.json_files import write_json
+from hopping_leg.io import Tree, write_json
 from hopping_leg.robot import Robot, build_model, load_robot, shipped_robots
-from hopping_leg.robot.fields import Tree
 from hopping_leg.robot.robot_files import load_tree
 
 Target = tyro.conf.Positional[str]

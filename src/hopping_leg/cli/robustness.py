@@ -7,8 +7,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.figures import draw_robustness, to_svg
 from hopping_leg.evaluate.keeper import Keeper
 from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
-from hopping_leg.json_files import write_json
-from hopping_leg.trace import write_atomically
+from hopping_leg.io import write_atomically, write_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -8,7 +8,7 @@ from rich.table import Table
 
 from hopping_leg.cli.bench.shared import mm
 from hopping_leg.evaluate.skills.suite import run_skills
-from hopping_leg.json_files import write_json
+from hopping_leg.io import write_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Literal
 
 from hopping_leg.errors import UsageError
-from hopping_leg.json_files import write_json
+from hopping_leg.io import write_json
 from hopping_leg.robot import load_robot
 
 

@@ -29,9 +29,8 @@ from rich.table import Table
 
 from hopping_leg.cli.bench.shared import at_least
 from hopping_leg.evaluate.tune_energy_shaping import Search, Tuned, tune
-from hopping_leg.json_files import write_json
+from hopping_leg.io import write_atomically, write_json
 from hopping_leg.robot import load_robot
-from hopping_leg.trace import write_atomically
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
 """Gain files: one TOML per tuned set of energy shaping, beside the leg it was found on."""
 
 import dataclasses
-import math
 import tomllib
 from importlib import resources
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import Any
 
 from hopping_leg.controllers.shaping_gains import ShapingGains
 from hopping_leg.errors import UsageError
-from hopping_leg.trace import write_atomically
+from hopping_leg.io import read_dataclass, write_atomically
 
 _SHIPPED = resources.files("hopping_leg.controllers") / "gains"
 _NAMES = [field.name for field in dataclasses.fields(ShapingGains)]
@@ -47,7 +46,7 @@ def load_gains(name_or_path: str | Path = TUNED) -> GainFile:
         raise UsageError(f"There is no gain file {source}; write one with `hop tune`.") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise UsageError(f"{source} is not valid TOML: {error}.") from error
-    return GainFile(_text(tree, "robot", name), _text(tree, "source", name), _gains(tree, name))
+    return read_dataclass(GainFile, tree, name)
 
 
 def save_gains(path: Path, found: GainFile) -> None:
@@ -55,31 +54,6 @@ def save_gains(path: Path, found: GainFile) -> None:
     lines = [f"robot = {_quoted(found.robot)}", f"source = {_quoted(found.source)}", "", "[gains]"]
     lines += [f"{name} = {float(getattr(found.gains, name))!r}" for name in _NAMES]
     write_atomically(path, ("\n".join(lines) + "\n").encode())
-
-
-def _gains(tree: dict[str, Any], origin: str) -> ShapingGains:
-    table = tree.get("gains")
-    if not isinstance(table, dict):
-        raise UsageError(f"{origin} has no table [gains]; it holds: {', '.join(_NAMES)}.")
-    for name, value in table.items():
-        if name not in _NAMES:
-            raise UsageError(f"{origin}: there is no gain '{name}'; valid: {', '.join(_NAMES)}.")
-        if (
-            isinstance(value, bool)
-            or not isinstance(value, int | float)
-            or not math.isfinite(value)
-        ):
-            raise UsageError(f"{origin}: gain '{name}' must be a finite number, not {value!r}.")
-    return ShapingGains(**{name: float(value) for name, value in table.items()})
-
-
-def _text(tree: dict[str, Any], key: str, origin: str) -> str:
-    value = tree.get(key)
-    if not isinstance(value, str):
-        raise UsageError(
-            f"{origin} must say '{key}' as text: the robot's name and how it was found."
-        )
-    return value
 
 
 def _quoted(text: str) -> str:

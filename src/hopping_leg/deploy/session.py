@@ -2,8 +2,6 @@
 
 import concurrent.futures
 import datetime
-import importlib.metadata
-import platform
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -25,6 +23,7 @@ from hopping_leg.deploy.safety_limits import SafetyLimits
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.supervisor import State
 from hopping_leg.deploy.telemetry import columns
+from hopping_leg.io import safe_file_name, versions
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import Trace
 
@@ -101,7 +100,7 @@ def header_of(robot: Robot, controller: Controller, rate: float, **facts: Any) -
         **policy,
         "rate_hz": rate,
         "started": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-        "versions": _versions(),
+        "versions": versions(*_PACKAGES),
         "codes": {
             "state": _names(State),
             "part": _names(Part),
@@ -114,7 +113,7 @@ def header_of(robot: Robot, controller: Controller, rate: float, **facts: Any) -
 
 def new_path(folder: Path, name: str) -> Path:
     """Return a trace's path that no earlier run has."""
-    safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
+    safe = safe_file_name(name)
     stamp = datetime.datetime.now(datetime.UTC).strftime("%Y%m%d-%H%M%S")
     path, count = folder / f"{safe}-{stamp}.parquet", 1
     while path.exists() or path.with_suffix(SUFFIX).exists():
@@ -150,13 +149,3 @@ def _stopped_by_signals(loop: ControlLoop) -> Iterator[None]:
 
 def _names(kind: Any) -> dict[str, str]:  # noqa: ANN401
     return {str(member.value): member.name.lower() for member in kind}
-
-
-def _versions() -> dict[str, str]:
-    found = {"python": platform.python_version()}
-    for package in _PACKAGES:
-        try:
-            found[package] = importlib.metadata.version(package)
-        except importlib.metadata.PackageNotFoundError:
-            continue
-    return found

@@ -10,16 +10,15 @@ value = 0.012       # what it means depends on the kind: here seconds
 duration = 0.1
 """
 
-import dataclasses
 import math
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from hopping_leg.deploy.joint_transform import JOINTS
 from hopping_leg.emulator.settings import DEFAULTS
 from hopping_leg.errors import UsageError, unknown_name
+from hopping_leg.io import read_dataclass
 
 
 @dataclass(frozen=True)
@@ -76,7 +75,7 @@ class Fault:
         UsageError: A field has no meaning.
     """
 
-    kind: str
+    kind: str = field(metadata={"choices": tuple(KINDS)})
     since: str = "powered"
     at: float = 0.0
     """Seconds after ``since``."""
@@ -93,20 +92,18 @@ class Fault:
     """Setting that is wrong, for ``configuration``."""
 
     def __post_init__(self) -> None:
-        for field, valid in (
+        for name, valid in (
             ("kind", KINDS),
             ("since", SINCE),
             ("phase", PHASES),
             ("drive", DRIVES),
         ):
-            if getattr(self, field) not in valid:
-                raise UsageError(unknown_name(f"fault {field}", str(getattr(self, field)), valid))
-        for field in ("at", "duration"):
-            seconds = getattr(self, field)
+            if getattr(self, name) not in valid:
+                raise UsageError(unknown_name(f"fault {name}", str(getattr(self, name)), valid))
+        for name in ("at", "duration"):
+            seconds = getattr(self, name)
             if seconds is not None and not seconds >= 0:
-                raise UsageError(
-                    f"'{field}' of a {self.kind} is {seconds} s but must be 0 or more."
-                )
+                raise UsageError(f"'{name}' of a {self.kind} is {seconds} s but must be 0 or more.")
         if self.count < 1:
             raise UsageError(f"'count' of a {self.kind} is {self.count} but must be 1 or more.")
         if self.kind == "configuration" and self.name not in DEFAULTS:
@@ -143,22 +140,6 @@ def load_faults(path: Path) -> tuple[Fault, ...]:
     entries = tree.pop("fault", None)
     if tree or not isinstance(entries, list):
         raise UsageError(f"{path} must hold tables [[fault]] and nothing else.")
-    return tuple(_fault(entry, f"{path}, fault {n + 1}") for n, entry in enumerate(entries))
-
-
-def _fault(entry: dict[str, Any], where: str) -> Fault:
-    fields = {field.name: field for field in dataclasses.fields(Fault)}
-    for name, value in entry.items():
-        if name not in fields:
-            raise UsageError(f"{where}: {unknown_name('field', name, fields)}")
-        text = name in ("kind", "since", "phase", "drive", "name")
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not (isinstance(value, str) if text else number):
-            kind = "a text" if text else "a number"
-            raise UsageError(f"{where}: '{name}' is {value!r} but must be {kind}.")
-    if "kind" not in entry:
-        raise UsageError(f"{where}: 'kind' is missing; available: {', '.join(sorted(KINDS))}.")
-    try:
-        return Fault(**entry)
-    except UsageError as error:
-        raise UsageError(f"{where}: {error}") from error
+    return tuple(
+        read_dataclass(Fault, entry, f"{path}, fault {n + 1}") for n, entry in enumerate(entries)
+    )

@@ -18,8 +18,8 @@ from hopping_leg.evaluate.markup import Column, table
 from hopping_leg.evaluate.report import data_uri, page_template
 from hopping_leg.identify.overlay import RESTART, Overlay, overlays
 from hopping_leg.identify.result import Identified, as_json, parameters_json, quality_json
+from hopping_leg.io import Tree
 from hopping_leg.robot import load_robot
-from hopping_leg.robot.fields import Tree
 from hopping_leg.robot.robot_files import load_tree
 
 _CAD, _PAPER = "legv2", "legv2-paper"

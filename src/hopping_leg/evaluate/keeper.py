@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hopping_leg.json_files import write_json
+from hopping_leg.io import write_json
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from hopping_leg.evaluate.keeper import Keeper
 from hopping_leg.evaluate.result import Summary
 from hopping_leg.evaluate.robustness.case import times
 from hopping_leg.evaluate.runner import evaluate, software_versions
-from hopping_leg.evaluate.runs import safe_name
+from hopping_leg.io import safe_file_name
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 
@@ -117,7 +117,7 @@ def measure_limits(
     for done, (candidate, condition) in enumerate(parts, 1):
         place = {"controller": candidate.label, "condition": condition.name}
         kept = keeper.keep(
-            safe_name(f"{candidate.label}-{condition.name}"),
+            safe_file_name(f"{candidate.label}-{condition.name}"),
             f"{candidate.label}: {condition.name}",
             study.asked(candidate, condition),
             functools.partial(_hop, candidate, study, condition),

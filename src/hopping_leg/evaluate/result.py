@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from hopping_leg.evaluate.statistics import Neighbours
-from hopping_leg.json_files import json_text, plain
+from hopping_leg.io import json_text, plain
 
 SCHEMA = 1
 """Version of the JSON, raised when a name changes its meaning."""

@@ -1,10 +1,8 @@
 """Evaluate controllers: run the paper's trials, measure, compare."""
 
 import functools
-import platform
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, dataclass, replace
-from importlib.metadata import version
 from typing import Any
 
 from hopping_leg.controllers import RolloutConfig
@@ -16,6 +14,7 @@ from hopping_leg.evaluate.result import Evaluation, Group, Summary
 from hopping_leg.evaluate.runs import FLOORS, Run, on_floor, run_trials
 from hopping_leg.evaluate.tables import tabulate
 from hopping_leg.evaluate.trials import KINDS, Trial, check_reach, paper_trials, within
+from hopping_leg.io import versions
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.sim import NO_NOISE, Engine
 
@@ -200,4 +199,4 @@ def software_versions(engine: Engine = "mujoco") -> dict[str, str]:
     """Return the versions that the numbers may depend on."""
     names = ["hopping-leg", "mujoco", "numpy", "scipy", "onnxruntime"]
     names += ["pybullet"] if engine == "pybullet" else []
-    return {"python": platform.python_version(), **{name: version(name) for name in names}}
+    return versions(*names)

@@ -11,6 +11,7 @@ import numpy as np
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.evaluate.trials import Trial
+from hopping_leg.io import safe_file_name
 from hopping_leg.robot.model_mismatch import Ground
 from hopping_leg.robot.parameters import Contact, Robot
 from hopping_leg.trace import Trace
@@ -41,12 +42,7 @@ class Run:
     @property
     def file_name(self) -> str:
         """Name of the run's trace file, unique within an evaluation."""
-        return f"{safe_name(self.controller)}-{self.trial.name}-{self.repeat}.parquet"
-
-
-def safe_name(controller: str) -> str:
-    """Return a controller's name as part of a file's."""
-    return "".join(c if c.isalnum() or c in "-_." else "_" for c in controller)
+        return f"{safe_file_name(self.controller)}-{self.trial.name}-{self.repeat}.parquet"
 
 
 def floor_robot(robot: Robot, floor: str) -> Robot:

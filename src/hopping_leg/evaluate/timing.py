@@ -4,12 +4,12 @@ import os
 import platform
 import time
 from collections.abc import Callable, Mapping
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
 from hopping_leg.arrays import Array
+from hopping_leg.io import versions
 
 Timed = Callable[[], None]
 
@@ -54,11 +54,9 @@ def median_ratio(numerator: Array, denominator: Array) -> float:
 
 def host() -> dict[str, Any]:
     """Return what a timing depends on: processor, load, versions."""
-    packages = ("mujoco", "numpy", "gymnasium")
     return {
         "cores": os.cpu_count(),
         "machine": platform.machine(),
-        "python": platform.python_version(),
         "load_average": os.getloadavg()[0],
-        **{package: version(package) for package in packages},
+        **versions("mujoco", "numpy", "gymnasium"),
     }

@@ -21,8 +21,8 @@ from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.gain_space import from_unit, to_unit
 from hopping_leg.evaluate.hop_cost import CommandScore, calibrated, cost, score
 from hopping_leg.identify.cma import seeded_strategy
+from hopping_leg.io import write_atomically
 from hopping_leg.robot import Robot, load_robot
-from hopping_leg.trace import write_atomically
 
 COMMANDS = (0.22, 0.25, 0.30, 0.35, 0.40)
 """Heights that a candidate is tried at, m."""

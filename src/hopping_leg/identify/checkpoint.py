@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from hopping_leg.errors import UsageError
-from hopping_leg.trace import write_atomically
+from hopping_leg.io import write_atomically
 
 
 def save_state(path: Path | None, identity: dict[str, Any], state: dict[str, Any]) -> None:

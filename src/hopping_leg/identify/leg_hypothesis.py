@@ -2,9 +2,11 @@
 
 import dataclasses
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any
 
 from hopping_leg.errors import UsageError, unknown_name
+from hopping_leg.io import replace_at
 from hopping_leg.robot.parameters import Robot
 
 _DRIVE = "drive"
@@ -58,10 +60,7 @@ class LegHypothesis:
             UsageError: There is no such parameter.
         """
         _check(self, name)
-        value: Any = self
-        for part in _path(name):
-            value = getattr(value, part)
-        return float(value)
+        return float(attrgetter(_path(name))(self))
 
     def replace(self, values: dict[str, float]) -> "LegHypothesis":
         """Return the hypothesis with some parameters' values changed.
@@ -72,7 +71,7 @@ class LegHypothesis:
         hypothesis = self
         for name, value in values.items():
             _check(self, name)
-            hypothesis = _replaced(hypothesis, _path(name), float(value))
+            hypothesis = replace_at(hypothesis, _path(name), float(value))
         return hypothesis
 
 
@@ -82,9 +81,8 @@ def parameter_units(hypothesis: LegHypothesis) -> dict[str, str]:
     return dict(_leaves(hypothesis.robot)) | names
 
 
-def _path(name: str) -> list[str]:
-    parts = name.split(".")
-    return parts if parts[0] == _DRIVE else ["robot", *parts]
+def _path(name: str) -> str:
+    return name if name.startswith(f"{_DRIVE}.") else f"robot.{name}"
 
 
 def _leaves(owner: Any, prefix: str = "") -> list[tuple[str, str]]:  # noqa: ANN401
@@ -102,10 +100,3 @@ def _check(hypothesis: LegHypothesis, name: str) -> None:
     units = parameter_units(hypothesis)
     if name not in units:
         raise UsageError(unknown_name("parameter", name, units))
-
-
-def _replaced(owner: Any, path: list[str], value: float) -> Any:  # noqa: ANN401
-    head, *rest = path
-    return dataclasses.replace(
-        owner, **{head: _replaced(getattr(owner, head), rest, value) if rest else value}
-    )

@@ -32,9 +32,9 @@ from hopping_leg.identify.result import Identified, as_json, software_versions
 from hopping_leg.identify.run_folder import RunFolder
 from hopping_leg.identify.validation import Validation
 from hopping_leg.identify.windows import cut
-from hopping_leg.robot.fields import check_physics
 from hopping_leg.robot.model_mismatch import NO_MISMATCH
 from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.robot_files import check_physics
 
 
 @dataclass(frozen=True)

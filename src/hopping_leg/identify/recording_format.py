@@ -2,12 +2,11 @@
 
 import dataclasses
 import math
-import types
-import typing
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from hopping_leg.errors import RecordingError, unknown_name
+from hopping_leg.errors import RecordingError
+from hopping_leg.io import read_dataclass
 from hopping_leg.robot.model import GRAVITY
 
 Rig = Literal["fixed-base", "rail", "boom"]
@@ -102,66 +101,4 @@ def metadata_from_tree(tree: object, origin: str) -> RecordingMetadata:
     Raises:
         RecordingError: Naming file and field.
     """
-    metadata = _build(RecordingMetadata, tree, "", origin)
-    assert isinstance(metadata, RecordingMetadata)
-    return metadata
-
-
-def _build(kind: type, tree: object, prefix: str, origin: str) -> object:
-    if not isinstance(tree, dict):
-        raise RecordingError(
-            f"{origin}: '{prefix or 'the metadata'}' must be a table, not {tree!r}."
-        )
-    hints = typing.get_type_hints(kind)
-    for key in tree:
-        if key not in hints:
-            raise RecordingError(f"{origin}: {unknown_name('metadata field', str(key), hints)}")
-    required = [f.name for f in dataclasses.fields(kind) if _is_required(f)]
-    for name in required:
-        if name not in tree:
-            raise RecordingError(
-                f"{origin}: the metadata lacks '{name}'; it needs {', '.join(required)}."
-            )
-    values = {k: _value(hints[k], v, f"{prefix}{k}", origin) for k, v in tree.items()}
-    try:
-        return kind(**values)
-    except RecordingError as error:
-        raise RecordingError(f"{origin}: {error}") from None
-
-
-def _is_required(spec: dataclasses.Field[Any]) -> bool:
-    missing = dataclasses.MISSING
-    return spec.default is missing and spec.default_factory is missing
-
-
-def _value(kind: Any, value: object, path: str, origin: str) -> object:  # noqa: ANN401
-    """Return a value as its field's type, or say what was valid."""
-    choices = typing.get_args(kind)
-    if isinstance(kind, types.UnionType) or typing.get_origin(kind) is typing.Union:
-        return None if value is None else _value(choices[0], value, path, origin)
-    if typing.get_origin(kind) is Literal:
-        if value not in choices:
-            raise RecordingError(
-                f"{origin}: '{path}': {unknown_name('value', str(value), choices)}"
-            )
-        return value
-    if typing.get_origin(kind) is tuple:
-        if not isinstance(value, list | tuple) or len(value) != len(choices):
-            raise RecordingError(
-                f"{origin}: '{path}' is {value!r} but must be a pair [hip, knee] of numbers."
-            )
-        return tuple(_value(float, v, path, origin) for v in value)
-    if dataclasses.is_dataclass(kind):
-        return _build(typing.cast(type, kind), value, f"{path}.", origin)
-    if kind is float:
-        if (
-            isinstance(value, bool)
-            or not isinstance(value, int | float)
-            or not math.isfinite(value)
-        ):
-            raise RecordingError(f"{origin}: '{path}' is {value!r} but must be a finite number.")
-        return float(value)
-    if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-        names = {str: "a text in quotes", bool: "true or false", int: "a whole number"}
-        raise RecordingError(f"{origin}: '{path}' is {value!r} but must be {names[kind]}.")
-    return value
+    return read_dataclass(RecordingMetadata, tree, origin, error=RecordingError)

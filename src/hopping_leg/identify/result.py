@@ -2,10 +2,8 @@
 
 import dataclasses
 import math
-import platform
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from typing import Any
 
 from hopping_leg.identify.identifiability import Identifiability
@@ -16,7 +14,7 @@ from hopping_leg.identify.plan import Plan
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.recording_format import Rig
 from hopping_leg.identify.validation import Validation
-from hopping_leg.json_files import plain
+from hopping_leg.io import plain, versions
 from hopping_leg.robot.parameters import Robot
 
 _LIBRARIES = ("hopping-leg", "mujoco", "numpy", "scipy", "cma", "polars")
@@ -164,7 +162,7 @@ def parameters_json(identified: Identified) -> list[dict[str, Any]]:
 
 def software_versions() -> dict[str, str]:
     """Return the versions that the numbers may depend on."""
-    return {"python": platform.python_version(), **{name: version(name) for name in _LIBRARIES}}
+    return versions(*_LIBRARIES)
 
 
 def _pass_json(one: Pass) -> dict[str, Any]:

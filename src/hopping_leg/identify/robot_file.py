@@ -10,10 +10,8 @@ from hopping_leg.identify.result import (
     quality_json,
     software_versions,
 )
-from hopping_leg.robot.fields import Tree
-from hopping_leg.robot.robot_files import load_tree, robot_from_tree
-from hopping_leg.robot.writing import robot_text
-from hopping_leg.trace import write_atomically
+from hopping_leg.io import Tree, write_atomically
+from hopping_leg.robot.robot_files import load_tree, robot_from_tree, robot_text
 
 _LATENCY = "reality.latency.command"
 

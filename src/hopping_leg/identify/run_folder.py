@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from hopping_leg.errors import UsageError
-from hopping_leg.json_files import write_json
+from hopping_leg.io import write_json
 
 _CONFIG, _RESULT = "config.json", "result.json"
 

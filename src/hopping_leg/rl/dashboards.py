@@ -10,7 +10,7 @@ import numpy as np
 from stable_baselines3.common.logger import KVWriter, Logger, configure
 
 from hopping_leg.errors import UsageError
-from hopping_leg.trace import write_atomically
+from hopping_leg.io import write_atomically
 
 Log = Literal["tensorboard", "wandb", "trackio"]
 

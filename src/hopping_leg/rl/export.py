@@ -15,9 +15,9 @@ from hopping_leg.arrays import Array
 from hopping_leg.controllers.observation_history import make_layout
 from hopping_leg.controllers.policy import MEMORY, METADATA_KEY, NEXT_MEMORY, Card
 from hopping_leg.errors import UsageError
+from hopping_leg.io import write_atomically
 from hopping_leg.rl.graph import ACTIVATIONS, Graph, Layers, array_info
 from hopping_leg.rl.memories import Memory
-from hopping_leg.trace import write_atomically
 
 SQUASHES = ("tanh", "clip")
 """How the last layer's output is brought to -1..1."""

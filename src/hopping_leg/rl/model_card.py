@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from hopping_leg.trace import write_atomically
+from hopping_leg.io import write_atomically
 
 MISSED = 0.02
 """Median error beyond which a policy does not do what it is told, m; the robustness suite's."""

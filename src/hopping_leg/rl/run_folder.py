@@ -2,12 +2,11 @@
 
 import json
 from dataclasses import asdict
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from hopping_leg.errors import UsageError
-from hopping_leg.json_files import write_json
+from hopping_leg.io import versions, write_json
 from hopping_leg.rl.checkpoint import Tree, list_checkpoints, read_checkpoint
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes import words_of
@@ -175,13 +174,7 @@ def read_result(path: Path) -> dict[str, Any]:
 
 def library_versions() -> dict[str, str]:
     """Return the versions of the libraries that decide about a training's result."""
-    found = {}
-    for name in _LIBRARIES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return found
+    return {k: v for k, v in versions(*_LIBRARIES).items() if k != "python"}
 
 
 def _short(value: Any) -> str:  # noqa: ANN401

@@ -3,11 +3,11 @@
 from typing import Any
 
 from hopping_leg.controllers.policy import Policy
+from hopping_leg.io import write_atomically
 from hopping_leg.rl.judge import FINAL_SEEDS, FIRST_SEED, as_rows, judge, score
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.run_folder import RunFolder
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.trace import write_atomically
 
 FINALISTS = 4
 """Snapshots that are tried once more at the end."""

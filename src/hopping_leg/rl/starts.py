@@ -14,7 +14,7 @@ from typing import Any
 
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import UsageError
-from hopping_leg.json_files import write_json
+from hopping_leg.io import write_atomically, write_json
 from hopping_leg.rl.crew import work_here
 from hopping_leg.rl.dashboards import Log
 from hopping_leg.rl.judge import DECIDING_SEEDS, as_rows, every_centimetre, judge, score
@@ -24,7 +24,6 @@ from hopping_leg.rl.run_folder import RunFolder, read_result
 from hopping_leg.rl.scale import fit
 from hopping_leg.rl.train import Trained, check, train
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.trace import write_atomically
 
 _DECISION = "decision.json"
 

@@ -11,6 +11,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from hopping_leg.controllers.policy import Card
 from hopping_leg.errors import RobotError, UsageError
+from hopping_leg.io import write_atomically
 from hopping_leg.rl import resumable
 from hopping_leg.rl.checkpoint import write_checkpoint
 from hopping_leg.rl.dashboards import Log, check_log, make_logger
@@ -22,7 +23,6 @@ from hopping_leg.rl.run_folder import RunFolder
 from hopping_leg.rl.scale import fit
 from hopping_leg.rl.selection import Selection
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.trace import write_atomically
 
 SHOWN_EVERY = 0.5
 """Time between two updates of the progress bar, s."""

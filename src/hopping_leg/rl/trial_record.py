@@ -1,11 +1,12 @@
 """What a search has found, as plain values: every trial, the best, what mattered."""
 
-from importlib.metadata import version
 from typing import Any
 
 from optuna.importance import get_param_importances
 from optuna.study import Study
 from optuna.trial import FrozenTrial, TrialState
+
+from hopping_leg.io import versions
 
 FOLDER, ERROR = "folder", "error"
 """Attributes of a trial: number of the trial whose folder it goes on in; why it failed."""
@@ -20,7 +21,7 @@ def record(study: Study) -> dict[str, Any]:
         "trials": [_row(trial) for trial in trials],
         "best": None if best is None else _row(best),
         "importance": _importance(study, done),
-        "versions": {name: version(name) for name in ("hopping-leg", "optuna", "torch", "mujoco")},
+        "versions": versions("hopping-leg", "optuna", "torch", "mujoco"),
     }
 
 

@@ -25,7 +25,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from hopping_leg.cluster import RayCluster
 from hopping_leg.errors import PhysicsError, UsageError
-from hopping_leg.json_files import plain
+from hopping_leg.io import plain
 from hopping_leg.rl.crew import work_here, work_on
 from hopping_leg.rl.judge import FINAL_SEEDS, FIRST_SEED
 from hopping_leg.rl.recipe import Recipe

@@ -1,14 +1,22 @@
 """Robot files: one TOML per leg, every number with its unit and source."""
 
+import json
+import math
 import tomllib
+from functools import partial
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from hopping_leg.errors import RobotError, unknown_name
-from hopping_leg.robot.fields import Tree, build, check_physics
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.io import Field, Tree, is_number, read_dataclass
+from hopping_leg.robot import hardware
+from hopping_leg.robot.model import TIMESTEP
+from hopping_leg.robot.parameters import KINDS, Robot
 
 _SHIPPED = resources.files("hopping_leg.robot") / "robots"
+_MAY_BE_ZERO = {"friction", "damping"}
+_MAY_BE_NEGATIVE = {"lower", "upper"}
 
 
 def shipped_robots() -> list[str]:
@@ -40,7 +48,11 @@ def robot_from_tree(tree: Tree, origin: str) -> Robot:
     Raises:
         RobotError: Naming origin, field and what was valid.
     """
-    robot = build(Robot, _extend(tree, origin, ()), "", origin)
+    resolved = _extend(tree, origin, ())
+    read_quantity = partial(_read_quantity, origin)
+    robot = read_dataclass(Robot, resolved, origin, error=RobotError, read_quantity=read_quantity)
+    if not robot.name.strip():
+        raise RobotError(f"{origin}: 'name' is empty; give the robot a name.")
     check_physics(robot, origin)
     return robot
 
@@ -117,3 +129,139 @@ def _merge(parent: Tree, child: Tree) -> Tree:
             value = _merge(inherited, value)
         merged[key] = value
     return merged
+
+
+def robot_text(tree: Tree, comment: str = "") -> str:
+    """Return robot tables as TOML.
+
+    Args:
+        tree: The tables; numbers are ``{value, unit, source}``.
+        comment: Put above all, line by line.
+    """
+    lines = [f"# {line}".rstrip() for line in comment.splitlines()]
+    _write_table(tree, "", lines)
+    return "\n".join(lines).strip("\n") + "\n"
+
+
+def _write_table(tree: Tree, prefix: str, lines: list[str]) -> None:
+    plain = {k: v for k, v in tree.items() if not isinstance(v, dict) or "value" in v}
+    if prefix and plain:
+        lines += ["", f"[{prefix}]"]
+    lines += [f"{key} = {_text(value)}" for key, value in plain.items()]
+    for key, value in tree.items():
+        if key not in plain:
+            _write_table(value, f"{prefix}.{key}" if prefix else key, lines)
+
+
+def _text(value: Any) -> str:  # noqa: ANN401
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{k} = {_text(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    return repr(value)
+
+
+def _read_quantity(origin: str, entry: object, spec: Field, path: str) -> float:
+    """Return the value of a number that stands with unit and source."""
+    unit = spec.metadata["unit"]
+    if not isinstance(entry, dict) or set(entry) != {"value", "unit", "source"}:
+        is_what = "missing" if entry is None else repr(entry)
+        form = f'{{ value = ..., unit = "{unit}", source = "..." }}'
+        raise RobotError(f"{origin}: '{path}' is {is_what}; it needs {form}.")
+    value: float = entry["value"]
+    if not is_number(value):
+        raise RobotError(f"{origin}: '{path}' must be a finite number, not {value!r}.")
+    if entry["unit"] != unit:
+        raise RobotError(f"{origin}: '{path}' is in {entry['unit']!r} but must be in '{unit}'.")
+    if not isinstance(entry["source"], str) or not entry["source"].strip():
+        raise RobotError(f"{origin}: '{path}' has no source; say where {value} comes from.")
+    zero_is_valid = spec.name in _MAY_BE_ZERO or spec.metadata.get("zero", False)
+    signed = spec.name in _MAY_BE_NEGATIVE or spec.metadata.get("signed", False)
+    if not signed and (value < 0 or (value == 0 and not zero_is_valid)):
+        least = "zero or more" if zero_is_valid else "more than zero"
+        raise RobotError(f"{origin}: '{path}' is {value} {unit} but must be {least}.")
+    return float(value)
+
+
+def check_physics(robot: Robot, origin: str) -> None:
+    """Check what no single field can tell.
+
+    Raises:
+        RobotError: Naming the fields that contradict each other.
+    """
+    for name, joint in (("hip", robot.hip), ("knee", robot.knee)):
+        motor = joint.motor
+        _below(origin, (f"{name}.lower", joint.lower), (f"{name}.upper", joint.upper), "rad")
+        for smaller in ("torque_limit", "rated_torque"):
+            _at_most(
+                origin,
+                (f"{name}.motor.{smaller}", getattr(motor, smaller)),
+                (f"{name}.motor.peak_torque", motor.peak_torque),
+                "N m",
+            )
+        if joint.load_friction >= 1:
+            raise RobotError(
+                f"{origin}: '{name}.load_friction' is {joint.load_friction:g} but a gear that takes"
+                " all that it gets never turns; give less than 1."
+            )
+    for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
+        _at_most(origin, (f"{name}.com", link.com), (f"{name}.length", link.length), "m")
+    if robot.kind not in KINDS:
+        raise RobotError(f"{origin}: 'kind': {unknown_name('kind of robot', robot.kind, KINDS)}")
+    if robot.kind == "leg" and (robot.knee.lower < -math.pi or robot.knee.upper > 0):
+        raise RobotError(
+            f"{origin}: 'knee.lower' and 'knee.upper' must lie between -pi and 0 rad,"
+            " because a leg's knee bends to the negative side;"
+            " for a robot that only swings write kind = 'pendulum'."
+        )
+    _check_mismatch(robot, origin)
+    wiring = hardware.mistake(robot.hardware)
+    if wiring is not None:
+        raise RobotError(f"{origin}: {wiring}")
+    least = 2 * TIMESTEP
+    if robot.contact.time_constant < least:
+        raise RobotError(
+            f"{origin}: 'contact.time_constant' is {robot.contact.time_constant:g} s but must be at"
+            f" least {least:g} s, two physics steps; MuJoCo would silently take that instead."
+        )
+
+
+def _check_mismatch(robot: Robot, origin: str) -> None:
+    """Check what no single field of ``[reality]`` can tell."""
+    reality = robot.reality
+    for name, joint, drive in (("hip", robot.hip, reality.hip), ("knee", robot.knee, reality.knee)):
+        at = f"reality.{name}"
+        if drive.efficiency > 1:
+            raise RobotError(
+                f"{origin}: '{at}.efficiency' is {drive.efficiency:g} but no gear gives more than"
+                " it gets; give at most 1."
+            )
+        if drive.stiction < 1:
+            raise RobotError(
+                f"{origin}: '{at}.stiction' is {drive.stiction:g} but friction at rest is not below"
+                " Coulomb friction; give 1 or more."
+            )
+        if drive.torque_limit is not None:
+            peak = joint.motor.peak_torque * joint.belt_ratio
+            limit = (f"{at}.torque_limit", drive.torque_limit)
+            _at_most(origin, limit, (f"{name}.motor.peak_torque x belt_ratio", peak), "N m")
+    softest = reality.ground.time_constant
+    if softest is not None and softest < 2 * TIMESTEP:
+        raise RobotError(
+            f"{origin}: 'reality.ground.time_constant' is {softest:g} s but must be at least"
+            f" {2 * TIMESTEP:g} s, two physics steps."
+        )
+
+
+def _below(origin: str, low: tuple[str, float], high: tuple[str, float], unit: str) -> None:
+    if low[1] >= high[1]:
+        raise RobotError(
+            f"{origin}: '{low[0]}' ({low[1]:g} {unit}) must lie below '{high[0]}' ({high[1]:g})."
+        )
+
+
+def _at_most(origin: str, low: tuple[str, float], high: tuple[str, float], unit: str) -> None:
+    if low[1] > high[1]:
+        raise RobotError(
+            f"{origin}: '{low[0]}' ({low[1]:g} {unit}) must not exceed '{high[0]}' ({high[1]:g})."
+        )

@@ -5,19 +5,19 @@ that alternative. Controllers and rewards go on believing the robot itself, so o
 alone reads may vary: sizes, motors' speeds and joint limits may not.
 """
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import attrgetter
-from typing import Any, Literal, TypeVar
+from typing import Literal
 
 import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError, unknown_name
-from hopping_leg.robot.fields import check_physics
+from hopping_leg.io import replace_at
 from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.robot_files import check_physics
 
 RANDOMIZABLE = (
     "base.mass",
@@ -144,8 +144,6 @@ WIDE_RANGES = (
 """What may surprise any leg: a payload, heavy links, a worn or dry rail, hard and soft ground,
 motors that give less or more than they should, joints that rub, commands that come later."""
 
-Part = TypeVar("Part")
-
 
 def sample(
     robot: Robot,
@@ -176,7 +174,7 @@ def sample(
         for spread in ranges:
             value = spread.sample(rng, attrgetter(spread.path)(robot))
             if probability == 1 or rng.random() < probability:
-                variant = with_value(variant, spread.path.split("."), value)
+                variant = replace_at(variant, spread.path, value)
         check_physics(variant, f"variant {number} of {robot.name}")
         variants.append(variant)
     return tuple(variants)
@@ -189,10 +187,3 @@ def normalized(robot: Robot, variants: Sequence[Robot], ranges: Sequence[Range])
         number = attrgetter(spread.path)
         found[:, column] = [spread.normalize(number(v), number(robot)) for v in variants]
     return found
-
-
-def with_value(part: Part, path: list[str], value: float) -> Part:
-    """Return a nested dataclass with the entry at a path replaced."""
-    name, *rest = path
-    entry: Any = with_value(getattr(part, name), rest, value) if rest else value
-    return dataclasses.replace(part, **{name: entry})  # type: ignore[type-var]

@@ -8,17 +8,14 @@ identification, the paper's Table I, recordings. Whoever doubts them passes othe
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from hopping_leg.errors import UsageError
-from hopping_leg.robot.fields import Tree
+from hopping_leg.io import Tree, replace_at, write_atomically
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.robot.robot_files import robot_from_tree, shipped_robots
-from hopping_leg.robot.writing import robot_text
+from hopping_leg.robot.robot_files import robot_from_tree, robot_text, shipped_robots
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, Range
-from hopping_leg.trace import write_atomically
 
 _CHOSEN = "[C]"
 
@@ -118,16 +115,13 @@ def draw_twin(seed: int, base: str = "legv2", ranges: Sequence[Range] = TWIN_RAN
         "extends": parent,
     }
     for spread in ranges:
-        _put(tree, spread, float(f"{spread.sample(rng):.6g}"), seed)
+        value = float(f"{spread.sample(rng):.6g}")
+        tree = replace_at(tree, spread.path, _entry(spread, value, seed))
     return Twin(robot_from_tree(tree, f"twin {seed}"), tree)
 
 
-def _put(tree: Tree, spread: Range, value: float, seed: int) -> None:
-    table: dict[str, Any] = tree
-    *tables, name = spread.path.split(".")
-    for key in tables:
-        table = table.setdefault(key, {})
+def _entry(spread: Range, value: float, seed: int) -> Tree:
     drawn = f"seed {seed}, {spread.scale} from {spread.low:g} to {spread.high:g}"
     fixed = spread.low == spread.high
     source = spread.source if fixed else f"{drawn}: {spread.source}"
-    table[name] = {"value": value, "unit": spread.unit, "source": source}
+    return {"value": value, "unit": spread.unit, "source": source}

@@ -23,7 +23,7 @@ from PIL import Image
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.timing import host
-from hopping_leg.trace import write_atomically
+from hopping_leg.io import write_atomically
 from hopping_leg.viewer import graphics
 from hopping_leg.viewer.browser import (
     SIZE,

@@ -28,7 +28,7 @@ from hopping_leg.cli.bench.probe import Probe
 from hopping_leg.cli.bench.simulation import Convergence, Env, Inference, Reach
 from hopping_leg.cli.bench.view import View
 from hopping_leg.cli.command_line import KEPT, command_line, verb_of
-from hopping_leg.json_files import write_json
+from hopping_leg.io import write_json
 
 Benchmark = (
     Env

@@ -11,9 +11,9 @@ from hopping_leg.cli.bench.shared import at_least, mm
 from hopping_leg.cli.finetune import guard_of
 from hopping_leg.controllers.registry import load_policy
 from hopping_leg.errors import UsageError
+from hopping_leg.io import write_atomically
 from hopping_leg.robot import load_robot
 from hopping_leg.sim.twins import draw_twin
-from hopping_leg.trace import write_atomically
 
 
 @dataclass(frozen=True)

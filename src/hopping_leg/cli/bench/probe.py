@@ -38,8 +38,8 @@ class Probe:
         from hopping_leg.evaluate.figures import to_svg
         from hopping_leg.evaluate.figures.probe import draw_probe
         from hopping_leg.evaluate.probe.study import run_study
+        from hopping_leg.io import write_atomically
         from hopping_leg.rl.hidden import expose_hidden
-        from hopping_leg.trace import write_atomically
 
         at_least(0, threads=self.threads, seed=self.study.seed)
         robot = load_robot(self.robot)

@@ -11,7 +11,7 @@ from typing import Any, Self
 from hopping_leg.evaluate import keeper
 from hopping_leg.identify.optimizers import Report
 from hopping_leg.identify.result import software_versions
-from hopping_leg.json_files import write_json
+from hopping_leg.io import write_json
 
 
 @dataclass(frozen=True)

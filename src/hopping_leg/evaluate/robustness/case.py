@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import reduce
 from operator import attrgetter
 
+from hopping_leg.io import replace_at
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim.randomization import with_value
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ def with_numbers(robot: Robot, numbers: Mapping[str, float]) -> Robot:
         numbers: Dotted path, e.g. ``"rail.friction"``, to value.
     """
     for path, value in numbers.items():
-        robot = with_value(robot, path.split("."), value)
+        robot = replace_at(robot, path, value)
     return robot
 
 

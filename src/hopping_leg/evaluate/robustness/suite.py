@@ -25,6 +25,7 @@ from hopping_leg.evaluate.robustness.plan import JOINT_POINTS, SECONDS, make_pla
 from hopping_leg.evaluate.robustness.score import level_rows, score_rows
 from hopping_leg.evaluate.runner import software_versions
 from hopping_leg.evaluate.trials import COMMANDS, check_reach, scaled
+from hopping_leg.io import safe_file_name
 
 RECOVERY = "recovery"
 """Part that follows changes in the middle of a run; no axis, part of no score."""
@@ -139,7 +140,7 @@ def run_suite(
         for number, part in enumerate(parts):
             tick = functools.partial(_report, on_progress, candidate.label, number, len(parts))
             kept = keeper.keep(
-                f"{_safe(candidate.label)}-{part}",
+                f"{safe_file_name(candidate.label)}-{part}",
                 f"{candidate.label}: {part}",
                 suite.asked(candidate.controller, part),
                 functools.partial(_run_part, candidate, suite, part, tick),
@@ -241,7 +242,3 @@ def _conditions(suite: Suite) -> dict[str, Any]:
         "rate_hz": setup.rate,
         "start_length_m": setup.standing_length,
     }
-
-
-def _safe(label: str) -> str:
-    return "".join(c if c.isalnum() or c in "-_." else "_" for c in label)

@@ -16,7 +16,7 @@ from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.identify.result import Identified, as_json
 from hopping_leg.identify.robot_file import save_robot
-from hopping_leg.json_files import write_json
+from hopping_leg.io import write_json
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.parameters import Robot
 

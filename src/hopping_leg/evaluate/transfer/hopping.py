@@ -21,7 +21,7 @@ from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.evaluate.runner import evaluate
 from hopping_leg.evaluate.transfer.methods import Method
 from hopping_leg.evaluate.transfer.study import Study, TwinFile
-from hopping_leg.json_files import write_json
+from hopping_leg.io import write_json
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 

@@ -8,12 +8,11 @@ from typing import Any
 
 from hopping_leg.controllers.hardware_trial import TrialRobot
 from hopping_leg.errors import UsageError
-from hopping_leg.json_files import write_json
+from hopping_leg.io import write_atomically, write_json
 from hopping_leg.rl.finetune.finetuning import Finetuned, Finetuning, Row
 from hopping_leg.rl.finetune.options import FinetuneOptions
 from hopping_leg.rl.finetune.prepared import Task
 from hopping_leg.rl.run_folder import library_versions
-from hopping_leg.trace import write_atomically
 
 RESULT = "finetune.json"
 POLICY = "policy.onnx"

@@ -14,7 +14,7 @@ import numpy as np
 
 from hopping_leg.controllers.hardware_trial import Steps
 from hopping_leg.controllers.policy import Policy
-from hopping_leg.json_files import write_json
+from hopping_leg.io import write_json
 from hopping_leg.rl.finetune.finetuning import Row
 from hopping_leg.rl.finetune.hops import score
 from hopping_leg.rl.finetune.options import FinetuneOptions, Method

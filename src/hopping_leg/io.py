@@ -1,0 +1,224 @@
+"""Files of plain data: written whole or not at all, read into dataclasses with errors that help."""
+
+import contextlib
+import dataclasses
+import json
+import math
+import os
+import platform
+import types
+import typing
+from collections.abc import Callable
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+from hopping_leg.errors import HoppingLegError, TraceError, UsageError, unknown_name
+
+Tree = dict[str, Any]
+"""Nested tables as read from TOML or JSON."""
+
+Field = dataclasses.Field[Any]
+Kind = TypeVar("Kind")
+
+_FORMS = {str: "a text in quotes", bool: "true or false", int: "a whole number"}
+
+
+def write_atomically(path: Path, content: bytes) -> None:
+    """Write a file so that a killed process or a full disk leaves the old one whole.
+
+    Raises:
+        TraceError: The file cannot be written.
+    """
+    path = path.resolve()
+    part = path.with_name(path.name + ".part")
+    try:
+        if path.exists() and not path.is_file():
+            path.write_bytes(content)  # a device or pipe must not be replaced by a file
+            return
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with part.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+        raise TraceError(f"Cannot write {path}: {error.strerror}; nothing was changed.") from error
+
+
+def write_json(path: Path, value: object) -> None:
+    """Write a value as readable JSON; an existing file stays whole if that fails.
+
+    Args:
+        path: The file.
+        value: See ``plain``.
+
+    Raises:
+        TraceError: The file cannot be written.
+    """
+    write_atomically(path, json_text(value).encode())
+
+
+def json_text(value: object) -> str:
+    """Return a value as readable JSON, see ``plain``."""
+    return f"{json.dumps(plain(value), indent=1, allow_nan=False)}\n"
+
+
+def plain(value: Any) -> Any:  # noqa: ANN401
+    """Return a value with lists for tuples and null for numbers that JSON does not know (NaN)."""
+    if isinstance(value, dict):
+        return {key: plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def safe_file_name(text: str) -> str:
+    """Return a text with all but letters, digits, ``-``, ``_`` and ``.`` replaced by ``_``."""
+    return "".join(c if c.isalnum() or c in "-_." else "_" for c in text)
+
+
+def versions(*packages: str) -> dict[str, str]:
+    """Return the versions of Python and of those packages that are installed."""
+    found = {"python": platform.python_version()}
+    for package in packages:
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            found[package] = metadata.version(package)
+    return found
+
+
+def replace_at(tree: Kind, path: str, value: object) -> Kind:
+    """Return nested dataclasses or dictionaries with one entry replaced.
+
+    Args:
+        tree: What stays otherwise; dictionaries on the way are made where there are none.
+        path: Names of the entry and of what holds it, outermost first, joined by dots.
+        value: The new entry.
+    """
+    name, _, rest = path.partition(".")
+    if isinstance(tree, dict):
+        inner = replace_at(tree.get(name, {}), rest, value) if rest else value
+        return typing.cast(Kind, {**tree, name: inner})
+    inner = replace_at(getattr(tree, name), rest, value) if rest else value
+    return dataclasses.replace(tree, **{name: inner})  # type: ignore[type-var]
+
+
+def read_dataclass(
+    kind: type[Kind],
+    tree: object,
+    origin: str,
+    *,
+    error: type[HoppingLegError] = UsageError,
+    path: str = "",
+    read_quantity: Callable[[object, Field, str], float] | None = None,
+) -> Kind:
+    """Return the dataclass that a table describes.
+
+    Its fields may be texts, numbers, truth values, literals, tuples of these, dataclasses, and any
+    of them or None. Numbers must be finite.
+
+    Args:
+        kind: The dataclass; a field's ``metadata["choices"]`` are all that it may be.
+        tree: The table: field names to values.
+        origin: Where it comes from, e.g. the file, for messages.
+        error: Raised where something is wrong.
+        path: Of the table in the file, e.g. ``"hip.motor"``.
+        read_quantity: Reads a number whose field has a ``unit`` in its metadata, given entry (None
+            where it is missing), field and path; without it, such fields are plain numbers.
+
+    Raises:
+        HoppingLegError: Naming the field and what was valid; ``error`` unless ``kind`` raised it.
+    """
+    if not isinstance(tree, dict):
+        raise error(f"{origin}: '{path or origin}' must be a table, not {tree!r}.")
+    specs: dict[str, Field] = {f.name: f for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
+    hints = typing.get_type_hints(kind)
+    for key in tree:
+        if key not in specs:
+            where = f"field in [{path}]" if path else "field"
+            raise error(f"{origin}: {unknown_name(where, str(key), specs)}")
+    values: Tree = {}
+    for name, spec in specs.items():
+        at = f"{path}.{name}" if path else name
+        missing = name not in tree
+        if missing and not spec.default is spec.default_factory is dataclasses.MISSING:
+            continue
+        if read_quantity is not None and "unit" in spec.metadata:
+            values[name] = read_quantity(tree.get(name), spec, at)
+        elif dataclasses.is_dataclass(inner := hints[name]) and not missing:
+            values[name] = read_dataclass(
+                typing.cast("type[Any]", inner),
+                tree[name],
+                origin,
+                error=error,
+                path=at,
+                read_quantity=read_quantity,
+            )
+        else:
+            choices = spec.metadata.get("choices", ())
+            if missing:
+                form = _form(hints[name], choices)
+                form += f" [{at}]" if form == "a table" else ""
+                raise error(f"{origin}: '{at}' is missing; it needs {form}.")
+            values[name] = _read(tree[name], hints[name], choices, f"{origin}: '{at}'", error)
+    try:
+        return kind(**values)
+    except HoppingLegError as problem:
+        raise type(problem)(f"{origin}: {problem}") from None
+
+
+def _read(
+    value: object,
+    kind: Any,  # noqa: ANN401
+    choices: tuple[str, ...],
+    subject: str,
+    error: type[HoppingLegError],
+) -> object:
+    """Return a value as its field's type, or say what was valid."""
+    args = typing.get_args(kind)
+    if _is_optional(kind):
+        return None if value is None else _read(value, args[0], choices, subject, error)
+    if typing.get_origin(kind) is Literal or choices:
+        valid = choices or args
+        if value not in valid:
+            raise error(f"{subject}: {unknown_name('value', str(value), map(str, valid))}")
+        return value
+    if typing.get_origin(kind) is tuple and isinstance(value, list | tuple):
+        kinds = [args[0]] * len(value) if args[-1] is Ellipsis else list(args)
+        if len(kinds) == len(value):
+            pairs = zip(value, kinds, strict=True)
+            return tuple(_read(v, k, (), subject, error) for v, k in pairs)
+    elif kind is float and is_number(value):
+        return float(typing.cast(float, value))
+    elif kind in _FORMS and isinstance(value, kind) and (kind is bool) == isinstance(value, bool):
+        return value
+    raise error(f"{subject} is {value!r} but must be {_form(kind, choices)}.")
+
+
+def is_number(value: object) -> bool:
+    """Tell whether a value is a finite number and no truth value."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and math.isfinite(typing.cast(float, value))
+
+
+def _form(kind: Any, choices: tuple[str, ...]) -> str:  # noqa: ANN401
+    """Return what a field may hold."""
+    args = typing.get_args(kind)
+    if _is_optional(kind):
+        return _form(args[0], choices)
+    if typing.get_origin(kind) is Literal or choices:
+        return f"one of {', '.join(map(str, choices or args))}"
+    if typing.get_origin(kind) is tuple:
+        pair = args == (float, float)
+        return "a pair [hip, knee] of numbers" if pair else f"a list of {len(args)}"
+    if dataclasses.is_dataclass(kind):
+        return "a table"
+    return _FORMS.get(kind, "a finite number")
+
+
+def _is_optional(kind: Any) -> bool:  # noqa: ANN401
+    return isinstance(kind, types.UnionType) or typing.get_origin(kind) is typing.Union

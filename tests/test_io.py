@@ -1,0 +1,115 @@
+"""Plain data is stored and read as it is, and mistakes in it are one sentence."""
+
+import dataclasses
+import json
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hopping_leg.errors import RobotError, TraceError, UsageError
+from hopping_leg.io import (
+    json_text,
+    plain,
+    read_dataclass,
+    replace_at,
+    safe_file_name,
+    versions,
+    write_json,
+)
+
+VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(),
+    lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
+)  # fmt: skip
+
+
+def test_json_has_null_where_there_is_no_number(tmp_path):
+    file = tmp_path / "deep" / "x.json"
+    write_json(file, {"a": [math.nan, 1.5, (math.inf,)], "b": None})
+    assert json.loads(file.read_text()) == {"a": [None, 1.5, [None]], "b": None}
+
+
+@given(VALUES)
+def test_what_json_knows_comes_back(value):
+    assert plain(value) == value
+    assert json.loads(json_text(value)) == value
+
+
+def test_a_folder_is_no_file(tmp_path):
+    with pytest.raises(TraceError):
+        write_json(tmp_path, {})
+
+
+@dataclass(frozen=True)
+class Inner:
+    level: Literal["low", "high"] = "low"
+    gain: float = field(default=1.0, metadata={"unit": "N m"})
+
+    def __post_init__(self):
+        if self.gain < 0:
+            raise UsageError(f"'gain' is {self.gain} but must be zero or more.")
+
+
+@dataclass(frozen=True)
+class Outer:
+    name: str
+    inner: Inner
+    count: int = 1
+    on: bool = False
+    pair: tuple[float, float] | None = None
+    kind: str = field(default="a", metadata={"choices": ("a", "b")})
+
+
+WHOLE = {"name": "x", "inner": {}}
+
+
+def test_a_dataclass_comes_back_from_its_table():
+    outer = Outer("x", Inner("high", 2.5), 3, True, (1.0, 2.0), "b")
+    tree = json.loads(json_text(dataclasses.asdict(outer)))
+    assert read_dataclass(Outer, tree, "f") == outer
+    assert read_dataclass(Outer, {**WHOLE, "pair": [1, 2]}, "f").pair == (1.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"nme": 1}, "f: There is no field 'nme'. Did you mean 'name'?"),
+        ({"inner": {"gian": 1}}, "f: There is no field in [inner] 'gian'. Did you mean 'gain'?"),
+        ({"inner": 3}, "f: 'inner' must be a table, not 3."),
+        ({"inner": {"level": "mid"}}, "f: 'inner.level': There is no value 'mid'."),
+        ({"inner": {"gain": -1}}, "f: 'gain' is -1.0 but must be zero or more."),
+        ({"inner": {"gain": math.inf}}, "f: 'inner.gain' is inf but must be a finite number."),
+        ({"inner": {"gain": True}}, "f: 'inner.gain' is True but must be a finite number."),
+        ({"name": 3}, "f: 'name' is 3 but must be a text in quotes."),
+        ({"count": 1.5}, "f: 'count' is 1.5 but must be a whole number."),
+        ({"count": True}, "f: 'count' is True but must be a whole number."),
+        ({"on": 1}, "f: 'on' is 1 but must be true or false."),
+        ({"pair": [1.0]}, "f: 'pair' is [1.0] but must be a pair [hip, knee] of numbers."),
+        ({"kind": "c"}, "f: 'kind': There is no value 'c'. Available: a, b."),
+    ],
+)
+def test_mistakes_in_a_table_are_one_sentence_with_the_field(change, sentence):
+    with pytest.raises(UsageError) as caught:
+        read_dataclass(Outer, WHOLE | change, "f")
+    assert str(caught.value).startswith(sentence)
+    with pytest.raises(RobotError, match="'inner' is missing; it needs a table \\[inner\\]"):
+        read_dataclass(Outer, {"name": "x"}, "f", error=RobotError)
+
+
+def test_one_entry_is_replaced_and_the_rest_stays():
+    outer = Outer("x", Inner())
+    assert replace_at(outer, "inner.gain", 2.0) == Outer("x", Inner(gain=2.0))
+    tree = {"a": {"b": 1, "c": 2}, "d": 3}
+    assert replace_at(tree, "a.b", 4) == {"a": {"b": 4, "c": 2}, "d": 3}
+    assert replace_at(tree, "e.f.g", 5)["e"] == {"f": {"g": 5}}
+    assert tree == {"a": {"b": 1, "c": 2}, "d": 3}
+
+
+def test_versions_leave_out_what_is_not_installed():
+    assert set(versions("numpy", "no-such-package")) == {"python", "numpy"}
+    assert safe_file_name("my leg/v2.1") == "my_leg_v2.1"
