@@ -57,13 +57,13 @@ test-fast: $(STAMP)
 results: $(STAMP)
 	$(BIN)/hop evaluate fast precise adaptive paper energy-shaping energy-shaping-literal --seeds 10 --no-video \
 	  --json docs/results/evaluation.json --traces runs/results/traces
-	$(BIN)/hop plot runs/results/traces/*.parquet --out docs/results/figures
+	$(BIN)/hop report figures runs/results/traces/*.parquet --out docs/results/figures
 	$(BIN)/hop evaluate precise adaptive recurrent energy-shaping energy-shaping-flying --seeds 5 --floor soft --no-video --json docs/results/precise.json \
 	  --commands $(HEIGHTS)
-	$(BIN)/hop evaluate energy-shaping energy-shaping-literal fast precise adaptive recurrent paper --suite robustness --seeds 3 \
+	$(BIN)/hop robustness energy-shaping energy-shaping-literal fast precise adaptive recurrent paper --seeds 3 \
 	  --out runs/results/robustness --json docs/results/robustness.json
 	cp runs/results/robustness/robustness.svg docs/results
-	$(BIN)/hop evaluate fast precise adaptive paper energy-shaping --suite skills --json docs/results/skills.json
+	$(BIN)/hop skills fast precise adaptive paper energy-shaping --json docs/results/skills.json
 	$(BIN)/hop bench probe fast precise adaptive recurrent paper --figure docs/results/probe.svg --json docs/results/probe.json
 	$(BIN)/hop bench env --json docs/results/env.json
 	$(BIN)/hop bench inference --json docs/results/inference.json
@@ -105,15 +105,15 @@ results: $(STAMP)
 	  $(foreach s,0 1 2 3 4,quarter-seed$(s)=runs/bench-quarter-former/precise-seed$(s)/policy.onnx) --seeds 5 --floor soft --no-video \
 	  --json docs/results/precise-seeds-former.json --commands $(HEIGHTS),0.41,0.42,0.43,0.44,0.45
 	$(BIN)/hop train --recipe adaptive --set $(FORMER) --out runs/adaptive
-	$(BIN)/hop evaluate 12-million-steps=runs/adaptive/policy.onnx adaptive --suite robustness --seeds 3 \
+	$(BIN)/hop robustness 12-million-steps=runs/adaptive/policy.onnx adaptive --seeds 3 \
 	  --out runs/results/robustness-adaptive --json docs/results/adaptive-robustness.json
 	for seed in 0 1 2 3 4; do $(BIN)/hop train --recipe precise --seed $$seed --steps 9000000 --set $(FORMER) teachers=1 epochs=4 task.command_skew=1 teaching=0.28 --out runs/teaching/0.28-seed$$seed; done
 	for seed in 2 4; do $(BIN)/hop train --recipe precise --seed $$seed --steps 9000000 --set $(FORMER) teachers=1 epochs=4 task.command_skew=1 teaching=0.38 --out runs/teaching/0.38-seed$$seed; done
 	$(BIN)/hop train --recipe precise --steps 9000000 --set $(FORMER) teachers=1 epochs=4 task.command_skew=1 teaching=0.55 --out runs/teaching/0.55-seed0
 	$(BIN)/hop evaluate "runs/teaching/*/policy.onnx" --seeds 5 --floor soft --no-video --json docs/results/teaching.json \
 	  --commands $(HEIGHTS)
-	$(BIN)/hop evaluate 0.28-seed0=runs/teaching/0.28-seed0/policy.onnx 0.38-seed2=runs/teaching/0.38-seed2/policy.onnx \
-	  0.55-seed0=runs/teaching/0.55-seed0/policy.onnx --suite robustness --seeds 3 --out runs/results/robustness-teaching --json docs/results/teaching-robustness.json
+	$(BIN)/hop robustness 0.28-seed0=runs/teaching/0.28-seed0/policy.onnx 0.38-seed2=runs/teaching/0.38-seed2/policy.onnx \
+	  0.55-seed0=runs/teaching/0.55-seed0/policy.onnx --seeds 3 --out runs/results/robustness-teaching --json docs/results/teaching-robustness.json
 	$(BIN)/hop train --recipe precise --seed 3 --steps 12000000 --set $(FORMER) teaching=0.42 imitation.knots=16 --out runs/precise
 	$(BIN)/hop bench limits --controllers precise adaptive recurrent energy-shaping quarter=runs/bench-quarter/precise-seed3/policy.onnx \
 	  --teacher runs/bench-quarter/precise-seed3/start-1 --json docs/results/limits.json

@@ -133,7 +133,7 @@ def exists(file: str, path: str = "") -> bool:
 
 
 def pictures() -> list[str]:
-    """Return the names of all figures that ``hop plot`` left in docs/results/figures."""
+    """Return the names of all figures that ``hop report figures`` left in docs/results/figures."""
     return sorted(path.name for path in (RESULTS / "figures").glob("*.svg"))
 
 

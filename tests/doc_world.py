@@ -32,10 +32,10 @@ SHORTER = {
     "hop evaluate": {
         "--seeds": "1", "--commands": "0.3", "--floor": "soft", "--no-video": None,
     },
-    "hop evaluate --suite robustness": {
+    "hop robustness": {
         "--seeds": "1", "--commands": "0.3", "--axes": "payload",
     },
-    "hop evaluate --suite skills": {"--seeds": "1", "--commands": "0.3", "--floor": "soft"},
+    "hop skills": {"--seeds": "1", "--commands": "0.3", "--floor": "soft"},
     "hop excite fixed-base": {
         "--amplitudes": "0.05", "--periods": "0.5", "--swings": "10", "--duration": "10",
     },

@@ -43,25 +43,10 @@ def last_cell(table):
     return table.splitlines()[2].split("|")[-2].strip()
 
 
-@pytest.mark.parametrize(
-    ("command", "change", "verdict"),
-    [
-        (0.3, {}, "yes"),
-        (0.3, {"median_error_m": -0.0051}, "no"),
-        (0.3, {"std_m": 0.0051}, "no"),
-        (0.38, {"std_m": 0.0069}, "yes"),
-        (0.38, {"std_m": 0.0081}, "no"),
-        (0.3, {"skipped_hops": 1}, "no"),
-        (0.3, {"body_contacts": 1}, "no"),
-        (0.3, {"hop_rate_hz": 1.5}, "no"),
-        (0.3, {"flight_fraction": 0.49}, "no"),
-        (0.45, {"std_m": 0.1}, "yes"),
-    ],
-)
-def test_a_table_says_whether_hops_are_as_asked(macros, tmp_path, command, change, verdict):
-    rows = [{**GOOD, "command_m": c} for c in (0.22, 0.26, 0.3, 0.34)]
-    file = store(tmp_path, [*rows, {**GOOD, "command_m": command, **change}])
-    assert last_cell(macros[0].precision(file, 0.4)) == verdict
+def test_a_table_says_whether_hops_are_as_asked(macros, tmp_path):
+    for change, verdict in (({}, "yes"), ({"skipped_hops": 1}, "no")):
+        file = store(tmp_path, [{**GOOD, "command_m": 0.3, **change}])
+        assert last_cell(macros[0].precision(file, 0.4)) == verdict
 
 
 def test_trainings_are_counted_and_other_controllers_are_not(macros, tmp_path):

@@ -1,4 +1,5 @@
 import json
+import re
 
 import pytest
 
@@ -33,11 +34,18 @@ def test_one_folder_receives_numbers_report_and_traces(spring, tmp_path, capsys)
     ]
     assert Trace.load(traces[0]).header["controller"] == "spring"
     assert "spring" in capsys.readouterr().out
+    page = tmp_path / "again.html"
+    assert main(["report", "page", str(out), "--out", str(page)]) == 0
+    again, report = (path.read_text() for path in (page, out / "report.html"))
+    assert re.sub('data:[^"]*', "", again) == re.sub('data:[^"]*', "", report)
     figures = tmp_path / "figures"
-    assert main(["plot", *map(str, traces), "--out", str(figures), "--format", "png"]) == 0
+    assert (
+        main(["report", "figures", *map(str, traces), "--out", str(figures), "--format", "png"])
+        == 0
+    )
     assert {"heights.png", "ladder.png"} <= {path.name for path in figures.iterdir()}
     ladder = str(traces[1])
-    assert main(["plot", ladder, "--out", str(figures), "--animation", "gif"]) == 2
+    assert main(["report", "figures", ladder, "--out", str(figures), "--animation", "gif"]) == 2
     assert "No trace of spring holds one command throughout" in capsys.readouterr().err
 
 
@@ -63,9 +71,3 @@ def test_bad_input_is_one_sentence(spring, capsys, words, sentence):
     error = capsys.readouterr().err
     assert sentence in error
     assert "Traceback" not in error
-
-
-def test_no_trace_is_one_sentence(capsys, tmp_path):
-    assert main(["plot"]) == 2
-    assert main(["plot", str(tmp_path / "none.parquet")]) == 2
-    assert "There is no trace file" in capsys.readouterr().err

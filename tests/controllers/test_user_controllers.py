@@ -204,13 +204,13 @@ def test_other_names_are_no_classes():
 def test_command_line_judges_a_class_and_names_a_broken_one(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     file = tmp_path / "robustness.json"
-    words = ["--suite", "robustness", "--axes", "pushes", "--seeds", "1", "--commands", "0.3"]
+    words = ["--axes", "pushes", "--seeds", "1", "--commands", "0.3"]
     words += ["--threads", "1", "--json", str(file)]
-    assert main(["evaluate", f"mine={BOUNCER}:Bouncer", *words]) == 0
+    assert main(["robustness", f"mine={BOUNCER}:Bouncer", *words]) == 0
     assert {row["controller"] for row in json.loads(file.read_text())["scores"]} == {"mine"}
     path = written(tmp_path / "bad.py", BATCHED, answer="np.full((self.count, 2), np.nan)")
     capsys.readouterr()
-    assert main(["evaluate", f"{path}:Held", *words]) == 2
+    assert main(["robustness", f"{path}:Held", *words]) == 2
     error = capsys.readouterr().err
     assert "bad.py:Held" in error
     assert "Traceback" not in error

@@ -73,7 +73,7 @@ def test_heights_come_from_the_traces_that_were_kept(folders):
 
 def test_the_page_holds_everything_and_needs_nothing(folders):
     names = [str(folders / name) for name in ("a", "b", "t0", "t1")]
-    page = write_comparison(set_beside(read_runs(names)), "hop compare a b").decode()
+    page = write_comparison(set_beside(read_runs(names)), "hop report page a b").decode()
     sources = re.findall(r'(?:src|href)="([^"]*)"', page)
     assert len(sources) == 4  # sequence, staircase, distributions, learning curves
     assert all(source.startswith("data:") for source in sources)

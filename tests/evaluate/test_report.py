@@ -35,7 +35,7 @@ def test_the_page_states_its_numbers_and_how_to_make_it_again(page, judged):
         assert f"{1e3 * row.median_error_m:+.1f}" in page
         assert f">{row.hops}<" in page
     assert judged.evaluation.conditions["robot_digest"] in page
-    assert "hop plot TRACES/spring-staircase-0.parquet" in page
+    assert "hop report figures TRACES/spring-staircase-0.parquet" in page
 
 
 def test_the_same_evaluation_gives_the_same_page(page, commanded):

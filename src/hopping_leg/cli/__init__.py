@@ -26,8 +26,9 @@ from hopping_leg.errors import HoppingLegError, UsageError, unknown_name
 VERBS = {
     "robots": "list the legs, show every number with its source, check your own",
     "evaluate": "run the paper's trials for controllers and write the report",
-    "compare": "set stored evaluations and trainings beside each other on a page",
-    "plot": "draw the figures of stored traces again",
+    "robustness": "ask how far the world may change before controllers fail",
+    "skills": "so many hops and stop, stairs, soft landings",
+    "report": "draw stored traces, set stored runs beside each other on a page",
     "train": "train a controller from scratch, or go on after an interruption",
     "finetune": "continue a policy's training on the real leg, or on a twin",
     "tune": "search the gains of energy shaping, or a recipe's numbers",

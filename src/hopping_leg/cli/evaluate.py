@@ -8,13 +8,12 @@ Examples:
   hop evaluate fast energy-shaping
   hop evaluate fast energy-shaping --out runs/first
   hop evaluate 'runs/*/policy.onnx' --commands 0.25,0.30 --json result.json
-  hop evaluate mine=policy.onnx energy-shaping --suite robustness --json robustness.json
-  hop evaluate fast energy-shaping --suite skills --json skills.json
   hop evaluate energy-shaping --robot my_leg.toml --seeds 20 --floor stiff
   hop evaluate fast --engine pybullet --floor soft --seeds 2
 """
 
-from collections.abc import Callable, Sequence
+import functools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -25,14 +24,11 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 
 from hopping_leg.cli.command_line import command_line
 from hopping_leg.cli.options import Heights
-from hopping_leg.cli.robustness import judge_robustness
-from hopping_leg.cli.skills import judge_skills, print_skills
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Candidate, Judged, evaluate
 from hopping_leg.evaluate.candidates import load_candidates
 from hopping_leg.evaluate.report import render_videos, write_report
-from hopping_leg.evaluate.robustness.tables import print_robustness
 from hopping_leg.evaluate.runs import save_traces
 from hopping_leg.evaluate.terminal import print_tables
 from hopping_leg.evaluate.trials import KINDS
@@ -42,41 +38,22 @@ from hopping_leg.sim import CONTROL_RATE, NO_NOISE, Engine, NoiseAndDelay
 
 
 @dataclass(frozen=True)
-class Evaluate:
-    """What is judged, where and how often."""
+class Conditions:
+    """Controllers and what they meet, whatever is measured of them."""
 
     controllers: tyro.conf.Positional[tuple[str, ...]]
     """Names (energy-shaping, paper, fast, ...), .onnx files, a quoted pattern of them, or Python
     classes as FILE.py:CLASS; LABEL=FILE chooses the name in all tables."""
-    suite: Literal["paper", "robustness", "skills"] = "paper"
-    """The paper's trials; how far the world may change before a controller fails; or skills beyond
-    the paper: so many hops and stop, stairs, soft landings."""
-    axes: tuple[str, ...] = ()
-    """Of the robustness suite: axes by name; default: all, and changes in the middle of a run."""
     robot: str = "legv2-paper"
     """A shipped robot or a .toml file."""
     commands: Heights | None = None
-    """Apex heights of the fixed trials and the sequence, m; default 0.25,0.30,0.35, scaled to the
-    leg's length."""
+    """Apex heights, m; default 0.25,0.30,0.35, scaled to the leg's length."""
     seeds: int = 5
     """Realisations of noise and delay per trial."""
     seed: int = 1000
     """All of them follow from it; choose one that selected nothing."""
-    out: Path | None = None
-    """Folder for evaluation.json, report.html and traces/, instead of naming each; the robustness
-    suite leaves robustness.json, robustness.svg and all that a killed run goes on from, the skills
-    suite skills.json."""
     json: Path | None = None
     """File for every number."""
-    report: Path | None = None
-    """File for the report, one self-contained HTML page."""
-    traces: Path | None = None
-    """Folder for the runs as Parquet, for `hop plot` and your own tools."""
-    floor: Literal["soft", "stiff", "both"] = "both"
-    """The robot's own contact (soft), the engine's default (stiff), or all trials on the first and
-    the fixed ones on the second."""
-    engine: Engine = "mujoco"
-    """What computes the physics; pybullet needs the extra `bullet` and is much slower."""
     noise: bool = True
     """The paper's sensor noise, torque noise and delay."""
     timestep: float = 5e-4
@@ -85,6 +62,42 @@ class Evaluate:
     """Control rate, Hz."""
     threads: int = 0
     """Threads of the physics, 0 for all cores; results do not depend on it."""
+
+    def load(self) -> tuple[list[Candidate], RolloutConfig]:
+        """Return the controllers and the world that they believe in.
+
+        Raises:
+            UsageError: An option has no meaning, or there is no such robot or controller.
+        """
+        if self.seed < 0:
+            raise UsageError(f"A seed of {self.seed} has no meaning; give 0 or more.")
+        check_file(self.json)
+        robot = load_robot(self.robot)
+        setup = RolloutConfig(
+            robot,
+            NoiseAndDelay() if self.noise else NO_NOISE,
+            rate=self.rate,
+            timestep=self.timestep,
+            threads=self.threads,
+        )
+        return load_candidates(self.controllers, robot, self.rate), setup
+
+
+@dataclass(frozen=True)
+class Evaluate(Conditions):
+    """What is judged, where and how often."""
+
+    out: Path | None = None
+    """Folder for evaluation.json, report.html and traces/, instead of naming each."""
+    report: Path | None = None
+    """File for the report, one self-contained HTML page."""
+    traces: Path | None = None
+    """Folder for the runs as Parquet, for `hop report figures` and your own tools."""
+    floor: Literal["soft", "stiff", "both"] = "both"
+    """The robot's own contact (soft), the engine's default (stiff), or all trials on the first and
+    the fixed ones on the second."""
+    engine: Engine = "mujoco"
+    """What computes the physics; pybullet needs the extra `bullet` and is much slower."""
     video: bool = True
     """Put a short video of each controller into the report, where OpenGL is to be had."""
 
@@ -94,34 +107,21 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
 
     Args:
         args: Options.
-        notes: Sentences for table and report of the paper's trials, before those that arise.
+        notes: Sentences for table and report, before those that arise.
     """
     command = command_line("hop evaluate", args)
-    if args.suite == "paper":
-        args = _with_folder(args)
-    _check(args)
-    robot = load_robot(args.robot)
-    disturbance = NoiseAndDelay() if args.noise else NO_NOISE
-    setup = RolloutConfig(
-        robot,
-        disturbance,
-        rate=args.rate,
-        timestep=args.timestep,
-        threads=args.threads,
-        engine=args.engine,
-    )
-    candidates = load_candidates(args.controllers, robot, args.rate)
-    if args.suite == "robustness":
-        with progress_bar() as bar:
-            result = judge_robustness(args, candidates, setup, _bar_updater(bar), command)
-        print_robustness(Console(), result)
-        return
-    if args.suite == "skills":
-        with progress_bar() as bar:
-            result = judge_skills(args, candidates, setup, _bar_updater(bar), command)
-        print_skills(Console(), result)
-        return
-    judged = judge(candidates, setup, args)
+    if args.out is not None:
+        args = replace(
+            args,
+            json=args.json or args.out / "evaluation.json",
+            report=args.report or args.out / "report.html",
+            traces=args.traces or args.out / "traces",
+        )
+    check_file(args.report)
+    if args.traces:
+        args.traces.mkdir(parents=True, exist_ok=True)
+    candidates, setup = args.load()
+    judged = _judge(candidates, replace(setup, engine=args.engine), args)
     notes = [*notes, *judged.evaluation.notes]
     judged = replace(judged, evaluation=replace(judged.evaluation, command=command, notes=notes))
     if args.json:
@@ -131,89 +131,67 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
     if args.traces:
         save_traces(judged.runs, args.traces)
     if args.report:
-        videos = render_videos(judged, robot) if args.video else None
+        videos = render_videos(judged, setup.robot) if args.video else None
         write_atomically(args.report, write_report(judged, videos))
-    for path in (args.json, args.report, args.traces):
-        if path:
-            console.print(f"Wrote {path}", highlight=False, soft_wrap=True)
+    say_written(console, args.json, args.report, args.traces)
 
 
-def _check(args: Evaluate) -> None:
-    """Refuse what cannot work before anything is simulated."""
-    if args.axes and args.suite != "robustness":
-        raise UsageError("--axes belongs to --suite robustness; give that, too.")
-    for name, given in (("report", args.report), ("traces", args.traces)):
-        if given and args.suite != "paper":
-            raise UsageError(f"--{name} belongs to the paper's suite; leave it out.")
-    if args.seed < 0:
-        raise UsageError(f"A seed of {args.seed} has no meaning; give 0 or more.")
-    for path in (args.json, args.report):
-        if path and path.is_dir():
-            raise UsageError(f"{path} is a folder; name a file.")
-    for folder in (args.json and args.json.parent, args.report and args.report.parent, args.traces):
-        if folder:
-            folder.mkdir(parents=True, exist_ok=True)
+def check_file(path: Path | None) -> None:
+    """Make the folder of a file that will be written.
+
+    Raises:
+        UsageError: It is a folder itself.
+    """
+    if path and path.is_dir():
+        raise UsageError(f"{path} is a folder; name a file.")
+    if path:
+        path.parent.mkdir(parents=True, exist_ok=True)
 
 
-def _with_folder(args: Evaluate) -> Evaluate:
-    if args.out is None:
-        return args
-    return replace(
-        args,
-        json=args.json or args.out / "evaluation.json",
-        report=args.report or args.out / "report.html",
-        traces=args.traces or args.out / "traces",
-    )
+def say_written(console: Console, *paths: Path | None) -> None:
+    """Say where files were written."""
+    for path in filter(None, paths):
+        console.print(f"Wrote {path}", highlight=False, soft_wrap=True)
 
 
-def judge(candidates: list[Candidate], setup: RolloutConfig, args: Evaluate) -> Judged:
+def _judge(candidates: list[Candidate], setup: RolloutConfig, args: Evaluate) -> Judged:
     """Run all trials under a progress bar."""
     floors = ("soft", "stiff") if args.floor == "both" else (args.floor,)
-    with progress_bar() as bar:
-        judged = _on_floor(candidates, setup, args, floors[0], bar)
-        if len(floors) == 1:
-            return judged
-        secondary = _on_floor(candidates, setup, args, floors[1], bar)
-    return Judged(replace(judged.evaluation, secondary=secondary.evaluation), judged.runs)
+    with ShareProgress() as bar:
+        judged = [
+            evaluate(
+                candidates,
+                setup,
+                commands=args.commands,
+                repeats=args.seeds,
+                seed=args.seed,
+                floor=floor,
+                kinds=KINDS if floor == "soft" or args.floor != "both" else ("fixed",),
+                on_progress=functools.partial(bar.show, about=f", {floor} floor"),
+            )
+            for floor in floors
+        ]
+    first = judged[0]
+    secondary = judged[1].evaluation if len(judged) > 1 else None
+    return replace(first, evaluation=replace(first.evaluation, secondary=secondary))
 
 
-def _on_floor(
-    candidates: list[Candidate], setup: RolloutConfig, args: Evaluate, floor: str, bar: Progress
-) -> Judged:
-    whole = floor == "soft" or args.floor != "both"
-    return evaluate(
-        candidates,
-        setup,
-        commands=args.commands,
-        repeats=args.seeds,
-        seed=args.seed,
-        floor=floor,
-        kinds=KINDS if whole else ("fixed",),
-        on_progress=_bar_updater(bar, f", {floor} floor"),
-    )
+class ShareProgress(Progress):
+    """A bar per label that shows the share done, elapsed and remaining time."""
 
+    def __init__(self) -> None:
+        super().__init__(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.percentage:>3.0f}%"),
+            TimeElapsedColumn(),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+        )
 
-def progress_bar() -> Progress:
-    """Return a bar that shows share, elapsed and remaining time."""
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f}%"),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-    )
-
-
-def _bar_updater(bar: Progress, about: str = "") -> Callable[[str, float], None]:
-    tasks: dict[str, tuple[int, float]] = {}
-
-    def update(label: str, share: float) -> None:
-        if label not in tasks:
-            tasks[label] = (bar.add_task(f"{label}{about}", total=1.0), -1.0)
-        task, shown = tasks[label]
-        if share - shown > 0.005 or share >= 1:
-            bar.update(bar.tasks[task].id, completed=share)
-            tasks[label] = (task, share)
-
-    return update
+    def show(self, label: str, share: float, about: str = "") -> None:
+        """Show the share done, 0 to 1, of what a label, and more about it, stands for."""
+        label += about
+        known = {task.description: task.id for task in self.tasks}
+        task = known[label] if label in known else self.add_task(label, total=1.0)
+        self.update(task, completed=share)

@@ -1,56 +1,50 @@
-"""`hop evaluate --suite robustness`."""
+"""Ask how far the world may differ from what controllers believe before they fail.
 
+Every axis (payload, friction, delay, noise, pushes, ...) is changed alone in rising levels, then
+all at once; and the world changes in the middle of a run. A run that was killed goes on where it
+was.
+
+Examples:
+  hop robustness mine=runs/mine/policy.onnx energy-shaping --out runs/robustness
+  hop robustness fast --axes payload delay --seeds 3 --json payload.json
+"""
+
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-from hopping_leg.errors import UsageError
+from rich.console import Console
+
+from hopping_leg.cli.command_line import command_line
+from hopping_leg.cli.evaluate import Conditions, ShareProgress, say_written
 from hopping_leg.evaluate.figures import draw_robustness, to_svg
 from hopping_leg.evaluate.keeper import Keeper
 from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
+from hopping_leg.evaluate.robustness.tables import print_robustness
 from hopping_leg.io import write_atomically, write_json
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
-    from hopping_leg.cli.evaluate import Evaluate
-    from hopping_leg.controllers import RolloutConfig
-    from hopping_leg.evaluate import Candidate
+@dataclass(frozen=True)
+class Robustness(Conditions):
+    """Which controllers meet which axes."""
 
-FOLDER = Path("runs/robustness")
-"""Where results are kept unless ``--out`` says otherwise."""
+    axes: tuple[str, ...] = ()
+    """Axes by name; default: all, and changes in the middle of a run."""
+    out: Path = Path("runs/robustness")
+    """Folder for robustness.json, robustness.svg and all that a killed run goes on from."""
 
 
-def judge_robustness(
-    args: "Evaluate",
-    candidates: "list[Candidate]",
-    setup: "RolloutConfig",
-    on_progress: "Callable[[str, float], None]",
-    command: str,
-) -> dict[str, Any]:
-    """Run the suite and write what was asked for.
-
-    Args:
-        args: The command line's.
-        candidates: What is judged.
-        setup: What they believe.
-        on_progress: Called with a label and the share done.
-        command: What makes this result again.
-
-    Raises:
-        UsageError: An option has no meaning here.
-    """
-    if args.engine != "mujoco":
-        raise UsageError("The robustness suite needs MuJoCo; leave --engine out.")
-    if args.floor != "both":
-        raise UsageError("The ground is an axis of this suite; leave --floor out.")
+def run(args: Robustness) -> None:
+    """Run the benchmark, print the scores, write everything."""
+    candidates, setup = args.load()
     suite = make_suite(
         setup, axes=args.axes, commands=args.commands, repeats=args.seeds, seed=args.seed
     )
-    keeper = Keeper(args.out or FOLDER)
-    result = {"command": command, **run_suite(candidates, suite, keeper, on_progress)}
-    file = args.json or (args.out / "robustness.json" if args.out else None)
-    if file:
-        write_json(file, result)
-    if args.out:
-        write_atomically(args.out / "robustness.svg", to_svg(draw_robustness(result)))
-    return result
+    with ShareProgress() as bar:
+        found = run_suite(candidates, suite, Keeper(args.out), bar.show)
+    result = {"command": command_line("hop robustness", args), **found}
+    file, figure = args.json or args.out / "robustness.json", args.out / "robustness.svg"
+    write_json(file, result)
+    write_atomically(figure, to_svg(draw_robustness(result)))
+    console = Console()
+    print_robustness(console, result)
+    say_written(console, file, figure)

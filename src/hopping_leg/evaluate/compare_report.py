@@ -1,4 +1,4 @@
-"""The page of `hop compare`: it holds everything and needs nothing."""
+"""The page of runs beside each other: it holds everything and needs nothing."""
 
 from collections.abc import Callable
 from typing import Any

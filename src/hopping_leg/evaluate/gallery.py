@@ -1,4 +1,4 @@
-"""All figures that a set of runs allows, for the report and for `hop plot`."""
+"""All figures that a set of runs allows, for the report and for `hop report`."""
 
 import itertools
 from collections.abc import Iterable, Sequence

@@ -1,6 +1,7 @@
 """The report: one HTML page that holds everything and needs nothing."""
 
 import base64
+import dataclasses
 from importlib import resources
 from typing import Any
 
@@ -8,6 +9,7 @@ from jinja2 import Environment, StrictUndefined, Template
 from markupsafe import Markup
 
 from hopping_leg.evaluate import markup
+from hopping_leg.evaluate.acceptance import acceptance_lines
 from hopping_leg.evaluate.figures import to_svg
 from hopping_leg.evaluate.gallery import Picture, draw_gallery
 from hopping_leg.evaluate.result import Evaluation
@@ -31,6 +33,7 @@ def write_report(judged: Judged, videos: dict[str, Video] | None = None) -> byte
         subtitle=_subtitle(evaluation),
         evaluation=evaluation,
         tables=_tables(evaluation),
+        acceptance=acceptance_lines(map(dataclasses.asdict, evaluation.summary)),
         pictures=[_picture(p, evaluation) for p in draw_gallery(evaluation, judged.runs)],
         videos=[_video(name, video) for name, video in (videos or {}).items()],
         conditions=_conditions(evaluation),
@@ -88,7 +91,7 @@ def _picture(picture: Picture, evaluation: Evaluation) -> dict[str, Any]:
         "title": picture.title,
         "caption": picture.caption,
         "source": data_uri(to_svg(picture.figure), "image/svg+xml"),
-        "command": f"hop plot {' '.join(f'TRACES/{name}' for name in shown)}",
+        "command": f"hop report figures {' '.join(f'TRACES/{name}' for name in shown)}",
         "long": picture.name == "ladder",
         "table": beside.get(picture.name, lambda: Markup(""))(),
     }

@@ -76,10 +76,10 @@ def test_energy_shaping_counts_and_climbs(setup, shaping):
 @pytest.mark.slow
 def test_command_line_writes_everything(tmp_path, capsys):
     file = tmp_path / "skills.json"
-    words = ["evaluate", "energy-shaping", "--suite", "skills", "--commands", "0.3", "--seeds", "1"]
+    words = ["skills", "energy-shaping", "--commands", "0.3", "--seeds", "1"]
     assert main([*words, "--floor", "soft", "--threads", "1", "--json", str(file)]) == 0
     data = json.loads(file.read_text())
-    assert data["command"].startswith("hop evaluate energy-shaping --suite skills")
+    assert data["command"].startswith("hop skills energy-shaping")
     assert [len(data[name]) for name in ("counted", "stairs", "climbs", "landings")] == [2, 7, 1, 2]
     assert "weights" in capsys.readouterr().out
 

@@ -10,7 +10,7 @@ def test_trainings_beside_each_other(tmp_path, capsys):
         (tmp_path / name / "result.json").write_text(json.dumps(TRAINING))
     page, numbers = tmp_path / "page.html", tmp_path / "numbers.json"
     runs = [str(tmp_path / "one"), str(tmp_path / "two")]
-    assert main(["compare", *runs, "--out", str(page), "--json", str(numbers)]) == 0
+    assert main(["report", "page", *runs, "--out", str(page), "--json", str(numbers)]) == 0
     assert "Learning curves" in page.read_text()
     found = json.loads(numbers.read_text())
     assert [row["label"] for row in found["trainings"]] == ["one", "two"]
@@ -19,8 +19,10 @@ def test_trainings_beside_each_other(tmp_path, capsys):
 
 
 def test_bad_input_is_one_sentence(tmp_path, capsys):
-    for words in ([], ["none", "nothing"], ["a", "b", "--out", str(tmp_path)]):
-        assert main(["compare", *words]) == 2
+    trace = str(tmp_path / "none.parquet")
+    pages = ([], ["none", "nothing"], ["a", "b", "--out", str(tmp_path)])
+    for words in (["figures"], ["figures", trace], *(["page", *page] for page in pages)):
+        assert main(["report", *words]) == 2
         error = capsys.readouterr().err
         assert error.startswith("hop: ")
         assert "Traceback" not in error

@@ -1,16 +1,19 @@
-"""Draw the figures of stored traces again.
+"""Draw stored traces, and set stored runs on a page, one alone or several beside each other.
 
-Give the traces of one controller or of several side by side; what can be drawn from them is drawn:
-heights over time, distributions, ladder, phase space, estimated height.
+`figures` draws what can be drawn from traces: heights over time, distributions, ladder, phase
+space, estimated height. `page` writes one self-contained HTML page: the report of an evaluation
+again, or evaluations and trainings beside each other, with what differs in their conditions said.
 
 Examples:
-  hop plot runs/first/traces/*.parquet --out runs/first/figures
-  hop plot runs/first/traces/fast-staircase-0.parquet
-  hop plot runs/first/traces/*-fixed-*.parquet --format png
-  hop plot runs/first/traces/*.parquet --format pdf --width column
-  hop plot runs/first/traces/*-fixed-*.parquet --animation gif
+  hop report figures runs/first/traces/*.parquet --out runs/first/figures
+  hop report figures runs/first/traces/*-fixed-*.parquet --format pdf --width column
+  hop report figures runs/first/traces/*-fixed-*.parquet --animation gif
+  hop report page runs/first
+  hop report page old=runs/first/evaluation.json new=runs/second --out runs/comparison.html
+  hop report page runs/fast-seed0 runs/fast-seed1 --json runs/comparison.json
 """
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,20 +21,26 @@ from pathlib import Path
 import tyro
 from rich.console import Console
 
+from hopping_leg.cli.evaluate import check_file, say_written
 from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.errors import UsageError
+from hopping_leg.evaluate import Judged
+from hopping_leg.evaluate.compare import set_beside
+from hopping_leg.evaluate.compare_report import write_comparison
 from hopping_leg.evaluate.figures.paper import Format, Width, encode
 from hopping_leg.evaluate.gallery import draw_gallery, run_of
+from hopping_leg.evaluate.report import write_report
 from hopping_leg.evaluate.runs import Run
+from hopping_leg.evaluate.stored import read_runs
 from hopping_leg.evaluate.tables import tabulate
 from hopping_leg.evaluate.video import Animation, fixed_traces, render_video
-from hopping_leg.io import safe_file_name, write_atomically
+from hopping_leg.io import safe_file_name, write_atomically, write_json
 from hopping_leg.robot import load_robot
 
 
 @dataclass(frozen=True)
-class Plot:
-    """Which traces, and where the figures go."""
+class Figures:
+    """Draw the figures of stored traces."""
 
     traces: tyro.conf.Positional[tuple[Path, ...]]
     """Parquet files from `hop evaluate --traces DIR` or `hop deploy`; also the .blackbox that a
@@ -47,15 +56,55 @@ class Plot:
     OpenGL and traces of a shipped robot."""
 
 
-def run(args: Plot) -> None:
-    """Draw and write every figure that the traces allow."""
+@dataclass(frozen=True)
+class Page:
+    """Write the page of a stored evaluation, or of several runs beside each other."""
+
+    runs: tyro.conf.Positional[tuple[str, ...]]
+    """Folders or JSON files of `hop evaluate`, folders of finished trainings; LABEL=PATH chooses
+    the name in all tables."""
+    out: Path = Path("report.html")
+    """File for the page."""
+    json: Path | None = None
+    """File for every number."""
+
+
+def run(args: Figures | Page) -> None:
+    """Draw figures or write a page."""
+    if isinstance(args, Figures):
+        _draw(args)
+    else:
+        _write(args)
+
+
+def _write(args: Page) -> None:
+    check_file(args.out)
+    check_file(args.json)
+    console, runs = Console(), read_runs(args.runs)
+    if len(runs) == 1 and (evaluation := runs[0].evaluation):
+        traces = sorted(runs[0].traces.glob("*.parquet")) if runs[0].traces else []
+        page = write_report(Judged(evaluation, [run_of(path) for path in traces]))
+        numbers = evaluation.to_json()
+    else:
+        compared = set_beside(runs)
+        command = shlex.join(["hop", "report", "page", *args.runs, "--out", str(args.out)])
+        page = write_comparison(compared, command)
+        numbers = {"command": command, **compared.to_json()}
+        for note in compared.notes:
+            console.print(note, highlight=False)
+    write_atomically(args.out, page)
+    if args.json:
+        write_json(args.json, numbers)
+    say_written(console, args.out, args.json)
+
+
+def _draw(args: Figures) -> None:
     if not args.traces:
         raise UsageError("No trace was named; record some with `hop evaluate ... --traces DIR`.")
     runs = [run_of(_trace(path)) for path in args.traces]
     controllers = list(dict.fromkeys(run.controller for run in runs))
-    evaluation = tabulate(runs, controllers, seed=0)
     console = Console()
-    for picture in draw_gallery(evaluation, runs):
+    for picture in draw_gallery(tabulate(runs, controllers, seed=0), runs):
         path = args.out / f"{picture.name}.{args.format}"
         write_atomically(path, encode(picture.figure, args.format, args.width))
         console.print(f"{picture.title}: {path}", highlight=False)
