@@ -4,10 +4,10 @@ import dataclasses
 import math
 
 from macros_results import grid, number
+from studies.fault_campaign.families import FAMILIES
 
 from hopping_leg.cli.robots import derived, numbers
 from hopping_leg.emulator.faults import KINDS
-from hopping_leg.evaluate.faults.families import FAMILIES
 from hopping_leg.evaluate.robustness.axes import AXES
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.robot_files import load_tree

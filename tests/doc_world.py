@@ -17,14 +17,6 @@ from hopping_leg.trace import Trace
 from tests.doc_pages import ROOT, blocks
 
 SHORTER = {
-    "hop bench engines": {
-        "--controllers": "energy-shaping", "--commands": "0.3", "--seeds": "1", "--workers": "1",
-    },
-    "hop bench faults": {
-        "--controllers": "energy-shaping", "--families": "encoder jump", "--repeats": "1",
-        "--live": "0", "--workers": "1",
-    },
-    "hop bench probe": {"--commands": "0.3", "--legs": "2", "--seconds": "4"},
     "hop deploy": {"--seconds": "0.3", "--yes": None},
     "hop doctor --home": {"--yes": None},
     "hop doctor --write": {"--yes": None},
@@ -60,8 +52,6 @@ SECONDS = {
 
 ELSEWHERE = {
     "hop finetune": "minutes even when small: tests/cli/test_finetune.py",
-    "hop bench finetune": "hours: tests/rl/finetune/test_study.py",
-    "hop experiment": "minutes even when small: tests/cli/test_experiment.py",
     "hop reproduce": "minutes even with --quick: tests/cli/test_reproduce.py",
 }
 """Commands that are not run here, and why; their options must parse all the same."""

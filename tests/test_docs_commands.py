@@ -19,7 +19,7 @@ from importlib.util import find_spec
 
 import pytest
 
-from hopping_leg.cli import VERBS, main
+from hopping_leg.cli import VERBS, main, read_options
 from tests.cli.emulated import put_behind
 from tests.doc_pages import PAGES, ROOT, blocks, indented_commands, inline_commands, with_files
 from tests.doc_world import BEFORE, ELSEWHERE, INTERRUPTED, REFUSED, SECONDS, furnish, shorten
@@ -37,7 +37,7 @@ WAIT = 600
 RUNNABLE = [page for page in PAGES if any(b.language in ("bash", "python") for b in blocks(page))]
 
 
-WITH_KINDS = ("bench", "excite", "export", "robots", "tune")
+WITH_KINDS = ("excite", "export", "robots", "tune")
 """Verbs whose options depend on the next word."""
 
 
@@ -128,6 +128,8 @@ def run(words, monkeypatch):
     program = words[0]
     if program == "hop":
         run_hop(words, monkeypatch)
+    elif words[:2] == ["python", "-m"]:  # a study: its options must parse
+        parse_study(words[2:], monkeypatch)
     elif program == "python":
         monkeypatch.setattr(sys, "argv", words[1:])
         runpy.run_path(words[1], run_name="__main__")
@@ -175,3 +177,18 @@ def parse(words, monkeypatch):
         patch.setattr(module, "run", note)
         assert main(words[1:]) == 0
     assert len(seen) == 1
+
+
+def parse_study(words, monkeypatch):
+    """Check a study's options without running it."""
+
+    def parse_only(name, options, arguments, keep_out):
+        read_options(options, name, None, arguments)
+        return 0
+
+    with monkeypatch.context() as patch:
+        patch.setattr("studies.shared._run", parse_only)
+        patch.setattr(sys, "argv", words)
+        with pytest.raises(SystemExit) as ended:
+            runpy.run_module(words[0], run_name="__main__")
+    assert ended.value.code == 0

@@ -39,6 +39,7 @@ def test_the_source_archive_holds_what_is_installed_and_what_is_to_be_read(archi
     }
     assert {Path(name).suffix for name in inside} >= {".py", ".toml", ".xml", ".onnx", ".j2"}
     read = {"README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md", "constraints.txt", "Makefile"}
+    read |= {str(path.relative_to(ROOT)) for path in (ROOT / "studies").rglob("*.py")}
     examples = {f"examples/{path.name}" for path in (ROOT / "examples").glob("*.*")}
     assert not (inside | read | examples) - set(archive)
 
@@ -48,6 +49,11 @@ def test_the_source_archive_holds_nothing_large_and_no_run(archive):
     assert not {name: size for name, size in archive.items() if size > LARGEST}
     top = {name.partition("/")[0] for name in archive}
     assert not top & {"runs", "build", "site", ".venv", "MUJOCO_LOG.TXT"}
+
+
+def test_studies_are_not_installed():
+    wheel = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["hatch"]["build"]
+    assert wheel["targets"]["wheel"]["packages"] == ["src/hopping_leg"]
 
 
 def test_types_and_licence_are_handed_out():

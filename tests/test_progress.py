@@ -3,9 +3,9 @@ import time
 
 import pytest
 
-from hopping_leg.evaluate.transfer.board import Board
 from hopping_leg.progress import LiveProgress, minutes
 from hopping_leg.rl.progress import TrainingProgress
+from hopping_leg.sim_to_real.board import Board
 
 
 def test_without_a_terminal_there_is_a_line_at_most_once_a_minute(capsys, monkeypatch):

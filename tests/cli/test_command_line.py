@@ -10,8 +10,6 @@ import tyro
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hopping_leg.cli.bench import Benchmark
-from hopping_leg.cli.bench.controllers import EnergyShaping, Training
 from hopping_leg.cli.command_line import command_line, verb_of
 from hopping_leg.cli.options import Heights
 
@@ -59,10 +57,14 @@ def test_what_changes_no_number_is_left_out():
     assert command_line("hop", Options(out=Path("there")), ()) == "hop --out there"
 
 
+@dataclass(frozen=True)
+class TwoWords(Options):
+    pass
+
+
 def test_defaults_are_left_out_and_subcommands_go_by_tyros_names(capsys):
-    verb = f"hop bench {verb_of(Training())}"
-    assert command_line(verb, Training(threads=1)) == "hop bench training --threads 1"
+    assert verb_of(TwoWords()) == "two-words"
+    assert command_line("hop two-words", TwoWords(loud=True)) == "hop two-words --loud"
     with pytest.raises(SystemExit):
-        tyro.cli(Benchmark, args=["--help"])
-    assert verb_of(EnergyShaping()) == "energy-shaping"
-    assert "energy-shaping" in capsys.readouterr().out
+        tyro.cli(Options | TwoWords, args=["--help"])
+    assert "two-words" in capsys.readouterr().out

@@ -15,7 +15,7 @@ import io
 import sys
 import types
 import typing
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from typing import Annotated, Any, Union
 
@@ -32,7 +32,6 @@ VERBS = {
     "train": "train a controller from scratch, or go on after an interruption",
     "finetune": "continue a policy's training on the real leg, or on a twin",
     "tune": "search the gains of energy shaping, or a recipe's numbers",
-    "bench": "measure speed, convergence and accuracy",
     "excite": "write the trajectory that a leg is identified with",
     "export": "write a leg as URDF, inspect a policy file",
     "record": "play an excitation on a leg and record it",
@@ -41,7 +40,6 @@ VERBS = {
     "view": "watch the leg in the browser: live, a trace, or the real one",
     "doctor": "say what is missing here; check, configure and home a leg's drives",
     "emulate": "stand in for the real leg: two drives behind a real wire",
-    "experiment": "run the paper's sim-to-real experiment on twins",
     "reproduce": "the main job: train, evaluate, compare and report",
 }
 """Every verb with its line in the overview."""
@@ -59,8 +57,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Args:
         arguments: Without the program's name; default: those of the process.
     """
+    return guard(lambda: _dispatch(list(sys.argv[1:] if arguments is None else arguments)))
+
+
+def guard(program: Callable[[], int]) -> int:
+    """Return a program's exit code; what a user can mend is said in a sentence on stderr."""
     try:
-        return _dispatch(list(sys.argv[1:] if arguments is None else arguments))
+        return program()
     except HoppingLegError as error:
         return _complain(str(error))
     except KeyboardInterrupt:
@@ -103,13 +106,27 @@ def _dispatch(arguments: list[str]) -> int:
         return _print_completion(*rest[:1])
     if verb not in VERBS:
         raise UsageError(unknown_name("verb", verb, VERBS) + " Try `hop --help`.")
-    _refuse_repeated(rest)
     module, options = _load_verb(verb)
-    description = inspect.getdoc(module)
-    module.run(
-        tyro.cli(options, prog=f"hop {verb}", description=description, args=rest, config=_CONFIG)
-    )
+    module.run(read_options(options, f"hop {verb}", inspect.getdoc(module), rest))
     return 0
+
+
+def read_options(
+    options: Any,  # noqa: ANN401
+    program: str,
+    description: str | None,
+    arguments: Sequence[str],
+) -> Any:  # noqa: ANN401
+    """Return an instance of a dataclass of options, or of one of a union's.
+
+    Args:
+        options: The dataclass, or a union of dataclasses, which become subcommands.
+        program: As the shell calls it.
+        description: What its help begins with.
+        arguments: Behind the program.
+    """
+    _refuse_repeated(arguments)
+    return tyro.cli(options, prog=program, description=description, args=arguments, config=_CONFIG)
 
 
 def _load_verb(verb: str) -> tuple[types.ModuleType, Any]:
@@ -139,7 +156,7 @@ def _print_completion(shell: str = "") -> int:
     return 0
 
 
-def _refuse_repeated(arguments: list[str]) -> None:
+def _refuse_repeated(arguments: Sequence[str]) -> None:
     """An option given twice would silently lose its first values."""
     flags = [a.partition("=")[0] for a in arguments if a.startswith("--")]
     for flag in flags:

@@ -19,7 +19,7 @@ def command_line(verb: str, args: Any, leave_out: Collection[str] = KEPT) -> str
     beside the others.
 
     Args:
-        verb: What comes before the options, e.g. ``hop bench env``.
+        verb: What comes before the options, e.g. ``python -m studies.speed env``.
         args: The dataclass that tyro reads the options into.
         leave_out: Names of further fields to leave out.
     """

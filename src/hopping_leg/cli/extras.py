@@ -16,7 +16,7 @@ PURPOSES = {
     "hardware": "talk to the drives (hop deploy, hop doctor, hop emulate)",
     "pi3hat": "talk to the drives from a Raspberry Pi with a pi3hat",
     "bullet": "the leg in PyBullet (hop evaluate --engine pybullet)",
-    "bench": "mujoco.sysid beside our fits (hop bench identify)",
+    "bench": "mujoco.sysid beside our fits (python -m studies.identification)",
     "cluster": "identify or tune on a Ray cluster (--ray)",
     "docs": "build the documentation (make docs)",
     "dev": "test and check a clone (make test, make check)",

@@ -16,14 +16,18 @@ Examples:
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from hopping_leg.cli import evaluate, experiment
+from rich.console import Console
+from rich.table import Table
+
+from hopping_leg.cli import evaluate
 from hopping_leg.controllers.registry import ENERGY_SHAPING, shipped_policies
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.transfer.methods import DEFAULT, choose_methods
-from hopping_leg.evaluate.transfer.study import SHORTEST, USUAL_FIT, Study, find_twins
 from hopping_leg.identify.least_squares import LeastSquaresOptions
 from hopping_leg.io import write_atomically, write_json
+from hopping_leg.sim_to_real.methods import DEFAULT, choose_methods
+from hopping_leg.sim_to_real.study import SHORTEST, USUAL_FIT, Study, find_twins
 
 _MINIATURE = ("identified", "cad")
 _PAPER = (*DEFAULT, "rail-only", "fixed-base-only", "two-pass", "one-pass")
@@ -82,7 +86,7 @@ def run(args: Reproduce) -> None:
     """Record, identify, train, evaluate, transfer, report."""
     start = time.monotonic()
     _check(args)
-    from hopping_leg.evaluate.transfer.run import transfer
+    from hopping_leg.sim_to_real.run import transfer
 
     study = make_study(args)
     write_atomically(args.folder / _MARK, f"{args.size}\n".encode())
@@ -104,7 +108,7 @@ def run(args: Reproduce) -> None:
         ),
         args.notes,
     )
-    experiment.show(result)
+    show_transfer(result)
     print(
         "\n".join(
             [
@@ -153,3 +157,43 @@ def _check(args: Reproduce) -> None:
             f"{args.folder} holds a run of the {size} size, not of the {args.size} one; give"
             " another --out."
         )
+
+
+def show_transfer(result: dict[str, Any]) -> None:
+    """Print a study's tables."""
+    table = Table("trained on", "command, mm", "|error|, mm", "95 %", "error, mm", "skipped")
+    for row in result["rows"]:
+        low, high = (_mm(row[f"median_abs_error_{end}_m"]) for end in ("low", "high"))
+        table.add_row(
+            row["method"],
+            _mm(row["command_m"]),
+            _mm(row["median_abs_error_m"]),
+            f"{low}-{high}",
+            _mm(row["median_error_m"]),
+            f"{row['skipped_hops']}/{row['hops'] + row['skipped_hops']}",
+        )
+    console = Console()
+    console.print(table)
+    _show_overall(console, result)
+    if "best_in_own_simulation" in result:
+        console.print("\nOf several trainings, those alone that hop best in their own simulation:")
+        _show_overall(console, result["best_in_own_simulation"])
+
+
+def _show_overall(console: Console, result: dict[str, Any]) -> None:
+    for row in result["methods"]:
+        console.print(
+            f"{row['method']}: {_mm(row['median_abs_error_m'])} mm over all commands,"
+            f" {row['ordered']} of {row['policies']} policies in order",
+            highlight=False,
+        )
+    for row in result["comparison"]:
+        console.print(
+            f"{row['method']} errs {row['ratio']:.1f} times as much as {row['over']}"
+            f" ({row['ratio_low']:.1f} to {row['ratio_high']:.1f})",
+            highlight=False,
+        )
+
+
+def _mm(metres: float) -> str:
+    return f"{1e3 * metres:.0f}"

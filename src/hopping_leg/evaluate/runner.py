@@ -115,7 +115,7 @@ def _note_coarse(timestep: float) -> list[str]:
         return []
     return [
         f"The physics step of {timestep:g} s is coarser than {TIMESTEP:g} s; heights may be"
-        " wrong: `hop bench convergence` measures by how much."
+        " wrong: `python -m studies.physics_step` measures by how much."
     ]
 
 

@@ -1,1 +1,0 @@
-"""Benchmark of identification: known twins, throughput, the paper's size, others, real data."""

@@ -1,0 +1,1 @@
+"""Studies of the leg and of this package, each run by ``python -m studies.NAME``."""

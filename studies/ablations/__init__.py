@@ -1,0 +1,1 @@
+"""What is each part of a recipe worth?"""

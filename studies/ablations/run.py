@@ -1,0 +1,89 @@
+"""What each part of a recipe is worth: the recipe with one part taken away at a time."""
+
+import functools
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from hopping_leg.errors import UsageError, unknown_name
+from hopping_leg.evaluate.runner import software_versions
+from hopping_leg.robot.parameters import Robot
+from studies.ablations.variants import ABLATIONS
+from studies.training_time.run import bench_training, over_commands
+
+_OF_A_RUN = ("seed", "minutes", "exam_scores_m")
+_COUNTED = ("skipped_hops", "body_contacts")
+
+
+def bench_ablation(
+    recipe: str,
+    robot: Robot,
+    out: Path,
+    *,
+    steps: int,
+    variants: Sequence[str] = (),
+    training_seeds: Sequence[int] = (0,),
+    evaluation_seeds: int = 5,
+    threads: int = 2,
+    on_progress: Callable[[str], None] = lambda _note: None,
+) -> dict[str, Any]:
+    """Train variants for the same number of steps and judge them.
+
+    Args:
+        recipe: Name of the recipe.
+        robot: The leg.
+        out: Folder of the runs.
+        steps: Control steps of experience of each.
+        variants: Names of those to train, in any order; all if there are none.
+        training_seeds: Of the trainings.
+        evaluation_seeds: Realisations of noise and delay per command.
+        threads: Of torch and physics.
+        on_progress: Called with a sentence on what begins.
+
+    Raises:
+        UsageError: There are no ablations of the recipe, or none of a name.
+    """
+    if recipe not in ABLATIONS:
+        raise UsageError(unknown_name("recipe with ablations", recipe, ABLATIONS))
+    known = {ablation.name: ablation for ablation in ABLATIONS[recipe]()}
+    for name in variants:
+        if name not in known:
+            raise UsageError(unknown_name(f"variant of {recipe}", name, known))
+    rows: list[dict[str, Any]] = []
+    found: list[dict[str, Any]] = []
+    for ablation in [known[name] for name in known if not variants or name in variants]:
+        result = bench_training(
+            replace(ablation.recipe, steps=steps, judge_every=max(1, steps // 5)),
+            robot,
+            out / ablation.name,
+            training_seeds=training_seeds,
+            evaluation_seeds=evaluation_seeds,
+            threads=threads,
+            on_progress=functools.partial(_named, on_progress, ablation.name),
+        )
+        named = {"variant": ablation.name, "meaning": ablation.meaning}
+        rows += [{**named, **row} for row in result["rows"]]
+        found += [
+            {
+                **named,
+                **{key: run[key] for key in _OF_A_RUN},
+                **over_commands(run["selected"]),
+                **{key: sum(row[key] for row in run["selected"]) for key in _COUNTED},
+            }
+            for run in result["runs"]
+        ]
+    return {
+        "recipe": recipe,
+        "robot": robot.name,
+        "steps": steps,
+        "threads": threads,
+        "evaluation_seeds": evaluation_seeds,
+        "rows": rows,
+        "variants": found,
+        "versions": software_versions(),
+    }
+
+
+def _named(on_progress: Callable[[str], None], name: str, note: str) -> None:
+    on_progress(f"{name}: {note}")

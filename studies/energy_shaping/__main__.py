@@ -1,0 +1,9 @@
+"""Run the study: ``python -m studies.energy_shaping --help``."""
+
+import sys
+
+from studies.energy_shaping.options import EnergyShaping
+from studies.shared import main
+
+if __name__ == "__main__":
+    sys.exit(main("energy_shaping", EnergyShaping))

@@ -1,0 +1,1 @@
+"""Do controllers hop in another physics engine as well?"""

@@ -1,0 +1,9 @@
+"""Run the study: ``python -m studies.engines --help``."""
+
+import sys
+
+from studies.engines.options import Engines
+from studies.shared import main
+
+if __name__ == "__main__":
+    sys.exit(main("engines", Engines))

@@ -1,0 +1,1 @@
+"""Is the leg safe whatever fails?"""

@@ -1,0 +1,9 @@
+"""Run the study: ``python -m studies.fault_campaign --help``."""
+
+import sys
+
+from studies.fault_campaign.options import Faults
+from studies.shared import main
+
+if __name__ == "__main__":
+    sys.exit(main("fault_campaign", Faults))

@@ -1,0 +1,174 @@
+"""Which trial, what became of it, and how a leg is made to hop in it."""
+
+import dataclasses
+import zlib
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from hopping_leg.controllers.registry import load_controller
+from hopping_leg.deploy.clock import Clock
+from hopping_leg.deploy.drive_info import inspect
+from hopping_leg.deploy.driver import MoteusLink
+from hopping_leg.deploy.motion_sequence import MotionSequence, SequenceTiming, hopping_poses
+from hopping_leg.deploy.preflight import judge, require
+from hopping_leg.deploy.safety_limits import hopping_limits
+from hopping_leg.deploy.schedule import Schedule
+from hopping_leg.deploy.session import Performance, header_of, perform
+from hopping_leg.deploy.stop_reasons import Reason
+from hopping_leg.emulator.faults import Fault
+from hopping_leg.emulator.start import Start
+from hopping_leg.robot.limits import SoftLimiter, SoftLimits
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim import CONTROL_RATE
+from studies.fault_campaign.families import Family, Mishap
+from studies.fault_campaign.verdict import Limits
+
+HEIGHTS = (0.25, 0.30, 0.35)
+"""Commanded heights, m; each trial takes one."""
+
+_TIMING = SequenceTiming(hop=0.0, rise=0.3, settle=0.1, sink=0.3, fade=0.1)
+_FIRST_HOP = 0.6
+"""Time that the first lift-off may take, s."""
+_AFTERWARDS = 0.3
+"""Hopping after a mishap that may be survived, s."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """Which trial.
+
+    Attributes:
+        family: Of the mishap.
+        controller: Name or file.
+        robot: Name or file.
+        index: Number of the repeat.
+        seed: Of the campaign.
+        live: In real time over a terminal, rather than in virtual time.
+    """
+
+    family: str
+    controller: str
+    robot: str
+    index: int
+    seed: int
+    live: bool = False
+
+    @property
+    def rng(self) -> np.random.Generator:
+        """The trial's own source of randomness: the same mishaps for all controllers."""
+        family = zlib.crc32(self.family.encode())
+        return np.random.default_rng([self.seed, family, self.index, self.live])
+
+
+@dataclass
+class Result:
+    """What became of a trial.
+
+    Attributes:
+        what: The mishap in words.
+        began: When it began, s; None if it did not.
+        reason: For which the run ended.
+        sentence: The reason with what was seen.
+        reaction: From the first bad answer to the first safe command, s; None without either.
+        braked: From the host's death until the drives brake, s.
+        disturbed: Whether the run ended safely, but because the computer was too slow for it: such
+            a trial in real time tells nothing.
+        problems: What was unsafe or wrong; empty if all is well.
+    """
+
+    what: str
+    began: float | None = None
+    reason: str = ""
+    sentence: str = ""
+    reaction: float | None = None
+    braked: float | None = None
+    disturbed: bool = False
+    problems: list[str] = field(default_factory=list)
+
+
+class Scene:
+    """All that is drawn for a trial.
+
+    Args:
+        case: Which.
+        family: Of its mishap.
+        robot: Loaded.
+    """
+
+    def __init__(self, case: Case, family: Family, robot: Robot) -> None:
+        rng = case.rng
+        self.case, self.family, self.robot = case, family, robot
+        self.mishap = family.draw(rng)
+        faults = () if self.mishap.fault is None else (self.mishap.fault,)
+        self.start = dataclasses.replace(
+            self.mishap.start or Start(faults=faults),
+            robot=case.robot,
+            seed=int(rng.integers(1 << 30)),
+        )
+        self.envelope = hopping_limits(robot, CONTROL_RATE)
+        self.limits = Limits.of(robot, self.envelope)
+        self.height = float(rng.choice(HEIGHTS))
+        self.checksums = bool(rng.random() < 0.5)
+        self.killed_after = float(rng.uniform(0, 0.01))
+        """Time of the computer between the moment of the hop and a kill, s."""
+
+    def require_fitness(self, link: MoteusLink) -> None:
+        """Check the drives as before arming.
+
+        Raises:
+            HardwareError: They may not be armed.
+        """
+        require(judge(self.robot, self.envelope, inspect(link)))
+
+    def perform(
+        self, link: MoteusLink, folder: Path, clock: Clock | None, *, realtime: bool
+    ) -> Performance:
+        """Let the leg rise, hop beyond the mishap, sink and stop.
+
+        Raises:
+            HardwareError: The drives may not be armed.
+            KeyboardInterrupt: A signal stopped the leg.
+        """
+        controller = load_controller(self.case.controller, self.robot)
+        sequence = MotionSequence(
+            controller,
+            Schedule(((self.height, 100.0),)),
+            hopping_poses(self.robot),
+            SoftLimiter(self.robot, SoftLimits()),
+            dataclasses.replace(_TIMING, hop=_FIRST_HOP + self.mishap.at + _AFTERWARDS),
+        )
+        self.require_fitness(link)
+        done = perform(
+            link,
+            sequence,
+            self.envelope,
+            folder / "run.parquet",
+            header_of(self.robot, controller, CONTROL_RATE),
+            clock=clock,
+            realtime=realtime,
+        )
+        memory = done.outcome.supervisor
+        if Reason.OPERATOR_STOP in (memory.cause.reason, memory.stop_cause.reason):
+            raise KeyboardInterrupt
+        return done
+
+
+def words(mishap: Mishap) -> str:
+    """Return a mishap in words."""
+    if mishap.start is not None:
+        faults = ", ".join(map(_of_fault, mishap.start.faults))
+        return faults or f"pose {mishap.start.pose}"
+    if mishap.fault is not None:
+        return f"{_of_fault(mishap.fault)} at {mishap.at:.3f} s"
+    if mishap.dies:
+        return f"killed at {mishap.at:.3f} s"
+    return f"stalled for {mishap.stall:.3f} s at {mishap.at:.3f} s"
+
+
+def _of_fault(fault: Fault) -> str:
+    parts = [fault.kind, fault.drive, fault.name, f"value {fault.amount:.4g}"]
+    if fault.count > 1:
+        parts.append(f"{fault.count} times")
+    return " ".join(part for part in parts if part)

@@ -1,0 +1,149 @@
+"""A trial in real time: the host here, the drives in another process, a terminal between them.
+
+It measures what virtual time cannot: how soon after a bad answer the host's computer has sent a
+safe command, and how soon after its death the drives brake.
+"""
+
+import os
+import signal
+import tempfile
+import time
+from pathlib import Path
+
+from hopping_leg.deploy.driver import MoteusLink
+from hopping_leg.deploy.flight_recorder import SUFFIX, recover
+from hopping_leg.deploy.joint_transform import JOINTS
+from hopping_leg.deploy.stop_reasons import Reason
+from hopping_leg.deploy.transport import opener
+from hopping_leg.emulator.moteus_codes import MoteusMode
+from hopping_leg.emulator.process import EmulatorProcess
+from hopping_leg.emulator.wire_log import WireLog
+from hopping_leg.errors import TraceError
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.trace import Trace
+from studies.fault_campaign.case import Case, Result, Scene, words
+from studies.fault_campaign.families import Family
+from studies.fault_campaign.judging import (
+    BRAKED_WITHIN,
+    judge_trace,
+    judge_wire,
+    problems_of_box,
+)
+
+LIVE = (
+    *("encoder jump", "drive fault", "over-temperature", "over-voltage", "under-voltage"),
+    *("drive restarted", "killed host"),
+)
+"""Families that show in an answer, or end the host: what a reaction can be measured of."""
+
+_OF_A_SLOW_COMPUTER = (
+    *(Reason.REPLIES_MISSING, Reason.DRIVE_TIMEOUT, Reason.LOOP_OVERRUN, Reason.LOOP_STALLED),
+    *(Reason.POSITION_LIMIT, Reason.ARMING_TOOK_TOO_LONG),
+)
+
+_PATIENCE = 30.0
+"""Longest wait for the first lift-off, s."""
+_AFTERWARDS = 0.15
+"""How long the drives are watched after the host's death, s."""
+
+
+def play_live(case: Case, family: Family, robot: Robot) -> Result:
+    """Run and judge a trial.
+
+    Args:
+        case: Which.
+        family: Of its mishap, one of ``LIVE``.
+        robot: Loaded.
+
+    Raises:
+        KeyboardInterrupt: A signal stopped the leg.
+    """
+    scene = Scene(case, family, robot)
+    with EmulatorProcess(scene.start) as emulator, tempfile.TemporaryDirectory() as folder:
+        if scene.mishap.dies:
+            return _killed(scene, emulator, Path(folder))
+        return _hop(scene, emulator, Path(folder))
+
+
+def _hop(scene: Scene, emulator: EmulatorProcess, folder: Path) -> Result:
+    result = Result(words(scene.mishap))
+    link = MoteusLink(scene.robot, opener(str(emulator.path)))
+    try:
+        done = scene.perform(link, folder, None, realtime=True)
+    finally:
+        link.close()
+    record = emulator.record()
+    reason = done.outcome.supervisor.stop_cause.reason
+    result.disturbed = not record.faults or (
+        reason in _OF_A_SLOW_COMPUTER and reason not in scene.family.reasons
+    )
+    result.began = record.faults[0][0] if record.faults else _armed(record.log)
+    judge_wire(result, scene, record.log, emulator.state().modes)
+    judge_trace(result, done, () if result.disturbed else scene.family.reasons)
+    return result
+
+
+def _killed(scene: Scene, emulator: EmulatorProcess, folder: Path) -> Result:
+    """Let a process drive the leg and kill it at a moment of the hop."""
+    result = Result(words(scene.mishap))
+    child = os.fork()
+    if child == 0:
+        try:
+            link = MoteusLink(scene.robot, opener(str(emulator.path)))
+            scene.perform(link, folder, None, realtime=True)
+            signal.pause()
+        finally:
+            os._exit(1)
+    try:
+        if not _flown(emulator, scene.mishap.at):
+            result.disturbed = True
+            return result
+        result.began = emulator.state().time
+    finally:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+    if _gave_up(folder):
+        result.disturbed = True
+        return result
+    time.sleep(_AFTERWARDS)
+    result.braked = _braked(emulator.record().log, result.began)
+    if result.braked is None or result.braked > BRAKED_WITHIN:
+        result.problems.append("the drives did not brake in time after the host's death")
+    result.problems += problems_of_box(folder)
+    return result
+
+
+def _gave_up(folder: Path) -> bool:
+    """Tell whether the host had stopped the leg before it died, as the computer was too slow."""
+    slow = {reason.name.lower() for reason in _OF_A_SLOW_COMPUTER}
+    try:
+        traces = [Trace.load(file) for file in folder.glob("*.parquet")]
+        traces += [recover(file) for file in folder.glob(f"*{SUFFIX}")]
+    except TraceError:
+        return False
+    return any(event.get("reason") in slow for t in traces for event in t.header["events"])
+
+
+def _armed(log: WireLog) -> float:
+    """Return when torque was commanded for the first time, s."""
+    return next((told.time for told in log.commands if told.mode is MoteusMode.POSITION), 0.0)
+
+
+def _flown(emulator: EmulatorProcess, seconds: float) -> bool:
+    """Wait until so long after the first lift-off; return whether there was one."""
+    until = time.monotonic() + _PATIENCE
+    while time.monotonic() < until:
+        state = emulator.state()
+        if state.time >= state.flown + seconds:
+            return True
+        time.sleep(0.002)
+    return False
+
+
+def _braked(log: WireLog, death: float) -> float | None:
+    """Return the time from the host's death until both drives have left torque mode, s."""
+    left: dict[int, float] = {}
+    for change in log.changes:
+        if change.time >= death and change.mode is not MoteusMode.POSITION:
+            left.setdefault(change.joint, change.time - death)
+    return max(left.values()) if len(left) == len(JOINTS) else None

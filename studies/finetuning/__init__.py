@@ -1,0 +1,1 @@
+"""What does continued training on a leg bring?"""

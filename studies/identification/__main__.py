@@ -1,0 +1,9 @@
+"""Run the study: ``python -m studies.identification --help``."""
+
+import sys
+
+from studies.identification.options import Identify
+from studies.shared import main
+
+if __name__ == "__main__":
+    sys.exit(main("identification", Identify))

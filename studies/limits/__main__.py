@@ -1,0 +1,9 @@
+"""Run the study: ``python -m studies.limits --help``."""
+
+import sys
+
+from studies.limits.options import Limits
+from studies.shared import main
+
+if __name__ == "__main__":
+    sys.exit(main("limits", Limits))

@@ -1,0 +1,1 @@
+"""How high could the leg hop with its torques?"""

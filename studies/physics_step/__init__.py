@@ -1,0 +1,1 @@
+"""How fine must the physics step be?"""

@@ -1,0 +1,1 @@
+"""What do policies know of contact, phase and height?"""

@@ -1,0 +1,9 @@
+"""Run the study: ``python -m studies.sim_to_real --help``."""
+
+import sys
+
+from studies.shared import main
+from studies.sim_to_real.options import Experiment
+
+if __name__ == "__main__":
+    sys.exit(main("sim_to_real", Experiment, keep_out=("threads",)))

@@ -1,0 +1,1 @@
+"""How fast are environment, policies, viewer and control loop?"""

@@ -1,0 +1,245 @@
+"""How well the loop keeps its time against emulated drives, and how high the leg hops through them.
+
+Timing is real: the drives run in a process of their own behind a terminal. Heights are compared
+with the same controller simulated in process, once in real time and once in virtual time, which
+other load on the computer cannot touch.
+"""
+
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.controllers import RolloutConfig, rollout
+from hopping_leg.controllers.policy import Policy
+from hopping_leg.controllers.registry import load_controller
+from hopping_leg.deploy.driver import MoteusLink
+from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
+from hopping_leg.deploy.safety_limits import hopping_limits
+from hopping_leg.deploy.schedule import Schedule
+from hopping_leg.deploy.session import Performance, header_of, perform
+from hopping_leg.deploy.transport import opener
+from hopping_leg.emulator.lockstep import Lockstep
+from hopping_leg.emulator.process import EmulatorProcess
+from hopping_leg.emulator.start import Start
+from hopping_leg.evaluate.metrics import START_SECONDS
+from hopping_leg.hop_detection import find_hops
+from hopping_leg.robot import load_robot
+from hopping_leg.robot.limits import SoftLimiter, SoftLimits
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim import CONTROL_RATE, NO_NOISE
+from hopping_leg.trace import Trace
+from studies.speed.emulated_truth import Truth, apexes_of, watched
+from studies.speed.inference import bench_inference
+from studies.timing import host
+
+HEIGHTS = (0.25, 0.30, 0.35)
+"""Commands that are compared, m."""
+
+MOST_STOPS = 5
+"""Stops by the supervisor after which the benchmark gives up."""
+
+_PERCENTILES = (50.0, 99.0, 99.9)
+_COLUMNS = {
+    "wake_late_s": "wake_late_us",
+    "exchange_s": "exchange_us",
+    "control_s": "control_us",
+    "tick_s": "tick_us",
+}
+
+
+@dataclass(frozen=True)
+class Study:
+    """What is measured.
+
+    Attributes:
+        controller: Name or file.
+        robot: Name or file; stands on both sides of the wire.
+        minutes: Of hopping in real time.
+        seconds: Of hopping at each height in virtual time and in process, s.
+        heights: Commands, m.
+    """
+
+    controller: str = "fast"
+    robot: str = "legv2-paper"
+    minutes: float = 10.0
+    seconds: float = 15.0
+    heights: tuple[float, ...] = HEIGHTS
+
+
+def bench_deploy(study: Study, on_progress: Callable[[str], None]) -> dict[str, Any]:
+    """Measure ticks, wake-ups and heights.
+
+    Args:
+        study: What is measured.
+        on_progress: Told what begins.
+
+    Returns:
+        Percentiles in us, ``share_on_time`` of all ticks that were due, heights in m.
+    """
+    robot = load_robot(study.robot)
+    controller = load_controller(study.controller, robot)
+    result: dict[str, Any] = {
+        "controller": controller.name,
+        "robot": robot.name,
+        "rate_hz": CONTROL_RATE,
+        **_real_time(study, robot, on_progress),
+        "heights": _heights(study, robot, on_progress),
+        "host": host(),
+    }
+    if isinstance(controller, Policy):
+        row = bench_inference([study.controller])["rows"][0]
+        result["inference_us"] = {k: row[f"inference_{k}_us"] for k in ("median", "p99")}
+    return result
+
+
+def _real_time(study: Study, robot: Robot, on_progress: Callable[[str], None]) -> dict[str, Any]:
+    """Hop in real time until the minutes are over; start again after a stop."""
+    wanted, done = 60 * study.minutes, 0.0
+    traces: list[Trace] = []
+    rows: list[tuple[float, float]] = []
+    stops: list[str] = []
+    notices: tuple[str, ...] = ()
+    while done < wanted - 1 and len(stops) < MOST_STOPS:
+        on_progress(f"{(wanted - done) / 60:.1f} minutes in real time")
+        with EmulatorProcess(Start(robot=study.robot)) as emulator, _folder() as folder:
+            link, truth = MoteusLink(robot, opener(str(emulator.path))), Truth()
+            part = (wanted - done) / len(study.heights)
+            schedule = Schedule(tuple((height, part) for height in study.heights))
+            sequence = _sequence(study, robot, schedule, wanted - done)
+            performance = _perform(
+                link,
+                sequence,
+                robot,
+                folder / "run.parquet",
+                beside=lambda loop, e=emulator, t=truth: watched(e, robot, t),
+            )
+            link.close()
+        notices = performance.notices
+        hopping = _hopping(performance.trace)
+        traces.append(hopping)
+        rows += apexes_of(performance.trace, truth)
+        done += hopping.table.height / CONTROL_RATE
+        cause = performance.outcome.supervisor.stop_cause
+        if cause.reason.name != "FINISHED":
+            stops.append(str(cause))
+    return {
+        "minutes": done / 60,
+        "stops": stops,
+        "notices": list(notices),
+        **_ticks(traces),
+        "real_time_heights": [
+            {"command_m": height, "apex_m": _median([a for c, a in rows if c == height])}
+            for height in study.heights
+        ],
+    }
+
+
+def _heights(
+    study: Study, robot: Robot, on_progress: Callable[[str], None]
+) -> list[dict[str, float | None]]:
+    """Compare the median apex through the wire with that in process, at every height."""
+    found = []
+    for height in study.heights:
+        on_progress(f"{height:g} m through the wire and in process")
+        plain, wired = _in_process(study, robot, height), _in_lockstep(study, robot, height)
+        error = None if plain is None or wired is None else wired / plain - 1
+        found.append(
+            {
+                "command_m": height,
+                "in_process_m": plain,
+                "through_the_wire_m": wired,
+                "relative_difference": error,
+            }
+        )
+    return found
+
+
+def _in_process(study: Study, robot: Robot, height: float) -> float | None:
+    controller = load_controller(study.controller, robot)
+    commands = np.full((round(study.seconds * CONTROL_RATE), 1), height)
+    trace = rollout(controller, RolloutConfig(robot, NO_NOISE), commands, seed=0).trace(0)
+    hops = find_hops(
+        trace.column("height_m"),
+        trace.column("height_rate_m_s"),
+        trace.column("foot_clearance_m"),
+    )
+    counted = trace.column("time_s")[hops.tick] >= START_SECONDS
+    return _median(hops.apex[counted])
+
+
+def _in_lockstep(study: Study, robot: Robot, height: float) -> float | None:
+    lockstep = Lockstep(Start(robot=study.robot).build())
+    schedule = Schedule(((height, study.seconds),))
+    sequence = _sequence(study, robot, schedule, study.seconds)
+    with _folder() as folder:
+        performance = _perform(
+            lockstep.link, sequence, robot, folder / "run.parquet", clock=lockstep, realtime=False
+        )
+    lockstep.link.close()
+    time, heights, clearances = np.array(lockstep.truth).T
+    truth = Truth(time.tolist(), heights.tolist(), clearances.tolist())
+    return _median([apex for _, apex in apexes_of(performance.trace, truth)])
+
+
+def _sequence(study: Study, robot: Robot, schedule: Schedule, seconds: float) -> MotionSequence:
+    controller = load_controller(study.controller, robot)
+    limiter = SoftLimiter(robot, SoftLimits())
+    return MotionSequence(
+        controller, schedule, hopping_poses(robot), limiter, SequenceTiming(hop=seconds)
+    )
+
+
+def _perform(
+    link: MoteusLink,
+    sequence: MotionSequence,
+    robot: Robot,
+    path: Path,
+    **options: Any,  # noqa: ANN401
+) -> Performance:
+    envelope = hopping_limits(robot, CONTROL_RATE)
+    header = header_of(robot, sequence.controller, CONTROL_RATE)
+    return perform(link, sequence, envelope, path, header, **options)
+
+
+def _hopping(trace: Trace) -> Trace:
+    return Trace(trace.table.filter(trace.table["part"] == Part.HOP), trace.header)
+
+
+def _ticks(traces: list[Trace]) -> dict[str, Any]:
+    """Return percentiles, and the share of all ticks due that were done within their period."""
+
+    def pooled(column: str) -> Array:
+        return np.concatenate([trace.column(column) for trace in traces])
+
+    result: dict[str, Any] = {}
+    for column, name in _COLUMNS.items():
+        values = 1e6 * pooled(column)
+        result[name] = {f"p{p:g}": float(np.percentile(values, p)) for p in _PERCENTILES}
+        result[name]["max"] = float(values.max())
+    skipped = float(pooled("skipped_ticks").sum())
+    on_time = int((pooled("tick_s") <= 1 / CONTROL_RATE).sum())
+    ticks = len(pooled("tick_s"))
+    fresh = np.minimum(pooled("hip_fresh"), pooled("knee_fresh"))
+    return {
+        "ticks": ticks,
+        "skipped": int(skipped),
+        "share_on_time": on_time / (ticks + skipped),
+        "ticks_without_all_replies": int((fresh == 0).sum()),
+        **result,
+    }
+
+
+def _median(values: list[float] | Array) -> float | None:
+    return float(np.median(values)) if len(values) else None
+
+
+@contextmanager
+def _folder() -> Iterator[Path]:
+    with tempfile.TemporaryDirectory() as folder:
+        yield Path(folder)

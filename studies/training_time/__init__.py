@@ -1,0 +1,1 @@
+"""How good is a training after how long?"""

@@ -1,0 +1,97 @@
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+from studies.engines.run import (
+    BAR,
+    WORLDS,
+    EnginesStudy,
+    World,
+    _judge,
+    bench_engines,
+)
+
+from hopping_leg.controllers import RolloutConfig
+from hopping_leg.controllers.registry import load_controller
+from hopping_leg.errors import UsageError
+from hopping_leg.evaluate import Candidate, evaluate
+from hopping_leg.evaluate.runs import on_floor
+from hopping_leg.robot import load_robot
+
+ROBOT = load_robot("legv2-paper")
+
+
+def summary(command, error):
+    return SimpleNamespace(command_m=command, median_error_m=error, std_m=0.001, skipped_hops=1)
+
+
+def test_a_controller_passes_if_all_errors_are_small_and_heights_rise():
+    good = _judge(WORLDS[0], "x", [summary(0.25, 0.004), summary(0.3, -0.005)])
+    assert (good["ordered"], good["within_bar"], good["skipped_hops"]) == (True, True, 2)
+    assert good["largest_median_error_m"] == pytest.approx(0.005)
+    swapped = _judge(WORLDS[0], "x", [summary(0.25, 0.01), summary(0.26, -0.01)])
+    assert (swapped["ordered"], swapped["within_bar"]) == (False, False)
+    far = _judge(WORLDS[0], "x", [summary(0.25, 2 * BAR), summary(0.3, 0.0)])
+    assert (far["ordered"], far["within_bar"]) == (True, False)
+
+
+def test_without_hops_there_is_neither_error_nor_order():
+    row = _judge(WORLDS[0], "x", [summary(0.25, float("nan")), summary(0.3, 0.0)])
+    assert (row["largest_median_error_m"], row["ordered"], row["within_bar"]) == (
+        None,
+        False,
+        False,
+    )
+
+
+def test_the_stiff_floor_is_the_engines_own():
+    mujoco, bullet = RolloutConfig(ROBOT), RolloutConfig(ROBOT, engine="pybullet")
+    assert on_floor(mujoco, "stiff").robot.contact.time_constant == 0.02
+    assert on_floor(bullet, "stiff") == replace(bullet, ground="rigid")
+    assert on_floor(bullet, "soft") == bullet
+
+
+def test_a_ground_that_the_engine_lacks_is_refused():
+    with pytest.raises(UsageError, match="pybullet"):
+        RolloutConfig(ROBOT, ground="rigid")
+
+
+@pytest.mark.slow
+def test_controllers_hop_in_pybullet_without_retraining():
+    """At a coarse step, for speed; the results file has the accuracy."""
+    pytest.importorskip("pybullet", reason="needs the extra 'bullet'")
+    setup = RolloutConfig(ROBOT, engine="pybullet", ground="rigid", timestep=1e-3)
+    judged = evaluate(
+        [Candidate("fast", load_controller("fast", ROBOT))],
+        setup,
+        commands=[0.3],
+        repeats=1,
+        kinds=("fixed",),
+    ).evaluation
+    assert judged.summary[0].hops > 15
+    assert abs(judged.summary[0].median_error_m) < 0.03
+    assert judged.conditions["engine"] == "pybullet"
+    assert "rigid" in judged.conditions["floor_meaning"]
+    assert "pybullet" in judged.versions
+
+
+@pytest.mark.slow
+def test_the_benchmark_has_a_row_for_every_world_and_command():
+    pytest.importorskip("pybullet", reason="needs the extra 'bullet'")
+    worlds = (World("here", "mujoco"), World("there", "pybullet", "rigid"))
+    study = EnginesStudy(
+        ROBOT,
+        controllers=("fast",),
+        commands=(0.3,),
+        seeds=1,
+        timestep=2.5e-3,
+        worlds=worlds,
+        rates=(),
+    )
+    result = bench_engines(study)
+    assert [(row["world"], row["command_m"]) for row in result["rows"]] == [
+        ("here", 0.3),
+        ("there", 0.3),
+    ]
+    here, there = result["drops"]
+    assert here["deepest_sink_m"] > 0.03 > 1e-3 > there["deepest_sink_m"]

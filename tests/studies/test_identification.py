@@ -1,0 +1,174 @@
+import json
+
+import numpy as np
+import pytest
+from studies.identification import mujoco_sysid
+from studies.identification.bars import bars
+from studies.identification.fits import compare, summary
+from studies.identification.plain_loop import PlainLoop
+from studies.identification.real import real
+from studies.identification.run import bench_identify
+from studies.identification.study import Keeper, Study
+from studies.identification.synthetic import FIXED, identify_twin
+from studies.identification.twin import AIR, GROUND, record, twin
+
+from hopping_leg.cli import main
+from hopping_leg.errors import UsageError
+from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.plan import make_plan
+from hopping_leg.identify.simulate import WindowSimulator
+from hopping_leg.identify.windows import cut
+from hopping_leg.robot import load_robot
+from hopping_leg.robot.model import TIMESTEP
+
+
+def test_twins_are_recorded_with_the_step_that_fits_take():
+    recording = record(AIR, "swings", 16.0)
+    assert recording.trace.header["timestep_s"] == TIMESTEP
+    assert make_plan([recording], load_robot("legv2")).timestep == TIMESTEP
+
+
+@pytest.mark.parametrize("motion", ["swings", "hops"])
+def test_plain_loop_and_batch_simulate_the_same(motion):
+    recordings = [record(GROUND, motion, 16.0)]
+    windows = cut(recordings, 0.25)[4::12]
+    candidate = LegHypothesis(load_robot("legv2"))
+    loop = PlainLoop(recordings, windows, TIMESTEP)
+    plain = loop.run(candidate)
+    batch = WindowSimulator(recordings, windows, timestep=TIMESTEP, threads=1)
+    batched = batch.run([candidate]).position[0]
+    np.testing.assert_allclose(np.stack(plain), batched, atol=1e-9)
+    for ticks, steps in zip(loop.run(candidate, whole_ticks=True), plain, strict=True):
+        np.testing.assert_array_equal(ticks, steps)
+    start = np.array([recordings[0].array("position")[w.start] for w in windows])
+    np.testing.assert_allclose(np.stack(plain)[:, 0], start, atol=1e-9)
+    assert np.ptp(np.stack(plain), axis=1).max() > 0.2
+
+
+def test_work_is_done_once(tmp_path):
+    begun = []
+    keeper = Keeper(tmp_path, begun.append)
+    for asked, number in (({"size": 1}, 7), ({"size": 1}, 8), ({"size": 2}, 9)):
+        result = keeper.keep("part", "words", asked, lambda n=number: {"number": n})
+        assert result == {"number": 7 if asked["size"] == 1 else 9}
+    assert len(begun) == 2
+
+
+def test_checkpoints_of_other_work_are_forgotten(tmp_path):
+    keeper = Keeper(tmp_path)
+    checkpoint = keeper.fit_folder("part") / "search.json"
+
+    def killed(size):
+        with pytest.raises(KeyboardInterrupt):
+            keeper.keep("part", "words", {"size": size}, interrupt)
+
+    def interrupt():
+        there.append(checkpoint.exists())
+        checkpoint.parent.mkdir(parents=True, exist_ok=True)
+        checkpoint.touch()
+        raise KeyboardInterrupt
+
+    there = []
+    for size in (1, 1, 2):
+        killed(size)
+    assert there == [False, True, False]
+
+
+def test_errors_are_relative_to_the_truth_and_claims_are_counted():
+    rows = compare({"hip.friction": 0.111, "drive.delay": 1e-4}, {"hip.friction": 0.11}, ["x"])
+    assert rows[0]["error_percent"] == pytest.approx(100 / 110)
+    assert rows[1]["error_percent"] is None
+    assert summary(rows)["identifiable"] == 0
+    told = summary(compare({"hip.friction": 0.111}, {"hip.friction": 0.11}, ["hip.friction"]))
+    assert told["worst_identifiable_error_percent"] == pytest.approx(100 / 110)
+    assert summary(compare({"hip.friction": 0.1}, AIR, None))["identifiable"] is None
+
+
+def test_bars_know_which_side_is_better():
+    speed = {
+        "batch_two_threads_over_loop": 2.0,
+        "batch_two_threads_over_one": 1.9,
+    }
+    rows = [
+        {
+            "rig": "double pendulum",
+            "predicted_0_2_s_rms_rad": [0.010, 0.030],
+            "predicted_0_5_s_rms_rad": [0.020, None],
+        },
+        {
+            "rig": "double pendulum",
+            "predicted_0_2_s_rms_rad": [0.011, 0.020],
+            "predicted_0_5_s_rms_rad": [0.034, None],
+        },
+    ]
+    found = bars({"throughput": speed, "recordings": {"rows": rows}})
+    assert [row["reached"] for row in found] == [False, True, True, False, False]
+    assert found[2]["measured"] == pytest.approx(11.0)
+
+
+def test_bad_input_is_one_sentence(tmp_path):
+    with pytest.raises(UsageError, match=r"'physics'.*synthetic"):
+        bench_identify(Study(), Keeper(tmp_path), parts=["physics"])
+    with pytest.raises(UsageError, match="legv2_fixed_base"):
+        real(Study(), Keeper(tmp_path), tmp_path)
+    assert main(["bench", "identify", "--population", "1"]) == 2
+    assert main(["bench", "identify", "--seconds", "8"]) == 2
+
+
+def test_a_missing_extra_is_said(monkeypatch, tmp_path):
+    monkeypatch.setattr(mujoco_sysid, "available", lambda: False)
+    result = mujoco_sysid.mujoco_sysid(Study(), Keeper(tmp_path), [])
+    assert "hopping-leg[bench]" in result["missing"]
+    assert result["rows"] == []
+
+
+@pytest.mark.skipif(not mujoco_sysid.available(), reason="mujoco.sysid is not installed")
+@pytest.mark.parametrize(("way", "error"), [("windows", 1e-12), ("whole", 1e-3)])
+def test_the_truth_explains_the_data_to_mujoco_sysid(way, error):
+    from mujoco import sysid
+    from studies.identification.sequences import sequences
+
+    names, values = tuple(AIR), tuple(AIR.values())
+    cut_up = sequences(record(AIR, "swings", 16.0), way)
+    parameters = sysid.ParameterDict()
+    for name, value in AIR.items():
+        parameters.add(sysid.Parameter(name, value, 0, 1))
+
+    def largest(scale):
+        vector = scale * np.array(values)
+        parts = [
+            sysid.model_residual(
+                vector, parameters, lambda p: cut_up.build(names, tuple(p.as_vector())), t
+            )[0]
+            for t in cut_up.trajectories[:4]
+        ]
+        return np.abs(np.concatenate(parts)).max()
+
+    assert largest(1.0) < error
+    assert largest(2.0) > 3 * error
+
+
+@pytest.mark.slow
+def test_the_command_measures_keeps_and_goes_on(tmp_path):
+    file = tmp_path / "identify.json"
+    words = ["bench", "identify", "--parts", "throughput", "--population", "4", "--repeats", "1"]
+    sizes = ["--throughput-seconds", "12", "--out", str(tmp_path / "kept"), "--json", str(file)]
+    assert main([*words, *sizes]) == 0
+    first = json.loads(file.read_text())
+    speed = first["throughput"]
+    assert speed["largest_difference_rad"] < 1e-6
+    assert all(row["s_per_candidate"] > 0 for row in speed["rows"])
+    assert [row["bar"] for row in first["bars"]] == [3.0, 1.8]
+    assert "--throughput-seconds 12" in first["command"]
+    assert "--out" not in first["command"]
+    assert main([*words, *sizes]) == 0
+    assert json.loads(file.read_text())["throughput"] == speed
+
+
+@pytest.mark.slow
+def test_a_known_twin_is_found(tmp_path):
+    row = identify_twin(Study(threads=1), Keeper(tmp_path), "fit", FIXED, "least-squares")
+    assert row["worst_identifiable_error_percent"] < 0.5
+    assert row["identifiable"] == 8
+    assert row["other_swings_rms_rad"] < 1e-3
+    assert twin(AIR) != load_robot("legv2")
