@@ -74,7 +74,7 @@ results: $(STAMP)
 	$(BIN)/hop tune energy-shaping --start runs/flying-0/gains.toml --seed 1 --flight 0.52 --generations 40 --population 16 \
 	  --step 0.1 --out runs/flying --json docs/results/energy_shaping_flying.json
 	$(BIN)/hop bench training --json docs/results/training.json
-	$(BIN)/hop bench training --recipe precise --starts 2 --threads 1 --minutes 13.5 --steps 20000000 --training-seeds 0 1 2 3 4 \
+	$(BIN)/hop bench training --recipe precise --parallel-seeds 2 --threads 1 --minutes 13.5 --steps 20000000 --training-seeds 0 1 2 3 4 \
 	  --out runs/bench-quarter --json docs/results/training-quarter.json
 	$(BIN)/hop evaluate precise \
 	  $(foreach s,0 1 2 3 4,quarter-seed$(s)=runs/bench-quarter/precise-seed$(s)/policy.onnx) --seeds 5 --floor soft --no-video \
@@ -91,7 +91,7 @@ results: $(STAMP)
 	  $(foreach s,0 1 2 3 4,quarter-seed$(s)=runs/bench-quarter-0.4/precise-seed$(s)/policy.onnx) \
 	  again-seed3=runs/bench-quarter-again/precise-seed3/policy.onnx --seeds 5 --floor soft --no-video \
 	  --json docs/results/precise-seeds-jerk-0.4.json --commands $(HEIGHTS),0.41,0.42,0.43,0.44,0.45
-	$(BIN)/hop train --recipe precise --threads 2 --minutes 13.5 --steps 20000000 --set reward.jerk=0.4 epochs=4 --out runs/parts/four-passes
+	$(BIN)/hop train --recipe precise --threads 2 --minutes 13.5 --steps 20000000 --set reward.jerk=0.4 n_epochs=4 --out runs/parts/four-passes
 	$(BIN)/hop evaluate four-passes=runs/parts/four-passes/policy.onnx --seeds 5 --floor soft --no-video \
 	  --json docs/results/precise-passes.json --commands $(HEIGHTS),0.41,0.42,0.43,0.44,0.45
 	$(BIN)/hop bench training --recipe precise --set reward.jerk=0.3 --minutes 13.5 --steps 20000000 --training-seeds 0 1 2 3 4 \
@@ -107,18 +107,18 @@ results: $(STAMP)
 	$(BIN)/hop train --recipe adaptive --set $(FORMER) --out runs/adaptive
 	$(BIN)/hop robustness 12-million-steps=runs/adaptive/policy.onnx adaptive --seeds 3 \
 	  --out runs/results/robustness-adaptive --json docs/results/adaptive-robustness.json
-	for seed in 0 1 2 3 4; do $(BIN)/hop train --recipe precise --seed $$seed --steps 9000000 --set $(FORMER) teachers=1 epochs=4 task.command_skew=1 teaching=0.28 --out runs/teaching/0.28-seed$$seed; done
-	for seed in 2 4; do $(BIN)/hop train --recipe precise --seed $$seed --steps 9000000 --set $(FORMER) teachers=1 epochs=4 task.command_skew=1 teaching=0.38 --out runs/teaching/0.38-seed$$seed; done
-	$(BIN)/hop train --recipe precise --steps 9000000 --set $(FORMER) teachers=1 epochs=4 task.command_skew=1 teaching=0.55 --out runs/teaching/0.55-seed0
+	for seed in 0 1 2 3 4; do $(BIN)/hop train --recipe precise --seed $$seed --steps 9000000 --set $(FORMER) teachers=1 n_epochs=4 task.command_skew=1 teacher_share=0.28 --out runs/teaching/0.28-seed$$seed; done
+	for seed in 2 4; do $(BIN)/hop train --recipe precise --seed $$seed --steps 9000000 --set $(FORMER) teachers=1 n_epochs=4 task.command_skew=1 teacher_share=0.38 --out runs/teaching/0.38-seed$$seed; done
+	$(BIN)/hop train --recipe precise --steps 9000000 --set $(FORMER) teachers=1 n_epochs=4 task.command_skew=1 teacher_share=0.55 --out runs/teaching/0.55-seed0
 	$(BIN)/hop evaluate "runs/teaching/*/policy.onnx" --seeds 5 --floor soft --no-video --json docs/results/teaching.json \
 	  --commands $(HEIGHTS)
 	$(BIN)/hop robustness 0.28-seed0=runs/teaching/0.28-seed0/policy.onnx 0.38-seed2=runs/teaching/0.38-seed2/policy.onnx \
 	  0.55-seed0=runs/teaching/0.55-seed0/policy.onnx --seeds 3 --out runs/results/robustness-teaching --json docs/results/teaching-robustness.json
-	$(BIN)/hop train --recipe precise --seed 3 --steps 12000000 --set $(FORMER) teaching=0.42 imitation.knots=16 --out runs/precise
+	$(BIN)/hop train --recipe precise --seed 3 --steps 12000000 --set $(FORMER) teacher_share=0.42 dagger.knots=16 --out runs/precise
 	$(BIN)/hop bench limits --controllers precise adaptive recurrent energy-shaping quarter=runs/bench-quarter/precise-seed3/policy.onnx \
 	  --teacher runs/bench-quarter/precise-seed3/start-1 --json docs/results/limits.json
 	$(BIN)/hop bench reach --json docs/results/reach.json
-	$(BIN)/hop train --recipe precise --steps 9000000 --set $(FORMER) teachers=1 epochs=4 task.command_skew=1 teaching=0.55 --observation three-samples --heights 0.2 0.42 --out runs/fifteen
+	$(BIN)/hop train --recipe precise --steps 9000000 --set $(FORMER) teachers=1 n_epochs=4 task.command_skew=1 teacher_share=0.55 --observation three-samples --heights 0.2 0.42 --out runs/fifteen
 	$(BIN)/hop train --recipe recurrent --set $(FORMER) --observation three-samples --out runs/fifteen-recurrent
 	$(BIN)/hop evaluate fifteen=runs/fifteen/policy.onnx fifteen-recurrent=runs/fifteen-recurrent/policy.onnx \
 	  --seeds 5 --floor soft --no-video --json docs/results/fifteen.json
@@ -133,7 +133,7 @@ results: $(STAMP)
 	$(BIN)/hop bench identify --parts recordings --json docs/results/bench_identify_recordings.json
 	$(BIN)/hop experiment transfer --set $(FORMER) --seeds 0 1 --json docs/results/transfer.json
 	$(BIN)/hop experiment transfer --set $(FORMER) --methods identified-surprises cad-surprises --json docs/results/transfer-surprises.json
-	$(BIN)/hop experiment transfer --folder runs/transfer-standing --set $(FORMER) epochs=8 task.idle=1.5 task.fall_penalty=2 task.command_skew=1.5 \
+	$(BIN)/hop experiment transfer --folder runs/transfer-standing --set $(FORMER) n_epochs=8 task.idle=1.5 task.fall_penalty=2 task.command_skew=1.5 \
 	  reward.tail=0.25 --json docs/results/transfer-standing.json
 	$(BIN)/hop experiment transfer --recipe fast --folder runs/transfer-fast --json docs/results/transfer-fast.json
 	$(BIN)/hop experiment prediction --json docs/results/prediction.json

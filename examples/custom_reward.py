@@ -12,7 +12,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.envs.apex_reward import ApexReward
 from hopping_leg.envs.transition import Transition
-from hopping_leg.rl.fast import FastRecipe
+from hopping_leg.rl.recipes.fast import FastRecipe
 from hopping_leg.rl.train import train
 from hopping_leg.robot import Robot, load_robot
 
@@ -43,7 +43,7 @@ class QuietRecipe(FastRecipe):
 
 steps = int(sys.argv[1]) if len(sys.argv) > 1 else 200_000
 folder = Path(f"runs/quiet-{steps}")
-recipe = QuietRecipe(steps=steps, rollout=32, judge_from=0.0)
+recipe = QuietRecipe(steps=steps, n_steps=32, eval_start=0.0)
 if (folder / "policy.onnx").exists():
     print(f"{folder} holds a finished training; delete it to train again.")
 else:

@@ -14,7 +14,7 @@ def test_every_example_runs(path, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "agg")
     if path.stem in ARGUMENTS:
-        monkeypatch.setattr("hopping_leg.rl.judge._SECONDS", 0.5)
+        monkeypatch.setattr("hopping_leg.rl.policy_evaluation._SECONDS", 0.5)
     monkeypatch.setattr(sys, "argv", [str(path), *ARGUMENTS.get(path.stem, [])])
     runpy.run_path(str(path), run_name="__main__")
     assert capsys.readouterr().out

@@ -12,7 +12,7 @@ from hopping_leg.robot.parameters import Robot
 from studies.ablations.variants import ABLATIONS
 from studies.training_time.run import bench_training, over_commands
 
-_OF_A_RUN = ("seed", "minutes", "exam_scores_m")
+_OF_A_RUN = ("seed", "minutes", "teacher_scores_m")
 _COUNTED = ("skipped_hops", "body_contacts")
 
 
@@ -54,7 +54,7 @@ def bench_ablation(
     found: list[dict[str, Any]] = []
     for ablation in [known[name] for name in known if not variants or name in variants]:
         result = bench_training(
-            replace(ablation.recipe, steps=steps, judge_every=max(1, steps // 5)),
+            replace(ablation.recipe, steps=steps, eval_every=max(1, steps // 5)),
             robot,
             out / ablation.name,
             training_seeds=training_seeds,

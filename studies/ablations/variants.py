@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, replace
 
-from hopping_leg.rl.fast import FastRecipe
-from hopping_leg.rl.precise import PreciseRecipe
-from hopping_leg.rl.recurrent import RecurrentRecipe
+from hopping_leg.rl.recipes.fast import FastRecipe
+from hopping_leg.rl.recipes.precise import PreciseRecipe
+from hopping_leg.rl.recipes.recurrent import RecurrentRecipe
 
 _LATENT = 1.6
 """Log norm of the actor's last layer early in training: gSDE's noise over its weights' noise."""
@@ -44,7 +44,7 @@ def _of_fast() -> list[Ablation]:
         Ablation(
             "white-noise",
             "white exploration noise of the same size instead of gSDE",
-            replace(base, noise_hold=0, log_std=(first + _LATENT, last + _LATENT)),
+            replace(base, sde_sample_freq=0, log_std=(first + _LATENT, last + _LATENT)),
         ),
         Ablation(
             "blind-critic",
@@ -97,12 +97,12 @@ def _of_precise() -> list[Ablation]:
         Ablation(
             "four-passes",
             "four passes over a rollout instead of eight",
-            replace(base, epochs=4),
+            replace(base, n_epochs=4),
         ),
         Ablation(
             "no-teacher",
             "no teacher: reinforcement learning on the same inputs, as `fast` learns",
-            replace(fast, task=base.task, judge_commands=base.judge_commands),
+            replace(fast, task=base.task, eval_commands=base.eval_commands),
         ),
         Ablation(
             "short-past",
@@ -115,7 +115,7 @@ def _of_precise() -> list[Ablation]:
             replace(
                 recurrent,
                 task=replace(recurrent.task, command_range=base.task.command_range),
-                judge_commands=base.judge_commands,
+                eval_commands=base.eval_commands,
             ),
         ),
         Ablation(
@@ -126,12 +126,12 @@ def _of_precise() -> list[Ablation]:
         Ablation(
             "no-aim",
             "a teacher that is told the command itself",
-            replace(base, imitation=replace(base.imitation, aiming=0.0)),
+            replace(base, dagger=replace(base.dagger, correction_rate=0.0)),
         ),
         Ablation(
             "newest-only",
             "only the newest tenth of the ticks from which the policy learns",
-            replace(base, imitation=replace(base.imitation, memory=base.imitation.memory // 10)),
+            replace(base, dagger=replace(base.dagger, buffer_size=base.dagger.buffer_size // 10)),
         ),
         Ablation(
             "coarse-physics",

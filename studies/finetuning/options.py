@@ -44,8 +44,8 @@ class Finetune:
     def measure(self) -> dict[str, Any]:
         """Run it, print a table, return every number."""
         from hopping_leg.evaluate.figures.style import to_svg
-        from hopping_leg.rl.finetune.options import FinetuneOptions
-        from hopping_leg.rl.finetune.rules import Rules
+        from hopping_leg.rl.finetune.config import FinetuneConfig
+        from hopping_leg.rl.finetune.stopping_rules import StoppingRules
         from studies.finetuning.figure import draw_finetuning
         from studies.finetuning.run import Study, measure
 
@@ -62,7 +62,7 @@ class Finetune:
                 tuple(draw_twin(seed, self.robot).robot for seed in self.twins),
                 self.methods,
                 self.seeds,
-                FinetuneOptions(rules=Rules(minutes=self.minutes)),
+                FinetuneConfig(stopping_rules=StoppingRules(minutes=self.minutes)),
                 guard_of(robot, policy.card.rate),
                 self.folder,
                 judges=self.judges,

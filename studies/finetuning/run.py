@@ -15,10 +15,10 @@ import numpy as np
 from hopping_leg.controllers.hardware_trial import Steps
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.io import write_json
+from hopping_leg.rl.finetune.config import FinetuneConfig, Method
 from hopping_leg.rl.finetune.finetuning import Row
 from hopping_leg.rl.finetune.hops import score
-from hopping_leg.rl.finetune.options import FinetuneOptions, Method
-from hopping_leg.rl.finetune.prepared import Task
+from hopping_leg.rl.finetune.pretraining import Task
 from hopping_leg.rl.finetune.running import POLICY, RESULT, finetune
 from hopping_leg.rl.finetune.simulated import Guard, Simulated
 from hopping_leg.robot.parameters import Robot
@@ -42,10 +42,10 @@ class Study:
     twins: tuple[Robot, ...]
     methods: tuple[Method, ...]
     seeds: tuple[int, ...]
-    options: FinetuneOptions
+    options: FinetuneConfig
     guard: Guard
     folder: Path
-    judge_commands: tuple[float, ...] = (0.25, 0.27, 0.29, 0.31, 0.33, 0.35)
+    eval_commands: tuple[float, ...] = (0.25, 0.27, 0.29, 0.31, 0.33, 0.35)
     judges: int = 3
     """Judging outings of each policy."""
 
@@ -102,7 +102,7 @@ def _run(
             replace(study.options, method=method),
             folder,
             resume=True,
-            prepared=study.folder / "prepared",
+            pretraining=study.folder / "pretraining",
             on_outing=lambda row: on_progress(
                 f"{folder.name} {row['minutes']:.2f} min: {1e3 * row['error_m']:.0f} mm"
             ),
@@ -114,14 +114,14 @@ def _run(
 def _judge(study: Study, twin: Robot, policy: Policy, method: str, seed: int | None) -> list[Row]:
     """Return true errors of a policy at every height and judging seed; kept in a file."""
     name = f"{twin.name}-{method}" + ("" if seed is None else f"-seed{seed}")
-    asked = {"policy": policy.digest, "twin": twin.digest, "commands": list(study.judge_commands),
+    asked = {"policy": policy.digest, "twin": twin.digest, "commands": list(study.eval_commands),
              "judges": study.judges}  # fmt: skip
     path = study.folder / "judged" / f"{name}.json"
     if path.exists():
         stored = json.loads(path.read_text(encoding="utf-8"))
         if stored["asked"] == asked:
             return list(stored["rows"])
-    steps: Steps = tuple((command, _SECONDS) for command in study.judge_commands)
+    steps: Steps = tuple((command, _SECONDS) for command in study.eval_commands)
     rows = []
     for judge in range(FIRST_JUDGE, FIRST_JUDGE + study.judges):
         outing = Simulated(twin, study.guard).hop(policy, steps, judge)
@@ -165,7 +165,7 @@ def _pooled(twin: str, method: str, judged: list[Row]) -> Row:
 
 
 def _point(row: Row) -> Row:
-    names = ("outing", "kind", "minutes", "error_m", "true_error_m", "thrown_back")
+    names = ("outing", "kind", "minutes", "error_m", "true_error_m", "rolled_back")
     return {**{name: row[name] for name in names}, "ended_early": bool(row["complaint"])}
 
 
@@ -174,7 +174,7 @@ def _ending(result: dict[str, Any]) -> Row:
         "minutes": result["minutes"],
         "why_it_ended": result["why_it_ended"],
         "ended_early": result["safety"]["ended_early"],
-        "thrown_back": result["safety"]["thrown_back"],
+        "rolled_back": result["safety"]["rolled_back"],
         "first_estimated_error_m": result["first_check"]["error_m"],
         "best_estimated_error_m": result["best_check"]["error_m"],
     }

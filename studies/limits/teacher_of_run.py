@@ -5,11 +5,11 @@ from pathlib import Path
 
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.checkpoint import list_checkpoints, read_checkpoint
-from hopping_leg.rl.precise import PreciseRecipe
+from hopping_leg.rl.distillation.teacher import Teacher
 from hopping_leg.rl.recipes import recipe_of
+from hopping_leg.rl.recipes.precise import PreciseRecipe
 from hopping_leg.rl.resumable import restore_learner
 from hopping_leg.rl.scale import fit
-from hopping_leg.rl.teacher import Teacher
 from hopping_leg.robot.parameters import Robot
 
 

@@ -32,7 +32,7 @@ class Training:
     """Of learning, by the clock, after which the best snapshot is selected."""
     threads: int = 2
     """Of torch and physics, of each start."""
-    starts: int = 1
+    parallel_seeds: int = 1
     """Trainings that begin side by side for every seed, as for ``hop train``."""
     out: Path = Path("runs/bench-training")
     """Where the trainings are kept; finished ones are not repeated, killed ones go on."""
@@ -45,7 +45,7 @@ class Training:
         from studies.training_time.run import bench_training
 
         at_least(1, evaluation_seeds=self.evaluation_seeds, threads=self.threads)
-        at_least(1, starts=self.starts)
+        at_least(1, parallel_seeds=self.parallel_seeds)
         if not self.training_seeds:
             raise UsageError("--training-seeds names no seed; give e.g. --training-seeds 0 1 2.")
         recipe = change(get_recipe(self.recipe), self.set)
@@ -60,7 +60,7 @@ class Training:
             evaluation_seeds=self.evaluation_seeds,
             minutes=self.minutes,
             threads=self.threads,
-            starts=self.starts,
+            parallel_seeds=self.parallel_seeds,
             on_progress=console.print,
         )
         table = Table("minutes", "seed", "command, m", "median error, mm", "std, mm", "skipped")

@@ -14,15 +14,15 @@ from hopping_leg.controllers import RolloutConfig
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.evaluate.candidates import Candidate
 from hopping_leg.evaluate.runner import evaluate, software_versions
+from hopping_leg.rl.parallel_seeds import ParallelSeeds
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.run_folder import read_result
-from hopping_leg.rl.starts import Starts
 from hopping_leg.robot.parameters import Robot
 
 JUDGING_SEED = 1000
 """First of the evaluation seeds."""
 
-_OF_STARTS = ("starts", "chosen_start")
+_OF_SEEDS = ("seed_scores", "chosen_seed")
 
 
 def bench_training(
@@ -34,7 +34,7 @@ def bench_training(
     evaluation_seeds: int = 5,
     minutes: float | None = None,
     threads: int = 2,
-    starts: int = 1,
+    parallel_seeds: int = 1,
     on_progress: Callable[[str], None] = lambda _note: None,
 ) -> dict[str, Any]:
     """Train from scratch with several seeds and judge every snapshot and every selected policy.
@@ -48,33 +48,33 @@ def bench_training(
         training_seeds: Of the trainings.
         evaluation_seeds: Realisations of noise and delay per command.
         minutes: Of learning, by the clock; None learns until the recipe's steps are done.
-        threads: Of torch and physics, of each start.
-        starts: Trainings side by side, of which the best policy counts.
+        threads: Of torch and physics, of each training.
+        parallel_seeds: Trainings side by side, of which the best policy counts.
         on_progress: Called with a sentence on what begins.
 
     Returns:
-        Per training seed: minutes, selection included, how its teachers did in their exams, its
-        starts if there were several, the selected policy's summary rows, and the curve of
+        Per training seed: minutes, selection included, how its teachers scored, its
+        parallel seeds if there were several, the selected policy's summary rows, and the curve of
         (minutes, worst and mean |median error| over commands) of all snapshots.
     """
     runs = []
     for seed in training_seeds:
         folder = out / f"{recipe.name}-seed{seed}"
         on_progress(f"training {recipe.name} with seed {seed}")
-        several = Starts(recipe, robot, seed, folder, starts, minutes, threads)
+        several = ParallelSeeds(recipe, robot, seed, folder, parallel_seeds, minutes, threads)
         if not (folder / "policy.onnx").exists():
             several.train(resume=folder.exists())
         on_progress(f"judging {recipe.name} with seed {seed}")
         result = read_result(folder)
         content = (folder / "policy.onnx").read_bytes()
-        learnt = several.folder(result.get("chosen_start", 0))
+        learnt = several.folder(result.get("chosen_seed", 0))
         runs.append(
             {
                 "seed": seed,
                 "minutes": result["minutes"],
                 "steps": result["steps"],
-                "exam_scores_m": result.get("exam_scores_m", []),
-                **{key: result[key] for key in _OF_STARTS if key in result},
+                "teacher_scores_m": result.get("teacher_scores_m", []),
+                **{key: result[key] for key in _OF_SEEDS if key in result},
                 "selected": _judge({"selected": content}, recipe, robot, evaluation_seeds),
                 "curve": _curve(learnt, recipe, robot, evaluation_seeds),
             }
@@ -83,7 +83,7 @@ def bench_training(
         "recipe": recipe.name,
         "robot": robot.name,
         "threads": threads,
-        "starts": starts,
+        "parallel_seeds": parallel_seeds,
         "minutes_budget": minutes,
         "evaluation_seed": JUDGING_SEED,
         "evaluation_seeds": evaluation_seeds,
@@ -95,9 +95,9 @@ def bench_training(
         ],
         "curve": [{"seed": run["seed"], **point} for run in runs for point in run["curve"]],
         "minutes_max": max(run["minutes"] for run in runs),
-        "worst_abs_median_error_m": max(
-            abs(row["median_error_m"]) for run in runs for row in run["selected"]
-        ),
+        "worst_abs_median_error_m": over_commands([row for run in runs for row in run["selected"]])[
+            "worst_abs_median_error_m"
+        ],
         "versions": software_versions(),
     }
 
@@ -132,7 +132,7 @@ def _judge(
     judged = evaluate(
         candidates,
         RolloutConfig(robot),
-        commands=recipe.judge_commands,
+        commands=recipe.eval_commands,
         repeats=seeds,
         seed=JUDGING_SEED,
         kinds=("fixed",),

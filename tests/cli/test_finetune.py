@@ -42,20 +42,20 @@ def test_the_guard_is_the_supervisors():
 
 def test_an_outings_line_says_what_happened():
     row = {"minutes": 1.0, "kind": "check", "error_m": 0.02, "true_error_m": 0.018, "hops": 9,
-           "complaint": "A joint left its range.", "thrown_back": True}  # fmt: skip
+           "complaint": "A joint left its range.", "rolled_back": True}  # fmt: skip
     said = line(row)
     assert "20.0 mm" in said
     assert "18.0 mm" in said
-    assert said.endswith("A joint left its range. Thrown back to the best.")
+    assert said.endswith("A joint left its range. Rolled back to the best.")
 
 
 @pytest.mark.slow
 def test_a_run_leaves_policy_card_and_numbers(tmp_path, monkeypatch, capsys):
     from hopping_leg.rl.finetune import finetuning
-    from hopping_leg.rl.finetune.contact import ContactOptions
-    from hopping_leg.rl.finetune.prepared import prepare
+    from hopping_leg.rl.finetune.contact import ContactConfig
+    from hopping_leg.rl.finetune.pretraining import prepare
 
-    few = ContactOptions(legs=4, seconds=3.0, steps=50, hidden=(8,))
+    few = ContactConfig(num_envs=4, seconds=3.0, steps=50, hidden=(8,))
     monkeypatch.setattr(finetuning, "prepare", lambda task, _, folder: prepare(task, few, folder))
     out, numbers = tmp_path / "run", tmp_path / "finetune.json"
     words = ["finetune", "fast", "--on", "twin", "--method", "aim", "--minutes", "0.4", "--outing",

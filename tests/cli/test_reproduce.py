@@ -10,7 +10,7 @@ from hopping_leg.cli import evaluate, main
 from hopping_leg.cli.reproduce import NOTHING_MEANT
 
 pytest.importorskip("torch")
-from hopping_leg.rl.fast import FastRecipe
+from hopping_leg.rl.recipes.fast import FastRecipe
 from hopping_leg.sim_to_real import run as transfer_run
 
 NUMBERS = {"rows": [], "methods": [], "comparison": []}

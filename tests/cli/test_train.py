@@ -3,7 +3,7 @@ import dataclasses
 import pytest
 
 from hopping_leg import cli
-from hopping_leg.rl import judge, recipes
+from hopping_leg.rl import policy_evaluation, recipes
 from tests.rl.learners import TINY
 
 
@@ -13,9 +13,9 @@ def tiny(monkeypatch):
         name = "tiny"
 
         def __new__(cls):
-            return dataclasses.replace(TINY, steps=64, judge_every=32, warmup=32)
+            return dataclasses.replace(TINY, steps=64, eval_every=32, learning_starts=32)
 
-    monkeypatch.setattr(judge, "_SECONDS", 0.5)
+    monkeypatch.setattr(policy_evaluation, "_SECONDS", 0.5)
     monkeypatch.setitem(recipes.RECIPES, "tiny", Tiny)
 
 
@@ -40,9 +40,9 @@ def test_a_training_leaves_policy_card_and_json(tiny, tmp_path, capsys):
         (["--seed", "-1"], "must be at least 0"),
         (["--threads", "0"], "at least 1"),
         (["--steps", "0"], "at least 1"),
-        (["--starts", "0"], "at least 1"),
-        (["--starts", "2", "--source", "runs/before"], "leave --starts out"),
-        (["--starts", "2", "--minutes", "-1"], "must be positive"),
+        (["--parallel-seeds", "0"], "at least 1"),
+        (["--parallel-seeds", "2", "--source", "runs/before"], "leave --parallel-seeds out"),
+        (["--parallel-seeds", "2", "--minutes", "-1"], "must be positive"),
         (["--set", "learning_rat=1"], "Did you mean 'learning_rate'"),
         (["--set", "learning_rate=fast"], "give e.g. learning_rate="),
         (["--set", "num_envs=2.5"], "a whole number"),

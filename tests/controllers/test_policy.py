@@ -11,7 +11,7 @@ from onnx import TensorProto, helper
 from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.controllers.registry import controller_names, load_controller, load_policy
 from hopping_leg.errors import PolicyError, UsageError
-from hopping_leg.rl.export import Network, build_policy, save_policy
+from hopping_leg.rl.onnx_export import Network, build_policy, save_policy
 from hopping_leg.robot import load_robot
 from hopping_leg.sim.channel import Measurement
 

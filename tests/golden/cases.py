@@ -28,7 +28,7 @@ from hopping_leg.envs import (
     PaperReward,
     TaskConfig,
 )
-from hopping_leg.rl import judge
+from hopping_leg.rl import policy_evaluation
 from hopping_leg.robot import load_robot
 from tests.cli.emulated import put_behind
 
@@ -140,29 +140,43 @@ def task_range(folder: Path) -> Values:
     return _task("dated", "apex", command_range=(0.22, 0.4), command_skew=1.5, timestep=1e-3)
 
 
+# fmt: off
 RECIPES = {
-    "paper": ["warmup=64", "gradient_steps=4", "batch=32"],
-    "fast": ["batch=64"],
-    "precise": ["batch=64", "teaching=0.5", "teachers=2", "imitation.updates=4"],
-    "adaptive": ["batch=64", "teaching=0.5", "imitation.updates=4", "alike=0.5", "draws=2"],
-    "recurrent": ["batch=64", "teaching=0.5", "imitation.updates=4", "imitation.batch=64"],
+    "paper": ["learning_starts=64", "gradient_steps=4", "batch_size=32"],
+    "fast": ["batch_size=64"],
+    "precise": ["batch_size=64", "teacher_share=0.5", "teachers=2", "dagger.gradient_steps=4"],
+    "adaptive": [
+        "batch_size=64",
+        "teacher_share=0.5",
+        "dagger.gradient_steps=4",
+        "alike=0.5",
+        "draws=2",
+    ],
+    "recurrent": [
+        "batch_size=64",
+        "teacher_share=0.5",
+        "dagger.gradient_steps=4",
+        "dagger.batch_size=64",
+    ],
 }
+# fmt: on
 """What makes a training of a recipe short: two rollouts, of teacher and student each."""
 
 
 def _trained(folder: Path, recipe: str) -> Values:
     """Return weights of a training's snapshots and policy, and the scores of its trials."""
-    rollouts = 4 if "teaching=0.5" in RECIPES[recipe] else 2
-    numbers = ["num_envs=4", "rollout=32", "judge_every=64", "judge_from=0.5", *RECIPES[recipe]]
+    rollouts = 4 if "teacher_share=0.5" in RECIPES[recipe] else 2
+    rollout = "train_freq=32" if recipe == "paper" else "n_steps=32"
+    numbers = ["num_envs=4", rollout, "eval_every=64", "eval_start=0.5", *RECIPES[recipe]]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(judge, "_SECONDS", 0.5)
+        patch.setattr(policy_evaluation, "_SECONDS", 0.5)
         hop(
             "train", "--recipe", recipe, "--seed", 3, "--threads", 1, "--out", folder / "run",
             "--steps", 128 * rollouts, "--set", *numbers,
         )  # fmt: skip
     files = [*sorted((folder / "run" / "snapshots").iterdir()), folder / "run" / "policy.onnx"]
     told = json.loads((folder / "run" / "result.json").read_text())
-    scores = [row["score_m"] for row in told["history"]] + told.get("exam_scores_m", [])
+    scores = [row["score_m"] for row in told["history"]] + told.get("teacher_scores_m", [])
     return [np.array(scores, float), *(w for file in files for w in _weights(file))]
 
 

@@ -5,36 +5,45 @@ import dataclasses
 import torch
 from stable_baselines3.common.logger import configure
 
-from hopping_leg.rl.adaptive import AdaptiveRecipe
-from hopping_leg.rl.fast import FastRecipe
-from hopping_leg.rl.imitation import Imitation
-from hopping_leg.rl.paper import PaperRecipe
-from hopping_leg.rl.precise import PreciseRecipe
-from hopping_leg.rl.recurrent import RecurrentRecipe
+from hopping_leg.rl.distillation.dagger import DaggerConfig
+from hopping_leg.rl.recipes.adaptive import AdaptiveRecipe
+from hopping_leg.rl.recipes.fast import FastRecipe
+from hopping_leg.rl.recipes.paper import PaperRecipe
+from hopping_leg.rl.recipes.precise import PreciseRecipe
+from hopping_leg.rl.recipes.recurrent import RecurrentRecipe
 from hopping_leg.rl.resumable import ResumablePPO
 from hopping_leg.robot import load_robot
 
 ROBOT = load_robot("legv2-paper")
 TINY = PaperRecipe(
-    steps=1200, warmup=300, judge_every=10**9, hidden=(8, 8), num_envs=2, gradient_steps=4, batch=16
+    steps=1200,
+    learning_starts=300,
+    eval_every=10**9,
+    hidden=(8, 8),
+    num_envs=2,
+    gradient_steps=4,
+    batch_size=16,
 )
-TINY_FAST = FastRecipe(steps=768, num_envs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8))
+TINY_FAST = FastRecipe(
+    steps=768, num_envs=4, n_steps=32, batch_size=64, actor=(8, 8), critic=(8, 8)
+)
 TINY_PRECISE = PreciseRecipe(
-    judge_commands=(0.3,), teachers=3, exam_at=(1.0,),
-    steps=768, num_envs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8), student=(8, 8),
-    teaching=0.4, imitation=Imitation(memory=200, updates=4, batch=64),
+    eval_commands=(0.3,), teachers=3, exam_at=(1.0,),
+    steps=768, num_envs=4, n_steps=32, batch_size=64, actor=(8, 8), critic=(8, 8), student=(8, 8),
+    teacher_share=0.4, dagger=DaggerConfig(buffer_size=200, gradient_steps=4, batch_size=64),
 )  # fmt: skip
 
 
 TINY_RECURRENT = RecurrentRecipe(
-    steps=768, num_envs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8), memory=8,
-    teaching=0.4, imitation=Imitation(memory=200, updates=4, batch=64),
+    steps=768, num_envs=4, n_steps=32, batch_size=64, actor=(8, 8), critic=(8, 8), memory=8,
+    teacher_share=0.4, dagger=DaggerConfig(buffer_size=200, gradient_steps=4, batch_size=64),
 )  # fmt: skip
 
 
 TINY_ADAPTIVE = AdaptiveRecipe(
-    steps=768, num_envs=4, rollout=32, batch=64, actor=(8, 8), critic=(8, 8), student=(8, 8),
-    feeling=(8, 8), teaching=0.4, imitation=Imitation(memory=200, updates=4, batch=64),
+    steps=768, num_envs=4, n_steps=32, batch_size=64, actor=(8, 8), critic=(8, 8), student=(8, 8),
+    feeling=(8, 8), teacher_share=0.4,
+    dagger=DaggerConfig(buffer_size=200, gradient_steps=4, batch_size=64),
 )  # fmt: skip
 
 

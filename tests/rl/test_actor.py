@@ -6,7 +6,7 @@ import torch
 
 from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.envs.observation import PaperObservation, sample_scaling
-from hopping_leg.rl.export import build_policy
+from hopping_leg.rl.onnx_export import build_policy
 from hopping_leg.sim.channel import Measurement
 from tests.rl.learners import ROBOT, TINY, TINY_FAST, TinyPPO, learner
 

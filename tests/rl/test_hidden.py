@@ -9,9 +9,9 @@ import pytest
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_policy
 from hopping_leg.errors import PolicyError
-from hopping_leg.rl.export import Network, build_policy
 from hopping_leg.rl.hidden import expose_hidden
 from hopping_leg.rl.memories import RecurrentUnit
+from hopping_leg.rl.onnx_export import Network, build_policy
 
 POLICY = load_policy("fast")
 

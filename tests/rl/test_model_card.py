@@ -1,6 +1,6 @@
 import pytest
 
-from hopping_leg.rl.model_card import MISSED, doubt, exams
+from hopping_leg.rl.model_card import MISSED, doubt, teacher_scores
 
 
 def trials(**errors):
@@ -25,6 +25,6 @@ def test_a_command_between_centimetres_is_not_rounded_to_another():
     assert "0.225 m (+30 mm)" in doubt([{"command_m": 0.225, "median_error_m": 0.03}])
 
 
-def test_a_card_tells_how_teachers_did_in_their_exams():
-    assert exams([]) == ""
-    assert "order in which they were taken: 21.0, 4.1 mm" in exams([0.021, 0.0041])
+def test_a_card_tells_how_teachers_did():
+    assert teacher_scores([]) == ""
+    assert "Evaluations of the teachers in order: 21.0, 4.1 mm" in teacher_scores([0.021, 0.0041])

@@ -7,8 +7,8 @@ import pytest
 
 from hopping_leg.controllers.registry import load_policy, shipped_policies
 from hopping_leg.errors import PolicyError
-from hopping_leg.rl.export import build_policy
 from hopping_leg.rl.network_file import read_network
+from hopping_leg.rl.onnx_export import build_policy
 
 
 @pytest.mark.parametrize("name", shipped_policies())

@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from hopping_leg.errors import UsageError
-from hopping_leg.rl import judge
+from hopping_leg.rl import policy_evaluation
 from hopping_leg.rl import train as module
 from hopping_leg.rl.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
 from hopping_leg.rl.resumable import restore, state_of
@@ -105,9 +105,9 @@ def test_no_checkpoint_holds_a_pickle(tmp_path):
 
 
 def test_a_run_is_never_overwritten_or_mixed(tmp_path, monkeypatch):
-    monkeypatch.setattr(judge, "_SECONDS", 0.5)
+    monkeypatch.setattr(policy_evaluation, "_SECONDS", 0.5)
     out = tmp_path / "run"
-    recipe = dataclasses.replace(TINY, steps=64, judge_every=32, warmup=32)
+    recipe = dataclasses.replace(TINY, steps=64, eval_every=32, learning_starts=32)
     done = module.train(recipe, ROBOT, 0, out, quiet=True)
     content = done.policy.read_bytes()
     with pytest.raises(UsageError, match="--resume"):
@@ -124,10 +124,10 @@ import sys
 from pathlib import Path
 from tests.rl.learners import ROBOT, TINY
 import dataclasses
-from hopping_leg.rl import judge
+from hopping_leg.rl import policy_evaluation
 from hopping_leg.rl.train import train
-judge._SECONDS = 0.5
-recipe = dataclasses.replace(TINY, steps=1600, checkpoint_seconds=0.0, judge_every=800)
+policy_evaluation._SECONDS = 0.5
+recipe = dataclasses.replace(TINY, steps=1600, checkpoint_seconds=0.0, eval_every=800)
 train(recipe, ROBOT, 0, Path(sys.argv[1]), resume=True, quiet=True)
 """
 
@@ -159,9 +159,11 @@ def test_killed_runs_end_like_the_run_that_was_left_alone(tmp_path):
 
 
 def test_a_run_can_begin_where_another_stopped(tmp_path, monkeypatch):
-    monkeypatch.setattr(judge, "_SECONDS", 0.5)
+    monkeypatch.setattr(policy_evaluation, "_SECONDS", 0.5)
     first, second = tmp_path / "first", tmp_path / "second"
-    recipe = dataclasses.replace(TINY, steps=128, judge_every=64, warmup=32, checkpoint_seconds=0)
+    recipe = dataclasses.replace(
+        TINY, steps=128, eval_every=64, learning_starts=32, checkpoint_seconds=0
+    )
     module.train(recipe, ROBOT, 0, first, quiet=True)
     with pytest.raises(UsageError, match="no checkpoint"):
         module.train(recipe, ROBOT, 0, second, source=tmp_path, quiet=True)

@@ -2,9 +2,9 @@ import dataclasses
 
 import pytest
 
-from hopping_leg.rl.fast import FastRecipe
-from hopping_leg.rl.paper import PaperRecipe
-from hopping_leg.rl.precise import PreciseRecipe
+from hopping_leg.rl.recipes.fast import FastRecipe
+from hopping_leg.rl.recipes.paper import PaperRecipe
+from hopping_leg.rl.recipes.precise import PreciseRecipe
 from hopping_leg.rl.scale import fit
 from hopping_leg.robot import load_robot, shipped_robots
 
@@ -26,7 +26,7 @@ def test_every_shipped_leg_can_stand_and_reach_its_commands(recipe, name):
     fitted = fit(recipe, robot)
     low, high = fitted.task.command_bounds
     assert 0.6 * robot.straight_height < low < high < 1.5 * robot.straight_height
-    assert low <= min(fitted.judge_commands) <= max(fitted.judge_commands) <= high
+    assert low <= min(fitted.eval_commands) <= max(fitted.eval_commands) <= high
     assert (fitted.task.action_torque <= robot.of_joints("torque_limit")).all()
     env = fitted.__class__.make_env(fitted, robot, 0)
     assert (env.task.legs.height > 0.3 * robot.straight_height).all()
@@ -38,6 +38,6 @@ def test_heights_that_are_asked_for_are_those_of_any_leg(recipe, name):
     asked = dataclasses.replace(recipe, heights=(0.21, 0.47))
     fitted = fit(asked, load_robot(name))
     assert fitted.task.command_bounds == (0.21, 0.47)
-    assert len(fitted.judge_commands) == len(recipe.judge_commands)
-    assert 0.21 < min(fitted.judge_commands) < max(fitted.judge_commands) < 0.47
+    assert len(fitted.eval_commands) == len(recipe.eval_commands)
+    assert 0.21 < min(fitted.eval_commands) < max(fitted.eval_commands) < 0.47
     assert fitted.task.action_torque == fit(recipe, load_robot(name)).task.action_torque

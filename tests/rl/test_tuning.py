@@ -14,7 +14,7 @@ from hopping_leg.cli import main
 from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.evaluate.figures import to_svg
 from hopping_leg.evaluate.figures.tuning import FIGURES
-from hopping_leg.rl import judge, tuning
+from hopping_leg.rl import policy_evaluation, tuning
 from hopping_leg.rl.recipes import RECIPES
 from hopping_leg.rl.search_space import SPACES, defaults, dimensions
 from hopping_leg.rl.tuning import Tuning, open_study, tune
@@ -60,7 +60,7 @@ def test_the_first_trial_is_the_recipe_as_it_is_and_all_are_recorded(small, trai
     (first, folder), *_ = trained
     assert first.learning_rate == RECIPES["fast"]().learning_rate
     assert first.actor == RECIPES["fast"]().actor
-    assert (first.steps, first.judge_every) == (100, 25)
+    assert (first.steps, first.eval_every) == (100, 25)
     assert folder == small.out / "trial-0000"
     trials = result["trials"]
     assert [trial["number"] for trial in trials] == list(range(6))
@@ -152,7 +152,7 @@ def test_figures_are_drawn_from_the_numbers_alone(small, trained):
 
 @pytest.mark.slow
 def test_command_line_trains_and_leaves_everything(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(judge, "_SECONDS", 0.5)
+    monkeypatch.setattr(policy_evaluation, "_SECONDS", 0.5)
     out, study = tmp_path / "out", tmp_path / "deep" / "study.db"
     words = ["tune", "fast", "--trials", "2", "--steps", "256", "--snapshots", "2"]
     words += ["--set", "num_envs=2", "--study", str(study), "--out", str(out)]
@@ -171,9 +171,9 @@ def test_command_line_trains_and_leaves_everything(tmp_path, capsys, monkeypatch
 
 SHARED = """
 from hopping_leg.cli import main
-from hopping_leg.rl import judge
+from hopping_leg.rl import policy_evaluation
 
-judge._SECONDS = 0.5
+policy_evaluation._SECONDS = 0.5
 if __name__ == "__main__":
     raise SystemExit(main({words!r}))
 """
@@ -209,9 +209,9 @@ def test_a_ray_cluster_works_on_a_study(tmp_path, monkeypatch):
     pytest.importorskip("ray", reason="Ray is not installed (extra 'cluster')")
 
     def judge_briefly():
-        from hopping_leg.rl import judge
+        from hopping_leg.rl import policy_evaluation
 
-        judge._SECONDS = 0.5
+        policy_evaluation._SECONDS = 0.5
 
     monkeypatch.chdir(tmp_path)
     words = ["tune", "fast", "--trials", "3", "--steps", "128", "--snapshots", "1"]

@@ -12,7 +12,7 @@ def row(command, error, skipped):
 
 def trained_to(*rows, exams=()):
     """Return what a training comes to."""
-    run = {"seed": 0, "minutes": 1.0, "exam_scores_m": list(exams), "selected": list(rows)}
+    run = {"seed": 0, "minutes": 1.0, "teacher_scores_m": list(exams), "selected": list(rows)}
     return {"rows": list(rows), "runs": [run]}
 
 
@@ -31,7 +31,7 @@ def test_all_variants_train_as_long_and_are_summed_up(monkeypatch, tmp_path, rob
     assert found["recipe"]["worst_abs_median_error_m"] == pytest.approx(0.003)
     assert found["recipe"]["mean_abs_median_error_m"] == pytest.approx(0.002)
     assert (found["recipe"]["skipped_hops"], found["recipe"]["body_contacts"]) == (2, 2)
-    assert (found["recipe"]["seed"], found["recipe"]["exam_scores_m"]) == (0, [0.004])
+    assert (found["recipe"]["seed"], found["recipe"]["teacher_scores_m"]) == (0, [0.004])
     assert found["no-event"]["mean_abs_median_error_m"] is None
 
 

@@ -35,9 +35,11 @@ def seeds(monkeypatch):
 
 def test_a_study_measures_every_method_and_is_not_repeated(tmp_path, seeds):
     twin = dataclasses.replace(load_robot("twin"), name="other")
-    options = dataclasses.replace(OPTIONS, rules=dataclasses.replace(OPTIONS.rules, minutes=0.15))
+    options = dataclasses.replace(
+        OPTIONS, stopping_rules=dataclasses.replace(OPTIONS.stopping_rules, minutes=0.15)
+    )
     study = Study(POLICY, ROBOT, (twin,), ("aim",), (0, 1), options, WIDE, tmp_path,
-                  judge_commands=(0.26, 0.34), judges=2)  # fmt: skip
+                  eval_commands=(0.26, 0.34), judges=2)  # fmt: skip
     result = measure(study, lambda _: None)
     assert [row["method"] for row in result["rows"]] == ["start", "aim"]
     assert [row["policies"] for row in result["rows"]] == [1, 2]

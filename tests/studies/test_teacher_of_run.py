@@ -74,7 +74,10 @@ def test_what_has_no_teacher_is_refused(tmp_path):
 def test_its_torques_can_err_as_an_imitators_do(tmp_path):
     model = stop_early(tmp_path)
     task, recipe = model.env.task, get_recipe("precise")
-    right, wrong = (recipe.make_teacher(model.policy, ROBOT, erring) for erring in (0.0, 0.05))
+    right, wrong = (
+        recipe.make_teacher(model.policy, ROBOT, teacher_action_noise)
+        for teacher_action_noise in (0.0, 0.05)
+    )
 
     def errors():
         model.env.reset()

@@ -3,7 +3,7 @@
 The robot is reached through outings of some seconds alone, and nothing is known of it but what its
 joints measure: heights are reckoned from the time in the air. First a correction of the commanded
 height is learnt, two numbers, then the network's weights go on by soft actor-critic, beside the
-believed robot's experience. A policy that became worse is thrown back to the best; the run stops
+believed robot's experience. A policy that became worse is rolled back to the best; the run stops
 when hops are accurate, when nothing improves, or when the minutes of robot time are used up. A
 killed run goes on with --resume.
 
@@ -73,16 +73,19 @@ class Finetune:
 
 def run(args: Finetune) -> None:
     """Continue the training, say how it went."""
-    from hopping_leg.rl.finetune.options import FinetuneOptions
-    from hopping_leg.rl.finetune.prepared import Task
-    from hopping_leg.rl.finetune.rules import Rules
+    from hopping_leg.rl.finetune.config import FinetuneConfig
+    from hopping_leg.rl.finetune.pretraining import Task
     from hopping_leg.rl.finetune.running import POLICY, finetune
+    from hopping_leg.rl.finetune.stopping_rules import StoppingRules
 
     policy, robot = load_policy(args.policy), load_robot(args.robot)
     _refuse(args, policy, robot)
-    rules = Rules(minutes=args.minutes, tolerance=args.tolerance)
-    options = FinetuneOptions(
-        method=args.method, commands=tuple(sorted(args.commands)), outing=args.outing, rules=rules
+    stopping_rules = StoppingRules(minutes=args.minutes, tolerance=args.tolerance)
+    options = FinetuneConfig(
+        method=args.method,
+        commands=tuple(sorted(args.commands)),
+        outing=args.outing,
+        stopping_rules=stopping_rules,
     )
     span = (min(args.commands), max(args.commands))
     console = Console()
@@ -102,7 +105,7 @@ def run(args: Finetune) -> None:
 def line(row: dict[str, Any]) -> str:
     """Return what to show of an outing."""
     true = f", in truth {1e3 * row['true_error_m']:.1f} mm" if "true_error_m" in row else ""
-    notes = [row["complaint"], "Thrown back to the best." if row["thrown_back"] else ""]
+    notes = [row["complaint"], "Rolled back to the best." if row["rolled_back"] else ""]
     return " ".join(
         [
             f"{row['minutes']:.2f} min, {row['kind']}: error {1e3 * row['error_m']:.1f} mm{true},"

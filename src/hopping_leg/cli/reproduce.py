@@ -125,7 +125,7 @@ def run(args: Reproduce) -> None:
 
 def make_study(args: Reproduce) -> Study:
     """Return what is done with how many twins."""
-    from hopping_leg.rl.fast import FastRecipe
+    from hopping_leg.rl.recipes.fast import FastRecipe
 
     folder = args.folder / "transfer"
     count = "5" if args.full else "1"

@@ -6,7 +6,7 @@ nothing had happened.
 
 Examples:
   hop train --recipe fast --minutes 5
-  hop train --recipe precise --starts 2 --minutes 13.5 --steps 20000000
+  hop train --recipe precise --parallel-seeds 2 --minutes 13.5 --steps 20000000
   hop train --recipe paper --seed 1 --out runs/mine
   hop train --recipe paper --seed 1 --out runs/mine --resume
   hop train --recipe fast --out runs/shared --log wandb
@@ -58,9 +58,9 @@ class Options:
     """Control steps of experience, all legs together, instead of the recipe's."""
     threads: int = 1
     """Threads of the networks and the physics."""
-    starts: int = 1
+    parallel_seeds: int = 1
     """Trainings that begin side by side, each with a seed and in a process of its own. As soon as
-    the recipe can tell how they will end, at the exam of their teachers or else at the end, the
+    the recipe can tell how they will end, when their teachers are scored or else at the end, the
     best goes on alone with the threads of all. A training may fail by bad luck; two hardly do."""
     log: Literal["tensorboard", "wandb", "trackio"] = "tensorboard"
     """Who gets the curves besides TensorBoard; wandb and trackio are packages of their own."""
@@ -70,13 +70,13 @@ class Options:
 
 def run(args: Options) -> None:
     """Train a controller."""
+    from hopping_leg.rl.parallel_seeds import ParallelSeeds
     from hopping_leg.rl.recipes import change, get_recipe, randomise
     from hopping_leg.rl.run_folder import read_result
-    from hopping_leg.rl.starts import Starts
 
     recipe = get_recipe(args.recipe)
-    if args.seed < 0 or min(args.threads, args.starts) < 1:
-        raise UsageError("--seed must be at least 0, --threads and --starts at least 1.")
+    if args.seed < 0 or min(args.threads, args.parallel_seeds) < 1:
+        raise UsageError("--seed must be at least 0, --threads and --parallel-seeds at least 1.")
     if args.steps is not None:
         if args.steps < 1:
             raise UsageError(f"--steps is {args.steps} but must be at least 1.")
@@ -91,12 +91,12 @@ def run(args: Options) -> None:
     out = args.out or Path("runs") / f"{args.recipe}-seed{args.seed}"
     robot = load_robot(args.robot)
     try:
-        trained = Starts(
+        trained = ParallelSeeds(
             recipe,
             robot,
             args.seed,
             out,
-            args.starts,
+            args.parallel_seeds,
             minutes=args.minutes,
             threads=args.threads,
             log=args.log,

@@ -12,9 +12,9 @@ from torch import nn
 from hopping_leg.arrays import Array
 from hopping_leg.envs.observation import Observation
 from hopping_leg.errors import UsageError
-from hopping_leg.rl.aiming import AimingStudent
-from hopping_leg.rl.export import Network
-from hopping_leg.rl.memories import OwnAim, RecurrentUnit
+from hopping_leg.rl.distillation.adaptive_student import AdaptiveStudent
+from hopping_leg.rl.memories import CommandIntegrator, RecurrentUnit
+from hopping_leg.rl.onnx_export import Network
 
 _NAMES = {nn.ReLU: "relu", nn.Tanh: "tanh", nn.ELU: "elu"}
 
@@ -77,19 +77,19 @@ def recurrent_network(
     )
 
 
-def aiming_network(student: AimingStudent, observation: Observation, squash: str) -> Network:
+def adaptive_network(student: AdaptiveStudent, observation: Observation, squash: str) -> Network:
     """Return a student that remembers where to aim, as ``dense_network`` does."""
     network = dense_network([student.layers], observation, squash)
     layers = [_weights(m) for m in _flatten(student.feeling) if isinstance(m, nn.Linear)]
     order = np.append(observation.order, observation.size)
     layers[0] = (layers[0][0][:, order], layers[0][1])
-    aiming = student.aiming
-    aim = OwnAim(
+    command_integrator = student.command_integrator
+    aim = CommandIntegrator(
         layers,
-        rate=student.rate * aiming.scale,
-        most=aiming.most,
-        farthest=aiming.farthest,
-        beyond=aiming.beyond,
+        rate=student.rate * command_integrator.scale,
+        most=command_integrator.most,
+        farthest=command_integrator.farthest,
+        beyond=command_integrator.beyond,
         follow=student.follow,
     )
     return dataclasses.replace(network, memory=aim)

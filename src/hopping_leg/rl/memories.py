@@ -84,8 +84,8 @@ class RecurrentUnit:
 
 
 @dataclass(frozen=True)
-class OwnAim:
-    """Where a policy aims so that its hops come true, see ``learn.aiming``.
+class CommandIntegrator:
+    """Where a policy aims so that its hops come true, see ``rl.distillation.adaptive_student``.
 
     Remembers the aim at both ends of the range of commands and the command of late, all as the
     command is normalised, which must be the last input.

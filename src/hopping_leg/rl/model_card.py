@@ -37,8 +37,8 @@ One network from joint measurements to joint torques, for robot `{result["robot"
 
 - Training: {result["steps"]} control steps, {result["minutes"]:.1f} min of wall-clock time, physics
   step {1000 * task["timestep"]:g} ms.
-{starts(result)}\
-{exams(result.get("exam_scores_m", []))}\
+{parallel_seeds(result)}\
+{teacher_scores(result.get("teacher_scores_m", []))}\
 - Selection: the policy after {selected["steps"]} steps ({selected["minutes"]:.1f} min), the best of
   {len(selected["finalists"])} finalists out of {len(result["history"])} snapshots.
 - Versions: {versions}.
@@ -51,25 +51,25 @@ step 0.5 ms, the first 2 s of each trial dropped. These seeds chose the policy; 
 {doubt(selected["trials"])}"""
 
 
-def starts(result: dict[str, Any]) -> str:
+def parallel_seeds(result: dict[str, Any]) -> str:
     """Return a line on the trainings of which this was the best, if there were several.
 
     Args:
         result: Content of ``result.json``.
     """
-    if "starts" not in result:
+    if "seed_scores" not in result:
         return ""
-    rows = result["starts"]
+    rows = result["seed_scores"]
     scores = ", ".join(f"{1000 * row['score_m']:.1f} mm (seed {row['seed']})" for row in rows)
-    chosen = rows[result["chosen_start"]]["seed"]
+    chosen = rows[result["chosen_seed"]]["seed"]
     return (
-        f"- Starts: the training with seed {chosen}, the best of {len(rows)} when they could be"
-        f" compared, less being better:\n  {scores}.\n"
+        f"- Parallel seeds: the training with seed {chosen}, the best of {len(rows)} when they"
+        f" could be compared, less being better:\n  {scores}.\n"
     )
 
 
-def exams(scores: list[float]) -> str:
-    """Return a line on the teachers' exams, if there were any.
+def teacher_scores(scores: list[float]) -> str:
+    """Return a line on the teachers' scores, if there were any.
 
     Args:
         scores: In the order in which they were taken, m.
@@ -78,7 +78,7 @@ def exams(scores: list[float]) -> str:
         return ""
     numbers = ", ".join(f"{1000 * score:.1f}" for score in scores)
     return (
-        f"- Exams of the teachers, in the order in which they were taken: {numbers} mm where they"
+        f"- Evaluations of the teachers in order: {numbers} mm where they"
         " did worst (less is better); who did best taught.\n"
     )
 
@@ -87,7 +87,7 @@ def doubt(trials: list[dict[str, Any]]) -> str:
     """Return a paragraph on the commands that a policy misses in its own simulation, if any.
 
     Args:
-        trials: Rows of ``judge``.
+        trials: Rows of ``evaluate_policy``.
     """
     errors = {t["command_m"]: t["median_error_m"] for t in trials}
     missed = [
@@ -107,7 +107,7 @@ def table(trials: list[dict[str, Any]]) -> str:
     """Return trials as a Markdown table.
 
     Args:
-        trials: Rows of ``judge``.
+        trials: Rows of ``evaluate_policy``.
     """
     head = (
         "| command m | median error mm | std mm | hops/s | flight % | skipped | body contact ticks"

@@ -7,8 +7,8 @@ from onnx import numpy_helper
 from hopping_leg.arrays import Array
 from hopping_leg.controllers.policy import MEMORY
 from hopping_leg.errors import PolicyError
-from hopping_leg.rl.export import Network
 from hopping_leg.rl.graph import ACTIVATIONS
+from hopping_leg.rl.onnx_export import Network
 
 
 def read_network(content: bytes) -> Network:

@@ -9,8 +9,8 @@ import numpy as np
 from hopping_leg.envs import HoppingTask, TaskConfig
 from hopping_leg.envs.transition import Reward
 from hopping_leg.rl.actor import network_of
-from hopping_leg.rl.export import Network
-from hopping_leg.rl.vecenv import TaskVecEnv
+from hopping_leg.rl.onnx_export import Network
+from hopping_leg.rl.sb3_env import TaskVecEnv
 from hopping_leg.robot.parameters import Robot
 
 
@@ -32,11 +32,11 @@ class Recipe(ABC):
     """Control steps of experience in all, summed over the legs."""
     learning_rate: float = 1e-3
     """At the start of its schedule."""
-    judge_every: int = 25_000
+    eval_every: int = 25_000
     """Control steps between two trials of the deterministic policy, for checkpoint selection."""
-    judge_from: float = 0.0
+    eval_start: float = 0.0
     """Share of the training before which no snapshot is tried."""
-    judge_commands: tuple[float, ...] = (0.25, 0.30, 0.35)
+    eval_commands: tuple[float, ...] = (0.25, 0.30, 0.35)
     """Heights of those trials, m."""
     log_every: int = 32
     """Episodes (SAC) or updates (PPO) between two entries in the TensorBoard log."""
@@ -71,14 +71,14 @@ class Recipe(ABC):
         Called before every rollout, also of a resumed training: depend on ``share`` alone.
         """
 
-    def promise(self, model: Any) -> float | None:  # noqa: ANN401
+    def early_score(self, model: Any) -> float | None:  # noqa: ANN401
         """Return how bad a training is likely to end, m, if that can be told before its end.
 
         None as long as it cannot; trainings side by side are compared as soon as it can.
         """
         return None
 
-    def findings(self, model: Any) -> dict[str, Any]:  # noqa: ANN401
+    def extra_results(self, model: Any) -> dict[str, Any]:  # noqa: ANN401
         """Return what else the result of a finished training tells, as JSON values."""
         return {}
 

@@ -15,7 +15,7 @@ from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from hopping_leg.rl.checkpoint import Tree
-from hopping_leg.rl.vecenv import TaskVecEnv
+from hopping_leg.rl.sb3_env import TaskVecEnv
 
 _COUNTERS = ("num_timesteps", "_episode_num", "_n_updates", "_current_progress_remaining")
 _REPLAY = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")

@@ -18,7 +18,7 @@ _ASKED = (
     "recipe",
     "robot_digest",
     "seed",
-    "number_of_starts",
+    "parallel_seeds",
     "minutes_budget",
     "source",
     "options",
@@ -42,7 +42,7 @@ class RunFolder:
         seed: int,
         minutes: float | None,
         source: Path | None = None,
-        starts: int = 1,
+        parallel_seeds: int = 1,
     ) -> None:
         self.path, self._source = path, source
         self._defaults = _as_stored(asdict(type(recipe)()))
@@ -55,7 +55,7 @@ class RunFolder:
                 "seed": seed,
                 "minutes_budget": minutes,
                 "source": str(source) if source else None,
-                "number_of_starts": starts,
+                "parallel_seeds": parallel_seeds,
                 "versions": library_versions(),
             }
         )
@@ -80,8 +80,8 @@ class RunFolder:
             words += ["--source", config["source"]]
         if config["minutes_budget"] is not None:
             words += ["--minutes", f"{config['minutes_budget']:g}"]
-        if config["number_of_starts"] > 1:
-            words += ["--starts", str(config["number_of_starts"])]
+        if config["parallel_seeds"] > 1:
+            words += ["--parallel-seeds", str(config["parallel_seeds"])]
         return " ".join([*words, *words_of(config["recipe"], config["options"])])
 
     def snapshot(self, steps: int) -> Path:
@@ -136,7 +136,7 @@ class RunFolder:
         stored = json.loads(self._config_file.read_text(encoding="utf-8"))
         # A run from before an option existed was asked for what is now its default.
         _complete(stored.get("options", {}), self._defaults)
-        stored.setdefault("number_of_starts", 1)
+        stored.setdefault("parallel_seeds", 1)
         for key in _ASKED:
             if stored.get(key) != self.config[key]:
                 raise UsageError(

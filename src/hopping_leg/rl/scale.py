@@ -37,9 +37,9 @@ def _take_heights(recipe: R) -> R:
     task = dataclasses.replace(recipe.task, command_range=recipe.heights)
     low, high = task.command_bounds
     edge = 0.1 * (high - low)
-    judged = np.linspace(low + edge, high - edge, len(recipe.judge_commands))
+    judged = np.linspace(low + edge, high - edge, len(recipe.eval_commands))
     heights = tuple(float(_round(height)) for height in judged)
-    return dataclasses.replace(recipe, task=task, judge_commands=heights)
+    return dataclasses.replace(recipe, task=task, eval_commands=heights)
 
 
 def _grow(recipe: R, robot: Robot) -> R:
@@ -62,8 +62,8 @@ def _grow(recipe: R, robot: Robot) -> R:
         drop_length=(_round(task.drop_length[0] * ratio), _round(task.drop_length[1] * ratio)),
         action_torque=(hip, knee),
     )
-    heights = tuple(_round(c * ratio) for c in recipe.judge_commands)
-    return dataclasses.replace(recipe, task=fitted, judge_commands=heights)
+    heights = tuple(_round(c * ratio) for c in recipe.eval_commands)
+    return dataclasses.replace(recipe, task=fitted, eval_commands=heights)
 
 
 def _round(value: float, step: float = 0.005) -> float:

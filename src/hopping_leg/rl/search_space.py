@@ -82,11 +82,11 @@ class FastSpace:
     critic: OneOf = OneOf(_LAYERS)
     gamma: Real = Real(0.97, 0.997)
     gae_lambda: Real = Real(0.90, 0.99)
-    noise_hold: OneOf = OneOf((0, 8, 16, 24, 40))
-    rollout: OneOf = OneOf((32, 64, 128))
-    batch: OneOf = OneOf((1024, 2048, 4096, 8192))
-    epochs: OneOf = OneOf((2, 4, 8))
-    quiet_from: Real = Real(0.3, 1.0)
+    sde_sample_freq: OneOf = OneOf((0, 8, 16, 24, 40))
+    n_steps: OneOf = OneOf((32, 64, 128))
+    batch_size: OneOf = OneOf((1024, 2048, 4096, 8192))
+    n_epochs: OneOf = OneOf((2, 4, 8))
+    log_std_until: Real = Real(0.3, 1.0)
 
 
 @dataclass(frozen=True)
@@ -95,11 +95,11 @@ class PaperSpace:
 
     learning_rate: Real = Real(1e-4, 3e-3, log=True)
     hidden: OneOf = OneOf(((128, 128), (256, 256), (256, 256, 128, 128)))
-    batch: OneOf = OneOf((128, 256, 512))
-    returns: OneOf = OneOf((1, 3, 5))
+    batch_size: OneOf = OneOf((128, 256, 512))
+    n_steps: OneOf = OneOf((1, 3, 5))
     tau: Real = Real(1e-3, 2e-2, log=True)
     gamma: Real = Real(0.97, 0.997)
-    rollout: OneOf = OneOf((8, 16, 32, 64))
+    train_freq: OneOf = OneOf((8, 16, 32, 64))
     gradient_steps: OneOf = OneOf((32, 64, 128, 256))
     target_entropy: Real = Real(-4.0, 0.0)
     log_std: Real = Real(-3.5, -1.0)
@@ -113,8 +113,8 @@ class PreciseSpace:
     student: OneOf = OneOf((*_LAYERS, (512, 256)))
     gamma: Real = Real(0.97, 0.997)
     gae_lambda: Real = Real(0.90, 0.99)
-    teaching: Real = Real(0.2, 0.7)
-    guided: Real = Real(0.0, 0.5)
+    teacher_share: Real = Real(0.2, 0.7)
+    dagger_mixing_share: Real = Real(0.0, 0.5)
 
 
 Space = FastSpace | PaperSpace | PreciseSpace

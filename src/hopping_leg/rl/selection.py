@@ -4,7 +4,13 @@ from typing import Any
 
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.io import write_atomically
-from hopping_leg.rl.judge import FINAL_SEEDS, FIRST_SEED, as_rows, judge, score
+from hopping_leg.rl.policy_evaluation import (
+    FINAL_SEEDS,
+    FIRST_SEED,
+    as_rows,
+    evaluate_policy,
+    score,
+)
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.run_folder import RunFolder
 from hopping_leg.robot.parameters import Robot
@@ -27,7 +33,7 @@ class Selection:
     @property
     def next_at(self) -> int:
         """Steps after which the next snapshot is due."""
-        every = self._recipe.judge_every
+        every = self._recipe.eval_every
         return every * (self.rows[-1]["steps"] // every + 1) if self.rows else every
 
     def add(self, steps: int, minutes: float, content: bytes) -> dict[str, Any]:
@@ -65,5 +71,7 @@ class Selection:
     def _trials(self, content: bytes, seeds: tuple[int, ...]) -> dict[str, Any]:
         recipe = self._recipe
         policy = Policy(content, "snapshot", recipe.name)
-        verdicts = judge(policy, self._robot, recipe.judge_commands, seeds, recipe.task.rate)
-        return {"score_m": score(verdicts), "trials": as_rows(verdicts)}
+        results = evaluate_policy(
+            policy, self._robot, recipe.eval_commands, seeds, recipe.task.rate
+        )
+        return {"score_m": score(results), "trials": as_rows(results)}

@@ -14,9 +14,9 @@ from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.io import write_atomically
 from hopping_leg.rl import resumable
 from hopping_leg.rl.checkpoint import write_checkpoint
-from hopping_leg.rl.dashboards import Log, check_log, make_logger
-from hopping_leg.rl.export import build_policy
+from hopping_leg.rl.loggers import Log, check_log, make_logger
 from hopping_leg.rl.model_card import write_card
+from hopping_leg.rl.onnx_export import build_policy
 from hopping_leg.rl.progress import TrainingProgress
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.run_folder import RunFolder
@@ -60,7 +60,7 @@ def train(
     quiet: bool = False,
     log: Log = "tensorboard",
     on_snapshot: Callable[[int, float], None] = lambda _steps, _score: None,
-    on_promise: Callable[[float, float], None] | None = None,
+    on_early_score: Callable[[float, float], None] | None = None,
 ) -> Trained:
     """Train a controller and leave its policy, card and history in ``out``.
 
@@ -81,8 +81,8 @@ def train(
         log: Who gets the curves besides TensorBoard.
         on_snapshot: Called with the steps and the score, m, of every snapshot that was tried; what
             it raises ends the training.
-        on_promise: Called once, as soon as the recipe can tell how bad the training is likely to
-            end, with that in m and with the minutes so far, a checkpoint being written; what it
+        on_early_score: Called once, as soon as the recipe can tell how bad the training is likely
+            to end, with that in m and with the minutes so far, a checkpoint being written; what it
             raises ends the training.
 
     Raises:
@@ -98,7 +98,7 @@ def train(
     trainer = Trainer(recipe, robot, seed, folder, minutes, threads)
     trainer.model.set_logger(make_logger(folder.path, log, folder.config))
     trainer.on_snapshot = on_snapshot
-    trainer.on_promise = on_promise
+    trainer.on_early_score = on_early_score
     if tree is not None:
         trainer.restore(tree)
     with TrainingProgress(f"{recipe.name} seed {seed}", quiet=quiet) as progress:
@@ -155,7 +155,7 @@ class Trainer:
         self._shown = 0.0
         self._progress: TrainingProgress | None = None
         self.on_snapshot: Callable[[int, float], None] = lambda _steps, _score: None
-        self.on_promise: Callable[[float, float], None] | None = None
+        self.on_early_score: Callable[[float, float], None] | None = None
 
     @property
     def elapsed(self) -> float:
@@ -187,7 +187,7 @@ class Trainer:
                 log_interval=recipe.log_every,
                 reset_num_timesteps=not self._restored,
             )
-        self._judge()
+        self._evaluate()
         model.logger.close()
         self._show(force=True)
         content, results = self.selection.choose()
@@ -198,7 +198,7 @@ class Trainer:
             "steps": steps,
             "selected": results,
             "history": self.selection.rows,
-            **recipe.findings(model),
+            **recipe.extra_results(model),
         }
         self.folder.write("result.json", {**self.folder.config, **result})
         write_card(self.folder.path)
@@ -213,18 +213,18 @@ class Trainer:
     def _at_boundary(self) -> None:
         share = 1 - self.model._current_progress_remaining
         self.recipe.anneal(self.model, self.env, share)
-        self._tell_promise()
-        if share >= self.recipe.judge_from and self.model.num_timesteps >= self.selection.next_at:
-            self._judge()
+        self._tell_early_score()
+        if share >= self.recipe.eval_start and self.model.num_timesteps >= self.selection.next_at:
+            self._evaluate()
         if time.monotonic() - self._saved >= self.recipe.checkpoint_seconds:
             self.checkpoint()
 
-    def _tell_promise(self) -> None:
-        promise, tell = self.recipe.promise(self.model), self.on_promise
-        if promise is not None and tell is not None:
-            self.on_promise = None
+    def _tell_early_score(self) -> None:
+        early_score, tell = self.recipe.early_score(self.model), self.on_early_score
+        if early_score is not None and tell is not None:
+            self.on_early_score = None
             self.checkpoint()
-            tell(promise, self.elapsed / 60)
+            tell(early_score, self.elapsed / 60)
 
     def checkpoint(self) -> None:
         """Write a checkpoint; only at a boundary does it continue exactly."""
@@ -256,7 +256,7 @@ class Trainer:
         )
         return build_policy(recipe.network(self.model, self.env), card)
 
-    def _judge(self) -> None:
+    def _evaluate(self) -> None:
         steps = int(self.model.num_timesteps)
         content = self.policy_content()
         row = self.selection.add(steps, self.elapsed / 60, content)

@@ -27,7 +27,7 @@ from hopping_leg.cluster import RayCluster
 from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.io import plain
 from hopping_leg.rl.crew import work_here, work_on
-from hopping_leg.rl.judge import FINAL_SEEDS, FIRST_SEED
+from hopping_leg.rl.policy_evaluation import FINAL_SEEDS, FIRST_SEED
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes import change, get_recipe
 from hopping_leg.rl.run_folder import read_result
@@ -280,7 +280,7 @@ def _recipe(tuning: Tuning) -> Recipe:
     recipe = dataclasses.replace(
         get_recipe(tuning.recipe),
         steps=tuning.steps,
-        judge_every=max(tuning.steps // tuning.snapshots, 1),
+        eval_every=max(tuning.steps // tuning.snapshots, 1),
     )
     return change(recipe, tuning.fixed)
 

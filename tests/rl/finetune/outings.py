@@ -6,11 +6,11 @@ import numpy as np
 
 from hopping_leg.controllers.hardware_trial import HardwareTrial, by_tick, measured_table
 from hopping_leg.controllers.registry import load_policy
-from hopping_leg.rl.finetune.contact import Contact, ContactOptions
-from hopping_leg.rl.finetune.hindsight import Reckoning
-from hopping_leg.rl.finetune.learner import LearnerOptions
-from hopping_leg.rl.finetune.options import FinetuneOptions
-from hopping_leg.rl.finetune.rules import Rules
+from hopping_leg.rl.finetune.apex_estimate import ApexEstimator
+from hopping_leg.rl.finetune.config import FinetuneConfig
+from hopping_leg.rl.finetune.contact import Contact, ContactConfig
+from hopping_leg.rl.finetune.learner import SacConfig
+from hopping_leg.rl.finetune.stopping_rules import StoppingRules
 from hopping_leg.robot import kinematics, load_robot
 from hopping_leg.robot.model import GRAVITY
 from hopping_leg.trace import Trace
@@ -18,20 +18,20 @@ from hopping_leg.trace import Trace
 ROBOT = load_robot("legv2-paper")
 POLICY = load_policy("fast")
 PERIOD = 0.005
-CONTACT = ContactOptions(legs=4, seconds=3.0, steps=20, batch=64, hidden=(8,))
-OPTIONS = FinetuneOptions(
+CONTACT = ContactConfig(num_envs=4, seconds=3.0, steps=20, batch_size=64, hidden=(8,))
+OPTIONS = FinetuneConfig(
     method="both",
     commands=(0.25, 0.35),
     outing=4.0,
     hold=2.0,
     explorations=1,
-    aiming=0.1,
+    correction_minutes=0.1,
     believed_seconds=32.0,
     first_steps=2,
     steps_per_tick=0.004,
     critics_first=0,
-    rules=Rules(minutes=0.4, patience=50, margin=10.0),
-    learner=LearnerOptions(critic=(8,), batch=16, buffer=4000),
+    stopping_rules=StoppingRules(minutes=0.4, patience=50, margin=10.0),
+    learner=SacConfig(critic=(8,), batch_size=16, buffer_size=4000),
     contact=CONTACT,
 )
 
@@ -89,10 +89,10 @@ class Known(Contact):
         super().__init__(dataclasses.replace(CONTACT, hidden=(2,)))
         self._flying = flying
 
-    def airborne(self, heard):
+    def airborne(self, data):
         """Return it."""
         return np.where(self._flying, 1.0, -1.0)[:, None]
 
 
-def reckoning(flying):
-    return Reckoning(ROBOT, Known(flying))
+def estimator(flying):
+    return ApexEstimator(ROBOT, Known(flying))

@@ -9,13 +9,13 @@ import pytest
 
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import UsageError
-from hopping_leg.rl.finetune import prepared
+from hopping_leg.rl.finetune import pretraining
 from hopping_leg.rl.finetune.finetuning import Finetuning
-from hopping_leg.rl.finetune.prepared import Task, prepare
-from hopping_leg.rl.finetune.rules import Rules
+from hopping_leg.rl.finetune.pretraining import Task, prepare
 from hopping_leg.rl.finetune.running import POLICY as FILE
 from hopping_leg.rl.finetune.running import finetune
 from hopping_leg.rl.finetune.simulated import Guard, Simulated
+from hopping_leg.rl.finetune.stopping_rules import StoppingRules
 from hopping_leg.robot import load_robot
 
 from .outings import OPTIONS, POLICY, ROBOT, Imagined
@@ -25,14 +25,14 @@ TASK = Task(POLICY, ROBOT, (0.25, 0.35), 3)
 
 @pytest.fixture(scope="module")
 def ready(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("prepared")
+    folder = tmp_path_factory.mktemp("pretraining")
     prepare(TASK, OPTIONS.contact, folder)
     return folder
 
 
 @pytest.fixture(autouse=True)
 def few_legs(monkeypatch):
-    monkeypatch.setattr(prepared, "BELIEVED_LEGS", 2)
+    monkeypatch.setattr(pretraining, "BELIEVED_LEGS", 2)
 
 
 class KilledError(Exception):
@@ -43,7 +43,7 @@ def test_what_is_learnt_beforehand_is_learnt_once(ready, monkeypatch):
     def never(*_):
         raise AssertionError("simulated again")
 
-    monkeypatch.setattr(prepared, "doubtful_legs", never)
+    monkeypatch.setattr(pretraining, "doubtful_legs", never)
     again = prepare(TASK, OPTIONS.contact, ready)
     assert again.drag.shape == (2,)
     other = dataclasses.replace(OPTIONS.contact, seed=6)
@@ -53,7 +53,7 @@ def test_what_is_learnt_beforehand_is_learnt_once(ready, monkeypatch):
 
 @pytest.mark.slow
 def test_a_killed_run_goes_on_exactly(tmp_path, ready):
-    whole = finetune(TASK, Imagined(), OPTIONS, tmp_path / "whole", prepared=ready)
+    whole = finetune(TASK, Imagined(), OPTIONS, tmp_path / "whole", pretraining=ready)
     kinds = [row["kind"] for row in whole["outings"]]
     assert {"check", "exploration"} <= set(kinds)
     for number in (1, 3, 4):
@@ -65,8 +65,8 @@ def test_a_killed_run_goes_on_exactly(tmp_path, ready):
 
         with pytest.raises(KilledError):
             finetune(TASK, Imagined(), OPTIONS, tmp_path / "cut", resume=number > 1,
-                  prepared=ready, on_outing=kill)  # fmt: skip
-    cut = finetune(TASK, Imagined(), OPTIONS, tmp_path / "cut", resume=True, prepared=ready)
+                  pretraining=ready, on_outing=kill)  # fmt: skip
+    cut = finetune(TASK, Imagined(), OPTIONS, tmp_path / "cut", resume=True, pretraining=ready)
     assert cut["outings"] == whole["outings"]
     assert (tmp_path / "cut" / FILE).read_bytes() == (tmp_path / "whole" / FILE).read_bytes()
 
@@ -87,29 +87,31 @@ def test_weights_move_and_the_policy_file_names_its_source(tmp_path, ready):
 def test_outings_that_were_ended_early_never_win_and_are_counted(tmp_path, ready):
     options = dataclasses.replace(OPTIONS, method="aim")
     robot = Imagined(complain_from=1)
-    result = finetune(TASK, robot, options, tmp_path, prepared=ready)
+    result = finetune(TASK, robot, options, tmp_path, pretraining=ready)
     assert result["safety"]["ended_early"] == len(result["outings"]) - 1
     assert result["best_check"]["outing"] == 0
-    assert result["safety"]["thrown_back"] > 0 or options.rules.margin > 1
-    strict = dataclasses.replace(options, rules=Rules(minutes=0.4, margin=0.01, patience=50))
+    assert result["safety"]["rolled_back"] > 0 or options.stopping_rules.margin > 1
+    strict = dataclasses.replace(
+        options, stopping_rules=StoppingRules(minutes=0.4, margin=0.01, patience=50)
+    )
     shutil.rmtree(tmp_path)
-    again = finetune(TASK, Imagined(complain_from=1), strict, tmp_path, prepared=ready)
-    assert again["safety"]["thrown_back"] > 0
+    again = finetune(TASK, Imagined(complain_from=1), strict, tmp_path, pretraining=ready)
+    assert again["safety"]["rolled_back"] > 0
 
 
 def test_an_exploration_that_was_ended_early_goes_back_to_the_best_policy(tmp_path, ready):
     options = dataclasses.replace(OPTIONS, method="sac")
-    result = finetune(TASK, Imagined(complain_from=3), options, tmp_path, prepared=ready)
+    result = finetune(TASK, Imagined(complain_from=3), options, tmp_path, pretraining=ready)
     for row in result["outings"]:
-        assert row["thrown_back"] or not (row["complaint"] and row["kind"] == "exploration")
+        assert row["rolled_back"] or not (row["complaint"] and row["kind"] == "exploration")
     assert any(row["complaint"] for row in result["outings"] if row["kind"] == "exploration")
 
 
 def test_a_folder_with_another_run_is_refused(tmp_path, ready):
     options = dataclasses.replace(OPTIONS, method="aim")
-    finetune(TASK, Imagined(), options, tmp_path, prepared=ready)
+    finetune(TASK, Imagined(), options, tmp_path, pretraining=ready)
     with pytest.raises(UsageError, match="--resume"):
-        finetune(TASK, Imagined(), options, tmp_path, prepared=ready)
+        finetune(TASK, Imagined(), options, tmp_path, pretraining=ready)
     with pytest.raises(UsageError, match="another seed"):
         finetune(dataclasses.replace(TASK, seed=4), Imagined(), options, tmp_path, resume=True)
     with pytest.raises(UsageError, match="finished"):

@@ -7,14 +7,14 @@ import pytest
 import torch
 
 from hopping_leg.controllers.registry import load_policy
-from hopping_leg.rl.export import build_policy
-from hopping_leg.rl.finetune.exploring import EDGE, Exploring
-from hopping_leg.rl.finetune.learner import Learner, LearnerOptions
-from hopping_leg.rl.finetune.replay import CRITIC_SIZE, Rows
+from hopping_leg.rl.finetune.exploring import EDGE, ExploringPolicy
+from hopping_leg.rl.finetune.learner import Learner, SacConfig
+from hopping_leg.rl.finetune.replay import CRITIC_SIZE, Transitions
 from hopping_leg.rl.network_file import read_network
+from hopping_leg.rl.onnx_export import build_policy
 from hopping_leg.sim.channel import Measurement
 
-TINY = LearnerOptions(critic=(8, 8), batch=16, actor_share=1.0, change=np.inf)
+TINY = SacConfig(critic=(8, 8), batch_size=16, actor_share=1.0, change=np.inf)
 
 
 def rows(size, count=200, reward=None):
@@ -23,7 +23,7 @@ def rows(size, count=200, reward=None):
     action = rng.uniform(-0.9, 0.9, (count, 2)).astype(np.float32)
     given = np.zeros(count) if reward is None else reward(action)
     done = np.ones(count, np.float32)
-    return Rows(seen, seen, action, given.astype(np.float32), done)
+    return Transitions(seen, seen, action, given.astype(np.float32), done)
 
 
 def learner(name, reward=None, options=TINY):
@@ -79,14 +79,14 @@ def test_a_round_changes_actions_no_more_than_it_may():
         with torch.no_grad():
             return made.model.actor(seen, deterministic=True)
 
-    for heard in (False, True):
+    for data in (False, True):
         before = act()
         made.learn(100, 1)
         moved = (act() - before).square().mean().sqrt()
         assert moved > 1e-4
-        if heard:
+        if data:
             assert moved <= 0.02
-        made.hear(real)
+        made.keep(real)
 
 
 def test_frozen_parts_stay():
@@ -94,7 +94,7 @@ def test_frozen_parts_stay():
     made.learn(5, 1, critics_only=True)
     for (now, _), (then, _) in zip(made.network().layers, network.layers, strict=True):
         np.testing.assert_array_equal(now, then.astype(np.float32))
-    last = LearnerOptions(critic=(8, 8), batch=16, last_layer=True)
+    last = SacConfig(critic=(8, 8), batch_size=16, last_layer=True)
     made, network = learner("fast", lambda action: action.sum(axis=1), last)
     made.learn(5, 1)
     np.testing.assert_array_equal(
@@ -120,7 +120,9 @@ def test_a_batch_mixes_both_robots_once_the_real_one_is_known():
     real = rows(len(network.offset), 50)
     buffer = made.model.replay_buffer
     assert len(buffer.sample(16).rewards) == 16
-    made.hear(Rows(real.observation, real.following, real.action, real.reward + 1, real.done))
+    made.keep(
+        Transitions(real.observation, real.following, real.action, real.reward + 1, real.done)
+    )
     share = buffer.sample(400).rewards.numpy().mean()
     np.testing.assert_allclose(share, 1 - TINY.believed_share)
 
@@ -135,7 +137,7 @@ def test_exploration_without_spread_is_the_policy_and_with_it_stays_within_torqu
     wanted = np.clip(policy.act(seen), -6 * EDGE, 6 * EDGE)
     for spread, same in ((0.0, True), (3.0, False)):
         matrix = np.full((hidden, 2), spread)
-        explorer = Exploring(policy.content, policy.card, matrix, 4, np.random.default_rng(0))
+        explorer = ExploringPolicy(policy.content, policy.card, matrix, 4, np.random.default_rng(0))
         explorer.reset(4)
         torque = explorer.act(seen)
         assert np.allclose(torque, wanted, atol=1e-5) == same

@@ -8,11 +8,11 @@ import pytest
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.envs import ApexReward, HoppingTask, TaskConfig
 from hopping_leg.hop_detection import find_hops
-from hopping_leg.rl.finetune.heard import Heard
-from hopping_leg.rl.finetune.hindsight import Hindsight
-from hopping_leg.rl.finetune.options import FinetuneOptions
-from hopping_leg.rl.finetune.replay import CRITIC_SIZE, Rewriter
+from hopping_leg.rl.finetune.apex_estimate import ApexEstimate
+from hopping_leg.rl.finetune.config import FinetuneConfig
+from hopping_leg.rl.finetune.replay import CRITIC_SIZE, TransitionWriter
 from hopping_leg.rl.finetune.simulated import Witness, traces_of
+from hopping_leg.rl.finetune.trial_data import TrialData
 from hopping_leg.rl.network_file import read_network
 from hopping_leg.sim import NO_NOISE
 
@@ -30,20 +30,20 @@ def run():
     return rollout(witness, setup, commands, 3, on_legs=witness.watch)
 
 
-def rewriter():
-    reward = ApexReward(ROBOT, FinetuneOptions().reward, 200.0)
+def writer():
+    reward = ApexReward(ROBOT, FinetuneConfig().reward, 200.0)
     reward.anneal(1.0)
-    return Rewriter(POLICY.card, read_network(POLICY.content), ROBOT, reward, 5.0), reward
+    return TransitionWriter(POLICY.card, read_network(POLICY.content), ROBOT, reward, 5.0), reward
 
 
 def truth(run):
-    """Return perfect hindsight."""
+    """Return a perfect estimate."""
     height, rate, gap = (
         run.data[name] for name in ("height_m", "height_rate_m_s", "foot_clearance_m")
     )
     hops = find_hops(height[:, 0], rate[:, 0], gap[:, 0])
     apexes = np.stack([hops.tick.astype(float), hops.apex], axis=1)
-    return Hindsight(height, rate, gap >= 0.003, [apexes])
+    return ApexEstimate(height, rate, gap >= 0.003, [apexes])
 
 
 def environment(run):
@@ -58,7 +58,7 @@ def environment(run):
         timestep=5e-4,
         episode=60.0,
     )
-    _, reward = rewriter()
+    _, reward = writer()
     task = HoppingTask(ROBOT, 1, options, reward, np.random.default_rng(0), 1, autoreset=False)
     task.command[:] = COMMAND
     task.legs.stand(slice(None), RolloutConfig(ROBOT).start_posture)
@@ -76,8 +76,8 @@ def environment(run):
 
 
 def test_observations_and_rewards_are_the_environments(run):
-    write, _ = rewriter()
-    rows = write(Heard.of(traces_of(run)), truth(run))
+    write, _ = writer()
+    rows = write(TrialData.of(traces_of(run)), truth(run))
     seen, rewards = environment(run)
     own = rows.observation[:, :-CRITIC_SIZE]
     np.testing.assert_allclose(own, seen[:-1], atol=2e-3)
@@ -89,17 +89,17 @@ def test_observations_and_rewards_are_the_environments(run):
 
 
 def test_an_outing_that_was_ended_costs_and_is_terminal(run):
-    write, _ = rewriter()
-    heard, hindsight = Heard.of(traces_of(run)), truth(run)
-    fine, ended = write(heard, hindsight), write(heard, hindsight, ended=True)
+    write, _ = writer()
+    data, estimate = TrialData.of(traces_of(run)), truth(run)
+    fine, ended = write(data, estimate), write(data, estimate, ended=True)
     assert ended.done[-1] == 1
     assert not ended.done[:-1].any()
     np.testing.assert_allclose(fine.reward[-1] - ended.reward[-1], 5.0, rtol=1e-5)
 
 
 def test_rows_of_several_join(run):
-    write, _ = rewriter()
-    rows = write(Heard.of(traces_of(run)), truth(run))
+    write, _ = writer()
+    rows = write(TrialData.of(traces_of(run)), truth(run))
     both = type(rows).join([rows, rows])
     for field in dataclasses.fields(rows):
         assert len(getattr(both, field.name)) == 2 * (TICKS - 1)

@@ -17,8 +17,8 @@ from hopping_leg.arrays import Array
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.controllers.rollout import Rollout
 from hopping_leg.rl.checkpoint import Tree
-from hopping_leg.rl.finetune.heard import Heard
 from hopping_leg.rl.finetune.simulated import hop_many, traces_of
+from hopping_leg.rl.finetune.trial_data import TrialData
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, Range, sample
 from hopping_leg.sim.twins import TWIN_RANGES
@@ -41,10 +41,10 @@ _SPREAD = np.array([0.4, 0.5, 8.0, 12.0, 3.0, 3.0])
 
 
 @dataclass(frozen=True)
-class ContactOptions:
+class ContactConfig:
     """How contact is learnt."""
 
-    legs: int = 192
+    num_envs: int = 192
     """That differ."""
     seconds: float = 12.0
     """For which each of them hops."""
@@ -56,7 +56,7 @@ class ContactOptions:
     """Its hidden layers."""
     steps: int = 6000
     """Gradient steps."""
-    batch: int = 1024
+    batch_size: int = 1024
     """Ticks per gradient step."""
     learning_rate: float = 2e-3
     """Falls along a cosine."""
@@ -71,7 +71,7 @@ class Contact:
         options: Its size.
     """
 
-    def __init__(self, options: ContactOptions) -> None:
+    def __init__(self, options: ContactConfig) -> None:
         self._options = options
         sizes = (6 * (2 * options.reach + 1), *options.hidden)
         layers: list[nn.Module] = []
@@ -79,25 +79,25 @@ class Contact:
             layers += [nn.Linear(size, following), nn.ELU()]
         self._net = nn.Sequential(*layers, nn.Linear(sizes[-1], 1))
 
-    def airborne(self, heard: Heard) -> Array:
+    def airborne(self, data: TrialData) -> Array:
         """Return how surely the foot was in the air, (ticks, n)."""
-        seen = _normalised(heard.filled())
-        rows = torch.arange(heard.ticks)
+        seen = _normalised(data.filled())
+        rows = torch.arange(data.ticks)
         with torch.no_grad():
             legs = [self._judge(seen[:, leg], rows) for leg in range(seen.shape[1])]
         return torch.stack(legs, dim=1).double().numpy()
 
-    def learn(self, heard: Heard, flying: Array, seed: int) -> None:
+    def learn(self, data: TrialData, flying: Array, seed: int) -> None:
         """Learn from legs of which it is known.
 
         Args:
-            heard: What they measured.
+            data: What they measured.
             flying: Whether the foot was in the air, (ticks, n).
             seed: Of weights, noise and batches.
         """
         o, rng = self._options, np.random.default_rng(seed)
-        noise = rng.standard_normal((*heard.q.shape[:2], 6)) * _sensor_noise()
-        seen, truth = _normalised(heard.filled() + noise), torch.from_numpy(flying).float()
+        noise = rng.standard_normal((*data.q.shape[:2], 6)) * _sensor_noise()
+        seen, truth = _normalised(data.filled() + noise), torch.from_numpy(flying).float()
         ticks, count = flying.shape
         with torch.random.fork_rng():
             torch.manual_seed(seed)
@@ -107,7 +107,10 @@ class Contact:
             optimizer = torch.optim.Adam(self._net.parameters(), o.learning_rate)
             schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, o.steps)
             for _ in range(o.steps):
-                tick, leg = torch.randint(ticks, (o.batch,)), torch.randint(count, (o.batch,))
+                tick, leg = (
+                    torch.randint(ticks, (o.batch_size,)),
+                    torch.randint(count, (o.batch_size,)),
+                )
                 guess = self._judge(seen, tick, leg)
                 loss = nn.functional.binary_cross_entropy_with_logits(guess, truth[tick, leg])
                 optimizer.zero_grad()
@@ -138,7 +141,7 @@ def doubtful_legs(
     robot: Robot,
     commands: tuple[float, float],
     seed: int,
-    o: ContactOptions,
+    o: ContactConfig,
 ) -> Rollout:
     """Let a controller hop on legs that each differ from the believed one.
 
@@ -150,17 +153,17 @@ def doubtful_legs(
         o: How many and how long.
     """
     rng = np.random.default_rng(seed)
-    robots = sample(robot, DOUBTS, o.legs, rng)
+    robots = sample(robot, DOUBTS, o.num_envs, rng)
     held = round(o.hold * 200)
-    steps = rng.uniform(*commands, (round(o.seconds / o.hold), o.legs))
+    steps = rng.uniform(*commands, (round(o.seconds / o.hold), o.num_envs))
     return hop_many(controller, robot, robots, np.repeat(steps, held, axis=0), seed)
 
 
-def learn_contact(run: Rollout, seed: int, options: ContactOptions) -> Contact:
+def learn_contact(run: Rollout, seed: int, options: ContactConfig) -> Contact:
     """Return a network that has learnt contact from a run of ``doubtful_legs``."""
     contact = Contact(options)
-    heard = Heard.of(traces_of(run))
-    contact.learn(heard, (run.data["foot_clearance_m"] > 0).astype(np.float64), seed)
+    data = TrialData.of(traces_of(run))
+    contact.learn(data, (run.data["foot_clearance_m"] > 0).astype(np.float64), seed)
     return contact
 
 

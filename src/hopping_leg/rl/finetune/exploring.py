@@ -17,7 +17,7 @@ EDGE = 0.995
 """Largest action: exploration and gradients end where tanh is flat."""
 
 
-class Exploring:
+class ExploringPolicy:
     """Acts as a policy file does, and off it; implements ``Controller``.
 
     Args:

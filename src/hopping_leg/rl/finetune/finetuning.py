@@ -1,7 +1,7 @@
 """Continue a policy's training on a robot: outings, checks, learning, the best one kept.
 
 A check is an outing without exploration at fixed heights; its error, as estimated from the joints,
-decides what is best, what is thrown back and when to stop. Checks take robot time like any outing.
+decides what is best, what is rolled back and when to stop. Checks take robot time like any outing.
 All randomness follows from seed and number of the outing, so that a run that was killed goes on
 exactly: networks and optimisers from a checkpoint, experience from the outings' traces.
 """
@@ -23,16 +23,16 @@ from hopping_leg.rl.checkpoint import (
     read_checkpoint,
     write_checkpoint,
 )
-from hopping_leg.rl.export import Network, build_policy
-from hopping_leg.rl.finetune.aim import Aim
-from hopping_leg.rl.finetune.exploring import Exploring
-from hopping_leg.rl.finetune.heard import Heard
+from hopping_leg.rl.finetune.command_correction import CommandCorrection
+from hopping_leg.rl.finetune.config import FinetuneConfig
+from hopping_leg.rl.finetune.exploring import ExploringPolicy
 from hopping_leg.rl.finetune.hops import Score, estimated, score, settled
 from hopping_leg.rl.finetune.learner import Learner
-from hopping_leg.rl.finetune.options import FinetuneOptions
-from hopping_leg.rl.finetune.prepared import Task, believed_rows, prepare
-from hopping_leg.rl.finetune.replay import Rewriter
+from hopping_leg.rl.finetune.pretraining import Task, believed_rows, prepare
+from hopping_leg.rl.finetune.replay import TransitionWriter
+from hopping_leg.rl.finetune.trial_data import TrialData
 from hopping_leg.rl.network_file import read_network
+from hopping_leg.rl.onnx_export import Network, build_policy
 from hopping_leg.trace import Trace
 
 Row = dict[str, Any]
@@ -62,7 +62,7 @@ class Finetuning:
         robot: The real one, or what plays it.
         options: What is asked for.
         folder: For traces, checkpoints and what is learnt beforehand.
-        prepared: Folder of what is learnt beforehand, if others share it.
+        pretraining: Folder of what is learnt beforehand, if others share it.
         on_outing: Called with every outing's row.
     """
 
@@ -70,16 +70,16 @@ class Finetuning:
         self,
         task: Task,
         robot: TrialRobot,
-        options: FinetuneOptions,
+        options: FinetuneConfig,
         folder: Path,
-        prepared: Path | None = None,
+        pretraining: Path | None = None,
         on_outing: Callable[[Row], None] = lambda _: None,
     ) -> None:
         self._task, self._robot, self._options, self._folder = task, robot, options, folder
         self._on_outing = on_outing
-        self._reckon = prepare(task, options.contact, prepared or folder / "prepared")
+        self._estimator = prepare(task, options.contact, pretraining or folder / "pretraining")
         self._network = read_network(task.policy.content)
-        self._aim = Aim(*task.commands)
+        self._aim = CommandCorrection(*task.commands)
         self._learner: Learner | None = None
         self._best = self._origin = (self._network, self._aim)
         self._explored = 0
@@ -110,18 +110,22 @@ class Finetuning:
         return [row["error_m"] for row in self.rows if row["kind"] == "check"]
 
     def _errors_since(self) -> list[float]:
-        """Return the best error and those of the checks since a policy was thrown back, m."""
+        """Return the best error and those of the checks since a policy was rolled back, m."""
         checks = [row for row in self.rows if row["kind"] == "check"]
-        thrown = [index for index, row in enumerate(checks) if row["thrown_back"]]
+        thrown = [index for index, row in enumerate(checks) if row["rolled_back"]]
         first = thrown[-1] + 1 if thrown else 0
         return [min(self._errors), *(row["error_m"] for row in checks[first:])]
 
     def _reason(self) -> str:
-        return self._options.rules.reason(self._errors, self.minutes, self._options.outing / 60)
+        return self._options.stopping_rules.reason(
+            self._errors, self.minutes, self._options.outing / 60
+        )
 
     def _learns_weights(self) -> bool:
         method = self._options.method
-        return method == "sac" or (method == "both" and self.minutes >= self._options.aiming)
+        return method == "sac" or (
+            method == "both" and self.minutes >= self._options.correction_minutes
+        )
 
     def _check_is_due(self) -> bool:
         latest = [row["kind"] for row in self.rows[-self._options.explorations :]]
@@ -143,13 +147,15 @@ class Finetuning:
         assert self._learner is not None
         rng = np.random.default_rng((self._task.seed, number, 2))
         card = self._task.policy.card
-        return Exploring(content, card, self._learner.spread, self._options.noise_hold, rng)
+        return ExploringPolicy(
+            content, card, self._learner.spread, self._options.sde_sample_freq, rng
+        )
 
     def _take(self, outing: HardwareTrial, steps: Steps, *, check: bool) -> None:
         """Judge an outing, learn from it, note it."""
-        heard = Heard.of([outing.trace])
-        hindsight = self._reckon(heard)
-        apexes = estimated(outing, hindsight)
+        data = TrialData.of([outing.trace])
+        estimate = self._estimator(data)
+        apexes = estimated(outing, estimate)
         judged = score(apexes, steps, outing.complaint)
         row: Row = {
             "outing": len(self.rows),
@@ -161,26 +167,26 @@ class Finetuning:
         }
         if outing.truth is not None:
             row |= _numbers(score(outing.truth, steps, outing.complaint), "true_")
-        row["thrown_back"] = False
+        row["rolled_back"] = False
         self.rows.append(row)
         if check or outing.complaint:
-            self._keep_best_or_throw_back(row)
+            self._keep_best_or_roll_back(row)
         if self._learns_weights():
-            self._learn(outing, len(heard.command), explored=not check)
-        elif not row["thrown_back"]:
+            self._learn(outing, len(data.command), explored=not check)
+        elif not row["rolled_back"]:
             counted = settled(apexes, steps)
             errors = counted[:, 2] - counted[:, 1]
             self._aim = self._aim.corrected(counted[:, 1], errors, self._options.aim)
 
-    def _keep_best_or_throw_back(self, row: Row) -> None:
+    def _keep_best_or_roll_back(self, row: Row) -> None:
         check = row["kind"] == "check"
         if check and row["error_m"] <= min(self._errors):
             self._best = (self._network, self._aim)
-        elif row["complaint"] or self._options.rules.thrown_back(self._errors_since()):
-            row["thrown_back"] = True
+        elif row["complaint"] or self._options.stopping_rules.rolled_back(self._errors_since()):
+            row["rolled_back"] = True
             self._network, self._aim = self._best
             if self._learner is not None:
-                self._learner.take_back(self._network)
+                self._learner.set_actor(self._network)
 
     def _learn(self, outing: HardwareTrial, ticks: int, *, explored: bool) -> None:
         if self._learner is None:
@@ -188,7 +194,7 @@ class Finetuning:
             self._begin_learning()
             self._pretrain()
         else:
-            self._hear(outing.trace, bool(outing.complaint))
+            self._keep(outing.trace, bool(outing.complaint))
         assert self._learner is not None
         self._explored += explored
         steps = round(self._options.steps_per_tick * ticks)
@@ -196,10 +202,10 @@ class Finetuning:
         self._learner.learn(steps, self._seed(len(self.rows), 3), critics_only=first)
         self._network = self._learner.network()
 
-    def _hear(self, trace: Trace, ended: bool) -> None:
+    def _keep(self, trace: Trace, ended: bool) -> None:
         assert self._learner is not None
-        heard = Heard.of([trace])
-        self._learner.hear(self._rewriter()(heard, self._reckon(heard), ended=ended))
+        data = TrialData.of([trace])
+        self._learner.keep(self._writer()(data, self._estimator(data), ended=ended))
 
     def _begin_learning(self) -> None:
         """Make a learner that knows the believed robot and every outing so far."""
@@ -209,11 +215,11 @@ class Finetuning:
         spread = np.full((hidden, 2), np.exp(o.learner.log_std))
         rng = np.random.default_rng((task.seed, 4))
         content = self._content(self._network, self._aim)
-        explorer = Exploring(content, task.policy.card, spread, o.noise_hold, rng)
-        rows = believed_rows(task, explorer, self._reckon, self._rewriter(), o.believed_seconds)
+        explorer = ExploringPolicy(content, task.policy.card, spread, o.sde_sample_freq, rng)
+        rows = believed_rows(task, explorer, self._estimator, self._writer(), o.believed_seconds)
         self._learner = Learner(self._network, rows, o.learner, task.seed)
         for row in self.rows:
-            self._hear(Trace.load(self._trace(row["outing"])), bool(row["complaint"]))
+            self._keep(Trace.load(self._trace(row["outing"])), bool(row["complaint"]))
 
     def _pretrain(self) -> None:
         """Let the critics learn from what is there before the actor does."""
@@ -221,14 +227,14 @@ class Finetuning:
         steps = self._options.first_steps
         self._learner.learn(steps, self._seed(0, 5), critics_only=True)
 
-    def _rewriter(self) -> Rewriter:
+    def _writer(self) -> TransitionWriter:
         o, card = self._options, self._task.policy.card
         reward = ApexReward(self._task.robot, o.reward, card.rate)
         reward.anneal(1.0)
         scaled = self._aim.applied(self._network, card)
-        return Rewriter(card, scaled, self._task.robot, reward, o.penalty)
+        return TransitionWriter(card, scaled, self._task.robot, reward, o.penalty)
 
-    def _content(self, network: Network, aim: Aim) -> bytes:
+    def _content(self, network: Network, aim: CommandCorrection) -> bytes:
         policy = self._task.policy
         card = replace(
             policy.card,
@@ -271,13 +277,13 @@ class Finetuning:
         self._network, self._aim = self._from_tree(tree["now"])
         self._best = self._from_tree(tree["best"])
 
-    def _from_tree(self, tree: Tree) -> tuple[Network, Aim]:
+    def _from_tree(self, tree: Tree) -> tuple[Network, CommandCorrection]:
         layers = [(np.array(weight), np.array(bias)) for weight, bias in tree["layers"]]
         a, b = tree["shift"]
         return replace(self._network, layers=layers), replace(self._aim, shift=(a, b))
 
 
-def _as_tree(network: Network, aim: Aim) -> Tree:
+def _as_tree(network: Network, aim: CommandCorrection) -> Tree:
     return {"layers": [list(layer) for layer in network.layers], "shift": list(aim.shift)}
 
 

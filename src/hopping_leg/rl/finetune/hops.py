@@ -6,7 +6,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.controllers.hardware_trial import HardwareTrial, Steps
-from hopping_leg.rl.finetune.hindsight import Hindsight
+from hopping_leg.rl.finetune.apex_estimate import ApexEstimate
 
 SETTLING = 1.0
 """Time after a new command whose hops do not count, s."""
@@ -32,9 +32,9 @@ class Score:
     error: float
 
 
-def estimated(outing: HardwareTrial, hindsight: Hindsight) -> Array:
+def estimated(outing: HardwareTrial, estimate: ApexEstimate) -> Array:
     """Return time, command and estimated height of an outing's apexes, s, m, m, (hops, 3)."""
-    tick, height = hindsight.apexes[0].T
+    tick, height = estimate.apexes[0].T
     rows = tick.astype(np.int64)
     columns = (outing.trace.column(name)[rows] for name in ("time_s", "command_m"))
     begin = outing.trace.column("time_s")[0] if len(outing.trace.table) else 0.0

@@ -19,12 +19,12 @@ from stable_baselines3.common.type_aliases import ReplayBufferSamples
 from torch import nn
 
 from hopping_leg.arrays import Array
-from hopping_leg.rl.asymmetric import AsymmetricSACPolicy
 from hopping_leg.rl.checkpoint import Tree
-from hopping_leg.rl.export import Network
 from hopping_leg.rl.finetune.exploring import EDGE
-from hopping_leg.rl.finetune.replay import CRITIC_SIZE, Rows
+from hopping_leg.rl.finetune.replay import CRITIC_SIZE, Transitions
+from hopping_leg.rl.onnx_export import Network
 from hopping_leg.rl.resumable import learner_state, restore_learner
+from hopping_leg.rl.sb3_policies import AsymmetricSACPolicy
 
 _LOOKED_AT = 3000
 """Ticks on which it is told how much actions have changed, the newest, 15 s."""
@@ -36,7 +36,7 @@ _ACTIVATIONS = {"relu": nn.ReLU, "tanh": nn.Tanh, "elu": nn.ELU}
 
 
 @dataclass(frozen=True)
-class LearnerOptions:
+class SacConfig:
     """Numbers of SAC."""
 
     critic: tuple[int, ...] = (128, 128)
@@ -50,7 +50,7 @@ class LearnerOptions:
     change: float = 0.02
     """Root mean square by which learning from an outing may change the actor's actions, of full
     torque: critics that have heard little of the robot would lead it far astray."""
-    batch: int = 256
+    batch_size: int = 256
     """Transitions per gradient step."""
     gamma: float = 0.99
     """Discount per tick: a horizon of half a second, about one hop."""
@@ -62,7 +62,7 @@ class LearnerOptions:
     """Of gSDE's weights: as quiet as the recipe `fast` ends."""
     believed_share: float = 0.25
     """Share of a batch from the believed robot, once the real one has been heard of."""
-    buffer: int = 150_000
+    buffer_size: int = 150_000
     """Transitions of the real robot that are kept, the newest."""
 
 
@@ -77,7 +77,7 @@ class Learner:
     """
 
     def __init__(
-        self, network: Network, believed: Rows, options: LearnerOptions, seed: int
+        self, network: Network, believed: Transitions, options: SacConfig, seed: int
     ) -> None:
         self.options, self._network = options, network
         size = believed.observation.shape[1]
@@ -87,8 +87,8 @@ class Learner:
             AsymmetricSACPolicy,
             None,
             learning_rate=options.learning_rate,
-            buffer_size=options.buffer,
-            batch_size=options.batch,
+            buffer_size=options.buffer_size,
+            batch_size=options.batch_size,
             tau=options.tau,
             gamma=options.gamma,
             ent_coef=options.entropy,
@@ -118,7 +118,7 @@ class Learner:
             spread: Array = self.model.actor.get_std().double().numpy()
         return spread
 
-    def hear(self, rows: Rows) -> None:
+    def keep(self, rows: Transitions) -> None:
         """Keep transitions of the real robot."""
         _fill(self.model.replay_buffer, rows)
 
@@ -138,7 +138,7 @@ class Learner:
             frozen = name == "log_std" or (self.options.last_layer and "latent_pi" in name)
             weight.requires_grad_(not (critics_only or frozen))
         before = self._weights()
-        self.model.train(steps, self.options.batch)
+        self.model.train(steps, self.options.batch_size)
         if not critics_only:
             self._hold_back(before)
 
@@ -187,7 +187,7 @@ class Learner:
         """Go on from a ``state``."""
         restore_learner(self.model, state)
 
-    def take_back(self, network: Network) -> None:
+    def set_actor(self, network: Network) -> None:
         """Let the actor go on from another network; the critics stay."""
         self._take(network)
 
@@ -265,7 +265,7 @@ class _Unclipped(nn.Module):
         return unclipped
 
 
-def _buffer(rows: Rows, model: SAC) -> ReplayBuffer:
+def _buffer(rows: Transitions, model: SAC) -> ReplayBuffer:
     buffer = ReplayBuffer(
         max(len(rows.reward), 1), model.observation_space, model.action_space, "cpu"
     )
@@ -273,7 +273,7 @@ def _buffer(rows: Rows, model: SAC) -> ReplayBuffer:
     return buffer
 
 
-def _fill(buffer: ReplayBuffer, rows: Rows) -> None:
+def _fill(buffer: ReplayBuffer, rows: Transitions) -> None:
     """Add transitions at once, in the place of the oldest."""
     count = len(rows.reward)
     at = (buffer.pos + np.arange(count)) % buffer.buffer_size

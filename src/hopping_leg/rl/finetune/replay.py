@@ -1,7 +1,7 @@
 """Transitions from what outings measured: what the environment would have given.
 
 The actor's part of an observation is made by the policy's own layout from the samples as they
-arrived. The critics' part and the reward come from hindsight: a robot that cannot know its height
+arrived. The critics' part and the reward come from estimate: a robot that cannot know its height
 while it hops can know it afterwards, and critics are asked only then.
 """
 
@@ -16,10 +16,10 @@ from hopping_leg.controllers.policy import Card
 from hopping_leg.envs import ApexReward
 from hopping_leg.envs.observation import Array32
 from hopping_leg.envs.transition import Transition
-from hopping_leg.rl.export import Network
+from hopping_leg.rl.finetune.apex_estimate import ApexEstimate
 from hopping_leg.rl.finetune.exploring import EDGE
-from hopping_leg.rl.finetune.heard import Heard
-from hopping_leg.rl.finetune.hindsight import Hindsight
+from hopping_leg.rl.finetune.trial_data import TrialData
+from hopping_leg.rl.onnx_export import Network
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
 
@@ -31,7 +31,7 @@ _HEIGHT, _SPEED = 0.1, 10.0
 
 
 @dataclass(frozen=True)
-class Rows:
+class Transitions:
     """Transitions, (n, ...).
 
     Attributes:
@@ -49,13 +49,15 @@ class Rows:
     done: Array32
 
     @staticmethod
-    def join(parts: "list[Rows]") -> "Rows":
+    def join(parts: "list[Transitions]") -> "Transitions":
         """Return several as one."""
         names = ("observation", "following", "action", "reward", "done")
-        return Rows(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+        return Transitions(
+            *(np.concatenate([getattr(part, name) for part in parts]) for name in names)
+        )
 
 
-class Rewriter:
+class TransitionWriter:
     """Writes transitions.
 
     Args:
@@ -73,77 +75,79 @@ class Rewriter:
         self._reward, self._penalty = reward, penalty
         self._scale = np.array(card.torque_scale)
 
-    def __call__(self, heard: Heard, hindsight: Hindsight, *, ended: bool = False) -> Rows:
+    def __call__(
+        self, data: TrialData, estimate: ApexEstimate, *, ended: bool = False
+    ) -> Transitions:
         """Return the transitions of outings.
 
         Args:
-            heard: What they measured.
-            hindsight: What is reckoned of them.
+            data: What they measured.
+            estimate: What is reckoned of them.
             ended: Whether they were ended early.
         """
-        action = np.clip(heard.asked / self._scale, -EDGE, EDGE)
+        action = np.clip(data.asked / self._scale, -EDGE, EDGE)
         seen = np.concatenate(
-            [self.actor_inputs(heard), self._critic_inputs(heard, hindsight, action)], axis=-1
+            [self.actor_inputs(data), self._critic_inputs(data, estimate, action)], axis=-1
         ).astype(np.float32)
-        reward = self._rewards(heard, hindsight, action)
+        reward = self._rewards(data, estimate, action)
         done = np.zeros(reward.shape, np.float32)
         if ended:
             done[-1] = 1.0
             reward[-1] -= self._penalty
         flat = [v.reshape(-1, v.shape[-1]) for v in (seen[:-1], seen[1:], action[:-1])]
         before, after, taken = flat
-        return Rows(
+        return Transitions(
             before, after, taken.astype(np.float32), reward.ravel().astype(np.float32), done.ravel()
         )
 
-    def actor_inputs(self, heard: Heard) -> Array:
+    def actor_inputs(self, data: TrialData) -> Array:
         """Return what the network computes with at every tick, normalised, (ticks, n, size)."""
         card, network = self._card, self._network
         layout = make_layout(card.layout, 1 / card.rate)
-        layout.reset(heard.command.shape[1])
-        last = np.zeros(heard.asked.shape[1:])
+        layout.reset(data.command.shape[1])
+        last = np.zeros(data.asked.shape[1:])
         rows = []
-        for tick, measurement in enumerate(heard.measurements()):
+        for tick, measurement in enumerate(data.measurements()):
             layout.update(measurement, last)
             parts = [part.reshape(len(part), -1) for part in layout.inputs().values()]
             joined = np.concatenate(parts, axis=1, dtype=np.float64)
             rows.append((joined - network.offset) * network.gain)
-            last = heard.asked[tick]
+            last = data.asked[tick]
         return np.stack(rows)
 
-    def _critic_inputs(self, heard: Heard, hindsight: Hindsight, action: Array) -> Array:
-        filled = heard.filled()
+    def _critic_inputs(self, data: TrialData, estimate: ApexEstimate, action: Array) -> Array:
+        filled = data.filled()
         middle = (self._card.command_low + self._card.command_high) / 2
         last = np.concatenate([np.zeros_like(action[:1]), action[:-1]])
         return np.concatenate(
             [
-                ((hindsight.height - middle) / _HEIGHT)[..., None],
-                hindsight.rate[..., None],
+                ((estimate.height - middle) / _HEIGHT)[..., None],
+                estimate.rate[..., None],
                 filled[..., 0:2],
                 filled[..., 2:4] / _SPEED,
-                ((heard.command - middle) / _HEIGHT)[..., None],
-                hindsight.flying[..., None],
+                ((data.command - middle) / _HEIGHT)[..., None],
+                estimate.flying[..., None],
                 last,
             ],
             axis=-1,
         )
 
-    def _rewards(self, heard: Heard, hindsight: Hindsight, action: Array) -> Array:
+    def _rewards(self, data: TrialData, estimate: ApexEstimate, action: Array) -> Array:
         """Return the reward of every tick but the last, (ticks - 1, n)."""
-        filled = heard.filled()
-        joints = [filled[..., 0:2], hindsight.rate[..., None], filled[..., 2:4]]
-        state = np.concatenate([hindsight.height[..., None], *joints], axis=-1)
-        gap = kinematics.foot_clearance(self._robot, hindsight.height, filled[..., 0:2])
-        gap = np.where(hindsight.flying, np.maximum(gap, 1.0), 0.0)
-        reached = np.full(heard.command.shape, np.nan)
-        for leg, apexes in enumerate(hindsight.apexes):
+        filled = data.filled()
+        joints = [filled[..., 0:2], estimate.rate[..., None], filled[..., 2:4]]
+        state = np.concatenate([estimate.height[..., None], *joints], axis=-1)
+        gap = kinematics.foot_clearance(self._robot, estimate.height, filled[..., 0:2])
+        gap = np.where(estimate.flying, np.maximum(gap, 1.0), 0.0)
+        reached = np.full(data.command.shape, np.nan)
+        for leg, apexes in enumerate(estimate.apexes):
             reached[np.maximum(apexes[:, 0].astype(np.int64), 1), leg] = apexes[:, 1]
         self._reward.restore({"air": np.zeros(0), "since": np.zeros(0)})
-        rewards, last = np.empty((heard.ticks - 1, gap.shape[1])), np.zeros_like(action[0])
-        for tick in range(1, heard.ticks):
+        rewards, last = np.empty((data.ticks - 1, gap.shape[1])), np.zeros_like(action[0])
+        for tick in range(1, data.ticks):
             rewards[tick - 1], _ = self._reward(
                 Transition(
-                    state[tick], heard.command[tick - 1], action[tick - 1], last,
+                    state[tick], data.command[tick - 1], action[tick - 1], last,
                     ~np.isnan(reached[tick]), reached[tick], partial(np.copy, gap[tick]),
                 )
             )  # fmt: skip

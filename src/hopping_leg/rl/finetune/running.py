@@ -9,9 +9,9 @@ from typing import Any
 from hopping_leg.controllers.hardware_trial import TrialRobot
 from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically, write_json
+from hopping_leg.rl.finetune.config import FinetuneConfig
 from hopping_leg.rl.finetune.finetuning import Finetuned, Finetuning, Row
-from hopping_leg.rl.finetune.options import FinetuneOptions
-from hopping_leg.rl.finetune.prepared import Task
+from hopping_leg.rl.finetune.pretraining import Task
 from hopping_leg.rl.run_folder import library_versions
 
 RESULT = "finetune.json"
@@ -21,11 +21,11 @@ POLICY = "policy.onnx"
 def finetune(
     task: Task,
     robot: TrialRobot,
-    options: FinetuneOptions,
+    options: FinetuneConfig,
     out: Path,
     *,
     resume: bool = False,
-    prepared: Path | None = None,
+    pretraining: Path | None = None,
     on_outing: Callable[[Row], None] = lambda _: None,
 ) -> dict[str, Any]:
     """Continue a policy's training and leave policy, card and numbers in a folder.
@@ -36,7 +36,7 @@ def finetune(
         options: What is asked for.
         out: The run's folder.
         resume: Go on with the run in ``out``; without one, begin.
-        prepared: Folder of what is learnt beforehand, if others share it.
+        pretraining: Folder of what is learnt beforehand, if others share it.
         on_outing: Called with every outing's row.
 
     Returns:
@@ -47,7 +47,7 @@ def finetune(
     """
     asked = _asked(task, robot, options)
     _begin(out, asked, resume=resume)
-    finetuned = Finetuning(task, robot, options, out, prepared, on_outing).run()
+    finetuned = Finetuning(task, robot, options, out, pretraining, on_outing).run()
     result = {**asked, **summary(finetuned), "versions": library_versions()}
     write_json(out / RESULT, result)
     write_atomically(out / "model_card.md", card(result).encode())
@@ -68,7 +68,7 @@ def summary(finetuned: Finetuned) -> dict[str, Any]:
         "safety": {
             "ended_early": sum(bool(row["complaint"]) for row in rows),
             "complaints": sorted({row["complaint"] for row in rows if row["complaint"]}),
-            "thrown_back": sum(row["thrown_back"] for row in rows),
+            "rolled_back": sum(row["rolled_back"] for row in rows),
         },
         "outings": rows,
     }
@@ -88,8 +88,8 @@ def card(result: dict[str, Any]) -> str:
         f" `{result['options']['method']}`.\n",
         f"- Robot time: {result['minutes']:.1f} min in {len(result['outings'])} outings."
         f" {result['why_it_ended']}",
-        f"- Ended early: {result['safety']['ended_early']}; thrown back:"
-        f" {result['safety']['thrown_back']}.",
+        f"- Ended early: {result['safety']['ended_early']}; rolled back:"
+        f" {result['safety']['rolled_back']}.",
     ]
     if best:
         lines.append(
@@ -99,7 +99,7 @@ def card(result: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _asked(task: Task, robot: TrialRobot, options: FinetuneOptions) -> dict[str, Any]:
+def _asked(task: Task, robot: TrialRobot, options: FinetuneConfig) -> dict[str, Any]:
     asked: dict[str, Any] = json.loads(
         json.dumps(
             {

@@ -1,0 +1,230 @@
+"""A teacher that sees the true state, and a student that learns to act like it on measurements.
+
+What a policy has to remember makes reinforcement learning slow; a teacher that sees the true state
+has nothing to remember and learns in a few minutes. Then the student hops while the teacher says at
+every tick what it would do (DAgger, Ross et al. 2011), which is regression and bears any memory.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from stable_baselines3.common.type_aliases import Schedule
+
+from hopping_leg.arrays import IntArray
+from hopping_leg.envs.privileged_observation import PRIVILEGED_COMMAND
+from hopping_leg.rl.checkpoint import Tree
+from hopping_leg.rl.distillation.dagger import CommandCorrection, DaggerConfig
+from hopping_leg.rl.distillation.students import Student
+from hopping_leg.rl.resumable import ResumablePPO
+from hopping_leg.rl.sb3_policies import AsymmetricPolicy
+
+
+class TeacherStudentPolicy(AsymmetricPolicy):
+    """PPO policy whose actor is the teacher, with a student beside it.
+
+    Observations are what is measured, then the true state, which the critic sees.
+
+    Attributes:
+        student_learns: Whether the student acts and learns, rather than the teacher.
+        mixing: Chance that the teacher acts for a learning student, leg by leg and tick by
+            tick: at first the student would only show how to fall.
+        begun: Tells whose episode began with this tick, (n,).
+
+    Args:
+        measured: Entries that the student sees, the first ones.
+        teacher_sees: Entries that the teacher sees.
+        student: Builds it, a module.
+    """
+
+    def __init__(
+        self,
+        *args: Any,  # noqa: ANN401
+        measured: int,
+        teacher_sees: Sequence[int],
+        student: Callable[[], Any],
+        **kwargs: Any,  # noqa: ANN401
+    ) -> None:
+        self.student_learns, self.mixing = False, 0.0
+        self.measured, self._make_student = measured, student
+        self.begun: Callable[[], npt.NDArray[np.bool_]] = lambda: np.ones((), np.bool_)
+        super().__init__(*args, actor_size=measured, actor_sees=list(teacher_sees), **kwargs)
+
+    def _build_mlp_extractor(self) -> None:
+        super()._build_mlp_extractor()
+        self.mlp_extractor.student = self._make_student()
+
+    def begin_anew(self, rate: Schedule) -> None:
+        """Forget all that teacher and critic have learnt, and what the optimiser remembers.
+
+        Args:
+            rate: Learning rate over the share that is left.
+        """
+        self._build(rate)
+
+    @property
+    def student(self) -> Student:
+        """What learns from the teacher."""
+        minds: Any = self.mlp_extractor
+        student: Student = minds.student
+        return student
+
+    def student_action(self, observation: torch.Tensor) -> torch.Tensor:
+        """Return what the student would do, unbounded, (n, 2)."""
+        return self.student.act(observation, self.begun())
+
+    def teacher_action(self, observation: torch.Tensor) -> torch.Tensor:
+        """Return what the teacher would do, within -1 and 1, (n, 2)."""
+        action: torch.Tensor = self.action_net(self.mlp_extractor.forward_actor(observation))
+        return action.clamp(-1.0, 1.0)
+
+    def forward(
+        self, obs: torch.Tensor, deterministic: bool = False
+    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Return actions, values and log-likelihoods, the latter two zero if the student learns."""
+        if not self.student_learns:
+            result: tuple[torch.Tensor, torch.Tensor, torch.Tensor] = super().forward(
+                obs, deterministic
+            )
+            return result
+        mixed = torch.rand(len(obs), 1) < self.mixing
+        action = torch.where(mixed, self.teacher_action(obs), self.student_action(obs))
+        nothing = torch.zeros(len(obs), 1)
+        return action.clamp(-1.0, 1.0), nothing, nothing[:, 0]
+
+
+class TeacherStudentPPO(ResumablePPO):
+    """PPO while the teacher learns; regression on the teacher's actions while the student does.
+
+    Attributes:
+        teacher_scores: What the teachers that have learnt so far scored, m; less is better.
+
+    Args:
+        dagger: How the student learns.
+        evaluate_teacher: Scores the teacher as it stands.
+        pace: Learning rate at a share of the training, 0 to 1, after these scores.
+    """
+
+    def __init__(
+        self,
+        *args: Any,  # noqa: ANN401
+        dagger: DaggerConfig,
+        evaluate_teacher: Callable[[TeacherStudentPolicy], float],
+        pace: Callable[[float, Sequence[float]], float],
+        **kwargs: Any,  # noqa: ANN401
+    ) -> None:
+        self._dagger, self._evaluate_teacher = dagger, evaluate_teacher
+        self.teacher_scores: list[float] = []
+        self._best: dict[str, torch.Tensor] = {}
+        kwargs["learning_rate"] = lambda left: pace(1 - left, self.teacher_scores)
+        super().__init__(*args, **kwargs)
+        task = self.env.task
+        scaling = task.observation.scaling
+        self._told = task.observation.size + PRIVILEGED_COMMAND
+        self._correction = CommandCorrection(scaling.offset[-1], scaling.gain[-1], dagger.knots)
+        self.policy.begun = lambda: self._last_episode_starts
+
+    def evaluate_teacher(self) -> None:
+        """Examine the teacher that has learnt; keep it if it is the best so far."""
+        self.teacher_scores.append(self._evaluate_teacher(self.policy))
+        self.logger.record("teacher/score_m", self.teacher_scores[-1])
+        if self.teacher_scores[-1] == min(self.teacher_scores):
+            self._best = {k: v.clone() for k, v in self.policy.state_dict().items()}
+
+    def next_teacher(self) -> None:
+        """Let another teacher begin."""
+        self.policy.begin_anew(self.lr_schedule)
+
+    def choose_teacher(self) -> None:
+        """Let the best teacher go on to teach."""
+        self.policy.load_state_dict(self._best)
+        self._best = {}
+
+    def train(self) -> None:
+        """Learn from the rollout."""
+        policy: TeacherStudentPolicy = self.policy
+        if not policy.student_learns:
+            super().train()
+            return
+        self._update_learning_rate(policy.optimizer)
+        self._correct_command()
+        buffer = self.rollout_buffer
+        begun = buffer.episode_starts.astype(np.bool_)
+        seen, known = shift_to_arrival(
+            buffer.observations, begun, self.env.task.legs.delay_ticks, policy.measured
+        )
+        policy.student.add_rollout(seen, begun, known)
+        losses = [self._dagger_step(policy) for _ in range(self._dagger.gradient_steps)]
+        self._n_updates += self._dagger.gradient_steps
+        self.logger.record("train/dagger_loss", sum(losses) / len(losses))
+
+    def _dagger_step(self, policy: TeacherStudentPolicy) -> float:
+        """Take one step towards what the teacher would do; return the loss."""
+        loss = policy.student.loss(self._dagger.batch_size, self._wanted)
+        policy.optimizer.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        policy.optimizer.step()
+        return loss.item()
+
+    def _correct_command(self) -> None:
+        """Let the hops of the rollout tell where the teacher should aim."""
+        commands, errors = self.env.recent_hops
+        self._correction.correct(commands, errors, self._dagger.correction_rate)
+
+    def _wanted(self, seen: torch.Tensor) -> torch.Tensor:
+        """Return what the teacher would do where it is told what it should aim at, (n, 2)."""
+        told = seen.clone()
+        told[:, self._told] = self._correction(seen[:, self._told])
+        policy: TeacherStudentPolicy = self.policy
+        with torch.no_grad():
+            return policy.teacher_action(told)
+
+    def own_state(self) -> Tree:
+        """Return what the student learns from, where the teacher aims, and the scores so far."""
+        policy: TeacherStudentPolicy = self.policy
+        return {
+            "teacher_scores": list(self.teacher_scores),
+            "best": {k: v.numpy().copy() for k, v in self._best.items()},
+            "student": policy.student.state(),
+            "aim": self._correction.state(),
+        }
+
+    def restore_own(self, state: Tree) -> None:
+        """Go on from an ``own_state``."""
+        policy: TeacherStudentPolicy = self.policy
+        self.teacher_scores = list(
+            state["teacher_scores" if "teacher_scores" in state else "exams"]
+        )
+        self._best = {k: torch.from_numpy(v.copy()) for k, v in state["best"].items()}
+        policy.student.restore(state["student"])
+        self._correction.restore(state["aim"])
+
+
+def shift_to_arrival(
+    observations: npt.NDArray[np.float32], begun: npt.NDArray[np.bool_], late: IntArray, first: int
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.bool_]]:
+    """Show the teacher the state in which a late leg's action will have its effect.
+
+    Seen in hindsight: what it would do there is what the student has to ask for before.
+
+    Args:
+        observations: Of a rollout, (ticks, n, size).
+        begun: Whose episode began with a tick, (ticks, n).
+        late: Ticks until an action arrives, (n,).
+        first: Entry with which the true state begins.
+
+    Returns:
+        Observations with later true states, and whether those are known: not at the end of the
+        rollout nor of an episode, (ticks, n).
+    """
+    if not late.any():
+        return observations, np.ones(begun.shape, np.bool_)
+    ticks, rows = np.arange(len(begun))[:, None], np.arange(len(late))
+    then = np.minimum(ticks + late, len(begun) - 1)
+    episode = begun.cumsum(axis=0)
+    known = (ticks + late < len(begun)) & (episode[then, rows] == episode)
+    shown = observations.copy()
+    shown[..., first:] = observations[then, rows, first:]
+    return shown, known

@@ -1,0 +1,92 @@
+"""Tell a network another command, so that hops come true on average.
+
+What it is told at a command c is c + a + b (c - m) / w, with m the middle and w half of the range
+of commands. After every outing a and b move against the line through the errors of its hops, as an
+integral controller does. The two numbers vanish in the scaling of the network's inputs: the file
+is an ordinary policy.
+"""
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.controllers.observation_history import make_layout
+from hopping_leg.controllers.policy import Card
+from hopping_leg.rl.finetune.lines import robust_line
+from hopping_leg.rl.onnx_export import Network
+
+
+@dataclass(frozen=True)
+class CommandCorrectionConfig:
+    """How the aim follows the errors."""
+
+    rate: float = 0.6
+    """Share of an outing's error that is corrected."""
+    ridge: float = 2.0
+    """Hops' worth of doubt that the errors depend on the command at all."""
+    farthest: float = 0.1
+    """Largest correction at either end of the range, m."""
+
+
+@dataclass(frozen=True)
+class CommandCorrection:
+    """Where a network is told to hop.
+
+    Attributes:
+        low: Lowest command, m.
+        high: Highest command, m.
+        shift: a and b, m, (2,).
+    """
+
+    low: float
+    high: float
+    shift: tuple[float, float] = (0.0, 0.0)
+
+    def told(self, command: Array) -> Array:
+        """Return what the network is told at commands, m, (...)."""
+        told: Array = command + self._lean(command) @ np.array(self.shift)
+        return told
+
+    def corrected(
+        self, command: Array, error: Array, options: CommandCorrectionConfig
+    ) -> "CommandCorrection":
+        """Return the aim after hops.
+
+        Args:
+            command: Of every hop, m, (hops,).
+            error: Apex minus command, m, (hops,).
+            options: How fast.
+        """
+        if not len(error):
+            return self
+        line = robust_line(self._lean(command)[:, 1], error, options.ridge)
+        a, b = np.array(self.shift) - options.rate * line
+        most = options.farthest
+        a = float(np.clip(a, -most, most))
+        room = most - abs(a)
+        return dataclasses.replace(self, shift=(a, float(np.clip(b, -room, room))))
+
+    def applied(self, network: Network, card: Card) -> Network:
+        """Return a network that is told the aim at every command."""
+        a, b = self.shift
+        middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
+        slope = 1 + b / half
+        at = command_columns(card)
+        offset, gain = network.offset.copy(), network.gain.copy()
+        offset[at] = (offset[at] - a + b / half * middle) / slope
+        gain[at] = gain[at] * slope
+        return dataclasses.replace(network, offset=offset, gain=gain)
+
+    def _lean(self, command: Array) -> Array:
+        middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
+        return np.stack([np.ones_like(command), (command - middle) / half], axis=-1)
+
+
+def command_columns(card: Card) -> list[int]:
+    """Return where commands stand among a policy's joined inputs."""
+    shapes = make_layout(card.layout, 1 / card.rate).shapes
+    sizes = {name: int(np.prod(shape)) for name, shape in shapes.items()}
+    first = sum(sizes[name] for name in list(sizes)[: list(sizes).index("command")])
+    return list(range(first, first + sizes["command"]))

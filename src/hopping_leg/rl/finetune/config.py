@@ -1,0 +1,73 @@
+"""What continued training is asked for."""
+
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+from hopping_leg.envs import ApexRewardOptions
+from hopping_leg.errors import UsageError
+from hopping_leg.rl.finetune.command_correction import CommandCorrectionConfig
+from hopping_leg.rl.finetune.contact import ContactConfig
+from hopping_leg.rl.finetune.learner import SacConfig
+from hopping_leg.rl.finetune.stopping_rules import StoppingRules
+
+Method = Literal["aim", "sac", "both"]
+"""Two numbers of the command, all weights, or first the one and then the other."""
+
+
+@dataclass(frozen=True)
+class FinetuneConfig:
+    """Continued training on a robot."""
+
+    method: Method = "both"
+    """What is learnt: the command that the network is told, its weights, or first the one."""
+    commands: tuple[float, ...] = (0.25, 0.30, 0.35)
+    """Heights of the checks, m; explorations hop between the lowest and the highest."""
+    outing: float = 15.0
+    """Length of an outing, s."""
+    hold: float = 2.5
+    """Time between new commands on explorations, s."""
+    explorations: int = 3
+    """Outings with exploration after each check, where weights are learnt."""
+    correction_minutes: float = 2.0
+    """Robot time for the aim before weights are learnt, with the method `both`, min."""
+    sde_sample_freq: int = 24
+    """Ticks that exploration keeps its noise, 0.12 s: about a push-off."""
+    believed_seconds: float = 320.0
+    """Experience of the believed robot in the replay, s."""
+    first_steps: int = 5000
+    """Gradient steps of the critics on that alone."""
+    steps_per_tick: float = 0.33
+    """Gradient steps for every tick of the real robot."""
+    critics_first: int = 2
+    """Outings of exploration from which only the critics learn."""
+    penalty: float = 5.0
+    """Reward lost where an outing is ended early."""
+    stopping_rules: StoppingRules = field(default_factory=StoppingRules)
+    """When it ends."""
+    aim: CommandCorrectionConfig = field(default_factory=CommandCorrectionConfig)
+    """How the aim follows the errors."""
+    learner: SacConfig = field(default_factory=SacConfig)
+    """Numbers of SAC."""
+    contact: ContactConfig = field(default_factory=ContactConfig)
+    """How contact is learnt in simulation."""
+    reward: ApexRewardOptions = field(
+        default_factory=lambda: ApexRewardOptions(width=(0.03, 0.015), sharp_from=1e-6, tail=0.5)
+    )
+    """Of the estimated apexes."""
+
+    def __post_init__(self) -> None:
+        if self.method not in get_args(Method):
+            raise UsageError(f"'method' is '{self.method}'; valid: {', '.join(get_args(Method))}.")
+        if len(set(self.commands)) < 2:
+            raise UsageError(
+                f"Commands {self.commands} are too few to aim by; give at least two heights."
+            )
+        if not 2 * len(self.commands) <= self.outing <= 60:
+            raise UsageError(
+                f"An outing of {self.outing:g} s does not suit {len(self.commands)} commands; give"
+                f" {2 * len(self.commands)} to 60 s."
+            )
+        if not 0 < self.stopping_rules.minutes <= 600:
+            raise UsageError(
+                f"'minutes' is {self.stopping_rules.minutes:g} but must lie in 0 to 600."
+            )

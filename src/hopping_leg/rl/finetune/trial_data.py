@@ -1,0 +1,91 @@
+"""What outings measured, as arrays, and what a policy was shown at every tick of them."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hopping_leg.arrays import Array, IntArray
+from hopping_leg.controllers.hardware_trial import MEASURED
+from hopping_leg.errors import TraceError
+from hopping_leg.sim.channel import SAMPLES, Measurement
+from hopping_leg.trace import Trace
+
+
+@dataclass(frozen=True)
+class TrialData:
+    """Measured and asked of n outings of the same length; samples that did not arrive are NaN.
+
+    Attributes:
+        q: Joint positions, rad, (ticks, n, 2).
+        qd: Joint velocities, rad/s, (ticks, n, 2).
+        torque: Measured at the joints, N m, (ticks, n, 2).
+        asked: Asked for by the controller, N m, (ticks, n, 2).
+        command: Desired height, m, (ticks, n).
+        period: Control period, s.
+    """
+
+    q: Array
+    qd: Array
+    torque: Array
+    asked: Array
+    command: Array
+    period: float
+
+    @staticmethod
+    def of(traces: Sequence[Trace]) -> "TrialData":
+        """Return equally long traces of outings as arrays.
+
+        Raises:
+            TraceError: A trace lacks a column, or has no sample at all.
+        """
+        joints = {
+            name: np.stack(
+                [np.stack([t.column(column) for column in columns], axis=1) for t in traces],
+                axis=1,
+            )
+            for name, columns in MEASURED.items()
+        }
+        if np.isnan(joints["q"]).all(axis=(0, 2)).any():
+            raise TraceError(
+                "A trace of an outing holds no sample of the joints; it tells nothing."
+            )
+        command = np.stack([trace.column("command_m") for trace in traces], axis=1)
+        return TrialData(**joints, command=command, period=1 / traces[0].header["rate_hz"])
+
+    @property
+    def ticks(self) -> int:
+        """Control periods."""
+        return len(self.command)
+
+    def filled(self) -> Array:
+        """Return q, qd and torque with gaps held, (ticks, n, 6); what comes first fills back."""
+        joined = np.concatenate([self.q, self.qd, self.torque], axis=-1)
+        place = np.where(np.isfinite(joined), np.arange(self.ticks)[:, None, None], -1)
+        last = np.maximum.accumulate(place, axis=0)
+        first = np.where(place >= 0, place, self.ticks).min(axis=0)
+        held: Array = np.take_along_axis(joined, np.where(last < 0, first, last), axis=0)
+        return held
+
+    def measurements(self) -> Iterator[Measurement]:
+        """Yield what the controller saw at every tick: the newest samples, each with its age."""
+        newest = self._newest()
+        legs = np.arange(self.command.shape[1])[:, None]
+        for tick in range(self.ticks):
+            chosen = newest[tick]
+            at = (chosen, legs)
+            age = np.maximum(tick - chosen, 0) * self.period
+            yield Measurement(self.q[at], self.qd[at], self.command[at], age)
+
+    def _newest(self) -> IntArray:
+        """Return the ticks of the newest samples of both joints, newest first, (ticks, n, 3)."""
+        whole = np.isfinite(self.q).all(axis=-1) & np.isfinite(self.qd).all(axis=-1)
+        arrived = np.where(whole, np.arange(self.ticks)[:, None], -1)
+        last = np.maximum.accumulate(arrived, axis=0)
+        first = np.argmax(whole, axis=0)
+        chosen = [np.maximum(last, first)]
+        for _ in range(SAMPLES - 1):
+            before = np.take_along_axis(last, np.maximum(chosen[-1] - 1, 0), axis=0)
+            usable = (chosen[-1] > 0) & (before >= 0)
+            chosen.append(np.where(usable, before, chosen[-1]))
+        return np.stack(chosen, axis=-1)

@@ -1,0 +1,193 @@
+"""Train with several seeds side by side, and go on with the best.
+
+A training may fail by bad luck, its teacher above all, and trainings of one thread each learn more
+on as many cores than one of several threads. So all begin, each in a process of its own; as soon as
+the recipe can tell how each is likely to end, the best one goes on alone, with the threads of all.
+"""
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hopping_leg.controllers.policy import Policy
+from hopping_leg.errors import UsageError
+from hopping_leg.io import write_atomically, write_json
+from hopping_leg.rl.crew import work_here
+from hopping_leg.rl.loggers import Log
+from hopping_leg.rl.model_card import write_card
+from hopping_leg.rl.policy_evaluation import (
+    DECIDING_SEEDS,
+    as_rows,
+    evaluate_policy,
+    every_centimetre,
+    score,
+)
+from hopping_leg.rl.recipe import Recipe
+from hopping_leg.rl.run_folder import RunFolder, read_result
+from hopping_leg.rl.scale import fit
+from hopping_leg.rl.train import Trained, check, train
+from hopping_leg.robot.parameters import Robot
+
+_DECISION = "decision.json"
+
+
+class _ComparableError(Exception):
+    """A training can be compared with the others."""
+
+
+@dataclass(frozen=True)
+class ParallelSeeds:
+    """Several trainings of a recipe that differ in their seeds.
+
+    Attributes:
+        recipe: What to train; scaled to the robot's size.
+        robot: The leg.
+        seed: Of all of them together; the k-th of n has seed ``n * seed + k``, so that no two
+            seeds share a start.
+        out: Folder in which each has its own, and in which the policy is left; of a single one it
+            is its own.
+        count: How many.
+        minutes: Wall-clock time after which learning stops; None for the recipe's steps.
+        threads: Of each.
+        quiet: Show no progress.
+        log: Who gets the curves besides TensorBoard.
+        source: Folder of another run, from whose checkpoint a single one begins.
+    """
+
+    recipe: Recipe
+    robot: Robot
+    seed: int
+    out: Path
+    count: int
+    minutes: float | None = None
+    threads: int = 1
+    quiet: bool = False
+    log: Log = "tensorboard"
+    source: Path | None = None
+
+    def train(self, *, resume: bool = False) -> Trained:
+        """Begin all of them, finish the best one.
+
+        Args:
+            resume: Go on with those in ``out``; without any, begin.
+
+        Raises:
+            UsageError: There is none, or several from one source; ``out`` holds something else,
+                what ``log`` needs is not installed, or one of the trainings ended early.
+            RobotError: The robot has effects that training does not simulate.
+        """
+        if self.count < 1:
+            raise UsageError(f"--parallel-seeds is {self.count} but must be at least 1.")
+        if self.count == 1:
+            return self._train(0, self.threads, resume=resume, quiet=self.quiet)
+        if self.source is not None:
+            raise UsageError(
+                "--source begins from one run's checkpoint; leave --parallel-seeds out."
+            )
+        check(self.robot, self.minutes, self.log)
+        recipe = fit(self.recipe, self.robot)
+        folder = RunFolder(
+            self.out, recipe, self.robot, self.seed, self.minutes, parallel_seeds=self.count
+        )
+        folder.begin(resume=resume)
+        if any(self._decision(number) is None for number in range(self.count)):
+            work_here(self.work, self.count)
+        return self._finish(folder)
+
+    def folder(self, number: int) -> Path:
+        """Return the folder of a start."""
+        return self.out if self.count == 1 else self.out / f"start-{number}"
+
+    def work(self, number: int) -> None:
+        """Train one of them, or go on, until it can be compared; leave what decides.
+
+        Only the first shows its progress: all take about as long.
+        """
+        if self._decision(number) is not None:
+            return
+        folder = self.folder(number)
+        try:
+            if not (folder / "policy.onnx").exists():
+                quiet = self.quiet or number > 0
+                self._train(number, self.threads, quiet=quiet, on_early_score=_stop)
+            decision = self._try(folder)
+        except _ComparableError as early_score:
+            score_m, minutes = early_score.args
+            decision = {"score_m": score_m, "minutes": minutes}
+        seed = self._seed(number)
+        write_json(folder / _DECISION, {"seed": seed, **decision})
+
+    def _train(
+        self,
+        number: int,
+        threads: int,
+        *,
+        resume: bool = True,
+        quiet: bool,
+        on_early_score: Callable[[float, float], None] | None = None,
+    ) -> Trained:
+        return train(
+            self.recipe,
+            self.robot,
+            self._seed(number),
+            self.folder(number),
+            resume=resume,
+            source=self.source,
+            minutes=self.minutes,
+            threads=threads,
+            quiet=quiet,
+            log=self.log,
+            on_early_score=on_early_score,
+        )
+
+    def _seed(self, number: int) -> int:
+        return self.count * self.seed + number
+
+    def _try(self, folder: Path) -> dict[str, Any]:
+        """Try the policy of a finished training at every centimetre."""
+        began = time.monotonic()
+        policy = Policy((folder / "policy.onnx").read_bytes(), folder.name, self.recipe.name)
+        commands = every_centimetre(fit(self.recipe, self.robot).eval_commands)
+        rate = self.recipe.task.rate
+        results = evaluate_policy(policy, self.robot, commands, DECIDING_SEEDS, rate, self.threads)
+        minutes = read_result(folder)["minutes"] + (time.monotonic() - began) / 60
+        return {"score_m": score(results), "minutes": minutes, "trials": as_rows(results)}
+
+    def _decision(self, number: int) -> dict[str, Any] | None:
+        """Return what decides about a start: seed, score in m, and minutes until then."""
+        file = self.folder(number) / _DECISION
+        if not file.exists():
+            return None
+        decision: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        return decision
+
+    def _finish(self, folder: RunFolder) -> Trained:
+        """Go on with the best of them where it is not finished, and keep its policy."""
+        decisions = [d for number in range(self.count) if (d := self._decision(number))]
+        chosen = min(range(self.count), key=lambda number: float(decisions[number]["score_m"]))
+        best = self.folder(chosen)
+        if not (best / "policy.onnx").exists():
+            self._train(chosen, self.count * self.threads, quiet=self.quiet)
+        # The last of them to be comparable is waited for.
+        slowest = max(decision["minutes"] for decision in decisions)
+        own = read_result(best)
+        result = {
+            **own,
+            **folder.config,
+            "command": folder.command,
+            "minutes": max(own["minutes"] + slowest - decisions[chosen]["minutes"], slowest),
+            "seed_scores": decisions,
+            "chosen_seed": chosen,
+        }
+        folder.write("result.json", result)
+        write_card(folder.path)
+        write_atomically(folder.policy, (best / "policy.onnx").read_bytes())
+        trials = own["selected"]["trials"]
+        return Trained(folder.policy, folder.path, result["minutes"], own["steps"], trials)
+
+
+def _stop(early_score: float, minutes: float) -> None:
+    raise _ComparableError(early_score, minutes)

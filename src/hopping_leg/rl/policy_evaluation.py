@@ -1,0 +1,163 @@
+"""Try a policy as evaluation does, to choose among the snapshots of a training.
+
+The seeds here select; they must never be among those that judge (1000 and above).
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from hopping_leg.controllers.protocol import Controller
+from hopping_leg.controllers.rollout import Rollout, RolloutConfig, rollout
+from hopping_leg.hop_detection import HopMeasurement, measure_hops
+from hopping_leg.robot.parameters import Robot
+
+FIRST_SEED = 500
+"""Judges every snapshot while training."""
+
+FINAL_SEEDS = (501, 502, 503, 504)
+"""Judge the best snapshots once more at the end."""
+
+DECIDING_SEEDS = (505, 506, 507, 508)
+"""Judge the policies of several seeds, each the best of its own training."""
+
+_SPACING = 0.01
+"""Of the heights at which nothing between two others should be missed, m."""
+
+SETTLE = 0.2
+"""Share of a trial at its start that does not count."""
+
+_DISORDER = 0.1
+"""Score for neighbouring commands whose hops are not in order, m."""
+
+_UNRELIABLE = 0.01
+"""Score for hops that are skipped or hit the ground at a command, however few, m."""
+
+_LEGS = 4
+_SECONDS = 10.0
+_PENALTY = 0.1
+"""Score for every hop skipped and every contact of body and ground, per hop, m."""
+
+
+@dataclass(frozen=True)
+class CommandResult:
+    """Hops at one command, pooled over legs and seeds.
+
+    Attributes:
+        command_m: Desired apex height, m.
+        median_error_m: Median of apex - command, m; NaN without hops.
+        std_m: Standard deviation of the apexes, m; NaN without hops.
+        hops: In-flight apexes.
+        hops_per_s: Their rate, 1/s.
+        flight_fraction: Share of the time with the foot off the ground.
+        skipped_hops: Hops that should have happened and did not.
+        body_contact_ticks: Ticks with base or knee on the ground.
+        min_height_m: Lowest base height, m.
+    """
+
+    command_m: float
+    median_error_m: float
+    std_m: float
+    hops: int
+    hops_per_s: float
+    flight_fraction: float
+    skipped_hops: int
+    body_contact_ticks: int
+    min_height_m: float
+
+
+def evaluate_policy(
+    controller: Controller,
+    robot: Robot,
+    commands: tuple[float, ...],
+    seeds: tuple[int, ...] = (FIRST_SEED,),
+    rate: float = 200.0,
+    threads: int = 1,
+) -> list[CommandResult]:
+    """Let a controller hop at fixed commands with noise and delay on, physics at 0.5 ms.
+
+    Args:
+        controller: To be judged.
+        robot: The leg.
+        commands: Desired heights, rising, m.
+        seeds: Of noise and delay; each adds four legs per command.
+        rate: Control rate, Hz.
+        threads: Worker threads, 0 for one per core.
+    """
+    schedule = np.tile(np.repeat(commands, _LEGS), (round(_SECONDS * rate), 1))
+    setup = RolloutConfig(robot, rate=rate, threads=threads)
+    runs = [rollout(controller, setup, schedule, seed) for seed in seeds]
+    return [
+        _command_result(runs, command, range(index * _LEGS, (index + 1) * _LEGS), rate)
+        for index, command in enumerate(commands)
+    ]
+
+
+def every_centimetre(commands: Sequence[float]) -> tuple[float, ...]:
+    """Return the heights from the lowest to the highest command in steps of about 1 cm, m.
+
+    A policy may hop in one way at low commands and in another at high ones, and fail where it
+    changes.
+    """
+    low, high = min(commands), max(commands)
+    return tuple(map(float, np.linspace(low, high, round((high - low) / _SPACING) + 1)))
+
+
+def score(results: list[CommandResult]) -> float:
+    """Return how bad a policy is, m.
+
+    Mean over commands of ``command_score`` and of a penalty where hops are skipped or the body hits
+    the ground at all: who seldom does so must not win by scattering less. And a penalty
+    for every pair of neighbouring commands of which the higher one does not give the higher hops: a
+    policy that ignores its command must not win by hopping in between.
+    """
+    heights = [v.command_m + v.median_error_m for v in results]
+    disordered = sum(not low < high for low, high in itertools.pairwise(heights))
+    unreliable = [v.skipped_hops + v.body_contact_ticks > 0 for v in results]
+    worse = _UNRELIABLE * float(np.mean(unreliable)) + _DISORDER * disordered
+    return float(np.mean([command_score(v) for v in results])) + worse
+
+
+def command_score(result: CommandResult) -> float:
+    """Return median error + spread + penalties at a command, m; 1 without hops."""
+    if result.hops == 0:
+        return 1.0
+    faults = (result.skipped_hops + result.body_contact_ticks) / result.hops
+    return abs(result.median_error_m) + result.std_m + _PENALTY * min(faults, 3.0)
+
+
+def as_rows(results: list[CommandResult]) -> list[dict[str, Any]]:
+    """Return results as JSON rows; null stands for no hops."""
+    rows = [asdict(v) for v in results]
+    return [{k: None if v != v else v for k, v in row.items()} for row in rows]
+
+
+def _command_result(runs: list[Rollout], command: float, legs: range, rate: float) -> CommandResult:
+    start = round(SETTLE * _SECONDS * rate)
+    columns = ("height_m", "height_rate_m_s", "foot_clearance_m")
+    hops: list[HopMeasurement] = []
+    contacts, lowest = 0, np.inf
+    for run in runs:
+        for leg in legs:
+            data = {name: values[:, leg] for name, values in run.data.items()}
+            height, velocity, clearance = (data[name] for name in columns)
+            hops.append(measure_hops(height, velocity, clearance, rate, start))
+            body = np.minimum(data["base_clearance_m"], data["knee_clearance_m"])
+            contacts += int((body <= 0).sum())
+            lowest = min(lowest, float(height.min()))
+    apex = np.concatenate([h.apex for h in hops])
+    ticks = sum(h.ticks for h in hops)
+    return CommandResult(
+        command_m=command,
+        median_error_m=float(np.median(apex) - command) if len(apex) else float("nan"),
+        std_m=float(apex.std()) if len(apex) else float("nan"),
+        hops=len(apex),
+        hops_per_s=len(apex) * rate / ticks,
+        flight_fraction=sum(h.flight_ticks for h in hops) / ticks,
+        skipped_hops=sum(h.skipped for h in hops),
+        body_contact_ticks=contacts,
+        min_height_m=lowest,
+    )

@@ -1,0 +1,163 @@
+"""The adaptive recipe: its policy feels how far it was off and aims elsewhere."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+
+from hopping_leg.controllers.policy import Card, Policy
+from hopping_leg.errors import UsageError
+from hopping_leg.rl.onnx_export import build_policy
+from hopping_leg.robot.model_mismatch import Latency, ModelMismatch
+from hopping_leg.sim.randomization import WIDE_RANGES
+from tests.rl.learners import ROBOT, TINY_ADAPTIVE, learner
+
+
+def policy_of(recipe, model):
+    card = Card(
+        "adaptive", recipe.task.observation, *recipe.task.command_bounds,
+        recipe.task.action_torque, ROBOT.name, ROBOT.digest, recipe.task.rate,
+    )  # fmt: skip
+    return Policy(build_policy(recipe.network(model, model.env), card), "a test", "adaptive")
+
+
+def test_the_policy_file_acts_as_the_student_and_aims_as_it_does():
+    recipe = dataclasses.replace(
+        TINY_ADAPTIVE,
+        command_integrator=dataclasses.replace(
+            TINY_ADAPTIVE.command_integrator, start=0.0, share=5.0
+        ),
+        task=dataclasses.replace(
+            TINY_ADAPTIVE.task, reset_distribution="standing", random_episode_start=False
+        ),
+    )
+    model = learner(recipe)
+    model.policy.student.trust = 1.0
+    task, student = model.env.task, model.policy.student
+    policy = policy_of(recipe, model)
+    for _ in range(2):
+        policy.reset(task.count)
+        seen = model.env.reset()
+        model._last_episode_starts = np.ones(task.count, bool)
+        for _ in range(40):
+            with torch.no_grad():
+                action = model.policy.student_action(torch.from_numpy(seen)).clamp(-1, 1)
+            torque = policy.act(task.measurement)
+            np.testing.assert_allclose(
+                torque, action.numpy() * recipe.task.action_torque, atol=1e-4
+            )
+            np.testing.assert_allclose(policy._memory, student._memory.numpy(), atol=1e-5)
+            model.env.step_async(action.numpy())
+            seen = model.env.step_wait()[0]
+            model._last_episode_starts = np.zeros(task.count, bool)
+        assert np.abs(policy._memory).min() > 1e-4
+
+
+@pytest.mark.parametrize("command", [-1.0, -0.4, 1.0])
+def test_an_aim_follows_the_truth_by_its_share_of_every_hop(command):
+    model = learner(TINY_ADAPTIVE)
+    student = model.policy.student
+    places = student._places
+    seen = torch.zeros(4, places.size)
+    seen[:, [places.command, places.true_command]] = command
+    nobody = np.zeros(4, bool)
+
+    def pass_by(height, clearance, ticks):
+        seen[:, places.true_height], seen[:, places.true_clearance] = height, clearance
+        for _ in range(ticks):
+            student.act(seen, nobody)
+
+    pass_by(command - 0.1, 1.0, 40)
+    pass_by(command - 0.5, 0.0, 22 + 5)
+    shares = np.array([(1 - command) / 2, (1 + command) / 2])
+    aim = student._memory[0, :2].numpy() @ shares
+    assert aim == pytest.approx(0.1 * TINY_ADAPTIVE.command_integrator.share, rel=1e-4)
+
+
+def test_an_identified_leg_may_differ_too():
+    """Its gears rub under load, and its commands are late by parts of a tick."""
+    leg = dataclasses.replace(
+        ROBOT,
+        knee=dataclasses.replace(ROBOT.knee, load_friction=0.1),
+        reality=ModelMismatch(latency=Latency(command=4.56e-3)),
+    )
+    env = TINY_ADAPTIVE.make_env(leg, 0)
+    env.reset()
+    for draw in (1, 2):
+        env.task.randomize(draw)
+        for _ in range(10):
+            env.step_async(np.full((TINY_ADAPTIVE.num_envs, 2), 0.3, np.float32))
+            seen, reward, _, _ = env.step_wait()
+        assert np.isfinite(seen).all()
+        assert np.isfinite(reward).all()
+        assert np.ptp(seen[:, -len(WIDE_RANGES) :], axis=0).max() > 0
+
+
+def test_what_a_student_learns_from_is_what_it_was_told():
+    """The teacher is asked at the aim, and the network that feels is shown the truth."""
+    model = learner(TINY_ADAPTIVE)
+    student = model.policy.student
+    places = student._places
+    asked = []
+
+    def wanted(rows):
+        asked.append(rows[:, places.true_command] - rows[:, places.command])
+        return torch.zeros(len(rows), 2)
+
+    seen = np.zeros((30, 4, places.size), np.float32)
+    begun = np.zeros((30, 4), bool)
+    begun[0] = True
+    for row, first in zip(seen, begun, strict=True):
+        student.act(torch.from_numpy(row), first)
+    student.add_rollout(seen, begun, np.ones_like(begun))
+    student.loss(64, wanted)
+    aims = student._memory[:, :2].mean(dim=1)
+    assert asked[0].abs().max() > 0
+    distance = (asked[0][:, None] - aims[None]).abs().min(dim=1).values
+    assert distance.max() < 1e-3
+
+
+def test_the_aims_of_ever_more_legs_follow_what_is_felt():
+    model = learner(TINY_ADAPTIVE)
+    trust = []
+    for share in np.linspace(TINY_ADAPTIVE.teacher_share, 1, 21):
+        TINY_ADAPTIVE.anneal(model, model.env, share)
+        trust.append(model.policy.student.trust)
+    assert trust[0] == 0
+    assert trust[-1] == 1
+    assert (np.diff(trust) >= 0).all()
+
+
+def test_legs_are_alike_until_the_policy_can_act_and_change_from_then_on():
+    draws = [TINY_ADAPTIVE.draw(student_progress) for student_progress in np.linspace(-0.5, 1, 301)]
+    alike = np.linspace(-0.5, 1, 301) < TINY_ADAPTIVE.alike
+    assert not np.array(draws)[alike].any()
+    later = np.array(draws)[~alike]
+    assert later[0] == 1
+    assert set(np.diff(later)) == {0, 1}
+    assert later[-1] == TINY_ADAPTIVE.draws + 1
+
+
+def test_it_can_learn_to_feel():
+    """The truth is shown among the measurements: the network that feels finds it."""
+    model = learner(TINY_ADAPTIVE)
+    student = model.policy.student
+    places = student._places
+    optimizer = torch.optim.Adam(student.parameters(), lr=1e-2)
+    rng = np.random.default_rng(0)
+    rows = np.zeros((50, 4, places.size + 3), np.float32)
+    rows[..., 0] = rows[..., -1] = rng.uniform(-1, 1, (50, 4))
+    student._lessons.add(rows)
+    for _ in range(300):
+        loss = student.loss(64, lambda seen: torch.zeros(len(seen), 2))
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+    assert loss.item() < 0.02
+
+
+def test_an_observation_with_three_commands_is_refused():
+    task = dataclasses.replace(TINY_ADAPTIVE.task, observation="three-samples")
+    with pytest.raises(UsageError, match="choose --observation dated-long"):
+        learner(dataclasses.replace(TINY_ADAPTIVE, task=task))

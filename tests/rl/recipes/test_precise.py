@@ -1,0 +1,287 @@
+"""The precise recipe: a teacher on the true state, a student that comes to act like it."""
+
+import dataclasses
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+import torch
+
+from hopping_leg.rl.distillation.teacher_student import shift_to_arrival
+from hopping_leg.rl.recipes import precise
+from hopping_leg.rl.recipes.precise import PreciseRecipe
+from hopping_leg.sim.randomization import WIDE_RANGES
+from tests.rl.learners import ROBOT, TINY_PRECISE, learner
+
+RECIPE = PreciseRecipe(num_envs=8, batch_size=512)
+
+
+@pytest.fixture(scope="module")
+def model():
+    return learner(RECIPE)
+
+
+@pytest.fixture
+def seen(model):
+    return torch.as_tensor(model.env.reset())
+
+
+def test_the_student_depends_on_measurements_alone(model, seen):
+    size = model.env.task.observation.size
+    other = seen.clone()
+    other[:, size:] += 1
+    act = model.policy.student_action
+    torch.testing.assert_close(act(other), act(seen))
+    other[:, 0] += 1
+    assert not torch.equal(act(other), act(seen))
+
+
+def test_the_teacher_sees_the_true_state_and_its_own_last_torque(model, seen):
+    policy, task = model.policy, model.env.task
+    for _ in range(3):
+        model.env.step_async(np.full((8, 2), 0.25, np.float32))
+        seen = torch.as_tensor(model.env.step_wait()[0])
+    columns = list(policy.mlp_extractor._actor)
+    torch.testing.assert_close(
+        seen[:, columns[-2:]], torch.as_tensor(task._last, dtype=torch.float32)
+    )
+    torch.testing.assert_close(seen[:, columns[:-2]], torch.as_tensor(task.privileged()))
+    blind = seen.clone()
+    blind[:, [c for c in range(task.observation.size) if c not in columns]] += 1
+    torch.testing.assert_close(policy.teacher_action(blind), policy.teacher_action(seen))
+
+
+def test_the_teacher_learns_first_and_guides_the_student_ever_less(model):
+    policy = model.policy
+    shares = np.linspace(0, 1, 41)
+    mixing = []
+    for share in shares:
+        RECIPE.anneal(model, model.env, share)
+        assert policy.student_learns == (share >= RECIPE.teacher_share)
+        mixing.append(policy.mixing)
+    student_progress = np.array(mixing)[shares >= RECIPE.teacher_share]
+    assert student_progress[0] > 0.8
+    assert (np.diff(student_progress) <= 0).all()
+    assert student_progress[-1] == 0
+
+
+def test_learning_rates_fall_for_the_teacher_and_again_for_the_student():
+    left = 1 - RECIPE.teacher_share
+    assert RECIPE.rate(1.0) == RECIPE.learning_rate
+    assert RECIPE.rate(left + 1e-6) < 0.03 * RECIPE.learning_rate
+    assert RECIPE.rate(left - 1e-6) > 0.9 * RECIPE.learning_rate
+    assert RECIPE.rate(0.0) < 0.03 * RECIPE.learning_rate
+
+
+def test_every_teacher_learns_from_the_start_at_the_full_rate():
+    each = RECIPE.teacher_share / RECIPE.teachers
+    for number in range(RECIPE.teachers):
+        begun = 1 - number * each
+        assert RECIPE.rate(begun - 1e-6) > 0.9 * RECIPE.learning_rate
+        assert RECIPE.rate(begun - each + 1e-6) < 0.03 * RECIPE.learning_rate
+
+
+def test_the_teacher_with_the_best_score_teaches():
+    scores = iter([0.03, 0.01, 0.02])
+    evaluated = []
+
+    def evaluate_teacher(policy):
+        evaluated.append({k: v.clone() for k, v in policy.state_dict().items()})
+        return next(scores)
+
+    chooser = learner(TINY_PRECISE)
+    chooser._evaluate_teacher = evaluate_teacher
+    learnt = np.linspace(0, TINY_PRECISE.teacher_share, 7)
+    for share in learnt:
+        TINY_PRECISE.anneal(chooser, chooser.env, share)
+        with torch.no_grad():
+            chooser.policy.action_net.bias += 1.0
+    with torch.no_grad():
+        chooser.policy.action_net.bias -= 1.0
+    assert chooser.teacher_scores == [0.03, 0.01, 0.02]
+    assert TINY_PRECISE.extra_results(chooser) == {"teacher_scores_m": [0.03, 0.01, 0.02]}
+    weights = [one["mlp_extractor.policy_net.0.weight"] for one in evaluated]
+    assert not torch.equal(weights[0], weights[1])
+    assert not torch.equal(weights[1], weights[2])
+    now = chooser.policy.state_dict()
+    best = {k: v for k, v in evaluated[1].items() if k != "log_std"}
+    assert all(torch.equal(now[name], value) for name, value in best.items())
+    TINY_PRECISE.anneal(chooser, chooser.env, 1.0)
+    assert len(chooser.teacher_scores) == 3
+
+
+def test_a_teacher_that_passes_gives_the_time_of_the_next_ones_to_the_policy():
+    recipe = dataclasses.replace(TINY_PRECISE, teacher_accept_score=0.01)
+    scores = iter([0.03, 0.005])
+    chooser = learner(recipe)
+    chooser._evaluate_teacher = lambda policy: next(scores)
+    until = recipe.teacher_share * 2 / recipe.teachers
+    for share in (0.0, until / 2, until - 1e-3):
+        recipe.anneal(chooser, chooser.env, share)
+        assert not chooser.policy.student_learns
+    recipe.anneal(chooser, chooser.env, until)
+    assert chooser.teacher_scores == [0.03, 0.005]
+    assert chooser.policy.student_learns
+    assert chooser.policy.mixing == 1.0
+    recipe.anneal(chooser, chooser.env, recipe.teacher_share)
+    assert len(chooser.teacher_scores) == 2
+    assert chooser.policy.mixing < 1.0
+
+
+def test_the_policys_rate_falls_from_when_its_teacher_passed():
+    teacher_scores = [*[0.03] * len(RECIPE.exam_at), RECIPE.teacher_accept_score]
+    until = RECIPE.student_from(teacher_scores)
+    assert until == pytest.approx(RECIPE.teacher_share * (1 + RECIPE.exam_at[0]) / RECIPE.teachers)
+    assert RECIPE.pace(until, teacher_scores) == pytest.approx(RECIPE.learning_rate)
+    middle, end = (RECIPE.pace(share, teacher_scores) for share in ((1 + until) / 2, 1.0))
+    assert RECIPE.learning_rate > middle > end
+    assert RECIPE.student_progress(until, teacher_scores) == 0
+    assert RECIPE.student_progress(1.0, teacher_scores) == 1
+
+
+def test_a_teacher_is_examined_several_times_and_its_best_counts():
+    recipe = dataclasses.replace(TINY_PRECISE, teachers=2, exam_at=(0.5, 1.0))
+    scores = iter([0.02, 0.9, 0.04, 0.03])
+    kept = []
+
+    def evaluate_teacher(policy):
+        kept.append(policy.action_net.bias.detach().clone())
+        return next(scores)
+
+    chooser = learner(recipe)
+    chooser._evaluate_teacher = evaluate_teacher
+    for share in recipe.teacher_share * np.array([0.0, 0.24, 0.25, 0.49, 0.5, 0.75, 1.0]):
+        recipe.anneal(chooser, chooser.env, share)
+        assert len(chooser.teacher_scores) == 4 * share // recipe.teacher_share
+        with torch.no_grad():
+            chooser.policy.action_net.bias += 1.0
+    with torch.no_grad():
+        chooser.policy.action_net.bias -= 1.0
+    assert chooser.teacher_scores == [0.02, 0.9, 0.04, 0.03]
+    torch.testing.assert_close(chooser.policy.action_net.bias.detach(), kept[0])
+
+
+def test_a_single_teacher_takes_no_exam():
+    alone = dataclasses.replace(TINY_PRECISE, teachers=1)
+    model = learner(alone)
+    for share in (0.0, alone.teacher_share, 1.0):
+        alone.anneal(model, model.env, share)
+    assert model.teacher_scores == []
+    assert alone.extra_results(model) == {}
+
+
+def test_an_exam_tells_a_teacher_that_does_not_hop():
+    recipe = dataclasses.replace(TINY_PRECISE, eval_commands=(0.25, 0.35))
+    model = learner(recipe)
+    with torch.no_grad():
+        for weight in model.policy.action_net.parameters():
+            weight.zero_()
+    assert recipe.evaluate_teacher(model.policy, ROBOT) >= 1.0
+
+
+def test_an_exam_counts_the_worst_height_under_errors(monkeypatch):
+    asked = {}
+
+    def judged(teacher, robot, commands, rate, threads):
+        asked.update(teacher_action_noise=teacher._action_noise, commands=commands)
+        scores = dict.fromkeys(commands, 0.002) | {commands[1]: 0.01}
+        return [Mock(score=score, flight_fraction=0.6) for score in scores.values()]
+
+    monkeypatch.setattr(precise, "evaluate_policy", judged)
+    monkeypatch.setattr(precise, "command_score", lambda result: result.score)
+    assert RECIPE.evaluate_teacher(learner(TINY_PRECISE).policy, ROBOT) == 0.01
+    assert asked["teacher_action_noise"] == RECIPE.teacher_action_noise > 0
+    heights = asked["commands"]
+    assert (heights[0], heights[-1]) == (min(RECIPE.eval_commands), max(RECIPE.eval_commands))
+    assert np.diff(heights).max() < 0.011
+
+
+def test_an_exam_counts_time_on_the_ground_beyond_half(monkeypatch):
+    flights = iter([0.5, 0.7, 0.42])
+
+    def judged(teacher, robot, commands, rate, threads):
+        return [Mock(score=0.003, flight_fraction=next(flights))]
+
+    monkeypatch.setattr(precise, "evaluate_policy", judged)
+    monkeypatch.setattr(precise, "command_score", lambda result: result.score)
+    policy = learner(TINY_PRECISE).policy
+    scores = [RECIPE.evaluate_teacher(policy, ROBOT) for _ in range(3)]
+    assert scores == pytest.approx([0.003, 0.003, 0.011])
+
+
+def test_imitation_brings_the_student_to_its_teacher_and_leaves_the_teacher_alone():
+    student = learner(TINY_PRECISE)
+    policy = student.policy
+    student.on_boundary = lambda: setattr(policy, "student_learns", True)
+    student.learn(128)
+    before = {k: v.clone() for k, v in policy.state_dict().items() if "student" not in k}
+    buffer = torch.as_tensor(student.rollout_buffer.observations.reshape(-1, policy.features_dim))
+
+    def distance():
+        with torch.no_grad():
+            gap = policy.student_action(buffer) - policy.teacher_action(buffer)
+        return float(gap.square().mean())
+
+    student._current_progress_remaining = 0.5
+    first = distance()
+    for _ in range(20):
+        student.train()
+    assert distance() < 0.5 * first
+    assert all(torch.equal(v, before[k]) for k, v in policy.state_dict().items() if k in before)
+
+
+def test_the_exported_network_is_the_student(model, seen):
+    network = RECIPE.network(model, model.env)
+    x = seen[:, : model.env.task.observation.size].double().numpy()
+    for weight, bias in network.layers[:-1]:
+        x = np.tanh(x @ weight.T + bias)
+    weight, bias = network.layers[-1]
+    with torch.no_grad():
+        wanted = model.policy.student_action(seen).numpy()
+    np.testing.assert_allclose(x @ weight.T + bias, wanted, atol=1e-5)
+
+
+def test_its_range_lies_within_what_the_leg_reaches():
+    low, high = RECIPE.task.command_bounds
+    assert low < min(RECIPE.eval_commands) < max(RECIPE.eval_commands) < high
+    assert ROBOT.straight_height > low
+
+
+def test_the_papers_observation_can_be_taught_too():
+    task = dataclasses.replace(TINY_PRECISE.task, observation="three-samples")
+    model = learner(dataclasses.replace(TINY_PRECISE, task=task))
+    model.on_boundary = lambda: setattr(model.policy, "student_learns", True)
+    model.learn(128)
+    assert model.policy.measured == 15
+    assert np.isfinite(model.logger.name_to_value["train/dagger_loss"])
+
+
+def test_legs_differ_for_the_policy_but_not_for_its_teacher():
+    task = dataclasses.replace(TINY_PRECISE.task, randomised=WIDE_RANGES)
+    recipe = dataclasses.replace(TINY_PRECISE, task=task)
+    model = learner(recipe)
+    apart = []
+    for share in (0.0, recipe.teacher_share):
+        recipe.anneal(model, model.env, share)
+        legs = model.env.task.legs
+        legs.stand(slice(None), [0.7, -1.4], 0.05)
+        for _ in range(40):
+            legs.step(np.full((4, 2), [1.0, -3.0]))
+        apart.append(np.ptp(legs.height))
+    assert apart[0] == 0
+    assert apart[1] > 1e-3
+
+
+def test_the_teacher_is_asked_where_a_late_legs_action_arrives():
+    ticks, first = 6, 1
+    seen = np.zeros((ticks, 3, 2), np.float32)
+    seen[..., 0] = seen[..., 1] = np.arange(ticks)[:, None]
+    begun = np.zeros((ticks, 3), bool)
+    begun[3, 2] = True
+    shown, known = shift_to_arrival(seen, begun, np.array([0, 2, 2]), first)
+    np.testing.assert_array_equal(shown[..., 0], seen[..., 0])
+    np.testing.assert_array_equal(shown[:, 0], seen[:, 0])
+    assert known[:, 0].all()
+    np.testing.assert_array_equal(known[:, 1], [1, 1, 1, 1, 0, 0])
+    np.testing.assert_array_equal(known[:, 2], [1, 0, 0, 1, 0, 0])
+    np.testing.assert_array_equal(shown[:, 1, 1][known[:, 1]], [2, 3, 4, 5])

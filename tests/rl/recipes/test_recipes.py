@@ -1,0 +1,140 @@
+"""Recipes changed from the command line: what a card prints gives the same recipe again."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hopping_leg.errors import UsageError
+from hopping_leg.rl.recipes import (
+    RECIPES,
+    change,
+    changes_of,
+    get_recipe,
+    randomise,
+    recipe_of,
+)
+from hopping_leg.rl.run_folder import RunFolder
+from hopping_leg.rl.scale import fit
+from hopping_leg.robot import load_robot
+from hopping_leg.sim.randomization import Range
+
+
+@given(
+    name=st.sampled_from(sorted(RECIPES)),
+    steps=st.integers(1, 10**9),
+    rate=st.floats(1e-9, 1.0),
+    privileged=st.booleans(),
+)
+def test_a_cards_changes_give_the_recipe_again(name, steps, rate, privileged):
+    recipe = dataclasses.replace(
+        get_recipe(name), steps=steps, learning_rate=rate, privileged_critic=privileged
+    )
+    stored = dataclasses.asdict(recipe)
+    assert change(get_recipe(name), changes_of(name, stored)) == recipe
+
+
+def test_numbers_of_a_part_are_changed_by_its_name():
+    usual = get_recipe("precise")
+    changed = change(usual, ["reward.jerk=0.5", "reward.energy_beyond=0.03", "dagger.batch_size=7"])
+    assert (changed.reward.jerk, changed.reward.energy_beyond) == (0.5, 0.03)
+    assert changed.reward.width == usual.reward.width
+    assert (changed.dagger.batch_size, changed.steps) == (7, usual.steps)
+    stored = dataclasses.asdict(changed)
+    assert change(usual, changes_of("precise", stored)) == changed
+    del stored["reward"]["energy_beyond"]
+    assert "reward.energy_beyond=0.03" not in changes_of("precise", stored)
+
+
+def test_a_run_from_before_a_number_existed_did_without_it():
+    stored = dataclasses.asdict(get_recipe("precise"))
+    del stored["task"]["command_skew"]
+    assert changes_of("precise", stored) == ["task.command_skew=1.0"]
+
+
+@pytest.mark.parametrize(
+    ("entry", "named"),
+    [
+        ("reward.speed=3", "reward.apex"),
+        ("task.timestep=1", "steps"),
+        ("speed=3", "steps"),
+        ("steps=many", "a whole number"),
+        ("learning_rate=nan", "a number"),
+        ("privileged_critic=perhaps", "true or false"),
+    ],
+)
+def test_changes_without_meaning_get_a_sentence(entry, named):
+    with pytest.raises(UsageError, match=named):
+        change(get_recipe("fast"), [entry])
+
+
+def test_a_randomised_recipe_trains_legs_that_differ():
+    recipe = dataclasses.replace(get_recipe("fast"), num_envs=3)
+    robot = load_robot("legv2")
+    plain, mixed = recipe.make_env(robot, 0), randomise(recipe, "twins").make_env(robot, 0)
+    for env in (plain, mixed):
+        env.task.legs.stand(slice(None), [0.7, -1.4], 0.05)
+        for _ in range(40):
+            env.task.legs.step(np.full((3, 2), [1.0, -3.0]))
+    assert np.ptp(plain.task.legs.height) == 0
+    assert np.ptp(mixed.task.legs.height) > 1e-3
+
+
+def test_a_run_says_how_it_was_randomised_and_older_ones_were_not(tmp_path):
+    recipe, robot = get_recipe("fast"), load_robot("legv2")
+    folder = RunFolder(tmp_path, recipe, robot, 0, None)
+    assert "--randomise" not in folder.command
+    for ranges in ("twins", "surprises"):
+        command = RunFolder(tmp_path, randomise(recipe, ranges), robot, 0, None).command
+        assert f"--randomise {ranges}" in command
+    del folder.config["options"]["task"]["randomised"]
+    folder.write("config.json", folder.config)
+    RunFolder(tmp_path, recipe, robot, 0, None).check_same()
+    with pytest.raises(UsageError, match="another options"):
+        RunFolder(tmp_path, randomise(recipe, "twins"), robot, 0, None).check_same()
+
+
+def test_a_run_on_ranges_of_ones_own_still_says_how_it_was_made(tmp_path):
+    own = Range("base.mass", "kg", 0.3, 0.5, "scales")
+    task = dataclasses.replace(get_recipe("fast").task, randomised=(own,))
+    recipe = dataclasses.replace(get_recipe("fast"), task=task)
+    folder = RunFolder(tmp_path, recipe, load_robot("legv2"), 0, None)
+    assert folder.command.startswith("hop train --recipe fast")
+    assert "--randomise" not in folder.command
+
+
+def test_a_run_says_what_its_policy_saw_where_that_is_not_the_recipes(tmp_path):
+    recipe, robot = get_recipe("precise"), load_robot("legv2")
+    assert "--observation" not in RunFolder(tmp_path, recipe, robot, 0, None).command
+    task = dataclasses.replace(recipe.task, observation="three-samples")
+    bare = dataclasses.replace(recipe, task=task)
+    command = RunFolder(tmp_path, bare, robot, 0, None).command
+    assert "--observation three-samples" in command
+
+
+def test_a_run_says_for_which_heights_it_was_asked(tmp_path):
+    recipe, robot = get_recipe("precise"), load_robot("legv2")
+    assert "--heights" not in RunFolder(tmp_path, recipe, robot, 0, None).command
+    wide = fit(dataclasses.replace(recipe, heights=(0.2, 0.46)), robot)
+    assert "--heights 0.2 0.46" in RunFolder(tmp_path, wide, robot, 0, None).command
+
+
+@given(
+    name=st.sampled_from(sorted(RECIPES)),
+    steps=st.integers(1, 10**9),
+    ranges=st.sampled_from([None, "none", "twins", "surprises"]),
+    heights=st.sampled_from([None, (0.2, 0.4)]),
+    observation=st.sampled_from([None, "three-samples", "dated"]),
+)
+def test_a_runs_recipe_is_read_from_its_options(name, steps, ranges, heights, observation):
+    recipe = dataclasses.replace(change(get_recipe(name), [f"steps={steps}"]), heights=heights)
+    if ranges is not None:
+        recipe = randomise(recipe, ranges)
+    if observation is not None:
+        task = dataclasses.replace(recipe.task, observation=observation)
+        recipe = dataclasses.replace(recipe, task=task)
+    stored = json.loads(json.dumps(dataclasses.asdict(recipe)))
+    assert recipe_of(name, stored) == recipe
