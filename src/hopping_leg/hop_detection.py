@@ -11,6 +11,10 @@ import numpy as np
 from scipy.signal import find_peaks
 
 from hopping_leg.arrays import Array, BoolArray, IntArray
+from hopping_leg.trace import Trace
+
+COLUMNS = ("height_m", "height_rate_m_s", "foot_clearance_m")
+"""Columns of a trace that hops are found in, in the order of ``find_hops``."""
 
 FLIGHT_CLEARANCE = 0.003
 """Foot clearance that counts as flight, m."""
@@ -86,6 +90,11 @@ def find_hops(height: Array, velocity: Array, clearance: Array) -> Hops:
     highest = np.lexsort((-apex, flight))
     highest = highest[np.diff(flight[highest], prepend=-1) > 0]
     return Hops(tick[highest], apex[highest], flying)
+
+
+def trace_hops(trace: Trace) -> Hops:
+    """Find the hops of a trace, one per flight."""
+    return find_hops(*map(trace.column, COLUMNS))
 
 
 def measure_hops(

@@ -16,7 +16,7 @@ from hopping_leg.controllers import RolloutConfig
 from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range, fingerprint
 from hopping_leg.evaluate.keeper import Keeper
 from hopping_leg.evaluate.result import Summary
-from hopping_leg.evaluate.robustness.case import times
+from hopping_leg.evaluate.robustness.axes import times
 from hopping_leg.evaluate.runner import evaluate, software_versions
 from hopping_leg.io import safe_file_name
 from hopping_leg.robot.parameters import Robot

@@ -27,7 +27,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Judged
 from hopping_leg.evaluate.compare import set_beside
 from hopping_leg.evaluate.compare_report import write_comparison
-from hopping_leg.evaluate.figures.paper import Format, Width, encode
+from hopping_leg.evaluate.figures.style import Format, Width, encode
 from hopping_leg.evaluate.gallery import draw_gallery, run_of
 from hopping_leg.evaluate.report import write_report
 from hopping_leg.evaluate.runs import Run

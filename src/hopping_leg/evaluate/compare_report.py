@@ -5,13 +5,13 @@ from typing import Any
 
 from markupsafe import Markup
 
-from hopping_leg.evaluate import markup
+from hopping_leg.evaluate import html_tables
 from hopping_leg.evaluate.compare import Compared, command_of, traces_of, training_row
 from hopping_leg.evaluate.figures import draw_learning, to_svg
 from hopping_leg.evaluate.gallery import Picture, draw_gallery
-from hopping_leg.evaluate.markup import Column, millimetres, table
+from hopping_leg.evaluate.html_tables import Column, millimetres, table
 from hopping_leg.evaluate.report import data_uri, page_template
-from hopping_leg.evaluate.result import Evaluation, Summary
+from hopping_leg.evaluate.result import Evaluation, Staircase, Summary
 
 
 def write_comparison(compared: Compared, command: str = "") -> bytes:
@@ -28,7 +28,7 @@ def write_comparison(compared: Compared, command: str = "") -> bytes:
         command=command,
         compared=compared,
         beside=beside_table(evaluation),
-        summary=markup.summary_table(evaluation.summary),
+        summary=html_tables.summary_table(evaluation.summary),
         pictures=[_picture(picture, evaluation) for picture in pictures],
         learning=_source(_learning(compared)) if compared.trainings else "",
         trainings=training_table(compared),
@@ -81,7 +81,7 @@ def _learning(compared: Compared) -> Any:  # noqa: ANN401
 def _picture(picture: Picture, evaluation: Evaluation) -> dict[str, Any]:
     beside = {
         "staircase": lambda: _staircases(evaluation),
-        "ladder": lambda: markup.ladder_table(evaluation.ladder),
+        "ladder": lambda: html_tables.ladder_table(evaluation.ladder),
     }
     return {
         "title": picture.title,
@@ -93,11 +93,10 @@ def _picture(picture: Picture, evaluation: Evaluation) -> dict[str, Any]:
 
 def _staircases(evaluation: Evaluation) -> Markup:
     """Return one table per set of steps, as runs of different legs have different ones."""
-    sets = dict.fromkeys(tuple(s.commands_m) for s in evaluation.staircase)
-    return Markup("").join(
-        markup.staircase_table([s for s in evaluation.staircase if tuple(s.commands_m) == steps])
-        for steps in sets
-    )
+    sets: dict[tuple[float, ...], list[Staircase]] = {}
+    for stairs in evaluation.staircase:
+        sets.setdefault(tuple(stairs.commands_m), []).append(stairs)
+    return Markup("").join(map(html_tables.staircase_table, sets.values()))
 
 
 def _source(figure: Any) -> str:  # noqa: ANN401

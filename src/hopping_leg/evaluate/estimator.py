@@ -7,7 +7,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.evaluate.metrics import START_SECONDS
 from hopping_leg.evaluate.result import Estimator
-from hopping_leg.hop_detection import find_hops
+from hopping_leg.hop_detection import trace_hops
 from hopping_leg.trace import Trace
 
 HEIGHT = "estimated_height_m"
@@ -65,8 +65,7 @@ def apex_errors(trace: Trace) -> Array:
     if APEX not in trace.table.columns:
         return np.empty(0)
     estimate = trace.column(APEX)
-    rate = trace.column("height_rate_m_s")
-    hops = find_hops(trace.column("height_m"), rate, trace.column("foot_clearance_m"))
+    hops = trace_hops(trace)
     ends = np.append(hops.tick, len(estimate))[1:]
     settled = trace.column("time_s")[hops.tick] >= START_SECONDS
     errors = []

@@ -14,7 +14,7 @@ from hopping_leg.evaluate.figures.fits import (
     draw_overlay,
     draw_spectra,
 )
-from hopping_leg.evaluate.markup import Column, table
+from hopping_leg.evaluate.html_tables import Column, table
 from hopping_leg.evaluate.report import data_uri, page_template
 from hopping_leg.identify.overlay import RESTART, Overlay, overlays
 from hopping_leg.identify.result import Identified, as_json, parameters_json, quality_json

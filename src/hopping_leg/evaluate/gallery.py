@@ -1,6 +1,5 @@
 """All figures that a set of runs allows, for the report and for `hop report`."""
 
-import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from hopping_leg.evaluate.figures import (
     draw_ladder,
     draw_phase_space,
 )
+from hopping_leg.evaluate.metrics import stretches
 from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.evaluate.runs import Run
 from hopping_leg.evaluate.trials import Trial
@@ -165,9 +165,8 @@ def run_of(path: Path) -> Run:
     """Load a trace as a run; traces from elsewhere count as fixed trials of their own."""
     trace = Trace.load(path)
     command, time = trace.column("command_m"), trace.column("time_s")
-    edges = [0, *(np.flatnonzero(np.diff(command)) + 1).tolist(), len(command)]
     period = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-    steps = tuple((float(command[a]), (b - a) * period) for a, b in itertools.pairwise(edges))
+    steps = tuple((float(command[a]), (b - a) * period) for a, b in stretches(command))
     header = trace.header
     default = "fixed" if len(steps) == 1 else "sequence"
     return Run(

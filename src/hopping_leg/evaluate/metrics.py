@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.hop_detection import measure_hops
+from hopping_leg.hop_detection import COLUMNS, measure_hops
 from hopping_leg.trace import Trace
 
 START_SECONDS = 2.0
@@ -60,22 +60,23 @@ class Window:
 
 def measure(trace: Trace) -> list[Window]:
     """Measure a run: one window per stretch of constant command, in order of time."""
-    command = trace.column("command_m")
     rate = _rate(trace)
-    switches = np.flatnonzero(np.diff(command)) + 1
-    edges = [0, *switches.tolist(), len(command)]
     return [
         _window(trace, start, end, rate, START_SECONDS if start == 0 else SWITCH_SECONDS)
-        for start, end in itertools.pairwise(edges)
+        for start, end in stretches(trace.column("command_m"))
     ]
 
 
+def stretches(command: Array) -> list[tuple[int, int]]:
+    """Return first tick and one past the last of every stretch of constant command."""
+    edges = [0, *(np.flatnonzero(np.diff(command)) + 1).tolist(), len(command)]
+    return list(itertools.pairwise(edges))
+
+
 def _window(trace: Trace, start: int, end: int, rate: float, drop: float) -> Window:
-    height = trace.column("height_m")
-    clearance = trace.column("foot_clearance_m")
+    height, velocity, clearance = map(trace.column, COLUMNS)
     torque = np.stack([trace.column(f"{j}_torque_nm")[start:end] for j in ("hip", "knee")])
     first = min(start + round(drop * rate), end)
-    velocity = trace.column("height_rate_m_s")
     hops = measure_hops(height[:end], velocity[:end], clearance[:end], rate, first)
     return Window(
         command=float(trace.column("command_m")[start]),
@@ -108,8 +109,7 @@ def _events(touching: BoolArray) -> int:
 def skipped_in_run(trace: Trace) -> int:
     """Count skipped hops of a whole run after its start, switches of command included."""
     rate = _rate(trace)
-    names = ("height_m", "height_rate_m_s", "foot_clearance_m")
-    height, velocity, clearance = map(trace.column, names)
+    height, velocity, clearance = map(trace.column, COLUMNS)
     return measure_hops(height, velocity, clearance, rate, round(START_SECONDS * rate)).skipped
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined, Template
 from markupsafe import Markup
 
-from hopping_leg.evaluate import markup
+from hopping_leg.evaluate import html_tables
 from hopping_leg.evaluate.acceptance import acceptance_lines
 from hopping_leg.evaluate.figures import to_svg
 from hopping_leg.evaluate.gallery import Picture, draw_gallery
@@ -72,18 +72,18 @@ def _subtitle(evaluation: Evaluation) -> str:
 def _tables(evaluation: Evaluation) -> dict[str, Markup]:
     secondary = evaluation.secondary
     return {
-        "summary": markup.summary_table(evaluation.summary),
-        "groups": markup.group_table(evaluation.groups),
-        "secondary": markup.summary_table(secondary.summary) if secondary else Markup(""),
-        "estimators": markup.estimator_table(evaluation.estimators),
+        "summary": html_tables.summary_table(evaluation.summary),
+        "groups": html_tables.group_table(evaluation.groups),
+        "secondary": html_tables.summary_table(secondary.summary) if secondary else Markup(""),
+        "estimators": html_tables.estimator_table(evaluation.estimators),
     }
 
 
 def _picture(picture: Picture, evaluation: Evaluation) -> dict[str, Any]:
     beside = {
-        "distributions": lambda: markup.neighbour_table(evaluation.neighbours),
-        "staircase": lambda: markup.staircase_table(evaluation.staircase),
-        "ladder": lambda: markup.ladder_table(evaluation.ladder),
+        "distributions": lambda: html_tables.neighbour_table(evaluation.neighbours),
+        "staircase": lambda: html_tables.staircase_table(evaluation.staircase),
+        "ladder": lambda: html_tables.ladder_table(evaluation.ladder),
     }
     files = picture.files
     shown = [*files[:2], "..."] if len(files) > 3 else files

@@ -17,7 +17,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.evaluate.metrics import START_SECONDS
 from hopping_leg.evaluate.runs import Run
-from hopping_leg.hop_detection import find_hops
+from hopping_leg.hop_detection import trace_hops
 from hopping_leg.robot import Robot, get_spec
 from hopping_leg.trace import Trace
 
@@ -97,7 +97,7 @@ def clip(trace: Trace) -> Array:
     time = trace.column("time_s")
     names = ("height_m", "hip_position_rad", "knee_position_rad")
     pose = np.stack([trace.column(name) for name in names], axis=1)
-    hops = find_hops(pose[:, 0], trace.column("height_rate_m_s"), trace.column("foot_clearance_m"))
+    hops = trace_hops(trace)
     settled = time[hops.tick][time[hops.tick] >= START_SECONDS]
     start = settled[0] if len(settled) else min(START_SECONDS, time[-1])
     moments = start + np.arange(round(CLIP_SECONDS * FRAME_RATE)) / FRAME_RATE

@@ -7,8 +7,7 @@ import pytest
 
 from hopping_leg.controllers import rollout
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.robustness.axes import AXES, JOINT, NOMINAL, axis_names
-from hopping_leg.evaluate.robustness.case import Case
+from hopping_leg.evaluate.robustness.axes import AXES, JOINT, NOMINAL, Case, axis_names
 from hopping_leg.evaluate.robustness.outcome import run_plan
 from hopping_leg.evaluate.robustness.plan import PUSH_SECONDS, make_plan
 

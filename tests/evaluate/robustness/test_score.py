@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from hopping_leg.evaluate.robustness.outcome import Outcome
-from hopping_leg.evaluate.robustness.score import level_rows, score_rows, share
+from hopping_leg.evaluate.robustness.outcome import Outcome, level_rows, score_rows, share
 
 
 def outcome(level, error=0.0, skipped=0, contacts=0):

@@ -12,8 +12,7 @@ from hopping_leg.controllers.registry import load_controller
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Candidate
 from hopping_leg.evaluate.skills.counted import count_hops
-from hopping_leg.evaluate.skills.impact import ground_force, last_touchdown, rebound
-from hopping_leg.evaluate.skills.landings import land
+from hopping_leg.evaluate.skills.landings import ground_force, land, last_touchdown, rebound
 from hopping_leg.evaluate.skills.stairs import climb
 from hopping_leg.evaluate.skills.suite import run_skills
 from hopping_leg.trace import Trace

@@ -12,9 +12,8 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.evaluate.metrics import START_SECONDS
-from hopping_leg.evaluate.robustness.axes import axis_named
-from hopping_leg.evaluate.robustness.case import Case, times, with_numbers
-from hopping_leg.hop_detection import Hops, find_hops
+from hopping_leg.evaluate.robustness.axes import Case, axis_named, times, with_numbers
+from hopping_leg.hop_detection import trace_hops
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.perturbation import Perturbation
 from hopping_leg.trace import Trace
@@ -117,14 +116,9 @@ def study_changes(
 
 def hops_after(trace: Trace, tick: int) -> Array:
     """Return the apexes whose flight began after a tick, in order, m, (hops,)."""
-    hops = _hops(trace)
+    hops = trace_hops(trace)
     grounded = np.flatnonzero(~hops.in_flight[tick:])
     return hops.apex[hops.tick > tick + grounded[0]] if len(grounded) else np.empty(0)
-
-
-def _hops(trace: Trace) -> Hops:
-    columns = ("height_m", "height_rate_m_s", "foot_clearance_m")
-    return find_hops(*map(trace.column, columns))
 
 
 def _recovery(run: _Run, traces: Sequence[Trace], change: int) -> dict[str, Any]:
@@ -148,7 +142,7 @@ def _recovery(run: _Run, traces: Sequence[Trace], change: int) -> dict[str, Any]
 
 def _before(run: _Run, traces: Sequence[Trace], change: int) -> Array:
     start = round(START_SECONDS * change / AT)
-    found = [_hops(trace) for trace in traces]
+    found = [trace_hops(trace) for trace in traces]
     apexes = [h.apex[(h.tick >= start) & (h.tick < change)] for h in found]
     return np.concatenate(apexes) - run.before
 

@@ -8,8 +8,14 @@ import numpy as np
 from scipy.stats import qmc
 
 from hopping_leg.arrays import Array
-from hopping_leg.evaluate.robustness.axes import AXES, JOINT, JOINT_LEVELS, NOMINAL, axis_named
-from hopping_leg.evaluate.robustness.case import Case
+from hopping_leg.evaluate.robustness.axes import (
+    AXES,
+    JOINT,
+    JOINT_LEVELS,
+    NOMINAL,
+    Case,
+    axis_named,
+)
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.perturbation import Perturbation
 

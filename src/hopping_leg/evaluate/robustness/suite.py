@@ -20,9 +20,14 @@ from hopping_leg.evaluate.robustness.axes import (
     axis_named,
     axis_names,
 )
-from hopping_leg.evaluate.robustness.outcome import TOLERANCE, Outcome, run_plan
+from hopping_leg.evaluate.robustness.outcome import (
+    TOLERANCE,
+    Outcome,
+    level_rows,
+    run_plan,
+    score_rows,
+)
 from hopping_leg.evaluate.robustness.plan import JOINT_POINTS, SECONDS, make_plan
-from hopping_leg.evaluate.robustness.score import level_rows, score_rows
 from hopping_leg.evaluate.runner import software_versions
 from hopping_leg.evaluate.trials import COMMANDS, check_reach, scaled
 from hopping_leg.io import safe_file_name

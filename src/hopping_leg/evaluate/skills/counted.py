@@ -5,12 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.controllers.stand_hop_land import STAND_SECONDS, StandHopLand
 from hopping_leg.evaluate.metrics import measure
-from hopping_leg.evaluate.skills.impact import last_touchdown, peak_force
-from hopping_leg.hop_detection import find_hops
+from hopping_leg.evaluate.skills.landings import last_touchdown, peak_force
+from hopping_leg.hop_detection import trace_hops
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import Trace
 
@@ -86,7 +85,7 @@ def count_hops(
 def _row(
     label: str, floor: str, command: float, asked: int, traces: Sequence[Trace], robot: Robot
 ) -> Counted:
-    apexes = [_apexes(trace) for trace in traces]
+    apexes = [trace_hops(trace).apex for trace in traces]
     made = [len(apex) for apex in apexes]
     errors = np.concatenate(apexes) - command
     windows = [window for trace in traces for window in measure(trace)]
@@ -105,11 +104,6 @@ def _row(
         body_contacts=sum(w.base_contacts + w.knee_contacts for w in windows),
         runs=len(traces),
     )
-
-
-def _apexes(trace: Trace) -> Array:
-    columns = ("height_m", "height_rate_m_s", "foot_clearance_m")
-    return find_hops(*(trace.column(name) for name in columns)).apex
 
 
 def _landing_force(robot: Robot, trace: Trace) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.evaluate.metrics import START_SECONDS, measure, skipped_in_run
-from hopping_leg.hop_detection import find_hops
+from hopping_leg.hop_detection import trace_hops
 from hopping_leg.sim.perturbation import Perturbation
 from hopping_leg.trace import Trace
 
@@ -151,7 +151,7 @@ def _errors(trace: Trace, steps: range, rise: float) -> Array:
         rise: Of the ground at the beginning of the step, m.
     """
     height, rate = trace.column("height_m"), trace.column("height_rate_m_s")
-    hops = find_hops(height, rate, trace.column("foot_clearance_m"))
+    hops = trace_hops(trace)
     period = np.diff(trace.column("time_s")).mean()
     jump = np.diff(height) - period * (rate[1:] + rate[:-1]) / 2
     moved = np.flatnonzero(np.abs(jump) > abs(rise) / 2) if rise else np.array([steps.start])
