@@ -18,7 +18,7 @@ from hopping_leg.deploy.schedule import Schedule
 from hopping_leg.deploy.session import Performance, header_of, perform
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.emulator.faults import Fault
-from hopping_leg.emulator.start import Start
+from hopping_leg.emulator.server import Start
 from hopping_leg.robot.limits import SoftLimiter, SoftLimits
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import CONTROL_RATE

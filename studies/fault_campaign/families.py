@@ -7,7 +7,7 @@ import numpy as np
 
 from hopping_leg.deploy.stop_reasons import FAULTS, Reason
 from hopping_leg.emulator.faults import Fault
-from hopping_leg.emulator.start import Start
+from hopping_leg.emulator.server import Start
 
 HOP_SECONDS = 1.0
 """Faults begin at a random time of this long after the first lift-off, s: two to three hops."""

@@ -6,8 +6,8 @@ import threading
 import time
 
 from hopping_leg.emulator.drive import Drive
-from hopping_leg.emulator.lockstep import Lockstep
 from hopping_leg.emulator.moteus_codes import CONTROLLING, MoteusMode
+from hopping_leg.emulator.virtual_time import Lockstep
 
 _WATCHED = 0.1
 """How long the drives are watched after the host's death, s."""

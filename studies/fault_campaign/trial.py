@@ -5,8 +5,8 @@ import signal
 import tempfile
 from pathlib import Path
 
-from hopping_leg.emulator.lockstep import Lockstep
 from hopping_leg.emulator.moteus_codes import MoteusMode
+from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot.parameters import Robot
 from studies.fault_campaign.case import Case, Result, Scene, words

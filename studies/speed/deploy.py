@@ -24,9 +24,9 @@ from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.schedule import Schedule
 from hopping_leg.deploy.session import Performance, header_of, perform
 from hopping_leg.deploy.transport import opener
-from hopping_leg.emulator.lockstep import Lockstep
 from hopping_leg.emulator.process import EmulatorProcess
-from hopping_leg.emulator.start import Start
+from hopping_leg.emulator.server import Start
+from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.evaluate.metrics import START_SECONDS
 from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import load_robot

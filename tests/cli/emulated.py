@@ -6,8 +6,8 @@ import functools
 from hopping_leg.cli import deploy, motors, record_motors
 from hopping_leg.deploy import driver, session
 from hopping_leg.deploy.motion_sequence import SequenceTiming
-from hopping_leg.emulator.lockstep import Lockstep
-from hopping_leg.emulator.start import Start
+from hopping_leg.emulator.server import Start
+from hopping_leg.emulator.virtual_time import Lockstep
 
 
 def put_behind(monkeypatch, **start):

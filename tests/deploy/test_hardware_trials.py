@@ -7,8 +7,8 @@ import pytest
 
 from hopping_leg.controllers.registry import load_policy
 from hopping_leg.deploy.hardware_trials import Deployed
-from hopping_leg.emulator.lockstep import Lockstep
-from hopping_leg.emulator.start import Start
+from hopping_leg.emulator.server import Start
+from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot import load_robot
 

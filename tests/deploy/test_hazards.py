@@ -14,9 +14,8 @@ from hopping_leg.deploy.driver import MoteusLink
 from hopping_leg.deploy.preflight import judge, require
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.transport import opener
-from hopping_leg.emulator.frames import Frame
-from hopping_leg.emulator.line_protocol import LineProtocol, received_line
-from hopping_leg.emulator.start import Start
+from hopping_leg.emulator.frames import Frame, LineProtocol, received_line
+from hopping_leg.emulator.server import Start
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot import load_robot
 

@@ -16,7 +16,7 @@ from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.deploy.flight_recorder import recover
 from hopping_leg.deploy.supervisor import State
 from hopping_leg.emulator.process import EmulatorProcess
-from hopping_leg.emulator.start import Start
+from hopping_leg.emulator.server import Start
 from hopping_leg.errors import TraceError
 from hopping_leg.trace import Trace
 

@@ -13,8 +13,8 @@ from hopping_leg.deploy.schedule import Schedule
 from hopping_leg.deploy.session import header_of, perform
 from hopping_leg.deploy.supervisor import State
 from hopping_leg.emulator.faults import Fault
-from hopping_leg.emulator.lockstep import Lockstep
-from hopping_leg.emulator.start import Start
+from hopping_leg.emulator.server import Start
+from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.limits import SoftLimiter, SoftLimits

@@ -6,8 +6,8 @@ import math
 import moteus
 import numpy as np
 
-from hopping_leg.emulator.memory_transport import MemoryTransport
 from hopping_leg.emulator.robot import EmulatedRobot
+from hopping_leg.emulator.virtual_time import MemoryTransport
 from hopping_leg.robot import load_robot
 
 R = moteus.Register

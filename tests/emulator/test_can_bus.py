@@ -7,7 +7,7 @@ import pytest
 from moteus.pythoncan_device import PythonCanDevice
 
 from hopping_leg.emulator.process import EmulatorProcess
-from hopping_leg.emulator.start import Start
+from hopping_leg.emulator.server import Start
 from hopping_leg.errors import UsageError
 
 CHANNEL = f"239.74.{os.getpid() >> 8 & 0xFF}.{os.getpid() & 0xFF}"

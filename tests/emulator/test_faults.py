@@ -5,10 +5,8 @@ import pytest
 from moteus.fdcanusb_device import _strip_and_validate_checksum
 
 from hopping_leg.emulator.faults import KINDS, Fault, load_faults
-from hopping_leg.emulator.frames import Frame
-from hopping_leg.emulator.line_protocol import LineProtocol
+from hopping_leg.emulator.frames import Frame, LineProtocol, QueuedReply
 from hopping_leg.emulator.moteus_codes import FaultCode, MoteusMode
-from hopping_leg.emulator.reply_queue import QueuedReply
 from hopping_leg.errors import UsageError
 from tests.emulator.bench import Bench, R
 
@@ -57,7 +55,7 @@ def test_a_duplicated_reply_arrives_twice():
 
 @pytest.mark.parametrize("checksums", [True, False])
 def test_a_corrupted_line_fails_its_checksum_or_means_something_else(checksums):
-    from hopping_leg.emulator.pty_port import PtyPort
+    from hopping_leg.emulator.ports import PtyPort
 
     port = PtyPort()
     lines = []

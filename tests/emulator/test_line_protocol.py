@@ -3,8 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from moteus.fdcanusb_device import _append_checksum, _compute_crc8
 
-from hopping_leg.emulator.frames import Frame, padded
-from hopping_leg.emulator.line_protocol import LineProtocol, crc8, received_line
+from hopping_leg.emulator.frames import Frame, LineProtocol, crc8, padded, received_line
 
 SEND = b"can send 8001 1100 bF"
 

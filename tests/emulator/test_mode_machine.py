@@ -3,8 +3,13 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hopping_leg.emulator.mode_machine import STARTING_TIME, ModeMachine
-from hopping_leg.emulator.moteus_codes import BETWEEN, FaultCode, MoteusMode
+from hopping_leg.emulator.moteus_codes import (
+    BETWEEN,
+    STARTING_TIME,
+    FaultCode,
+    ModeMachine,
+    MoteusMode,
+)
 
 STEP = 5e-4
 

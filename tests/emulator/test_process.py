@@ -8,7 +8,7 @@ from moteus.fdcanusb_device import FdcanusbDevice
 
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.process import EmulatorProcess
-from hopping_leg.emulator.start import Start
+from hopping_leg.emulator.server import Start
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot
 

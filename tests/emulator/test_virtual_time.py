@@ -6,8 +6,8 @@ import pytest
 
 from hopping_leg.deploy.drive_link import LIMP, STOP
 from hopping_leg.emulator.faults import Fault
-from hopping_leg.emulator.lockstep import Lockstep
-from hopping_leg.emulator.start import Start
+from hopping_leg.emulator.server import Start
+from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.errors import HardwareError
 
 

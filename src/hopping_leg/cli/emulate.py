@@ -20,16 +20,32 @@ A fault script is TOML; `hop emulate --kinds` lists what it may name:
   value = 0.012
 """
 
+import contextlib
 import math
+import signal
+import sys
+import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from rich.console import Console
 from rich.table import Table
 
-from hopping_leg.emulator.faults import KINDS
+from hopping_leg.deploy.joint_transform import JOINTS
+from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
+from hopping_leg.emulator.faults import KINDS, load_faults
+from hopping_leg.emulator.moteus_codes import FaultCode, MoteusMode, Notice
 from hopping_leg.errors import UsageError
+
+if TYPE_CHECKING:
+    from hopping_leg.emulator.drive import Drive
+    from hopping_leg.emulator.ports import Port
+    from hopping_leg.emulator.robot import EmulatedRobot
+
+_RENEWED = 0.2
+"""How often the status line is renewed, s."""
 
 
 @dataclass(frozen=True)
@@ -65,16 +81,41 @@ class Emulate:
 
 
 def run(args: Emulate) -> None:
-    """Serve the emulated robot until Ctrl-C."""
+    """Serve the emulated robot until it is over, and tell what happens."""
     console = Console(highlight=False)
     if args.kinds:
         _list_kinds(console)
         return
     if args.seed < 0:
         raise UsageError(f"A seed of {args.seed} has no meaning; give 0 or more.")
-    from hopping_leg.cli.emulating import emulate
+    from hopping_leg.emulator.server import Server, Start
 
-    emulate(args, console)
+    start = Start(
+        robot=args.robot,
+        pose=args.start_pose,
+        configured=args.configured,
+        homed=args.homed,
+        held=args.held,
+        seed=args.seed,
+        faults=() if args.faults is None else load_faults(args.faults),
+        interface=args.interface,
+        channel=args.channel,
+        link=args.link,
+    )
+    robot, port = start.build(), start.open()
+    seconds = math.inf if args.seconds is None else args.seconds
+    try:
+        with _ending_signals() as over:
+            _greet(console, robot, port)
+            if args.realtime and prefer_this_thread() is not None:
+                console.print("Without real-time priority the drives may answer late under load.")
+            server, display = Server(robot, port), _Display(robot)
+            server.on_turn = lambda: display.renew(server.lost)
+            with uninterrupted():
+                server.run(lambda: bool(over) or robot.time >= seconds)
+            display.end()
+    finally:
+        port.close()
 
 
 def _list_kinds(console: Console) -> None:
@@ -86,3 +127,95 @@ def _list_kinds(console: Console) -> None:
             lasts = "on" if math.isinf(kind.duration) else f"{kind.duration:g} s"
         table.add_row(name, kind.text, f"{kind.value:g}" if kind.unit else "", kind.unit, lasts)
     console.print(table)
+
+
+@contextlib.contextmanager
+def _ending_signals() -> Iterator[list[int]]:
+    """Yield what fills with the signals that ask for the end: that is no error."""
+    over: list[int] = []
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = {number: signal.signal(number, lambda n, _: over.append(n)) for number in numbers}
+    try:
+        yield over
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _greet(console: Console, robot: "EmulatedRobot", port: "Port") -> None:
+    ids = " and ".join(str(drive.id) for drive in robot.drives)
+    where = f"on {port}." if ":" in str(port) else f"behind {port}"
+    console.print(f"Drives {ids} of {robot.robot.name} {where}", soft_wrap=True)
+    console.print(f"  hop deploy fast --transport {port}", soft_wrap=True)
+    sys.stdout.flush()
+
+
+class _Display:
+    """Events on lines of their own; the state on a line that is renewed, on a terminal only."""
+
+    def __init__(self, robot: "EmulatedRobot") -> None:
+        self._robot = robot
+        self._modes = [drive.machine.mode for drive in robot.drives]
+        self._faults_shown = 0
+        self._live = sys.stdout.isatty()
+        self._due = time.monotonic()
+
+    def renew(self, lost: float) -> None:
+        """Show what is new; ``lost`` is the time that could not be simulated, s."""
+        clear = "\r\x1b[K" if self._live else ""
+        for line in self._events():
+            print(f"{clear}{line}", flush=True)
+        if self._live and time.monotonic() >= self._due:
+            self._due = time.monotonic() + _RENEWED
+            print(f"{clear}{self._status(lost)}", end="", flush=True)
+
+    def end(self) -> None:
+        """Leave the line."""
+        if self._live:
+            print()
+        print(f"The emulator ended after {self._robot.time:.1f} s.", flush=True)
+
+    def _events(self) -> list[str]:
+        """Return a line for each fault that began and each change of mode since the last call."""
+        robot, lines = self._robot, []
+        log = robot.fault_injector.log
+        for begun, fault in log[self._faults_shown :]:
+            who = "" if fault.kind == "unplug" else f" ({fault.drive})"
+            lines.append(f"{begun:7.3f} s  fault: {KINDS[fault.kind].text}{who}")
+        self._faults_shown = len(log)
+        for joint, drive in enumerate(robot.drives):
+            mode = drive.machine.mode
+            if mode is not self._modes[joint]:
+                self._modes[joint] = mode
+                why = f": {_code_text(drive.machine.fault)}" if mode is MoteusMode.FAULT else ""
+                lines.append(f"{robot.time:7.3f} s  {JOINTS[joint]}: {_mode_text(drive)}{why}")
+        return lines
+
+    def _status(self, lost: float) -> str:
+        """Return the state in one line."""
+        robot = self._robot
+        parts = [f"{robot.time:7.1f} s"]
+        for joint, (name, drive) in enumerate(zip(JOINTS, robot.drives, strict=True)):
+            _, _, torque = robot.leg.sensed(joint)
+            given = robot.leg.transforms[joint].joint_torque(torque) if drive.active else 0.0
+            angle = math.degrees(robot.leg.q[joint])
+            parts.append(f"{name} {_mode_text(drive):<12} {angle:+7.1f} deg {given:+6.2f} N m")
+        parts.append(f"height {robot.leg.height:.3f} m{' held' if robot.held else ''}")
+        if lost > 0.1:
+            parts.append(f"{lost:.1f} s lost: the computer is too busy")
+        return " | ".join(parts)
+
+
+def _mode_text(drive: "Drive") -> str:
+    """Return a drive's mode, with its fault or notice."""
+    mode, code = drive.machine.mode, drive.machine.fault
+    text = mode.name.lower().replace("_", " ")
+    return f"{text} {code}" if code else text
+
+
+def _code_text(code: int) -> str:
+    """Return what a fault code or notice means."""
+    for kind in (FaultCode, Notice):
+        if code in set(kind):
+            return kind(code).name.lower().replace("_", " ")
+    return "unknown"

@@ -1,14 +1,10 @@
-"""The drive's text console, tunnelled in frames: ``tel stop``, ``conf ...``, ``d ...``.
+"""The drive's text console, tunnelled in frames: ``tel stop``, ``conf ...``, ``d ...``."""
 
-The host writes lines and polls for the answers, with or without packet numbers.
-"""
+from collections.abc import Callable
 
-from typing import TYPE_CHECKING
-
+from hopping_leg.emulator.rotor_encoder import RotorEncoder
+from hopping_leg.emulator.settings import Settings
 from hopping_leg.errors import UsageError
-
-if TYPE_CHECKING:
-    from hopping_leg.emulator.drive import Drive
 
 CHANNEL = 1
 """Of the console."""
@@ -20,12 +16,18 @@ _PACKETS = 256
 class Diagnostic:
     """The console of one drive.
 
+    The host writes lines and polls for the answers, with or without packet numbers.
+
     Args:
-        drive: That it configures.
+        settings: Of the drive.
+        encoder: Of the drive.
+        stop: Stops the drive at a time, s.
     """
 
-    def __init__(self, drive: "Drive") -> None:
-        self._drive = drive
+    def __init__(
+        self, settings: Settings, encoder: RotorEncoder, stop: Callable[[float], None]
+    ) -> None:
+        self._settings, self._encoder, self._stop = settings, encoder, stop
         self._input = self._output = self._sent = b""
         self._packet = 0
 
@@ -56,7 +58,7 @@ class Diagnostic:
             return f"ERR {error}\r\n".encode()
 
     def _answer(self, words: list[str], time: float) -> bytes:
-        settings = self._drive.settings
+        settings = self._settings
         match words:
             case ["tel", "stop"]:
                 return _OK
@@ -76,11 +78,11 @@ class Diagnostic:
             case ["conf", "default"]:
                 settings.reset()
             case ["d", "stop"]:
-                self._drive.stop(time)
+                self._stop(time)
             case ["d", "nearest" | "rezero", *where]:
-                self._drive.encoder.set_nearest(float(where[0]) if where else 0.0)
+                self._encoder.set_nearest(float(where[0]) if where else 0.0)
             case ["d", "exact", where]:
-                self._drive.encoder.set_exact(float(where))
+                self._encoder.set_exact(float(where))
             case ["d", "cfg-set-output", where]:
                 self._set_offset(float(where))
             case _:
@@ -89,7 +91,7 @@ class Diagnostic:
 
     def _set_offset(self, where: float) -> None:
         """Change the configured offset so that the output is at a position, revolutions."""
-        settings, position = self._drive.settings, self._drive.encoder.position
+        settings, position = self._settings, self._encoder.position
         change = (where - position) * float(settings["motor_position.output.sign"])
         offset = float(settings["motor_position.output.offset"]) + change
         settings.set("motor_position.output.offset", repr(offset))

@@ -9,14 +9,25 @@ from dataclasses import dataclass, fields
 from moteus.multiplex import F32
 from moteus.protocol import Register, scale_register
 
-from hopping_leg.emulator.command import COMMAND_FIELDS, Command
 from hopping_leg.emulator.diagnostic import Diagnostic
-from hopping_leg.emulator.identity import Identity
-from hopping_leg.emulator.mode_machine import ModeMachine
-from hopping_leg.emulator.moteus_codes import CONTROLLING, MODES, FaultCode, MoteusMode, Notice
+from hopping_leg.emulator.moteus_codes import (
+    CONTROLLING,
+    MODES,
+    FaultCode,
+    ModeMachine,
+    MoteusMode,
+    Notice,
+)
+from hopping_leg.emulator.registers import Identity
 from hopping_leg.emulator.rotor_encoder import RotorEncoder
 from hopping_leg.emulator.settings import Settings
-from hopping_leg.emulator.torque_law import TORQUE_CONSTANT, WITH_BOUNDS, TorqueLaw
+from hopping_leg.emulator.torque_law import (
+    COMMAND_FIELDS,
+    TORQUE_CONSTANT,
+    WITH_BOUNDS,
+    Command,
+    TorqueLaw,
+)
 
 AMBIENT = 30.0
 """Temperature of an idle drive, degrees C."""
@@ -71,7 +82,7 @@ class Drive:
         self.machine = ModeMachine()
         self.law = TorqueLaw(settings)
         self.command = Command()
-        self.diagnostic = Diagnostic(self)
+        self.diagnostic = Diagnostic(settings, self.encoder, self.stop)
         self.disturbances = Disturbances()
         self.uptime = 0.0
         self._brake, self.nominal_voltage = brake * 2 * math.pi, voltage

@@ -1,4 +1,6 @@
-"""What can go wrong, and when: a fault is one entry of a small TOML script.
+"""What can go wrong: an entry of a fault script says what and when, a class per kind what it does.
+
+A new kind is a subclass of ``FaultKind`` here, and a family in the study of faults.
 
 [[fault]]
 kind = "late_reply"
@@ -14,48 +16,21 @@ import math
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar, Protocol
+
+import numpy as np
 
 from hopping_leg.deploy.joint_transform import JOINTS
+from hopping_leg.emulator.frames import QueuedReply, ReplyQueue
 from hopping_leg.emulator.settings import DEFAULTS
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.io import read_dataclass
 
+if TYPE_CHECKING:
+    from hopping_leg.emulator.drive import Drive
+    from hopping_leg.emulator.leg import EmulatedLeg
 
-@dataclass(frozen=True)
-class Kind:
-    """A family of faults.
-
-    Attributes:
-        text: What happens.
-        unit: Of the fault's value; empty if it has none.
-        value: Default value.
-        duration: Default duration, s; NaN where a number of replies is meant.
-    """
-
-    text: str
-    unit: str = ""
-    value: float = 0.0
-    duration: float = math.inf
-
-
-KINDS = {
-    "drop_reply": Kind("replies are lost", duration=math.nan),
-    "corrupt_reply": Kind("bits of replies flip on the serial line", duration=math.nan),
-    "late_reply": Kind("replies arrive later", "s", 0.012, math.nan),
-    "duplicate_reply": Kind("replies arrive twice", duration=math.nan),
-    "silence": Kind("no reply arrives any more"),
-    "garbage_line": Kind("noise arrives as a line of its own", duration=math.nan),
-    "encoder_jump": Kind("a joint's angle is wrong from now on", "rad", 0.5),
-    "drive_fault": Kind("a drive goes to fault with this code", "code", 33.0),
-    "over_temperature": Kind("a drive warms up", "K/s", 40.0),
-    "over_voltage": Kind("the bus voltage rises to", "V", 50.0),
-    "under_voltage": Kind("the bus voltage sags to", "V", 10.0),
-    "limit_notice": Kind("a drive reports that a limit is at work", "code", 102.0),
-    "unplug": Kind("the adapter is pulled out, and back in after the duration", duration=0.5),
-    "power_loss": Kind("a drive restarts: stopped, and not homed"),
-    "boot_pose": Kind("a drive counts rotor turns wrongly, from the start", "turns", 1.0),
-    "configuration": Kind("a drive's setting is wrong, from the start", "as the setting's"),
-}
+KINDS: "dict[str, type[FaultKind]]" = {}
 """Every kind that a script may name."""
 
 SINCE = ("start", "powered", "flight")
@@ -66,16 +41,19 @@ PHASES = ("any", "stance", "flight", "rising", "falling", "touchdown", "apex")
 
 DRIVES = (*JOINTS, "both")
 
+_FLIPS = 1 << 16
+_NOISE = b"@#!%\x07~ moteus?"
+
 
 @dataclass(frozen=True)
 class Fault:
-    """One fault.
+    """One entry of a fault script.
 
     Raises:
         UsageError: A field has no meaning.
     """
 
-    kind: str = field(metadata={"choices": tuple(KINDS)})
+    kind: str = field(metadata={"choices": KINDS})
     since: str = "powered"
     at: float = 0.0
     """Seconds after ``since``."""
@@ -106,8 +84,7 @@ class Fault:
                 raise UsageError(f"'{name}' of a {self.kind} is {seconds} s but must be 0 or more.")
         if self.count < 1:
             raise UsageError(f"'count' of a {self.kind} is {self.count} but must be 1 or more.")
-        if self.kind == "configuration" and self.name not in DEFAULTS:
-            raise UsageError(unknown_name("drive setting", self.name, DEFAULTS))
+        KINDS[self.kind].check(self)
 
     @property
     def amount(self) -> float:
@@ -121,8 +98,259 @@ class Fault:
 
     @property
     def joints(self) -> tuple[int, ...]:
-        """Drives that it befalls."""
+        """Drives that have it: 0 for the hip, 1 for the knee."""
         return (0, 1) if self.drive == "both" else (JOINTS.index(self.drive),)
+
+
+class FaultyRobot(Protocol):
+    """What faults change."""
+
+    time: float
+    """s"""
+    plugged: bool
+    """Whether the adapter is plugged in."""
+    leg: "EmulatedLeg"
+    reply_queue: ReplyQueue
+
+    @property
+    def drives(self) -> "tuple[Drive, ...]":
+        """Hip and knee."""
+        ...
+
+
+@dataclass
+class Delivery:
+    """How a drive's reply reaches the host.
+
+    Attributes:
+        due: When, s.
+        copies: How often.
+        flip: Which bits flip, see ``QueuedReply``.
+    """
+
+    due: float
+    copies: int = 1
+    flip: int = -1
+
+
+class FaultKind:
+    """A fault at work; a subclass says what it does.
+
+    Attributes:
+        text: What happens.
+        unit: Of the fault's value; empty if it has none.
+        value: Default value.
+        duration: Default duration, s; NaN where a number of replies is meant.
+        at_start: Whether the robot starts with it, whatever the script says of its time.
+
+    Args:
+        fault: Entry of the script.
+        robot: That has it.
+        rng: Of the bits that flip.
+    """
+
+    text: ClassVar[str]
+    unit: ClassVar[str] = ""
+    value: ClassVar[float] = 0.0
+    duration: ClassVar[float] = math.inf
+    at_start: ClassVar[bool] = False
+
+    def __init_subclass__(cls, *, kind: str) -> None:
+        KINDS[kind] = cls
+
+    def __init__(self, fault: Fault, robot: FaultyRobot, rng: np.random.Generator) -> None:
+        self.fault, self.robot, self.rng = fault, robot, rng
+        self.begun = robot.time
+        self.replies_left = math.inf
+        if math.isnan(fault.lasts):
+            self.replies_left = fault.count * len(fault.joints)
+
+    @classmethod
+    def check(cls, fault: Fault) -> None:
+        """Refuse an entry that the kind cannot do; raises ``UsageError``."""
+
+    @property
+    def drives(self) -> "list[Drive]":
+        """Those that have the fault."""
+        return [self.robot.drives[joint] for joint in self.fault.joints]
+
+    @property
+    def over(self) -> bool:
+        """Whether it has lasted as long as it should."""
+        lasts = self.fault.lasts
+        return self.replies_left <= 0 or (
+            not math.isnan(lasts) and self.robot.time >= self.begun + lasts
+        )
+
+    def begin(self) -> None:
+        """Set the robot's fault when its time has come."""
+
+    def update(self) -> None:
+        """Change it before each step of physics."""
+
+    def end(self) -> None:
+        """Reset the robot when the fault is over."""
+
+    def on_reply(self, delivery: Delivery) -> None:
+        """Change how a reply of one of the drives is delivered."""
+
+
+class _DropReply(FaultKind, kind="drop_reply"):
+    text = "replies are lost"
+    duration = math.nan
+
+    def on_reply(self, delivery: Delivery) -> None:
+        delivery.copies = 0
+
+
+class _CorruptReply(FaultKind, kind="corrupt_reply"):
+    text = "bits of replies flip on the serial line"
+    duration = math.nan
+
+    def on_reply(self, delivery: Delivery) -> None:
+        delivery.flip = int(self.rng.integers(_FLIPS))
+
+
+class _LateReply(FaultKind, kind="late_reply"):
+    text, unit, value = "replies arrive later", "s", 0.012
+    duration = math.nan
+
+    def on_reply(self, delivery: Delivery) -> None:
+        delivery.due += self.fault.amount
+
+
+class _DuplicateReply(FaultKind, kind="duplicate_reply"):
+    text = "replies arrive twice"
+    duration = math.nan
+
+    def on_reply(self, delivery: Delivery) -> None:
+        delivery.copies += 1
+
+
+class _Silence(FaultKind, kind="silence"):
+    text = "no reply arrives any more"
+
+    def on_reply(self, delivery: Delivery) -> None:
+        delivery.copies = 0
+
+
+class _GarbageLine(FaultKind, kind="garbage_line"):
+    text = "noise arrives as a line of its own"
+    duration = math.nan
+
+    def begin(self) -> None:
+        self.replies_left = 0
+        for _ in range(self.fault.count):
+            self.robot.reply_queue.put(self.robot.time, QueuedReply(noise=_NOISE))
+
+
+class _EncoderJump(FaultKind, kind="encoder_jump"):
+    text, unit, value = "a joint's angle is wrong from now on", "rad", 0.5
+
+    def begin(self) -> None:
+        for joint, drive in zip(self.fault.joints, self.drives, strict=True):
+            jump = self.robot.leg.transforms[joint].motor_velocity(self.fault.amount)
+            drive.encoder.jump = jump * drive.encoder.gear_ratio
+
+    def end(self) -> None:
+        for drive in self.drives:
+            drive.encoder.jump = 0.0
+
+
+class _DriveFault(FaultKind, kind="drive_fault"):
+    text, unit, value = "a drive goes to fault with this code", "code", 33.0
+
+    def begin(self) -> None:
+        for drive in self.drives:
+            drive.disturbances.fault = int(self.fault.amount)
+
+    def end(self) -> None:
+        for drive in self.drives:
+            drive.disturbances.fault = 0
+
+
+class _OverTemperature(FaultKind, kind="over_temperature"):
+    text, unit, value = "a drive warms up", "K/s", 40.0
+
+    def update(self) -> None:
+        for drive in self.drives:
+            passed = self.robot.time - self.begun
+            drive.disturbances.temperature = self.fault.amount * passed
+
+    def end(self) -> None:
+        for drive in self.drives:
+            drive.disturbances.temperature = 0.0
+
+
+class _OverVoltage(FaultKind, kind="over_voltage"):
+    text, unit, value = "the bus voltage rises to", "V", 50.0
+
+    def begin(self) -> None:
+        for drive in self.drives:
+            drive.disturbances.voltage = self.fault.amount - drive.nominal_voltage
+
+    def end(self) -> None:
+        for drive in self.drives:
+            drive.disturbances.voltage = 0.0
+
+
+class _UnderVoltage(_OverVoltage, kind="under_voltage"):
+    text, value = "the bus voltage sags to", 10.0
+
+
+class _LimitNotice(FaultKind, kind="limit_notice"):
+    text, unit, value = "a drive reports that a limit is at work", "code", 102.0
+
+    def begin(self) -> None:
+        for drive in self.drives:
+            drive.disturbances.notice = int(self.fault.amount)
+
+    def end(self) -> None:
+        for drive in self.drives:
+            drive.disturbances.notice = 0
+
+
+class _Unplug(FaultKind, kind="unplug"):
+    text = "the adapter is pulled out, and back in after the duration"
+    duration = 0.5
+
+    def begin(self) -> None:
+        self.robot.plugged = False
+
+    def end(self) -> None:
+        self.robot.plugged = True
+
+
+class _PowerLoss(FaultKind, kind="power_loss"):
+    text = "a drive restarts: stopped, and not homed"
+
+    def begin(self) -> None:
+        for joint, drive in zip(self.fault.joints, self.drives, strict=True):
+            drive.boot(self.robot.leg.sensed(joint)[0])
+
+
+class _BootPose(FaultKind, kind="boot_pose"):
+    text, unit, value = "a drive counts rotor turns wrongly, from the start", "turns", 1.0
+    at_start = True
+
+    def begin(self) -> None:
+        for drive in self.drives:
+            drive.encoder.misplace(self.fault.amount)
+
+
+class _Configuration(FaultKind, kind="configuration"):
+    text, unit = "a drive's setting is wrong, from the start", "as the setting's"
+    at_start = True
+
+    @classmethod
+    def check(cls, fault: Fault) -> None:
+        if fault.name not in DEFAULTS:
+            raise UsageError(unknown_name("drive setting", fault.name, DEFAULTS))
+
+    def begin(self) -> None:
+        for drive in self.drives:
+            drive.settings.set(self.fault.name, repr(self.fault.amount))
+            drive.settings.save()
 
 
 def load_faults(path: Path) -> tuple[Fault, ...]:

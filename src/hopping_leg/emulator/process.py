@@ -13,10 +13,9 @@ from types import TracebackType
 
 from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
 from hopping_leg.emulator.faults import Fault
-from hopping_leg.emulator.pty_port import PtyPort
+from hopping_leg.emulator.ports import PtyPort
 from hopping_leg.emulator.robot import EmulatedRobot
-from hopping_leg.emulator.server import Server
-from hopping_leg.emulator.start import Start
+from hopping_leg.emulator.server import Server, Start
 from hopping_leg.emulator.wire_log import WireLog
 from hopping_leg.errors import UsageError
 

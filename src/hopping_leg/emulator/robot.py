@@ -1,4 +1,4 @@
-"""The emulated robot: two drives, the leg that they turn, and the faults that befall them.
+"""The emulated robot: two drives, the leg that they turn, and their faults.
 
 Time comes as an argument. Nothing here knows of sockets, terminals or the clock on the wall.
 """
@@ -16,10 +16,9 @@ from hopping_leg.emulator import bus
 from hopping_leg.emulator.drive import Drive
 from hopping_leg.emulator.fault_injection import FaultInjector
 from hopping_leg.emulator.faults import Fault
-from hopping_leg.emulator.frames import Frame
-from hopping_leg.emulator.identity import Identity
+from hopping_leg.emulator.frames import Frame, ReplyQueue
 from hopping_leg.emulator.leg import TIMESTEP, EmulatedLeg
-from hopping_leg.emulator.reply_queue import ReplyQueue
+from hopping_leg.emulator.registers import Identity
 from hopping_leg.emulator.settings import Settings
 from hopping_leg.emulator.wire_log import WireLog
 from hopping_leg.robot.parameters import Robot
@@ -73,6 +72,8 @@ class EmulatedRobot:
         """What is on its way to the host."""
         self.wire_time = 0.0
         """What a reply takes at least, s."""
+        self.plugged = True
+        """Whether the adapter is plugged in."""
         self.log = WireLog()
         """What went over the wire."""
         self._sense()
@@ -101,7 +102,7 @@ class EmulatedRobot:
             self.log.told(self.time, joint, message, drive)
             if answer is not None:
                 self.log.answered(self.time, joint, answer)
-                self.fault_injector.send(answer, joint, self.reply_queue)
+                self.fault_injector.send(answer, joint, self.wire_time)
 
     def _step(self) -> None:
         self.fault_injector.step()

@@ -1,4 +1,4 @@
-"""The emulated robot in real time behind a port.
+"""The emulated robot in real time behind a port: how it starts, and the thread that serves it.
 
 One thread does all: it waits for the host, the next step or the next reply, lets the robot catch up
 with the clock, and answers.
@@ -7,50 +7,114 @@ with the clock, and answers.
 import select
 import time
 from collections.abc import Callable
-from typing import Protocol
+from dataclasses import dataclass
+from pathlib import Path
 
-from hopping_leg.emulator.frames import Frame
-from hopping_leg.emulator.reply_queue import QueuedReply
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.emulator.faults import Fault
+from hopping_leg.emulator.ports import DEFAULT_CHANNELS, CanPort, Port, PtyPort
 from hopping_leg.emulator.robot import EmulatedRobot
+from hopping_leg.errors import UsageError, unknown_name
+from hopping_leg.robot import kinematics, load_robot
+from hopping_leg.robot.parameters import Robot
+
+_LENGTHS = {"stand": 0.69, "crouch": 0.5, "stretch": 0.93}
+"""Named poses: leg length over the straight leg's, foot below the hip."""
+
+POSES = (*_LENGTHS, "zero")
+"""Named poses; ``zero`` is the leg straight down, where the joints' angles are zero."""
+
+PTY = "pty"
+"""A serial terminal, as an fdcanusb's."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """What is emulated and how it begins."""
+
+    robot: str = "legv2"
+    """A shipped robot or a .toml file; its [reality] holds."""
+    pose: str = "stand"
+    """One of POSES or joint angles as 'HIP,KNEE' in rad."""
+    configured: bool = True
+    """Drives configured as the robot's file asks; else as the firmware is delivered."""
+    homed: bool = True
+    """Drives homed, as somebody did by hand; else known only within a turn of their rotors."""
+    held: bool = True
+    """Somebody holds the leg until both drives are powered."""
+    seed: int = 0
+    """Of sensor noise and jitter."""
+    faults: tuple[Fault, ...] = ()
+    """What goes wrong, and when."""
+    interface: str = PTY
+    """How the host reaches it: ``pty`` or a bus of python-can, see ``ports``."""
+    channel: str | None = None
+    """Of a bus; none takes the interface's default."""
+    link: Path | None = None
+    """Also offer the terminal under this path, which stays the same when it is plugged again."""
+
+    def build(self) -> EmulatedRobot:
+        """Return the emulated robot.
+
+        Raises:
+            RobotError: The robot is unknown, wrong or cannot stand.
+            UsageError: The pose is unknown.
+        """
+        robot = load_robot(self.robot)
+        robot.require_leg()
+        return EmulatedRobot(
+            robot,
+            posture(robot, self.pose),
+            configured=self.configured,
+            homed=self.homed,
+            held=self.held,
+            seed=self.seed,
+            faults=self.faults,
+        )
+
+    def open(self) -> Port:
+        """Return the adapter.
+
+        Raises:
+            UsageError: The interface has no such option or cannot be opened.
+        """
+        if self.interface == PTY:
+            if self.channel is not None:
+                raise UsageError("A channel is for CAN buses; a pty has a link.")
+            return PtyPort(self.link)
+        if self.link is not None:
+            raise UsageError("A link is for the interface pty; a CAN bus has a channel.")
+        if self.interface not in DEFAULT_CHANNELS:
+            raise UsageError(unknown_name("interface", self.interface, (PTY, *DEFAULT_CHANNELS)))
+        return CanPort(self.interface, self.channel)
+
+
+def posture(robot: Robot, pose: str) -> Array:
+    """Return the joint angles of a named or given pose, rad, (2,).
+
+    Raises:
+        UsageError: There is no such pose.
+    """
+    if pose == "zero":
+        return np.zeros(2)
+    if pose in _LENGTHS:
+        length = _LENGTHS[pose] * (robot.thigh.length + robot.shank.length)
+        return kinematics.joint_angles(robot, np.array([length, 0.0]))
+    try:
+        hip, knee = (float(part) for part in pose.split(","))
+    except ValueError as error:
+        valid = unknown_name("pose", pose, POSES)
+        raise UsageError(f"{valid} Or give joint angles, rad, e.g. 0.6,-1.3.") from error
+    return np.array([hip, knee])
+
 
 _IDLE = 0.001
 """Longest sleep between two looks at the clock, s."""
 
 _FURTHEST = 0.02
 """Most that is caught up with at once after the process was held off, s; the rest is lost."""
-
-
-class Port(Protocol):
-    """The adapter between host and drives."""
-
-    @property
-    def plugged(self) -> bool:
-        """Whether the host can reach it."""
-        ...
-
-    def fileno(self) -> int:
-        """Return the descriptor to wait for."""
-        ...
-
-    def receive(self) -> list[Frame]:
-        """Return frames that the host sent."""
-        ...
-
-    def send(self, item: QueuedReply) -> None:
-        """Send to the host."""
-        ...
-
-    def plug_in(self) -> None:
-        """Come back."""
-        ...
-
-    def unplug(self) -> None:
-        """Be gone for the host."""
-        ...
-
-    def close(self) -> None:
-        """End."""
-        ...
 
 
 class Server:
@@ -114,7 +178,7 @@ def serve(robot: EmulatedRobot, port: Port, *, ready: bool) -> bool:
     for item in items:
         if port.plugged:
             port.send(item)
-    plugged = robot.fault_injector.plugged
+    plugged = robot.plugged
     if plugged == port.plugged:
         return bool(items)
     if plugged:

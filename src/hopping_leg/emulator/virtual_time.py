@@ -1,8 +1,8 @@
-"""The host's asyncio client in virtual time, with the emulator at the other end of its line.
+"""Host and emulated robot in one process in virtual time: exact, and as fast as it goes.
 
 An event loop that has nothing to do does not sleep: it lets the emulated robot move until something
-arrives or the next timer is due. All of the client runs unchanged, down to the bytes on the
-terminal; a run is exact and as fast as the processor.
+arrives or the next timer is due. The host's loop, link and client run unchanged, down to the bytes
+on a terminal; ``MemoryTransport`` goes without the terminal.
 """
 
 import asyncio
@@ -10,8 +10,16 @@ import selectors
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
+from moteus import Transport
+from moteus.transport_device import Frame as ClientFrame
+from moteus.transport_device import TransportDevice
+
+from hopping_leg.deploy.driver import MoteusLink
+from hopping_leg.deploy.fdcanusb import TolerantFdcanusb
+from hopping_leg.emulator.frames import Frame, padded
+from hopping_leg.emulator.ports import Port, PtyPort
 from hopping_leg.emulator.robot import EmulatedRobot
-from hopping_leg.emulator.server import Port, serve
+from hopping_leg.emulator.server import serve
 from hopping_leg.errors import HardwareError
 
 Result = TypeVar("Result")
@@ -113,3 +121,107 @@ class SteppedClient:
 
 def _words(context: dict[str, Any]) -> str:
     return str(context.get("exception") or context.get("message", "unknown"))
+
+
+WIRE_TIME = 5e-4
+"""Time from a question to its answer, s, as measured with two motors on an fdcanusb."""
+
+
+class Lockstep:
+    """A clock that moves an emulated robot, and the link to it.
+
+    Args:
+        robot: Behind the wire.
+        checksums: Whether the lines have checksums; a plain fdcanusb's have none.
+
+    Attributes:
+        truth: Time and base height at every tick, s and m, and the foot's clearance, m.
+    """
+
+    def __init__(self, robot: EmulatedRobot, *, checksums: bool = True) -> None:
+        self.robot = robot
+        robot.wire_time = WIRE_TIME
+        self.truth: list[tuple[float, float, float]] = []
+        self._port, self._checksums = PtyPort(), checksums
+        self.link = MoteusLink(robot.robot, self._open, self, self._make_client)
+
+    def now(self) -> float:
+        """Return the robot's time."""
+        return self.robot.time
+
+    def wait_until(self, deadline: float) -> float:
+        """Let the robot move until a deadline."""
+        self._client.wait(deadline)
+        leg = self.robot.leg
+        self.truth.append((self.robot.time, leg.height, leg.foot_clearance))
+        return max(self.robot.time, deadline)
+
+    def patience(self, until: float) -> float:
+        """Return the time that is left, s: none once the client has done its work."""
+        return max(until - self.robot.time, 0.0)
+
+    def _make_client(self, on_error: Callable[[str], None]) -> SteppedClient:
+        self._client = SteppedClient(self.robot, self._port, on_error)
+        return self._client
+
+    def _open(self) -> Any:  # noqa: ANN401
+        device = TolerantFdcanusb(str(self._port.path))
+        if not self._checksums:
+            device._is_fdcanusb, device._checksum_active = True, False
+        return Transport([device])
+
+
+class MemoryTransport(TransportDevice):  # type: ignore[misc]
+    """A device whose transactions take no time; replies that are late or lost stay away.
+
+    Args:
+        robot: Behind it.
+    """
+
+    def __init__(self, robot: EmulatedRobot) -> None:
+        super().__init__()
+        self.robot = robot
+
+    def empty_bus_tx_safe(self) -> bool:
+        """Return True: anything may be sent."""
+        return True
+
+    async def send_frame(self, frame: ClientFrame) -> None:
+        """Send a frame; replies go to the receive queue."""
+        self._send(frame)
+        for reply in self._replies():
+            await self._handle_received_frame(reply)
+
+    async def transaction(self, requests: list[Any], **_: object) -> None:
+        """Send requests; each gets the first reply that it waits for and that has arrived."""
+        for request in requests:
+            self._send(request.frame)
+        for reply in self._replies():
+            for request in requests:
+                wants = request.frame_filter is not None and request.frame_filter(reply)
+                if wants and not request.responses:
+                    request.responses.append(reply)
+                    break
+            else:
+                await self._handle_received_frame(reply)
+
+    def _send(self, frame: ClientFrame) -> None:
+        if self.robot.plugged:
+            self.robot.receive(Frame(frame.arbitration_id, padded(bytes(frame.data))))
+
+    def _replies(self) -> list[ClientFrame]:
+        """Return what arrives now; a CAN controller discards what was corrupted."""
+        items = self.robot.reply_queue.take(self.robot.time)
+        return [
+            ClientFrame(
+                arbitration_id=item.frame.arbitration_id,
+                data=item.frame.data,
+                dlc=len(item.frame.data),
+                is_extended_id=item.frame.extended,
+                is_fd=True,
+                bitrate_switch=True,
+                channel=self,
+            )
+            for item in items
+            if item.frame is not None and item.flip < 0 and self.robot.plugged
+        ]

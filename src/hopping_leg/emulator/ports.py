@@ -1,0 +1,224 @@
+"""The adapter between host and drives: a terminal that passes for an fdcanusb, or a CAN bus.
+
+``udp_multicast`` needs neither root nor a kernel that knows CAN; ``socketcan`` on a ``vcan`` works
+as well where there is one.
+"""
+
+import os
+import termios
+import tty
+from pathlib import Path
+from typing import Protocol
+
+import can
+
+from hopping_leg.emulator.frames import Frame, LineProtocol, QueuedReply, received_line
+from hopping_leg.errors import UsageError
+
+UDP_MULTICAST = "udp_multicast"
+"""The interface that needs no driver."""
+
+DEFAULT_CHANNELS = {UDP_MULTICAST: "239.74.163.2", "socketcan": "vcan0"}
+"""Interfaces of python-can that the emulator serves, with the channel that it takes by default."""
+
+
+class Port(Protocol):
+    """The adapter between host and drives."""
+
+    @property
+    def plugged(self) -> bool:
+        """Whether the host can reach it."""
+        ...
+
+    def fileno(self) -> int:
+        """Return the descriptor to wait for."""
+        ...
+
+    def receive(self) -> list[Frame]:
+        """Return frames that the host sent."""
+        ...
+
+    def send(self, item: QueuedReply) -> None:
+        """Send to the host."""
+        ...
+
+    def plug_in(self) -> None:
+        """Come back."""
+        ...
+
+    def unplug(self) -> None:
+        """Be gone for the host."""
+        ...
+
+    def close(self) -> None:
+        """End."""
+        ...
+
+
+class PtyPort:
+    """The adapter's end of a serial line.
+
+    Args:
+        link: Also offer the terminal under this path, which stays the same when it is plugged in
+            again.
+    """
+
+    def __init__(self, link: Path | None = None) -> None:
+        self._link = link
+        self.plug_in()
+
+    def __str__(self) -> str:
+        return str(self.path)
+
+    @property
+    def path(self) -> Path:
+        """What the host opens."""
+        return self._link or self._terminal
+
+    @property
+    def plugged(self) -> bool:
+        """Whether there is a terminal."""
+        return self._master >= 0
+
+    def plug_in(self) -> None:
+        """Offer a new terminal."""
+        self._master, self._slave = os.openpty()
+        for descriptor in (self._master, self._slave):
+            tty.setraw(descriptor, termios.TCSANOW)
+        os.set_blocking(self._master, False)
+        self._terminal = Path(os.ttyname(self._slave))
+        self._protocol = LineProtocol()
+        if self._link is not None:
+            self._link.unlink(missing_ok=True)
+            self._link.symlink_to(self._terminal)
+
+    def unplug(self) -> None:
+        """Take the terminal away; the host's reads and writes fail."""
+        if self._link is not None:
+            self._link.unlink(missing_ok=True)
+        os.close(self._master)
+        os.close(self._slave)
+        self._master = self._slave = -1
+
+    close = unplug
+
+    def fileno(self) -> int:
+        """Return the descriptor to wait for; -1 while unplugged."""
+        return self._master
+
+    def receive(self) -> list[Frame]:
+        """Return frames that the host sent; lines that are none are answered."""
+        try:
+            items = self._protocol.feed(os.read(self._master, 65536))
+        except BlockingIOError:
+            return []
+        frames = []
+        for item in items:
+            if isinstance(item, Frame):
+                frames.append(item)
+            else:
+                self._write(item)
+        return frames
+
+    def send(self, item: QueuedReply) -> None:
+        """Send what is due as a line."""
+        if item.frame is None:
+            self._write(item.noise + b"\r\n")
+            return
+        line = self._protocol.line(received_line(item.frame))
+        if item.flip >= 0:
+            line = _flipped(line, 2 * len(item.frame.data), item.flip)
+        self._write(line)
+
+    def _write(self, data: bytes) -> None:
+        """Write; a host that does not read loses it."""
+        try:
+            os.write(self._master, data)
+        except BlockingIOError:
+            return
+
+
+def _flipped(line: bytes, digits: int, flip: int) -> bytes:
+    """Return a line with another digit in its payload: ``flip`` says which and how."""
+    which, how = flip % digits, flip // digits % 15 + 1
+    at = line.index(b" ", line.index(b" ") + 1) + 1 + which
+    return line[:at] + b"%X" % (int(line[at : at + 1], 16) ^ how) + line[at + 1 :]
+
+
+class CanPort:
+    """One node on a CAN-FD bus that speaks for both drives.
+
+    Args:
+        interface: One of ``DEFAULT_CHANNELS``.
+        channel: Of the interface; none takes the default.
+
+    Raises:
+        UsageError: The bus cannot be opened.
+    """
+
+    def __init__(self, interface: str = UDP_MULTICAST, channel: str | None = None) -> None:
+        self.interface = interface
+        self.channel = channel or DEFAULT_CHANNELS[interface]
+        self._bus: can.BusABC | None = None
+        self.plug_in()
+
+    def __str__(self) -> str:
+        return f"{self.interface}:{self.channel}"
+
+    @property
+    def plugged(self) -> bool:
+        """Whether the drives are on the bus."""
+        return self._bus is not None
+
+    def plug_in(self) -> None:
+        """Join the bus.
+
+        Raises:
+            UsageError: The bus cannot be opened.
+        """
+        try:
+            self._bus = can.Bus(interface=self.interface, channel=self.channel, fd=True)
+        except (can.CanError, OSError, ImportError) as error:
+            raise UsageError(
+                f"Cannot open {self.interface} '{self.channel}': {error}; udp_multicast needs a"
+                " network interface that knows multicast and the package msgpack."
+            ) from error
+
+    def unplug(self) -> None:
+        """Leave the bus: the host's frames are heard by nobody."""
+        if self._bus is not None:
+            self._bus.shutdown()
+            self._bus = None
+
+    close = unplug
+
+    def fileno(self) -> int:
+        """Return the descriptor to wait for; -1 while unplugged."""
+        return -1 if self._bus is None else int(self._bus.fileno())
+
+    def receive(self) -> list[Frame]:
+        """Return frames that were sent on the bus."""
+        frames: list[Frame] = []
+        while self._bus is not None:
+            try:
+                message = self._bus.recv(timeout=0)
+            except can.CanError:
+                continue  # noise that is no frame
+            if message is None:
+                break
+            frames.append(Frame(message.arbitration_id, bytes(message.data)))
+        return frames
+
+    def send(self, item: QueuedReply) -> None:
+        """Send a frame; noise and corrupted frames are discarded by CAN controllers."""
+        if self._bus is None or item.frame is None or item.flip >= 0:
+            return
+        self._bus.send(
+            can.Message(
+                arbitration_id=item.frame.arbitration_id,
+                is_extended_id=item.frame.extended,
+                data=item.frame.data,
+                is_fd=True,
+                bitrate_switch=True,
+            )
+        )
