@@ -8,13 +8,11 @@ runs/lab-leg.toml.
 import sys
 from pathlib import Path
 
-from hopping_leg.identify.excitation import make_excitation
-from hopping_leg.identify.multisine import Multisine
+from hopping_leg.identify.excitation import Multisine, make_excitation
 from hopping_leg.identify.pipeline import identify
 from hopping_leg.identify.play_excitation import play
 from hopping_leg.identify.recording import load_recording
-from hopping_leg.identify.result import parameters_json
-from hopping_leg.identify.robot_file import save_robot
+from hopping_leg.identify.result import parameters_json, save_robot
 from hopping_leg.robot import load_robot
 
 SIDECAR = """\

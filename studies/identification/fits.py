@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.identify.cma import CmaOptions
-from hopping_leg.identify.judging import judge
-from hopping_leg.identify.leg_hypothesis import LegHypothesis
-from hopping_leg.identify.optimizers import SearchOptions
+from hopping_leg.identify.optimizers import CmaOptions
+from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import Recording
+from hopping_leg.identify.search import SearchOptions
+from hopping_leg.identify.validation import judge
 from hopping_leg.robot.model import TIMESTEP
 from studies.identification.study import Clock, Keeper, Study
 from studies.identification.twin import believed

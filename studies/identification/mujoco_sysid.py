@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from studies.identification.fits import compare, summary, unseen_errors
 from studies.identification.study import Clock, Keeper, Study

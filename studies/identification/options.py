@@ -12,7 +12,7 @@ from rich.table import Table
 from hopping_leg.cli.fit_progress import FitProgress
 from hopping_leg.cli.options import at_least
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.optimizers import Report
+from hopping_leg.identify.search import Report
 
 _VARIABLE = "HOPPING_LEG_RECORDINGS"
 

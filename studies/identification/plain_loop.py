@@ -7,10 +7,10 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RecordingError
-from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.actuator_model import build_rig_model
+from hopping_leg.identify.initial_states import base_rate, start_states
+from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.rig_model import build_rig_model
-from hopping_leg.identify.states import base_rate, start_states
 from hopping_leg.identify.windows import Window
 from hopping_leg.robot.limits import MotorLimit
 from hopping_leg.robot.parameters import Robot

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.ownership import robot_of
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
+from hopping_leg.identify.plan import robot_of
 from hopping_leg.identify.recording import Recording, load_recording
 from hopping_leg.identify.result import validation_json
 from hopping_leg.robot import load_robot

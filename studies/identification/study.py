@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, Self
 
 from hopping_leg.evaluate import keeper
-from hopping_leg.identify.optimizers import Report
 from hopping_leg.identify.result import software_versions
+from hopping_leg.identify.search import Report
 from hopping_leg.io import write_json
 
 

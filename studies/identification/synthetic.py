@@ -3,7 +3,7 @@
 import functools
 from typing import Any
 
-from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from studies.identification.fits import fit, unseen_errors
 from studies.identification.study import Keeper, Study

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import make_plan
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import cut

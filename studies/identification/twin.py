@@ -3,9 +3,16 @@
 from functools import cache
 from typing import Literal
 
-from hopping_leg.identify.excitation import adapt, make_excitation
-from hopping_leg.identify.leg_hypothesis import LegHypothesis
-from hopping_leg.identify.paper_excitation import DURATION, Stroke, Strokes, fixed_base, moving_base
+from hopping_leg.identify.excitation import make_excitation
+from hopping_leg.identify.paper_excitation import (
+    DURATION,
+    Stroke,
+    Strokes,
+    adapt,
+    fixed_base,
+    moving_base,
+)
+from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.play_excitation import play
 from hopping_leg.identify.recording import Recording
 from hopping_leg.robot import load_robot

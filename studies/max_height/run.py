@@ -17,7 +17,7 @@ import numpy as np
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.evaluate.keeper import Keeper
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
-from hopping_leg.identify.cma import seeded_strategy
+from hopping_leg.identify.optimizers import seeded_strategy
 from hopping_leg.robot.kinematics import foot_position, joint_angles
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import MujocoSimulator

@@ -5,7 +5,7 @@ import pytest
 
 from hopping_leg.evaluate.figures.fits import residual_spectrum, worst_stretch
 from hopping_leg.evaluate.fit_report import parameter_table, quality_table, write_fit_report
-from hopping_leg.identify.overlay import overlays
+from hopping_leg.identify.validation import overlays
 from hopping_leg.robot import load_robot
 from tests.identify.fitting import identified, run
 from tests.identify.twin import LEG, record, swing

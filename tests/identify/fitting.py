@@ -2,11 +2,10 @@
 
 import functools
 
-from hopping_leg.identify.cma import CmaOptions
-from hopping_leg.identify.least_squares import LeastSquaresOptions
-from hopping_leg.identify.leg_hypothesis import LegHypothesis
-from hopping_leg.identify.optimizers import SearchOptions
+from hopping_leg.identify.optimizers import CmaOptions, LeastSquaresOptions
+from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
+from hopping_leg.identify.search import SearchOptions
 from tests.identify.twin import LEG, record, swing
 
 TRUTH = {"hip.friction": 0.12, "knee.damping": 0.06}

@@ -2,10 +2,8 @@
 
 import numpy as np
 
-from hopping_leg.identify.cost import Scoring
-from hopping_leg.identify.leg_hypothesis import LegHypothesis
-from hopping_leg.identify.objective import Objective
-from hopping_leg.identify.parameters import choose
+from hopping_leg.identify.cost import Objective, Scoring
+from hopping_leg.identify.parameters import LegHypothesis, choose
 from hopping_leg.identify.windows import cut
 from tests.identify.twin import LEG, STEP, record, swing
 

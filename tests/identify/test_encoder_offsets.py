@@ -3,10 +3,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from hopping_leg.identify.columns import PAIRS
 from hopping_leg.identify.encoder_offsets import OffsetFinder
-from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import with_metadata
+from hopping_leg.identify.recording_format import PAIRS
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.validation import open_loop
 from hopping_leg.identify.windows import cut

@@ -5,10 +5,9 @@ import polars as pl
 import pytest
 
 from hopping_leg.errors import TraceError, UsageError
-from hopping_leg.identify.excitation import adapt, load_excitation, make_excitation
+from hopping_leg.identify.excitation import Multisine, load_excitation, make_excitation
 from hopping_leg.identify.feasibility import HardwareRange
-from hopping_leg.identify.multisine import Multisine
-from hopping_leg.identify.paper_excitation import Stroke, Strokes, fixed_base, moving_base
+from hopping_leg.identify.paper_excitation import Stroke, Strokes, adapt, fixed_base, moving_base
 from hopping_leg.robot import kinematics, load_robot
 from hopping_leg.trace import Trace
 from tests.identify.runs import RECORDINGS, needs_recordings, swinging

@@ -1,7 +1,7 @@
 import numpy as np
 
 from hopping_leg.identify.identifiability import identifiability
-from hopping_leg.identify.least_squares import jacobian
+from hopping_leg.identify.optimizers import jacobian
 from hopping_leg.identify.parameters import choose
 from tests.identify.searches import CAD, TRUTH, TWO, objective
 from tests.identify.twin import record, swing

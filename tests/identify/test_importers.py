@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 from scipy.ndimage import uniform_filter1d
 
-from hopping_leg.identify.columns import COLUMNS
 from hopping_leg.identify.feasibility import inverse_dynamics
 from hopping_leg.identify.importers import IMPORTERS, recognise
 from hopping_leg.identify.recording import load_recording
+from hopping_leg.identify.recording_format import COLUMNS
 from hopping_leg.robot import load_robot
 from tests.identify.runs import RECORDINGS, needs_recordings
 
@@ -21,9 +21,9 @@ FOLDERS = {
 @pytest.mark.parametrize("name", IMPORTERS)
 def test_a_rig_is_recognised_by_its_own_columns_only(name):
     importer = IMPORTERS[name]
-    assert recognise(sorted(importer.COLUMNS)) is importer
-    assert recognise(sorted(importer.COLUMNS)[1:]) is not importer
-    assert set(importer.NAMES.values()) <= set(COLUMNS)
+    assert recognise(sorted(importer.columns)) is importer
+    assert recognise(sorted(importer.columns)[1:]) is not importer
+    assert set(importer.names.values()) <= set(COLUMNS)
 
 
 @needs_recordings
@@ -50,7 +50,7 @@ def test_folders_are_recognised_as_their_rig(folder, name):
         "legv1_rail": "legv1",
         "doublependulum": "doublependulum",
     }.get(name, "legv2")
-    assert recording.metadata.source in importer.read.__globals__["METADATA"].source
+    assert recording.metadata.source in importer.metadata.source
 
 
 @needs_recordings

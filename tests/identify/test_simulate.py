@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.errors import RecordingError
-from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import with_metadata
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import cut

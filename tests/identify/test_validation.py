@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.validation import validate
 from tests.identify.twin import LEG, STEP, record, swing
 

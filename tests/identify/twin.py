@@ -4,10 +4,9 @@ import mujoco
 import numpy as np
 import polars as pl
 
-from hopping_leg.identify.columns import PAIRS
+from hopping_leg.identify.actuator_model import build_rig_model
 from hopping_leg.identify.recording import make_recording
-from hopping_leg.identify.recording_format import RecordingMetadata
-from hopping_leg.identify.rig_model import build_rig_model
+from hopping_leg.identify.recording_format import PAIRS, RecordingMetadata
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.limits import MotorLimit
 from hopping_leg.robot.robot_files import load_robot

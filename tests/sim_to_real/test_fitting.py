@@ -3,7 +3,7 @@
 import pytest
 
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.robot import load_robot

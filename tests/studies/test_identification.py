@@ -14,7 +14,7 @@ from studies.identification.twin import AIR, GROUND, record, twin
 
 from hopping_leg.cli import main
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import make_plan
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import cut

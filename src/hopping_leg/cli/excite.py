@@ -10,6 +10,7 @@ Examples:
 """
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +18,11 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from hopping_leg.identify import multisine, paper_excitation
-from hopping_leg.identify.excitation import RATE, Excitation, adapt, make_excitation
+from hopping_leg.identify import excitation as excitations
+from hopping_leg.identify.excitation import RATE, Excitation, make_excitation
 from hopping_leg.identify.feasibility import HardwareRange, demand
-from hopping_leg.identify.paper_excitation import DURATION, Bend, Strokes
+from hopping_leg.identify.paper_excitation import DURATION, Bend, adapt, fixed_base, moving_base
 from hopping_leg.identify.recording_format import Pair
-from hopping_leg.identify.templates import Template
 from hopping_leg.io import write_json
 from hopping_leg.robot import Robot, load_robot
 
@@ -101,9 +101,24 @@ def run(args: FixedBase | MovingBase | Multisine) -> None:
     """Write an excitation."""
     robot = load_robot(args.robot)
     limits = HardwareRange(args.hip_range, args.knee_range)
-    template = _template(args)
-    if isinstance(template, Strokes) and isinstance(args, Grid) and args.adapt:
-        template = adapt(template, robot, rate=args.rate, limits=limits)
+    template: excitations.Template
+    if isinstance(args, Multisine):
+        sines = (args.centre, args.amplitude, args.lowest, args.highest, args.duration)
+        template = excitations.Multisine(*sines)
+    else:
+        strokes = moving_base
+        if isinstance(args, FixedBase):
+            strokes = partial(fixed_base, swings=args.swings)
+        template = strokes(
+            args.amplitudes,
+            args.periods,
+            duration=args.duration,
+            margin=args.margin,
+            bend=args.bend,
+            every_pair=args.every_pair,
+        )
+        if args.adapt:
+            template = adapt(template, robot, rate=args.rate, limits=limits)
     excitation = make_excitation(
         template, robot, rate=args.rate, limits=limits, track_velocity=args.track_velocity
     )
@@ -119,30 +134,6 @@ def run(args: FixedBase | MovingBase | Multisine) -> None:
     console = Console()
     console.print(table)
     console.print(excitation.description.replace("; ", "\n"), highlight=False)
-
-
-def _template(args: FixedBase | MovingBase | Multisine) -> Template:
-    if isinstance(args, Multisine):
-        sines = (args.centre, args.amplitude, args.lowest, args.highest, args.duration)
-        return multisine.Multisine(*sines)
-    if isinstance(args, FixedBase):
-        return paper_excitation.fixed_base(
-            args.amplitudes,
-            args.periods,
-            args.swings,
-            duration=args.duration,
-            margin=args.margin,
-            bend=args.bend,
-            every_pair=args.every_pair,
-        )
-    return paper_excitation.moving_base(
-        args.amplitudes,
-        args.periods,
-        duration=args.duration,
-        margin=args.margin,
-        bend=args.bend,
-        every_pair=args.every_pair,
-    )
 
 
 def _facts(excitation: Excitation, robot: Robot) -> dict[str, Any]:

@@ -27,13 +27,18 @@ from hopping_leg.cli.command_line import command_line
 from hopping_leg.cli.fit_progress import FitProgress
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.fit_report import write_fit_report
-from hopping_leg.identify.cma import CmaOptions
-from hopping_leg.identify.optimizers import SearchOptions
-from hopping_leg.identify.ownership import robot_of
+from hopping_leg.identify.optimizers import CmaOptions
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
+from hopping_leg.identify.plan import robot_of
 from hopping_leg.identify.recording import Recording, load_recording, sidecar_path
-from hopping_leg.identify.result import Identified, as_json, parameters_json, quality_json
-from hopping_leg.identify.robot_file import save_robot
+from hopping_leg.identify.result import (
+    Identified,
+    as_json,
+    parameters_json,
+    quality_json,
+    save_robot,
+)
+from hopping_leg.identify.search import SearchOptions
 from hopping_leg.io import write_atomically, write_json
 from hopping_leg.robot import load_robot
 
@@ -71,7 +76,7 @@ class Identify:
     report: Path | None = None
     """Write the report to this file as one HTML page."""
     search: str | None = None
-    """`least-squares` (default), `cma`, or the paper's `two-pass`; `one-pass` is its ablation."""
+    """`least-squares` (default), `cma`, or the paper's `two-pass`."""
     parameters: Names | None = None
     """What to fit, e.g. `hip.friction,drive.delay`; default: what these recordings may tell. With
     `two-pass` they are fitted besides Table I."""

@@ -17,7 +17,7 @@ from hopping_leg.deploy.schedule import Schedule
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.identify.excitation import Excitation
-from hopping_leg.identify.from_motors import recording_of
+from hopping_leg.identify.play_excitation import recording_of
 from hopping_leg.robot.parameters import Robot
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ from rich.table import Table
 from hopping_leg.cli import evaluate
 from hopping_leg.controllers.registry import ENERGY_SHAPING, shipped_policies
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.least_squares import LeastSquaresOptions
+from hopping_leg.identify.optimizers import LeastSquaresOptions
 from hopping_leg.io import write_atomically, write_json
 from hopping_leg.sim_to_real.methods import DEFAULT, choose_methods
 from hopping_leg.sim_to_real.study import SHORTEST, USUAL_FIT, Study, find_twins

@@ -16,8 +16,8 @@ from hopping_leg.evaluate.figures.fits import (
 )
 from hopping_leg.evaluate.html_tables import Column, table
 from hopping_leg.evaluate.report import data_uri, page_template
-from hopping_leg.identify.overlay import RESTART, Overlay, overlays
 from hopping_leg.identify.result import Identified, as_json, parameters_json, quality_json
+from hopping_leg.identify.validation import RESTART, Overlay, overlays
 from hopping_leg.io import Tree
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.robot_files import load_tree

@@ -20,7 +20,7 @@ from hopping_leg.controllers.shaping_gains import ROBUST, ShapingGains, scale_ga
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.gain_space import from_unit, to_unit
 from hopping_leg.evaluate.hop_cost import CommandScore, calibrated, cost, score
-from hopping_leg.identify.cma import seeded_strategy
+from hopping_leg.identify.optimizers import seeded_strategy
 from hopping_leg.io import write_atomically
 from hopping_leg.robot import Robot, load_robot
 

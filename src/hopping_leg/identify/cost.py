@@ -1,14 +1,91 @@
 """How far a simulation is from a recording: the paper's J, and what the data call for beyond it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.arrays import Array, BoolArray, IntArray
 from hopping_leg.errors import RecordingError, UsageError
-from hopping_leg.identify.leg_hypothesis import LegHypothesis
-from hopping_leg.identify.robust_loss import RobustLoss, grouping, total_costs
+from hopping_leg.identify.parameters import LegHypothesis, ParameterSet
+from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.simulate import Simulated, WindowSimulator
+from hopping_leg.identify.windows import Window
+from hopping_leg.robot.model import TIMESTEP
+
+
+@dataclass(frozen=True)
+class RobustLoss:
+    """What residuals are worth beside others of their window.
+
+    Attributes:
+        groups: Number of each residual's group, (size,).
+        level: Mean squared residual beyond which a group counts ever less.
+    """
+
+    groups: IntArray
+    level: float
+
+    @cached_property
+    def sizes(self) -> IntArray:
+        """Residuals in each group, (groups,)."""
+        return np.bincount(self.groups)
+
+    def weights(self, residuals: Array) -> Array:
+        """Return factors of one hypothesis's residuals at its own levels, (size,)."""
+        share: Array = ((1 + self._squares(residuals)) ** -0.75)[self.groups]
+        return share
+
+    def rest(self, residuals: Array) -> Array:
+        """Return the root of what each group costs beside its weighted residuals, (groups,)."""
+        squares = self._squares(residuals)
+        root = np.sqrt(1 + squares)
+        # 2 (1 - 1 / root) - squares / root**3 without the cancellation of small squares
+        share = (squares / (root + 1)) ** 2 * (2 * root + 1) / root**3
+        rest: Array = np.sqrt(self.sizes * self.level * share)
+        return rest
+
+    def cost(self, residuals: Array) -> float:
+        """Return the cost of one hypothesis's residuals, (size,)."""
+        weighted = self.weights(residuals) * residuals
+        return float(np.sum(weighted**2) + np.sum(self.rest(residuals) ** 2))
+
+    def _squares(self, residuals: Array) -> Array:
+        """Return groups' mean squared residuals in units of the level, (groups,)."""
+        total = np.bincount(self.groups, np.square(residuals), len(self.sizes))
+        mean: Array = total / np.maximum(self.sizes, 1) / self.level
+        return mean
+
+
+def grouping(counts: Sequence[BoolArray]) -> IntArray:
+    """Return the number of each residual's group: a window's, in one quantity of one joint.
+
+    Args:
+        counts: What counts of each quantity, (windows, rows, ...); residuals are in this order.
+    """
+    parts, first = [], 0
+    for mask in counts:
+        columns = mask[0, 0].size
+        numbers = first + np.arange(len(mask) * columns).reshape(len(mask), 1, *mask.shape[2:])
+        parts.append(np.broadcast_to(numbers, mask.shape)[mask])
+        first += len(mask) * columns
+    return np.concatenate(parts)
+
+
+def total_costs(residuals: Array, loss: RobustLoss | None) -> Array:
+    """Return the costs of hypotheses' residuals (n, size), (n,).
+
+    Args:
+        residuals: Of every hypothesis.
+        loss: None counts every residual in full.
+    """
+    if loss is None:
+        total: Array = np.square(residuals).sum(axis=1)
+        return total
+    return np.array([loss.cost(r) for r in residuals])
+
 
 _QUANTITIES = ("position", "velocity", "torque", "height")
 _FAILED = 1e3
@@ -126,3 +203,68 @@ def measured(simulator: WindowSimulator, quantity: str) -> Array:
         sampled[~recording.exact_time[rows]] = np.nan
         values[i, w.unscored : w.length] = sampled
     return values
+
+
+@dataclass(frozen=True)
+class Objective:
+    """Residuals and costs of search vectors.
+
+    It can be sent to other machines, where it builds its simulations anew.
+
+    Attributes:
+        recordings: What was recorded.
+        windows: Which stretches count.
+        parameters: What vectors mean.
+        scoring: What errors count.
+        timestep: Physics step, s.
+        threads: Worker threads, 0 for one per core.
+    """
+
+    recordings: tuple[Recording, ...]
+    windows: tuple[Window, ...]
+    parameters: ParameterSet
+    scoring: Scoring
+    timestep: float = TIMESTEP
+    threads: int = 0
+
+    @cached_property
+    def cost(self) -> Cost:
+        """The simulations and their measured counterparts."""
+        simulator = WindowSimulator(
+            self.recordings, self.windows, timestep=self.timestep, threads=self.threads
+        )
+        return Cost(simulator, self.scoring)
+
+    def residuals(self, vectors: Array) -> Array:
+        """Return residuals of search vectors (n, k), (n, m)."""
+        return self.cost.residuals(self.parameters.hypotheses(vectors))
+
+    @property
+    def loss(self) -> RobustLoss | None:
+        """What windows that no parameters explain are worth; None counts every one in full."""
+        return self.cost.loss
+
+    @property
+    def jumping(self) -> IntArray | None:
+        """Groups of the residuals, (m,), if feet touch down, which makes them jump; else None."""
+        grounded = any(
+            self.recordings[w.recording].metadata.rig != "fixed-base" for w in self.windows
+        )
+        return self.cost.groups if grounded else None
+
+    def __call__(self, vectors: Array) -> Array:
+        """Return the costs of search vectors (n, k), (n,)."""
+        return total_costs(self.residuals(vectors), self.loss)
+
+    def about(self) -> dict[str, Any]:
+        """Return what tells this objective from others, for checkpoints."""
+        return {
+            "recordings": [r.digest or r.name for r in self.recordings],
+            "windows": repr(self.windows),
+            "base": repr(self.parameters.base),
+            "scoring": repr(self.scoring),
+            "timestep": self.timestep,
+        }
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {k: v for k, v in self.__dict__.items() if k != "cost"}

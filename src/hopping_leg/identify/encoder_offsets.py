@@ -14,10 +14,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.initial_states import start_states
+from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.recording_format import RecordingMetadata
-from hopping_leg.identify.states import start_states
 from hopping_leg.robot import dynamics
 from hopping_leg.robot.model import GRAVITY
 

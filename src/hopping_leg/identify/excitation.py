@@ -1,28 +1,104 @@
 """Excitations: what the joints are told to do, in a file that all who play it share."""
 
 import hashlib
+import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import polars as pl
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import TraceError, UsageError
-from hopping_leg.identify.columns import PAIRS
 from hopping_leg.identify.feasibility import HardwareRange, check_demand, demand
-from hopping_leg.identify.paper_excitation import LAB_MARGIN, Stroke, Strokes
-from hopping_leg.identify.recording_format import Rig
-from hopping_leg.identify.templates import Template
+from hopping_leg.identify.recording_format import PAIRS, Pair, Rig
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import Trace
+
+
+class Template(Protocol):
+    """A trajectory of the joints."""
+
+    @property
+    def rig(self) -> Rig:
+        """What the base is on."""
+        ...
+
+    @property
+    def duration(self) -> float:
+        """How long it lasts, s."""
+        ...
+
+    def joints(self, robot: Robot, time: Array) -> Array:
+        """Return joint angles at times, rad, (ticks, 2); NaN where the foot is out of reach."""
+        ...
+
+
+def require_positive(name: str, value: float) -> None:
+    """Refuse a number that is not positive and finite.
+
+    Raises:
+        UsageError: Naming it.
+    """
+    if not 0 < value < math.inf:
+        raise UsageError(f"'{name}' is {value:g} but must be positive and finite.")
+
+
+@dataclass(frozen=True)
+class Multisine:
+    """Harmonics with Schroeder phases around a posture: a flat spectrum with low peaks.
+
+    Raises:
+        UsageError: A number has no meaning.
+    """
+
+    centre: Pair
+    """Posture, rad."""
+    amplitude: Pair
+    """Largest excursion, rad."""
+    lowest: float = 0.1
+    """Hz; also the spacing of the harmonics."""
+    highest: float = 4.0
+    """Hz."""
+    duration: float = 60.0
+    """s."""
+    rig: Rig = "fixed-base"
+
+    def __post_init__(self) -> None:
+        for name in ("lowest", "duration"):
+            require_positive(name, getattr(self, name))
+        if not self.lowest < self.highest < math.inf:
+            raise UsageError(f"'highest' is {self.highest:g} Hz but must exceed 'lowest'.")
+
+    def joints(self, robot: Robot, time: Array) -> Array:
+        """Return joint angles at times, rad, (ticks, 2); hip and knee take turns by harmonic."""
+        del robot
+        count = math.floor(self.highest / self.lowest + 1e-9)
+        orders: Array = np.arange(1.0, count + 1)
+        angles = np.empty((len(time), 2))
+        for joint in range(2):
+            mine = orders[joint::2]
+            index = np.arange(len(mine))
+            phases = -np.pi * index * (index + 1) / max(1, len(mine))
+            one = np.arange(2048) / (2048 * self.lowest)
+            waves = [_wave(t, mine * self.lowest, phases) for t in (time, one)]
+            scale = self.amplitude[joint] / max(np.abs(waves[1]).max(), 1e-12)
+            fade = np.clip(np.minimum(time, self.duration - time) * self.lowest * 4, 0, 1)
+            smooth = fade**3 * (10 - 15 * fade + 6 * fade**2)
+            angles[:, joint] = self.centre[joint] + smooth * scale * waves[0]
+        return angles
+
+
+def _wave(time: Array, frequencies: Array, phases: Array) -> Array:
+    wave: Array = np.cos(2 * np.pi * np.multiply.outer(time, frequencies) + phases).sum(axis=-1)
+    return wave
+
 
 RATE = 200.0
 """Of the paper's recordings, Hz."""
 
 _KEY = "excitation"
-_SHRINK = 0.95
-_SMALLEST = 0.005
 
 
 @dataclass(frozen=True)
@@ -129,45 +205,3 @@ def make_excitation(
     check_demand(robot, wanted, rate, limits or HardwareRange())
     velocity = wanted.velocity if track_velocity else np.zeros_like(position)
     return Excitation(time, position, velocity, template.rig, rate, robot.name, str(template))
-
-
-def adapt(
-    strokes: Strokes,
-    robot: Robot,
-    *,
-    rate: float = RATE,
-    limits: HardwareRange | None = None,
-) -> Strokes:
-    """Return the strokes as large as the leg can follow: the paper's grid does not fit every leg.
-
-    Amplitudes shrink in steps of 5 %, and the leg stays ``LAB_MARGIN`` from straight, where the
-    knee would have to jump.
-
-    Args:
-        strokes: The paper's template.
-        robot: The leg.
-        rate: Of the samples, Hz.
-        limits: How far the real joints turn.
-
-    Raises:
-        UsageError: A stroke is beyond the leg at any amplitude.
-    """
-    return Strokes(
-        tuple(_adapt_stroke(s, robot, rate, limits or HardwareRange()) for s in strokes.parts)
-    )
-
-
-def _adapt_stroke(stroke: Stroke, robot: Robot, rate: float, limits: HardwareRange) -> Stroke:
-    time = np.arange(round(stroke.duration * rate)) / rate
-    margin, amplitude = max(stroke.margin, LAB_MARGIN), stroke.amplitude
-    while True:
-        smaller = stroke.smaller(amplitude, margin)
-        try:
-            wanted = demand(robot, stroke.rig, smaller.joints(robot, time), rate)
-            check_demand(robot, wanted, rate, limits)
-        except UsageError:
-            amplitude *= _SHRINK
-            if amplitude < _SMALLEST:
-                raise
-        else:
-            return smaller

@@ -8,8 +8,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.columns import JOINTS
-from hopping_leg.identify.recording_format import Pair, Rig
+from hopping_leg.identify.recording_format import JOINTS, Pair, Rig
 from hopping_leg.robot import dynamics, kinematics
 from hopping_leg.robot.limits import MotorLimit
 from hopping_leg.robot.parameters import Robot

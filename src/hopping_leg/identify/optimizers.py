@@ -1,249 +1,363 @@
-"""A plan's search carried out: every candidate with every window in one batch, on disk as it goes.
+"""The searches, each resumable: bounded least squares, and CMA-ES as in the paper."""
 
-Cost is the sum of squared residuals throughout, as the objective's robust loss weighs it.
-"""
-
-import dataclasses
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+import cma
 import numpy as np
+from scipy import optimize
 
-from hopping_leg.arrays import Array
-from hopping_leg.errors import UsageError
-from hopping_leg.identify.cluster import Cluster
-from hopping_leg.identify.cma import CmaOptions, cma_es
-from hopping_leg.identify.least_squares import (
-    Found,
-    LeastSquaresOptions,
-    Residuals,
-    least_squares,
-    multi_start,
-)
-from hopping_leg.identify.objective import Objective
+from hopping_leg.arrays import Array, IntArray
+from hopping_leg.identify.cost import RobustLoss
 from hopping_leg.identify.parameters import ParameterSet
-from hopping_leg.identify.plan import Plan
-from hopping_leg.identify.recording_format import Rig
-from hopping_leg.identify.robust_loss import RobustLoss, total_costs
-from hopping_leg.identify.two_pass import pass_names, two_pass
-from hopping_leg.identify.windows import deal
+from hopping_leg.identify.run_folder import load_state, save_state
 
-Progress = Callable[[float, float], None]
-"""Called with the share done (0 to 1) and the lowest cost so far."""
+Residuals = Callable[[Array], Array]
+"""Search vectors (n, k) to residuals (n, m)."""
 
-Search = Callable[[Array, Path | None, Progress], Found]
-"""From a start, the checkpoint and its progress report, to where the search ended."""
+_NOTHING = 1e-3
+"""A cost that is nothing, as residuals are in units of errors that matter."""
 
-Report = Callable[[str, float, float], None]
-"""Called with what is being done, its share done (0 to 1) and the lowest cost so far."""
+_MARGIN = 1.0
+"""Distance from its bounds at which a parameter starts, in units of its scale."""
 
 
 @dataclass(frozen=True)
-class SearchOptions:
-    """How hard to search."""
+class LeastSquaresOptions:
+    """How to search."""
 
-    starts: int = 1
-    """Searches, the first from the robot's own values and the others from random ones."""
-    cma: CmaOptions = field(default_factory=CmaOptions)
-    """Of CMA-ES, in each pass."""
-    least_squares: LeastSquaresOptions = field(default_factory=LeastSquaresOptions)
-
-    def __post_init__(self) -> None:
-        if self.starts < 1 or self.cma.generations < 1 or self.cma.population < 4:
-            raise UsageError(
-                "A search needs at least one start, one generation and four candidates in each."
-            )
-        if not self.cma.seconds > 0:
-            raise UsageError(
-                f"A generation is judged by {self.cma.seconds} s of windows but needs more than 0;"
-                " infinity takes all."
-            )
+    rounds: int = 4
+    """Restarts of the trust region; each is a checkpoint."""
+    evaluations: int = 6
+    """Steps tried in a round."""
+    step: float = 1e-3
+    """Of finite differences, in units of the parameters' scales."""
+    tolerance: float = 1e-4
+    """A round that lowers the cost by a smaller share ends the search."""
 
 
 @dataclass(frozen=True)
-class Pass:
-    """One search: the paper's method has two, others one.
+class Found:
+    """Where a search ended.
 
     Attributes:
-        name: Of the pass.
-        parameters: What it searched.
-        found: Where it ended, from the best of its starts.
-        others: Costs where the other starts ended, best first.
+        vector: In search coordinates, (k,).
+        cost: Sum of squared residuals, as the levels of unexplained ones weigh it.
+        evaluations: Candidates simulated.
+        history: Best cost after each round or generation.
     """
 
-    name: str
-    parameters: ParameterSet
-    found: Found
-    others: tuple[float, ...] = ()
+    vector: Array
+    cost: float
+    evaluations: int
+    history: list[float]
 
 
-class Searcher:
-    """Searches as a plan says.
+def jacobian(
+    residuals: Residuals,
+    vector: Array,
+    bounds: tuple[Array, Array],
+    step: float,
+    groups: IntArray | None = None,
+) -> Array:
+    """Return d residuals / d vector, (m, k), by differences.
 
     Args:
-        plan: What to search, how.
-        objective: Of the plan's parameters; a pass with others gets its own.
-        options: How hard.
-        seed: Of all randomness.
-        folder: For checkpoints; None keeps none.
-        report: Called with the progress.
-        ray: Address of a Ray cluster that simulates, ``local`` for one on this machine; None
-            simulates here.
-        about: What else makes this run this run.
+        residuals: Function of search vectors.
+        vector: Where, (k,).
+        bounds: Lower and upper, (k,) each.
+        step: Difference in search coordinates.
+        groups: Number of each residual's group, (m,), where groups jump now and then: each takes
+            the smaller of two differences, to either side, or inside one bound at two distances.
+            None takes one, towards the inside.
     """
+    low, high = bounds
+    room = np.minimum(step, np.maximum(high - vector, vector - low))
+    near = np.where(vector + room <= high, room, -room)
+    steps = [near]
+    if groups is not None:
+        other = vector - near
+        steps.append(np.where((low <= other) & (other <= high), -near, 0.5 * near))
+    moved = [vector + np.diag(one) for one in steps]
+    values = residuals(np.concatenate([vector[None], *moved]))
+    sides = np.reshape(values[1:] - values[0], (len(steps), len(vector), -1))
+    slopes = sides / np.stack(steps)[..., None]
+    if groups is None:
+        return np.asarray(slopes[0].T)
+    columns = [_calmer(first, second, groups) for first, second in zip(*slopes, strict=True)]
+    return np.stack(columns, axis=1)
 
-    def __init__(
-        self,
-        plan: Plan,
-        objective: Objective,
-        options: SearchOptions,
-        seed: int,
-        folder: Path | None,
-        report: Report,
-        ray: str | None,
-        about: Mapping[str, object],
-    ) -> None:
-        self._plan, self._objective, self._options = plan, objective, options
-        self._seed, self._folder, self._report, self._ray = seed, folder, report, ray
-        self._about = dict(about)
 
-    def run(self, rigs: list[Rig]) -> list[Pass]:
-        """Return the passes in order; the last one's end is the result.
+def least_squares(
+    residuals: Residuals,
+    parameters: ParameterSet,
+    options: LeastSquaresOptions | None = None,
+    *,
+    loss: RobustLoss | None = None,
+    groups: IntArray | None = None,
+    start: Array | None = None,
+    about: Mapping[str, object] | None = None,
+    checkpoint: Path | None = None,
+    report: Callable[[int, float], None] = lambda index, cost: None,
+) -> Found:
+    """Search from one start; a run that was killed resumes with its round and ends the same.
 
-        Args:
-            rigs: Of the recordings.
-        """
-        if self._plan.search != "two-pass":
-            return [self._pass(self._plan.search, self._plan.parameters, 0.0, 1.0)]
-        passes: list[Pass] = []
+    Args:
+        residuals: Function of search vectors.
+        parameters: Bounds and scales.
+        options: How.
+        loss: Of residuals that no parameters explain; None counts every one in full.
+        groups: Of residuals that jump now and then, as ``jacobian`` takes them.
+        start: Search vector to start from, (k,); None takes the parameters' start.
+        about: What else tells this search from others, e.g. the recordings' hashes.
+        checkpoint: File for the state after each round.
+        report: Called with round and cost after each round.
 
-        def search(name: str, parameters: ParameterSet) -> Found:
-            passes.append(self._pass(f"two-pass, {name}", parameters, 0.5 * len(passes), 0.5))
-            return passes[-1].found
-
-        known = [name for names in pass_names(rigs) for name in names]
-        own = self._plan.parameters.parameters
-        two_pass(
-            self._plan.start,
-            rigs,
-            search,
-            further=[p.name for p in own if p.name not in known],
-            start={p.name: p.start for p in own},
-            bounds={p.name: (p.low, p.high) for p in own},
+    Raises:
+        UsageError: The checkpoint belongs to another search.
+    """
+    options = options or LeastSquaresOptions()
+    low, high = parameters.bounds
+    vector = _inside(np.zeros(len(low)) if start is None else start, low, high)
+    identity = {
+        "parameters": repr(parameters.parameters),
+        "start": vector.tolist(),
+        "options": repr(options),
+        "about": dict(about or {}),
+    }
+    history: list[float] = []
+    evaluations = 0
+    saved = load_state(checkpoint, identity)
+    if saved is not None:
+        vector, evaluations = np.array(saved["vector"]), int(saved["evaluations"])
+        history = list(saved["history"])
+    while len(history) < options.rounds and not _settled(history, options.tolerance):
+        problem = _Problem(residuals, (low, high), options.step, loss, groups)
+        result = optimize.least_squares(
+            problem.values,
+            vector,
+            jac=problem.slopes,
+            bounds=(low, high),
+            x_scale="jac",
+            max_nfev=options.evaluations,
         )
-        return passes
-
-    def _pass(self, name: str, parameters: ParameterSet, begin: float, share: float) -> Pass:
-        """Search from every start and report within a share of the whole."""
-        objective = Objective(
-            self._objective.recordings,
-            self._objective.windows,
-            parameters,
-            self._objective.scoring,
-            self._objective.timestep,
-            self._objective.threads if self._ray is None else 1,
-        )
-        about = {**objective.about(), **self._about}
-        starts = self._options.starts
-        find = self._least_squares if self._plan.search == "least-squares" else self._cma
-        searched = find(objective, about)
-
-        def search(number: int, start: Array) -> Found:
-            stage = name if starts == 1 else f"{name}, start {number + 1} of {starts}"
-            file = f"search-{name.replace(', ', '-')}-{number}.json"
-
-            def progress(done: float, cost: float) -> None:
-                self._report(stage, begin + share * (number + done) / starts, cost)
-
-            checkpoint = None if self._folder is None else self._folder / file
-            return searched(start, checkpoint, progress)
-
-        ends = multi_start(search, parameters, starts, self._seed)
-        return Pass(name, parameters, ends[0], tuple(end.cost for end in ends[1:]))
-
-    def _least_squares(self, objective: Objective, about: Mapping[str, object]) -> Search:
-        residuals, loss = self._spread(objective.residuals), objective.loss
-        options = self._options.least_squares
-
-        def search(start: Array, checkpoint: Path | None, progress: Progress) -> Found:
-            rounds = _Rounds(residuals, loss, options, progress)
-            return least_squares(
-                rounds,
-                objective.parameters,
-                options,
-                loss=loss,
-                groups=objective.jumping,
-                start=start,
-                about=about,
-                checkpoint=checkpoint,
-                report=rounds.finished,
-            )
-
-        return search
-
-    def _cma(self, objective: Objective, about: Mapping[str, object]) -> Search:
-        options = self._options.cma
-        values = self._spread(objective)
-        shares = [self._spread(share) for share in self._shares(objective)]
-
-        def search(start: Array, checkpoint: Path | None, progress: Progress) -> Found:
-            return cma_es(
-                values,
-                objective.parameters,
-                options,
-                seed=self._seed,
-                start=start,
-                shares=shares,
-                about=about,
-                checkpoint=checkpoint,
-                report=lambda index, cost: progress(index / options.generations, cost),
-            )
-
-        return search
-
-    def _shares(self, objective: Objective) -> list[Objective]:
-        """Return what judges generations in turn; nothing if all windows can judge each."""
-        rates = [r.metadata.rate_hz for r in objective.recordings]
-        simulated = sum(w.length / rates[w.recording] for w in objective.windows)
-        count = max(1, round(simulated / self._options.cma.seconds))
-        hands = deal(objective.windows, count, np.random.default_rng(self._seed))
-        if len(hands) < 2:
-            return []
-        return [dataclasses.replace(objective, windows=hand) for hand in hands]
-
-    def _spread(self, evaluate: Callable[[Array], Array]) -> Callable[[Array], Array]:
-        """Return a function of a population, on the cluster if there is one."""
-        return evaluate if self._ray is None else Cluster(evaluate, self._ray)
+        vector, cost = result.x, 2 * float(result.cost)
+        evaluations += problem.count
+        history.append(cost)
+        state = {"vector": vector.tolist(), "evaluations": evaluations, "history": history}
+        save_state(checkpoint, identity, state)
+        report(len(history), cost)
+    return Found(vector, history[-1], evaluations, history)
 
 
-class _Rounds:
-    """Residuals that tell how far least squares has come, counting the steps that it tries."""
+def multi_start(
+    search: Callable[[int, Array], Found], parameters: ParameterSet, starts: int, seed: int
+) -> list[Found]:
+    """Search from the parameters' start and from random others; best first.
+
+    Args:
+        search: From the start's number and vector to where it ended.
+        parameters: Starts are drawn within the bounds, up to three scales from the start.
+        starts: How many.
+        seed: Of the draws.
+    """
+    low, high = parameters.bounds
+    rng = np.random.default_rng(seed)
+    draws = rng.uniform(np.maximum(low, -3), np.minimum(high, 3), (starts, len(low)))
+    draws[0] = np.clip(0.0, low, high)
+    return sorted((search(i, x) for i, x in enumerate(draws)), key=lambda found: found.cost)
+
+
+def _calmer(first: Array, second: Array, groups: IntArray) -> Array:
+    """Return two columns of slopes joined, (m,): of each group whichever is smaller."""
+    squares = [np.bincount(groups, np.square(column)) for column in (first, second)]
+    chosen: Array = np.where((squares[0] <= squares[1])[groups], first, second)
+    return chosen
+
+
+def _inside(vector: Array, low: Array, high: Array) -> Array:
+    """Return the vector off its bounds, near which the trust region would barely move it."""
+    margin = np.minimum(_MARGIN, 0.25 * (high - low))
+    return np.clip(vector, low + margin, high - margin)
+
+
+def _settled(history: list[float], tolerance: float) -> bool:
+    if history and history[-1] < _NOTHING:
+        return True
+    return len(history) > 1 and history[-2] - history[-1] <= tolerance * history[-2]
+
+
+class _Problem:
+    """Residuals whose squares add up to the cost, and their slopes; counts candidates.
+
+    The slopes are those at the levels of the moment, which make the cost's own slope exact.
+    """
 
     def __init__(
         self,
         residuals: Residuals,
+        bounds: tuple[Array, Array],
+        step: float,
         loss: RobustLoss | None,
-        options: LeastSquaresOptions,
-        progress: Progress,
+        groups: IntArray | None,
     ) -> None:
-        self._residuals, self._loss = residuals, loss
-        self._options, self._progress = options, progress
-        self._round, self._tried, self._least = 0, 0, np.inf
+        self._residuals, self._bounds, self._step = residuals, bounds, step
+        self._loss, self._groups = loss, groups
+        self._at: Array = np.empty(0)
+        self.count = 0
 
-    def __call__(self, vectors: Array) -> Array:
-        """Return residuals of search vectors (n, k), (n, m)."""
+    def values(self, vector: Array) -> Array:
+        """Return residuals, (m,), and with a robust loss what each group costs beside them."""
+        residuals: Array = self._counted(vector[None])[0]
+        if self._loss is None:
+            return residuals
+        weights, rest = self._loss.weights(residuals), self._loss.rest(residuals)
+        return np.concatenate([weights * residuals, rest])
+
+    def slopes(self, vector: Array) -> Array:
+        """Return the slopes of what ``values`` returns, (m, k)."""
+        slopes = jacobian(self._counted, vector, self._bounds, self._step, self._groups)
+        if self._loss is None:
+            return slopes
+        still = np.zeros((len(self._loss.sizes), len(vector)))
+        return np.concatenate([self._loss.weights(self._at)[:, None] * slopes, still])
+
+    def _counted(self, vectors: Array) -> Array:
+        self.count += len(vectors)
         values = self._residuals(vectors)
-        self._least = min(self._least, float(total_costs(values, self._loss).min()))
-        self._tried += len(vectors) == 1
-        self._tell()
+        self._at = values[0]
         return values
 
-    def finished(self, rounds: int, cost: float) -> None:
-        """Note that a round is over."""
-        self._round, self._tried, self._least = rounds, 0, cost
-        self._tell()
 
-    def _tell(self) -> None:
-        within = min(self._tried / self._options.evaluations, 1.0)
-        self._progress(min((self._round + within) / self._options.rounds, 1.0), self._least)
+Values = Callable[[Array], Array]
+"""Search vectors (n, k) to costs (n,)."""
+
+
+@dataclass(frozen=True)
+class CmaOptions:
+    """How to search."""
+
+    generations: int = 100
+    population: int = 16
+    """Candidates of a generation."""
+    spread: float = 1.0
+    """First standard deviation, in units of the parameters' scales."""
+    tolerance: float = 1e-9
+    """Range of a generation's costs, relative to its best, below which the search has converged."""
+    seconds: float = 25.0
+    """Simulated for a candidate in each generation, about. Of more windows each generation is
+    judged by another share, and the end by all."""
+
+
+_RECENT = 4
+"""Generations whose best stand for election at the end of a search that is judged by shares."""
+
+_COLLAPSED = 1e-3
+"""Standard deviation, in units of the parameters' scales, below which such a search has ended."""
+
+
+def cma_es(
+    values: Values,
+    parameters: ParameterSet,
+    options: CmaOptions | None = None,
+    *,
+    seed: int,
+    start: Array | None = None,
+    shares: Sequence[Values] = (),
+    about: Mapping[str, object] | None = None,
+    checkpoint: Path | None = None,
+    report: Callable[[int, float], None] = lambda index, cost: None,
+) -> Found:
+    """Search from one start.
+
+    Costs only rank the candidates of a generation, so a share of the data is enough to judge it
+    by. As shares take turns, the distribution's mean wanders about where all of them agree; its
+    averages and the last generations' best are judged by everything, and the best one counts.
+
+    The checkpoint holds every generation's costs. A resumed run draws the same generations from
+    the same seed and takes their costs from there, so it ends bit for bit as if never killed.
+
+    Args:
+        values: Function of search vectors.
+        parameters: Bounds and scales.
+        options: How.
+        seed: Of all randomness.
+        start: Search vector to start from, (k,); None takes the parameters' start.
+        shares: Functions whose sum is ``values``; each generation is judged by the next one in
+            turn, and what comes out by ``values``, which judges everything if there are none.
+        about: What else tells this search from others, e.g. the recordings' hashes.
+        checkpoint: File for the state after each generation.
+        report: Called with generation and best cost so far, or what its share makes of it.
+
+    Raises:
+        UsageError: The checkpoint belongs to another search.
+    """
+    options = options or CmaOptions()
+    low, high = parameters.bounds
+    first = np.clip(np.zeros(len(low)) if start is None else start, low, high)
+    identity = {
+        "parameters": repr(parameters.parameters),
+        "start": first.tolist(),
+        "options": repr(options),
+        "seed": seed,
+        "about": dict(about or {}),
+    }
+    saved = load_state(checkpoint, identity) or {"costs": []}
+    costs: list[list[float]] = saved["costs"]
+    bounds = [low.tolist(), high.tolist()]
+    strategy = seeded_strategy(first, options.spread, bounds, options.population, seed)
+    judges = [*shares] or [values]
+    bests: list[Array] = []
+    means: list[Array] = []
+    history: list[float] = []
+    for generation in range(options.generations):
+        vectors = np.array(strategy.ask())
+        if generation == len(costs):
+            judge = judges[generation % len(judges)]
+            costs.append(np.asarray(judge(vectors)).tolist())
+            save_state(checkpoint, identity, {"costs": costs})
+        found = np.array(costs[generation])
+        strategy.tell(list(vectors), found.tolist())
+        means.append(np.array(strategy.result.xfavorite))
+        least = len(judges) * float(found.min())
+        counts = bool(shares) or not history or least < history[-1]
+        if counts:
+            bests.append(vectors[found.argmin()])
+        history.append(least if counts else history[-1])
+        report(generation + 1, history[-1])
+        if np.ptp(found) <= options.tolerance * abs(found.min()):
+            break
+        if shares and np.max(strategy.result.stds) < _COLLAPSED:
+            break
+    count = len(history) * options.population
+    if not shares:
+        return Found(bests[-1], history[-1], count, history)
+    spans = (1, len(shares), len(means) // 3 + 1)
+    elected = np.array([*bests[-_RECENT:], *(np.mean(means[-n:], axis=0) for n in spans)])
+    final = np.asarray(values(elected))
+    least = float(final.min())
+    return Found(elected[final.argmin()], least, count + len(elected), [*history, least])
+
+
+def seeded_strategy(
+    first: Array, step: float, bounds: Sequence[object], population: int, seed: int
+) -> cma.CMAEvolutionStrategy:
+    """Return pycma's strategy; randomness comes from a generator of our own.
+
+    Args:
+        first: Where to begin, (size,).
+        step: First step size.
+        bounds: Lower and upper ones, a number or a list each.
+        population: Candidates per generation.
+        seed: Of the generator.
+    """
+    rng = np.random.default_rng(seed)
+    settings = {
+        "popsize": population,
+        "bounds": bounds,
+        "randn": lambda *shape: rng.standard_normal(shape),
+        "seed": np.nan,
+        "verbose": -9,
+    }
+    return cma.CMAEvolutionStrategy(first, step, settings)

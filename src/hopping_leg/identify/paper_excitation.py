@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, Self
 
@@ -11,8 +11,9 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
+from hopping_leg.identify.excitation import RATE, require_positive
+from hopping_leg.identify.feasibility import HardwareRange, check_demand, demand
 from hopping_leg.identify.recording_format import Rig
-from hopping_leg.identify.templates import require_positive
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
 
@@ -21,6 +22,9 @@ DURATION = 240.0
 
 LAB_MARGIN = 0.005
 """How far from straight the lab kept the leg in its recordings, m; the paper says nothing."""
+
+_SHRINK = 0.95
+_SMALLEST = 0.005
 
 Bend = Literal["backward", "forward"]
 
@@ -141,10 +145,8 @@ def fixed_base(
         every_pair: Combine every amplitude with every period; otherwise the first with the first
             and so on, as in the lab's recordings.
     """
-    pairs = _pairs(amplitudes, periods, every_pair)
-    grid = [(a, t1, t2) for (a, t1), t2 in itertools.product(pairs, swings)]
-    length = duration / max(1, len(grid))
-    return _strokes(Stroke(a, t1, t2, length, margin, bend) for a, t1, t2 in grid)
+    parts = _strokes(_pairs(amplitudes, periods, every_pair), swings, duration, margin, bend)
+    return Strokes(parts)
 
 
 def moving_base(
@@ -161,8 +163,8 @@ def moving_base(
     Arguments as for ``fixed_base``.
     """
     pairs = _pairs(amplitudes, periods, every_pair)
-    length = duration / max(1, len(pairs))
-    return _strokes(Stroke(a, t1, None, length, margin, bend, "rail") for a, t1 in pairs)
+    parts = _strokes(pairs, (None,), duration, margin, bend)
+    return Strokes(tuple(dataclasses.replace(part, rig="rail") for part in parts))
 
 
 def _pairs(
@@ -178,16 +180,66 @@ def _pairs(
     return list(zip(amplitudes, periods, strict=True))
 
 
-def _strokes(parts: Iterable[Stroke]) -> Strokes:
-    strokes = Strokes(tuple(parts))
-    if not strokes.parts:
+def _strokes(
+    pairs: list[tuple[float, float]],
+    swings: Sequence[float | None],
+    duration: float,
+    margin: float,
+    bend: Bend,
+) -> tuple[Stroke, ...]:
+    """Return a stroke for every pair of amplitude and period with every swing, of equal length."""
+    grid = [(a, t1, t2) for (a, t1), t2 in itertools.product(pairs, swings)]
+    if not grid:
         raise UsageError("No stroke is left; give at least one amplitude, period and swing.")
-    count = len(strokes.parts)
-    slowest = max(max(part.period, part.swing or 0.0) for part in strokes.parts)
-    if count > 1 and strokes.duration < count * slowest - 1e-9:
+    count, length = len(grid), duration / len(grid)
+    parts = tuple(Stroke(a, t1, t2, length, margin, bend) for a, t1, t2 in grid)
+    slowest = max(max(part.period, part.swing or 0.0) for part in parts)
+    if count > 1 and sum(part.duration for part in parts) < count * slowest - 1e-9:
         raise UsageError(
-            f"Each of {count} strokes lasts {strokes.duration / count:.3g} s, so that one with a"
-            f" period of {slowest:g} s would break off; make them {count * slowest:g} s or longer"
-            " in all, or give fewer or shorter periods."
+            f"Each of {count} strokes lasts {length:.3g} s, so that one with a period of"
+            f" {slowest:g} s would break off; make them {count * slowest:g} s or longer in all, or"
+            " give fewer or shorter periods."
         )
-    return strokes
+    return parts
+
+
+def adapt(
+    strokes: Strokes,
+    robot: Robot,
+    *,
+    rate: float = RATE,
+    limits: HardwareRange | None = None,
+) -> Strokes:
+    """Return the strokes as large as the leg can follow: the paper's grid does not fit every leg.
+
+    Amplitudes shrink in steps of 5 %, and the leg stays ``LAB_MARGIN`` from straight, where the
+    knee would have to jump.
+
+    Args:
+        strokes: The paper's template.
+        robot: The leg.
+        rate: Of the samples, Hz.
+        limits: How far the real joints turn.
+
+    Raises:
+        UsageError: A stroke is beyond the leg at any amplitude.
+    """
+    return Strokes(
+        tuple(_adapt_stroke(s, robot, rate, limits or HardwareRange()) for s in strokes.parts)
+    )
+
+
+def _adapt_stroke(stroke: Stroke, robot: Robot, rate: float, limits: HardwareRange) -> Stroke:
+    time = np.arange(round(stroke.duration * rate)) / rate
+    margin, amplitude = max(stroke.margin, LAB_MARGIN), stroke.amplitude
+    while True:
+        smaller = stroke.smaller(amplitude, margin)
+        try:
+            wanted = demand(robot, stroke.rig, smaller.joints(robot, time), rate)
+            check_demand(robot, wanted, rate, limits)
+        except UsageError:
+            amplitude *= _SHRINK
+            if amplitude < _SMALLEST:
+                raise
+        else:
+            return smaller

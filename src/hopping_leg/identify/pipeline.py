@@ -15,23 +15,18 @@ from hopping_leg.errors import (
     UsageError,
     unknown_name,
 )
-from hopping_leg.identify.commands import check_commands
-from hopping_leg.identify.holdout import SHORTEST, duration, hold_out
+from hopping_leg.identify.cost import Objective, Scoring
 from hopping_leg.identify.identifiability import Identifiability, identifiability
-from hopping_leg.identify.judging import judge
-from hopping_leg.identify.least_squares import jacobian
-from hopping_leg.identify.leg_hypothesis import LegHypothesis
-from hopping_leg.identify.objective import Objective
-from hopping_leg.identify.optimizers import Pass, Report, Searcher, SearchOptions
-from hopping_leg.identify.ownership import check_owner
-from hopping_leg.identify.parameters import ParameterSet
-from hopping_leg.identify.plan import Plan, make_plan
+from hopping_leg.identify.optimizers import jacobian
+from hopping_leg.identify.parameters import LegHypothesis, ParameterSet
+from hopping_leg.identify.plan import FitPlan, check_commands, check_owner, make_plan
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.recording_format import Rig
 from hopping_leg.identify.result import Identified, as_json, software_versions
 from hopping_leg.identify.run_folder import RunFolder
-from hopping_leg.identify.validation import Validation
-from hopping_leg.identify.windows import cut
+from hopping_leg.identify.search import Pass, Report, Searcher, SearchOptions
+from hopping_leg.identify.validation import Validation, judge
+from hopping_leg.identify.windows import SHORTEST, cut, duration, hold_out
 from hopping_leg.robot.model_mismatch import NO_MISMATCH
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.robot.robot_files import check_physics
@@ -46,7 +41,9 @@ class IdentifyOptions:
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Bounds that differ from the widest ones."""
     search: str | None = None
-    """``least-squares``, ``cma``, ``two-pass`` or ``one-pass``; None lets the plan decide."""
+    """``least-squares``, ``cma`` or ``two-pass``; None lets the plan decide."""
+    scoring: Scoring | None = None
+    """What errors count; None lets the plan decide."""
     effort: SearchOptions = field(default_factory=SearchOptions)
     """How hard to search."""
     threads: int = 0
@@ -98,6 +95,7 @@ def identify(
         parameters=options.parameters,
         bounds={**_file_bounds(robot), **options.bounds},
         search=options.search,
+        scoring=options.scoring,
     )
     _check_bounds(options.bounds, plan.parameters)
     fit, held, split = _split(recordings, validate, plan, seed)
@@ -178,7 +176,7 @@ def _check_bounds(bounds: Mapping[str, tuple[float, float]], parameters: Paramet
 
 
 def _split(
-    recordings: Sequence[Recording], validation: Sequence[Recording], plan: Plan, seed: int
+    recordings: Sequence[Recording], validation: Sequence[Recording], plan: FitPlan, seed: int
 ) -> tuple[list[Recording], list[Recording], str]:
     if not validation:
         rng = np.random.default_rng(seed)

@@ -5,22 +5,93 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hopping_leg.errors import UsageError, unknown_name
-from hopping_leg.identify.columns import JOINTS
+from hopping_leg.errors import RecordingError, RobotError, UsageError, unknown_name
 from hopping_leg.identify.cost import Scoring
-from hopping_leg.identify.leg_hypothesis import LegHypothesis
-from hopping_leg.identify.parameters import ParameterSet, choose
+from hopping_leg.identify.initial_states import full_states
+from hopping_leg.identify.parameters import LegHypothesis, ParameterSet, choose
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.states import full_states
-from hopping_leg.identify.two_pass import INERTIAS, pass_names
+from hopping_leg.identify.recording_format import JOINTS, PAIRS, Rig
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.robot_files import load_robot
 
-SEARCHES = ("least-squares", "cma", "two-pass", "one-pass")
+_TOLERANCE = 0.2
+"""Share by which link lengths may differ between files of one leg."""
+
+
+def robot_of(recordings: Sequence[Recording]) -> str:
+    """Return the name or path of the robot that recordings were filed under.
+
+    Raises:
+        UsageError: There is no recording, or they name several robots.
+    """
+    names = list(dict.fromkeys(r.metadata.robot for r in recordings))
+    if not names:
+        raise UsageError("No recording was given; name at least one file.")
+    if len(names) > 1:
+        raise UsageError(
+            f"The recordings belong to several robots ({', '.join(names)}); identify one at a time,"
+            " or say with --robot where to start if these are the same leg."
+        )
+    return names[0]
+
+
+def check_owner(recordings: Sequence[Recording], robot: Robot) -> None:
+    """Refuse a robot whose kind or links are not those of the recordings' own.
+
+    Raises:
+        RecordingError: A recording belongs to another leg.
+    """
+    for recording in recordings:
+        try:
+            own = load_robot(recording.metadata.robot)
+        except RobotError:
+            continue  # filed under a robot that is not here: nothing to compare with
+        if own.kind != robot.kind:
+            raise RecordingError(
+                f"{recording.name} is of '{recording.metadata.robot}', a {own.kind}, but"
+                f" '{robot.name}' is a {robot.kind}; give its robot file with --robot."
+            )
+        for link in ("thigh", "shank"):
+            measured, given = getattr(own, link).length, getattr(robot, link).length
+            if abs(given / measured - 1) > _TOLERANCE:
+                raise RecordingError(
+                    f"{recording.name} is of '{recording.metadata.robot}', whose {link} is"
+                    f" {measured:g} m long, but that of '{robot.name}' is {given:g} m: another"
+                    " leg's robot file; leave --robot out or give this leg's."
+                )
+
+
+def check_commands(recordings: Sequence[Recording]) -> None:
+    """Refuse recordings without the commands that their rig was driven by.
+
+    Raises:
+        RecordingError: Naming file and columns.
+    """
+    for recording in recordings:
+        torques = recording.metadata.onboard == "torque"
+        wanted = "torque_command" if torques else "position_command"
+        if not recording.has(wanted):
+            what = "commanded torques" if torques else "targets of its on-board PD"
+            raise RecordingError(
+                f"{recording.name} has no {what} ({', '.join(PAIRS[wanted])}), so that nothing says"
+                " what moved the leg; record them."
+            )
+
+
+SEARCHES = ("least-squares", "cma", "two-pass")
 """What a plan may search with."""
 
-_PAPER = ("two-pass", "one-pass")
-"""Searches of Table I on positions only, as the paper's."""
+JOINT_PARAMETERS = tuple(
+    f"{joint}.{name}" for joint in JOINTS for name in ("friction", "damping", "armature")
+)
+"""Table I, hip and knee."""
+RAIL_PARAMETERS = ("rail.friction", "rail.damping")
+"""Table I, rail."""
+INERTIAS = ("thigh.inertia", "shank.inertia")
+"""Table I, link inertias, fixed in the first pass."""
+SOLVER_PARAMETERS = ("contact.time_constant", "contact.damping_ratio")
+"""Table I, the contact's, fixed in the first pass."""
 
 _COARSE = 1e-3
 """Physics step for a clamped leg whose drives' own loop the model only approximates, s; half of
@@ -34,7 +105,7 @@ _FASTEST, _REACHED = 0.999, 0.8
 
 
 @dataclass(frozen=True)
-class Plan:
+class FitPlan:
     """All decisions of an identification.
 
     Attributes:
@@ -65,7 +136,8 @@ def make_plan(
     parameters: tuple[str, ...] | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     search: str | None = None,
-) -> Plan:
+    scoring: Scoring | None = None,
+) -> FitPlan:
     """Decide how to identify a robot.
 
     Args:
@@ -73,9 +145,9 @@ def make_plan(
         robot: Its values before the fit.
         parameters: What to fit; None decides by what the recordings can tell.
         bounds: Bounds that differ from the widest ones.
-        search: One of ``SEARCHES``; ``two-pass`` is the paper's: CMA-ES on positions only, and
-            ``one-pass`` the same over all of its parameters at once, without its bounds. None
+        search: One of ``SEARCHES``; ``two-pass`` is the paper's: CMA-ES on positions only. None
             takes least squares.
+        scoring: What errors count; None decides by the recordings and the search.
 
     Raises:
         UsageError: There is no recording, a parameter or search does not exist, or bounds
@@ -87,20 +159,32 @@ def make_plan(
     if search not in SEARCHES:
         raise UsageError(unknown_name("search", search, SEARCHES))
     start = _start(recordings, robot)
-    names = parameters or _names(recordings, paper=search in _PAPER)
+    paper = search == "two-pass"
+    names = parameters or _names(recordings, paper=paper)
     window, unscored = _window(recordings)
-    return Plan(
+    return FitPlan(
         start=start,
         parameters=choose(
             start, names, bounds={**_speed_bounds(recordings, robot), **(bounds or {})}
         ),
-        scoring=_scoring(recordings, paper=search in _PAPER),
+        scoring=scoring or (Scoring() if paper else _scoring(recordings)),
         window=window,
         stride=window,
         unscored=unscored,
         timestep=_timestep(recordings),
         search=search,
     )
+
+
+def pass_names(rigs: Sequence[Rig]) -> tuple[list[str], list[str]]:
+    """Return the parameters of the paper's first pass and those that the second one adds.
+
+    Args:
+        rigs: Rigs of the recordings; without a moving base nothing is known of rail and contact.
+    """
+    moving = any(rig != "fixed-base" for rig in rigs)
+    first = [*JOINT_PARAMETERS, *(RAIL_PARAMETERS if moving else ())]
+    return first, [*INERTIAS, *(SOLVER_PARAMETERS if moving else ())]
 
 
 def _names(recordings: Sequence[Recording], *, paper: bool) -> list[str]:
@@ -205,9 +289,7 @@ def _start(recordings: Sequence[Recording], robot: Robot) -> LegHypothesis:
     return LegHypothesis(robot).replace(values)
 
 
-def _scoring(recordings: Sequence[Recording], *, paper: bool) -> Scoring:
-    if paper:
-        return Scoring()
+def _scoring(recordings: Sequence[Recording]) -> Scoring:
     if all(r.metadata.onboard == "torque" for r in recordings):
         return Scoring(position=0.02, robust=2.0, unexplained=0.4)
     torque = 0.2 if any(r.has("torque") for r in recordings) else None

@@ -1,4 +1,4 @@
-"""An excitation played on a simulated leg: the recording that the real one would give."""
+"""Recordings of an excitation: played on a simulated leg, or cut from a trace of motors."""
 
 from collections.abc import Callable
 
@@ -6,14 +6,14 @@ import numpy as np
 import polars as pl
 
 from hopping_leg.controllers.joint_pd import JointGains, JointPD
-from hopping_leg.errors import PhysicsError
-from hopping_leg.identify.columns import PAIRS
+from hopping_leg.errors import PhysicsError, RecordingError
 from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.recording import Recording, make_recording
-from hopping_leg.identify.recording_format import Quantisation, RecordingMetadata
+from hopping_leg.identify.recording_format import MEASURED, PAIRS, Quantisation, RecordingMetadata
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import NO_NOISE, MujocoSimulator, Plant
+from hopping_leg.trace import Trace
 
 _IMPOSSIBLE = 1e4
 """Joint speed that no leg reaches, rad/s."""
@@ -114,3 +114,50 @@ def _table(excitation: Excitation, rows: np.ndarray) -> pl.DataFrame:
 def _quantisation(robot: Robot) -> Quantisation:
     kinds = ("position", "velocity", "torque")
     return Quantisation(*(float(robot.reality.of_sensors(f"{kind}_step").max()) for kind in kinds))
+
+
+def recording_of(
+    trace: Trace, excitation: Excitation, *, believed: str, gains: JointGains, name: str
+) -> Recording:
+    """Return the part of a run in which the excitation was played.
+
+    Each row holds what the drives reported when the command of the row was computed; ticks without
+    a reply have no measurement. The joint PD runs on the host, once per row.
+
+    Args:
+        trace: Of the run, with the targets of the PD in its columns.
+        excitation: That was played.
+        believed: Robot file that the recording is filed under, where identification begins.
+        gains: Of the PD.
+        name: Of the recording, for messages.
+
+    Raises:
+        RecordingError: The excitation was not played, or the recording cannot be believed.
+    """
+    targets = PAIRS["position_command"] + PAIRS["velocity_command"]
+    lacking = [column for column in (*MEASURED, *targets) if column not in trace.table.columns]
+    if lacking:
+        raise RecordingError(f"{name} has no column '{lacking[0]}'; no excitation was played.")
+    table = trace.table.filter(pl.col(targets[0]).is_finite())
+    if not table.height:
+        raise RecordingError(f"{name} ended before the excitation began; see its events.")
+    first = float(table["time_s"][0])
+    time = np.round(table["time_s"].to_numpy() - first, 9)
+    columns = [table[column] for column in (*MEASURED, *targets)]
+    metadata = RecordingMetadata(
+        rig=excitation.rig,
+        rate_hz=excitation.rate,
+        robot=believed,
+        source=f"motors on {trace.header.get('transport')}, {trace.header.get('started')}",
+        onboard="zoh",
+        stiffness=gains.stiffness,
+        damping=gains.damping,
+    )
+    facts = {
+        "excitation": excitation.description,
+        "excitation_digest": excitation.digest,
+        "run": {k: v for k, v in trace.header.items() if k != "events"},
+    }
+    return make_recording(
+        pl.DataFrame([pl.Series("time_s", time), *columns]), metadata, name, header=facts
+    )

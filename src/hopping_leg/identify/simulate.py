@@ -4,14 +4,276 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from mujoco import batch
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.actuator_model import (
+    FIELDS,
+    DelayLine,
+    MotorBounds,
+    VelocityWindow,
+    build_rig_model,
+    drive_values,
+    model_field,
+    recorded_gains,
+    require_gains,
+)
+from hopping_leg.identify.encoder_offsets import OffsetFinder, find_offsets, has_encoder_offsets
+from hopping_leg.identify.initial_states import base_rate, start_states
+from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.window_group import WindowGroup
+from hopping_leg.identify.resampling import HeldSignal, RowResampling
 from hopping_leg.identify.windows import Window
+from hopping_leg.robot import kinematics
 from hopping_leg.robot.model import TIMESTEP
+from hopping_leg.robot.parameters import Robot
+
+_BLOCK = 256
+"""Ticks whose commands are prepared at once."""
+
+_TICKS_PER_PERIOD = 5
+"""Of a drive that closes its own loop: how often its target, integral and limits are renewed."""
+
+_WILD = 1e4
+"""Joint velocity beyond which a simulation has broken down, rad/s."""
+
+
+class WindowGroup:
+    """Windows that share rig, rate and on-board controller.
+
+    The simulation advances by ticks of the recording's period, rounded to physics steps; recorded
+    rows may lie anywhere between ticks. Row n holds state and torque before command n acts. A
+    ``zoh`` PD is computed once per tick from the simulated state; a ``continuous`` one is the
+    actuators' own and acts at every physics step, its target, integral and limits renewed at
+    several ticks a period.
+
+    Args:
+        recordings: All recordings.
+        windows: This group's.
+        timestep: Physics step, s.
+        threads: Worker threads, 0 for one per core.
+
+    Raises:
+        UsageError: The physics step is longer than the recording's period.
+    """
+
+    def __init__(
+        self,
+        recordings: Sequence[Recording],
+        windows: Sequence[Window],
+        timestep: float,
+        threads: int,
+    ) -> None:
+        self._timestep, self._threads = timestep, threads
+        self._recordings = [recordings[w.recording] for w in windows]
+        self._metadata = self._recordings[0].metadata
+        period = self._metadata.period
+        if timestep > period * 1.001:
+            raise UsageError(
+                f"A physics step of {timestep} s is longer than the recordings' period of"
+                f" {period:g} s; take {period:g} s or less."
+            )
+        parts = _TICKS_PER_PERIOD if self._metadata.onboard == "continuous" else 1
+        self._substeps = max(1, round(period / timestep / parts))
+        self._tick = self._substeps * timestep
+        self._zoh = self._metadata.onboard == "zoh"
+        self._numbers = sorted({w.recording for w in windows})
+        self._of_window = np.array([self._numbers.index(w.recording) for w in windows])
+        self._prepare_rows(recordings, windows)
+        self._distinct = [recordings[n] for n in self._numbers]
+        self._start_rows = np.array([w.start for w in windows])
+        self._prepare_commands()
+        self._offsets = [
+            OffsetFinder(r) if has_encoder_offsets(r.metadata) else None for r in self._distinct
+        ]
+        self._base_rates: dict[tuple[float, ...], Array] = {}
+        self._batches: dict[int, batch.Batch] = {}
+
+    def run(self, hypotheses: Sequence[LegHypothesis]) -> tuple[Array, Array, Array, Array]:
+        """Return position, velocity and measured torque of the joints, and the base's height.
+
+        Of shape (hypotheses, windows, rows, 2) the first three, (hypotheses, windows, rows) the
+        last, which is NaN where the base is fixed.
+        """
+        offsets = find_offsets(self._offsets, hypotheses)[:, self._of_window]
+        simulation = self._start(hypotheses, offsets)
+        *history, heights = self._advance(simulation, hypotheses)
+        shape = (self._rows.ticks, len(hypotheses), -1, 2)
+        q, qd, torque = (values.reshape(shape) for values in history)
+        height = self._rows.linear(heights.reshape(*shape[:3], 1))[..., 0]
+        position, velocity = self._rows.cubic(q, qd)
+        position += offsets[:, :, None]
+        gain = drive_values(hypotheses, "sensor_gain")[:, None, None]
+        offset = drive_values(hypotheses, "torque_offset")[:, None, None]
+        measured = gain * self._rows.linear(torque) + offset
+        for values in (position, velocity, measured, height):
+            values[:, self._rows.padding] = np.nan
+        return position, velocity, measured, height
+
+    def _prepare_rows(self, recordings: Sequence[Recording], windows: Sequence[Window]) -> None:
+        """Place every window's rows among the ticks and collect initial states."""
+        times = []
+        self._begin = np.empty(len(windows))
+        states = {n: start_states(recordings[n]) for n in self._numbers}
+        self._q0, self._qd0 = np.empty((len(windows), 2)), np.empty((len(windows), 2))
+        self._height0 = np.full(len(windows), np.nan)
+        for i, w in enumerate(windows):
+            recording = recordings[w.recording]
+            stamps = recording.time[w.start : w.start + w.length]
+            self._begin[i] = stamps[0]
+            even = self._tick * np.arange(w.length, dtype=float)
+            times.append(even if self._zoh else stamps - stamps[0])
+            self._q0[i], self._qd0[i] = (values[w.start] for values in states[w.recording])
+            if recording.has_column("height_m"):
+                self._height0[i] = recording.trace.column("height_m")[w.start]
+        self._rows = RowResampling(times, self._tick)
+
+    def _prepare_commands(self) -> None:
+        self._held, self._ramps, self._gains = [], [], []
+        for recording in self._distinct:
+            columns = [
+                np.nan_to_num(recording.array(f"{name}_command"))
+                for name in ("position", "velocity", "torque")
+            ]
+            time = recording.time
+            self._held.append(HeldSignal(time, np.concatenate(columns, axis=1)))
+            self._ramps.append(HeldSignal(time, np.zeros_like(columns[1]), columns[1]))
+            rows = [recorded_gains(recording, n) for n in ("stiffness", "damping", "integral")]
+            self._gains.append(HeldSignal(time, np.concatenate(rows, axis=1)))
+
+    def _start(self, hypotheses: Sequence[LegHypothesis], offsets: Array) -> batch.Batch:
+        """Return the batch with each simulation's model and initial state set."""
+        metadata, windows = self._metadata, len(self._begin)
+        models = [
+            build_rig_model(c.robot, metadata.rig, self._timestep, metadata.effective_gravity)
+            for c in hypotheses
+        ]
+        count = len(hypotheses) * windows
+        if count not in self._batches:
+            self._batches[count] = batch.Batch(models[0], count, self._threads)
+        simulation = self._batches[count]
+        for name in FIELDS:
+            values = np.stack([model_field(m, name) for m in models])
+            simulation.expand(name)[...] = np.repeat(values, windows, axis=0)
+        simulation.reset(stage=0)
+        q, qd = simulation.bind("qpos"), simulation.bind("qvel")
+        q[:, -2:] = (self._q0 - offsets).reshape(-1, 2)
+        qd[:, -2:] = np.tile(self._qd0, (len(hypotheses), 1))
+        if metadata.rig != "fixed-base":
+            standing = [kinematics.stance_height(c.robot, self._q0) for c in hypotheses]
+            height = np.where(np.isnan(self._height0), np.stack(standing), self._height0)
+            q[:, 0] = height.ravel()
+            qd[:, 0] = np.concatenate([self._base_rate(c.robot) for c in hypotheses])
+        return simulation
+
+    def _base_rate(self, robot: Robot) -> Array:
+        """Return the base's first speed in each window, m/s; zero if no height was measured."""
+        lengths = (robot.thigh.length, robot.shank.length, robot.foot.radius)
+        if lengths not in self._base_rates:
+            rates = np.zeros(len(self._begin))
+            for n, recording in enumerate(self._distinct):
+                if recording.has_column("height_m"):
+                    mine = self._of_window == n
+                    rates[mine] = base_rate(recording, robot)[self._start_rows[mine]]
+            self._base_rates[lengths] = rates
+        return self._base_rates[lengths]
+
+    def _advance(
+        self, simulation: batch.Batch, hypotheses: Sequence[LegHypothesis]
+    ) -> tuple[Array, Array, Array, Array]:
+        """Run all ticks; return joint position, velocity and torque, base height at each.
+
+        Of shape (ticks, n, 2) the first three, (ticks, n) the last.
+        """
+        windows, count = len(self._begin), simulation.nsim
+        history = tuple(np.full((self._rows.ticks, count, 2), np.nan) for _ in range(3))
+        positions, velocities, torques = history
+        heights = np.full((self._rows.ticks, count), np.nan)
+        q, qd = simulation.bind("qpos")[:, -2:], simulation.bind("qvel")[:, -2:]
+        base = simulation.bind("qpos")[:, 0] if self._metadata.rig != "fixed-base" else np.nan
+        ctrl = simulation.bind("ctrl")
+        bias = simulation.expand("actuator_biasprm")
+        force = simulation.expand("actuator_forcerange")
+        friction = simulation.expand("dof_frictionloss")[:, -2:]
+        still = friction.copy()
+        bounds = MotorBounds(hypotheses, self._recordings)
+        gain = np.repeat([c.robot.of_joints("torque_gain") for c in hypotheses], windows, axis=0)
+        load = np.repeat([c.robot.of_joints("load_friction") for c in hypotheses], windows, axis=0)
+        delay = np.repeat([c.drive.delay for c in hypotheses], windows)
+        line = DelayLine(delay / self._tick)
+        window = np.repeat([c.drive.velocity_window for c in hypotheses], windows)
+        lagging = (window > 0)[:, None]
+        windowed = bool(lagging.any()) and not self._zoh
+        seen = VelocityWindow(window, self._tick, q, qd)
+        integral, last = np.zeros((count, 2)), np.zeros((count, 2))
+        alive = np.arange(count)
+        for tick in range(self._rows.ticks):
+            if tick % _BLOCK == 0:
+                commands, gains = self._block(tick, delay, hypotheses)
+            target, rate, feed = np.split(commands[tick % _BLOCK], 3, axis=-1)
+            kp, kd, ki = gains[tick % _BLOCK]
+            lower, upper = bounds.at(qd)
+            push = feed + ki * integral
+            if windowed:
+                push = push - np.where(lagging, kd * seen.push(q, qd), 0.0)
+            if self._zoh:
+                asked = push + kp * (target - q) + kd * (rate - qd)
+                torque = ctrl.copy()
+                ctrl[...] = gain * np.clip(line.push(asked), lower, upper)
+                torque = torque if tick else ctrl.copy()
+            else:
+                asked = push + kp * target + kd * rate
+                kd = np.where(lagging, 0.0, kd)
+                reply = np.clip((last if tick else asked) - kp * q - kd * qd, lower, upper)
+                torque, last = gain * reply, asked
+                ctrl[...] = gain * asked
+                bias[:, :, 1], bias[:, :, 2] = -gain * kp, -gain * kd
+                force[..., 0], force[..., 1] = gain * lower, gain * upper
+            integral += self._tick * (target - q)
+            positions[tick], velocities[tick], torques[tick] = q, qd, torque
+            heights[tick] = base
+            if load.any():
+                friction[...] = still + load * np.abs(ctrl if self._zoh else torque)
+            simulation.step(ids=alive, nstep=self._substeps)
+            wild = ~(np.abs(qd) < _WILD).all(axis=1)
+            if wild.any():
+                alive = np.setdiff1d(alive, np.flatnonzero(wild))
+                if not len(alive):
+                    break
+        positions[:, np.setdiff1d(np.arange(count), alive)] = np.nan
+        return positions, velocities, torques, heights
+
+    def _block(
+        self, tick: int, delay: Array, hypotheses: Sequence[LegHypothesis]
+    ) -> tuple[Array, Array]:
+        """Return a block of ticks' commands, (ticks, n, 6), and gains, (ticks, 3, n, 2)."""
+        windows, number = len(self._begin), len(hypotheses)
+        ticks = np.arange(tick, min(tick + _BLOCK, self._rows.ticks))[:, None, None] * self._tick
+        late = np.zeros(number) if self._zoh else delay[::windows]
+        late = late[:1] if (late == late[0]).all() else late
+        ramp = np.array([[c.drive.ramp] for c in hypotheses])
+        commands = np.empty((len(ticks), number, windows, 6))
+        gains = np.empty((len(ticks), 3, number, windows, 2))
+        fitted = np.array(
+            [drive_values(hypotheses, n) for n in ("stiffness", "damping", "integral")]
+        )[:, :, None]
+        for n in range(len(self._numbers)):
+            mine = self._of_window == n
+            start = self._begin[mine] + ticks - late[:, None]
+            held = self._held[n].average(start, self._tick)
+            if ramp.any():
+                held = np.repeat(held, number // len(late), axis=1)
+                held[..., :2] += ramp[:, None] * self._ramps[n].average(start, self._tick)
+            commands[:, :, mine] = held
+            rows = self._gains[n].at(start + 1e-9)
+            rows = np.moveaxis(rows.reshape(*start.shape, 3, 2), 3, 1)
+            gains[:, :, :, mine] = np.where(np.isnan(fitted), rows, fitted)
+        if self._metadata.onboard == "torque":
+            gains[...] = 0.0
+        for index, name in enumerate(("stiffness", "damping")):
+            require_gains(gains[:, index], name, self._recordings[0])
+        return commands.reshape(len(ticks), -1, 6), gains.reshape(len(ticks), 3, -1, 2)
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.identify.cost import measured
 from hopping_leg.identify.encoder_offsets import SETTLING, has_encoder_offsets
-from hopping_leg.identify.leg_hypothesis import LegHypothesis
+from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.simulate import WindowSimulator
-from hopping_leg.identify.windows import Window, cut
+from hopping_leg.identify.windows import Window, cut, duration
 from hopping_leg.robot.model import TIMESTEP
 
 HORIZONS = (0.2, 0.5, 1.0)
@@ -160,3 +160,129 @@ def _rms(errors: Array) -> Pair:
     with np.errstate(invalid="ignore", divide="ignore"):
         hip, knee = np.sqrt(np.nansum(np.square(flat), axis=0) / counts)
     return float(hip), float(knee)
+
+
+UNSCORED = 1.0
+"""Beginning of a recording that does not count in closed loop, s, or a quarter of a short one."""
+
+
+def judge(
+    recordings: Sequence[Recording], hypothesis: LegHypothesis, timestep: float, threads: int = 0
+) -> Validation:
+    """Judge a hypothesis; a recording that is shorter than a horizon is left out there.
+
+    Args:
+        recordings: Best those that no fit has seen.
+        hypothesis: What to judge.
+        timestep: Physics step, s.
+        threads: Worker threads, 0 for one per core.
+
+    Raises:
+        RecordingError: A recording is too short to judge anything.
+    """
+    closed = validate(
+        recordings,
+        hypothesis,
+        timestep=timestep,
+        threads=threads,
+        unscored=unscored(recordings),
+        horizons=(),
+    )
+    predicted = {}
+    for horizon in HORIZONS:
+        long_enough = [r for r in recordings if _reaches(r, horizon)]
+        predicted[horizon] = open_loop(long_enough, hypothesis, horizon, timestep, threads)
+    return dataclasses.replace(closed, open_loop_position=predicted)
+
+
+def unscored(recordings: Sequence[Recording]) -> float:
+    """Return the beginning of each recording that does not count in closed loop, s."""
+    return min(UNSCORED, 0.25 * min(map(duration, recordings)))
+
+
+def _reaches(recording: Recording, horizon: float) -> bool:
+    rows = max(s.stop - s.start for s in recording.segments())
+    return bool(rows >= max(3, round(horizon * recording.metadata.rate_hz)))
+
+
+RESTART = 0.5
+"""Where a recording's torques are commanded there is no loop that holds the simulation to it; it
+is started anew so often, s."""
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """One recording; NaN where nothing was measured or simulated.
+
+    Attributes:
+        recording: The recording or part of one.
+        restarted: Whether the simulation was started anew every ``RESTART``.
+        position: Measured, and counted, rad, (rows, 2).
+        torque: Likewise, N m, (rows, 2).
+        simulated_position: By each hypothesis, rad, (hypotheses, rows, 2).
+        simulated_torque: Likewise, N m, (hypotheses, rows, 2).
+    """
+
+    recording: Recording
+    restarted: bool
+    position: Array
+    torque: Array
+    simulated_position: Array
+    simulated_torque: Array
+
+    def errors(self, quantity: str) -> Array:
+        """Return simulated minus measured, (hypotheses, rows, 2).
+
+        Args:
+            quantity: ``position`` or ``torque``.
+        """
+        difference: Array = getattr(self, f"simulated_{quantity}") - getattr(self, quantity)
+        return difference
+
+
+def overlays(
+    recordings: Sequence[Recording],
+    hypotheses: Sequence[LegHypothesis],
+    timestep: float,
+    threads: int = 0,
+) -> list[Overlay]:
+    """Simulate recordings with hypotheses.
+
+    Args:
+        recordings: Best those that no fit has seen.
+        hypotheses: To compare.
+        timestep: Physics step, s.
+        threads: Worker threads, 0 for one per core.
+    """
+    skip = unscored(recordings)
+    return [_overlay(r, hypotheses, timestep, threads, skip) for r in recordings]
+
+
+def _overlay(
+    recording: Recording,
+    hypotheses: Sequence[LegHypothesis],
+    timestep: float,
+    threads: int,
+    skip: float,
+) -> Overlay:
+    restarted = recording.metadata.onboard == "torque"
+    windows: list[Window] = (
+        cut([recording], RESTART) if restarted else cut([recording], None, unscored=skip)
+    )
+    simulator = WindowSimulator([recording], windows, timestep=timestep, threads=threads)
+    simulated = simulator.run(hypotheses)
+    rows = len(recording)
+    filled = {}
+    for name in ("position", "torque"):
+        filled[name] = _in_rows(measured(simulator, name)[None], windows, rows)[0]
+        filled[f"simulated_{name}"] = _in_rows(getattr(simulated, name), windows, rows)
+    return Overlay(recording, restarted, **filled)
+
+
+def _in_rows(values: Array, windows: Sequence[Window], rows: int) -> Array:
+    """Put windows (n, windows, length, 2) where they lie in their recording, (n, rows, 2)."""
+    placed = np.full((len(values), rows, 2), np.nan)
+    for index, window in enumerate(windows):
+        stop = window.start + window.length
+        placed[:, window.start : stop] = values[:, index, : window.length]
+    return placed

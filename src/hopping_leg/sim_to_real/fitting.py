@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.cma import CmaOptions
-from hopping_leg.identify.leg_hypothesis import LegHypothesis
-from hopping_leg.identify.optimizers import SearchOptions
+from hopping_leg.identify.cost import Scoring
+from hopping_leg.identify.optimizers import CmaOptions
+from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
+from hopping_leg.identify.plan import make_plan
 from hopping_leg.identify.recording import load_recording
-from hopping_leg.identify.result import Identified, as_json
-from hopping_leg.identify.robot_file import save_robot
+from hopping_leg.identify.result import Identified, as_json, save_robot
+from hopping_leg.identify.search import SearchOptions
 from hopping_leg.io import write_json
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.parameters import Robot
@@ -75,10 +76,17 @@ class Identify:
             cma=CmaOptions(generations=study.generations),
             least_squares=study.least_squares,
         )
+        recordings = [load_recording(path) for path in self._recordings]
+        options = IdentifyOptions(search=search, bounds=_bounds(believed), effort=effort)
+        if search == "one-pass":
+            names = make_plan(recordings, believed, search="two-pass").parameters.names
+            options = dataclasses.replace(
+                options, search="cma", parameters=tuple(names), scoring=Scoring()
+            )
         identified = identify(
-            [load_recording(path) for path in self._recordings],
+            recordings,
             believed,
-            options=IdentifyOptions(search=search, bounds=_bounds(believed), effort=effort),
+            options=options,
             folder=file.with_suffix(""),
             resume=True,
         )

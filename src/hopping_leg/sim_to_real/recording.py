@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.excitation import adapt, make_excitation
-from hopping_leg.identify.paper_excitation import Strokes, fixed_base, moving_base
+from hopping_leg.identify.excitation import make_excitation
+from hopping_leg.identify.paper_excitation import Strokes, adapt, fixed_base, moving_base
 from hopping_leg.identify.play_excitation import play
 from hopping_leg.identify.recording_format import Rig
 from hopping_leg.robot import load_robot

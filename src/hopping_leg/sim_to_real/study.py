@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.least_squares import LeastSquaresOptions
+from hopping_leg.identify.optimizers import LeastSquaresOptions
 from hopping_leg.robot.model_mismatch import NO_MISMATCH, Latency
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.robot.robot_files import load_robot, parent_robot, shipped_robots

@@ -9,8 +9,8 @@ from scipy.signal import lombscargle
 
 from hopping_leg.arrays import Array
 from hopping_leg.evaluate.figures.style import TORQUE_MAP, WIDTH, colour, styled
-from hopping_leg.identify.optimizers import Pass
-from hopping_leg.identify.overlay import Overlay
+from hopping_leg.identify.search import Pass
+from hopping_leg.identify.validation import Overlay
 
 JOINTS = ("hip", "knee")
 LABELS = {"position": "position / rad", "torque": "torque / N m"}

@@ -1,11 +1,23 @@
-"""Values that are no measurements: uninitialised memory, dead columns, rows before the start."""
+"""What the loader rejects, and what it leaves out and warns about.
+
+A check raises, or changes the inspection's table to what can be believed. Rows in messages are
+those of the file, the first below the header being 0.
+"""
 
 import numpy as np
 import polars as pl
 
 from hopping_leg.arrays import BoolArray
-from hopping_leg.identify.columns import COLUMNS, MEASURED, PAIRS
-from hopping_leg.identify.inspection import Inspection
+from hopping_leg.errors import RecordingError
+from hopping_leg.identify.recording_format import COLUMNS, MEASURED, PAIRS
+from hopping_leg.identify.unit_checks import (
+    STALL,
+    Inspection,
+    check_clock,
+    check_units,
+    check_velocity,
+    row_period,
+)
 
 TINY, HUGE = 1e-30, 1e30
 """No sensor gives a magnitude beyond these; uninitialised memory read as a float does."""
@@ -20,7 +32,35 @@ _JUMP = 0.05
 """Step out of rows of zeros, rad, that only a sensor that woke up makes."""
 
 
-def drop_garbage(inspection: Inspection) -> pl.DataFrame:
+_LEAST_ROWS = 20
+"""Rows with a position that a recording needs."""
+
+_LEAST_MOTION = 0.02
+"""Motion of the joint that moves more, rad; below it nothing can be identified."""
+
+_SMALL_MOTION = 0.5
+"""Below it, rad, positions may be revolutions."""
+
+
+def check_table(inspection: Inspection) -> tuple[pl.DataFrame, list[str]]:
+    """Return a table that can be believed, and a sentence for each thing that was strange.
+
+    Raises:
+        RecordingError: Naming file, column and row.
+    """
+    _check_columns(inspection)
+    check_clock(inspection)
+    _drop_garbage(inspection)
+    _drop_zeros(inspection)
+    _drop_startup(inspection)
+    check_units(inspection)
+    check_velocity(inspection)
+    _check_motion(inspection)
+    _warn_of_stalls(inspection)
+    return inspection.table, inspection.warnings
+
+
+def _drop_garbage(inspection: Inspection) -> None:
     """Leave out denormal, infinite and huge values."""
     for column, (dtype, _) in COLUMNS.items():
         if dtype != pl.Float64 or column not in inspection.table.columns:
@@ -37,15 +77,14 @@ def drop_garbage(inspection: Inspection) -> pl.DataFrame:
         )
         if garbage.mean() > _MOSTLY:
             inspection.warn(f"{found}; the column is left out")
-            inspection.table = inspection.without(column)
+            inspection.drop(column)
         else:
             inspection.warn(f"{found}; left out")
             kept = pl.when(pl.Series(garbage)).then(None).otherwise(pl.col(column))
             inspection.table = inspection.table.with_columns(kept.alias(column))
-    return inspection.table
 
 
-def drop_zeros(inspection: Inspection) -> pl.DataFrame:
+def _drop_zeros(inspection: Inspection) -> None:
     """Leave out measured columns that are zero throughout; a command may well be zero."""
     joints = "torque_command" if inspection.metadata.onboard == "torque" else "position_command"
     for column in (*MEASURED, *PAIRS[joints]):
@@ -55,13 +94,12 @@ def drop_zeros(inspection: Inspection) -> pl.DataFrame:
         sentence = f"{inspection.named(column)} is zero in all rows from {inspection.row(0)} on"
         if column in MEASURED:
             inspection.warn(f"{sentence}: not recorded, left out")
-            inspection.table = inspection.without(column)
+            inspection.drop(column)
         else:
             inspection.warn(f"{sentence}: kept as a command of zero")
-    return inspection.table
 
 
-def drop_startup(inspection: Inspection) -> pl.DataFrame:
+def _drop_startup(inspection: Inspection) -> None:
     """Leave out first rows in which sensors slept or commands were not applied."""
     known = inspection.metadata.startup_rows
     rows, reason = max(
@@ -72,14 +110,14 @@ def drop_startup(inspection: Inspection) -> pl.DataFrame:
     )
     already = inspection.row(0)
     if known and already:
-        return inspection.table  # saved again after they were left out
+        return  # saved again after they were left out
     if rows:
         columns = ", ".join(inspection.named(c) for c in _startup_columns(inspection))
         inspection.warn(
             f"rows {already} to {inspection.row(rows - 1)} are start-up rows ({reason};"
             f" {columns}); left out"
         )
-    return inspection.table.slice(rows)
+    inspection.table = inspection.table.slice(rows)
 
 
 def _startup_columns(inspection: Inspection) -> list[str]:
@@ -115,3 +153,59 @@ def _unapplied(inspection: Inspection) -> int:
         if len(ignored) and command[_STARTUP:].max() > 0:
             last = max(last, int(ignored[-1]) + 3)
     return last
+
+
+def _check_columns(inspection: Inspection) -> None:
+    table = inspection.table
+    if table.height == 0:
+        raise RecordingError(f"{inspection.origin} has no rows below its header; record again.")
+    if "time_s" not in table.columns:
+        raise RecordingError(
+            f"{inspection.origin} has no column 'time_s'; a recording needs time and position."
+        )
+
+
+def _check_motion(inspection: Inspection) -> None:
+    """Refuse what is too short or at rest."""
+    table, origin = inspection.table, inspection.origin
+    spans = {}
+    for column in PAIRS["position"]:
+        values = inspection.values(column).drop_nulls()
+        if values.len() >= _LEAST_ROWS:
+            spans[column] = float(values.max()) - float(values.min())  # type: ignore[arg-type]
+        elif column not in table.columns or values.len() == 0:
+            inspection.warn(f"{inspection.named(column)} was not recorded")
+    if not spans:
+        raise RecordingError(
+            f"{origin} is too short: {table.height} rows, and no joint has {_LEAST_ROWS} positions"
+            f" ({' or '.join(map(inspection.named, PAIRS['position']))})."
+        )
+    widest = max(spans, key=lambda column: spans[column])
+    if spans[widest] < _LEAST_MOTION:
+        raise RecordingError(
+            f"{origin} is at rest: {inspection.named(widest)} spans {spans[widest]:.2g} rad;"
+            f" nothing can be identified below {_LEAST_MOTION:g} rad, play an excitation."
+        )
+    if spans[widest] < _SMALL_MOTION:
+        inspection.warn(
+            f"{inspection.named(widest)} spans only {spans[widest]:.2g}; check that it is in rad,"
+            " not in revolutions"
+        )
+
+
+def _warn_of_stalls(inspection: Inspection) -> None:
+    """Say where rows are missing; windows do not reach across."""
+    time = inspection.floats("time_s")
+    steps, period = np.diff(time), row_period(time, inspection.metadata.period)
+    stalls = np.flatnonzero(steps > STALL * period) + 1
+    for index in stalls[:3]:
+        gap = time[index] - time[index - 1]
+        inspection.warn(
+            f"{inspection.named('time_s')}: stall of {gap * 1e3:.1f} ms, {gap / period:.1f}"
+            f" periods, before row {inspection.row(index)}"
+        )
+    if len(stalls) > 3:
+        inspection.warn(
+            f"{inspection.named('time_s')}: {len(stalls) - 3} further stalls, the last before row"
+            f" {inspection.row(stalls[-1])}"
+        )

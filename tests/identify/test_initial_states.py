@@ -1,9 +1,9 @@
 import mujoco
 import numpy as np
 
+from hopping_leg.identify.actuator_model import build_rig_model
+from hopping_leg.identify.initial_states import base_rate, full_states, start_states
 from hopping_leg.identify.recording import make_recording
-from hopping_leg.identify.rig_model import build_rig_model
-from hopping_leg.identify.states import base_rate, full_states, start_states
 from hopping_leg.robot import kinematics
 from tests.identify.twin import LEG, STEP, record, swing
 

@@ -1,0 +1,306 @@
+"""A plan's search carried out: every candidate with every window in one batch, on disk as it goes.
+
+Cost is the sum of squared residuals throughout, as the objective's robust loss weighs it. The
+paper's search has two passes: "The parameters that can be roughly estimated during modeling, i.e.
+link inertia and solver parameters, are fixed in a first optimization pass. In a second pass, we
+optimize all dynamic and solver parameters while placing bounds on the friction, damping, and
+armature parameters derived from the first pass."
+"""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.cluster import RayCluster
+from hopping_leg.errors import UsageError
+from hopping_leg.identify.cost import Objective, RobustLoss, total_costs
+from hopping_leg.identify.optimizers import (
+    CmaOptions,
+    Found,
+    LeastSquaresOptions,
+    Residuals,
+    cma_es,
+    least_squares,
+    multi_start,
+)
+from hopping_leg.identify.parameters import ParameterSet, choose
+from hopping_leg.identify.plan import FitPlan, pass_names
+from hopping_leg.identify.recording_format import Rig
+from hopping_leg.identify.windows import deal
+
+_FACTOR = 2.0
+"""The paper's second pass keeps the first one's parameters within this factor."""
+
+Progress = Callable[[float, float], None]
+"""Called with the share done (0 to 1) and the lowest cost so far."""
+
+Search = Callable[[Array, Path | None, Progress], Found]
+"""From a start, the checkpoint and its progress report, to where the search ended."""
+
+Report = Callable[[str, float, float], None]
+"""Called with what is being done, its share done (0 to 1) and the lowest cost so far."""
+
+Evaluate = Callable[[Array], Array]
+"""Search vectors (n, k) to costs (n,) or residuals (n, m), row by row independent."""
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """How hard to search."""
+
+    starts: int = 1
+    """Searches, the first from the robot's own values and the others from random ones."""
+    cma: CmaOptions = field(default_factory=CmaOptions)
+    """Options of CMA-ES, in each pass."""
+    least_squares: LeastSquaresOptions = field(default_factory=LeastSquaresOptions)
+
+    def __post_init__(self) -> None:
+        if self.starts < 1 or self.cma.generations < 1 or self.cma.population < 4:
+            raise UsageError(
+                "A search needs at least one start, one generation and four candidates in each."
+            )
+        if not self.cma.seconds > 0:
+            raise UsageError(
+                f"A generation is judged by {self.cma.seconds} s of windows but needs more than 0;"
+                " infinity takes all."
+            )
+
+
+@dataclass(frozen=True)
+class Pass:
+    """One search: the paper's method has two, others one.
+
+    Attributes:
+        name: Name of the pass.
+        parameters: What it searched.
+        found: Where it ended, from the best of its starts.
+        others: Costs where the other starts ended, best first.
+    """
+
+    name: str
+    parameters: ParameterSet
+    found: Found
+    others: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Searcher:
+    """Searches as a plan says.
+
+    Attributes:
+        plan: What to search, how.
+        objective: Cost of the plan's parameters; a pass with others gets its own.
+        options: How hard.
+        seed: Seed of all randomness.
+        folder: For checkpoints; None keeps none.
+        report: Called with the progress.
+        ray: Address of a Ray cluster that simulates, ``local`` for one on this machine; None
+            simulates here.
+        about: What else makes this run this run.
+    """
+
+    plan: FitPlan
+    objective: Objective
+    options: SearchOptions
+    seed: int = 0
+    folder: Path | None = None
+    report: Report = lambda stage, share, cost: None
+    ray: str | None = None
+    about: Mapping[str, object] = field(default_factory=dict)
+
+    def run(self, rigs: Sequence[Rig]) -> list[Pass]:
+        """Return the passes in order; the last one's end is the result.
+
+        Args:
+            rigs: Rigs of the recordings.
+        """
+        plan = self.plan
+        if plan.search != "two-pass":
+            return [self._pass(plan.search, plan.parameters, 0.0, 1.0)]
+        names, added = pass_names(rigs)
+        own = {p.name: p for p in plan.parameters.parameters}
+        start = {name: p.start for name, p in own.items()}
+        bounds = {name: (p.low, p.high) for name, p in own.items()}
+        further = [name for name in own if name not in (*names, *added)]
+        parameters = choose(plan.start, [*names, *further], bounds=bounds, start=start)
+        first = self._pass("two-pass, first", parameters, 0.0, 0.5)
+        parameters = second_pass(parameters, first.found, rigs, bounds=bounds, start=start)
+        return [first, self._pass("two-pass, second", parameters, 0.5, 0.5)]
+
+    def _pass(self, name: str, parameters: ParameterSet, begin: float, share: float) -> Pass:
+        """Search from every start and report within a share of the whole."""
+        threads = self.objective.threads if self.ray is None else 1
+        objective = dataclasses.replace(self.objective, parameters=parameters, threads=threads)
+        about = {**objective.about(), **self.about}
+        starts = self.options.starts
+        find = self._least_squares if self.plan.search == "least-squares" else self._cma
+        searched = find(objective, about)
+
+        def search(number: int, start: Array) -> Found:
+            stage = name if starts == 1 else f"{name}, start {number + 1} of {starts}"
+            file = f"search-{name.replace(', ', '-')}-{number}.json"
+
+            def progress(done: float, cost: float) -> None:
+                self.report(stage, begin + share * (number + done) / starts, cost)
+
+            checkpoint = None if self.folder is None else self.folder / file
+            return searched(start, checkpoint, progress)
+
+        ends = multi_start(search, parameters, starts, self.seed)
+        return Pass(name, parameters, ends[0], tuple(end.cost for end in ends[1:]))
+
+    def _least_squares(self, objective: Objective, about: Mapping[str, object]) -> Search:
+        residuals, loss = self._spread(objective.residuals), objective.loss
+        options = self.options.least_squares
+
+        def search(start: Array, checkpoint: Path | None, progress: Progress) -> Found:
+            rounds = _Rounds(residuals, loss, options, progress)
+            return least_squares(
+                rounds,
+                objective.parameters,
+                options,
+                loss=loss,
+                groups=objective.jumping,
+                start=start,
+                about=about,
+                checkpoint=checkpoint,
+                report=rounds.finished,
+            )
+
+        return search
+
+    def _cma(self, objective: Objective, about: Mapping[str, object]) -> Search:
+        options = self.options.cma
+        values = self._spread(objective)
+        shares = [self._spread(share) for share in self._shares(objective)]
+
+        def search(start: Array, checkpoint: Path | None, progress: Progress) -> Found:
+            return cma_es(
+                values,
+                objective.parameters,
+                options,
+                seed=self.seed,
+                start=start,
+                shares=shares,
+                about=about,
+                checkpoint=checkpoint,
+                report=lambda index, cost: progress(index / options.generations, cost),
+            )
+
+        return search
+
+    def _shares(self, objective: Objective) -> list[Objective]:
+        """Return what judges generations in turn; nothing if all windows can judge each."""
+        rates = [r.metadata.rate_hz for r in objective.recordings]
+        simulated = sum(w.length / rates[w.recording] for w in objective.windows)
+        count = max(1, round(simulated / self.options.cma.seconds))
+        hands = deal(objective.windows, count, np.random.default_rng(self.seed))
+        if len(hands) < 2:
+            return []
+        return [dataclasses.replace(objective, windows=hand) for hand in hands]
+
+    def _spread(self, evaluate: Evaluate) -> Evaluate:
+        """Return a function of a population, on the cluster if there is one."""
+        return evaluate if self.ray is None else Cluster(evaluate, self.ray)
+
+
+def second_pass(
+    first: ParameterSet,
+    found: Found,
+    rigs: Sequence[Rig],
+    *,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    start: Mapping[str, float] | None = None,
+) -> ParameterSet:
+    """Return the parameters of the paper's second pass.
+
+    Args:
+        first: Parameters of the first pass.
+        found: Where that ended.
+        rigs: Rigs of the recordings.
+        bounds: Bounds of the added parameters that differ from the widest ones.
+        start: Starting values of those that differ from the robot's.
+    """
+    names, added = pass_names(rigs)
+    starts, every = {**(start or {})}, {**(bounds or {})}
+    for p, value in zip(first.parameters, first.values(found.vector).tolist(), strict=True):
+        low, high = p.low, p.high
+        if p.name in names:
+            reach = 0.1 * p.scale
+            low = max(low, min(value / _FACTOR, value * _FACTOR, value - reach))
+            high = min(high, max(value / _FACTOR, value * _FACTOR, value + reach))
+        starts[p.name], every[p.name] = value, (low, high)
+    return choose(first.base, [*first.names, *added], bounds=every, start=starts)
+
+
+class Cluster:
+    """Spreads populations over the workers of a Ray cluster.
+
+    A candidate's simulation does not depend on which candidates share its batch, so splitting a
+    population changes nothing but the time.
+
+    Args:
+        evaluate: What each worker runs; sent to them once.
+        address: Address of the cluster, or None to start one on this machine.
+        workers: How many parts to cut a population into; None takes one per CPU of the cluster.
+
+    Raises:
+        UsageError: Ray is not installed or the cluster cannot be reached.
+    """
+
+    def __init__(
+        self, evaluate: Evaluate, address: str | None = None, workers: int | None = None
+    ) -> None:
+        self._cluster = RayCluster(address)
+        self.workers = workers or self._cluster.cores
+        self._evaluate = self._cluster.put(evaluate)
+
+    def __call__(self, vectors: Array) -> Array:
+        """Return what ``evaluate`` returns, in the population's order."""
+        calls = ((self._evaluate, part) for part in split_population(vectors, self.workers))
+        return np.concatenate(self._cluster.map(_evaluate_part, calls))
+
+
+def split_population(vectors: Array, workers: int) -> list[Array]:
+    """Cut a population (n, k) into at most ``workers`` parts of nearly equal size, in order."""
+    return np.array_split(vectors, min(workers, len(vectors)))
+
+
+def _evaluate_part(evaluate: Evaluate, vectors: Array) -> Array:
+    return evaluate(vectors)
+
+
+class _Rounds:
+    """Residuals that tell how far least squares has come, counting the steps that it tries."""
+
+    def __init__(
+        self,
+        residuals: Residuals,
+        loss: RobustLoss | None,
+        options: LeastSquaresOptions,
+        progress: Progress,
+    ) -> None:
+        self._residuals, self._loss = residuals, loss
+        self._options, self._progress = options, progress
+        self._round, self._tried, self._least = 0, 0, np.inf
+
+    def __call__(self, vectors: Array) -> Array:
+        """Return residuals of search vectors (n, k), (n, m)."""
+        values = self._residuals(vectors)
+        self._least = min(self._least, float(total_costs(values, self._loss).min()))
+        self._tried += len(vectors) == 1
+        self._tell()
+        return values
+
+    def finished(self, rounds: int, cost: float) -> None:
+        """Note that a round is over."""
+        self._round, self._tried, self._least = rounds, 0, cost
+        self._tell()
+
+    def _tell(self) -> None:
+        within = min(self._tried / self._options.evaluations, 1.0)
+        self._progress(min((self._round + within) / self._options.rounds, 1.0), self._least)
