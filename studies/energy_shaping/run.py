@@ -10,8 +10,13 @@ import polars as pl
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.baselines import paper_energy_shaping, tuned_energy_shaping
 from hopping_leg.controllers.energy_shaping import EnergyShaping
-from hopping_leg.evaluate.estimator import APEX, apex_errors
-from hopping_leg.evaluate.metrics import Window, measure, pooled_apexes
+from hopping_leg.evaluate.metrics import (
+    ESTIMATED_APEX,
+    HopWindow,
+    apex_errors,
+    measure,
+    pooled_apexes,
+)
 from hopping_leg.robot import Robot, load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, NoiseAndDelay
 from hopping_leg.trace import Trace
@@ -175,7 +180,7 @@ def _hop(case: Case, seed: int, runs: int, seconds: float, threads: int) -> list
     return [run.trace(leg) for leg in range(commands.shape[1])]
 
 
-def _row(case: Case, command: float, windows: Sequence[Window]) -> dict[str, Any]:
+def _row(case: Case, command: float, windows: Sequence[HopWindow]) -> dict[str, Any]:
     apex = pooled_apexes(windows)
     settled = sum(w.settled for w in windows)
     return {
@@ -213,7 +218,7 @@ def _summary(case: Case, rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
 def _estimators(case: Case, traces: Sequence[Trace]) -> list[dict[str, Any]]:
     """Return the errors of the calibrated and of both raw apex estimates."""
     columns = {
-        "as used": APEX,
+        "as used": ESTIMATED_APEX,
         "flight time": "flight_time_apex_m",
         "ballistic": "ballistic_apex_m",
     }
@@ -233,5 +238,5 @@ def _estimators(case: Case, traces: Sequence[Trace]) -> list[dict[str, Any]]:
 
 
 def _estimating(trace: Trace, column: str) -> Trace:
-    table = trace.table.with_columns(pl.col(column).alias(APEX))
+    table = trace.table.with_columns(pl.col(column).alias(ESTIMATED_APEX))
     return Trace(table, trace.header)

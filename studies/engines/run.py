@@ -17,11 +17,10 @@ import numpy as np
 
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.errors import PhysicsError
-from hopping_leg.evaluate.candidates import load_candidates
+from hopping_leg.evaluate.entries import load_entries
 from hopping_leg.evaluate.result import Summary
 from hopping_leg.evaluate.runner import evaluate, software_versions
-from hopping_leg.evaluate.runs import on_floor
-from hopping_leg.evaluate.trials import FIXED_SECONDS
+from hopping_leg.evaluate.trials import FIXED_SECONDS, on_floor
 from hopping_leg.robot import Robot
 from hopping_leg.robot.kinematics import joint_angles
 from hopping_leg.robot.model import TIMESTEP
@@ -161,7 +160,7 @@ def _hop(
         threads=1,
     )
     judged = evaluate(
-        load_candidates([name], study.robot, rate),
+        load_entries([name], study.robot, rate),
         setup,
         commands=study.commands,
         repeats=study.seeds,

@@ -12,7 +12,7 @@ from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.search import SearchOptions
 from hopping_leg.identify.validation import judge
 from hopping_leg.robot.model import TIMESTEP
-from studies.identification.study import Clock, Keeper, Study
+from studies.identification.study import Clock, FitCache, Study
 from studies.identification.twin import believed
 
 METHODS = {
@@ -24,7 +24,7 @@ METHODS = {
 
 def fit(
     study: Study,
-    keeper: Keeper,
+    cache: FitCache,
     name: str,
     method: str,
     recordings: Sequence[Recording],
@@ -36,7 +36,7 @@ def fit(
 
     Args:
         study: Efforts.
-        keeper: Has the fit's checkpoints and hears of its progress.
+        cache: Has the fit's checkpoints and hears of its progress.
         name: Of the checkpoints' folder.
         method: One of ``METHODS``.
         recordings: To fit to.
@@ -44,7 +44,7 @@ def fit(
         truth: What differs from where the fit begins.
         parameters: What to fit; None lets the plan decide.
     """
-    folder = keeper.fit_folder(name)
+    folder = cache.fit_folder(name)
     resumed = folder.exists()
     options = IdentifyOptions(
         parameters=parameters,
@@ -60,7 +60,7 @@ def fit(
             options=options,
             folder=folder,
             seed=study.seed,
-            report=keeper.report,
+            report=cache.report,
         )
     said = identified.identifiability.statements
     told = [

@@ -12,7 +12,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from studies.identification.fits import compare, summary, unseen_errors
-from studies.identification.study import Clock, Keeper, Study
+from studies.identification.study import Clock, FitCache, Study
 from studies.identification.synthetic import CASES, FIXED, RAIL
 from studies.identification.twin import believed, record
 
@@ -36,12 +36,12 @@ def available() -> bool:
     return hasattr(sysid, "optimize")
 
 
-def mujoco_sysid(study: Study, keeper: Keeper, fits: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def mujoco_sysid(study: Study, cache: FitCache, fits: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Fit the twins on fixed base and rail, with the parameters and bounds of least squares.
 
     Args:
         study: Efforts.
-        keeper: Keeps each fit.
+        cache: Keeps each fit.
         fits: Rows of the known twins' fits.
 
     Returns:
@@ -57,11 +57,11 @@ def mujoco_sysid(study: Study, keeper: Keeper, fits: Sequence[dict[str, Any]]) -
         bounds = {p["name"]: (p["start"], p["low"], p["high"]) for p in searched}
         for words, way, settings in SETTINGS:
             name = f"sysid-{CASES[row['case']][0]}-{words.replace(', ', '-').replace(' ', '-')}"
-            found = keeper.keep(
+            found = cache.load_or_run(
                 name,
                 f"mujoco.sysid, {row['case']}: {words}",
                 {**study.asked("least-squares", study.seconds), "bounds": bounds, "way": way},
-                functools.partial(_fit, study, keeper, row["case"], bounds, way, settings),
+                functools.partial(_fit, study, cache, row["case"], bounds, way, settings),
             )
             rows.append({"case": row["case"], "method": f"mujoco.sysid, {words}", **found})
     return {"rows": rows}
@@ -69,7 +69,7 @@ def mujoco_sysid(study: Study, keeper: Keeper, fits: Sequence[dict[str, Any]]) -
 
 def _fit(
     study: Study,
-    keeper: Keeper,
+    cache: FitCache,
     case: str,
     bounds: dict[str, tuple[float, float, float]],
     way: Any,  # noqa: ANN401
@@ -106,7 +106,7 @@ def _fit(
             if x.ndim == 1:
                 least = min(least, sum(float(np.square(part).sum()) for part in found))
             jacobians += x.ndim > 1
-            keeper.report("mujoco.sysid", min(jacobians / ITERATIONS, 1.0), least)
+            cache.report("mujoco.sysid", min(jacobians / ITERATIONS, 1.0), least)
             return found, [], []
 
         with contextlib.redirect_stdout(io.StringIO()):

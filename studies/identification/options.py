@@ -56,7 +56,7 @@ class Identify:
     def measure(self) -> dict[str, Any]:
         """Run it, print what was to be reached and what was, return every number."""
         from studies.identification.run import PARTS, bench_identify
-        from studies.identification.study import Keeper, Study
+        from studies.identification.study import FitCache, Study
 
         at_least(1, generations=self.generations, repeats=self.repeats, threads=self.threads)
         at_least(4, population=self.population)
@@ -83,7 +83,7 @@ class Identify:
         with _Progress(console) as progress:
             result = bench_identify(
                 study,
-                Keeper(self.out, progress.begin, progress.report),
+                FitCache(self.out, progress.begin, progress.report),
                 parts=self.parts or [part for part in PARTS if part not in left_out],
                 recordings=self.recordings or _recordings(),
                 on_repeat=lambda done, total: console.print(f"round {done} of {total}"),

@@ -3,17 +3,17 @@
 from typing import Any
 
 from studies.identification.fits import fit
-from studies.identification.study import Keeper, Study
+from studies.identification.study import FitCache, Study
 from studies.identification.synthetic import BEYOND_TABLE
 from studies.identification.twin import GROUND, record, record_paper
 
 
-def paper_size(study: Study, keeper: Keeper, method: str) -> dict[str, Any]:
+def paper_size(study: Study, cache: FitCache, method: str) -> dict[str, Any]:
     """Identify the twin from recordings of the paper's size.
 
     Args:
         study: Length of the recordings and effort.
-        keeper: Has the checkpoints: a killed fit goes on, and then says that it was resumed.
+        cache: Has the checkpoints: a killed fit goes on, and then says that it was resumed.
         method: How to search.
 
     Returns:
@@ -26,7 +26,7 @@ def paper_size(study: Study, keeper: Keeper, method: str) -> dict[str, Any]:
     parameters = BEYOND_TABLE if method == "two-pass" else None
     found = fit(
         study,
-        keeper,
+        cache,
         f"paper-size-{method}",
         method,
         record_paper(study.paper_seconds),

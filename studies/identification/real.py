@@ -11,7 +11,7 @@ from hopping_leg.identify.plan import robot_of
 from hopping_leg.identify.recording import Recording, load_recording
 from hopping_leg.identify.result import validation_json
 from hopping_leg.robot import load_robot
-from studies.identification.study import Clock, Keeper, Study
+from studies.identification.study import Clock, FitCache, Study
 
 RIGS = {
     "double pendulum": "doublependulum_fixed_base",
@@ -20,12 +20,12 @@ RIGS = {
 """Folder of each rig's recordings."""
 
 
-def real(study: Study, keeper: Keeper, folder: Path) -> dict[str, Any]:
+def real(study: Study, cache: FitCache, folder: Path) -> dict[str, Any]:
     """Identify every leave-one-out split of every rig.
 
     Args:
         study: Threads and seed.
-        keeper: Keeps each split's result.
+        cache: Keeps each split's result.
         folder: With the folders of ``RIGS``.
 
     Returns:
@@ -45,11 +45,11 @@ def real(study: Study, keeper: Keeper, folder: Path) -> dict[str, Any]:
                 continue
             short = f"real-{name}-without-{held.name.split('.')[0]}"
             asked = {"fitted": [r.digest for r in fitted], "held": held.digest, "seed": study.seed}
-            row = keeper.keep(
+            row = cache.load_or_run(
                 short,
                 f"{rig}, judged by {held.name}",
                 asked,
-                functools.partial(_split, study, keeper, short, fitted, held),
+                functools.partial(_split, study, cache, short, fitted, held),
             )
             rows.append({"rig": rig, "held_out": held.name, **row})
     if not rows:
@@ -59,9 +59,9 @@ def real(study: Study, keeper: Keeper, folder: Path) -> dict[str, Any]:
 
 
 def _split(
-    study: Study, keeper: Keeper, name: str, fitted: Sequence[Recording], held: Recording
+    study: Study, cache: FitCache, name: str, fitted: Sequence[Recording], held: Recording
 ) -> dict[str, Any]:
-    folder = keeper.fit_folder(name)
+    folder = cache.fit_folder(name)
     resumed = folder.exists()
     with Clock() as clock:
         identified = identify(
@@ -71,7 +71,7 @@ def _split(
             options=IdentifyOptions(threads=study.threads),
             folder=folder,
             seed=study.seed,
-            report=keeper.report,
+            report=cache.report,
         )
     after, before = (
         _flat(validation_json(v)) for v in (identified.validation, identified.start_validation)

@@ -13,7 +13,7 @@ from studies.identification.fits import METHODS
 from studies.identification.mujoco_sysid import mujoco_sysid
 from studies.identification.paper_size import paper_size
 from studies.identification.real import real
-from studies.identification.study import Keeper, Study
+from studies.identification.study import FitCache, Study
 from studies.identification.synthetic import synthetic
 from studies.identification.throughput import throughput
 from studies.timing import host
@@ -27,7 +27,7 @@ PAPER_METHODS = ("least-squares", "two-pass")
 
 def bench_identify(
     study: Study,
-    keeper: Keeper,
+    cache: FitCache,
     *,
     parts: Sequence[str] = PARTS,
     recordings: Path | None = None,
@@ -37,7 +37,7 @@ def bench_identify(
 
     Args:
         study: Sizes and efforts.
-        keeper: Keeps each result, so that a killed benchmark goes on.
+        cache: Keeps each result, so that a killed benchmark goes on.
         parts: Which of ``PARTS``.
         recordings: Folder with real recordings; None leaves them out.
         on_repeat: Called with rounds of the timing, done and in all.
@@ -59,32 +59,32 @@ def bench_identify(
         raise UsageError("Known twins are always identified by least squares, too; add it.")
     result: dict[str, Any] = {"study": asdict(study), "host": host()}
     if "synthetic" in parts or "mujoco-sysid" in parts:
-        result["synthetic"] = synthetic(study, keeper)
+        result["synthetic"] = synthetic(study, cache)
     if "throughput" in parts:
-        result["throughput"] = keeper.keep(
+        result["throughput"] = cache.load_or_run(
             "throughput",
             "throughput: batch and plain loops in turn",
             {**study.asked("cma", study.throughput_seconds), "repeats": study.repeats},
             lambda: throughput(study, on_repeat),
         )
     if "mujoco-sysid" in parts:
-        result["mujoco_sysid"] = mujoco_sysid(study, keeper, result["synthetic"]["rows"])
+        result["mujoco_sysid"] = mujoco_sysid(study, cache, result["synthetic"]["rows"])
         result["mujoco_sysid"]["side_by_side"] = _beside(result)
     if "paper-size" in parts:
         result["paper_size"] = {
             "rows": [
-                keeper.keep(
+                cache.load_or_run(
                     f"paper-size-{method}",
                     f"recordings of the paper's size: {method}",
                     study.asked(method, study.paper_seconds),
-                    functools.partial(paper_size, study, keeper, method),
+                    functools.partial(paper_size, study, cache, method),
                 )
                 for method in PAPER_METHODS
                 if method in study.searches
             ]
         }
     if "recordings" in parts and recordings is not None:
-        result["recordings"] = real(study, keeper, recordings)
+        result["recordings"] = real(study, cache, recordings)
     return {**result, "bars": bars(result), "versions": software_versions()}
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-from hopping_leg.evaluate import keeper
+from hopping_leg.evaluate import result_cache
 from hopping_leg.identify.result import software_versions
 from hopping_leg.identify.search import Report
 from hopping_leg.io import write_json
@@ -54,7 +54,7 @@ class Study:
 
 
 @dataclass(frozen=True)
-class Keeper(keeper.Keeper):
+class FitCache(result_cache.ResultCache):
     """Also keeps the checkpoints of a fit that was killed.
 
     Attributes:
@@ -63,11 +63,11 @@ class Keeper(keeper.Keeper):
 
     report: Report = lambda stage, share, cost: None
 
-    def keep(
+    def load_or_run(
         self, name: str, words: str, asked: dict[str, Any], work: Callable[[], dict[str, Any]]
     ) -> dict[str, Any]:
         """Return the kept result of the same work by the same software, or do it and keep it."""
-        return super().keep(name, words, {**asked, "software": software_versions()}, work)
+        return super().load_or_run(name, words, {**asked, "software": software_versions()}, work)
 
     def _begin(self, name: str, asked: dict[str, Any]) -> None:
         """Note what is asked for, and forget checkpoints of anything else."""

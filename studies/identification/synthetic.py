@@ -6,7 +6,7 @@ from typing import Any
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from studies.identification.fits import fit, unseen_errors
-from studies.identification.study import Keeper, Study
+from studies.identification.study import FitCache, Study
 from studies.identification.twin import AIR, GROUND, Motion, believed, record
 
 Case = tuple[str, dict[str, float], tuple[Motion, ...], tuple[Motion, ...], tuple[str, ...]]
@@ -52,7 +52,7 @@ BEYOND_TABLE = ("thigh.com", "shank.com")
 _NOT_JUDGED = {f"other_{motion}_rms_rad": None for motion in ("swings", "squats", "hops")}
 
 
-def synthetic(study: Study, keeper: Keeper) -> dict[str, Any]:
+def synthetic(study: Study, cache: FitCache) -> dict[str, Any]:
     """Identify each twin with each search.
 
     Returns:
@@ -68,11 +68,11 @@ def synthetic(study: Study, keeper: Keeper) -> dict[str, Any]:
                 "fitted": fitted,
                 "judged": judged,
             }
-            row = keeper.keep(
+            row = cache.load_or_run(
                 name,
                 f"known twin, {case}: {method}",
                 asked,
-                functools.partial(identify_twin, study, keeper, name, case, method),
+                functools.partial(identify_twin, study, cache, name, case, method),
             )
             rows.append({"case": case, **_NOT_JUDGED, **row})
         unseen: dict[str, Recording] = {
@@ -84,7 +84,7 @@ def synthetic(study: Study, keeper: Keeper) -> dict[str, Any]:
 
 
 def identify_twin(
-    study: Study, keeper: Keeper, name: str, case: str, method: str
+    study: Study, cache: FitCache, name: str, case: str, method: str
 ) -> dict[str, Any]:
     """Identify one of ``CASES`` with one search; as ``fits.fit``."""
     _, truth, fitted, judged, _ = CASES[case]
@@ -93,7 +93,7 @@ def identify_twin(
         motion: record(truth, motion, study.seconds) for motion in judged
     }
     parameters = BEYOND_TABLE if method == "two-pass" else _parameters(case)
-    return fit(study, keeper, name, method, recordings, unseen, truth, parameters)
+    return fit(study, cache, name, method, recordings, unseen, truth, parameters)
 
 
 def _parameters(case: str) -> tuple[str, ...] | None:

@@ -39,29 +39,29 @@ class Limits:
 
     def measure(self) -> dict[str, Any]:
         """Run it, print a table, return every number."""
-        from hopping_leg.evaluate.candidates import Candidate, load_candidates
-        from hopping_leg.evaluate.keeper import Keeper
+        from hopping_leg.evaluate.entries import Entry, load_entries
+        from hopping_leg.evaluate.result_cache import ResultCache
         from hopping_leg.sim import CONTROL_RATE
         from studies.limits.run import LimitsStudy, measure_limits
 
         at_least(1, seeds=self.seeds)
         at_least(0, threads=self.threads, seed=self.seed)
         robot = load_robot(self.robot)
-        candidates = load_candidates(self.controllers, robot, CONTROL_RATE)
+        entries = load_entries(self.controllers, robot, CONTROL_RATE)
         if self.teacher is not None:
             from studies.limits.teacher_of_run import teacher_of_run
 
             teacher = teacher_of_run(self.teacher, robot)
-            candidates.append(Candidate(teacher.name, teacher, teacher.command_range))
+            entries.append(Entry(teacher.name, teacher, teacher.command_range))
         study = LimitsStudy(
             robot, self.commands, seeds=self.seeds, seed=self.seed, threads=self.threads
         )
         with Progress(transient=True) as bar:
             task = bar.add_task("hopping", total=None)
             result = measure_limits(
-                candidates,
+                entries,
                 study,
-                Keeper(self.folder, lambda words: bar.update(task, description=words)),
+                ResultCache(self.folder, lambda words: bar.update(task, description=words)),
                 lambda done, total: bar.update(task, completed=done, total=total),
             )
         table = Table("controller", "with", "worst |error|, mm", "mean std, mm", "worst", "skipped")

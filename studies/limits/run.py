@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.controllers import RolloutConfig
-from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range, fingerprint
-from hopping_leg.evaluate.keeper import Keeper
+from hopping_leg.evaluate.entries import Entry, check_labels, check_range, fingerprint
 from hopping_leg.evaluate.result import Summary
+from hopping_leg.evaluate.result_cache import ResultCache
 from hopping_leg.evaluate.robustness.axes import times
 from hopping_leg.evaluate.runner import evaluate, software_versions
 from hopping_leg.io import safe_file_name
@@ -75,10 +75,10 @@ class LimitsStudy:
     """Of the physics."""
     conditions: Sequence[Condition] = CONDITIONS
 
-    def asked(self, candidate: Candidate, condition: Condition) -> dict[str, Any]:
+    def asked(self, entry: Entry, condition: Condition) -> dict[str, Any]:
         """Return all that a result depends on, as JSON values."""
         return {
-            "controller": fingerprint(candidate.controller),
+            "controller": fingerprint(entry.controller),
             "condition": asdict(condition),
             "robot": self.robot.digest,
             "commands_m": self.commands,
@@ -89,38 +89,38 @@ class LimitsStudy:
 
 
 def measure_limits(
-    candidates: Sequence[Candidate],
+    entries: Sequence[Entry],
     study: LimitsStudy,
-    keeper: Keeper,
+    cache: ResultCache,
     on_done: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, Any]:
-    """Let every candidate hop under every condition.
+    """Let every entry hop under every condition.
 
     Args:
-        candidates: What is judged, ``PrivilegedController`` controllers among them.
+        entries: What is judged, ``PrivilegedController`` controllers among them.
         study: Where.
-        keeper: Keeps each result.
+        cache: Keeps each result.
         on_done: Called with (parts done, parts in all).
 
     Returns:
-        ``rows``, one per candidate and condition, over all commands, and ``commands``, one per
+        ``rows``, one per entry and condition, over all commands, and ``commands``, one per
         command of these.
 
     Raises:
-        UsageError: A command is out of a candidate's range, or a name is taken twice.
+        UsageError: A command is out of a entry's range, or a name is taken twice.
     """
-    check_labels(candidates)
-    for candidate in candidates:
-        check_range(candidate, study.commands)
-    parts = list(itertools.product(candidates, study.conditions))
+    check_labels(entries)
+    for entry in entries:
+        check_range(entry, study.commands)
+    parts = list(itertools.product(entries, study.conditions))
     rows, commands = [], []
-    for done, (candidate, condition) in enumerate(parts, 1):
-        place = {"controller": candidate.label, "condition": condition.name}
-        kept = keeper.keep(
-            safe_file_name(f"{candidate.label}-{condition.name}"),
-            f"{candidate.label}: {condition.name}",
-            study.asked(candidate, condition),
-            functools.partial(_hop, candidate, study, condition),
+    for done, (entry, condition) in enumerate(parts, 1):
+        place = {"controller": entry.label, "condition": condition.name}
+        kept = cache.load_or_run(
+            safe_file_name(f"{entry.label}-{condition.name}"),
+            f"{entry.label}: {condition.name}",
+            study.asked(entry, condition),
+            functools.partial(_hop, entry, study, condition),
         )
         rows.append(place | kept["row"])
         commands += [place | row for row in kept["commands"]]
@@ -136,11 +136,11 @@ def measure_limits(
     }
 
 
-def _hop(candidate: Candidate, study: LimitsStudy, condition: Condition) -> dict[str, Any]:
+def _hop(entry: Entry, study: LimitsStudy, condition: Condition) -> dict[str, Any]:
     robot = times(study.robot, condition.slowness, "contact.time_constant")
     setup = RolloutConfig(robot, condition.disturbance, threads=study.threads)
     judged = evaluate(
-        [candidate],
+        [entry],
         setup,
         commands=study.commands,
         repeats=study.seeds,

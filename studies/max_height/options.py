@@ -37,7 +37,7 @@ class Reach:
 
     def measure(self) -> dict[str, Any]:
         """Run it, print a table, return every number."""
-        from hopping_leg.evaluate.keeper import Keeper
+        from hopping_leg.evaluate.result_cache import ResultCache
         from studies.max_height.run import ReachStudy, measure_reach
 
         at_least(1, generations=self.generations)
@@ -57,7 +57,7 @@ class Reach:
             task = bar.add_task("searching", total=None)
             result = measure_reach(
                 study,
-                Keeper(self.folder),
+                ResultCache(self.folder),
                 lambda done, total: bar.update(task, completed=done, total=total),
             )
         table = Table("hip, N m", "knee, N m", "apex, m", "hops/s", "rms hip", "rms knee", "hits")

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.evaluate.keeper import Keeper
+from hopping_leg.evaluate.result_cache import ResultCache
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.identify.optimizers import seeded_strategy
 from hopping_leg.robot.kinematics import foot_position, joint_angles
@@ -69,13 +69,13 @@ class ReachStudy:
 
 
 def measure_reach(
-    study: ReachStudy, keeper: Keeper, on_done: Callable[[int, int], None] | None = None
+    study: ReachStudy, cache: ResultCache, on_done: Callable[[int, int], None] | None = None
 ) -> dict[str, Any]:
     """Search for the highest lasting hops within each pair of torques.
 
     Args:
         study: What is searched.
-        keeper: Keeps what was found for each pair.
+        cache: Keeps what was found for each pair.
         on_done: Called with the generations that are done and all.
 
     Returns:
@@ -90,7 +90,7 @@ def measure_reach(
     rows, way, before = [], np.full(_SIZE, 0.5), np.zeros(2)
     for earlier, limit in enumerate(map(np.array, study.torques)):
         first = _with_limit(way, before, limit)
-        found = keeper.keep(
+        found = cache.load_or_run(
             "{:g}-{:g}".format(*limit),
             "{:g} and {:g} N m".format(*limit),
             _asked(study, limit, first),

@@ -12,7 +12,7 @@ import numpy as np
 
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.controllers.policy import Policy
-from hopping_leg.evaluate.candidates import Candidate
+from hopping_leg.evaluate.entries import Entry
 from hopping_leg.evaluate.runner import evaluate, software_versions
 from hopping_leg.rl.parallel_seeds import ParallelSeeds
 from hopping_leg.rl.recipe import Recipe
@@ -124,13 +124,13 @@ def _judge(
     policies: dict[str, bytes], recipe: Recipe, robot: Robot, seeds: int
 ) -> list[dict[str, Any]]:
     """Judge policies at the heights of the recipe's own trials."""
-    candidates = []
+    entries = []
     for label, content in policies.items():
         policy = Policy(content, label, label)
         bounds = (policy.card.command_low, policy.card.command_high)
-        candidates.append(Candidate(label, policy, bounds))
+        entries.append(Entry(label, policy, bounds))
     judged = evaluate(
-        candidates,
+        entries,
         RolloutConfig(robot),
         commands=recipe.eval_commands,
         repeats=seeds,

@@ -1,7 +1,7 @@
 import json
 
 from hopping_leg.cli import main
-from tests.evaluate.test_compare import TRAINING
+from tests.evaluate.test_comparison import TRAINING
 
 
 def test_trainings_beside_each_other(tmp_path, capsys):

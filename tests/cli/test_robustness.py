@@ -4,7 +4,7 @@ import pytest
 
 from hopping_leg.cli import evaluate as verb
 from hopping_leg.cli import main
-from hopping_leg.evaluate import Candidate
+from hopping_leg.evaluate import Entry
 from tests.evaluate.conftest import Spring
 
 WORDS = ["robustness", "spring", "--commands", "0.3", "--seeds", "2"]
@@ -14,9 +14,9 @@ AXES = ["--axes", "pushes"]
 @pytest.fixture
 def spring(monkeypatch):
     def load(names, robot, rate):
-        return [Candidate(name, Spring(robot), (0.29, 0.31)) for name in names]
+        return [Entry(name, Spring(robot), (0.29, 0.31)) for name in names]
 
-    monkeypatch.setattr(verb, "load_candidates", load)
+    monkeypatch.setattr(verb, "load_entries", load)
 
 
 def test_one_folder_receives_numbers_figure_and_what_goes_on(spring, tmp_path, capsys):

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.controllers import RolloutConfig
-from hopping_leg.evaluate import Candidate, evaluate
+from hopping_leg.evaluate import Entry, evaluate
 from hopping_leg.robot import kinematics, load_robot
 
 
@@ -52,7 +52,7 @@ def judged(setup, robot):
     """One controller, everything but the ladder."""
     progress = []
     result = evaluate(
-        [Candidate("spring", Spring(robot))],
+        [Entry("spring", Spring(robot))],
         setup,
         commands=[0.25, 0.35],
         repeats=2,

@@ -2,7 +2,6 @@ import numpy as np
 import polars as pl
 import pytest
 
-from hopping_leg.evaluate.estimator import APEX, HEIGHT, judge_estimator
 from hopping_leg.evaluate.figures import (
     draw_distributions,
     draw_estimate,
@@ -11,8 +10,13 @@ from hopping_leg.evaluate.figures import (
     to_png,
     to_svg,
 )
-from hopping_leg.evaluate.gallery import draw_gallery, run_of
-from hopping_leg.evaluate.metrics import START_SECONDS
+from hopping_leg.evaluate.metrics import (
+    ESTIMATED_APEX,
+    ESTIMATED_HEIGHT,
+    START_SECONDS,
+    judge_estimator,
+)
+from hopping_leg.evaluate.report_figures import draw_report_figures, run_of
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE, find_hops
 from hopping_leg.trace import Trace
 
@@ -24,7 +28,7 @@ def with_estimate(trace, offset=0.01):
     apex = np.full(len(height), np.nan)
     for tick, value in zip(hops.tick, hops.apex, strict=True):
         apex[tick + 5 :] = value + offset
-    columns = [pl.Series(HEIGHT, height + offset), pl.Series(APEX, apex)]
+    columns = [pl.Series(ESTIMATED_HEIGHT, height + offset), pl.Series(ESTIMATED_APEX, apex)]
     return Trace(trace.table.with_columns(columns), trace.header)
 
 
@@ -67,7 +71,7 @@ def test_the_gallery_from_stored_traces_is_the_reports(judged, tmp_path):
     assert [(r.controller, r.trial.kind, r.repeat) for r in again] == [
         (r.controller, r.trial.kind, r.repeat) for r in judged.runs
     ]
-    before, after = (draw_gallery(judged.evaluation, runs) for runs in (judged.runs, again))
+    before, after = (draw_report_figures(judged.evaluation, runs) for runs in (judged.runs, again))
     assert [p.name for p in before] == [
         "sequence",
         "staircase",

@@ -3,7 +3,7 @@ import re
 
 import pytest
 
-from hopping_leg.evaluate import Judged
+from hopping_leg.evaluate import EvaluationRun
 from hopping_leg.evaluate.report import write_report
 from hopping_leg.evaluate.video import Video
 
@@ -12,7 +12,7 @@ COMMAND = "hop evaluate spring --commands 0.25,0.35"
 
 @pytest.fixture(scope="module")
 def commanded(judged):
-    return Judged(dataclasses.replace(judged.evaluation, command=COMMAND), judged.runs)
+    return EvaluationRun(dataclasses.replace(judged.evaluation, command=COMMAND), judged.runs)
 
 
 @pytest.fixture(scope="module")
@@ -45,14 +45,14 @@ def test_the_same_evaluation_gives_the_same_page(page, commanded):
 @pytest.fixture
 def without_figures(monkeypatch):
     """Skip the slow part where a test is about something else."""
-    monkeypatch.setattr("hopping_leg.evaluate.report.draw_gallery", lambda *_: [])
+    monkeypatch.setattr("hopping_leg.evaluate.report.draw_report_figures", lambda *_: [])
 
 
 @pytest.mark.usefixtures("without_figures")
 def test_names_are_escaped(judged):
     row = dataclasses.replace(judged.evaluation.summary[0], controller="<b>&")
     evaluation = dataclasses.replace(judged.evaluation, summary=[row], distributions=[])
-    page = write_report(Judged(evaluation, judged.runs)).decode()
+    page = write_report(EvaluationRun(evaluation, judged.runs)).decode()
     assert "<b>" not in page
     assert "&lt;b&gt;&amp;" in page
 
@@ -77,5 +77,5 @@ def test_a_controller_that_never_hopped_is_reported(judged):
     ]
     empty = [{**entry, "apexes_m": []} for entry in judged.evaluation.distributions]
     evaluation = dataclasses.replace(judged.evaluation, summary=rows, distributions=empty)
-    page = write_report(Judged(evaluation, judged.runs)).decode()
+    page = write_report(EvaluationRun(evaluation, judged.runs)).decode()
     assert "nan" not in re.sub(r"data:[^\"]*", "", page)

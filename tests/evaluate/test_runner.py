@@ -7,10 +7,9 @@ import pytest
 
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate import Candidate, evaluate
+from hopping_leg.evaluate import Entry, evaluate
 from hopping_leg.evaluate.runner import _note_stopped
-from hopping_leg.evaluate.runs import floor_robot, run_trials, save_traces
-from hopping_leg.evaluate.trials import Trial
+from hopping_leg.evaluate.trials import Trial, floor_robot, run_trials, save_traces
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 from hopping_leg.trace import Trace
@@ -62,7 +61,7 @@ def test_numbers_that_do_not_exist_are_null(judged):
 def test_the_same_seed_gives_the_same_bytes_at_any_thread_count(setup, spring):
     one, two = (
         evaluate(
-            [Candidate("spring", spring)],
+            [Entry("spring", spring)],
             dataclasses.replace(setup, threads=threads),
             commands=[0.35],
             repeats=2,
@@ -108,12 +107,12 @@ def test_the_stiff_floor_changes_the_contact_only(robot):
 
 def test_commands_outside_a_controllers_range_are_refused(setup, spring):
     with pytest.raises(UsageError, match=r"'spring' cannot be asked for 0\.35 m.*0\.2 to 0\.3 m"):
-        evaluate([Candidate("spring", spring, (0.2, 0.3))], setup, commands=[0.25, 0.35])
+        evaluate([Entry("spring", spring, (0.2, 0.3))], setup, commands=[0.25, 0.35])
 
 
 def test_what_is_left_out_or_coarse_is_noted(setup, spring):
     result = evaluate(
-        [Candidate("spring", spring, (0.29, 0.33))],
+        [Entry("spring", spring, (0.29, 0.33))],
         dataclasses.replace(setup, timestep=1e-3),
         commands=[0.30],
         repeats=1,
@@ -128,16 +127,16 @@ def test_nothing_to_do_is_said(setup, spring):
     with pytest.raises(UsageError, match="No controller"):
         evaluate([], setup)
     with pytest.raises(UsageError, match="named twice"):
-        evaluate([Candidate("a", spring), Candidate("a", spring)], setup)
+        evaluate([Entry("a", spring), Entry("a", spring)], setup)
     with pytest.raises(UsageError, match="0 seeds are too few"):
-        evaluate([Candidate("a", spring)], setup, repeats=0)
+        evaluate([Entry("a", spring)], setup, repeats=0)
 
 
 def test_a_twin_under_the_papers_disturbance_is_noted(spring):
     def notes(robot, disturbance):
         world = RolloutConfig(load_robot(robot), disturbance, threads=1)
-        candidates = [Candidate("spring", spring)]
-        found = evaluate(candidates, world, commands=[0.3], repeats=1, kinds=("fixed",))
+        entries = [Entry("spring", spring)]
+        found = evaluate(entries, world, commands=[0.3], repeats=1, kinds=("fixed",))
         return " ".join(found.evaluation.notes)
 
     assert "came on top" in notes("twin", NoiseAndDelay())

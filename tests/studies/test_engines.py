@@ -14,8 +14,8 @@ from studies.engines.run import (
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate import Candidate, evaluate
-from hopping_leg.evaluate.runs import on_floor
+from hopping_leg.evaluate import Entry, evaluate
+from hopping_leg.evaluate.trials import on_floor
 from hopping_leg.robot import load_robot
 
 ROBOT = load_robot("legv2-paper")
@@ -62,7 +62,7 @@ def test_controllers_hop_in_pybullet_without_retraining():
     pytest.importorskip("pybullet", reason="needs the extra 'bullet'")
     setup = RolloutConfig(ROBOT, engine="pybullet", ground="rigid", timestep=1e-3)
     judged = evaluate(
-        [Candidate("fast", load_controller("fast", ROBOT))],
+        [Entry("fast", load_controller("fast", ROBOT))],
         setup,
         commands=[0.3],
         repeats=1,

@@ -8,7 +8,7 @@ from studies.identification.fits import compare, summary
 from studies.identification.plain_loop import PlainLoop
 from studies.identification.real import real
 from studies.identification.run import bench_identify
-from studies.identification.study import Keeper, Study
+from studies.identification.study import FitCache, Study
 from studies.identification.synthetic import FIXED, identify_twin
 from studies.identification.twin import AIR, GROUND, record, twin
 
@@ -47,20 +47,20 @@ def test_plain_loop_and_batch_simulate_the_same(motion):
 
 def test_work_is_done_once(tmp_path):
     begun = []
-    keeper = Keeper(tmp_path, begun.append)
+    cache = FitCache(tmp_path, begun.append)
     for asked, number in (({"size": 1}, 7), ({"size": 1}, 8), ({"size": 2}, 9)):
-        result = keeper.keep("part", "words", asked, lambda n=number: {"number": n})
+        result = cache.load_or_run("part", "words", asked, lambda n=number: {"number": n})
         assert result == {"number": 7 if asked["size"] == 1 else 9}
     assert len(begun) == 2
 
 
 def test_checkpoints_of_other_work_are_forgotten(tmp_path):
-    keeper = Keeper(tmp_path)
-    checkpoint = keeper.fit_folder("part") / "search.json"
+    cache = FitCache(tmp_path)
+    checkpoint = cache.fit_folder("part") / "search.json"
 
     def killed(size):
         with pytest.raises(KeyboardInterrupt):
-            keeper.keep("part", "words", {"size": size}, interrupt)
+            cache.load_or_run("part", "words", {"size": size}, interrupt)
 
     def interrupt():
         there.append(checkpoint.exists())
@@ -108,16 +108,16 @@ def test_bars_know_which_side_is_better():
 
 def test_bad_input_is_one_sentence(tmp_path):
     with pytest.raises(UsageError, match=r"'physics'.*synthetic"):
-        bench_identify(Study(), Keeper(tmp_path), parts=["physics"])
+        bench_identify(Study(), FitCache(tmp_path), parts=["physics"])
     with pytest.raises(UsageError, match="legv2_fixed_base"):
-        real(Study(), Keeper(tmp_path), tmp_path)
+        real(Study(), FitCache(tmp_path), tmp_path)
     assert main(["bench", "identify", "--population", "1"]) == 2
     assert main(["bench", "identify", "--seconds", "8"]) == 2
 
 
 def test_a_missing_extra_is_said(monkeypatch, tmp_path):
     monkeypatch.setattr(mujoco_sysid, "available", lambda: False)
-    result = mujoco_sysid.mujoco_sysid(Study(), Keeper(tmp_path), [])
+    result = mujoco_sysid.mujoco_sysid(Study(), FitCache(tmp_path), [])
     assert "hopping-leg[bench]" in result["missing"]
     assert result["rows"] == []
 
@@ -167,7 +167,7 @@ def test_the_command_measures_keeps_and_goes_on(tmp_path):
 
 @pytest.mark.slow
 def test_a_known_twin_is_found(tmp_path):
-    row = identify_twin(Study(threads=1), Keeper(tmp_path), "fit", FIXED, "least-squares")
+    row = identify_twin(Study(threads=1), FitCache(tmp_path), "fit", FIXED, "least-squares")
     assert row["worst_identifiable_error_percent"] < 0.5
     assert row["identifiable"] == 8
     assert row["other_swings_rms_rad"] < 1e-3

@@ -7,8 +7,8 @@ from studies.limits import run as module
 from studies.limits.run import CONDITIONS, LimitsStudy, condense, measure_limits
 
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate import Candidate
-from hopping_leg.evaluate.keeper import Keeper
+from hopping_leg.evaluate import Entry
+from hopping_leg.evaluate.result_cache import ResultCache
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 
 OF = {"joint noise": "joint_noise", "torque noise": "torque_noise", "delay": "delay_probability"}
@@ -30,7 +30,7 @@ def test_one_disturbance_is_taken_away_or_left_alone(words, number):
 def test_a_slow_ground_is_the_robots_own_but_slower(robot, spring, tmp_path, monkeypatch):
     grounds = []
 
-    def stand(_candidates, setup, **_options):
+    def stand(_entries, setup, **_options):
         grounds.append((setup.robot.contact.time_constant, setup.robot.contact.damping_ratio))
         raise UsageError("no time for that")
 
@@ -38,7 +38,7 @@ def test_a_slow_ground_is_the_robots_own_but_slower(robot, spring, tmp_path, mon
     for words in ("all of it", "all of it, ground twice as slow", "nothing, ground twice as slow"):
         study = LimitsStudy(robot, (0.30,), conditions=(by_name(words),))
         with pytest.raises(UsageError, match="no time"):
-            measure_limits([Candidate("spring", spring)], study, Keeper(tmp_path))
+            measure_limits([Entry("spring", spring)], study, ResultCache(tmp_path))
     ground = robot.contact
     slow = (2 * ground.time_constant, ground.damping_ratio)
     assert grounds == [(ground.time_constant, ground.damping_ratio), slow, slow]
@@ -50,18 +50,18 @@ def test_a_leg_that_nothing_disturbs_repeats_its_hops(robot, spring, tmp_path):
         robot, (0.30,), seeds=2, threads=1, conditions=(by_name("all of it"), by_name("nothing"))
     )
     begun, done = [], []
-    candidates = [Candidate("spring", spring)]
-    keeper = Keeper(tmp_path, begun.append)
-    result = measure_limits(candidates, study, keeper, lambda *counts: done.append(counts))
+    entries = [Entry("spring", spring)]
+    cache = ResultCache(tmp_path, begun.append)
+    result = measure_limits(entries, study, cache, lambda *counts: done.append(counts))
     noisy, calm = result["rows"]
     assert (noisy["condition"], calm["condition"]) == ("all of it", "nothing")
     assert calm["mean_std_m"] < noisy["mean_std_m"]
     assert [row["command_m"] for row in result["commands"]] == [0.30, 0.30]
     assert done == [(1, 2), (2, 2)]
     assert len(begun) == 2
-    assert measure_limits(candidates, study, keeper) == result
+    assert measure_limits(entries, study, cache) == result
     assert len(begun) == 2
-    measure_limits(candidates, replace(study, seed=1001), keeper)
+    measure_limits(entries, replace(study, seed=1001), cache)
     assert len(begun) == 4
 
 
@@ -77,8 +77,8 @@ def test_a_command_without_hops_leaves_no_error(robot, judged):
 
 def test_commands_out_of_range_and_names_taken_twice_are_refused(robot, spring, tmp_path):
     study = LimitsStudy(robot, (0.30,), threads=1)
-    narrow = Candidate("spring", spring, (0.2, 0.25))
+    narrow = Entry("spring", spring, (0.2, 0.25))
     with pytest.raises(UsageError, match="cannot be asked for"):
-        measure_limits([narrow], study, Keeper(tmp_path))
+        measure_limits([narrow], study, ResultCache(tmp_path))
     with pytest.raises(UsageError, match="named twice"):
-        measure_limits([narrow, narrow], study, Keeper(tmp_path))
+        measure_limits([narrow, narrow], study, ResultCache(tmp_path))

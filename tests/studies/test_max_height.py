@@ -1,7 +1,7 @@
 import numpy as np
 from studies.max_height.run import KNOTS, ReachStudy, _interpolate, flight_tops, measure_reach
 
-from hopping_leg.evaluate.keeper import Keeper
+from hopping_leg.evaluate.result_cache import ResultCache
 from hopping_leg.robot import load_robot
 
 ROBOT = load_robot("legv2-paper")
@@ -30,18 +30,18 @@ def test_torques_go_through_their_knots_and_stay_beyond_them():
 
 
 def test_a_search_is_repeatable_and_keeps_within_its_torques(tmp_path):
-    keepers = [Keeper(tmp_path / name) for name in "ab"]
-    found, again = (measure_reach(study((3.0, 3.0)), keeper)["rows"] for keeper in keepers)
+    caches = [ResultCache(tmp_path / name) for name in "ab"]
+    found, again = (measure_reach(study((3.0, 3.0)), cache)["rows"] for cache in caches)
     assert found == again
     assert found[0]["rms_hip_torque_nm"] <= 3.0
     assert found[0]["rms_knee_torque_nm"] <= 3.0
 
 
 def test_more_torque_reaches_no_less_and_a_killed_search_goes_on(tmp_path):
-    pairs, keeper, begun = ((6.0, 6.0), (6.0, 12.0)), Keeper(tmp_path / "whole"), []
-    rows = measure_reach(study(*pairs, seconds=3.0), keeper)["rows"]
+    pairs, cache, begun = ((6.0, 6.0), (6.0, 12.0)), ResultCache(tmp_path / "whole"), []
+    rows = measure_reach(study(*pairs, seconds=3.0), cache)["rows"]
     assert 0.3 < rows[0]["apex_m"] <= rows[1]["apex_m"]
-    cut = Keeper(tmp_path / "cut", begun.append)
+    cut = ResultCache(tmp_path / "cut", begun.append)
     measure_reach(study(pairs[0], seconds=3.0), cut)
     assert measure_reach(study(*pairs, seconds=3.0), cut)["rows"] == rows
     assert begun == ["6 and 6 N m", "6 and 12 N m"]
@@ -50,6 +50,6 @@ def test_more_torque_reaches_no_less_and_a_killed_search_goes_on(tmp_path):
 def test_without_torque_there_is_no_hop_and_progress_is_told(tmp_path):
     told = []
     weak = study((1e-3, 1e-3), (2e-3, 1e-3))
-    rows = measure_reach(weak, Keeper(tmp_path), lambda n, all_: told.append((n, all_)))
+    rows = measure_reach(weak, ResultCache(tmp_path), lambda n, all_: told.append((n, all_)))
     assert [row["apex_m"] for row in rows["rows"]] == [0.0, 0.0]
     assert told == [(n, 8) for n in range(1, 9)]

@@ -26,12 +26,11 @@ from hopping_leg.cli.command_line import command_line
 from hopping_leg.cli.options import Heights
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate import Candidate, Judged, evaluate
-from hopping_leg.evaluate.candidates import load_candidates
+from hopping_leg.evaluate import Entry, EvaluationRun, evaluate
+from hopping_leg.evaluate.entries import load_entries
 from hopping_leg.evaluate.report import render_videos, write_report
-from hopping_leg.evaluate.runs import save_traces
 from hopping_leg.evaluate.terminal import print_tables
-from hopping_leg.evaluate.trials import KINDS
+from hopping_leg.evaluate.trials import KINDS, save_traces
 from hopping_leg.io import write_atomically
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, Engine, NoiseAndDelay
@@ -63,7 +62,7 @@ class Conditions:
     threads: int = 0
     """Threads of the physics, 0 for all cores; results do not depend on it."""
 
-    def load(self) -> tuple[list[Candidate], RolloutConfig]:
+    def load(self) -> tuple[list[Entry], RolloutConfig]:
         """Return the controllers and the world that they believe in.
 
         Raises:
@@ -80,7 +79,7 @@ class Conditions:
             timestep=self.timestep,
             threads=self.threads,
         )
-        return load_candidates(self.controllers, robot, self.rate), setup
+        return load_entries(self.controllers, robot, self.rate), setup
 
 
 @dataclass(frozen=True)
@@ -120,8 +119,8 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
     check_file(args.report)
     if args.traces:
         args.traces.mkdir(parents=True, exist_ok=True)
-    candidates, setup = args.load()
-    judged = _judge(candidates, replace(setup, engine=args.engine), args)
+    entries, setup = args.load()
+    judged = _judge(entries, replace(setup, engine=args.engine), args)
     notes = [*notes, *judged.evaluation.notes]
     judged = replace(judged, evaluation=replace(judged.evaluation, command=command, notes=notes))
     if args.json:
@@ -154,13 +153,13 @@ def say_written(console: Console, *paths: Path | None) -> None:
         console.print(f"Wrote {path}", highlight=False, soft_wrap=True)
 
 
-def _judge(candidates: list[Candidate], setup: RolloutConfig, args: Evaluate) -> Judged:
+def _judge(entries: list[Entry], setup: RolloutConfig, args: Evaluate) -> EvaluationRun:
     """Run all trials under a progress bar."""
     floors = ("soft", "stiff") if args.floor == "both" else (args.floor,)
     with ShareProgress() as bar:
         judged = [
             evaluate(
-                candidates,
+                entries,
                 setup,
                 commands=args.commands,
                 repeats=args.seeds,

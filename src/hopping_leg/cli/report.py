@@ -24,15 +24,14 @@ from rich.console import Console
 from hopping_leg.cli.evaluate import check_file, say_written
 from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate import Judged
-from hopping_leg.evaluate.compare import set_beside
-from hopping_leg.evaluate.compare_report import write_comparison
+from hopping_leg.evaluate import EvaluationRun
+from hopping_leg.evaluate.aggregation import tabulate
+from hopping_leg.evaluate.comparison import set_beside, write_comparison
 from hopping_leg.evaluate.figures.style import Format, Width, encode
-from hopping_leg.evaluate.gallery import draw_gallery, run_of
 from hopping_leg.evaluate.report import write_report
-from hopping_leg.evaluate.runs import Run
-from hopping_leg.evaluate.stored import read_runs
-from hopping_leg.evaluate.tables import tabulate
+from hopping_leg.evaluate.report_figures import draw_report_figures, run_of
+from hopping_leg.evaluate.result_files import read_runs
+from hopping_leg.evaluate.trials import Run
 from hopping_leg.evaluate.video import Animation, fixed_traces, render_video
 from hopping_leg.io import safe_file_name, write_atomically, write_json
 from hopping_leg.robot import load_robot
@@ -83,7 +82,7 @@ def _write(args: Page) -> None:
     console, runs = Console(), read_runs(args.runs)
     if len(runs) == 1 and (evaluation := runs[0].evaluation):
         traces = sorted(runs[0].traces.glob("*.parquet")) if runs[0].traces else []
-        page = write_report(Judged(evaluation, [run_of(path) for path in traces]))
+        page = write_report(EvaluationRun(evaluation, [run_of(path) for path in traces]))
         numbers = evaluation.to_json()
     else:
         compared = set_beside(runs)
@@ -104,7 +103,7 @@ def _draw(args: Figures) -> None:
     runs = [run_of(_trace(path)) for path in args.traces]
     controllers = list(dict.fromkeys(run.controller for run in runs))
     console = Console()
-    for picture in draw_gallery(tabulate(runs, controllers, seed=0), runs):
+    for picture in draw_report_figures(tabulate(runs, controllers, seed=0), runs):
         path = args.out / f"{picture.name}.{args.format}"
         write_atomically(path, encode(picture.figure, args.format, args.width))
         console.print(f"{picture.title}: {path}", highlight=False)

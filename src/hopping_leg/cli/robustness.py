@@ -17,7 +17,7 @@ from rich.console import Console
 from hopping_leg.cli.command_line import command_line
 from hopping_leg.cli.evaluate import Conditions, ShareProgress, say_written
 from hopping_leg.evaluate.figures import draw_robustness, to_svg
-from hopping_leg.evaluate.keeper import Keeper
+from hopping_leg.evaluate.result_cache import ResultCache
 from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
 from hopping_leg.evaluate.terminal import print_robustness
 from hopping_leg.io import write_atomically, write_json
@@ -35,12 +35,12 @@ class Robustness(Conditions):
 
 def run(args: Robustness) -> None:
     """Run the benchmark, print the scores, write everything."""
-    candidates, setup = args.load()
+    entries, setup = args.load()
     suite = make_suite(
         setup, axes=args.axes, commands=args.commands, repeats=args.seeds, seed=args.seed
     )
     with ShareProgress() as bar:
-        found = run_suite(candidates, suite, Keeper(args.out), bar.show)
+        found = run_suite(entries, suite, ResultCache(args.out), bar.show)
     result = {"command": command_line("hop robustness", args), **found}
     file, figure = args.json or args.out / "robustness.json", args.out / "robustness.svg"
     write_json(file, result)

@@ -27,10 +27,10 @@ class Skills(Conditions):
 
 def run(args: Skills) -> None:
     """Run all skills, print their tables, write what was asked for."""
-    candidates, setup = args.load()
+    entries, setup = args.load()
     with ShareProgress() as bar:
         found = run_skills(
-            candidates,
+            entries,
             setup,
             floors=("soft", "stiff") if args.floor == "both" else (args.floor,),
             commands=args.commands,

@@ -1,7 +1,7 @@
 """Trials, hop metrics, statistics, figures and the report."""
 
-from hopping_leg.evaluate.candidates import Candidate
+from hopping_leg.evaluate.entries import Entry
 from hopping_leg.evaluate.result import Evaluation
-from hopping_leg.evaluate.runner import Judged, evaluate
+from hopping_leg.evaluate.runner import EvaluationRun, evaluate
 
-__all__ = ["Candidate", "Evaluation", "Judged", "evaluate"]
+__all__ = ["Entry", "Evaluation", "EvaluationRun", "evaluate"]

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.hop_detection import COLUMNS, measure_hops
+from hopping_leg.evaluate.result import Estimator
+from hopping_leg.hop_detection import COLUMNS, measure_hops, trace_hops
 from hopping_leg.trace import Trace
 
 START_SECONDS = 2.0
@@ -18,7 +19,7 @@ SWITCH_SECONDS = 1.0
 
 
 @dataclass(frozen=True)
-class Window:
+class HopWindow:
     """One stretch of a run with a constant command.
 
     Apexes, skipped hops and flight are taken after the start (2 s) or switch (1 s) has settled;
@@ -58,7 +59,7 @@ class Window:
         return self.apex - self.command
 
 
-def measure(trace: Trace) -> list[Window]:
+def measure(trace: Trace) -> list[HopWindow]:
     """Measure a run: one window per stretch of constant command, in order of time."""
     rate = _rate(trace)
     return [
@@ -73,12 +74,12 @@ def stretches(command: Array) -> list[tuple[int, int]]:
     return list(itertools.pairwise(edges))
 
 
-def _window(trace: Trace, start: int, end: int, rate: float, drop: float) -> Window:
+def _window(trace: Trace, start: int, end: int, rate: float, drop: float) -> HopWindow:
     height, velocity, clearance = map(trace.column, COLUMNS)
     torque = np.stack([trace.column(f"{j}_torque_nm")[start:end] for j in ("hip", "knee")])
     first = min(start + round(drop * rate), end)
     hops = measure_hops(height[:end], velocity[:end], clearance[:end], rate, first)
-    return Window(
+    return HopWindow(
         command=float(trace.column("command_m")[start]),
         apex=hops.apex,
         settled=hops.ticks / rate,
@@ -113,6 +114,80 @@ def skipped_in_run(trace: Trace) -> int:
     return measure_hops(height, velocity, clearance, rate, round(START_SECONDS * rate)).skipped
 
 
-def pooled_apexes(windows: Sequence[Window]) -> Array:
+def pooled_apexes(windows: Sequence[HopWindow]) -> Array:
     """Return the apexes of several windows in one row, m, (hops,)."""
     return np.concatenate([w.apex for w in windows]) if windows else np.empty(0)
+
+
+ESTIMATED_HEIGHT = "estimated_height_m"
+"""Trace column: base height as estimated at each tick, m."""
+
+ESTIMATED_APEX = "estimated_apex_m"
+"""Trace column: height of the last apex as estimated after its flight, m."""
+
+
+def has_estimate(trace: Trace) -> bool:
+    """Tell whether a run has an estimated height and a true one to compare it with."""
+    if ESTIMATED_HEIGHT not in trace.table.columns:
+        return False
+    both = trace.column(ESTIMATED_HEIGHT) - trace.column("height_m")
+    return bool(np.isfinite(both).any())
+
+
+def judge_estimator(controller: str, traces: Sequence[Trace]) -> Estimator | None:
+    """Compare estimated with true heights over all runs, the first 2 s left out.
+
+    Returns:
+        None where the controller records no estimate.
+    """
+    estimating = [trace for trace in traces if has_estimate(trace)]
+    if not estimating:
+        return None
+    flight = np.concatenate([_errors(trace, flying=True) for trace in estimating])
+    stance = np.concatenate([_errors(trace, flying=False) for trace in estimating])
+    apex = np.concatenate([apex_errors(trace) for trace in estimating])
+    return Estimator(
+        controller=controller,
+        flight_bias_m=_mean(flight),
+        flight_std_m=_std(flight),
+        stance_bias_m=_mean(stance),
+        stance_std_m=_std(stance),
+        apex_bias_m=_mean(apex),
+        apex_std_m=_std(apex),
+        hops=len(apex),
+    )
+
+
+def _errors(trace: Trace, *, flying: bool) -> Array:
+    error = trace.column(ESTIMATED_HEIGHT) - trace.column("height_m")
+    settled = trace.column("time_s") >= START_SECONDS
+    phase = (trace.column("foot_clearance_m") > 0) == flying
+    chosen: Array = error[settled & phase & np.isfinite(error)]
+    return chosen
+
+
+def apex_errors(trace: Trace) -> Array:
+    """Return estimated minus true apex of every hop that the controller noticed, m, (hops,).
+
+    A controller corrects its apex after touchdown: its next value after a true apex is that hop's.
+    """
+    if ESTIMATED_APEX not in trace.table.columns:
+        return np.empty(0)
+    estimate = trace.column(ESTIMATED_APEX)
+    hops = trace_hops(trace)
+    ends = np.append(hops.tick, len(estimate))[1:]
+    settled = trace.column("time_s")[hops.tick] >= START_SECONDS
+    errors = []
+    for start, end, apex, counts in zip(hops.tick, ends, hops.apex, settled, strict=True):
+        changes = np.flatnonzero(np.diff(estimate[start:end]))
+        if counts and len(changes):
+            errors.append(estimate[start + changes[0] + 1] - apex)
+    return np.array(errors)
+
+
+def _mean(values: Array) -> float:
+    return float(np.mean(values)) if len(values) else float("nan")
+
+
+def _std(values: Array) -> float:
+    return float(np.std(values)) if len(values) else float("nan")

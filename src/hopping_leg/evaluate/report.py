@@ -11,16 +11,16 @@ from markupsafe import Markup
 from hopping_leg.evaluate import html_tables
 from hopping_leg.evaluate.acceptance import acceptance_lines
 from hopping_leg.evaluate.figures import to_svg
-from hopping_leg.evaluate.gallery import Picture, draw_gallery
+from hopping_leg.evaluate.report_figures import Picture, draw_report_figures
 from hopping_leg.evaluate.result import Evaluation
-from hopping_leg.evaluate.runner import Judged
+from hopping_leg.evaluate.runner import EvaluationRun
 from hopping_leg.evaluate.video import Video, fixed_traces, render_video
 from hopping_leg.robot.parameters import Robot
 
 _NO_VIDEO = Video(None, "it was not asked for")
 
 
-def write_report(judged: Judged, videos: dict[str, Video] | None = None) -> bytes:
+def write_report(judged: EvaluationRun, videos: dict[str, Video] | None = None) -> bytes:
     """Return the report as HTML.
 
     Args:
@@ -34,7 +34,7 @@ def write_report(judged: Judged, videos: dict[str, Video] | None = None) -> byte
         evaluation=evaluation,
         tables=_tables(evaluation),
         acceptance=acceptance_lines(map(dataclasses.asdict, evaluation.summary)),
-        pictures=[_picture(p, evaluation) for p in draw_gallery(evaluation, judged.runs)],
+        pictures=[_picture(p, evaluation) for p in draw_report_figures(evaluation, judged.runs)],
         videos=[_video(name, video) for name, video in (videos or {}).items()],
         conditions=_conditions(evaluation),
     )
@@ -49,7 +49,7 @@ def page_template(name: str) -> Template:
     return environment.from_string((folder / name).read_text(encoding="utf-8"))
 
 
-def render_videos(judged: Judged, robot: Robot) -> dict[str, Video]:
+def render_videos(judged: EvaluationRun, robot: Robot) -> dict[str, Video]:
     """Render one video per controller; after a first failure the rest are not tried."""
     videos: dict[str, Video] = {}
     for name in judged.evaluation.controllers:

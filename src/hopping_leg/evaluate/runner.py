@@ -8,19 +8,27 @@ from typing import Any
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range
-from hopping_leg.evaluate.pooling import pool_group
+from hopping_leg.evaluate.aggregation import pool_group, tabulate
+from hopping_leg.evaluate.entries import Entry, check_labels, check_range
 from hopping_leg.evaluate.result import Evaluation, Group, Summary
-from hopping_leg.evaluate.runs import FLOORS, Run, on_floor, run_trials
-from hopping_leg.evaluate.tables import tabulate
-from hopping_leg.evaluate.trials import KINDS, Trial, check_reach, paper_trials, within
+from hopping_leg.evaluate.trials import (
+    FLOORS,
+    KINDS,
+    Run,
+    Trial,
+    check_commands,
+    on_floor,
+    paper_trials,
+    run_trials,
+    within,
+)
 from hopping_leg.io import versions
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.sim import NO_NOISE, Engine
 
 
 @dataclass(frozen=True)
-class Judged:
+class EvaluationRun:
     """An evaluation with the runs behind it."""
 
     evaluation: Evaluation
@@ -28,7 +36,7 @@ class Judged:
 
 
 def evaluate(
-    candidates: Sequence[Candidate],
+    entries: Sequence[Entry],
     setup: RolloutConfig,
     *,
     commands: Sequence[float] | None = None,
@@ -37,11 +45,11 @@ def evaluate(
     floor: str = "soft",
     kinds: Collection[str] = KINDS,
     on_progress: Callable[[str, float], None] = lambda _label, _share: None,
-) -> Judged:
-    """Run all trials of all candidates and measure them.
+) -> EvaluationRun:
+    """Run all trials of all entries and measure them.
 
     Args:
-        candidates: What is judged.
+        entries: What is judged.
         setup: The world; its robot stands on ``floor``.
         commands: Heights of the fixed trials and the sequence, m; the paper's by default.
         repeats: Realisations of noise and delay per trial.
@@ -51,34 +59,34 @@ def evaluate(
         on_progress: Called with a label and the share done of its runs.
 
     Raises:
-        UsageError: A command is out of reach or out of a candidate's range, a name is taken twice,
+        UsageError: A command is out of reach or out of a entry's range, a name is taken twice,
             or there is nothing to do.
     """
-    _check(candidates, setup, commands, repeats)
+    _check(entries, setup, commands, repeats)
     trials = [t for t in paper_trials(setup.robot, commands) if t.kind in kinds]
     world = on_floor(setup, floor)
     notes = _note_coarse(setup.timestep) + _note_twice(setup)
     runs: list[Run] = []
-    for candidate in candidates:
-        fitting = [t for t in trials if within(t, candidate.command_range)]
-        notes += candidate.notes
-        notes += _note_left_out(candidate, trials, fitting)
+    for entry in entries:
+        fitting = [t for t in trials if within(t, entry.command_range)]
+        notes += entry.notes
+        notes += _note_left_out(entry, trials, fitting)
         own = run_trials(
-            candidate.label,
-            candidate.controller,
+            entry.label,
+            entry.controller,
             world,
             fitting,
             repeats=repeats,
             seed=seed,
-            on_progress=functools.partial(on_progress, candidate.label),
+            on_progress=functools.partial(on_progress, entry.label),
         )
-        notes += _note_stopped(candidate.label, own, setup)
+        notes += _note_stopped(entry.label, own, setup)
         runs += own
-    measured = tabulate(runs, [c.label for c in candidates], seed)
-    return Judged(
+    measured = tabulate(runs, [c.label for c in entries], seed)
+    return EvaluationRun(
         replace(
             measured,
-            groups=_groups(candidates, measured.summary, seed),
+            groups=_groups(entries, measured.summary, seed),
             conditions=_conditions(world, setup, floor, repeats, seed),
             versions=software_versions(setup.engine),
             notes=notes,
@@ -88,26 +96,26 @@ def evaluate(
 
 
 def _check(
-    candidates: Sequence[Candidate],
+    entries: Sequence[Entry],
     setup: RolloutConfig,
     commands: Sequence[float] | None,
     repeats: int,
 ) -> None:
-    check_labels(candidates)
+    check_labels(entries)
     if repeats < 1:
         raise UsageError(f"{repeats} seeds are too few; give --seeds 1 or more.")
     if commands is not None:
-        check_reach(setup.robot, commands)
+        check_commands(setup.robot, commands)
     fixed = [t for t in paper_trials(setup.robot, commands) if t.kind == "fixed"]
-    for candidate in candidates:
-        _check_range(candidate, fixed, asked=commands is not None)
+    for entry in entries:
+        _check_range(entry, fixed, asked=commands is not None)
 
 
-def _check_range(candidate: Candidate, fixed: Sequence[Trial], *, asked: bool) -> None:
+def _check_range(entry: Entry, fixed: Sequence[Trial], *, asked: bool) -> None:
     """Refuse commands that were asked for by name, or a range that leaves none."""
-    outside = [trial for trial in fixed if not within(trial, candidate.command_range)]
+    outside = [trial for trial in fixed if not within(trial, entry.command_range)]
     if asked or len(outside) == len(fixed):
-        check_range(candidate, [height for trial in outside for height, _ in trial.steps])
+        check_range(entry, [height for trial in outside for height, _ in trial.steps])
 
 
 def _note_coarse(timestep: float) -> list[str]:
@@ -129,17 +137,15 @@ def _note_twice(setup: RolloutConfig) -> list[str]:
     ]
 
 
-def _note_left_out(
-    candidate: Candidate, trials: Sequence[Trial], fitting: Sequence[Trial]
-) -> list[str]:
+def _note_left_out(entry: Entry, trials: Sequence[Trial], fitting: Sequence[Trial]) -> list[str]:
     left_out = [t for t in trials if t not in fitting]
-    if not left_out or candidate.command_range is None:
+    if not left_out or entry.command_range is None:
         return []
-    low, high = candidate.command_range
+    low, high = entry.command_range
     names = ", ".join(
         f"{t.kind} {t.steps[0][0]:g} m" if len(t.steps) == 1 else t.kind for t in left_out
     )
-    return [f"{candidate.label} was made for {low:g} to {high:g} m; left out: {names}."]
+    return [f"{entry.label} was made for {low:g} to {high:g} m; left out: {names}."]
 
 
 def _note_stopped(label: str, runs: Sequence[Run], setup: RolloutConfig) -> list[str]:
@@ -158,11 +164,11 @@ def _note_stopped(label: str, runs: Sequence[Run], setup: RolloutConfig) -> list
     ]
 
 
-def _groups(candidates: Sequence[Candidate], summary: Sequence[Summary], seed: int) -> list[Group]:
-    names = list(dict.fromkeys(c.group for c in candidates if c.group))
+def _groups(entries: Sequence[Entry], summary: Sequence[Summary], seed: int) -> list[Group]:
+    names = list(dict.fromkeys(c.group for c in entries if c.group))
     rows: list[Group] = []
     for name in names:
-        members = {c.label for c in candidates if c.group == name}
+        members = {c.label for c in entries if c.group == name}
         if len(members) > 1:
             rows += pool_group(name, [s for s in summary if s.controller in members], seed)
     return rows

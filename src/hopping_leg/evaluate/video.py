@@ -16,7 +16,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.evaluate.metrics import START_SECONDS
-from hopping_leg.evaluate.runs import Run
+from hopping_leg.evaluate.trials import Run
 from hopping_leg.hop_detection import trace_hops
 from hopping_leg.robot import Robot, get_spec
 from hopping_leg.trace import Trace

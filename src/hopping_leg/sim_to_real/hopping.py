@@ -16,7 +16,7 @@ import numpy as np
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.candidates import Candidate
+from hopping_leg.evaluate.entries import Entry
 from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.evaluate.runner import evaluate
 from hopping_leg.io import write_json
@@ -160,7 +160,7 @@ def hop(content: bytes, robot: Robot, study: Study) -> list[dict[str, Any]]:
     bounds = (policy.card.command_low, policy.card.command_high)
     setup = RolloutConfig(robot, disturbance_of(robot), threads=study.threads)
     judged = evaluate(
-        [Candidate("policy", policy, bounds)],
+        [Entry("policy", policy, bounds)],
         setup,
         commands=study.commands,
         repeats=study.repeats,

@@ -7,10 +7,10 @@ import pytest
 
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate import Candidate
-from hopping_leg.evaluate.candidates import fingerprint
+from hopping_leg.evaluate import Entry
+from hopping_leg.evaluate.entries import fingerprint
 from hopping_leg.evaluate.figures import draw_robustness, to_svg
-from hopping_leg.evaluate.keeper import Keeper
+from hopping_leg.evaluate.result_cache import ResultCache
 from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
 
 AXES = ("links", "pushes")
@@ -23,19 +23,22 @@ def tiny(setup):
 
 def test_a_suite_repeats_and_its_results_are_kept(tiny, spring, tmp_path):
     begun, progress = [], []
-    judged = [Candidate("my spring", spring)]
+    judged = [Entry("my spring", spring)]
     first = run_suite(
-        judged, tiny, Keeper(tmp_path, begun.append), lambda label, share: progress.append(share)
+        judged,
+        tiny,
+        ResultCache(tmp_path, begun.append),
+        lambda label, share: progress.append(share),
     )
     assert begun == [f"my spring: {axis}" for axis in ("nominal", *AXES)]
     assert progress == sorted(progress)
     assert progress[-1] == 1
-    again = run_suite(judged, tiny, Keeper(tmp_path, begun.append))
+    again = run_suite(judged, tiny, ResultCache(tmp_path, begun.append))
     assert len(begun) == 3
-    elsewhere = run_suite(judged, tiny, Keeper(tmp_path / "elsewhere"))
+    elsewhere = run_suite(judged, tiny, ResultCache(tmp_path / "elsewhere"))
     assert json.dumps(first) == json.dumps(again) == json.dumps(elsewhere)
     other = dataclasses.replace(tiny, seed=7, axes=("pushes",))
-    run_suite(judged, other, Keeper(tmp_path, begun.append))
+    run_suite(judged, other, ResultCache(tmp_path, begun.append))
     assert len(begun) == 5
     svg = to_svg(draw_robustness(first))
     assert svg == to_svg(draw_robustness(first))
@@ -43,7 +46,7 @@ def test_a_suite_repeats_and_its_results_are_kept(tiny, spring, tmp_path):
 
 
 def test_rows_have_the_promised_names(tiny, spring, tmp_path):
-    result = run_suite([Candidate("spring", spring)], tiny, Keeper(tmp_path))
+    result = run_suite([Entry("spring", spring)], tiny, ResultCache(tmp_path))
     scores = {row["axis"]: row for row in result["scores"]}
     assert list(scores) == ["links", "pushes", "overall"]
     assert all({"controller", "score", "low", "high"} <= row.keys() for row in scores.values())
@@ -69,8 +72,8 @@ def test_bad_input_is_one_sentence(setup, spring, tiny, tmp_path):
     with pytest.raises(UsageError, match="out of reach"):
         make_suite(setup, commands=[3.0])
     with pytest.raises(UsageError, match=r"0\.32 m: it was trained for 0\.2 to 0\.3 m"):
-        run_suite([Candidate("low", spring, (0.2, 0.3))], tiny, Keeper(tmp_path))
+        run_suite([Entry("low", spring, (0.2, 0.3))], tiny, ResultCache(tmp_path))
     with pytest.raises(UsageError, match="named twice"):
-        run_suite([Candidate("a", spring), Candidate("a", spring)], tiny, Keeper(tmp_path))
+        run_suite([Entry("a", spring), Entry("a", spring)], tiny, ResultCache(tmp_path))
     with pytest.raises(UsageError, match="No controller"):
-        run_suite([], tiny, Keeper(tmp_path))
+        run_suite([], tiny, ResultCache(tmp_path))

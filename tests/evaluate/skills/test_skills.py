@@ -10,7 +10,7 @@ import pytest
 from hopping_leg.cli import main
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate import Candidate
+from hopping_leg.evaluate import Entry
 from hopping_leg.evaluate.skills.counted import count_hops
 from hopping_leg.evaluate.skills.landings import ground_force, land, last_touchdown, rebound
 from hopping_leg.evaluate.skills.stairs import climb
@@ -84,7 +84,7 @@ def test_command_line_writes_everything(tmp_path, capsys):
 
 
 def test_bad_input_is_refused(setup, shaping):
-    narrow = Candidate("narrow", shaping, (0.29, 0.31))
+    narrow = Entry("narrow", shaping, (0.29, 0.31))
     with pytest.raises(UsageError, match=r"trained for 0\.29 to 0\.31 m"):
         run_skills([narrow], setup, commands=[0.25])
     with pytest.raises(UsageError, match="named twice"):

@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.evaluate.estimator import HEIGHT
 from hopping_leg.evaluate.figures.style import (
     COLOURS,
     COMMAND_COLOUR,
@@ -19,7 +18,7 @@ from hopping_leg.evaluate.figures.style import (
     panels,
     styled,
 )
-from hopping_leg.evaluate.metrics import START_SECONDS, SWITCH_SECONDS, stretches
+from hopping_leg.evaluate.metrics import ESTIMATED_HEIGHT, START_SECONDS, SWITCH_SECONDS, stretches
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE, trace_hops
 from hopping_leg.trace import Trace
 
@@ -155,7 +154,7 @@ def draw_estimate(trace: Trace, title: str = "") -> Figure:
         trace: A run whose controller records ``estimated_height_m``.
         title: Of the figure.
     """
-    time, height, estimate = (trace.column(n) for n in ("time_s", "height_m", HEIGHT))
+    time, height, estimate = (trace.column(n) for n in ("time_s", "height_m", ESTIMATED_HEIGHT))
     figure = Figure(figsize=(WIDTH, 3.2), layout="constrained")
     over_time, spread = figure.subplots(1, 2, width_ratios=(2, 1))
     shown = (time >= START_SECONDS) & (time < START_SECONDS + SHOWN_SECONDS)

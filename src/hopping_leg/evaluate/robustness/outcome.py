@@ -9,8 +9,8 @@ from scipy import stats
 
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
-from hopping_leg.evaluate.metrics import Window, measure, pooled_apexes
-from hopping_leg.evaluate.robustness.plan import Plan, Trial
+from hopping_leg.evaluate.metrics import HopWindow, measure, pooled_apexes
+from hopping_leg.evaluate.robustness.trials import AxisTrials, RobustnessTrial
 from hopping_leg.evaluate.statistics import CONFIDENCE, RESAMPLES
 from hopping_leg.trace import Trace
 
@@ -45,10 +45,10 @@ class Outcome:
         return self.skipped == 0 and self.error_m is not None and abs(self.error_m) <= TOLERANCE
 
 
-def run_plan(
+def run_axis(
     controller: Controller,
     setup: RolloutConfig,
-    plan: Plan,
+    plan: AxisTrials,
     on_tick: Callable[[int, int], None] | None = None,
 ) -> list[Outcome]:
     """Let a controller meet all trials of an axis.
@@ -65,7 +65,7 @@ def run_plan(
     return [judge(trial, run.trace(leg)) for leg, trial in enumerate(plan.trials)]
 
 
-def judge(trial: Trial, trace: Trace) -> Outcome:
+def judge(trial: RobustnessTrial, trace: Trace) -> Outcome:
     """Measure one trial."""
     windows = measure(trace)
     return Outcome(
@@ -78,7 +78,7 @@ def judge(trial: Trial, trace: Trace) -> Outcome:
     )
 
 
-def _median_error(windows: list[Window], command: float) -> float | None:
+def _median_error(windows: list[HopWindow], command: float) -> float | None:
     apex = pooled_apexes([w for w in windows if w.command == command])
     return float(np.median(apex)) - command if len(apex) else None
 

@@ -8,8 +8,8 @@ from typing import Any
 
 from hopping_leg.controllers import Controller, RolloutConfig
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range, fingerprint
-from hopping_leg.evaluate.keeper import Keeper
+from hopping_leg.evaluate.entries import Entry, check_labels, check_range, fingerprint
+from hopping_leg.evaluate.result_cache import ResultCache
 from hopping_leg.evaluate.robustness import changes
 from hopping_leg.evaluate.robustness.axes import (
     AXES,
@@ -24,12 +24,12 @@ from hopping_leg.evaluate.robustness.outcome import (
     TOLERANCE,
     Outcome,
     level_rows,
-    run_plan,
+    run_axis,
     score_rows,
 )
-from hopping_leg.evaluate.robustness.plan import JOINT_POINTS, SECONDS, make_plan
+from hopping_leg.evaluate.robustness.trials import JOINT_POINTS, SECONDS, make_trials
 from hopping_leg.evaluate.runner import software_versions
-from hopping_leg.evaluate.trials import COMMANDS, check_reach, scaled
+from hopping_leg.evaluate.trials import COMMANDS, check_commands, scaled
 from hopping_leg.io import safe_file_name
 
 RECOVERY = "recovery"
@@ -108,23 +108,23 @@ def make_suite(
     if repeats < 1:
         raise UsageError(f"{repeats} seeds are too few; give --seeds 1 or more.")
     chosen = scaled(COMMANDS, setup.robot) if commands is None else tuple(sorted(set(commands)))
-    check_reach(setup.robot, chosen)
+    check_commands(setup.robot, chosen)
     names = tuple(name for name in axis_names() if not axes or name in axes)
     return Suite(setup, names, chosen, repeats, seed, recovery=not axes, seconds=seconds)
 
 
 def run_suite(
-    candidates: Sequence[Candidate],
+    entries: Sequence[Entry],
     suite: Suite,
-    keeper: Keeper,
+    cache: ResultCache,
     on_progress: Callable[[str, float], None] = lambda label, share: None,
 ) -> dict[str, Any]:
-    """Let every candidate meet every axis.
+    """Let every entry meet every axis.
 
     Args:
-        candidates: What is judged.
+        entries: What is judged.
         suite: What it meets.
-        keeper: Keeps the result of each candidate and axis.
+        cache: Keeps the result of each entry and axis.
         on_progress: Called with a label and the share done of its axes.
 
     Returns:
@@ -132,52 +132,52 @@ def run_suite(
         ``notes``, as JSON values.
 
     Raises:
-        UsageError: A command is out of a candidate's range, or a name is taken twice.
+        UsageError: A command is out of a entry's range, or a name is taken twice.
     """
-    check_labels(candidates)
-    for candidate in candidates:
-        check_range(candidate, suite.commands)
+    check_labels(entries)
+    for entry in entries:
+        check_range(entry, suite.commands)
     result: dict[str, Any] = {"schema": SCHEMA, "scores": [], "levels": []}
     result |= {"recovery": [], "steps": []}
     parts = [NOMINAL, *suite.axes, *([RECOVERY] if suite.recovery else [])]
-    for candidate in candidates:
+    for entry in entries:
         outcomes: dict[str, list[Outcome]] = {}
         for number, part in enumerate(parts):
-            tick = functools.partial(_report, on_progress, candidate.label, number, len(parts))
-            kept = keeper.keep(
-                f"{safe_file_name(candidate.label)}-{part}",
-                f"{candidate.label}: {part}",
-                suite.asked(candidate.controller, part),
-                functools.partial(_run_part, candidate, suite, part, tick),
+            tick = functools.partial(_report, on_progress, entry.label, number, len(parts))
+            kept = cache.load_or_run(
+                f"{safe_file_name(entry.label)}-{part}",
+                f"{entry.label}: {part}",
+                suite.asked(entry.controller, part),
+                functools.partial(_run_part, entry, suite, part, tick),
             )
             if part == RECOVERY:
                 for name in ("recovery", "steps"):
-                    result[name] += [{"controller": candidate.label, **r} for r in kept[name]]
+                    result[name] += [{"controller": entry.label, **r} for r in kept[name]]
             else:
                 outcomes[part] = [Outcome(**row) for row in kept["outcomes"]]
-            on_progress(candidate.label, (number + 1) / len(parts))
+            on_progress(entry.label, (number + 1) / len(parts))
         for part, found in outcomes.items():
-            result["levels"] += level_rows(candidate.label, part, found)
+            result["levels"] += level_rows(entry.label, part, found)
         del outcomes[NOMINAL]
-        result["scores"] += score_rows(candidate.label, outcomes, suite.seed)
+        result["scores"] += score_rows(entry.label, outcomes, suite.seed)
     return {
         **result,
         "axes": [_described(axis) for axis in AXES if axis.name in suite.axes] + _joint(suite),
         "conditions": _conditions(suite),
         "versions": software_versions(),
-        "notes": [note for candidate in candidates for note in candidate.notes],
+        "notes": [note for entry in entries for note in entry.notes],
     }
 
 
 def _run_part(
-    candidate: Candidate, suite: Suite, part: str, on_tick: Callable[[int, int], None]
+    entry: Entry, suite: Suite, part: str, on_tick: Callable[[int, int], None]
 ) -> dict[str, Any]:
-    setup, controller = suite.setup, candidate.controller
+    setup, controller = suite.setup, entry.controller
     if part == RECOVERY:
         return changes.study_changes(
             controller, setup, suite.commands, changes.RUNS * suite.repeats, suite.seed, on_tick
         )
-    plan = make_plan(
+    plan = make_trials(
         part,
         setup.robot,
         suite.commands,
@@ -186,7 +186,7 @@ def _run_part(
         rate=setup.rate,
         seconds=suite.seconds,
     )
-    return {"outcomes": [asdict(one) for one in run_plan(controller, setup, plan, on_tick)]}
+    return {"outcomes": [asdict(one) for one in run_axis(controller, setup, plan, on_tick)]}
 
 
 def _report(

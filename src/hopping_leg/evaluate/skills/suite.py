@@ -1,4 +1,4 @@
-"""All skills of all candidates, as JSON values."""
+"""All skills of all entries, as JSON values."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
@@ -6,20 +6,19 @@ from typing import Any
 
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.candidates import Candidate, check_labels, check_range
+from hopping_leg.evaluate.entries import Entry, check_labels, check_range
 from hopping_leg.evaluate.runner import software_versions
-from hopping_leg.evaluate.runs import on_floor
 from hopping_leg.evaluate.skills.counted import COUNTS, count_hops
 from hopping_leg.evaluate.skills.landings import DROP, land
 from hopping_leg.evaluate.skills.stairs import STAIRS, climb
-from hopping_leg.evaluate.trials import COMMANDS, PAPER_HEIGHT, check_reach, scaled
+from hopping_leg.evaluate.trials import COMMANDS, PAPER_HEIGHT, check_commands, on_floor, scaled
 
 SCHEMA = 1
 """Version of the JSON, raised when a name changes its meaning."""
 
 
 def run_skills(
-    candidates: Sequence[Candidate],
+    entries: Sequence[Entry],
     setup: RolloutConfig,
     *,
     floors: Sequence[str] = ("soft", "stiff"),
@@ -28,12 +27,12 @@ def run_skills(
     seed: int = 1000,
     on_progress: Callable[[str, float], None] = lambda _label, _share: None,
 ) -> dict[str, Any]:
-    """Let every candidate hop so many times and stop, and over stairs; drop a leg.
+    """Let every entry hop so many times and stop, and over stairs; drop a leg.
 
     Args:
-        candidates: What is judged.
+        entries: What is judged.
         setup: The world, with the paper's noise and delay.
-        floors: Names of floors, see ``evaluate.runs.FLOORS``.
+        floors: Names of floors, see ``evaluate.trials.FLOORS``.
         commands: Desired apex heights, m; the paper's by default, scaled to the leg.
         repeats: Realisations of noise and delay.
         seed: All randomness follows from it.
@@ -43,7 +42,7 @@ def run_skills(
         ``counted``, ``stairs``, ``climbs``, ``landings``, ``conditions``, ``versions``, ``notes``.
 
     Raises:
-        UsageError: A command is out of reach or of a candidate's range, or the engine is not
+        UsageError: A command is out of reach or of a entry's range, or the engine is not
             MuJoCo.
     """
     if setup.engine != "mujoco":
@@ -51,17 +50,17 @@ def run_skills(
     if repeats < 1:
         raise UsageError(f"{repeats} seeds are too few; give --seeds 1 or more.")
     chosen = scaled(COMMANDS, setup.robot) if commands is None else tuple(sorted(set(commands)))
-    check_reach(setup.robot, chosen)
-    check_labels(candidates)
-    for candidate in candidates:
-        check_range(candidate, chosen)
+    check_commands(setup.robot, chosen)
+    check_labels(entries)
+    for entry in entries:
+        check_range(entry, chosen)
     size = setup.robot.straight_height / PAPER_HEIGHT
     stairs, drop = [size * level for level in STAIRS], size * DROP
     rows: dict[str, list[Any]] = {"counted": [], "stairs": [], "climbs": [], "landings": []}
-    for candidate in candidates:
+    for entry in entries:
         for number, floor in enumerate(floors):
             world = on_floor(setup, floor)
-            label, controller = candidate.label, candidate.controller
+            label, controller = entry.label, entry.controller
             rows["counted"] += count_hops(
                 label, controller, world, chosen, repeats=repeats, seed=seed, floor=floor
             )
@@ -100,5 +99,5 @@ def run_skills(
             "rate_hz": setup.rate,
         },
         "versions": software_versions(),
-        "notes": [note for candidate in candidates for note in candidate.notes],
+        "notes": [note for entry in entries for note in entry.notes],
     }

@@ -10,7 +10,7 @@ from hopping_leg.io import write_json
 
 
 @dataclass(frozen=True)
-class Keeper:
+class ResultCache:
     """Runs work once: its result lies in a folder and is taken from there the next time.
 
     Attributes:
@@ -21,7 +21,7 @@ class Keeper:
     folder: Path
     on_begin: Callable[[str], None] = lambda words: None
 
-    def keep(
+    def load_or_run(
         self, name: str, words: str, asked: dict[str, Any], work: Callable[[], dict[str, Any]]
     ) -> dict[str, Any]:
         """Return the kept result of the same work, or do it and keep its result.

@@ -8,8 +8,8 @@ import pytest
 from hopping_leg.controllers import rollout
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.robustness.axes import AXES, JOINT, NOMINAL, Case, axis_names
-from hopping_leg.evaluate.robustness.outcome import run_plan
-from hopping_leg.evaluate.robustness.plan import PUSH_SECONDS, make_plan
+from hopping_leg.evaluate.robustness.outcome import run_axis
+from hopping_leg.evaluate.robustness.trials import PUSH_SECONDS, make_trials
 
 COMMANDS = (0.25, 0.35)
 LEADERBOARD = {
@@ -23,7 +23,7 @@ LEADERBOARD = {
 
 
 def plan(robot, axis, **options):
-    return make_plan(axis, robot, COMMANDS, 2, options.pop("seed", 1000), rate=200.0, **options)
+    return make_trials(axis, robot, COMMANDS, 2, options.pop("seed", 1000), rate=200.0, **options)
 
 
 def arrays(made):
@@ -81,7 +81,7 @@ def test_levels_differ_in_size_only(robot):
 
 
 def test_commands_step_away_and_back_within_the_suites_heights(robot):
-    made = make_plan("command-steps", robot, (0.25, 0.3, 0.35), 1, 0, rate=200.0, levels=[0.04])
+    made = make_trials("command-steps", robot, (0.25, 0.3, 0.35), 1, 0, rate=200.0, levels=[0.04])
     pairs = [sorted(set(made.commands[:, leg].round(6))) for leg in range(3)]
     assert pairs == [[0.25, 0.29], [0.28, 0.32], [0.31, 0.35]]
     assert (np.abs(np.diff(made.commands, axis=0)) > 0).sum() == 3 * 3
@@ -101,12 +101,12 @@ def test_the_hypercube_stays_within_its_share_of_the_moderate_ranges(robot):
 def test_controllers_meet_the_same_and_leave_it_as_it_was(setup, robot, spring):
     made = plan(robot, "pushes", levels=[0.5], seconds=3.0)
     before = [array.copy() for array in arrays(made)]
-    first = run_plan(spring, setup, made)
+    first = run_axis(spring, setup, made)
     for one, same in zip(arrays(made), before, strict=True):
         np.testing.assert_array_equal(one, same)
-    assert run_plan(spring, setup, made) == first
+    assert run_axis(spring, setup, made) == first
     weak = dataclasses.replace(made, seed=made.seed + 1)
-    assert run_plan(spring, setup, weak) != first
+    assert run_axis(spring, setup, weak) != first
 
 
 def test_unknown_axes_are_one_sentence(robot):

@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from hopping_leg.evaluate.pooling import pool_group
+from hopping_leg.evaluate.aggregation import pool_group
 
 ERRORS = (-0.004, 0.001, 0.003)
 

@@ -15,7 +15,7 @@ from hopping_leg.robot.parameters import Robot
 
 
 @dataclass(frozen=True)
-class Candidate:
+class Entry:
     """A controller to be judged.
 
     Attributes:
@@ -33,7 +33,7 @@ class Candidate:
     notes: tuple[str, ...] = ()
 
 
-def load_candidates(names: Sequence[str], robot: Robot, rate: float) -> list[Candidate]:
+def load_entries(names: Sequence[str], robot: Robot, rate: float) -> list[Entry]:
     """Load every controller that is named.
 
     Policy files of one recipe that differ in their training seed become a group.
@@ -48,17 +48,17 @@ def load_candidates(names: Sequence[str], robot: Robot, rate: float) -> list[Can
         PolicyError: A file is unreadable, does not fit, or a pattern matches nothing.
         UsageError: There is no such controller.
     """
-    expanded = dict.fromkeys(pair for entry in names for pair in _expand(entry))
+    expanded = dict.fromkeys(pair for text in names for pair in _expand(text))
     return _grouped([_load(label, source, robot, rate) for label, source in expanded])
 
 
-def check_labels(candidates: Sequence[Candidate]) -> None:
+def check_labels(entries: Sequence[Entry]) -> None:
     """Check that there is something to judge, under names that differ.
 
     Raises:
         UsageError: There is not.
     """
-    labels = [candidate.label for candidate in candidates]
+    labels = [entry.label for entry in entries]
     if not labels:
         raise UsageError("No controller was named; try `hop evaluate energy-shaping`.")
     for label in labels:
@@ -66,17 +66,17 @@ def check_labels(candidates: Sequence[Candidate]) -> None:
             raise UsageError(f"Controller '{label}' was named twice; name each one once.")
 
 
-def check_range(candidate: Candidate, commands: Sequence[float]) -> None:
-    """Check that a candidate may be asked for heights, m.
+def check_range(entry: Entry, commands: Sequence[float]) -> None:
+    """Check that a entry may be asked for heights, m.
 
     Raises:
         UsageError: One is outside of the range that it was trained for.
     """
-    low, high = candidate.command_range or (-math.inf, math.inf)
+    low, high = entry.command_range or (-math.inf, math.inf)
     outside = [c for c in commands if not low - 1e-9 <= c <= high + 1e-9]
     if outside:
         raise UsageError(
-            f"'{candidate.label}' cannot be asked for {outside[0]:g} m: it was trained for"
+            f"'{entry.label}' cannot be asked for {outside[0]:g} m: it was trained for"
             f" {low:g} to {high:g} m; choose --commands within that range."
         )
 
@@ -89,16 +89,14 @@ def fingerprint(controller: Controller) -> str:
     return str(getattr(controller, "digest", named))
 
 
-def _expand(entry: str) -> list[tuple[str, str]]:
-    """Return the label and source of everything that an entry names."""
-    if not any(sign in entry for sign in "*?["):
-        label, _, source = (entry, "", entry) if Path(entry).exists() else entry.rpartition("=")
+def _expand(text: str) -> list[tuple[str, str]]:
+    """Return the label and source of everything that an text names."""
+    if not any(sign in text for sign in "*?["):
+        label, _, source = (text, "", text) if Path(text).exists() else text.rpartition("=")
         return [(label or source, source)]
-    found = sorted(glob.glob(entry, recursive=True))  # noqa: PTH207
+    found = sorted(glob.glob(text, recursive=True))  # noqa: PTH207
     if not found:
-        raise PolicyError(
-            f"No policy file matches '{entry}'; quote the pattern and check the path."
-        )
+        raise PolicyError(f"No policy file matches '{text}'; quote the pattern and check the path.")
     folders = [Path(path).parent.name for path in found]
     alike = len({Path(path).name for path in found}) == 1
     if len(found) > 1 and alike and len(set(folders)) == len(folders):
@@ -106,21 +104,21 @@ def _expand(entry: str) -> list[tuple[str, str]]:
     return [(path, path) for path in found]
 
 
-def _load(name: str, source: str, robot: Robot, rate: float) -> Candidate:
+def _load(name: str, source: str, robot: Robot, rate: float) -> Entry:
     controller = load_controller(source, robot, rate=rate, other="accept")
     if not isinstance(controller, Policy):
-        return Candidate(name, controller)
+        return Entry(name, controller)
     card = controller.card
     note = controller.stranger(robot, name)
     notes = (note,) if note else ()
-    return Candidate(name, controller, (card.command_low, card.command_high), notes=notes)
+    return Entry(name, controller, (card.command_low, card.command_high), notes=notes)
 
 
-def _grouped(candidates: list[Candidate]) -> list[Candidate]:
+def _grouped(entries: list[Entry]) -> list[Entry]:
     """Put policy files of one recipe in a group where every one has a training seed of its own."""
     cards = {
         c.label: c.controller.card
-        for c in candidates
+        for c in entries
         if isinstance(c.controller, Policy) and c.label not in shipped_policies()
     }
     names: dict[str, str] = {}
@@ -128,4 +126,4 @@ def _grouped(candidates: list[Candidate]) -> list[Candidate]:
         seeds = {label: card.seed for label, card in cards.items() if card.recipe == recipe}
         if len(set(seeds.values())) == len(seeds) > 1:
             names |= dict.fromkeys(seeds, f"{recipe}, {len(seeds)} training seeds")
-    return [replace(c, group=names.get(c.label)) for c in candidates]
+    return [replace(c, group=names.get(c.label)) for c in entries]

@@ -5,10 +5,9 @@ import re
 import pytest
 
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.compare import set_beside, traces_of
-from hopping_leg.evaluate.compare_report import write_comparison
-from hopping_leg.evaluate.runs import save_traces
-from hopping_leg.evaluate.stored import evaluation_from, read_runs
+from hopping_leg.evaluate.comparison import set_beside, traces_of, write_comparison
+from hopping_leg.evaluate.result_files import evaluation_from, read_runs
+from hopping_leg.evaluate.trials import save_traces
 
 TRAINING = {
     "recipe": "fast",

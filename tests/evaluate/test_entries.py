@@ -5,8 +5,8 @@ import pytest
 
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import PolicyError, UsageError
-from hopping_leg.evaluate import candidates
-from hopping_leg.evaluate.candidates import load_candidates
+from hopping_leg.evaluate import entries
+from hopping_leg.evaluate.entries import load_entries
 
 
 class FakePolicy:
@@ -25,12 +25,12 @@ class FakePolicy:
 
 def test_a_name_that_does_not_exist_is_answered_with_those_that_do(robot):
     with pytest.raises(UsageError, match="energy-shaping"):
-        load_candidates(["enrgy-shaping"], robot, 200.0)
+        load_entries(["enrgy-shaping"], robot, 200.0)
 
 
 def test_a_pattern_without_a_match_is_an_error(robot, tmp_path):
     with pytest.raises(PolicyError, match="No policy file matches"):
-        load_candidates([str(tmp_path / "*.onnx")], robot, 200.0)
+        load_entries([str(tmp_path / "*.onnx")], robot, 200.0)
 
 
 @pytest.fixture
@@ -38,15 +38,15 @@ def folder(tmp_path, monkeypatch):
     """Two policy files; the training seed is the file's name."""
     for name in ("1.onnx", "2.onnx"):
         (tmp_path / name).touch()
-    monkeypatch.setattr(candidates, "Policy", FakePolicy)
+    monkeypatch.setattr(entries, "Policy", FakePolicy)
     monkeypatch.setattr(
-        candidates, "load_controller", lambda name, *_, **__: FakePolicy(int(Path(name).stem))
+        entries, "load_controller", lambda name, *_, **__: FakePolicy(int(Path(name).stem))
     )
     return tmp_path
 
 
 def test_a_pattern_becomes_a_group_with_ranges_and_warnings(robot, folder):
-    found = load_candidates([str(folder / "*.onnx")], robot, 200.0)
+    found = load_entries([str(folder / "*.onnx")], robot, 200.0)
     assert [c.label for c in found] == [str(folder / "1.onnx"), str(folder / "2.onnx")]
     assert {c.group for c in found} == {"fast, 2 training seeds"}
     assert found[0].command_range == (0.2, 0.4)
@@ -57,12 +57,12 @@ def test_files_of_one_name_go_by_their_folders(robot, folder):
     for name in ("seed=1", "seed=2"):
         (folder / name).mkdir()
         (folder / name / "1.onnx").touch()
-    found = load_candidates([str(folder / "seed*" / "1.onnx")], robot, 200.0)
+    found = load_entries([str(folder / "seed*" / "1.onnx")], robot, 200.0)
     assert [c.label for c in found] == ["seed=1", "seed=2"]
 
 
 def test_a_file_can_be_given_a_label(robot, folder):
-    [found] = load_candidates([f"mine={folder / '1.onnx'}"], robot, 200.0)
+    [found] = load_entries([f"mine={folder / '1.onnx'}"], robot, 200.0)
     assert found.label == "mine"
     assert found.controller.card.seed == 1
     assert found.notes[0].startswith("mine was trained")
@@ -72,11 +72,11 @@ def test_a_path_may_hold_an_equals_sign(robot, folder):
     (folder / "a=1").mkdir()
     path = folder / "a=1" / "2.onnx"
     path.touch()
-    [found] = load_candidates([str(path)], robot, 200.0)
+    [found] = load_entries([str(path)], robot, 200.0)
     assert found.label == str(path)
 
 
 def test_snapshots_of_one_training_are_no_group(robot, folder):
     (folder / "01.onnx").touch()
-    found = load_candidates([str(folder / "*.onnx")], robot, 200.0)
+    found = load_entries([str(folder / "*.onnx")], robot, 200.0)
     assert [c.group for c in found] == [None] * 3

@@ -33,7 +33,7 @@ GROUND_SECONDS, SWITCH_SECONDS = 1.0, 2.5
 
 
 @dataclass(frozen=True)
-class Trial:
+class RobustnessTrial:
     """One leg of an axis' batch.
 
     Attributes:
@@ -52,7 +52,7 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Plan:
+class AxisTrials:
     """All trials of an axis, run as one batch.
 
     Attributes:
@@ -64,13 +64,13 @@ class Plan:
     """
 
     axis: str
-    trials: tuple[Trial, ...]
+    trials: tuple[RobustnessTrial, ...]
     commands: Array
     perturbation: Perturbation
     seed: int
 
 
-def make_plan(
+def make_trials(
     axis: str,
     robot: Robot,
     commands: Sequence[float],
@@ -80,7 +80,7 @@ def make_plan(
     rate: float,
     levels: Sequence[float] | None = None,
     seconds: float = SECONDS,
-) -> Plan:
+) -> AxisTrials:
     """Lay down all trials of an axis.
 
     Args:
@@ -103,7 +103,7 @@ def make_plan(
         trials = _trials(axis, robot, commands, repeats, levels)
     ticks, within = round(seconds * rate), (min(commands), max(commands))
     events = [_Events(trial, seed, ticks, rate, within) for trial in trials]
-    return Plan(
+    return AxisTrials(
         axis,
         tuple(trials),
         np.stack([event.command for event in events], axis=1),
@@ -123,14 +123,14 @@ def _trials(
     commands: Sequence[float],
     repeats: int,
     levels: Sequence[float] | None,
-) -> list[Trial]:
+) -> list[RobustnessTrial]:
     if axis == NOMINAL:
         cases = {0.0: Case(robot)}
     else:
         found = axis_named(axis)
         cases = {level: found.alter(Case(robot), level) for level in levels or found.levels}
     return [
-        Trial(level, command, repeat, 0, case)
+        RobustnessTrial(level, command, repeat, 0, case)
         for level, case in cases.items()
         for command in commands
         for repeat in range(repeats)
@@ -143,7 +143,7 @@ def _joint_trials(
     repeats: int,
     levels: Sequence[float],
     entropy: Sequence[int],
-) -> list[Trial]:
+) -> list[RobustnessTrial]:
     """Draw a hypercube once; a level is a share of the way from neutral to its points."""
     each = [
         (command, repeat, point)
@@ -153,7 +153,7 @@ def _joint_trials(
     ]
     cube = qmc.LatinHypercube(len(AXES), rng=np.random.default_rng(entropy)).random(len(each))
     return [
-        Trial(level, command, repeat, point, _joint_case(robot, row, level))
+        RobustnessTrial(level, command, repeat, point, _joint_case(robot, row, level))
         for level in levels
         for (command, repeat, point), row in zip(each, cube, strict=True)
     ]
@@ -182,7 +182,12 @@ class _Events:
     """
 
     def __init__(
-        self, trial: Trial, seed: int, ticks: int, rate: float, within: tuple[float, float]
+        self,
+        trial: RobustnessTrial,
+        seed: int,
+        ticks: int,
+        rate: float,
+        within: tuple[float, float],
     ) -> None:
         entropy = [seed, trial.repeat, trial.point, round(1e4 * trial.command)]
         rng = np.random.default_rng(entropy)
@@ -205,7 +210,7 @@ def _pushes(rng: np.random.Generator, ticks: int, rate: float) -> Array:
     return pushes
 
 
-def _stepped(trial: Trial, within: tuple[float, float], time: Array) -> Array:
+def _stepped(trial: RobustnessTrial, within: tuple[float, float], time: Array) -> Array:
     """Return the command over time, m: away by a step and back, within the suite's heights."""
     low, high = within
     share = (trial.command - low) / (high - low) if high > low else 0.5

@@ -1,4 +1,4 @@
-"""Several stored runs set beside each other: one evaluation of all, and where they differ."""
+"""Several stored runs beside each other: one evaluation of all, where they differ, and its page."""
 
 import dataclasses
 import itertools
@@ -6,11 +6,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from markupsafe import Markup
+
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.gallery import run_of
-from hopping_leg.evaluate.result import Evaluation
-from hopping_leg.evaluate.runs import Run
-from hopping_leg.evaluate.stored import Stored
+from hopping_leg.evaluate import html_tables
+from hopping_leg.evaluate.figures import draw_learning, to_svg
+from hopping_leg.evaluate.html_tables import Column, millimetres, table
+from hopping_leg.evaluate.report import data_uri, page_template
+from hopping_leg.evaluate.report_figures import Picture, draw_report_figures, run_of
+from hopping_leg.evaluate.result import Evaluation, Staircase, Summary
+from hopping_leg.evaluate.result_files import StoredRun
+from hopping_leg.evaluate.trials import Run
 
 _DRAWN = ("sequence", "staircase")
 """Trials whose heights are drawn, of one run each."""
@@ -23,7 +29,7 @@ _OF_CONTROLLERS = ("summary", "sequence", "ladder", "staircase", "neighbours", "
 class Compared:
     """Runs beside each other."""
 
-    runs: tuple[Stored, ...]
+    runs: tuple[StoredRun, ...]
     """As named, in that order."""
     evaluation: Evaluation
     """All evaluations as one; empty if there are trainings alone."""
@@ -48,7 +54,7 @@ class Compared:
         }
 
 
-def set_beside(runs: Sequence[Stored]) -> Compared:
+def set_beside(runs: Sequence[StoredRun]) -> Compared:
     """Compare runs.
 
     Args:
@@ -88,7 +94,7 @@ def traces_of(compared: Compared) -> list[Run]:
     return found
 
 
-def command_of(run: Stored) -> str:
+def command_of(run: StoredRun) -> str:
     """Return the commands that make a run again."""
     evaluated = run.evaluation.command if run.evaluation else ""
     trained = str((run.training or {}).get("command", ""))
@@ -186,7 +192,7 @@ def _flat(entries: dict[str, Any]) -> dict[str, str]:
     return found
 
 
-def _robot_notes(runs: Sequence[Stored]) -> list[str]:
+def _robot_notes(runs: Sequence[StoredRun]) -> list[str]:
     robots: dict[tuple[str, str], list[str]] = {}
     for run in runs:
         for source in (run.evaluation.conditions if run.evaluation else None, run.training):
@@ -207,7 +213,7 @@ def _condition_notes(differences: list[dict[str, str]]) -> list[str]:
     return [f"The conditions differ: {', '.join(names)}; see the table."] if names else []
 
 
-def _lonely_notes(runs: Sequence[Stored]) -> list[str]:
+def _lonely_notes(runs: Sequence[StoredRun]) -> list[str]:
     """Say what is shown without anything of its kind beside it."""
     judged = [run.label for run in runs if run.evaluation is not None]
     trained = [run.label for run in runs if run.training is not None]
@@ -216,3 +222,106 @@ def _lonely_notes(runs: Sequence[Stored]) -> list[str]:
         for labels, kind in ((judged, "evaluation"), (trained, "training"))
         if len(labels) == 1
     ]
+
+
+def write_comparison(compared: Compared, command: str = "") -> bytes:
+    """Return the comparison as HTML.
+
+    Args:
+        compared: Runs beside each other.
+        command: That makes the page again.
+    """
+    evaluation = compared.evaluation
+    pictures = draw_report_figures(evaluation, traces_of(compared)) if evaluation.summary else []
+    page = page_template("compare.html.j2").render(
+        title=f"Compared: {', '.join(run.label for run in compared.runs)}",
+        command=command,
+        compared=compared,
+        beside=beside_table(evaluation),
+        summary=html_tables.summary_table(evaluation.summary),
+        pictures=[_picture(picture, evaluation) for picture in pictures],
+        learning=_source(_learning(compared)) if compared.trainings else "",
+        trainings=training_table(compared),
+        differences=difference_table(compared),
+        commands={run.label: command_of(run) for run in compared.runs},
+    )
+    return page.encode()
+
+
+def beside_table(evaluation: Evaluation) -> Markup:
+    """Return median error and spread, one line per command and one column per controller."""
+    cells = {(row.command_m, row.controller): row for row in evaluation.summary}
+    columns = [Column("command / m", lambda command: f"{command:.2f}")]
+    columns += [Column(name, _cell(cells, name)) for name in evaluation.controllers]
+    caption = "median of apex minus command, +- standard deviation of the hops, mm"
+    return table(columns, sorted({command for command, _ in cells}), caption)
+
+
+def training_table(compared: Compared) -> Markup:
+    """Return one line per training."""
+    rows = [training_row(label, result) for label, result in compared.trainings.items()]
+    return table(
+        [
+            Column("training", lambda r: r["label"]),
+            Column("recipe", lambda r: r["recipe"]),
+            Column("robot", lambda r: r["robot"]),
+            Column("seed", lambda r: f"{r['seed']}"),
+            Column("steps", lambda r: f"{r['steps']}"),
+            Column("minutes", lambda r: f"{r['minutes']:.1f}"),
+            Column("selected at step", lambda r: f"{r['selected_steps']}"),
+            Column("its score / mm", lambda r: millimetres(r["selected_score_m"])),
+        ],
+        rows,
+    )
+
+
+def difference_table(compared: Compared) -> Markup:
+    """Return the conditions that are not the same in all evaluations."""
+    rows = compared.differences
+    labels = [key for key in rows[0] if key != "name"] if rows else []
+    columns = [Column("condition", lambda r: r["name"])]
+    columns += [Column(label.removeprefix("in "), _entry(label)) for label in labels]
+    return table(columns, rows)
+
+
+def _learning(compared: Compared) -> Any:  # noqa: ANN401
+    return draw_learning({label: t["history"] for label, t in compared.trainings.items()})
+
+
+def _picture(picture: Picture, evaluation: Evaluation) -> dict[str, Any]:
+    beside = {
+        "staircase": lambda: _staircases(evaluation),
+        "ladder": lambda: html_tables.ladder_table(evaluation.ladder),
+    }
+    return {
+        "title": picture.title,
+        "caption": picture.caption,
+        "source": _source(picture.figure),
+        "table": beside.get(picture.name, lambda: Markup(""))(),
+    }
+
+
+def _staircases(evaluation: Evaluation) -> Markup:
+    """Return one table per set of steps, as runs of different legs have different ones."""
+    sets: dict[tuple[float, ...], list[Staircase]] = {}
+    for stairs in evaluation.staircase:
+        sets.setdefault(tuple(stairs.commands_m), []).append(stairs)
+    return Markup("").join(map(html_tables.staircase_table, sets.values()))
+
+
+def _source(figure: Any) -> str:  # noqa: ANN401
+    return data_uri(to_svg(figure), "image/svg+xml")
+
+
+def _cell(cells: dict[tuple[float, str], Summary], name: str) -> Callable[[Any], str]:
+    def text(command: float) -> str:
+        row = cells.get((command, name))
+        if row is None:
+            return ""
+        return f"{millimetres(row.median_error_m, sign=True)} +- {millimetres(row.std_m)}"
+
+    return text
+
+
+def _entry(label: str) -> Callable[[Any], str]:
+    return lambda row: str(row[label])

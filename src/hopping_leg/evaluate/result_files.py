@@ -28,7 +28,7 @@ Record = TypeVar("Record")
 
 
 @dataclass(frozen=True)
-class Stored:
+class StoredRun:
     """One run to be compared."""
 
     label: str
@@ -43,7 +43,7 @@ class Stored:
     """Folder of the evaluation's traces, if it was kept."""
 
 
-def read_runs(names: Sequence[str]) -> list[Stored]:
+def read_runs(names: Sequence[str]) -> list[StoredRun]:
     """Read runs; each is named by the part of its path that tells it from the others.
 
     Args:
@@ -86,18 +86,18 @@ def _parts(path: Path) -> tuple[str, ...]:
     return whole.with_suffix("").parts if whole.suffix == ".json" else whole.parts
 
 
-def _read(label: str, path: Path) -> Stored:
+def _read(label: str, path: Path) -> StoredRun:
     if path.is_dir():
         return _read_folder(label, path)
     if not path.exists():
         raise UsageError(f"There is no {path}; {_WHAT}.")
     content = _load(path)
     if "history" in content and "recipe" in content:
-        return Stored(label, path, training=content)
-    return Stored(label, path, evaluation=_evaluation(content, path))
+        return StoredRun(label, path, training=content)
+    return StoredRun(label, path, evaluation=_evaluation(content, path))
 
 
-def _read_folder(label: str, path: Path) -> Stored:
+def _read_folder(label: str, path: Path) -> StoredRun:
     evaluation, training, traces = path / _EVALUATION, path / _TRAINING, path / "traces"
     measured = _evaluation(_load(evaluation), evaluation) if evaluation.exists() else None
     trained = _load(training) if training.exists() else None
@@ -109,7 +109,9 @@ def _read_folder(label: str, path: Path) -> Stored:
                 f"The training in {path} is not finished; go on with `hop train --resume`."
             )
         raise UsageError(f"{path} is not a run: it holds neither {_EVALUATION} nor {_TRAINING}.")
-    return Stored(label, path, measured, trained, traces if measured and traces.is_dir() else None)
+    return StoredRun(
+        label, path, measured, trained, traces if measured and traces.is_dir() else None
+    )
 
 
 def _load(path: Path) -> dict[str, Any]:

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from hopping_leg.evaluate.estimator import has_estimate
 from hopping_leg.evaluate.figures import (
     draw_distributions,
     draw_estimate,
@@ -15,10 +14,9 @@ from hopping_leg.evaluate.figures import (
     draw_ladder,
     draw_phase_space,
 )
-from hopping_leg.evaluate.metrics import stretches
+from hopping_leg.evaluate.metrics import has_estimate, stretches
 from hopping_leg.evaluate.result import Evaluation
-from hopping_leg.evaluate.runs import Run
-from hopping_leg.evaluate.trials import Trial
+from hopping_leg.evaluate.trials import Run, Trial
 from hopping_leg.trace import Trace
 
 
@@ -41,7 +39,7 @@ class Picture:
     files: tuple[str, ...]
 
 
-def draw_gallery(evaluation: Evaluation, runs: Sequence[Run]) -> list[Picture]:
+def draw_report_figures(evaluation: Evaluation, runs: Sequence[Run]) -> list[Picture]:
     """Draw every figure that the runs allow."""
     pictures: list[Picture] = []
     pictures += _heights(evaluation, runs)

@@ -1,0 +1,186 @@
+"""Recorded runs measured, pooled and turned into the tables of an evaluation."""
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.evaluate.metrics import (
+    HopWindow,
+    judge_estimator,
+    measure,
+    pooled_apexes,
+    skipped_in_run,
+)
+from hopping_leg.evaluate.result import Comparison, Evaluation, Group, Staircase, Summary
+from hopping_leg.evaluate.statistics import Neighbours, compare, median_interval
+from hopping_leg.evaluate.trials import Run
+
+
+def tabulate(runs: Sequence[Run], controllers: Sequence[str], seed: int) -> Evaluation:
+    """Measure runs and arrange the numbers; conditions, versions and notes stay empty.
+
+    Args:
+        runs: Of all controllers.
+        controllers: Their names in the order of the rows.
+        seed: Of the bootstrap.
+    """
+    of = {name: [run for run in runs if run.controller == name] for name in controllers}
+    fixed = {name: _windows(of[name], "fixed") for name in controllers}
+    sequence = {name: _windows(of[name], "sequence") for name in controllers}
+    pooled = {name: fixed[name] + sequence[name] for name in controllers}
+    ladder = {name: _windows(of[name], "ladder") for name in controllers}
+    robot = str(runs[0].trace.header.get("robot", "")) if runs else ""
+
+    def rows(windows: dict[str, list[HopWindow]]) -> list[Summary]:
+        return [
+            summarise(name, robot, command, group, seed)
+            for name in controllers
+            for command, group in _by_command(windows[name]).items()
+        ]
+
+    apexes = {name: _apexes(pooled[name]) for name in controllers}
+    stairs = {n: [run for run in of[n] if run.trial.kind == "staircase"] for n in controllers}
+    return Evaluation(
+        summary=rows(pooled),
+        sequence=rows(sequence),
+        ladder=rows(ladder),
+        staircase=[_staircase(name, found) for name, found in stairs.items() if found],
+        neighbours=[Comparison(name, _compare(apexes[name])) for name in controllers],
+        distributions=[
+            {"controller": name, "command_m": command, "apexes_m": np.round(apex, 5).tolist()}
+            for name in controllers
+            for command, apex in apexes[name].items()
+        ],
+        estimators=[
+            found
+            for name in controllers
+            if (found := judge_estimator(name, [run.trace for run in of[name]]))
+        ],
+    )
+
+
+def _windows(runs: Sequence[Run], kind: str) -> list[HopWindow]:
+    return [w for run in runs if run.trial.kind == kind for w in measure(run.trace)]
+
+
+def _by_command(windows: Sequence[HopWindow]) -> dict[float, list[HopWindow]]:
+    commands = sorted({w.command for w in windows})
+    return {c: [w for w in windows if w.command == c] for c in commands}
+
+
+def _apexes(windows: Sequence[HopWindow]) -> dict[float, Array]:
+    return {c: pooled_apexes(group) for c, group in _by_command(windows).items()}
+
+
+def _compare(apexes: dict[float, Array]) -> list[Neighbours]:
+    return [
+        compare(low, apexes[low], high, apexes[high]) for low, high in itertools.pairwise(apexes)
+    ]
+
+
+def _staircase(label: str, runs: Sequence[Run]) -> Staircase:
+    measured = [measure(run.trace) for run in runs]
+    steps = [list(group) for group in zip(*measured, strict=True)]
+    medians = np.array([_median(pooled_apexes(step)) for step in steps])
+    per_run = np.array([[_median(w.apex) for w in run] for run in measured])
+    return Staircase(
+        controller=label,
+        commands_m=[step[0].command for step in steps],
+        median_apexes_m=medians.tolist(),
+        monotone=bool((np.diff(medians) > 0).all()),
+        monotone_runs=int((np.diff(per_run, axis=1) > 0).all(axis=1).sum()),
+        runs=len(runs),
+        skipped_hops=sum(skipped_in_run(run.trace) for run in runs),
+    )
+
+
+def _median(values: Array) -> float:
+    return float(np.median(values)) if len(values) else float("nan")
+
+
+def summarise(
+    controller: str, robot: str, command: float, windows: Sequence[HopWindow], seed: int
+) -> Summary:
+    """Pool all windows of one controller at one command.
+
+    Args:
+        controller: As named on the command line.
+        robot: Name of the leg.
+        command: Desired apex height, m.
+        windows: One per run and stretch at this command.
+        seed: Of the bootstrap.
+    """
+    apex = pooled_apexes(windows)
+    low, high = median_interval([w.error for w in windows], seed)
+    settled = sum(w.settled for w in windows)
+    per_second = 1 / settled if settled else float("nan")
+    quartiles = np.percentile(apex, [25, 75]) if len(apex) else np.full(2, np.nan)
+    peak = np.max([w.peak_torque for w in windows], axis=0)
+    rms = np.sqrt(np.mean([np.square(w.rms_torque) for w in windows], axis=0))
+    return Summary(
+        controller=controller,
+        robot=robot,
+        command_m=command,
+        median_error_m=_of(np.median, apex - command),
+        median_error_low_m=low,
+        median_error_high_m=high,
+        mean_abs_error_m=_of(np.mean, np.abs(apex - command)),
+        std_m=_of(np.std, apex),
+        iqr_m=float(quartiles[1] - quartiles[0]),
+        hops=len(apex),
+        skipped_hops=sum(w.skipped for w in windows),
+        stance_bounces=sum(w.bounces for w in windows),
+        hop_rate_hz=len(apex) * per_second,
+        flight_fraction=sum(w.flight for w in windows) * per_second,
+        min_base_height_m=min(w.min_height for w in windows),
+        max_sink_m=max(w.max_sink for w in windows),
+        body_contacts=sum(w.base_contacts + w.knee_contacts for w in windows),
+        base_contacts=sum(w.base_contacts for w in windows),
+        knee_contacts=sum(w.knee_contacts for w in windows),
+        peak_hip_torque_nm=float(peak[0]),
+        peak_knee_torque_nm=float(peak[1]),
+        rms_hip_torque_nm=float(rms[0]),
+        rms_knee_torque_nm=float(rms[1]),
+        measured_s=settled,
+        runs=len(windows),
+    )
+
+
+def _of(statistic: "np.ufunc | object", values: Array) -> float:
+    return float(statistic(values)) if len(values) else float("nan")  # type: ignore[operator]
+
+
+def pool_group(group: str, rows: Sequence[Summary], seed: int) -> list[Group]:
+    """Aggregate several policies of one recipe, one row per command.
+
+    Args:
+        group: Name of the recipe or pattern.
+        rows: Summary rows of all its policies.
+        seed: Of the bootstrap.
+    """
+    return [
+        _group_row(group, command, [row for row in rows if row.command_m == command], seed)
+        for command in sorted({row.command_m for row in rows})
+    ]
+
+
+def _group_row(group: str, command: float, rows: Sequence[Summary], seed: int) -> Group:
+    errors = np.array([row.median_error_m for row in rows])
+    spreads = np.array([row.std_m for row in rows])
+    known = errors[np.isfinite(errors)]
+    low, high = median_interval(list(known[:, None]), seed)
+    return Group(
+        group=group,
+        command_m=command,
+        policies=len(rows),
+        motionless=len(rows) - len(known),
+        median_error_m=_of(np.median, known),
+        median_error_low_m=low,
+        median_error_high_m=high,
+        worst_abs_error_m=_of(np.max, np.abs(known)),
+        median_std_m=_of(np.median, spreads[np.isfinite(spreads)]),
+        skipped_hops=sum(row.skipped_hops for row in rows),
+        body_contacts=sum(row.body_contacts for row in rows),
+    )
