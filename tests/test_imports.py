@@ -25,11 +25,12 @@ ORDER = [
     "viewer",
     "cli",
 ]
-FOUNDATION = {"", "arrays", "cluster", "errors", "hop_detection", "io", "progress", "trace"}
+FOUNDATION = {"", "arrays", "cluster", "cma_strategy", "errors", "figure_style", "hop_detection"}
+FOUNDATION |= {"html_page", "io", "progress", "trace"}
 TRAINING = {"torch", "stable_baselines3", "onnx", "tensorboard"}
-BESIDE = {("evaluate", "rl"), ("viewer", "rl"), ("emulator", "rl")} | {
-    ("deploy", room) for room in ("sim", "identify", "envs", "rl")
-}
+BESIDE = {("viewer", "rl"), ("emulator", "rl")}
+BESIDE |= {("deploy", room) for room in ("sim", "identify", "envs", "rl")}
+BESIDE |= {("evaluate", room) for room in ("identify", "envs", "rl", "deploy", "emulator")}
 """Later rooms that still must not use these earlier ones: neither evaluation, viewer nor robot
 needs torch, and what drives the robot knows nothing of a simulation."""
 

@@ -5,7 +5,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hopping_leg.evaluate.figures.style import WIDTH, colour, styled
+from hopping_leg.figure_style import WIDTH, colour, styled
 
 _TOP = 0.97
 """Where crosses are drawn, of the panel's height; those of later methods a little lower."""

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.cma_strategy import seeded_strategy
 from hopping_leg.evaluate.result_cache import ResultCache
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
-from hopping_leg.identify.optimizers import seeded_strategy
 from hopping_leg.robot.kinematics import foot_position, joint_angles
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import MujocoSimulator

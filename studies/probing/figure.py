@@ -5,7 +5,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from hopping_leg.evaluate.figures.style import COLOURS, WIDTH, styled
+from hopping_leg.figure_style import COLOURS, WIDTH, styled
 
 _ACROSS = 2
 """Panels side by side."""

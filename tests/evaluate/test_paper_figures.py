@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from hopping_leg.evaluate.figures.style import INCHES, encode, fit_width
+from hopping_leg.figure_style import INCHES, encode, fit_width
 
 
 @pytest.fixture

@@ -26,11 +26,11 @@ from rich.table import Column, Table
 from hopping_leg.cli.command_line import command_line
 from hopping_leg.cli.fit_progress import FitProgress
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.fit_report import write_fit_report
 from hopping_leg.identify.optimizers import CmaOptions
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.plan import robot_of
 from hopping_leg.identify.recording import Recording, load_recording, sidecar_path
+from hopping_leg.identify.report import write_fit_report
 from hopping_leg.identify.result import (
     Identified,
     as_json,

@@ -27,12 +27,12 @@ from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import EvaluationRun
 from hopping_leg.evaluate.aggregation import tabulate
 from hopping_leg.evaluate.comparison import set_beside, write_comparison
-from hopping_leg.evaluate.figures.style import Format, Width, encode
 from hopping_leg.evaluate.report import write_report
 from hopping_leg.evaluate.report_figures import draw_report_figures, run_of
 from hopping_leg.evaluate.result_files import read_runs
 from hopping_leg.evaluate.trials import Run
 from hopping_leg.evaluate.video import Animation, fixed_traces, render_video
+from hopping_leg.figure_style import Format, Width, encode
 from hopping_leg.io import safe_file_name, write_atomically, write_json
 from hopping_leg.robot import load_robot
 

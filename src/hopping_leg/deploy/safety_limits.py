@@ -3,12 +3,8 @@
 from dataclasses import dataclass
 
 from hopping_leg.deploy.drive_link import Pair
+from hopping_leg.robot.limits import hopping_ranges
 from hopping_leg.robot.parameters import Robot
-
-MARGINS = (0.9, 0.5)
-"""How far hip and knee of a hopping leg may pass their soft limits, rad. The soft limits' PD acts
-before; it gives way where a policy swings the leg, most of all at the hip, whose mechanical stops
-are far."""
 
 RECORDING_MARGIN = 0.1
 """How far a recorded leg may pass its mechanical range, rad: backlash and the belt's give."""
@@ -64,13 +60,7 @@ def hopping_limits(robot: Robot, rate: float) -> SafetyLimits:
         robot: The leg.
         rate: Control rate, Hz.
     """
-    ranges = [
-        (max(joint.lower - margin, servo.lower), min(joint.upper + margin, servo.upper))
-        for joint, servo, margin in zip(
-            (robot.hip, robot.knee), robot.hardware.servos, MARGINS, strict=True
-        )
-    ]
-    return _envelope(robot, rate, ranges)
+    return _envelope(robot, rate, hopping_ranges(robot))
 
 
 def recording_limits(robot: Robot, rate: float) -> SafetyLimits:

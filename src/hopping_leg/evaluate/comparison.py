@@ -10,13 +10,13 @@ from markupsafe import Markup
 
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import html_tables
-from hopping_leg.evaluate.figures import draw_learning, to_svg
-from hopping_leg.evaluate.html_tables import Column, millimetres, table
-from hopping_leg.evaluate.report import data_uri, page_template
+from hopping_leg.evaluate.figures import draw_learning
+from hopping_leg.evaluate.html_tables import millimetres
 from hopping_leg.evaluate.report_figures import Picture, draw_report_figures, run_of
 from hopping_leg.evaluate.result import Evaluation, Staircase, Summary
 from hopping_leg.evaluate.result_files import StoredRun
 from hopping_leg.evaluate.trials import Run
+from hopping_leg.html_page import Column, page_template, svg_uri, table
 
 _DRAWN = ("sequence", "staircase")
 """Trials whose heights are drawn, of one run each."""
@@ -233,14 +233,14 @@ def write_comparison(compared: Compared, command: str = "") -> bytes:
     """
     evaluation = compared.evaluation
     pictures = draw_report_figures(evaluation, traces_of(compared)) if evaluation.summary else []
-    page = page_template("compare.html.j2").render(
+    page = page_template("hopping_leg.evaluate", "compare.html.j2").render(
         title=f"Compared: {', '.join(run.label for run in compared.runs)}",
         command=command,
         compared=compared,
         beside=beside_table(evaluation),
         summary=html_tables.summary_table(evaluation.summary),
         pictures=[_picture(picture, evaluation) for picture in pictures],
-        learning=_source(_learning(compared)) if compared.trainings else "",
+        learning=svg_uri(_learning(compared)) if compared.trainings else "",
         trainings=training_table(compared),
         differences=difference_table(compared),
         commands={run.label: command_of(run) for run in compared.runs},
@@ -296,7 +296,7 @@ def _picture(picture: Picture, evaluation: Evaluation) -> dict[str, Any]:
     return {
         "title": picture.title,
         "caption": picture.caption,
-        "source": _source(picture.figure),
+        "source": svg_uri(picture.figure),
         "table": beside.get(picture.name, lambda: Markup(""))(),
     }
 
@@ -307,10 +307,6 @@ def _staircases(evaluation: Evaluation) -> Markup:
     for stairs in evaluation.staircase:
         sets.setdefault(tuple(stairs.commands_m), []).append(stairs)
     return Markup("").join(map(html_tables.staircase_table, sets.values()))
-
-
-def _source(figure: Any) -> str:  # noqa: ANN401
-    return data_uri(to_svg(figure), "image/svg+xml")
 
 
 def _cell(cells: dict[tuple[float, str], Summary], name: str) -> Callable[[Any], str]:

@@ -1,48 +1,12 @@
 """Tables of the report as HTML; lengths in mm."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
 
 from markupsafe import Markup
 
 from hopping_leg.evaluate.result import Comparison, Estimator, Group, Staircase, Summary
 from hopping_leg.evaluate.statistics import Neighbours
-
-
-@dataclass(frozen=True)
-class Column:
-    """One column: heading, how a row becomes text, and when that deserves attention."""
-
-    heading: str
-    text: Callable[[Any], str]
-    bad: Callable[[Any], bool] = lambda _row: False
-
-
-def table(columns: Sequence[Column], rows: Sequence[Any], caption: str = "") -> Markup:
-    """Return an HTML table; a line sets off where the first column changes."""
-    if not rows:
-        return Markup("")
-    head = Markup("").join(Markup("<th>{}</th>").format(_unbroken(c.heading)) for c in columns)
-    lines = []
-    before = ""
-    for row in rows:
-        cells = Markup("").join(
-            Markup('<td class="{}">{}</td>').format("bad" if c.bad(row) else "", c.text(row))
-            for c in columns
-        )
-        first = columns[0].text(row)
-        begins = "first" if first != before else ""
-        lines.append(Markup('<tr class="{}">{}</tr>').format(begins, cells))
-        before = first
-    return Markup(
-        '<div class="wide"><table><caption>{}</caption><tr>{}</tr>{}</table></div>'
-    ).format(caption, head, Markup("").join(lines))
-
-
-def _unbroken(heading: str) -> str:
-    """Keep a unit on the line of its slash."""
-    return heading.replace(" / ", " /\N{NO-BREAK SPACE}").replace("N m", "N\N{NO-BREAK SPACE}m")
+from hopping_leg.html_page import Column, table
 
 
 def millimetres(value: float, sign: bool = False) -> str:

@@ -1,20 +1,17 @@
 """The report: one HTML page that holds everything and needs nothing."""
 
-import base64
 import dataclasses
-from importlib import resources
 from typing import Any
 
-from jinja2 import Environment, StrictUndefined, Template
 from markupsafe import Markup
 
 from hopping_leg.evaluate import html_tables
 from hopping_leg.evaluate.acceptance import acceptance_lines
-from hopping_leg.evaluate.figures import to_svg
 from hopping_leg.evaluate.report_figures import Picture, draw_report_figures
 from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.evaluate.runner import EvaluationRun
 from hopping_leg.evaluate.video import Video, fixed_traces, render_video
+from hopping_leg.html_page import data_uri, page_template, svg_uri
 from hopping_leg.robot.parameters import Robot
 
 _NO_VIDEO = Video(None, "it was not asked for")
@@ -28,7 +25,7 @@ def write_report(judged: EvaluationRun, videos: dict[str, Video] | None = None) 
         videos: Controller to its video; none are shown by default.
     """
     evaluation = judged.evaluation
-    page = page_template("report.html.j2").render(
+    page = page_template("hopping_leg.evaluate", "report.html.j2").render(
         title=f"Hopping leg: {', '.join(evaluation.controllers)}",
         subtitle=_subtitle(evaluation),
         evaluation=evaluation,
@@ -39,14 +36,6 @@ def write_report(judged: EvaluationRun, videos: dict[str, Video] | None = None) 
         conditions=_conditions(evaluation),
     )
     return page.encode()
-
-
-def page_template(name: str) -> Template:
-    """Return a page's template of this package, which finds the common look as ``style``."""
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    folder = resources.files("hopping_leg.evaluate")
-    environment.globals["style"] = Markup((folder / "report.css").read_text(encoding="utf-8"))
-    return environment.from_string((folder / name).read_text(encoding="utf-8"))
 
 
 def render_videos(judged: EvaluationRun, robot: Robot) -> dict[str, Video]:
@@ -90,7 +79,7 @@ def _picture(picture: Picture, evaluation: Evaluation) -> dict[str, Any]:
     return {
         "title": picture.title,
         "caption": picture.caption,
-        "source": data_uri(to_svg(picture.figure), "image/svg+xml"),
+        "source": svg_uri(picture.figure),
         "command": f"hop report figures {' '.join(f'TRACES/{name}' for name in shown)}",
         "long": picture.name == "ladder",
         "table": beside.get(picture.name, lambda: Markup(""))(),
@@ -114,8 +103,3 @@ def _conditions(evaluation: Evaluation) -> dict[str, str]:
 
 def _text(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def data_uri(content: bytes, kind: str) -> str:
-    """Return content as an address that carries it."""
-    return f"data:{kind};base64,{base64.b64encode(content).decode()}"

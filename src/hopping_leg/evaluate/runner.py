@@ -6,7 +6,6 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from hopping_leg.controllers import RolloutConfig
-from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.aggregation import pool_group, tabulate
 from hopping_leg.evaluate.entries import Entry, check_labels, check_range
@@ -23,6 +22,7 @@ from hopping_leg.evaluate.trials import (
     within,
 )
 from hopping_leg.io import versions
+from hopping_leg.robot.limits import hopping_ranges
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.sim import NO_NOISE, Engine
 
@@ -150,12 +150,11 @@ def _note_left_out(entry: Entry, trials: Sequence[Trial], fitting: Sequence[Tria
 
 def _note_stopped(label: str, runs: Sequence[Run], setup: RolloutConfig) -> list[str]:
     """Say so where the supervisor of the real leg would not let a controller hop on."""
-    limits = hopping_limits(setup.robot, setup.rate)
     stopped = 0
     for run in runs:
         angles = [run.trace.column(f"{joint}_position_rad") for joint in ("hip", "knee")]
-        pairs = zip(angles, limits.lower, limits.upper, strict=True)
-        stopped += any(angle.min() < low or angle.max() > high for angle, low, high in pairs)
+        pairs = zip(angles, hopping_ranges(setup.robot), strict=True)
+        stopped += any(angle.min() < low or angle.max() > high for angle, (low, high) in pairs)
     if not stopped:
         return []
     return [

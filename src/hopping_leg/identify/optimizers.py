@@ -4,11 +4,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import cma
 import numpy as np
 from scipy import optimize
 
 from hopping_leg.arrays import Array, IntArray
+from hopping_leg.cma_strategy import seeded_strategy
 from hopping_leg.identify.cost import RobustLoss
 from hopping_leg.identify.parameters import ParameterSet
 from hopping_leg.identify.run_folder import load_state, save_state
@@ -338,26 +338,3 @@ def cma_es(
     final = np.asarray(values(elected))
     least = float(final.min())
     return Found(elected[final.argmin()], least, count + len(elected), [*history, least])
-
-
-def seeded_strategy(
-    first: Array, step: float, bounds: Sequence[object], population: int, seed: int
-) -> cma.CMAEvolutionStrategy:
-    """Return pycma's strategy; randomness comes from a generator of our own.
-
-    Args:
-        first: Where to begin, (size,).
-        step: First step size.
-        bounds: Lower and upper ones, a number or a list each.
-        population: Candidates per generation.
-        seed: Of the generator.
-    """
-    rng = np.random.default_rng(seed)
-    settings = {
-        "popsize": population,
-        "bounds": bounds,
-        "randn": lambda *shape: rng.standard_normal(shape),
-        "seed": np.nan,
-        "verbose": -9,
-    }
-    return cma.CMAEvolutionStrategy(first, step, settings)

@@ -9,6 +9,23 @@ from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
 from hopping_leg.robot.parameters import Robot
 
+HOPPING_MARGINS = (0.9, 0.5)
+"""How far hip and knee of a hopping leg may pass their soft limits, rad. The soft limits' PD acts
+before; it gives way where a policy swings the leg, most of all at the hip, whose mechanical stops
+are far."""
+
+
+def hopping_ranges(robot: Robot) -> list[tuple[float, float]]:
+    """Return within which angles hip and knee of a hopping leg stay, rad.
+
+    Beyond them the supervisor of the real leg stops it.
+    """
+    joints = zip((robot.hip, robot.knee), robot.hardware.servos, HOPPING_MARGINS, strict=True)
+    return [
+        (max(joint.lower - margin, servo.lower), min(joint.upper + margin, servo.upper))
+        for joint, servo, margin in joints
+    ]
+
 
 class MotorLimit:
     """Torque each joint's motor can give at a speed.

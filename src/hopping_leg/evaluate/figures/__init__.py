@@ -7,7 +7,7 @@ from hopping_leg.evaluate.figures.results import (
     draw_robustness,
 )
 from hopping_leg.evaluate.figures.runs import draw_estimate, draw_heights, draw_phase_space
-from hopping_leg.evaluate.figures.style import to_png, to_svg
+from hopping_leg.figure_style import to_png, to_svg
 
 __all__ = [
     "draw_distributions",

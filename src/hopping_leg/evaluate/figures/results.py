@@ -10,8 +10,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from hopping_leg.arrays import Array
-from hopping_leg.evaluate.figures.style import COMMAND_COLOUR, WIDTH, colour, styled
 from hopping_leg.evaluate.result import Evaluation, Summary
+from hopping_leg.figure_style import COMMAND_COLOUR, WIDTH, colour, styled
 
 _ENOUGH = 5
 """Hops from which on a shape is drawn around the dots."""

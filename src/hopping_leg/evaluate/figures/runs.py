@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.evaluate.figures.style import (
+from hopping_leg.evaluate.metrics import ESTIMATED_HEIGHT, START_SECONDS, SWITCH_SECONDS, stretches
+from hopping_leg.figure_style import (
     COLOURS,
     COMMAND_COLOUR,
     TORQUE_MAP,
@@ -18,7 +19,6 @@ from hopping_leg.evaluate.figures.style import (
     panels,
     styled,
 )
-from hopping_leg.evaluate.metrics import ESTIMATED_HEIGHT, START_SECONDS, SWITCH_SECONDS, stretches
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE, trace_hops
 from hopping_leg.trace import Trace
 

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from hopping_leg.evaluate.figures.style import COLOURS, WIDTH, styled
+from hopping_leg.figure_style import COLOURS, WIDTH, styled
 
 _COLUMNS = 3
 

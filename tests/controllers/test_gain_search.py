@@ -3,13 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hopping_leg.controllers import RolloutConfig
+from hopping_leg.controllers import RolloutConfig, gain_search
+from hopping_leg.controllers.gain_cost import CommandScore, calibrated, cost
 from hopping_leg.controllers.gain_files import load_gains
+from hopping_leg.controllers.gain_search import SPACE, Search, evaluate, from_unit, search, to_unit
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate import tune_energy_shaping
-from hopping_leg.evaluate.gain_space import SPACE, from_unit, to_unit
-from hopping_leg.evaluate.hop_cost import CommandScore, calibrated, cost
-from hopping_leg.evaluate.tune_energy_shaping import Search, evaluate, search
 from hopping_leg.robot import load_robot
 
 GAINS = load_gains().gains
@@ -21,7 +19,7 @@ def scores(shift=0.0, scale=1.0, **changed):
         replace(
             CommandScore(c, 0.3 + shift + scale * (c - 0.3), 0.002, 2.0, 0.4, 0.03, 0.08), **changed
         )
-        for c in tune_energy_shaping.COMMANDS
+        for c in gain_search.COMMANDS
     ]
 
 
@@ -65,7 +63,7 @@ def test_calibration_moves_the_estimate_by_what_the_medians_missed():
 
 
 def test_search_goes_down_and_resumes_without_simulating(tmp_path, monkeypatch):
-    monkeypatch.setattr(tune_energy_shaping, "evaluate", fake_evaluate)
+    monkeypatch.setattr(gain_search, "evaluate", fake_evaluate)
     start, log = replace(GAINS, exponent=1.9), tmp_path / "log.jsonl"
     found = search(start, SETUP, Search(generations=15), 3, log, quiet)
     assert abs(found.exponent - 1.0) < 0.3
@@ -73,12 +71,12 @@ def test_search_goes_down_and_resumes_without_simulating(tmp_path, monkeypatch):
     log.write_text("\n".join(lines[:7]) + "\n" + lines[7][:20])
     again = search(start, SETUP, Search(generations=15), 3, log, quiet)
     assert again == found
-    monkeypatch.setattr(tune_energy_shaping, "evaluate", None)
+    monkeypatch.setattr(gain_search, "evaluate", None)
     assert search(start, SETUP, Search(generations=15), 3, log, quiet) == found
 
 
 def test_log_of_another_search_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(tune_energy_shaping, "evaluate", fake_evaluate)
+    monkeypatch.setattr(gain_search, "evaluate", fake_evaluate)
     log = tmp_path / "log.jsonl"
     search(GAINS, SETUP, Search(generations=1), 3, log, quiet)
     with pytest.raises(UsageError, match="seed 3"):

@@ -3,8 +3,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from hopping_leg.evaluate.figures.fits import residual_spectrum, worst_stretch
-from hopping_leg.evaluate.fit_report import parameter_table, quality_table, write_fit_report
+from hopping_leg.identify.report import parameter_table, quality_table, write_fit_report
+from hopping_leg.identify.report_figures import residual_spectrum, worst_stretch
 from hopping_leg.identify.validation import overlays
 from hopping_leg.robot import load_robot
 from tests.identify.fitting import identified, run

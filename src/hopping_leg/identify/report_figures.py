@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from scipy.signal import lombscargle
 
 from hopping_leg.arrays import Array
-from hopping_leg.evaluate.figures.style import TORQUE_MAP, WIDTH, colour, styled
+from hopping_leg.figure_style import TORQUE_MAP, WIDTH, colour, styled
 from hopping_leg.identify.search import Pass
 from hopping_leg.identify.validation import Overlay
 

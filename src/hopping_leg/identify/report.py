@@ -5,17 +5,14 @@ from typing import Any
 
 import numpy as np
 from markupsafe import Markup
-from matplotlib.figure import Figure
 
-from hopping_leg.evaluate.figures import to_svg
-from hopping_leg.evaluate.figures.fits import (
+from hopping_leg.html_page import Column, page_template, svg_uri, table
+from hopping_leg.identify.report_figures import (
     draw_correlations,
     draw_course,
     draw_overlay,
     draw_spectra,
 )
-from hopping_leg.evaluate.html_tables import Column, table
-from hopping_leg.evaluate.report import data_uri, page_template
 from hopping_leg.identify.result import Identified, as_json, parameters_json, quality_json
 from hopping_leg.identify.validation import RESTART, Overlay, overlays
 from hopping_leg.io import Tree
@@ -40,7 +37,7 @@ def write_fit_report(identified: Identified, command: str = "", threads: int = 0
     candidates = (identified.start, identified.hypothesis)
     drawn = overlays(identified.held, candidates, identified.plan.timestep, threads)
     known = identified.identifiability
-    page = page_template("fit_report.html.j2").render(
+    page = page_template("hopping_leg.identify", "report.html.j2").render(
         title=f"{identified.robot.name} identified",
         subtitle=_subtitle(identified),
         command=command,
@@ -48,12 +45,12 @@ def write_fit_report(identified: Identified, command: str = "", threads: int = 0
         quality=quality_table(identified),
         parameters=parameter_table(identified),
         statements=known.statements,
-        correlations=_picture(draw_correlations(known.names, known.correlation)),
+        correlations=svg_uri(draw_correlations(known.names, known.correlation)),
         recordings=recording_table(drawn),
         fits=[_fit(overlay) for overlay in _worst(drawn)],
         left_out=max(0, len(drawn) - _MOST),
-        spectra=_picture(draw_spectra(drawn)),
-        course=_picture(draw_course(identified.passes)),
+        spectra=svg_uri(draw_spectra(drawn)),
+        course=svg_uri(draw_course(identified.passes)),
         provenance=_provenance(as_json(identified)),
     )
     return page.encode()
@@ -142,7 +139,7 @@ def _fit(overlay: Overlay) -> dict[str, str]:
     return {
         "title": overlay.recording.name,
         "caption": f"{overlay.recording.metadata.source}; simulated {how}.",
-        "source": _picture(draw_overlay(overlay)),
+        "source": svg_uri(draw_overlay(overlay)),
     }
 
 
@@ -171,10 +168,6 @@ def _provenance(tree: dict[str, Any]) -> dict[str, str]:
     for r in tree["recordings"]:
         rows[f"{r['use']}: {r['name']}"] = f"{r['rows']} rows, sha256 {r['sha256'] or 'unknown'}"
     return rows
-
-
-def _picture(figure: Figure) -> str:
-    return data_uri(to_svg(figure), "image/svg+xml")
 
 
 def _scaled(key: str) -> Callable[[Any], str]:

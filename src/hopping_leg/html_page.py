@@ -1,0 +1,67 @@
+"""Pages that hold everything and need nothing: templates in one look, tables, figures inside."""
+
+import base64
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from typing import Any
+
+from jinja2 import Environment, StrictUndefined, Template
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from hopping_leg.figure_style import to_svg
+
+
+def page_template(package: str, name: str) -> Template:
+    """Return a template that lies in a package; it finds the common look as ``style``."""
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    look = resources.files("hopping_leg") / "report.css"
+    environment.globals["style"] = Markup(look.read_text(encoding="utf-8"))
+    text = (resources.files(package) / name).read_text(encoding="utf-8")
+    return environment.from_string(text)
+
+
+def data_uri(content: bytes, kind: str) -> str:
+    """Return content as an address that carries it."""
+    return f"data:{kind};base64,{base64.b64encode(content).decode()}"
+
+
+def svg_uri(figure: Figure) -> str:
+    """Return a figure as an address that carries it."""
+    return data_uri(to_svg(figure), "image/svg+xml")
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column: heading, how a row becomes text, and when that deserves attention."""
+
+    heading: str
+    text: Callable[[Any], str]
+    bad: Callable[[Any], bool] = lambda _row: False
+
+
+def table(columns: Sequence[Column], rows: Sequence[Any], caption: str = "") -> Markup:
+    """Return an HTML table; a line sets off where the first column changes."""
+    if not rows:
+        return Markup("")
+    head = Markup("").join(Markup("<th>{}</th>").format(_unbroken(c.heading)) for c in columns)
+    lines = []
+    before = ""
+    for row in rows:
+        cells = Markup("").join(
+            Markup('<td class="{}">{}</td>').format("bad" if c.bad(row) else "", c.text(row))
+            for c in columns
+        )
+        first = columns[0].text(row)
+        begins = "first" if first != before else ""
+        lines.append(Markup('<tr class="{}">{}</tr>').format(begins, cells))
+        before = first
+    return Markup(
+        '<div class="wide"><table><caption>{}</caption><tr>{}</tr>{}</table></div>'
+    ).format(caption, head, Markup("").join(lines))
+
+
+def _unbroken(heading: str) -> str:
+    """Keep a unit on the line of its slash."""
+    return heading.replace(" / ", " /\N{NO-BREAK SPACE}").replace("N m", "N\N{NO-BREAK SPACE}m")
