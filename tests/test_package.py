@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import hopping_leg
-from hopping_leg.cli.extras import PURPOSES
+from hopping_leg.cli.doctor import PURPOSES
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.deploy.clock import Clock
 from hopping_leg.deploy.drive_info import inspect
-from hopping_leg.deploy.driver import MoteusLink
+from hopping_leg.deploy.hardware_trials import Performance, header_of, perform
+from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.motion_sequence import MotionSequence, SequenceTiming, hopping_poses
-from hopping_leg.deploy.preflight import judge, require
+from hopping_leg.deploy.preflight import check_drives, require_fit
+from hopping_leg.deploy.realtime import Clock
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.schedule import Schedule
-from hopping_leg.deploy.session import Performance, header_of, perform
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.server import Start
@@ -120,7 +120,7 @@ class Scene:
         Raises:
             HardwareError: They may not be armed.
         """
-        require(judge(self.robot, self.envelope, inspect(link)))
+        require_fit(check_drives(self.robot, self.envelope, inspect(link)))
 
     def perform(
         self, link: MoteusLink, folder: Path, clock: Clock | None, *, realtime: bool

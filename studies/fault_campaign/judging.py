@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from hopping_leg.deploy.flight_recorder import SUFFIX, recover
-from hopping_leg.deploy.session import Performance
+from hopping_leg.deploy.hardware_trials import Performance
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.supervisor import State
 from hopping_leg.emulator.moteus_codes import MoteusMode

@@ -10,9 +10,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from hopping_leg.deploy.driver import MoteusLink
 from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.deploy.joint_transform import JOINTS
+from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.transport import opener
 from hopping_leg.emulator.moteus_codes import MoteusMode

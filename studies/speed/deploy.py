@@ -18,11 +18,11 @@ from hopping_leg.arrays import Array
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.deploy.driver import MoteusLink
+from hopping_leg.deploy.hardware_trials import Performance, header_of, perform
+from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.schedule import Schedule
-from hopping_leg.deploy.session import Performance, header_of, perform
 from hopping_leg.deploy.transport import opener
 from hopping_leg.emulator.process import EmulatorProcess
 from hopping_leg.emulator.server import Start

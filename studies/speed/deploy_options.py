@@ -8,7 +8,6 @@ from rich.console import Console
 from rich.table import Table
 
 from hopping_leg.cli.options import mm
-from hopping_leg.deploy.transport import require_moteus
 from hopping_leg.errors import UsageError
 
 
@@ -29,7 +28,6 @@ class Deploy:
 
     def measure(self) -> dict[str, Any]:
         """Run it, print a table, return every number."""
-        require_moteus()
         from studies.speed.deploy import Study, bench_deploy
 
         for name, value, least in (("minutes", self.minutes, 0.05), ("seconds", self.seconds, 3.0)):

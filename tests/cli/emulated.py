@@ -3,8 +3,8 @@
 import contextlib
 import functools
 
-from hopping_leg.cli import deploy, motors, record_motors
-from hopping_leg.deploy import driver, session
+from hopping_leg.cli import deploy, record_motors
+from hopping_leg.deploy import hardware_trials, moteus_link, transport
 from hopping_leg.deploy.motion_sequence import SequenceTiming
 from hopping_leg.emulator.server import Start
 from hopping_leg.emulator.virtual_time import Lockstep
@@ -13,12 +13,12 @@ from hopping_leg.emulator.virtual_time import Lockstep
 def put_behind(monkeypatch, **start):
     """Put drives behind every transport that is opened from now on; return them and their clock."""
     lockstep = Lockstep(Start(**{"robot": "legv2-paper", **start}).build())
-    monkeypatch.setattr(motors, "opener", lambda name: None)
-    monkeypatch.setattr(driver, "MoteusLink", lambda robot, opener: lockstep.link)
-    monkeypatch.setattr(session, "RealClock", lambda: lockstep)
+    monkeypatch.setattr(transport, "opener", lambda name: None)
+    monkeypatch.setattr(moteus_link, "MoteusLink", lambda robot, opener: lockstep.link)
+    monkeypatch.setattr(hardware_trials, "RealClock", lambda: lockstep)
     quick = functools.partial(SequenceTiming, rise=0.4, settle=0.1, sink=0.5)
     for verb in (deploy, record_motors):
         monkeypatch.setattr(verb, "SequenceTiming", quick)
     quiet = contextlib.nullcontext(())
-    monkeypatch.setattr(session, "keeping_time", lambda **_: quiet)
+    monkeypatch.setattr(hardware_trials, "keeping_time", lambda **_: quiet)
     return lockstep

@@ -1,7 +1,6 @@
 """The verbs that talk to motors, with emulated drives in lockstep behind them."""
 
 import functools
-import sys
 
 import numpy as np
 import pytest
@@ -35,7 +34,7 @@ def test_deploy_checks_runs_and_leaves_a_trace(emulate, tmp_path, capsys):
     assert trace.header["drives"]["knee"]["homed"] == "yes"
     assert set(np.unique(trace.column("command_m"))) == {0.25, 0.3}
     assert [drive.machine.mode for drive in lockstep.robot.drives] == [0, 0]
-    assert main(["plot", str(file), "--out", str(tmp_path / "figures")]) == 0
+    assert main(["report", "figures", str(file), "--out", str(tmp_path / "figures")]) == 0
     assert list((tmp_path / "figures").glob("*.svg"))
 
 
@@ -108,13 +107,6 @@ def test_a_transport_that_is_none_is_a_sentence(capsys, transport, sentence):
     error = capsys.readouterr().err
     assert sentence in error
     assert "Traceback" not in error
-
-
-@pytest.mark.parametrize("verb", [["deploy", "fast"], ["doctor"]])
-def test_without_the_client_library_the_extra_is_named(monkeypatch, capsys, verb):
-    monkeypatch.setitem(sys.modules, "moteus", None)
-    assert main([*verb, "--transport", "/dev/null"]) == 2
-    assert "hopping-leg[hardware]" in capsys.readouterr().err
 
 
 def test_doctor_says_what_is_wrong_and_puts_it_right(emulate, capsys):

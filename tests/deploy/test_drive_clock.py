@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hopping_leg.deploy.drive_clock import DriveClock
+from hopping_leg.deploy.replies import DriveClock
 
 PERIOD = 0.005
 

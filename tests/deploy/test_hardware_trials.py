@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.controllers.registry import load_policy
-from hopping_leg.deploy.hardware_trials import Deployed
+from hopping_leg.deploy.hardware_trials import DeployedRobot
 from hopping_leg.emulator.server import Start
 from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.errors import HardwareError
@@ -17,7 +17,7 @@ STEPS = ((0.3, 1.0), (0.25, 0.5))
 
 
 def deployed(tmp_path, lockstep, ready=lambda seconds: None):
-    return Deployed(
+    return DeployedRobot(
         ROBOT,
         200.0,
         tmp_path,

@@ -10,8 +10,8 @@ import pytest
 
 from hopping_leg.deploy.drive_info import inspect
 from hopping_leg.deploy.drive_link import LIMP, STOP
-from hopping_leg.deploy.driver import MoteusLink
-from hopping_leg.deploy.preflight import judge, require
+from hopping_leg.deploy.moteus_link import MoteusLink
+from hopping_leg.deploy.preflight import check_drives, require_fit
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.transport import opener
 from hopping_leg.emulator.frames import Frame, LineProtocol, received_line
@@ -196,5 +196,5 @@ def test_a_can_bus_without_drives_is_silence_and_named_so():
     facts = inspect(link)
     assert not any(drive.answers for drive in facts)
     with pytest.raises(HardwareError, match=r"id 1\) does not answer"):
-        require(judge(LEG, hopping_limits(LEG, 200.0), facts))
+        require_fit(check_drives(LEG, hopping_limits(LEG, 200.0), facts))
     link.close()

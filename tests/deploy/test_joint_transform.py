@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hopping_leg.deploy.configuration import wanted
 from hopping_leg.deploy.joint_transform import JointTransform, joint_transforms
+from hopping_leg.deploy.preflight import required_settings
 from hopping_leg.errors import RobotError
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.hardware import Hardware, Servo
@@ -74,7 +74,7 @@ def test_limits_of_a_reversed_motor_stay_in_order():
     robot = load_robot("legv2")
     reversed_hip = Servo(sign=-1.0, lower=-0.5, upper=1.5)
     robot = replace(robot, hardware=Hardware(hip=reversed_hip))
-    found = {setting.name: setting for setting in wanted(robot, 0)}
+    found = {setting.name: setting for setting in required_settings(robot, 0)}
     low, high = found["servopos.position_min"], found["servopos.position_max"]
     assert low.value == pytest.approx(-1.5 / math.tau)
     assert high.value == pytest.approx(0.5 / math.tau)

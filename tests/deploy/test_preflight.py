@@ -3,9 +3,7 @@ from dataclasses import replace
 
 import pytest
 
-from hopping_leg.deploy.configuration import wanted
-from hopping_leg.deploy.drive_info import DriveInfo
-from hopping_leg.deploy.preflight import judge, require
+from hopping_leg.deploy.preflight import DriveInfo, check_drives, require_fit, required_settings
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot import load_robot
@@ -25,19 +23,19 @@ def healthy(joint, **changes):
         position=(0.8, -1.6)[joint],
         voltage=24.0,
         temperature=30.0,
-        settings={setting.name: setting.value for setting in wanted(LEG, joint)},
+        settings={setting.name: setting.value for setting in required_settings(LEG, joint)},
     )
     return replace(facts, **changes)
 
 
 def complaints(knee, robot=LEG):
-    findings = judge(robot, LIMITS, (healthy(0), knee))
+    findings = check_drives(robot, LIMITS, (healthy(0), knee))
     return [finding.complaint for finding in findings if finding.complaint]
 
 
 def test_healthy_drives_may_be_armed():
     assert complaints(healthy(1)) == []
-    require(judge(LEG, LIMITS, (healthy(0), healthy(1))))
+    require_fit(check_drives(LEG, LIMITS, (healthy(0), healthy(1))))
 
 
 @pytest.mark.parametrize(
@@ -69,6 +67,6 @@ def test_a_swapped_drive_is_noticed():
 
 
 def test_the_first_complaint_is_raised_and_the_others_counted():
-    findings = judge(LEG, LIMITS, (healthy(0), healthy(1, home=0, voltage=9.0)))
+    findings = check_drives(LEG, LIMITS, (healthy(0), healthy(1, home=0, voltage=9.0)))
     with pytest.raises(HardwareError, match=r"bus voltage .* 1 more: see `hop doctor`"):
-        require(findings)
+        require_fit(findings)

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.deploy.configuration import wanted
 from hopping_leg.deploy.drive_info import configure, home, inspect
+from hopping_leg.deploy.hardware_trials import header_of, perform
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
-from hopping_leg.deploy.preflight import judge, require
+from hopping_leg.deploy.preflight import check_drives, require_fit, required_settings
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.schedule import Schedule
-from hopping_leg.deploy.session import header_of, perform
 from hopping_leg.deploy.supervisor import State
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.server import Start
@@ -49,8 +48,8 @@ def run(lockstep, path, *, controller="energy-shaping", hop=0.5, rise=0.5):
 def test_healthy_drives_pass_every_check_and_say_who_they_are():
     lockstep = emulated()
     facts = inspect(lockstep.link)
-    findings = judge(LEG, LIMITS, facts)
-    require(findings)
+    findings = check_drives(LEG, LIMITS, facts)
+    require_fit(findings)
     assert {f.joint for f in findings} == {0, 1}
     assert len(findings) == 2 * 14
     assert facts[0].serial != facts[1].serial
@@ -75,24 +74,26 @@ def test_healthy_drives_pass_every_check_and_say_who_they_are():
 def test_a_drive_that_is_not_fit_is_refused_with_the_reason(start, words):
     lockstep = emulated(**start)
     lockstep.robot.advance(0.01)
-    findings = judge(LEG, LIMITS, inspect(lockstep.link))
+    findings = check_drives(LEG, LIMITS, inspect(lockstep.link))
     complaints = [finding.complaint for finding in findings]
     assert any(words in complaint for complaint in complaints), complaints
     with pytest.raises(HardwareError, match="Not armed"):
-        require(findings)
+        require_fit(findings)
     lockstep.link.close()
 
 
 def test_configuring_and_homing_make_a_delivered_drive_fit():
     lockstep = emulated(configured=False, homed=False)
-    findings = judge(LEG, LIMITS, inspect(lockstep.link))
+    findings = check_drives(LEG, LIMITS, inspect(lockstep.link))
     for joint in (0, 1):
         wrong = {f.setting for f in findings if f.joint == joint and f.setting}
         assert "servo.timeout_mode" in wrong
-        configure(lockstep.link, joint, [s for s in wanted(LEG, joint) if s.name in wrong])
+        configure(
+            lockstep.link, joint, [s for s in required_settings(LEG, joint) if s.name in wrong]
+        )
     home(lockstep.link, lockstep.robot.leg.q + np.array([0.1, -0.1]))
     facts = inspect(lockstep.link)
-    require(judge(LEG, LIMITS, facts))
+    require_fit(check_drives(LEG, LIMITS, facts))
     np.testing.assert_allclose([f.position for f in facts], lockstep.robot.leg.q, atol=1e-3)
     lockstep.robot.drives[0].settings.load()
     assert lockstep.robot.drives[0].settings["servo.timeout_mode"] == 15

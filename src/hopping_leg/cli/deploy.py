@@ -17,11 +17,10 @@ Examples:
 """
 
 import contextlib
-import importlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import tyro
 from rich.console import Console
@@ -31,6 +30,7 @@ from hopping_leg.controllers.joint_pd import JointPD
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.controllers.registry import load_controller
+from hopping_leg.deploy.hardware_trials import Performance, header_of, new_path, perform
 from hopping_leg.deploy.height_page import HeightPage
 from hopping_leg.deploy.keyboard import LiveHeight, keys
 from hopping_leg.deploy.motion_sequence import MotionSequence, SequenceTiming, hopping_poses
@@ -52,7 +52,6 @@ from hopping_leg.sim import CONTROL_RATE
 
 if TYPE_CHECKING:
     from hopping_leg.deploy.loop import ControlLoop
-    from hopping_leg.deploy.session import Performance
 
 _WILLED = (Reason.FINISHED, Reason.OPERATOR_STOP)
 _SECONDS = 10.0
@@ -146,7 +145,7 @@ def _schedule(args: Deploy, controller: Controller, valid: Range) -> Schedule:
     return Schedule(((height, _SECONDS),))
 
 
-def _perform(args: Deploy, robot: Robot, plan: Plan) -> "Performance":
+def _perform(args: Deploy, robot: Robot, plan: Plan) -> Performance:
     live = args.live or args.web is not None
     height = LiveHeight(plan.schedule.at(0.0), plan.valid) if live else None
     page = None if args.web is None or height is None else HeightPage(height, args.web)
@@ -160,7 +159,7 @@ def _perform(args: Deploy, robot: Robot, plan: Plan) -> "Performance":
         SoftLimiter(robot, SoftLimits()) if args.soft_limits else None,
         SequenceTiming(hop=plan.seconds),
     )
-    envelope, console = hopping_limits(robot, plan.rate), Console()
+    limits, console = hopping_limits(robot, plan.rate), Console()
 
     @contextlib.contextmanager
     def beside(loop: "ControlLoop") -> Iterator[None]:
@@ -173,9 +172,8 @@ def _perform(args: Deploy, robot: Robot, plan: Plan) -> "Performance":
     if page is not None:
         console.print(f"Height and stop: {page.address}", highlight=False)
     with connect(robot, args.transport) as link:
-        found = check(link, robot, envelope)
-        session: Any = importlib.import_module("hopping_leg.deploy.session")
-        header = session.header_of(
+        found = check(link, robot, limits)
+        header = header_of(
             robot, plan.controller, plan.rate, transport=args.transport, drives=found
         )
         ask(
@@ -183,6 +181,5 @@ def _perform(args: Deploy, robot: Robot, plan: Plan) -> "Performance":
             f" {plan.controller.name}; keep a hand on the switch.",
             yes=args.yes,
         )
-        path = session.new_path(args.out, plan.controller.name)
-        done: Performance = session.perform(link, sequence, envelope, path, header, beside=beside)
-    return done
+        path = new_path(args.out, plan.controller.name)
+        return perform(link, sequence, limits, path, header, beside=beside)

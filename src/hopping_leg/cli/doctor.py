@@ -9,15 +9,17 @@ Examples:
   hop doctor --transport socketcan:can0 --home 0.0 0.0     # the leg hangs straight down
 """
 
-import importlib
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from importlib.metadata import PackageNotFoundError, requires, version
+from typing import TYPE_CHECKING
 
+from packaging.requirements import Requirement
 from rich.console import Console
 
-from hopping_leg.cli.extras import show_extras, survey
-from hopping_leg.deploy.configuration import wanted
+from hopping_leg.cli.motors import ask, connect, find, show
 from hopping_leg.deploy.joint_transform import JOINTS
+from hopping_leg.deploy.preflight import Finding, required_settings
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.robot import load_robot
@@ -25,7 +27,7 @@ from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import CONTROL_RATE
 
 if TYPE_CHECKING:
-    from hopping_leg.deploy.preflight import Finding
+    from hopping_leg.deploy.moteus_link import MoteusLink
 
 
 @dataclass(frozen=True)
@@ -52,18 +54,16 @@ def run(args: Doctor) -> None:
             raise UsageError("--write and --home need the drives; name their --transport.")
         show_extras(Console(), survey())
         return
-    from hopping_leg.cli.motors import connect, find, show
-
     robot, console = load_robot(args.robot), Console()
-    envelope = hopping_limits(robot, CONTROL_RATE)
+    limits = hopping_limits(robot, CONTROL_RATE)
     with connect(robot, args.transport) as link:
-        findings = find(link, robot, envelope)
+        findings = find(link, robot, limits)
         if args.write:
             _write(link, robot, findings, console, yes=args.yes)
         if args.home is not None:
             _home(link, args.home, yes=args.yes)
         if args.write or args.home is not None:
-            findings = find(link, robot, envelope)
+            findings = find(link, robot, limits)
     show(console, findings)
     if any(finding.complaint for finding in findings):
         raise HardwareError("The leg may not be armed; the sentences above say why.")
@@ -71,32 +71,111 @@ def run(args: Doctor) -> None:
 
 
 def _write(
-    link: Any,  # noqa: ANN401
-    robot: Robot,
-    findings: "list[Finding]",
-    console: Console,
-    *,
-    yes: bool,
+    link: "MoteusLink", robot: Robot, findings: list[Finding], console: Console, *, yes: bool
 ) -> None:
     """Write the settings that were found wrong."""
-    from hopping_leg.cli.motors import ask
+    from hopping_leg.deploy.drive_info import configure
 
-    inspection: Any = importlib.import_module("hopping_leg.deploy.drive_info")
     for joint, name in enumerate(JOINTS):
         wrong = {f.setting for f in findings if f.joint == joint and f.setting}
-        settings = [setting for setting in wanted(robot, joint) if setting.name in wrong]
+        settings = [s for s in required_settings(robot, joint) if s.name in wrong]
         if not settings:
             continue
         for setting in settings:
             console.print(f"{name}: {setting.name} = {setting.text} ({setting.why})")
         ask(f"These settings of the {name}'s drive will be written for good.", yes=yes)
-        inspection.configure(link, joint, settings)
+        configure(link, joint, settings)
 
 
-def _home(link: Any, angles: tuple[float, float], *, yes: bool) -> None:  # noqa: ANN401
-    from hopping_leg.cli.motors import ask
+def _home(link: "MoteusLink", angles: tuple[float, float], *, yes: bool) -> None:
+    from hopping_leg.deploy.drive_info import home
 
     hip, knee = angles
     ask(f"The drives will take the hip for {hip:g} and the knee for {knee:g} rad.", yes=yes)
-    inspection: Any = importlib.import_module("hopping_leg.deploy.drive_info")
-    inspection.home(link, angles)
+    home(link, angles)
+
+
+PACKAGE = "hopping-leg"
+
+PURPOSES = {
+    "train": "train policies (hop train)",
+    "tune": "search a recipe's numbers (hop tune)",
+    "view": "watch the leg in the browser (hop view)",
+    "hardware": "talk to the drives (hop deploy, hop doctor, hop emulate)",
+    "pi3hat": "talk to the drives from a Raspberry Pi with a pi3hat",
+    "bullet": "the leg in PyBullet (hop evaluate --engine pybullet)",
+    "bench": "mujoco.sysid beside our fits (python -m studies.identification)",
+    "cluster": "identify or tune on a Ray cluster (--ray)",
+    "docs": "build the documentation (make docs)",
+    "dev": "test and check a clone (make test, make check)",
+}
+"""Every extra, with what it is for."""
+
+
+@dataclass(frozen=True)
+class Extra:
+    """State of one extra."""
+
+    name: str
+    purpose: str
+    missing: tuple[str, ...]
+    """Requirements that are absent or of a version that does not fit."""
+
+    @property
+    def command(self) -> str:
+        """What installs it."""
+        return f"pip install '{PACKAGE}[{self.name}]'"
+
+
+def survey(requirements: Sequence[str] | None = None) -> list[Extra]:
+    """Look at what is installed.
+
+    Args:
+        requirements: As a package's metadata states them; default: those of this package.
+    """
+    lines = requires(PACKAGE) or [] if requirements is None else requirements
+    wanted = [Requirement(line) for line in lines]
+    return [
+        Extra(name, purpose, tuple(str_of(r) for r in wanted if _of(r, name) and not _met(r)))
+        for name, purpose in PURPOSES.items()
+    ]
+
+
+def show_extras(console: Console, extras: Sequence[Extra]) -> None:
+    """Print a line per extra, and the command for those that are missing."""
+    for extra in extras:
+        if not extra.missing:
+            console.print(f"{extra.name}: installed; {extra.purpose}", highlight=False)
+            continue
+        console.print(
+            f"{extra.name}: missing {', '.join(extra.missing)}; {extra.purpose}\n  {extra.command}",
+            highlight=False,
+            markup=False,
+        )
+
+
+def str_of(requirement: Requirement) -> str:
+    """Return a requirement without its condition."""
+    extras = f"[{','.join(sorted(requirement.extras))}]" if requirement.extras else ""
+    return f"{requirement.name}{extras}{requirement.specifier}"
+
+
+def _of(requirement: Requirement, extra: str) -> bool:
+    marker = requirement.marker
+    return (
+        marker is not None
+        and not marker.evaluate({"extra": ""})
+        and marker.evaluate({"extra": extra})
+    )
+
+
+def _met(requirement: Requirement) -> bool:
+    """Tell whether a requirement is installed, with the extras that it asks for."""
+    try:
+        found = version(requirement.name)
+    except PackageNotFoundError:
+        return False
+    brought = [Requirement(line) for line in requires(requirement.name) or []]
+    return requirement.specifier.contains(found, prereleases=True) and all(
+        _met(other) for extra in requirement.extras for other in brought if _of(other, extra)
+    )

@@ -13,7 +13,6 @@ Examples:
   hop finetune fast --robot my_leg.toml --transport /dev/fdcanusb --minutes 5
 """
 
-import importlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -24,6 +23,7 @@ from rich.console import Console
 from hopping_leg.cli.motors import ask, check, connect
 from hopping_leg.cli.options import Heights
 from hopping_leg.controllers.registry import load_policy
+from hopping_leg.deploy.hardware_trials import DeployedRobot
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.io import write_json
@@ -167,8 +167,7 @@ def _outings(args: Finetune, robot: Robot, policy: "Policy") -> "TrialRobot":
 
 
 def _deployed(args: Finetune, robot: Robot, rate: float, transport: str) -> "TrialRobot":
-    envelope = hopping_limits(robot, rate)
-    deployed: Any = importlib.import_module("hopping_leg.deploy.hardware_trials")
+    limits = hopping_limits(robot, rate)
 
     def ready(seconds: float) -> None:
         ask(
@@ -176,12 +175,11 @@ def _deployed(args: Finetune, robot: Robot, rate: float, transport: str) -> "Tri
             yes=args.yes,
         )
 
-    outings: TrialRobot = deployed.Deployed(
+    return DeployedRobot(
         robot,
         rate,
         args.out / "traces",
         lambda: connect(robot, transport),
-        lambda link: check(link, robot, envelope),
+        lambda link: check(link, robot, limits),
         ready,
     )
-    return outings

@@ -1,23 +1,21 @@
 """What all verbs share that talk to motors; the client library is imported only here, and late."""
 
 import contextlib
-import importlib
 import sys
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
 
 from hopping_leg.deploy.joint_transform import JOINTS
-from hopping_leg.deploy.preflight import Finding, judge, require
+from hopping_leg.deploy.preflight import Finding, check_drives, require_fit
 from hopping_leg.deploy.safety_limits import SafetyLimits
-from hopping_leg.deploy.transport import opener
 from hopping_leg.errors import UsageError
 from hopping_leg.robot.parameters import Robot
 
 if TYPE_CHECKING:
-    from hopping_leg.deploy.driver import MoteusLink
+    from hopping_leg.deploy.moteus_link import MoteusLink
 
 
 @contextlib.contextmanager
@@ -32,29 +30,31 @@ def connect(robot: Robot, transport: str) -> "Iterator[MoteusLink]":
         UsageError: There is no such transport.
         HardwareError: It cannot be opened.
     """
-    open_transport = opener(transport)
-    driver: Any = importlib.import_module("hopping_leg.deploy.driver")
-    link: MoteusLink = driver.MoteusLink(robot, open_transport)
+    from hopping_leg.deploy.moteus_link import MoteusLink
+    from hopping_leg.deploy.transport import opener
+
+    link = MoteusLink(robot, opener(transport))
     try:
         yield link
     finally:
         link.close()
 
 
-def find(link: "MoteusLink", robot: Robot, envelope: SafetyLimits) -> list[Finding]:
+def find(link: "MoteusLink", robot: Robot, limits: SafetyLimits) -> list[Finding]:
     """Return all checks of both drives."""
-    inspection: Any = importlib.import_module("hopping_leg.deploy.drive_info")
-    return judge(robot, envelope, inspection.inspect(link))
+    from hopping_leg.deploy.drive_info import inspect
+
+    return check_drives(robot, limits, inspect(link))
 
 
-def check(link: "MoteusLink", robot: Robot, envelope: SafetyLimits) -> dict[str, dict[str, str]]:
+def check(link: "MoteusLink", robot: Robot, limits: SafetyLimits) -> dict[str, dict[str, str]]:
     """Refuse drives that are not fit; return what was found, for the trace.
 
     Raises:
         HardwareError: Why they may not be armed.
     """
-    findings = find(link, robot, envelope)
-    require(findings)
+    findings = find(link, robot, limits)
+    require_fit(findings)
     return {
         name: {f.check: f.found for f in findings if f.joint == joint}
         for joint, name in enumerate(JOINTS)

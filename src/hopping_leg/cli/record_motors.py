@@ -1,6 +1,5 @@
 """`hop record --transport`: excitations played on real motors."""
 
-import importlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,6 +9,7 @@ from rich.console import Console
 
 from hopping_leg.cli.motors import ask, check, connect
 from hopping_leg.controllers.joint_pd import JointGains, JointPD
+from hopping_leg.deploy.hardware_trials import Performance, header_of, new_path, perform
 from hopping_leg.deploy.keyboard import keys
 from hopping_leg.deploy.motion_sequence import MotionSequence, Poses, SequenceTiming, hopping_poses
 from hopping_leg.deploy.safety_limits import recording_limits
@@ -21,8 +21,7 @@ from hopping_leg.identify.play_excitation import recording_of
 from hopping_leg.robot.parameters import Robot
 
 if TYPE_CHECKING:
-    from hopping_leg.deploy.driver import MoteusLink
-    from hopping_leg.deploy.session import Performance
+    from hopping_leg.deploy.moteus_link import MoteusLink
 
 _HANGING = np.zeros(2)
 
@@ -55,9 +54,9 @@ def record(
     rates = {excitation.rate for _, excitation in excitations}
     if len(rates) > 1:
         raise UsageError("The excitations have different rates; record them one by one.")
-    envelope, console = recording_limits(robot, rates.pop()), Console()
+    limits, console = recording_limits(robot, rates.pop()), Console()
     with connect(robot, transport) as link:
-        found = check(link, robot, envelope)
+        found = check(link, robot, limits)
         for name, excitation in excitations:
             ask(
                 f"{robot.name} on the {excitation.rig} will play {name} for"
@@ -87,8 +86,7 @@ def _play(
     folder: Path,
     facts: dict[str, Any],
     name: str,
-) -> "Performance":
-    session: Any = importlib.import_module("hopping_leg.deploy.session")
+) -> Performance:
     controller = JointPD(excitation.position, excitation.velocity, gains)
     fixed = excitation.rig == "fixed-base"
     rest = _HANGING if fixed else hopping_poses(robot).rest
@@ -100,13 +98,12 @@ def _play(
         SequenceTiming(hop=len(excitation) / excitation.rate),
         gains,
     )
-    header = session.header_of(robot, controller, excitation.rate, **facts)
-    performance: Performance = session.perform(
+    header = header_of(robot, controller, excitation.rate, **facts)
+    return perform(
         link,
         sequence,
         recording_limits(robot, excitation.rate),
-        session.new_path(folder, name),
+        new_path(folder, name),
         header,
         beside=lambda loop: keys(None, loop.stop, Console().print),
     )
-    return performance

@@ -41,8 +41,10 @@ class HardwareTrial:
 class TrialRobot(Protocol):
     """A robot that can be sent on outings."""
 
-    name: str
-    """Of the robot."""
+    @property
+    def name(self) -> str:
+        """Of the robot."""
+        ...
 
     def hop(self, controller: Controller, steps: Steps, seed: int) -> HardwareTrial:
         """Let a controller hop from standing.

@@ -3,15 +3,14 @@
 import asyncio
 import math
 from collections.abc import Awaitable, Callable, Sequence
-from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from moteus import CommandError, Stream, multiplex
 from moteus.protocol import Register
 
-from hopping_leg.deploy.configuration import Setting, wanted
-from hopping_leg.deploy.driver import MoteusLink
 from hopping_leg.deploy.joint_transform import JOINTS
+from hopping_leg.deploy.moteus_link import MoteusLink
+from hopping_leg.deploy.preflight import DriveInfo, Setting, required_settings
 
 _ANSWER_SECONDS = 1.0
 _TRIES = 3
@@ -34,37 +33,6 @@ _STATE = {
 }
 
 Result = TypeVar("Result")
-
-
-@dataclass(frozen=True)
-class DriveInfo:
-    """One drive before arming; joint side, SI.
-
-    Attributes:
-        answers: Whether it answers at all; if not, nothing else is known.
-        firmware: Version of its firmware, as the register holds it.
-        register_map: Version of its register map.
-        serial: Of its controller, 24 hex digits.
-        home: 2 where it has been told where its output is.
-        position: Joint angle as it believes, rad.
-        mode: As in ``DriveMode``.
-        fault: Code.
-        voltage: Of the bus, V.
-        temperature: deg C.
-        settings: Name to value; NaN where the firmware does not know the name.
-    """
-
-    answers: bool
-    firmware: int = 0
-    register_map: int = 0
-    serial: str = ""
-    home: int = 0
-    position: float = math.nan
-    mode: int = 0
-    fault: int = 0
-    voltage: float = math.nan
-    temperature: float = math.nan
-    settings: dict[str, float] = field(default_factory=dict)
 
 
 def inspect(link: MoteusLink) -> tuple[DriveInfo, DriveInfo]:
@@ -141,7 +109,8 @@ async def _inspect(link: MoteusLink, joint: int) -> DriveInfo:
 async def _settings(link: MoteusLink, joint: int) -> dict[str, float]:
     stream = await _console(link, joint)
     return {
-        setting.name: await _setting(stream, setting.name) for setting in wanted(link.robot, joint)
+        setting.name: await _setting(stream, setting.name)
+        for setting in required_settings(link.robot, joint)
     }
 
 

@@ -1,35 +1,165 @@
-"""Outings of a leg on real, or emulated, drives: what ``hop deploy`` does, once per outing.
+"""Hardware trials: a run from a checked link to a trace on disk, and the legs that make them."""
 
-The leg rises, hops, sinks down and is disarmed; the supervisor's limits hold all the while. What
-comes back is the part of the trace in which the controller had the leg.
-"""
-
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+import concurrent.futures
+import datetime
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
 from hopping_leg.controllers.hardware_trial import HardwareTrial, Steps
+from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.protocol import Controller
-from hopping_leg.deploy.clock import Clock
-from hopping_leg.deploy.driver import MoteusLink
+from hopping_leg.deploy.drive_link import Action
+from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorder, recover
+from hopping_leg.deploy.loop import ControlLoop, LoopOutcome
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
-from hopping_leg.deploy.safety_limits import hopping_limits
+from hopping_leg.deploy.realtime import Clock, RealClock, keeping_time
+from hopping_leg.deploy.safety_limits import SafetyLimits, hopping_limits
 from hopping_leg.deploy.schedule import Schedule
-from hopping_leg.deploy.session import header_of, new_path, perform
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.supervisor import State
+from hopping_leg.deploy.telemetry import columns
 from hopping_leg.errors import HardwareError
+from hopping_leg.io import safe_file_name, versions
 from hopping_leg.robot.limits import SoftLimiter, SoftLimits
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import Trace
 
+if TYPE_CHECKING:
+    from hopping_leg.deploy.moteus_link import MoteusLink
+
+_PACKAGES = ("hopping-leg", "numpy", "onnxruntime", "moteus", "python-can")
+
 
 @dataclass(frozen=True)
-class Deployed:
+class Performance:
+    """A finished run.
+
+    Attributes:
+        outcome: How it ended.
+        trace: What happened.
+        path: Of the trace on disk.
+        notices: What the computer did not permit.
+    """
+
+    outcome: LoopOutcome
+    trace: Trace
+    path: Path
+    notices: tuple[str, ...]
+
+
+def perform(
+    link: "MoteusLink",
+    sequence: MotionSequence,
+    limits: SafetyLimits,
+    path: Path,
+    header: dict[str, Any],
+    *,
+    clock: Clock | None = None,
+    realtime: bool = True,
+    beside: Callable[[ControlLoop], AbstractContextManager[None]] = lambda _: nullcontext(),
+) -> Performance:
+    """Arm, run a sequence, stop; SIGINT and SIGTERM stop it as the operator would.
+
+    Args:
+        link: To drives that were found fit.
+        sequence: What the leg does.
+        limits: The supervisor's limits.
+        path: Of the trace; the black box lies beside it as long as the run lasts.
+        header: Of the trace.
+        clock: The time; none takes the computer's.
+        realtime: Ask for priority and locked memory.
+        beside: Makes what is open while the loop runs, e.g. a keyboard that stops it.
+
+    Raises:
+        TraceError: The black box cannot be written.
+    """
+    box_path = path.with_suffix(SUFFIX)
+    box = FlightRecorder(box_path, columns(sequence.controller), header)
+    loop = ControlLoop(link, sequence, limits, box, clock or RealClock())
+    notices: tuple[str, ...] = ()
+    try:
+        with _stopped_by_signals(loop), beside(loop), keeping_time(realtime=realtime) as notices:
+            outcome = _run(loop)
+    finally:
+        if link.trouble:
+            box.event(link_trouble=link.trouble)
+        box.close()
+    trace = recover(box_path)
+    trace.save(path)
+    box_path.unlink()
+    return Performance(outcome, trace, path, notices)
+
+
+def header_of(robot: Robot, controller: Controller, rate: float, **facts: Any) -> dict[str, Any]:  # noqa: ANN401
+    """Return a trace's header: what ran on what, and what its codes mean."""
+    policy = {"policy_digest": controller.digest} if isinstance(controller, Policy) else {}
+    return {
+        "robot": robot.name,
+        "robot_digest": robot.digest,
+        "controller": controller.name,
+        **policy,
+        "rate_hz": rate,
+        "started": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "versions": versions(*_PACKAGES),
+        "codes": {
+            "state": _names(State),
+            "part": _names(Part),
+            "action": _names(Action),
+            "reason": _names(Reason),
+        },
+        **facts,
+    }
+
+
+def new_path(folder: Path, name: str) -> Path:
+    """Return a trace's path that no earlier run has."""
+    safe = safe_file_name(name)
+    stamp = datetime.datetime.now(datetime.UTC).strftime("%Y%m%d-%H%M%S")
+    path, count = folder / f"{safe}-{stamp}.parquet", 1
+    while path.exists() or path.with_suffix(SUFFIX).exists():
+        count += 1
+        path = folder / f"{safe}-{stamp}-{count}.parquet"
+    return path
+
+
+def _run(loop: ControlLoop) -> LoopOutcome:
+    """Run a loop in a thread of its own; hand its result, or its error, on."""
+    with concurrent.futures.ThreadPoolExecutor(1, "control-loop") as threads:
+        future = threads.submit(loop.run)
+        while not future.done():
+            concurrent.futures.wait([future], 0.1)
+        return future.result()
+
+
+@contextmanager
+def _stopped_by_signals(loop: ControlLoop) -> Iterator[None]:
+    """Let SIGINT and SIGTERM stop the leg; outside of the main thread there are none."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {s: signal.getsignal(s) for s in (signal.SIGINT, signal.SIGTERM)}
+    for number in before:
+        signal.signal(number, lambda *_: loop.stop())
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _names(kind: Any) -> dict[str, str]:  # noqa: ANN401
+    return {str(member.value): member.name.lower() for member in kind}
+
+
+@dataclass(frozen=True)
+class DeployedRobot:
     """A leg behind a wire; implements ``TrialRobot``.
 
     Attributes:
@@ -45,8 +175,8 @@ class Deployed:
     robot: Robot
     rate: float
     folder: Path
-    connect: Callable[[], AbstractContextManager[MoteusLink]]
-    check: Callable[[MoteusLink], dict[str, Any]]
+    connect: Callable[[], AbstractContextManager["MoteusLink"]]
+    check: Callable[["MoteusLink"], dict[str, Any]]
     ready: Callable[[float], None]
     clock: Clock | None = None
 

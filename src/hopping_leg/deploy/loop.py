@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.deploy import telemetry
-from hopping_leg.deploy.clock import Clock
 from hopping_leg.deploy.drive_link import BRAKE, STOP, DriveCommand, DriveLink, Exchange
 from hopping_leg.deploy.flight_recorder import FlightRecorder
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceStep
+from hopping_leg.deploy.realtime import Clock
 from hopping_leg.deploy.safety_limits import SafetyLimits
 from hopping_leg.deploy.sample_buffer import SampleBuffer
 from hopping_leg.deploy.stop_reasons import Operator, SupervisorInput

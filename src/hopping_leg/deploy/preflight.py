@@ -1,10 +1,13 @@
-"""Whether the drives may be armed: every check with a sentence that says why not."""
+"""Whether the drives may be armed: every check with a sentence that says why not.
 
+Among the checks is each drive's own configuration, which must be as the robot's file asks. Names
+of settings are those of the firmware's ``conf get`` and ``conf set``.
+"""
+
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
 
-from hopping_leg.deploy.configuration import wanted
 from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.deploy.joint_transform import JOINTS, joint_transforms
 from hopping_leg.deploy.safety_limits import SafetyLimits
@@ -13,11 +16,89 @@ from hopping_leg.errors import HardwareError
 from hopping_leg.robot.hardware import REGISTER_MAP
 from hopping_leg.robot.parameters import Robot
 
-if TYPE_CHECKING:
-    from hopping_leg.deploy.drive_info import DriveInfo
+BRAKE_MODE = 15
+"""What a drive shall do when its watchdog ends a torque command; the firmware's default is limp."""
+
+_RELATIVE = 1e-3
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One entry of a drive's configuration.
+
+    Attributes:
+        name: As the firmware calls it.
+        value: As wanted.
+        why: What depends on it.
+    """
+
+    name: str
+    value: float
+    why: str
+
+    def holds(self, found: float) -> bool:
+        """Tell whether a drive's value is the wanted one, within the rounding of its text."""
+        return math.isclose(found, self.value, rel_tol=_RELATIVE, abs_tol=1e-6)
+
+    @property
+    def text(self) -> str:
+        """The value as ``conf set`` takes it."""
+        return f"{self.value:.9g}"
+
+
+def required_settings(robot: Robot, joint: int) -> tuple[Setting, ...]:
+    """Return the configuration of one joint's drive.
+
+    Args:
+        robot: Whose drives.
+        joint: 0 for the hip, 1 for the knee.
+    """
+    servo, transform = robot.hardware.servos[joint], joint_transforms(robot)[joint]
+    motor = getattr(robot, JOINTS[joint]).motor
+    ends = sorted(transform.motor_position(angle) for angle in (servo.lower, servo.upper))
+    return (
+        Setting("motor_position.rotor_to_output_ratio", 1 / motor.gear_ratio, "gear ratio"),
+        Setting("servopos.position_min", ends[0], "mechanical stop"),
+        Setting("servopos.position_max", ends[1], "mechanical stop"),
+        Setting("servo.max_current_A", servo.max_current, "motor current"),
+        Setting("servo.timeout_mode", BRAKE_MODE, "brakes when the host is silent"),
+        Setting("servo.default_timeout_s", robot.hardware.watchdog, "watchdog"),
+    )
+
 
 HOMED = 2
 """Home state of a drive that knows where its output is (register 0x00c)."""
+
+
+@dataclass(frozen=True)
+class DriveInfo:
+    """One drive before arming; joint side, SI.
+
+    Attributes:
+        answers: Whether it answers at all; if not, nothing else is known.
+        firmware: Version of its firmware, as the register holds it.
+        register_map: Version of its register map.
+        serial: Of its controller, 24 hex digits.
+        home: 2 where it has been told where its output is.
+        position: Joint angle as it believes, rad.
+        mode: As in ``DriveMode``.
+        fault: Code.
+        voltage: Of the bus, V.
+        temperature: deg C.
+        settings: Name to value; NaN where the firmware does not know the name.
+    """
+
+    answers: bool
+    firmware: int = 0
+    register_map: int = 0
+    serial: str = ""
+    home: int = 0
+    position: float = math.nan
+    mode: int = 0
+    fault: int = 0
+    voltage: float = math.nan
+    temperature: float = math.nan
+    settings: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -39,7 +120,7 @@ class Finding:
     setting: str = ""
 
 
-def judge(robot: Robot, limits: SafetyLimits, drives: "Sequence[DriveInfo]") -> list[Finding]:
+def check_drives(robot: Robot, limits: SafetyLimits, drives: Sequence[DriveInfo]) -> list[Finding]:
     """Return all checks of both drives.
 
     Args:
@@ -53,7 +134,7 @@ def judge(robot: Robot, limits: SafetyLimits, drives: "Sequence[DriveInfo]") -> 
     return findings
 
 
-def require(findings: Sequence[Finding]) -> None:
+def require_fit(findings: Sequence[Finding]) -> None:
     """Refuse to arm if anything is wrong.
 
     Raises:
@@ -65,7 +146,7 @@ def require(findings: Sequence[Finding]) -> None:
         raise HardwareError(f"Not armed: {complaints[0]}{more}")
 
 
-def _of_drive(robot: Robot, limits: SafetyLimits, joint: int, facts: "DriveInfo") -> list[Finding]:
+def _of_drive(robot: Robot, limits: SafetyLimits, joint: int, facts: DriveInfo) -> list[Finding]:
     name, address = JOINTS[joint], joint_transforms(robot)[joint].id
     if not facts.answers:
         complaint = (
@@ -82,7 +163,7 @@ def _of_drive(robot: Robot, limits: SafetyLimits, joint: int, facts: "DriveInfo"
     ]
 
 
-def _of_identity(robot: Robot, joint: int, facts: "DriveInfo") -> list[Finding]:
+def _of_identity(robot: Robot, joint: int, facts: DriveInfo) -> list[Finding]:
     name, servo, address = (
         JOINTS[joint],
         robot.hardware.servos[joint],
@@ -108,7 +189,7 @@ def _of_identity(robot: Robot, joint: int, facts: "DriveInfo") -> list[Finding]:
     ]
 
 
-def _of_power(limits: SafetyLimits, joint: int, facts: "DriveInfo") -> list[Finding]:
+def _of_power(limits: SafetyLimits, joint: int, facts: DriveInfo) -> list[Finding]:
     name, low, high = JOINTS[joint], limits.voltage_low, limits.voltage_high
     volts, heat = f"{facts.voltage:.1f} V", f"{facts.temperature:.0f} deg C"
     supply = (
@@ -122,7 +203,7 @@ def _of_power(limits: SafetyLimits, joint: int, facts: "DriveInfo") -> list[Find
     ]
 
 
-def _of_pose(limits: SafetyLimits, joint: int, facts: "DriveInfo") -> list[Finding]:
+def _of_pose(limits: SafetyLimits, joint: int, facts: DriveInfo) -> list[Finding]:
     name, low, high = JOINTS[joint], limits.lower[joint], limits.upper[joint]
     homed = facts.home == HOMED
     lost = (
@@ -140,9 +221,9 @@ def _of_pose(limits: SafetyLimits, joint: int, facts: "DriveInfo") -> list[Findi
     ]
 
 
-def _of_configuration(robot: Robot, joint: int, facts: "DriveInfo") -> list[Finding]:
+def _of_configuration(robot: Robot, joint: int, facts: DriveInfo) -> list[Finding]:
     findings = []
-    for setting in wanted(robot, joint):
+    for setting in required_settings(robot, joint):
         found = facts.settings.get(setting.name, float("nan"))
         complaint = (
             ""

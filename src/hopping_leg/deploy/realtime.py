@@ -1,12 +1,59 @@
-"""What makes a loop keep its time: priority, locked memory, no garbage collection in between."""
+"""Time as the loop sees it, and what keeps it: priority, locked memory, no garbage collection."""
 
 import contextlib
 import ctypes
 import gc
 import os
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Protocol
+
+
+class Clock(Protocol):
+    """A monotonic clock, s."""
+
+    def now(self) -> float:
+        """Return the time."""
+        ...
+
+    def wait_until(self, deadline: float) -> float:
+        """Return at a deadline, or at once if it is over; returns the time."""
+        ...
+
+    def patience(self, until: float) -> float:
+        """Return how many of the computer's seconds something due at a time is worth waiting."""
+        ...
+
+
+class RealClock:
+    """The computer's clock: sleeps until shortly before a deadline and spins for the rest.
+
+    Args:
+        spin: Time to spin, s.
+    """
+
+    def __init__(self, spin: float = 2e-4) -> None:
+        self._spin = spin
+
+    def now(self) -> float:
+        """Return the time."""
+        return time.monotonic()
+
+    def wait_until(self, deadline: float) -> float:
+        """Return at a deadline; returns the time."""
+        pause = deadline - time.monotonic() - self._spin
+        if pause > 0:
+            time.sleep(pause)
+        while (now := time.monotonic()) < deadline:
+            pass
+        return now
+
+    def patience(self, until: float) -> float:
+        """Return the time that is left."""
+        return max(until - time.monotonic(), 0.0)
+
 
 PRIORITY = 60
 """Of SCHED_FIFO, 1 to 99; above ordinary work, below the kernel's own threads."""

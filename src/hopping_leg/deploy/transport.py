@@ -1,10 +1,14 @@
 """Which adapter: the path of an fdcanusb, a python-can interface, or a pi3hat."""
 
 import argparse
-import importlib
+import asyncio
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+import can
+from moteus import FdcanusbDevice, PythonCanDevice, Transport
+from moteus.transport_factory import get_transport_factories
 
 from hopping_leg.errors import HardwareError, UsageError
 
@@ -17,6 +21,61 @@ _FORMS = (
 )
 
 
+class TolerantFdcanusb(FdcanusbDevice):  # type: ignore[misc]
+    """The client library's fdcanusb without what would silence or hang it.
+
+    Of ``moteus`` 1.1: a line that is no answer, or a broken one, ends its reader task without a
+    word; an adapter that is gone wakes the event loop forever; and a closed port stays registered
+    with the loop, so that the next one with its number never reads.
+
+    Must be made inside of a running event loop.
+
+    Args:
+        path: Of the serial port.
+
+    Attributes:
+        garbage: Lines that were skipped.
+    """
+
+    def __init__(self, path: str) -> None:
+        self.garbage = 0
+        super().__init__(path)
+        self._loop = asyncio.get_running_loop()
+        self._descriptor: int | None = self._serial.fd
+        self._loop.add_reader(self._serial.fd, self._read)
+
+    @property
+    def gone(self) -> bool:
+        """Whether the adapter was pulled out, or the port closed."""
+        return self._descriptor is None
+
+    def _read(self) -> None:
+        try:
+            self._serial._handle_read()
+        except OSError:
+            self._abandon()
+
+    async def _process_one_line(self) -> Any:  # noqa: ANN401
+        try:
+            return await super()._process_one_line()
+        except (ValueError, IndexError):
+            self.garbage += 1
+            return False
+
+    async def _handle_other_response(self, line: bytes) -> None:
+        self.garbage += 1
+
+    def _abandon(self) -> None:
+        if self._descriptor is not None:
+            self._loop.remove_reader(self._descriptor)
+            self._descriptor = None
+
+    def close(self) -> None:
+        """Give the port back; another may be opened after it."""
+        self._abandon()
+        super().close()
+
+
 def opener(name: str) -> Opener:
     """Return what opens a transport.
 
@@ -25,62 +84,23 @@ def opener(name: str) -> Opener:
 
     Raises:
         UsageError: It names no transport.
-        HardwareError: What it needs is not installed.
     """
-    require_moteus()
     if name == "pi3hat":
         return _open_pi3hat
     if "/" in name:
         if not Path(name).exists():
             raise UsageError(f"There is no serial port {name}; give {_FORMS}.")
-        return lambda: _open_serial(name)
+        return lambda: Transport([TolerantFdcanusb(name)])
     interface, colon, channel = name.partition(":")
     if not (interface and colon and channel):
         raise UsageError(f"There is no transport '{name}'; give {_FORMS}.")
-    _check_interface(interface)
-    return lambda: _open_can(interface, channel)
-
-
-def require_moteus() -> None:
-    """Refuse to go on without the client library.
-
-    Raises:
-        HardwareError: It is not installed.
-    """
-    try:
-        importlib.import_module("moteus")
-    except ModuleNotFoundError as error:
-        raise HardwareError(
-            f"Motors need {error.name}, which comes with the hardware extra:"
-            " pip install 'hopping-leg[hardware]'."
-        ) from error
-
-
-def _check_interface(interface: str) -> None:
-    can: Any = importlib.import_module("can")
     if interface not in can.VALID_INTERFACES:
         valid = ", ".join(sorted(can.VALID_INTERFACES))
         raise UsageError(f"python-can has no interface '{interface}'; it has: {valid}.")
-
-
-def _open_serial(path: str) -> Any:  # noqa: ANN401
-    from moteus import Transport
-
-    from hopping_leg.deploy.fdcanusb import TolerantFdcanusb
-
-    return Transport([TolerantFdcanusb(path)])
-
-
-def _open_can(interface: str, channel: str) -> Any:  # noqa: ANN401
-    from moteus import PythonCanDevice, Transport
-
-    return Transport([PythonCanDevice(interface=interface, channel=channel, fd=True)])
+    return lambda: Transport([PythonCanDevice(interface=interface, channel=channel, fd=True)])
 
 
 def _open_pi3hat() -> Any:  # noqa: ANN401
-    from moteus import Transport
-    from moteus.transport_factory import get_transport_factories
-
     for factory in get_transport_factories():
         if factory.name == "pi3hat":
             parser = argparse.ArgumentParser()

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.deploy.configuration import wanted
 from hopping_leg.deploy.joint_transform import JOINTS
+from hopping_leg.deploy.preflight import required_settings
 from hopping_leg.emulator import bus
 from hopping_leg.emulator.drive import Drive
 from hopping_leg.emulator.fault_injection import FaultInjector
@@ -129,7 +129,7 @@ def _drive(robot: Robot, joint: int, configured: bool) -> Drive:
     motor = (robot.hip, robot.knee)[joint].motor
     changes: dict[str, float] = {"id.id": servo.id}
     if configured:
-        changes |= {setting.name: setting.value for setting in wanted(robot, joint)}
+        changes |= {setting.name: setting.value for setting in required_settings(robot, joint)}
     return Drive(
         Identity(f"{robot.name} {JOINTS[joint]}"),
         Settings(**changes),

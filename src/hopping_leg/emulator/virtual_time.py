@@ -14,8 +14,8 @@ from moteus import Transport
 from moteus.transport_device import Frame as ClientFrame
 from moteus.transport_device import TransportDevice
 
-from hopping_leg.deploy.driver import MoteusLink
-from hopping_leg.deploy.fdcanusb import TolerantFdcanusb
+from hopping_leg.deploy.moteus_link import MoteusLink
+from hopping_leg.deploy.transport import TolerantFdcanusb
 from hopping_leg.emulator.frames import Frame, padded
 from hopping_leg.emulator.ports import Port, PtyPort
 from hopping_leg.emulator.robot import EmulatedRobot

@@ -4,7 +4,7 @@ import sys
 import pytest
 
 from hopping_leg.cli import main
-from hopping_leg.cli.extras import PURPOSES, survey
+from hopping_leg.cli.doctor import PURPOSES, survey
 
 
 def test_what_is_missing_or_too_old_is_named_with_its_command():
@@ -19,7 +19,7 @@ def test_what_is_missing_or_too_old_is_named_with_its_command():
 
 def test_an_extra_of_another_package_counts(monkeypatch):
     theirs = {"numpy": ["no-such-package; extra == 'fast'", "scipy; extra == 'good'"]}
-    monkeypatch.setattr("hopping_leg.cli.extras.requires", theirs.get)
+    monkeypatch.setattr("hopping_leg.cli.doctor.requires", theirs.get)
     lines = ["numpy[fast]>=1; extra == 'bench'", "numpy[good]; extra == 'view'"]
     found = {extra.name: extra for extra in survey(lines)}
     assert found["bench"].missing == ("numpy[fast]>=1",)
@@ -32,7 +32,7 @@ def test_a_package_for_another_platform_is_not_missing():
 
 
 def test_doctor_without_a_transport_looks_at_the_installation(monkeypatch, capsys):
-    monkeypatch.setattr("hopping_leg.cli.extras.requires", lambda _: ["nothing; extra == 'view'"])
+    monkeypatch.setattr("hopping_leg.cli.doctor.requires", lambda _: ["nothing; extra == 'view'"])
     assert main(["doctor"]) == 0
     shown = capsys.readouterr().out
     assert "view: missing nothing" in shown
@@ -65,7 +65,7 @@ raise SystemExit(main({1!r}))
     ("words", "said"),
     [
         (["doctor"], "hardware: "),
-        (["completion", "bash"], "emulate"),
+        (["--tyro-print-completion", "bash"], "emulate"),
         (["emulate", "--kinds"], "late_reply"),
     ],
     ids=" ".join,
@@ -77,8 +77,14 @@ def test_the_core_can_say_what_there_is(words, said):
     assert said in done.stdout
 
 
-def test_a_verb_without_its_extra_names_it():
-    code = WITHOUT_EXTRAS.format(OPTIONAL, ["emulate"])
+@pytest.mark.parametrize(
+    "words",
+    [["emulate"], *([v, "--transport", "/dev/null"] for v in ("doctor", "deploy"))],
+    ids=lambda words: words[0],
+)
+def test_a_verb_without_its_extra_names_it(words):
+    words += ["energy-shaping"] if words[0] == "deploy" else []
+    code = WITHOUT_EXTRAS.format(OPTIONAL, words)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 2
     assert "pip install 'hopping-leg[hardware]'" in done.stderr
