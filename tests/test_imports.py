@@ -25,8 +25,8 @@ ORDER = [
     "viewer",
     "cli",
 ]
-FOUNDATION = {"", "arrays", "cluster", "cma_strategy", "errors", "figure_style", "hop_detection"}
-FOUNDATION |= {"html_page", "io", "progress", "trace"}
+FOUNDATION = {"", "arrays", "cma_strategy", "errors", "figure_style", "hop_detection"}
+FOUNDATION |= {"html_page", "io", "progress", "trace", "workers"}
 TRAINING = {"torch", "stable_baselines3", "onnx", "tensorboard"}
 BESIDE = {("viewer", "rl"), ("emulator", "rl")}
 BESIDE |= {("deploy", room) for room in ("sim", "identify", "envs", "rl")}

@@ -6,10 +6,9 @@ is told or trained again.
 """
 
 import itertools
-import multiprocessing
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, as_completed
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +25,7 @@ from hopping_leg.robot.kinematics import joint_angles
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.sim import CONTROL_RATE, Engine, Ground, make_simulator
 from hopping_leg.sim.pybullet.world import import_pybullet
+from hopping_leg.workers import ProcessWorkers
 
 BAR = 0.015
 """Largest median error that a controller may have in the other engine, m."""
@@ -111,7 +111,7 @@ def bench_engines(
     """
     import_pybullet()
     places = list(itertools.product(study.worlds, study.controllers))
-    with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
+    with ProcessWorkers(workers) as pool:
         hops = [pool.submit(_hop_timed, study, *place) for place in places]
         rates = [pool.submit(_rate, study, *rate) for rate in study.rates]
         drops = [pool.submit(_drop, study, world) for world in study.worlds]

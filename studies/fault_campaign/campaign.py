@@ -4,13 +4,10 @@ Finished trials are kept in a file, one JSON line each, and are not repeated.
 """
 
 import json
-import multiprocessing
-import os
-import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from importlib.metadata import version
@@ -23,6 +20,7 @@ import numpy as np
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.parameters import Robot
+from hopping_leg.workers import ProcessWorkers
 from studies.fault_campaign.case import Case, Result
 from studies.fault_campaign.families import FAMILIES
 from studies.fault_campaign.live import LIVE, play_live
@@ -202,30 +200,12 @@ def _run(cases: Sequence[Case], workers: int) -> Iterator[Row]:
 
 
 def _run_virtual(cases: Sequence[Case], workers: int) -> Iterator[Row]:
-    workers = min(workers or multiprocessing.cpu_count(), len(cases))
-    if workers <= 1:
-        yield from map(play_case, cases)
-        return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, context, _leave_with_parent, (os.getpid(),)) as pool:
-        futures: list[Future[Row]] = [pool.submit(play_case, case) for case in cases]
-        try:
-            for future in as_completed(futures):
-                yield future.result()
-        finally:
-            for future in futures:
-                future.cancel()
-
-
-def _leave_with_parent(parent: int) -> None:
-    """Let a worker end when its campaign was killed: nobody else would end it."""
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(1.0)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
+    with ProcessWorkers(workers) as processes:
+        if min(processes.count, len(cases)) <= 1:
+            yield from map(play_case, cases)
+            return
+        for future in as_completed([processes.submit(play_case, case) for case in cases]):
+            yield future.result()
 
 
 def play_case(case: Case) -> Row:

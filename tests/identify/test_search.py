@@ -9,13 +9,12 @@ from hopping_leg.identify.parameters import LegHypothesis, choose
 from hopping_leg.identify.plan import make_plan, pass_names
 from hopping_leg.identify.recording import make_recording
 from hopping_leg.identify.search import (
-    Cluster,
     Searcher,
     SearchOptions,
     second_pass,
-    split_population,
 )
 from hopping_leg.identify.windows import cut
+from hopping_leg.workers import RayWorkers, map_rows
 from tests.clusters import two_machines
 from tests.identify.searches import CAD, TRUTH
 from tests.identify.searches import RUN as TWIN_RUN
@@ -33,7 +32,7 @@ def objective():
 
 def test_a_population_in_parts_gets_the_same_costs():
     whole = objective()(VECTORS)
-    parts = [objective()(part) for part in split_population(VECTORS, 3)]
+    parts = [objective()(part) for part in np.array_split(VECTORS, 3)]
     np.testing.assert_array_equal(np.concatenate(parts), whole)
 
 
@@ -49,11 +48,10 @@ def test_machines_of_a_cluster_give_the_same_bits():
     pytest.importorskip("ray", reason="Ray is not installed (extra 'cluster')")
     goal = objective()
     with two_machines() as address:
-        spread = Cluster(goal, address)
-        assert spread.workers == 2
-        np.testing.assert_array_equal(spread(VECTORS), goal(VECTORS))
-        residuals = Cluster(goal.residuals, address)
-        np.testing.assert_array_equal(residuals(VECTORS), goal.residuals(VECTORS))
+        workers = RayWorkers(address)
+        for function in (goal, goal.residuals):
+            there = map_rows(workers, function, VECTORS)
+            np.testing.assert_array_equal(there, function(VECTORS))
 
 
 def test_the_second_pass_stays_near_the_first():

@@ -48,11 +48,9 @@ def test_the_best_goes_on_with_the_threads_of_all(scores, best, finished, tmp_pa
     def start(number):
         return RunFolder(out / f"start-{number}", TINY, ROBOT, 100 + number, None)
 
-    def work(_work, count):
-        assert count == len(scores)
-        for number, score in enumerate(scores):
-            policy = b"policy %d" % number if finished else None
-            leave(start(number), score=score, minutes=3.0 + number, policy=policy)
+    def work(_starts, number):
+        policy = b"policy %d" % number if finished else None
+        leave(start(number), score=scores[number], minutes=3.0 + number, policy=policy)
 
     def train(_recipe, _robot, _seed, folder, **options):
         number = int(folder.name[-1])
@@ -60,7 +58,8 @@ def test_the_best_goes_on_with_the_threads_of_all(scores, best, finished, tmp_pa
         leave(start(number), score=0, minutes=0, policy=b"policy %d" % number)
         leave(start(number), score=scores[number], minutes=3.0 + number, policy=None)
 
-    monkeypatch.setattr(module, "work_here", work)
+    monkeypatch.setattr(ParallelSeeds, "work", work)
+    monkeypatch.setattr(module.ProcessWorkers, "map", lambda _, f, args: [f(*a) for a in args])
     monkeypatch.setattr(module, "train", train)
     several = ParallelSeeds(TINY, ROBOT, 5, out, len(scores), threads=2, quiet=True)
     result = several.train()

@@ -248,10 +248,10 @@ def test_a_file_is_no_database_for_machines_elsewhere(small, monkeypatch):
     class Cluster:
         elsewhere = ("node-2", "node-3")
 
-        def __init__(self, address):
+        def __init__(self, address, count):
             assert address == "10.0.0.1:6379"
 
-    monkeypatch.setattr(tuning, "RayCluster", Cluster)
+    monkeypatch.setattr(tuning, "RayWorkers", Cluster)
     with pytest.raises(UsageError, match=r"node-2, node-3 cannot share .* postgresql"):
         tune(small, ray="10.0.0.1:6379")
     assert not (small.out.parent / "study.db").exists()

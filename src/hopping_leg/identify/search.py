@@ -8,6 +8,7 @@ armature parameters derived from the first pass."
 """
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,7 +16,6 @@ from pathlib import Path
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.cluster import RayCluster
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.cost import Objective, RobustLoss, total_costs
 from hopping_leg.identify.optimizers import (
@@ -31,6 +31,7 @@ from hopping_leg.identify.parameters import ParameterSet, choose
 from hopping_leg.identify.plan import FitPlan, pass_names
 from hopping_leg.identify.recording_format import Rig
 from hopping_leg.identify.windows import deal
+from hopping_leg.workers import RayWorkers, map_rows
 
 _FACTOR = 2.0
 """The paper's second pass keeps the first one's parameters within this factor."""
@@ -205,7 +206,9 @@ class Searcher:
 
     def _spread(self, evaluate: Evaluate) -> Evaluate:
         """Return a function of a population, on the cluster if there is one."""
-        return evaluate if self.ray is None else Cluster(evaluate, self.ray)
+        if self.ray is None:
+            return evaluate
+        return functools.partial(map_rows, RayWorkers(self.ray), evaluate)
 
 
 def second_pass(
@@ -235,43 +238,6 @@ def second_pass(
             high = min(high, max(value / _FACTOR, value * _FACTOR, value + reach))
         starts[p.name], every[p.name] = value, (low, high)
     return choose(first.base, [*first.names, *added], bounds=every, start=starts)
-
-
-class Cluster:
-    """Spreads populations over the workers of a Ray cluster.
-
-    A candidate's simulation does not depend on which candidates share its batch, so splitting a
-    population changes nothing but the time.
-
-    Args:
-        evaluate: What each worker runs; sent to them once.
-        address: Address of the cluster, or None to start one on this machine.
-        workers: How many parts to cut a population into; None takes one per CPU of the cluster.
-
-    Raises:
-        UsageError: Ray is not installed or the cluster cannot be reached.
-    """
-
-    def __init__(
-        self, evaluate: Evaluate, address: str | None = None, workers: int | None = None
-    ) -> None:
-        self._cluster = RayCluster(address)
-        self.workers = workers or self._cluster.cores
-        self._evaluate = self._cluster.put(evaluate)
-
-    def __call__(self, vectors: Array) -> Array:
-        """Return what ``evaluate`` returns, in the population's order."""
-        calls = ((self._evaluate, part) for part in split_population(vectors, self.workers))
-        return np.concatenate(self._cluster.map(_evaluate_part, calls))
-
-
-def split_population(vectors: Array, workers: int) -> list[Array]:
-    """Cut a population (n, k) into at most ``workers`` parts of nearly equal size, in order."""
-    return np.array_split(vectors, min(workers, len(vectors)))
-
-
-def _evaluate_part(evaluate: Evaluate, vectors: Array) -> Array:
-    return evaluate(vectors)
 
 
 class _Rounds:

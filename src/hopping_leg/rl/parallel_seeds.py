@@ -15,7 +15,6 @@ from typing import Any
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically, write_json
-from hopping_leg.rl.crew import work_here
 from hopping_leg.rl.loggers import Log
 from hopping_leg.rl.model_card import write_card
 from hopping_leg.rl.policy_evaluation import (
@@ -30,6 +29,7 @@ from hopping_leg.rl.run_folder import RunFolder, read_result
 from hopping_leg.rl.scale import fit
 from hopping_leg.rl.train import Trained, check, train
 from hopping_leg.robot.parameters import Robot
+from hopping_leg.workers import ProcessWorkers
 
 _DECISION = "decision.json"
 
@@ -94,7 +94,8 @@ class ParallelSeeds:
         )
         folder.begin(resume=resume)
         if any(self._decision(number) is None for number in range(self.count)):
-            work_here(self.work, self.count)
+            with ProcessWorkers(self.count) as workers:
+                workers.map(self.work, ((number,) for number in range(self.count)))
         return self._finish(folder)
 
     def folder(self, number: int) -> Path:

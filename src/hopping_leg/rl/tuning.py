@@ -6,7 +6,6 @@ the training's checkpoint where it can reach it.
 """
 
 import dataclasses
-import functools
 import shutil
 import warnings
 from dataclasses import dataclass
@@ -23,10 +22,8 @@ from optuna.trial import FrozenTrial, Trial, TrialState
 from sqlalchemy import Connection, Engine, event
 from sqlalchemy.exc import SQLAlchemyError
 
-from hopping_leg.cluster import RayCluster
 from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.io import plain
-from hopping_leg.rl.crew import work_here, work_on
 from hopping_leg.rl.policy_evaluation import FINAL_SEEDS, FIRST_SEED
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes import change, get_recipe
@@ -35,6 +32,7 @@ from hopping_leg.rl.search_space import SPACES, defaults, dimensions, suggest
 from hopping_leg.rl.train import train
 from hopping_leg.rl.trial_record import ERROR, FOLDER, record
 from hopping_leg.robot import load_robot
+from hopping_leg.workers import ProcessWorkers, RayWorkers
 
 _FAILURES = (PhysicsError, ValueError, FloatingPointError)
 """What a training with bad numbers may end in; the study goes on."""
@@ -111,12 +109,13 @@ def tune(tuning: Tuning, workers: int | None = None, ray: str | None = None) -> 
         UsageError: The database cannot be used, or holds a study of something else; there is no
             such cluster, or some of it cannot reach the database.
     """
-    cluster = None if ray is None else _reach(tuning, ray)
+    cluster = None if ray is None else _reach(tuning, ray, workers)
     study = open_study(tuning)
-    if cluster is None:
-        work_here(functools.partial(work, tuning), workers or 1)
+    if cluster is not None:
+        cluster.map(work, ((_anywhere(tuning), k) for k in range(cluster.count)))
     else:
-        work_on(cluster, functools.partial(work, _anywhere(tuning)), workers)
+        with ProcessWorkers(workers or 1) as here:
+            here.map(work, ((tuning, k) for k in range(here.count)))
     return {**tuning.conditions, "robot": tuning.robot, **record(study)}
 
 
@@ -242,9 +241,9 @@ def _run_trial(trial: Trial, tuning: Tuning) -> float:
     return float(read_result(folder)["selected"]["score_m"])
 
 
-def _reach(tuning: Tuning, address: str) -> RayCluster:
+def _reach(tuning: Tuning, address: str, workers: int | None) -> RayWorkers:
     """Return the cluster; refuse a file as database where others than this machine would work."""
-    cluster = RayCluster(address)
+    cluster = RayWorkers(address, workers)
     if tuning.in_file and cluster.elsewhere:
         raise UsageError(
             f"{', '.join(cluster.elsewhere)} cannot share the study in {tuning.storage}: SQLite is"

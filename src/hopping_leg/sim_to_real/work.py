@@ -3,15 +3,12 @@
 A job that is done is not done again, so that a study that was killed goes on where it was.
 """
 
-import multiprocessing
-import os
-import threading
-import time
 from collections.abc import Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from typing import Protocol
 
 from hopping_leg.sim_to_real.board import Board
+from hopping_leg.workers import ProcessWorkers
 
 _LOOK_EVERY = 1.0
 
@@ -67,10 +64,8 @@ def work(jobs: Sequence[Job], at_once: int, board: Board) -> None:
 
 
 def _share_out(jobs: Sequence[Job], at_once: int, board: Board) -> None:
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(min(at_once, len(jobs)), context, _end_with, (os.getpid(),))
-    try:
-        running = {pool.submit(_run, job): job for job in jobs}
+    with ProcessWorkers(min(at_once, len(jobs))) as workers:
+        running = {workers.submit(_run, job): job for job in jobs}
         while running:
             ended, _ = wait(running, _LOOK_EVERY, FIRST_COMPLETED)
             for future in ended:
@@ -78,8 +73,6 @@ def _share_out(jobs: Sequence[Job], at_once: int, board: Board) -> None:
                 future.result()
                 board.finish(job.name, job.weight)
             _show(running, at_once, board)
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
 
 
 def _show(running: dict[Future[None], Job], at_once: int, board: Board) -> None:
@@ -95,14 +88,3 @@ def _show(running: dict[Future[None], Job], at_once: int, board: Board) -> None:
 def _run(job: Job) -> None:
     if not job.done:
         job.run(quiet=True)
-
-
-def _end_with(parent: int) -> None:
-    """Let this process end when its parent was killed, which could not tell it so."""
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(_LOOK_EVERY)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()

@@ -1,0 +1,215 @@
+"""Work shared out, to processes of this machine or to a Ray cluster, with the same results."""
+
+import os
+import signal
+import socket
+import threading
+from collections.abc import Callable, Iterable
+from concurrent.futures import FIRST_EXCEPTION, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from types import TracebackType
+from typing import Any, ParamSpec, Protocol, Self, TypeVar
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.errors import HoppingLegError, UsageError
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+_PATIENCE = 5.0
+"""How long an address may take to answer, s."""
+
+_LOOK_EVERY = 0.5
+"""Time between two looks for an interruption, s."""
+
+
+class Workers(Protocol):
+    """What shares work out."""
+
+    @property
+    def count(self) -> int:
+        """How many tasks run at once."""
+        ...
+
+    def map(self, function: Callable[..., R], arguments: Iterable[tuple[Any, ...]]) -> list[R]:
+        """Call a function once per tuple of arguments; return what it returns, in their order.
+
+        Raises:
+            HoppingLegError: Of a task, as it was raised there.
+            UsageError: A worker died.
+        """
+        ...
+
+
+def map_rows(workers: Workers, function: Callable[[Array], Array], rows: Array) -> Array:
+    """Return what a function returns for rows (n, k), computed in parts of nearly equal size.
+
+    Args:
+        workers: Compute a part each.
+        function: Of any number of rows, one by one independent; (n, k) to (n, ...).
+        rows: Its argument.
+    """
+    parts = np.array_split(rows, min(workers.count, len(rows)))
+    return np.concatenate(workers.map(function, ((part,) for part in parts)))
+
+
+class ProcessWorkers:
+    """Processes of this machine, as a context manager.
+
+    They end with it, and with this process, however that one ends: the same command, given again,
+    must not find its old workers still writing.
+
+    Args:
+        count: How many; 0 takes one per core. The work of a single one is done in this process.
+    """
+
+    def __init__(self, count: int = 0) -> None:
+        self.count = count or os.cpu_count() or 1
+
+    def __enter__(self) -> Self:
+        """Make ready; processes begin with the first work."""
+        context = get_context("spawn")
+        ended, self._alive = context.Pipe(duplex=False)
+        self._pool = ProcessPoolExecutor(self.count, context, _watch, (ended,))
+        return self
+
+    def submit(self, function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> Future[R]:
+        """Begin a call in a process of its own, as soon as one is free."""
+        return self._pool.submit(function, *args, **kwargs)
+
+    def map(self, function: Callable[..., R], arguments: Iterable[tuple[Any, ...]]) -> list[R]:
+        """Call a function once per tuple of arguments; return what it returns, in their order.
+
+        Raises:
+            HoppingLegError: Of a task, as it was raised there.
+            UsageError: A process died.
+        """
+        if self.count == 1:
+            return [function(*values) for values in arguments]
+        futures = [self.submit(function, *values) for values in arguments]
+        left = set(futures)
+        while left:
+            # A signal that another thread takes does not end an endless wait.
+            done, left = wait(left, _LOOK_EVERY, FIRST_EXCEPTION)
+            for future in done:
+                if isinstance(error := future.exception(), BrokenProcessPool):
+                    raise UsageError(
+                        "A worker ended early; call the same command again to go on."
+                    ) from error
+                future.result()
+        return [future.result() for future in futures]
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """End the processes, and what they do if an error ends the work."""
+        self._pool.shutdown(wait=error is None, cancel_futures=True)
+        self._alive.close()
+
+
+def _watch(ended: Connection) -> None:
+    """Leave interruptions to the parent, and end with it: then nobody holds the other end."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def watch() -> None:
+        ended.poll(None)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+class RayWorkers:
+    """The CPUs of a Ray cluster; one that this process has joined already stays the one.
+
+    Args:
+        address: Of the cluster; ``local`` or None starts one on this machine, which ends with this
+            process.
+        count: How many tasks at once; None takes one per CPU.
+
+    Raises:
+        UsageError: Ray is not installed or the cluster cannot be reached.
+    """
+
+    def __init__(self, address: str | None = None, count: int | None = None) -> None:
+        self._ray = _import_ray()
+        self._sent: tuple[object, object] = (None, None)
+        if not self._ray.is_initialized():
+            try:
+                _knock(address)
+                self._ray.init(address=address or "local", log_to_driver=False)
+            except (OSError, ValueError, RuntimeError) as error:
+                raise UsageError(_unreached(address, str(error).rstrip("."))) from error
+        self.count = count or max(1, int(self._ray.cluster_resources().get("CPU", 1)))
+
+    @property
+    def elsewhere(self) -> list[str]:
+        """Names of its machines other than this one."""
+        names = {n["NodeManagerHostname"] for n in self._ray.nodes() if n["Alive"]}
+        return sorted(names - {socket.gethostname()})
+
+    def map(self, function: Callable[..., R], arguments: Iterable[tuple[Any, ...]]) -> list[R]:
+        """Call a function once per tuple of arguments; return what it returns, in their order.
+
+        A task takes one CPU; one whose process or machine dies is begun again a few times. The
+        same function, called again, is sent once.
+
+        Raises:
+            HoppingLegError: Of a task, as it was raised there.
+            UsageError: Workers died again and again.
+        """
+        exceptions = self._ray.exceptions
+        if self._sent[0] is not function:
+            self._sent = function, self._ray.put(function)
+        task = self._ray.remote(_call)
+        try:
+            return list(self._ray.get([task.remote(self._sent[1], *v) for v in arguments]))
+        except exceptions.RayTaskError as error:
+            if isinstance(error.cause, HoppingLegError):
+                raise error.cause from None
+            raise
+        except exceptions.RayError as error:
+            raise UsageError(
+                f"A worker of the Ray cluster died: {str(error).splitlines()[0].rstrip('.')}; call"
+                " the same command again to go on."
+            ) from error
+
+
+def _call(function: Callable[..., Any], *values: Any) -> Any:  # noqa: ANN401
+    return function(*values)
+
+
+def _unreached(address: str | None, why: str) -> str:
+    if address in (None, "local"):
+        return f"Ray does not start on this machine: {why}; name a cluster by its address instead."
+    return (
+        f"There is no Ray cluster at {address}: {why}; start one with `ray start --head`, or leave"
+        " the address out."
+    )
+
+
+def _knock(address: str | None) -> None:
+    """Fail at once where nothing answers; Ray itself would try for minutes.
+
+    Raises:
+        OSError: Nothing answers at an address of the form ``host:port``.
+    """
+    host, _, port = (address or "").removeprefix("ray://").rpartition(":")
+    if host and port.isdigit():
+        socket.create_connection((host, int(port)), _PATIENCE).close()
+
+
+def _import_ray() -> Any:  # noqa: ANN401
+    try:
+        import ray
+    except ModuleNotFoundError as error:
+        raise UsageError(
+            "A cluster needs Ray; install it with `pip install 'hopping-leg[cluster]'`."
+        ) from error
+    return ray

@@ -1,0 +1,144 @@
+"""Work shared out gives the same as at home, and nobody works on when its boss is gone."""
+
+import builtins
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hopping_leg.errors import PhysicsError, UsageError
+from hopping_leg.workers import ProcessWorkers, RayWorkers, map_rows
+from tests.clusters import local, two_machines
+
+
+def double(number):
+    return 2 * number
+
+
+def blow_up(number):
+    raise PhysicsError(f"Simulation {number} blew up.")
+
+
+def die_once(mark):
+    if not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return "lived"
+
+
+def die(number):
+    if number:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+def squares(rows):
+    return rows**2
+
+
+def check_contract(workers):
+    """Check what holds for all workers: order, errors as raised, rows in parts."""
+    assert workers.count == 2
+    assert workers.map(double, ((k,) for k in range(20))) == list(range(0, 40, 2))
+    with pytest.raises(PhysicsError) as caught:
+        workers.map(blow_up, [(7,)])
+    assert str(caught.value) == "Simulation 7 blew up."
+    assert type(caught.value) is PhysicsError
+    rows = np.arange(10.0).reshape(5, 2)
+    np.testing.assert_array_equal(map_rows(workers, squares, rows), rows**2)
+
+
+def test_processes_give_results_in_order_and_errors_as_they_were_raised():
+    with ProcessWorkers(2) as workers:
+        check_contract(workers)
+    with ProcessWorkers(1) as workers:
+        assert workers.map(os.getpid, [()]) == [os.getpid()]
+    with ProcessWorkers(2) as workers, pytest.raises(UsageError, match="A worker ended early"):
+        workers.map(die, [(0,), (1,)])
+
+
+_KILLED = """
+import sys, time
+from hopping_leg.workers import ProcessWorkers
+if __name__ == "__main__":
+    with ProcessWorkers(2) as workers:
+        workers.map(time.sleep, [(300.0,)] * 2)
+"""
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
+def test_processes_end_with_who_began_them(tmp_path, how):
+    script = tmp_path / "script.py"
+    script.write_text(_KILLED)
+    process = subprocess.Popen([sys.executable, str(script)], stderr=subprocess.DEVNULL)
+    wait_for(lambda: len(children(process.pid)) >= 3)  # multiprocessing's own, and two workers
+    begun = children(process.pid)
+    process.send_signal(how)
+    process.wait(60)
+    wait_for(lambda: not any(Path(f"/proc/{child}/cmdline").exists() for child in begun))
+
+
+def children(parent):
+    """Return the processes that a process has begun."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            if (entry / "stat").read_text().rsplit(")", 1)[1].split()[1] == str(parent):
+                found.append(int(entry.name))
+    return found
+
+
+def wait_for(happened):
+    deadline = time.monotonic() + 120
+    while not happened():
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+
+
+@pytest.mark.slow
+def test_a_cluster_gives_results_in_order_and_errors_as_they_were_raised():
+    pytest.importorskip("ray", reason="Ray is not installed (extra 'cluster')")
+    with local():
+        cluster = RayWorkers("local")
+        check_contract(cluster)
+        assert cluster.elsewhere == []
+
+
+@pytest.mark.slow
+def test_a_worker_that_dies_begins_again(tmp_path):
+    pytest.importorskip("ray", reason="Ray is not installed (extra 'cluster')")
+    with local():
+        assert RayWorkers().map(die_once, [(tmp_path / "mark",)]) == ["lived"]
+
+
+@pytest.mark.slow
+def test_an_address_is_joined():
+    pytest.importorskip("ray", reason="Ray is not installed (extra 'cluster')")
+    with two_machines() as address:
+        assert RayWorkers(address).count == 2
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1:1", "ray://127.0.0.1:1"])
+def test_where_no_cluster_answers_there_is_a_sentence_at_once(address):
+    ray = pytest.importorskip("ray", reason="Ray is not installed (extra 'cluster')")
+    ray.shutdown()
+    with pytest.raises(UsageError, match=rf"no Ray cluster at {address}: .*; start one"):
+        RayWorkers(address)
+
+
+def test_without_ray_there_is_a_sentence(monkeypatch):
+    real = builtins.__import__
+
+    def refuse(name, *rest, **more):
+        if name == "ray":
+            raise ModuleNotFoundError(name)
+        return real(name, *rest, **more)
+
+    monkeypatch.setattr(builtins, "__import__", refuse)
+    with pytest.raises(UsageError, match=r"hopping-leg\[cluster\]"):
+        RayWorkers()
