@@ -5,7 +5,6 @@ import pytest
 
 from hopping_leg.identify.encoder_offsets import OffsetFinder
 from hopping_leg.identify.parameters import LegHypothesis
-from hopping_leg.identify.recording import with_metadata
 from hopping_leg.identify.recording_format import PAIRS
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.validation import open_loop
@@ -26,7 +25,7 @@ def off_zero(run):
     ]
     table = run.trace.table.with_columns(columns)
     moved = dataclasses.replace(run, trace=dataclasses.replace(run.trace, table=table))
-    return with_metadata(moved, zeroed=True)
+    return moved.with_metadata(zeroed=True)
 
 
 RUN = off_zero(record(PENDULUM, swing(3.0, rate=500.0), rate=500.0, onboard="torque"))
@@ -44,13 +43,13 @@ def test_a_wrong_robot_finds_about_the_same_zeros():
 def test_simulations_show_what_the_encoders_show():
     got = WindowSimulator([RUN], cut([RUN], 0.25), timestep=STEP).run([TRUE]).position
     measured = RUN.array("position").reshape(12, 125, 2)
-    believed = with_metadata(RUN, zeroed=False)
+    believed = RUN.with_metadata(zeroed=False)
     wrong = WindowSimulator([believed], cut([believed], 0.25), timestep=STEP).run([TRUE]).position
     assert np.abs(got[0] - measured).max() < 0.2 * np.abs(wrong[0] - measured).max()
 
 
 def test_what_tells_the_zeros_is_not_predicted():
-    short = with_metadata(RUN, zeroed=True)
+    short = RUN.with_metadata(zeroed=True)
     first = dataclasses.replace(
         short, trace=dataclasses.replace(short.trace, table=short.trace.table[:550])
     )
@@ -60,8 +59,8 @@ def test_what_tells_the_zeros_is_not_predicted():
 
 @pytest.mark.parametrize("onboard", ["zoh", "continuous"])
 def test_a_drive_that_tracks_positions_is_believed(onboard):
-    run = with_metadata(record(PENDULUM, swing(1.0)), onboard=onboard, zeroed=True)
-    plain = with_metadata(run, zeroed=False)
+    run = record(PENDULUM, swing(1.0)).with_metadata(onboard=onboard, zeroed=True)
+    plain = run.with_metadata(zeroed=False)
     pair = [
         WindowSimulator([r], cut([r]), timestep=STEP).run([TRUE]).position for r in (run, plain)
     ]

@@ -6,7 +6,6 @@ import pytest
 
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.plan import make_plan
-from hopping_leg.identify.recording import with_metadata
 from hopping_leg.robot.model import TIMESTEP
 from tests.identify.twin import LEG, record, swing
 
@@ -24,9 +23,9 @@ def test_a_fixed_base_says_nothing_about_rail_and_contact():
 
 def test_known_gains_are_kept_and_unknown_ones_are_fitted():
     assert "drive.knee.stiffness" not in make_plan([FIXED], LEG).parameters.names
-    unknown = with_metadata(FIXED, stiffness=None)
+    unknown = FIXED.with_metadata(stiffness=None)
     assert "drive.knee.stiffness" in make_plan([unknown], LEG).parameters.names
-    doubtful = with_metadata(FIXED, gains_exact=False)
+    doubtful = FIXED.with_metadata(gains_exact=False)
     plan = make_plan([doubtful], LEG)
     assert plan.start.get("drive.knee.stiffness") == FIXED.metadata.stiffness[1]
 
@@ -67,8 +66,8 @@ def test_held_commands_are_simulated_with_the_step_of_training():
 
 
 def test_a_drive_at_its_limit_has_its_torque_speed_line_fitted():
-    weak = with_metadata(FIXED, onboard="continuous", gains_exact=False)
-    strong = with_metadata(weak, stiffness=(800.0, 800.0), damping=(0.0, 0.0))
+    weak = FIXED.with_metadata(onboard="continuous", gains_exact=False)
+    strong = weak.with_metadata(stiffness=(800.0, 800.0), damping=(0.0, 0.0))
     lines = {"hip.motor.peak_torque", "knee.motor.no_load_speed"}
     assert not lines & set(make_plan([weak], LEG).parameters.names)
     assert lines <= set(make_plan([strong], LEG).parameters.names)

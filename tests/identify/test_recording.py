@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from hopping_leg.errors import HoppingLegError, RecordingError, UsageError
 from hopping_leg.identify.importers import IMPORTERS
-from hopping_leg.identify.recording import load_recording, make_recording, with_metadata
+from hopping_leg.identify.recording import load_recording, make_recording
 from hopping_leg.identify.recording_format import COLUMNS, PAIRS
 from hopping_leg.trace import Trace
 from tests.identify.runs import METADATA, SIDECAR, swinging, write_run
@@ -37,7 +37,7 @@ def test_a_clean_run_is_read_without_a_word(tmp_path):
 
 def test_the_native_form_keeps_everything(tmp_path):
     first = load_recording(write_run(tmp_path, swinging()))
-    first = with_metadata(first, stiffness=(2.0, 30.0), torque_limit=(10.0, 20.0), startup_rows=4)
+    first = first.with_metadata(stiffness=(2.0, 30.0), torque_limit=(10.0, 20.0), startup_rows=4)
     path = tmp_path / "native.parquet"
     first.save(path)
     back = load_recording(path)

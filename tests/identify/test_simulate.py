@@ -5,7 +5,6 @@ import pytest
 
 from hopping_leg.errors import RecordingError
 from hopping_leg.identify.parameters import LegHypothesis
-from hopping_leg.identify.recording import with_metadata
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import cut
 from tests.identify.twin import LEG, STEP, record, swing
@@ -52,7 +51,7 @@ def test_a_candidate_does_not_depend_on_its_company_nor_on_threads():
 
 def test_a_continuous_pd_is_the_limit_of_a_fast_sampled_one():
     run = record(LEG, swing(1.0))
-    continuous = simulator([with_metadata(run, onboard="continuous")]).run([TRUE]).position
+    continuous = simulator([run.with_metadata(onboard="continuous")]).run([TRUE]).position
     sampled = simulator([run]).run([TRUE]).position
     fast = record(LEG, np.repeat(swing(1.0), 5, axis=0), rate=1000.0)
     exact = fast.array("position")[::5]
@@ -87,7 +86,7 @@ def test_friction_that_grows_with_load_slows_the_leg():
 
 
 def test_a_lagging_velocity_makes_a_stiff_drive_ring():
-    run = with_metadata(record(LEG, swing(1.0)), onboard="continuous", damping=(0.3, 3.2))
+    run = record(LEG, swing(1.0)).with_metadata(onboard="continuous", damping=(0.3, 3.2))
     lagging = TRUE.replace({"drive.velocity_window": 0.012})
     torque = simulator([run]).run([TRUE, lagging]).torque[:, 0, 50:, 1]
     rough = np.abs(np.diff(torque, n=2, axis=1)).mean(axis=1)
@@ -95,7 +94,7 @@ def test_a_lagging_velocity_makes_a_stiff_drive_ring():
 
 
 def test_an_unknown_gain_gets_a_sentence():
-    run = with_metadata(record(LEG, swing(0.5)), stiffness=None)
+    run = record(LEG, swing(0.5)).with_metadata(stiffness=None)
     with pytest.raises(RecordingError, match="does not say the stiffness"):
         simulator([run]).run([TRUE])
     fitted = TRUE.replace({"drive.hip.stiffness": 8.0, "drive.knee.stiffness": 8.0})

@@ -11,7 +11,7 @@ WRONG = TRUE.replace({"hip.friction": 0.4})
 
 def judge(hypothesis, onboard="zoh"):
     run = record(LEG, swing(2.0), onboard=onboard)
-    return validate([run], hypothesis, timestep=STEP, unscored=0.5, horizons=(0.2, 0.5))
+    return validate([run], hypothesis, STEP)
 
 
 @pytest.mark.parametrize("onboard", ["zoh", "torque"])
@@ -33,7 +33,7 @@ def test_without_torques_there_is_no_open_loop():
     run = record(LEG, swing(2.0))
     table = run.trace.table.with_columns(hip_torque_nm=None, knee_torque_nm=None)
     bare = run.__class__(run.trace.__class__(table), run.metadata, "bare")
-    validation = validate([bare], TRUE, timestep=STEP, unscored=0.5, horizons=(0.2,))
+    validation = validate([bare], TRUE, STEP)
     assert np.isnan(validation.closed_loop_torque).all()
     assert np.isnan(validation.open_loop_position[0.2]).all()
 
@@ -44,7 +44,6 @@ def test_where_torques_are_commanded_no_loop_is_closed():
     assert validation.open_loop_position[0.2][0] > 1e-3
     closed, commanded = (record(LEG, swing(2.0), onboard=name) for name in ("zoh", "torque"))
     pairs = [
-        validate(runs, WRONG, timestep=STEP, unscored=0.5, horizons=()).closed_loop_position
-        for runs in ([closed], [closed, commanded])
+        validate(runs, WRONG, STEP).closed_loop_position for runs in ([closed], [closed, commanded])
     ]
     assert pairs[0] == pairs[1]

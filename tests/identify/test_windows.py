@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from hopping_leg.errors import RecordingError, UsageError
-from hopping_leg.identify.windows import cut, deal, hold_out, part, split
+from hopping_leg.errors import RecordingError
+from hopping_leg.identify.windows import cut, deal, hold_out, part
 from tests.identify.twin import LEG, record, swing
 
 RUN = record(LEG, swing(3.0))
@@ -19,22 +19,9 @@ def test_without_a_duration_a_recording_is_one_window():
     assert (window.start, window.length, window.unscored) == (0, 600, 20)
 
 
-def test_a_split_loses_and_repeats_nothing():
-    windows = cut([RUN], 0.25)
-    fit, held = split(windows, 0.25, np.random.default_rng(0))
-    assert len(held) == 3
-    assert sorted((*fit, *held), key=lambda w: w.start) == windows
-
-
 def test_a_short_recording_gets_a_sentence():
     with pytest.raises(RecordingError, match="too short for windows of 5 s"):
         cut([RUN], 5.0)
-
-
-@pytest.mark.parametrize("share", [0.0, 1.0])
-def test_a_split_needs_a_share(share):
-    with pytest.raises(UsageError, match="between 0 and 1"):
-        split(cut([RUN], 0.5), share, np.random.default_rng(0))
 
 
 def test_dealt_windows_are_all_there_and_every_share_is_spread_over_them():

@@ -15,6 +15,7 @@ from hopping_leg.errors import (
     UsageError,
     unknown_name,
 )
+from hopping_leg.identify import validation
 from hopping_leg.identify.cost import Objective, Scoring
 from hopping_leg.identify.identifiability import Identifiability, identifiability
 from hopping_leg.identify.optimizers import jacobian
@@ -25,7 +26,7 @@ from hopping_leg.identify.recording_format import Rig
 from hopping_leg.identify.result import Identified, as_json, software_versions
 from hopping_leg.identify.run_folder import RunFolder
 from hopping_leg.identify.search import Pass, Report, Searcher, SearchOptions
-from hopping_leg.identify.validation import Validation, judge
+from hopping_leg.identify.validation import Validation
 from hopping_leg.identify.windows import SHORTEST, cut, duration, hold_out
 from hopping_leg.robot.model_mismatch import NO_MISMATCH
 from hopping_leg.robot.parameters import Robot
@@ -118,7 +119,7 @@ def identify(
         raise
     report("judging", 1.0, passes[-1].found.cost)
     hypotheses, step = (plan.start, hypothesis), plan.timestep
-    before, after = (judge(held, c, step, options.threads) for c in hypotheses)
+    before, after = (validation.validate(held, c, step, options.threads) for c in hypotheses)
     identified = Identified(
         hypothesis=hypothesis,
         start=plan.start,
@@ -146,7 +147,10 @@ def _judge_rigs(
     if len(rigs) == 1:
         return {}
     groups = {rig: [r for r in held if r.metadata.rig == rig] for rig in rigs}
-    return {rig: judge(group, hypothesis, timestep, threads) for rig, group in groups.items()}
+    return {
+        rig: validation.validate(group, hypothesis, timestep, threads)
+        for rig, group in groups.items()
+    }
 
 
 def _file_bounds(robot: Robot) -> dict[str, tuple[float, float]]:

@@ -34,34 +34,12 @@ from hopping_leg.identify.recording_format import (
 from hopping_leg.identify.unit_checks import STALL, Inspection, row_period
 from hopping_leg.trace import Trace
 
-TEXT_COLUMNS = {"phase"}
+_TEXT_COLUMNS = {"phase"}
 """Columns that hold words."""
 
-FLAGS = {"true": 1.0, "false": 0.0}
+_FLAGS = {"true": 1.0, "false": 0.0}
 _PARQUET = b"PAR1"
 _GZIP = b"\x1f\x8b"
-
-
-def read_bytes(path: Path) -> bytes:
-    """Return a file's content.
-
-    Raises:
-        RecordingError: It is missing, unreadable or empty.
-    """
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError as error:
-        raise RecordingError(f"There is no recording {path}.") from error
-    except OSError as error:
-        raise RecordingError(f"Cannot read the recording {path}: {error.strerror}.") from error
-    if not content:
-        raise RecordingError(f"{path} is empty; record again.")
-    return content
-
-
-def is_parquet(content: bytes) -> bool:
-    """Return whether a file's content begins like Parquet."""
-    return content.startswith(_PARQUET)
 
 
 def read_csv(content: bytes, origin: str) -> pl.DataFrame:
@@ -105,7 +83,7 @@ def as_numbers(table: pl.DataFrame, origin: str) -> pl.DataFrame:
     """
     columns = []
     for column in table.get_columns():
-        kind = pl.String if column.name in TEXT_COLUMNS else pl.Float64
+        kind = pl.String if column.name in _TEXT_COLUMNS else pl.Float64
         try:
             columns.append(column.cast(kind))
         except pl.exceptions.PolarsError as error:
@@ -140,13 +118,13 @@ def _rows(text: str, origin: str) -> Iterator[list[str]]:
 def _parse(name: str, texts: list[str], origin: str) -> pl.Series:
     words = pl.Series(name, texts, dtype=pl.String).str.strip_chars()
     words = words.set(words == "", None)
-    if name in TEXT_COLUMNS:
+    if name in _TEXT_COLUMNS:
         return words
     numbers = words.cast(pl.Float64, strict=False)
     strange = (words.is_not_null() & numbers.is_null()).arg_true()
     if strange.len() == 0:
         return numbers.fill_nan(None)
-    flags = words.str.to_lowercase().replace_strict(FLAGS, default=None, return_dtype=pl.Float64)
+    flags = words.str.to_lowercase().replace_strict(_FLAGS, default=None, return_dtype=pl.Float64)
     numbers = numbers.zip_with(numbers.is_not_null(), flags)
     for row in strange:
         if numbers[row] is None:
@@ -221,6 +199,10 @@ class Recording:
         edges = [0, *stalls.tolist(), len(self)]
         return [slice(a, b) for a, b in pairwise(edges)]
 
+    def with_metadata(self, **changes: Any) -> "Recording":  # noqa: ANN401
+        """Return the recording with other facts in its metadata, e.g. gains known elsewhere."""
+        return dataclasses.replace(self, metadata=dataclasses.replace(self.metadata, **changes))
+
     def save(self, path: Path) -> None:
         """Write the native form.
 
@@ -274,9 +256,18 @@ def load_recording(path: str | Path) -> Recording:
     """
     path = Path(path)
     origin = str(path)
-    content = read_bytes(path)
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError as error:
+        raise RecordingError(f"There is no recording {path}.") from error
+    except OSError as error:
+        raise RecordingError(f"Cannot read the recording {path}: {error.strerror}.") from error
+    if not content:
+        raise RecordingError(f"{path} is empty; record again.")
     digest = hashlib.sha256(content).hexdigest()
-    table, header = _native(path) if is_parquet(content) else (read_csv(content, origin), {})
+    table, header = (
+        _native(path) if content.startswith(_PARQUET) else (read_csv(content, origin), {})
+    )
     sidecar = _sidecar(path)
     names: dict[str, str] = {}
     if sidecar is not None:
@@ -358,10 +349,3 @@ def _typed(table: pl.DataFrame, origin: str) -> pl.DataFrame:
                 f"{origin}: column '{name}' holds {table[name].dtype} but must hold {dtype}."
             ) from error
     return pl.DataFrame(series).with_columns(pl.selectors.float().fill_nan(None))
-
-
-def with_metadata(recording: Recording, **changes: Any) -> Recording:  # noqa: ANN401
-    """Return the recording with other facts in its metadata, e.g. gains known from elsewhere."""
-    return dataclasses.replace(
-        recording, metadata=dataclasses.replace(recording.metadata, **changes)
-    )

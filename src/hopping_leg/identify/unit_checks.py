@@ -11,7 +11,7 @@ import polars as pl
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RecordingError, RobotError
-from hopping_leg.identify.recording_format import JOINTS, PAIRS, RecordingMetadata
+from hopping_leg.identify.recording_format import PAIRS, RecordingMetadata
 from hopping_leg.robot import load_robot
 
 
@@ -53,6 +53,10 @@ class Inspection:
         values: Array = self.values(column).cast(pl.Float64).to_numpy()
         return np.asarray(values, dtype=np.float64)
 
+    def refusal(self, sentence: str) -> RecordingError:
+        """Return the error that refuses the file; the sentence has its full stop."""
+        return RecordingError(f"{self.origin}: {sentence}")
+
     def warn(self, sentence: str) -> None:
         """Note something strange; the sentence gets the file and a full stop."""
         self.warnings.append(f"{self.origin}: {sentence}.")
@@ -66,9 +70,46 @@ class Inspection:
 STALL = 2.0
 """A gap between rows of more than this many periods is a stall."""
 
-_UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1 / 60}
+_TIME_UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1 / 60}
 _SPARSEST = 20.0
 """Periods per row beyond which the rate or the time's unit must be wrong."""
+
+_DEGREE, _TURN = 180 / np.pi, 1 / (2 * np.pi)
+_POSITION_UNITS = {"degrees": _DEGREE, "revolutions": _TURN}
+_VELOCITY_UNITS = {"degrees/s": 1 / _DEGREE, "revolutions/s": 1 / _TURN, "rpm": 1 / _TURN / 60}
+"""What a unit of these is in SI."""
+
+_HALF_TURNS = 12.5
+"""Largest distance of a joint from its middle, rad, two turns; degrees exceed it."""
+
+_FASTEST = 150.0
+"""Speed of a joint, rad/s, far beyond any leg's motor; degrees per second exceed it."""
+
+_HIGHEST = 5.0
+"""Base height, m; millimetres exceed it."""
+
+_STRONGEST = 5.0
+"""Torque in units of the motor's peak; mN m exceed it."""
+
+_COMMON_PEAK = 60.0
+"""Peak torque where the robot is unknown, N m."""
+
+_BLOCK = 0.05
+"""Time over which velocity is integrated and compared with the way, s; shorter blocks would
+compare the position's quantisation."""
+
+_LEAST_BLOCKS = 20
+_LEAST_WAY = 5e-3
+"""Root mean square way within a block below which nothing can be said, rad."""
+
+_GAP = 0.2
+"""Longest time between two velocities that is integrated across, s."""
+
+_DENSE = 0.9
+"""Share of rows with a velocity above which interpolation plays no role."""
+
+_ALIKE = 0.9
+"""Correlation above which two columns are one quantity, maybe in two units."""
 
 
 def row_period(time: np.ndarray, period: float) -> float:
@@ -85,59 +126,28 @@ def check_clock(inspection: Inspection) -> None:
     time, where = inspection.floats("time_s"), inspection.named("time_s")
     bad = np.flatnonzero(~np.isfinite(time))
     if len(bad):
-        raise RecordingError(
-            f"{inspection.origin}: {where} has no time in row {inspection.row(bad[0])};"
-            " every row needs one."
+        raise inspection.refusal(
+            f"{where} has no time in row {inspection.row(bad[0])}; every row needs one."
         )
     steps = np.diff(time)
     back = np.flatnonzero(steps <= 0)
     if len(back):
         index = back[0] + 1
-        raise RecordingError(
-            f"{inspection.origin}: {where} does not increase in row {inspection.row(index)}:"
+        raise inspection.refusal(
+            f"{where} does not increase in row {inspection.row(index)}:"
             f" {time[index]:.9g} s comes after {time[index - 1]:.9g} s; remove the row."
         )
-    if len(steps):
-        _check_unit(inspection, float(np.median(steps)))
-
-
-def _check_unit(inspection: Inspection, step: float) -> None:
-    periods = step * inspection.metadata.rate_hz
-    if 0.5 <= periods <= _SPARSEST:
+    if not len(steps):
         return
-    unit = next((u for u, f in _UNITS.items() if 0.8 < periods / f < 1.25), None)
-    guess = f"the time seems to be in {unit}" if unit else "one of the two is wrong"
-    raise RecordingError(
-        f"{inspection.origin}: {inspection.named('time_s')} steps by {step:.3g} from row to row"
-        f" but the metadata's rate_hz = {inspection.metadata.rate_hz:g} means"
-        f" {inspection.metadata.period:.3g} s; {guess}."
-    )
-
-
-DEGREE, TURN = 180 / np.pi, 1 / (2 * np.pi)
-"""What a rad is in degrees and in revolutions."""
-
-_WIDEST = 25.0
-"""Span of a joint, rad, four turns; degrees exceed it."""
-
-_FASTEST = 150.0
-"""Speed of a joint, rad/s, far beyond any leg's motor; degrees per second exceed it."""
-
-_HIGHEST = 5.0
-"""Base height, m; millimetres exceed it."""
-
-_STRONGEST = 5.0
-"""Torque in units of the motor's peak; mN m exceed it."""
-
-_COMMON_PEAK = 60.0
-"""Peak torque where the robot is unknown, N m."""
-
-_TOLERANCE = 0.1
-
-
-def unit_of(factor: float, units: dict[str, float]) -> str | None:
-    """Return the unit whose factor to SI is the given one, if any."""
-    return next((u for u, f in units.items() if abs(factor / f - 1) < _TOLERANCE), None)
+    step, metadata = float(np.median(steps)), inspection.metadata
+    periods = step * metadata.rate_hz
+    if not 0.5 <= periods <= _SPARSEST:
+        unit = next((u for u, f in _TIME_UNITS.items() if 0.8 < periods / f < 1.25), None)
+        guess = f"the time seems to be in {unit}" if unit else "one of the two is wrong"
+        raise inspection.refusal(
+            f"{where} steps by {step:.3g} from row to row but the metadata's rate_hz ="
+            f" {metadata.rate_hz:g} means {metadata.period:.3g} s; {guess}."
+        )
 
 
 def check_units(inspection: Inspection) -> None:
@@ -146,22 +156,20 @@ def check_units(inspection: Inspection) -> None:
     Raises:
         RecordingError: Naming file, column and row.
     """
-    for quantity in ("position", "position_command"):
-        for column in PAIRS[quantity]:
-            values = inspection.floats(column)
-            _at_most(inspection, column, values - _middle(values), _WIDEST / 2, "rad", "degrees")
-    for quantity in ("velocity", "velocity_command"):
-        for column in PAIRS[quantity]:
-            _at_most(inspection, column, inspection.floats(column), _FASTEST, "rad/s", "degrees/s")
-    peaks = _peak_torques(inspection)
-    for quantity in ("torque", "torque_command"):
-        for column, peak in zip(PAIRS[quantity], peaks, strict=True):
-            limit = _STRONGEST * peak
-            _at_most(inspection, column, inspection.floats(column), limit, "N m", "mN m")
+    joints = (
+        ("position", (_HALF_TURNS, _HALF_TURNS), "rad", "degrees"),
+        ("velocity", (_FASTEST, _FASTEST), "rad/s", "degrees/s"),
+        ("torque", _strongest(inspection.metadata.robot), "N m", "mN m"),
+    )
+    for quantity, limits, unit, guess in joints:
+        for columns in (PAIRS[quantity], PAIRS[f"{quantity}_command"]):
+            for column, limit in zip(columns, limits, strict=True):
+                middle = _middle(inspection.floats(column)) if quantity == "position" else 0.0
+                _at_most(inspection, column, middle, limit, unit, guess)
     for column in ("height_m", "base_rise_m"):
-        _at_most(inspection, column, inspection.floats(column), _HIGHEST, "m", "mm")
+        _at_most(inspection, column, 0.0, _HIGHEST, "m", "mm")
     for measured, commanded in zip(PAIRS["position"], PAIRS["position_command"], strict=True):
-        _compare(inspection, measured, commanded)
+        _check_command(inspection, measured, commanded)
 
 
 def _middle(values: Array) -> float:
@@ -170,69 +178,59 @@ def _middle(values: Array) -> float:
 
 
 def _at_most(
-    inspection: Inspection, column: str, values: Array, limit: float, unit: str, guess: str
+    inspection: Inspection, column: str, middle: float, limit: float, unit: str, guess: str
 ) -> None:
-    size = np.abs(values)
+    values = inspection.floats(column)
+    size = np.abs(values - middle)
     if np.isnan(size).all() or np.nanmax(size) <= limit:
         return
     worst = int(np.nanargmax(size))
-    value = inspection.floats(column)[worst]
-    raise RecordingError(
-        f"{inspection.origin}: {inspection.named(column)} cannot be in {unit}: row"
-        f" {inspection.row(worst)} holds {value:.4g}; is it in {guess}? Convert it."
+    raise inspection.refusal(
+        f"{inspection.named(column)} cannot be in {unit}: row {inspection.row(worst)} holds"
+        f" {values[worst]:.4g}; is it in {guess}? Convert it."
     )
 
 
-def _peak_torques(inspection: Inspection) -> list[float]:
+def _strongest(name: str) -> tuple[float, float]:
+    """Return the torques that hip and knee of a robot cannot give by far, N m."""
     try:
-        robot = load_robot(inspection.metadata.robot)
+        robot = load_robot(name)
     except (RobotError, OSError):
-        return [_COMMON_PEAK for _ in JOINTS]
-    return [j.motor.peak_torque * j.belt_ratio for j in (robot.hip, robot.knee)]
+        return _STRONGEST * _COMMON_PEAK, _STRONGEST * _COMMON_PEAK
+    hip, knee = (_STRONGEST * (j.motor.peak_torque * j.belt_ratio) for j in (robot.hip, robot.knee))
+    return hip, knee
 
 
-def _compare(inspection: Inspection, measured: str, commanded: str) -> None:
+def _check_command(inspection: Inspection, measured: str, commanded: str) -> None:
     """Refuse a position that follows its command in another unit."""
     q, command = inspection.floats(measured), inspection.floats(commanded)
     known = ~np.isnan(q + command)
     if known.sum() < 20:
         return
     q, command = q[known], command[known]
-    q, command = q - q.mean(), command - command.mean()
-    power = float(command @ command)
-    size = float(np.sqrt(power * (q @ q)))
-    if size == 0 or float(q @ command) / size < 0.9:
+    factor, correlation = _proportion(command - command.mean(), q - q.mean()) or (1.0, 0.0)
+    if correlation < _ALIKE:
         return
-    factor = float(q @ command) / power
-    unit = unit_of(factor, {"degrees": DEGREE, "revolutions": TURN})
-    unit, column = (
-        unit or unit_of(1 / factor, {"degrees": DEGREE, "revolutions": TURN}),
-        (measured if unit else commanded),
-    )
-    if unit:
-        first = inspection.row(int(np.argmax(known)))
-        raise RecordingError(
-            f"{inspection.origin}: {inspection.named(column)} seems to be in {unit} from row"
-            f" {first} on: position over command is {factor:.3g}; convert it to rad."
-        )
+    for column, ratio in ((measured, factor), (commanded, 1 / factor)):
+        unit = _unit_of(ratio, _POSITION_UNITS)
+        if unit:
+            raise inspection.refusal(
+                f"{inspection.named(column)} seems to be in {unit} from row"
+                f" {inspection.row(int(np.argmax(known)))} on: position over command is"
+                f" {factor:.3g}; convert it to rad."
+            )
 
 
-BLOCK = 0.05
-"""Time over which velocity is integrated and compared with the way, s; shorter blocks would
-compare the position's quantisation."""
+def _unit_of(factor: float, units: dict[str, float]) -> str | None:
+    """Return the unit whose factor to SI is the given one, if any."""
+    return next((u for u, f in units.items() if abs(factor / f - 1) < 0.1), None)
 
-_LEAST_BLOCKS = 20
-_LEAST_WAY = 5e-3
-"""Root mean square way within a block below which nothing can be said, rad."""
 
-_GAP = 0.2
-"""Longest time between two velocities that is integrated across, s."""
-
-_DENSE = 0.9
-"""Share of rows with a velocity above which interpolation plays no role."""
-
-_POSITION_UNITS = {"degrees": DEGREE, "revolutions": TURN}
-_VELOCITY_UNITS = {"degrees/s": 1 / DEGREE, "revolutions/s": 1 / TURN, "rpm": 1 / TURN / 60}
+def _proportion(x: Array, y: Array) -> tuple[float, float] | None:
+    """Return the factor from x to y and how they correlate; none if one of them is zero."""
+    power, product = float(x @ x), float(x @ y)
+    size = float(np.sqrt(power * (y @ y)))
+    return (product / power, product / size) if size else None
 
 
 @dataclass(frozen=True)
@@ -241,7 +239,7 @@ class Agreement:
 
     Attributes:
         factor: Way over integral.
-        correlation: Of the two.
+        correlation: Correlation of the two.
         worst: Index of the row that ends the block where they differ most.
     """
 
@@ -262,31 +260,24 @@ def check_velocity(inspection: Inspection) -> None:
         agreement = compare(time, inspection.floats(placed), velocity)
         if agreement is None:
             continue
-        _refuse_unit(inspection, placed, moving, agreement)
+        factor, worst = agreement.factor, inspection.row(agreement.worst)
+        for column, units in ((placed, _POSITION_UNITS), (moving, _VELOCITY_UNITS)):
+            unit = _unit_of(factor, units)
+            if unit and agreement.correlation >= _ALIKE:
+                raise inspection.refusal(
+                    f"{inspection.named(column)} seems to be in {unit}: in {_BLOCK * 1e3:g} ms,"
+                    f" position moves {factor:.3g} times the integral of velocity, most in row"
+                    f" {worst}; convert to rad and rad/s."
+                )
         dense = np.mean(~np.isnan(velocity)) > _DENSE
         tolerance, least = (0.1, 0.97) if dense else (0.3, 0.9)
-        if abs(agreement.factor - 1) > tolerance or agreement.correlation < least:
+        if abs(factor - 1) > tolerance or agreement.correlation < least:
             inspection.warn(
                 f"{inspection.named(moving)} is not the derivative of"
-                f" {inspection.named(placed)}, most in row {inspection.row(agreement.worst)}"
-                f" (way over integral {agreement.factor:.3g}, correlation"
-                f" {agreement.correlation:.2f}); left out"
+                f" {inspection.named(placed)}, most in row {worst} (way over integral"
+                f" {factor:.3g}, correlation {agreement.correlation:.2f}); left out"
             )
             inspection.drop(moving)
-
-
-def _refuse_unit(inspection: Inspection, placed: str, moving: str, agreement: Agreement) -> None:
-    if agreement.correlation < 0.9:
-        return
-    for column, units in ((placed, _POSITION_UNITS), (moving, _VELOCITY_UNITS)):
-        unit = unit_of(agreement.factor, units)
-        if unit:
-            raise RecordingError(
-                f"{inspection.origin}: {inspection.named(column)} seems to be in {unit}: in"
-                f" {BLOCK * 1e3:g} ms, position moves {agreement.factor:.3g} times the integral of"
-                f" velocity, most in row {inspection.row(agreement.worst)}; convert to rad and"
-                " rad/s."
-            )
 
 
 def compare(time: Array, position: Array, velocity: Array) -> Agreement | None:
@@ -309,18 +300,16 @@ def compare(time: Array, position: Array, velocity: Array) -> Agreement | None:
     way = np.append(0.0, np.cumsum((filled[1:] + filled[:-1]) / 2 * steps))
     run = np.append(0, np.cumsum(np.diff(time[moving]) > _GAP))
     runs = run[np.searchsorted(moving, placed, side="right") - 1]
-    late = np.searchsorted(time[placed], time[placed] + BLOCK)
+    late = np.searchsorted(time[placed], time[placed] + _BLOCK)
     early = np.flatnonzero(late < len(placed))
     late = late[early]
-    same = (runs[late] == runs[early]) & (time[placed][late] - time[placed][early] < 2 * BLOCK)
+    same = (runs[late] == runs[early]) & (time[placed][late] - time[placed][early] < 2 * _BLOCK)
     begin, end = placed[early[same]], placed[late[same]]
     if len(begin) < _LEAST_BLOCKS:
         return None
     integral, actual = way[end] - way[begin], position[end] - position[begin]
-    power = float(integral @ integral)
-    if power == 0 or np.sqrt(np.mean(actual**2)) < _LEAST_WAY:
+    proportion = _proportion(integral, actual)
+    if proportion is None or np.sqrt(np.mean(actual**2)) < _LEAST_WAY:
         return None
-    factor = float(integral @ actual) / power
-    size = float(np.sqrt(power * (actual @ actual)))
     worst = int(end[np.argmax(np.abs(actual - integral))])
-    return Agreement(factor, float(integral @ actual) / size, worst)
+    return Agreement(*proportion, worst)

@@ -11,6 +11,7 @@ from hopping_leg.identify.cost import measured
 from hopping_leg.identify.encoder_offsets import SETTLING, has_encoder_offsets
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
+from hopping_leg.identify.recording_format import Pair
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import Window, cut, duration
 from hopping_leg.robot.model import TIMESTEP
@@ -18,7 +19,8 @@ from hopping_leg.robot.model import TIMESTEP
 HORIZONS = (0.2, 0.5, 1.0)
 """How far to predict without looking at the recording again, s."""
 
-Pair = tuple[float, float]
+_UNSCORED = 1.0
+"""Beginning of a recording that does not count in closed loop, s, or a quarter of a short one."""
 
 _NOTHING: Pair = (float("nan"), float("nan"))
 """Where nothing counts."""
@@ -43,32 +45,26 @@ class Validation:
 def validate(
     recordings: Sequence[Recording],
     hypothesis: LegHypothesis,
-    *,
     timestep: float = TIMESTEP,
     threads: int = 0,
-    unscored: float = 1.0,
-    horizons: Sequence[float] = HORIZONS,
 ) -> Validation:
-    """Judge a hypothesis on recordings.
+    """Judge a hypothesis; a recording that is shorter than a horizon is left out there.
 
     Args:
         recordings: Best those that no fit has seen.
         hypothesis: What to judge.
         timestep: Physics step, s.
         threads: Worker threads, 0 for one per core.
-        unscored: Beginning of each recording that does not count in closed loop, s.
-        horizons: Of the open-loop predictions, s.
 
     Raises:
-        RecordingError: A recording is too short.
+        RecordingError: A recording is too short to judge anything.
     """
-    controlled = [r for r in recordings if r.metadata.onboard != "torque"]
-    position, torque = _closed_loop(controlled, hypothesis, timestep, threads, unscored)
-    return Validation(
-        position,
-        torque,
-        {h: open_loop(recordings, hypothesis, h, timestep, threads) for h in horizons},
-    )
+    closed = _closed_loop(recordings, hypothesis, timestep, threads)
+    predicted = {}
+    for horizon in HORIZONS:
+        long_enough = [r for r in recordings if _reaches(r, horizon)]
+        predicted[horizon] = open_loop(long_enough, hypothesis, horizon, timestep, threads)
+    return Validation(*closed, predicted)
 
 
 def _closed_loop(
@@ -76,13 +72,13 @@ def _closed_loop(
     hypothesis: LegHypothesis,
     timestep: float,
     threads: int,
-    unscored: float,
 ) -> tuple[Pair, Pair]:
     """Return the rms errors of position, rad, and torque, N m."""
-    if not recordings:
+    controlled = [r for r in recordings if r.metadata.onboard != "torque"]
+    if not controlled:
         return _NOTHING, _NOTHING
-    windows = cut(recordings, None, unscored=unscored)
-    simulator = WindowSimulator(recordings, windows, timestep=timestep, threads=threads)
+    windows = cut(controlled, None, unscored=_unscored(recordings))
+    simulator = WindowSimulator(controlled, windows, timestep=timestep, threads=threads)
     simulated = simulator.run([hypothesis])
     position, torque = (
         _rms(getattr(simulated, name)[0] - measured(simulator, name))
@@ -120,9 +116,8 @@ def as_torque_driven(recording: Recording) -> Recording:
     A row's torque is the one before its command acts: what a ``zoh`` PD held until then, so the
     next row's is this row's command; between rows of a ``continuous`` PD the mean of both acted.
     """
-    metadata = dataclasses.replace(recording.metadata, onboard="torque")
     if recording.metadata.onboard == "torque":
-        return dataclasses.replace(recording, metadata=metadata)
+        return recording
     table = recording.trace.table
     columns = {"hip_command_nm": "hip_torque_nm", "knee_command_nm": "knee_torque_nm"}
     acted = {
@@ -136,7 +131,7 @@ def as_torque_driven(recording: Recording) -> Recording:
         for command, now in acted.items()
     )
     trace = dataclasses.replace(recording.trace, table=table)
-    return dataclasses.replace(recording, trace=trace, metadata=metadata)
+    return dataclasses.replace(recording, trace=trace).with_metadata(onboard="torque")
 
 
 def _starts_known(recordings: Sequence[Recording], window: Window) -> bool:
@@ -162,42 +157,9 @@ def _rms(errors: Array) -> Pair:
     return float(hip), float(knee)
 
 
-UNSCORED = 1.0
-"""Beginning of a recording that does not count in closed loop, s, or a quarter of a short one."""
-
-
-def judge(
-    recordings: Sequence[Recording], hypothesis: LegHypothesis, timestep: float, threads: int = 0
-) -> Validation:
-    """Judge a hypothesis; a recording that is shorter than a horizon is left out there.
-
-    Args:
-        recordings: Best those that no fit has seen.
-        hypothesis: What to judge.
-        timestep: Physics step, s.
-        threads: Worker threads, 0 for one per core.
-
-    Raises:
-        RecordingError: A recording is too short to judge anything.
-    """
-    closed = validate(
-        recordings,
-        hypothesis,
-        timestep=timestep,
-        threads=threads,
-        unscored=unscored(recordings),
-        horizons=(),
-    )
-    predicted = {}
-    for horizon in HORIZONS:
-        long_enough = [r for r in recordings if _reaches(r, horizon)]
-        predicted[horizon] = open_loop(long_enough, hypothesis, horizon, timestep, threads)
-    return dataclasses.replace(closed, open_loop_position=predicted)
-
-
-def unscored(recordings: Sequence[Recording]) -> float:
+def _unscored(recordings: Sequence[Recording]) -> float:
     """Return the beginning of each recording that does not count in closed loop, s."""
-    return min(UNSCORED, 0.25 * min(map(duration, recordings)))
+    return min(_UNSCORED, 0.25 * min(map(duration, recordings)))
 
 
 def _reaches(recording: Recording, horizon: float) -> bool:
@@ -254,29 +216,20 @@ def overlays(
         timestep: Physics step, s.
         threads: Worker threads, 0 for one per core.
     """
-    skip = unscored(recordings)
-    return [_overlay(r, hypotheses, timestep, threads, skip) for r in recordings]
-
-
-def _overlay(
-    recording: Recording,
-    hypotheses: Sequence[LegHypothesis],
-    timestep: float,
-    threads: int,
-    skip: float,
-) -> Overlay:
-    restarted = recording.metadata.onboard == "torque"
-    windows: list[Window] = (
-        cut([recording], RESTART) if restarted else cut([recording], None, unscored=skip)
-    )
-    simulator = WindowSimulator([recording], windows, timestep=timestep, threads=threads)
-    simulated = simulator.run(hypotheses)
-    rows = len(recording)
-    filled = {}
-    for name in ("position", "torque"):
-        filled[name] = _in_rows(measured(simulator, name)[None], windows, rows)[0]
-        filled[f"simulated_{name}"] = _in_rows(getattr(simulated, name), windows, rows)
-    return Overlay(recording, restarted, **filled)
+    skip, drawn = _unscored(recordings), []
+    for recording in recordings:
+        restarted = recording.metadata.onboard == "torque"
+        length, unscored = (RESTART, 0.0) if restarted else (None, skip)
+        windows = cut([recording], length, unscored=unscored)
+        simulator = WindowSimulator([recording], windows, timestep=timestep, threads=threads)
+        simulated, filled = simulator.run(hypotheses), {}
+        for name in ("position", "torque"):
+            values = measured(simulator, name)[None]
+            filled[name] = _in_rows(values, windows, len(recording))[0]
+            values = getattr(simulated, name)
+            filled[f"simulated_{name}"] = _in_rows(values, windows, len(recording))
+        drawn.append(Overlay(recording, restarted, **filled))
+    return drawn
 
 
 def _in_rows(values: Array, windows: Sequence[Window], rows: int) -> Array:

@@ -93,29 +93,6 @@ def deal(
     ]
 
 
-def split(
-    windows: Sequence[Window], held_out: float, rng: np.random.Generator
-) -> tuple[list[Window], list[Window]]:
-    """Split windows into those to fit and those to judge by, at random.
-
-    Args:
-        windows: At least two.
-        held_out: Share to hold out, between 0 and 1; at least one window goes to each side.
-        rng: Source of randomness.
-
-    Raises:
-        UsageError: There is nothing to split, or the share has no meaning.
-    """
-    if not 0 < held_out < 1:
-        raise UsageError(f"The held-out share is {held_out} but must lie between 0 and 1.")
-    if len(windows) < 2:
-        raise UsageError("One window cannot be split; take shorter windows or more recordings.")
-    count = min(max(1, round(held_out * len(windows))), len(windows) - 1)
-    chosen = set(rng.choice(len(windows), count, replace=False).tolist())
-    fit = [w for i, w in enumerate(windows) if i not in chosen]
-    return fit, [w for i, w in enumerate(windows) if i in chosen]
-
-
 SHARE = 4
 """One stretch in so many is held out."""
 
