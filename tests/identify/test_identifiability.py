@@ -11,7 +11,7 @@ def test_only_the_sum_of_armature_and_inertia_is_identifiable():
     run = record(CAD.replace(TRUTH).robot, swing(1.0))
     parameters = choose(CAD.replace(TRUTH), ["hip.friction", "hip.armature", "thigh.inertia"])
     goal = objective(parameters, recordings=[run])
-    noise = np.random.default_rng(0).normal(size=goal.cost.size)
+    noise = np.random.default_rng(0).normal(size=goal.groups.size)
     slopes = jacobian(goal.residuals, np.zeros(3), parameters.bounds, 1e-3)
     known = identifiability(parameters, np.zeros(3), noise, slopes)
     assert abs(known.correlation[1, 2]) > 0.99

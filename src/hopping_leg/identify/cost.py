@@ -1,6 +1,5 @@
 """How far a simulation is from a recording: the paper's J, and what the data call for beyond it."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -9,16 +8,24 @@ import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray, IntArray
 from hopping_leg.errors import RecordingError, UsageError
-from hopping_leg.identify.parameters import LegHypothesis, ParameterSet
+from hopping_leg.identify.parameters import ParameterSet
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.simulate import Simulated, WindowSimulator
+from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import Window
 from hopping_leg.robot.model import TIMESTEP
 
 
 @dataclass(frozen=True)
 class RobustLoss:
-    """What residuals are worth beside others of their window.
+    """Loss by which each window's say depends on its own level of errors.
+
+    A window whose mean squared residual m, in one quantity of one joint, is beyond a level L counts
+    2 L (1 - (1 + m / L)^-1/2): nearly m far below the level, and far beyond it nearly the same
+    whatever is changed. So windows that the model cannot explain, as where a drive saturates,
+    hardly move the parameters, while those that it explains in part keep some say.
+
+    Gauss-Newton steps on such a cost are those on residuals that are weighted by the levels of the
+    moment; the rest of the cost beside their squares is residuals that no parameter moves.
 
     Attributes:
         groups: Number of each residual's group, (size,).
@@ -57,21 +64,6 @@ class RobustLoss:
         total = np.bincount(self.groups, np.square(residuals), len(self.sizes))
         mean: Array = total / np.maximum(self.sizes, 1) / self.level
         return mean
-
-
-def grouping(counts: Sequence[BoolArray]) -> IntArray:
-    """Return the number of each residual's group: a window's, in one quantity of one joint.
-
-    Args:
-        counts: What counts of each quantity, (windows, rows, ...); residuals are in this order.
-    """
-    parts, first = [], 0
-    for mask in counts:
-        columns = mask[0, 0].size
-        numbers = first + np.arange(len(mask) * columns).reshape(len(mask), 1, *mask.shape[2:])
-        parts.append(np.broadcast_to(numbers, mask.shape)[mask])
-        first += len(mask) * columns
-    return np.concatenate(parts)
 
 
 def total_costs(residuals: Array, loss: RobustLoss | None) -> Array:
@@ -125,63 +117,113 @@ class Scoring:
             raise UsageError("The scoring counts nothing; give a scale to position or torque.")
 
 
-class Cost:
-    """Residuals of hypotheses on a simulator's windows.
+@dataclass(frozen=True)
+class Objective:
+    """What a search minimises: residuals and costs of search vectors.
 
-    Only measured samples with an exact time stamp count, after each window's unscored rows.
+    Only measured samples with an exact time stamp count, after each window's unscored rows. An
+    objective can be sent to other machines, where it builds its simulations anew.
 
-    Args:
-        simulator: What to simulate.
-        scoring: What counts.
-
-    Raises:
-        RecordingError: The windows hold no sample that counts.
+    Attributes:
+        recordings: What was recorded.
+        windows: Which stretches count.
+        parameters: What vectors mean.
+        scoring: What errors count.
+        timestep: Physics step, s.
+        threads: Worker threads, 0 for one per core.
     """
 
-    def __init__(self, simulator: WindowSimulator, scoring: Scoring | None = None) -> None:
-        self.simulator, self.scoring = simulator, scoring or Scoring()
-        self._measured = {n: measured(simulator, n) for n in _QUANTITIES if self._scale(n)}
-        self._counts: dict[str, BoolArray] = {n: ~np.isnan(v) for n, v in self._measured.items()}
-        self.size = sum(int(np.count_nonzero(mask)) for mask in self._counts.values())
-        if not self.size:
+    recordings: tuple[Recording, ...]
+    windows: tuple[Window, ...]
+    parameters: ParameterSet
+    scoring: Scoring
+    timestep: float = TIMESTEP
+    threads: int = 0
+
+    @cached_property
+    def simulator(self) -> WindowSimulator:
+        """The simulations."""
+        return WindowSimulator(
+            self.recordings, self.windows, timestep=self.timestep, threads=self.threads
+        )
+
+    @cached_property
+    def _scored(self) -> dict[str, tuple[float, Array, BoolArray]]:
+        """Scale, measured values and which of them count, by quantity.
+
+        Raises:
+            RecordingError: The windows hold no sample that counts.
+        """
+        scored = {}
+        for name in _QUANTITIES:
+            scale = getattr(self.scoring, name)
+            if scale is not None:
+                values = measured(self.simulator, name)
+                scored[name] = (scale, values, ~np.isnan(values))
+        if not any(mask.any() for _, _, mask in scored.values()):
             raise RecordingError(
                 "The windows hold no measured sample of what the scoring counts; record"
-                f" {' or '.join(self._measured)}."
+                f" {' or '.join(scored)}."
             )
-        self.groups = grouping(list(self._counts.values()))
-        """Number of each residual's window, quantity and joint, (size,)."""
-        level = self.scoring.unexplained
-        self.loss = None if level is None else RobustLoss(self.groups, level)
-        """What windows that no parameters explain are worth; None counts every one in full."""
+        return scored
 
-    def residuals(self, hypotheses: list[LegHypothesis]) -> Array:
-        """Return residuals in units of the scales, robust if so chosen, (hypotheses, size)."""
-        raw = self.errors(self.simulator.run(hypotheses))
+    @cached_property
+    def groups(self) -> IntArray:
+        """Number of each residual's group: a window's, in one quantity of one joint, (size,)."""
+        parts, first = [], 0
+        for _, _, mask in self._scored.values():
+            count = len(mask) * mask[0, 0].size
+            numbers = first + np.arange(count).reshape(len(mask), 1, *mask.shape[2:])
+            parts.append(np.broadcast_to(numbers, mask.shape)[mask])
+            first += count
+        return np.concatenate(parts)
+
+    @cached_property
+    def loss(self) -> RobustLoss | None:
+        """What windows that no parameters explain are worth; None counts every one in full."""
+        level = self.scoring.unexplained
+        return None if level is None else RobustLoss(self.groups, level)
+
+    @property
+    def jumping(self) -> IntArray | None:
+        """Groups of the residuals, (size,), if feet touch down, which makes them jump."""
+        rigs = {self.recordings[w.recording].metadata.rig for w in self.windows}
+        return self.groups if rigs != {"fixed-base"} else None
+
+    def residuals(self, vectors: Array) -> Array:
+        """Return residuals of search vectors (n, k) in units of the scales, (n, size)."""
+        simulated = self.simulator.run(self.parameters.hypotheses(vectors))
+        parts = []
+        for name, (scale, values, mask) in self._scored.items():
+            error = getattr(simulated, name) - values
+            parts.append(error[:, mask] / scale)
+        joined = np.ascontiguousarray(np.concatenate(parts, axis=1))
+        finite = np.nan_to_num(joined, nan=_FAILED, posinf=_FAILED)
+        raw: Array = np.clip(finite, -_FAILED, _FAILED)
         bound = self.scoring.robust
         if bound is None:
             return raw
-        loss = 2 * bound**2 * (np.sqrt(1 + np.square(raw / bound)) - 1)
-        robust: Array = np.copysign(np.sqrt(loss), raw)
+        squares = 2 * bound**2 * (np.sqrt(1 + np.square(raw / bound)) - 1)
+        robust: Array = np.copysign(np.sqrt(squares), raw)
         return robust
 
-    def errors(self, simulated: Simulated) -> Array:
-        """Return scaled errors of a simulation, (hypotheses, size)."""
-        parts = []
-        for name, mask in self._counts.items():
-            error = getattr(simulated, name) - self._measured[name]
-            parts.append(error[:, mask] / self._scale(name))
-        joined = np.ascontiguousarray(np.concatenate(parts, axis=1))
-        finite = np.nan_to_num(joined, nan=_FAILED, posinf=_FAILED)
-        bounded: Array = np.clip(finite, -_FAILED, _FAILED)
-        return bounded
+    def __call__(self, vectors: Array) -> Array:
+        """Return the costs of search vectors (n, k), by default the paper's J, (n,)."""
+        return total_costs(self.residuals(vectors), self.loss)
 
-    def values(self, hypotheses: list[LegHypothesis]) -> Array:
-        """Return the costs, by default sums of squared residuals, the paper's J, (hypotheses,)."""
-        return total_costs(self.residuals(hypotheses), self.loss)
+    def about(self) -> dict[str, Any]:
+        """Return what tells this objective from others, for checkpoints."""
+        return {
+            "recordings": [r.digest or r.name for r in self.recordings],
+            "windows": repr(self.windows),
+            "base": repr(self.parameters.base),
+            "scoring": repr(self.scoring),
+            "timestep": self.timestep,
+        }
 
-    def _scale(self, name: str) -> float | None:
-        scale: float | None = getattr(self.scoring, name)
-        return scale
+    def __getstate__(self) -> dict[str, Any]:
+        cached = ("simulator", "_scored", "groups", "loss")
+        return {k: v for k, v in self.__dict__.items() if k not in cached}
 
 
 def measured(simulator: WindowSimulator, quantity: str) -> Array:
@@ -203,68 +245,3 @@ def measured(simulator: WindowSimulator, quantity: str) -> Array:
         sampled[~recording.exact_time[rows]] = np.nan
         values[i, w.unscored : w.length] = sampled
     return values
-
-
-@dataclass(frozen=True)
-class Objective:
-    """Residuals and costs of search vectors.
-
-    It can be sent to other machines, where it builds its simulations anew.
-
-    Attributes:
-        recordings: What was recorded.
-        windows: Which stretches count.
-        parameters: What vectors mean.
-        scoring: What errors count.
-        timestep: Physics step, s.
-        threads: Worker threads, 0 for one per core.
-    """
-
-    recordings: tuple[Recording, ...]
-    windows: tuple[Window, ...]
-    parameters: ParameterSet
-    scoring: Scoring
-    timestep: float = TIMESTEP
-    threads: int = 0
-
-    @cached_property
-    def cost(self) -> Cost:
-        """The simulations and their measured counterparts."""
-        simulator = WindowSimulator(
-            self.recordings, self.windows, timestep=self.timestep, threads=self.threads
-        )
-        return Cost(simulator, self.scoring)
-
-    def residuals(self, vectors: Array) -> Array:
-        """Return residuals of search vectors (n, k), (n, m)."""
-        return self.cost.residuals(self.parameters.hypotheses(vectors))
-
-    @property
-    def loss(self) -> RobustLoss | None:
-        """What windows that no parameters explain are worth; None counts every one in full."""
-        return self.cost.loss
-
-    @property
-    def jumping(self) -> IntArray | None:
-        """Groups of the residuals, (m,), if feet touch down, which makes them jump; else None."""
-        grounded = any(
-            self.recordings[w.recording].metadata.rig != "fixed-base" for w in self.windows
-        )
-        return self.cost.groups if grounded else None
-
-    def __call__(self, vectors: Array) -> Array:
-        """Return the costs of search vectors (n, k), (n,)."""
-        return total_costs(self.residuals(vectors), self.loss)
-
-    def about(self) -> dict[str, Any]:
-        """Return what tells this objective from others, for checkpoints."""
-        return {
-            "recordings": [r.digest or r.name for r in self.recordings],
-            "windows": repr(self.windows),
-            "base": repr(self.parameters.base),
-            "scoring": repr(self.scoring),
-            "timestep": self.timestep,
-        }
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {k: v for k, v in self.__dict__.items() if k != "cost"}

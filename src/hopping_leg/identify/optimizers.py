@@ -63,6 +63,12 @@ def jacobian(
 ) -> Array:
     """Return d residuals / d vector, (m, k), by differences.
 
+    A simulated touchdown falls on one physics step or the next, so that residuals of a window on
+    the ground jump a little wherever a parameter moves it across. A difference that spans such a
+    jump is the jump over the step, hundreds of times the slope, and one bad column misleads the
+    whole search. So there every slope is taken on both sides, and each window goes by the calmer
+    one: a jump seldom lies on both.
+
     Args:
         residuals: Function of search vectors.
         vector: Where, (k,).

@@ -211,7 +211,7 @@ def _conclude(
     objective = dataclasses.replace(objective, parameters=last.parameters)
     vector = last.found.vector
     (hypothesis,) = last.parameters.hypotheses(vector[None])
-    simulated = objective.cost.simulator.run([hypothesis]).position[0]
+    simulated = objective.simulator.run([hypothesis]).position[0]
     lengths = [w.length for w in objective.windows]
     broken = sum(not np.isfinite(p[:n]).all() for p, n in zip(simulated, lengths, strict=True))
     try:
