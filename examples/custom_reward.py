@@ -10,35 +10,26 @@ from pathlib import Path
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.envs.apex_reward import ApexReward
-from hopping_leg.envs.transition import Transition
+from hopping_leg.envs import Reward, RewardTerm, Transition
 from hopping_leg.rl.recipes.fast import FastRecipe
 from hopping_leg.rl.train import train
 from hopping_leg.robot import Robot, load_robot
 
 
-class QuietReward(ApexReward):
-    """The apex reward, less a price on every torque."""
-
-    names = (*ApexReward.names, "torque")
-    price = 0.02
-
-    def __call__(self, transition: Transition) -> tuple[Array, Array]:
-        """Return the reward, (n,), and its weighted parts, (n, parts)."""
-        reward, parts = super().__call__(transition)
-        torque = -self.price * np.sum(np.square(transition.action), axis=1)
-        return reward + self.options.scale * torque, np.column_stack([parts, torque])
+def squared_torque(transition: Transition) -> Array:
+    """Return the sum of the actions' squares, (n,)."""
+    return np.sum(np.square(transition.action), axis=1)
 
 
 @dataclass(frozen=True)
 class QuietRecipe(FastRecipe):
-    """`fast` with that reward."""
+    """`fast` with a price on every torque."""
 
     name = "quiet"
 
-    def make_reward(self, robot: Robot) -> QuietReward:
+    def make_reward(self, robot: Robot) -> Reward:
         """Build the reward."""
-        return QuietReward(robot, self.reward, self.task.rate)
+        return super().make_reward(robot).with_terms(RewardTerm("torque", -0.02, squared_torque))
 
 
 steps = int(sys.argv[1]) if len(sys.argv) > 1 else 200_000

@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.envs import HoppingEnv, HoppingTask, PaperReward, TaskConfig
+from hopping_leg.envs import HoppingEnv, HoppingTask, TaskConfig, paper_reward
 from hopping_leg.robot import Robot, build_model
 from hopping_leg.robot.kinematics import joint_angles
 from hopping_leg.sim import MujocoSimulator
@@ -128,7 +128,7 @@ def _functions(benchmark: EnvBenchmark) -> tuple[Mapping[str, Timed], Mapping[st
     """Return what is timed and how many control periods of one leg each call simulates."""
     robot, options = benchmark.robot, _options(benchmark)
     rng = np.random.default_rng(benchmark.seed)
-    reward = PaperReward(robot)
+    reward = paper_reward(robot)
     task = HoppingTask(robot, benchmark.count, options, reward, rng, benchmark.threads)
     many = record(task, benchmark.ticks)
     env = HoppingEnv(robot, options)

@@ -3,14 +3,10 @@
 import numpy as np
 import pytest
 
-from hopping_leg.envs.apex_reward import ApexReward, ApexRewardOptions
-from hopping_leg.envs.transition import Transition
+from hopping_leg.envs import ApexRewardConfig, Transition, apex_reward
 from hopping_leg.robot import load_robot
 
-RATE = 200.0
-
-
-NAMES = ApexReward.names
+CONFIG = ApexRewardConfig()
 
 
 def transition(height, rate, *, command=0.3, clearance=0.05, apex=False):
@@ -25,9 +21,18 @@ def transition(height, rate, *, command=0.3, clearance=0.05, apex=False):
     )
 
 
+def make(config=CONFIG):
+    return apex_reward(load_robot("legv2-paper"), config, 200.0)
+
+
+def term(reward, name, *args, **state):
+    _, terms = reward(transition(*args, **state))
+    return terms[0, reward.names.index(name)]
+
+
 @pytest.fixture
 def reward():
-    return ApexReward(load_robot("legv2-paper"), ApexRewardOptions(), RATE)
+    return make()
 
 
 def fly(reward, ticks):
@@ -37,22 +42,20 @@ def fly(reward, ticks):
 
 def test_a_true_hop_earns_the_event_and_a_tremble_does_not(reward):
     fly(reward, 100)
-    _, hop = reward(transition(0.3, 0.0, apex=True))
+    hop = term(reward, "apex", 0.3, 0.0, apex=True)
     reward(transition(0.3, 0.0, clearance=-0.001))
-    _, tremble = reward(transition(0.3, 0.0, apex=True))
-    assert hop[0, NAMES.index("apex")] == pytest.approx(reward.options.apex)
-    assert tremble[0, NAMES.index("apex")] < 0.01 * hop[0, NAMES.index("apex")]
+    tremble = term(reward, "apex", 0.3, 0.0, apex=True)
+    assert hop == pytest.approx(1.0)
+    assert tremble < 0.01
 
 
-def test_hasty_hops_earn_no_more_per_second(reward):
+def test_hasty_hops_earn_no_more_per_second():
     earned = {}
     for period in (40, 80):
-        fresh = ApexReward(load_robot("legv2-paper"), ApexRewardOptions(), RATE)
-        total = 0.0
-        for tick in range(1, 1601):
-            _, terms = fresh(transition(0.3, 0.0, apex=tick % period == 0))
-            total += terms[0, NAMES.index("apex")]
-        earned[period] = total
+        fresh = make()
+        earned[period] = sum(
+            term(fresh, "apex", 0.3, 0.0, apex=tick % period == 0) for tick in range(1, 1601)
+        )
     assert earned[40] == pytest.approx(earned[80], rel=0.05)
 
 
@@ -62,39 +65,30 @@ def test_error_costs_alike_above_and_below_and_more_as_training_goes_on(reward):
         reward.anneal(share)
         for error in (-0.02, 0.02):
             fly(reward, 100)
-            _, terms = reward(transition(0.3 + error, 0.0, apex=True))
-            values[share, error] = terms[0, NAMES.index("apex")]
+            values[share, error] = term(reward, "apex", 0.3 + error, 0.0, apex=True)
     assert values[0.0, -0.02] == pytest.approx(values[0.0, 0.02])
     assert values[1.0, 0.02] < values[0.0, 0.02]
 
 
 def test_prediction_is_the_ballistic_apex(reward):
-    rise = 0.1
-    rate = np.sqrt(2 * reward.options.effective_gravity * rise)
-    _, right = reward(transition(0.2, rate))
-    _, wrong = reward(transition(0.15, rate))
-    assert right[0, NAMES.index("predicted")] > wrong[0, NAMES.index("predicted")]
-    _, standing = reward(transition(0.2, rate, clearance=0.0))
-    assert standing[0, NAMES.index("predicted")] == 0.0
+    rate = np.sqrt(2 * CONFIG.effective_gravity * 0.1)
+    assert term(reward, "predicted", 0.2, rate) > term(reward, "predicted", 0.15, rate)
+    assert term(reward, "predicted", 0.2, rate, clearance=0.0) == 0.0
 
 
 def test_energy_gain_fades(reward):
-    _, early = reward(transition(0.2, 1.0, clearance=0.0))
+    moving, still = transition(0.2, 1.0, clearance=0.0), transition(0.2, 0.0, clearance=0.0)
+    (early,), (rest,) = reward(moving)[0], reward(still)[0]
+    assert early - rest == pytest.approx(CONFIG.scale * CONFIG.energy)
     reward.anneal(0.5)
-    _, late = reward(transition(0.2, 1.0, clearance=0.0))
-    assert early[0, NAMES.index("energy")] > 0.0
-    assert late[0, NAMES.index("energy")] == 0.0
+    assert reward(moving)[0] == reward(still)[0] == pytest.approx(rest)
 
 
 def test_the_energy_gain_can_end_where_the_hop_would_be_too_high():
-    options = ApexRewardOptions(energy_beyond=0.03)
-    bounded, free = (
-        ApexReward(load_robot("legv2-paper"), o, RATE) for o in (options, ApexRewardOptions())
-    )
+    bounded, free = make(ApexRewardConfig(energy_beyond=0.03)), make()
 
     def gains(command):
-        moving = transition(0.25, 1.5, command=command)
-        return [r(moving)[1][0, NAMES.index("energy")] for r in (bounded, free)]
+        return [term(r, "energy", 0.25, 1.5, command=command) for r in (bounded, free)]
 
     low, high = gains(0.22), gains(0.40)
     assert low[0] < 0.05 * low[1]
@@ -102,16 +96,14 @@ def test_the_energy_gain_can_end_where_the_hop_would_be_too_high():
 
 
 def test_coming_close_to_the_ground_costs(reward):
-    _, high = reward(transition(0.2, 0.0))
-    _, low = reward(transition(0.06, 0.0))
-    assert high[0, NAMES.index("clearance")] == 0.0
-    assert low[0, NAMES.index("clearance")] < 0.0
+    assert term(reward, "clearance", 0.2, 0.0) == 0.0
+    near, touching = (term(reward, "clearance", height, 0.0) for height in (0.15, 0.13))
+    assert 0.0 < near < 1.0 < CONFIG.touch < touching
 
 
 def test_state_survives_a_restart(reward):
     fly(reward, 10)
-    other = ApexReward(load_robot("legv2-paper"), ApexRewardOptions(), RATE)
+    other = make()
     other.restore(reward.state())
-    total, _ = reward(transition(0.3, 0.0, apex=True))
-    again, _ = other(transition(0.3, 0.0, apex=True))
-    assert total == again
+    hop = transition(0.3, 0.0, apex=True)
+    assert reward(hop)[0] == other(hop)[0]

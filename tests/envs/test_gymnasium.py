@@ -4,7 +4,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
-from hopping_leg.envs import ENV_ID, HoppingTask, PaperReward, TaskConfig
+from hopping_leg.envs import ENV_ID, HoppingTask, TaskConfig, paper_reward
 from hopping_leg.robot import load_robot
 
 SHORT = TaskConfig(episode=0.1)
@@ -61,7 +61,7 @@ def test_vector_env_is_the_batched_task():
     observation, _ = vector.reset(seed=11)
     robot = load_robot("legv2-paper")
     rng, _ = gymnasium.utils.seeding.np_random(11)
-    task = HoppingTask(robot, 5, SHORT, PaperReward(robot), np.random.default_rng(0), 1)
+    task = HoppingTask(robot, 5, SHORT, paper_reward(robot), np.random.default_rng(0), 1)
     np.testing.assert_array_equal(observation, task.reseed(rng))
     plan = np.random.default_rng(1).uniform(-1, 1, (45, 5, 2)).astype(np.float32)
     for tick, action in enumerate(plan, 1):

@@ -22,11 +22,11 @@ from hopping_leg.cli import main
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.registry import load_controller, load_policy, shipped_policies
 from hopping_leg.envs import (
-    ApexReward,
-    ApexRewardOptions,
+    ApexRewardConfig,
     HoppingTask,
-    PaperReward,
     TaskConfig,
+    apex_reward,
+    paper_reward,
 )
 from hopping_leg.rl import policy_evaluation
 from hopping_leg.robot import load_robot
@@ -98,8 +98,8 @@ def policies(folder: Path) -> Values:
 
 
 REWARDS = {
-    "paper": PaperReward,
-    "apex": lambda robot: ApexReward(robot, ApexRewardOptions(), 200.0),
+    "paper": paper_reward,
+    "apex": lambda robot: apex_reward(robot, ApexRewardConfig(), 200.0),
 }
 
 

@@ -6,7 +6,7 @@ from operator import attrgetter
 import numpy as np
 import pytest
 
-from hopping_leg.envs import HoppingTask, PaperReward, TaskConfig
+from hopping_leg.envs import HoppingTask, TaskConfig, paper_reward
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.model_mismatch import Latency, ModelMismatch
@@ -149,7 +149,7 @@ def test_what_controllers_believe_may_not_vary():
 
 def task(seed, ranges=IDENTIFIABLE_RANGES):
     options = TaskConfig(randomised=tuple(ranges), reset_distribution="mixed", episode=0.2)
-    return HoppingTask(LEG, 5, options, PaperReward(LEG), np.random.default_rng(seed), 1)
+    return HoppingTask(LEG, 5, options, paper_reward(LEG), np.random.default_rng(seed), 1)
 
 
 def heights(one, ticks=80):
@@ -239,7 +239,7 @@ def test_a_range_with_steps_draws_whole_multiples():
 def test_a_late_task_goes_on_exactly(delay):
     def begin():
         rng = np.random.default_rng(0)
-        return HoppingTask(late(delay), 5, TaskConfig(episode=0.2), PaperReward(LEG), rng, 1)
+        return HoppingTask(late(delay), 5, TaskConfig(episode=0.2), paper_reward(LEG), rng, 1)
 
     one, other = begin(), begin()
     heights(one, 33)

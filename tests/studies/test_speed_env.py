@@ -3,7 +3,7 @@ import pytest
 from studies.speed.env import EnvBenchmark, bench_env, record
 from studies.timing import interleave
 
-from hopping_leg.envs import HoppingTask, PaperReward, TaskConfig
+from hopping_leg.envs import HoppingTask, TaskConfig, paper_reward
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import MujocoSimulator
 
@@ -20,7 +20,7 @@ def test_rounds_alternate_and_the_cold_one_is_left_out():
 def test_bare_physics_repeats_the_very_same_motion():
     options = TaskConfig(action_torque=(10, 20), episode=3600)
     rng = np.random.default_rng(0)
-    task = HoppingTask(ROBOT, 3, options, PaperReward(ROBOT), rng, 1)
+    task = HoppingTask(ROBOT, 3, options, paper_reward(ROBOT), rng, 1)
     motion = record(task, 100)
     end = task.legs.state.copy()
     assert end[:, 0].max() > 0.15

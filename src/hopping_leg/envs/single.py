@@ -9,11 +9,11 @@ import numpy.typing as npt
 
 from hopping_leg.envs.observation import Array32
 from hopping_leg.envs.options import TaskConfig
+from hopping_leg.envs.paper_reward import paper_reward
 from hopping_leg.envs.render import Camera, Image
-from hopping_leg.envs.reward import PaperReward
+from hopping_leg.envs.rewards import Reward
 from hopping_leg.envs.step import Step
 from hopping_leg.envs.task import HoppingTask
-from hopping_leg.envs.transition import Reward
 from hopping_leg.robot import Robot, load_robot
 
 _LARGEST = float(np.finfo(np.float32).max)
@@ -56,7 +56,7 @@ class HoppingEnv(gymnasium.Env[Array32, npt.NDArray[np.float32]]):
         self.metadata = {**type(self).metadata, "render_fps": round(options.rate)}
         rng = np.random.default_rng(0)
         self.task = HoppingTask(
-            leg, 1, options, reward or PaperReward(leg), rng, threads=1, autoreset=False
+            leg, 1, options, reward or paper_reward(leg), rng, threads=1, autoreset=False
         )
         self.observation_space, self.action_space = observations(self.task), ACTIONS
         self._terms = self.task.reward.names

@@ -10,8 +10,8 @@ from hopping_leg.envs.observation import Array32, make_observation, sample_scali
 from hopping_leg.envs.options import TaskConfig
 from hopping_leg.envs.privileged_observation import PRIVILEGED, privileged_observation
 from hopping_leg.envs.reset import ResetSampler
+from hopping_leg.envs.rewards import Reward, Transition
 from hopping_leg.envs.step import Step
-from hopping_leg.envs.transition import Reward, Transition
 from hopping_leg.hop_detection import at_apex
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import Measurement, MujocoSimulator, Plant, randomization
@@ -254,6 +254,7 @@ class HoppingTask:
         self.legs.place(rows, height, q)
         self._end[rows] = self._tick + self._horizon
         self._last[rows], self._rises[rows] = 0.0, False
+        self.reward.reset(rows)
         if self.options.command_resampling_time is not None:
             self._switch[rows] = self._tick + self._draw_holds(count)
         self.plant.channel.restart(rows, self.legs.q[rows], self.legs.qd[rows], self.command[rows])

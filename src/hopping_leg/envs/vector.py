@@ -11,12 +11,12 @@ from gymnasium.vector.utils import batch_space
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.envs.observation import Array32
 from hopping_leg.envs.options import TaskConfig
+from hopping_leg.envs.paper_reward import paper_reward
 from hopping_leg.envs.render import Camera, Image
-from hopping_leg.envs.reward import PaperReward
+from hopping_leg.envs.rewards import Reward
 from hopping_leg.envs.single import ACTIONS, observations
 from hopping_leg.envs.step import Step
 from hopping_leg.envs.task import HoppingTask
-from hopping_leg.envs.transition import Reward
 from hopping_leg.robot import Robot, load_robot
 
 
@@ -54,7 +54,7 @@ class HoppingVectorEnv(gymnasium.vector.VectorEnv[Array32, npt.NDArray[np.float3
         leg = load_robot(robot) if isinstance(robot, str) else robot
         self.num_envs, self.render_mode = num_envs, render_mode
         self.metadata = {**type(self).metadata, "render_fps": round(options.rate)}
-        judge, rng = reward or PaperReward(leg), np.random.default_rng(0)
+        judge, rng = reward or paper_reward(leg), np.random.default_rng(0)
         self.task = HoppingTask(leg, num_envs, options, judge, rng, threads)
         self.single_observation_space, self.single_action_space = observations(self.task), ACTIONS
         self.observation_space = batch_space(self.single_observation_space, num_envs)

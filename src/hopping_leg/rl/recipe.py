@@ -6,8 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from hopping_leg.envs import HoppingTask, TaskConfig
-from hopping_leg.envs.transition import Reward
+from hopping_leg.envs import HoppingTask, Reward, TaskConfig
 from hopping_leg.rl.actor import network_of
 from hopping_leg.rl.onnx_export import Network
 from hopping_leg.rl.sb3_env import TaskVecEnv

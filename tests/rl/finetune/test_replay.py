@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.controllers import RolloutConfig, rollout
-from hopping_leg.envs import ApexReward, HoppingTask, TaskConfig
+from hopping_leg.envs import HoppingTask, TaskConfig, apex_reward
 from hopping_leg.hop_detection import find_hops
 from hopping_leg.rl.finetune.apex_estimate import ApexEstimate
 from hopping_leg.rl.finetune.config import FinetuneConfig
@@ -31,7 +31,7 @@ def run():
 
 
 def writer():
-    reward = ApexReward(ROBOT, FinetuneConfig().reward, 200.0)
+    reward = apex_reward(ROBOT, FinetuneConfig().reward, 200.0)
     reward.anneal(1.0)
     return TransitionWriter(POLICY.card, read_network(POLICY.content), ROBOT, reward, 5.0), reward
 

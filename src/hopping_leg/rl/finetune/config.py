@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
-from hopping_leg.envs import ApexRewardOptions
+from hopping_leg.envs import ApexRewardConfig
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.finetune.command_correction import CommandCorrectionConfig
 from hopping_leg.rl.finetune.contact import ContactConfig
@@ -50,8 +50,8 @@ class FinetuneConfig:
     """Numbers of SAC."""
     contact: ContactConfig = field(default_factory=ContactConfig)
     """How contact is learnt in simulation."""
-    reward: ApexRewardOptions = field(
-        default_factory=lambda: ApexRewardOptions(width=(0.03, 0.015), sharp_from=1e-6, tail=0.5)
+    reward: ApexRewardConfig = field(
+        default_factory=lambda: ApexRewardConfig(width=(0.03, 0.015), sharp_from=1e-6, tail=0.5)
     )
     """Of the estimated apexes."""
 

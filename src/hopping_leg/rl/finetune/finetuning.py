@@ -16,7 +16,7 @@ import numpy as np
 from hopping_leg.controllers.hardware_trial import HardwareTrial, Steps, TrialRobot
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.protocol import Controller
-from hopping_leg.envs import ApexReward
+from hopping_leg.envs import apex_reward
 from hopping_leg.rl.checkpoint import (
     Tree,
     list_checkpoints,
@@ -229,7 +229,7 @@ class Finetuning:
 
     def _writer(self) -> TransitionWriter:
         o, card = self._options, self._task.policy.card
-        reward = ApexReward(self._task.robot, o.reward, card.rate)
+        reward = apex_reward(self._task.robot, o.reward, card.rate)
         reward.anneal(1.0)
         scaled = self._aim.applied(self._network, card)
         return TransitionWriter(card, scaled, self._task.robot, reward, o.penalty)

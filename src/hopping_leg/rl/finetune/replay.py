@@ -13,9 +13,9 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.controllers.observation_history import make_layout
 from hopping_leg.controllers.policy import Card
-from hopping_leg.envs import ApexReward
+from hopping_leg.envs import Reward
 from hopping_leg.envs.observation import Array32
-from hopping_leg.envs.transition import Transition
+from hopping_leg.envs.rewards import Transition
 from hopping_leg.rl.finetune.apex_estimate import ApexEstimate
 from hopping_leg.rl.finetune.exploring import EDGE
 from hopping_leg.rl.finetune.trial_data import TrialData
@@ -69,10 +69,10 @@ class TransitionWriter:
     """
 
     def __init__(
-        self, card: Card, network: Network, robot: Robot, reward: ApexReward, penalty: float
+        self, card: Card, network: Network, robot: Robot, reward: Reward, penalty: float
     ) -> None:
         self._card, self._network, self._robot = card, network, robot
-        self._reward, self._penalty = reward, penalty
+        self._reward, self._penalty, self._untouched = reward, penalty, reward.state()
         self._scale = np.array(card.torque_scale)
 
     def __call__(
@@ -142,7 +142,7 @@ class TransitionWriter:
         reached = np.full(data.command.shape, np.nan)
         for leg, apexes in enumerate(estimate.apexes):
             reached[np.maximum(apexes[:, 0].astype(np.int64), 1), leg] = apexes[:, 1]
-        self._reward.restore({"air": np.zeros(0), "since": np.zeros(0)})
+        self._reward.restore(self._untouched)
         rewards, last = np.empty((data.ticks - 1, gap.shape[1])), np.zeros_like(action[0])
         for tick in range(1, data.ticks):
             rewards[tick - 1], _ = self._reward(

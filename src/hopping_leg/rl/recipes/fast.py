@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import torch
 from torch import nn
 
-from hopping_leg.envs import ApexReward, ApexRewardOptions, TaskConfig
+from hopping_leg.envs import ApexRewardConfig, Reward, TaskConfig, apex_reward
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.resumable import ResumablePPO
 from hopping_leg.rl.sb3_env import TaskVecEnv
@@ -36,7 +36,7 @@ class FastRecipe(Recipe):
             timestep=1e-3,
         )
     )
-    reward: ApexRewardOptions = field(default_factory=ApexRewardOptions)
+    reward: ApexRewardConfig = field(default_factory=ApexRewardConfig)
     """Apex reward."""
     num_envs: int = 512
     """Legs that gather experience at once."""
@@ -69,9 +69,9 @@ class FastRecipe(Recipe):
     log_std_until: float = 0.6
     """Share of the training after which exploration quietens no more."""
 
-    def make_reward(self, robot: Robot) -> ApexReward:
+    def make_reward(self, robot: Robot) -> Reward:
         """Build the apex reward."""
-        return ApexReward(robot, self.reward, self.task.rate)
+        return apex_reward(robot, self.reward, self.task.rate)
 
     def make_model(self, env: TaskVecEnv, seed: int) -> ResumablePPO:
         """Build PPO with gSDE and an asymmetric critic."""
@@ -115,9 +115,7 @@ class FastRecipe(Recipe):
 
     def anneal(self, model: Any, env: TaskVecEnv, share: float) -> None:  # noqa: ANN401
         """Sharpen the reward and quieten exploration."""
-        reward = env.task.reward
-        assert isinstance(reward, ApexReward)
-        reward.anneal(share)
+        env.task.reward.anneal(share)
         first, last = self.log_std
         with torch.no_grad():
             model.policy.log_std.fill_(

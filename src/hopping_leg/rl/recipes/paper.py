@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from torch import nn
 
-from hopping_leg.envs import PaperReward, PaperRewardOptions, TaskConfig
+from hopping_leg.envs import PaperRewardConfig, Reward, TaskConfig, paper_reward
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.resumable import ResumableSAC
 from hopping_leg.rl.sb3_env import TaskVecEnv
@@ -31,7 +31,7 @@ class PaperRecipe(Recipe):
             fall_penalty=20.0,
         )
     )
-    reward: PaperRewardOptions = field(default_factory=PaperRewardOptions)
+    reward: PaperRewardConfig = field(default_factory=PaperRewardConfig)
     """Weights as printed."""
     steps: int = 240_000
     """Control steps of experience in all, summed over the legs."""
@@ -62,9 +62,9 @@ class PaperRecipe(Recipe):
     log_std: float = -2.0
     """Initial log standard deviation of gSDE's weights."""
 
-    def make_reward(self, robot: Robot) -> PaperReward:
+    def make_reward(self, robot: Robot) -> Reward:
         """Build the paper's five-term reward."""
-        return PaperReward(robot, replace(self.reward, rest_length=self.task.start_length))
+        return paper_reward(robot, replace(self.reward, rest_length=self.task.start_length))
 
     def make_model(self, env: TaskVecEnv, seed: int) -> ResumableSAC:
         """Build SAC with gSDE."""

@@ -13,7 +13,7 @@ import numpy as np
 from torch import nn
 
 from hopping_leg.controllers.observation_history import make_layout
-from hopping_leg.envs import ApexRewardOptions, TaskConfig
+from hopping_leg.envs import ApexRewardConfig, TaskConfig
 from hopping_leg.envs.privileged_observation import PRIVILEGED
 from hopping_leg.rl.actor import dense_network
 from hopping_leg.rl.distillation.dagger import DaggerConfig
@@ -46,8 +46,8 @@ class PreciseRecipe(FastRecipe):
             randomize_from_start=False,
         )
     )
-    reward: ApexRewardOptions = field(
-        default_factory=lambda: ApexRewardOptions(
+    reward: ApexRewardConfig = field(
+        default_factory=lambda: ApexRewardConfig(
             width=(0.030, 0.006), energy=0.8, energy_beyond=0.05, jerk=0.5, effort=0.2
         )
     )

@@ -1,3 +1,4 @@
+import dataclasses
 import math
 
 import numpy as np
@@ -5,14 +6,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hopping_leg.envs import PaperReward, PaperRewardOptions, Transition
+from hopping_leg.envs import PaperRewardConfig, Transition, paper_reward
 from hopping_leg.robot import load_robot
 
 ROBOT = load_robot("legv2-paper")
 LOWER, UPPER = ROBOT.of_joints("lower"), ROBOT.of_joints("upper")
 SPEED = ROBOT.of_joints("no_load_speed")
 REST = 0.2 + ROBOT.foot.radius
-PRINTED = PaperRewardOptions()
+PRINTED = PaperRewardConfig()
 
 
 def transition(
@@ -32,8 +33,8 @@ def transition(
     )
 
 
-def terms_of(options=PRINTED, **state):
-    paper = PaperReward(ROBOT, options)
+def terms_of(config=PRINTED, **state):
+    paper = paper_reward(ROBOT, config)
     reward, terms = paper(transition(**state))
     return float(reward[0]), dict(zip(paper.names, terms[0].tolist(), strict=True))
 
@@ -69,13 +70,13 @@ def test_every_term_is_as_printed(height, rate, q, qd, command, action, last):
     [("step", math.exp(0.05)), ("printed", 1 - math.exp(0.05))],
 )
 def test_readings_of_the_height_barrier(barrier, expected):
-    options = PaperRewardOptions(barrier=barrier)
-    assert terms_of(options, height=0.35)[1]["height"] == pytest.approx(expected)
-    assert terms_of(options, height=0.29)[1]["height"] == 0.0
+    config = PaperRewardConfig(barrier=barrier)
+    assert terms_of(config, height=0.35)[1]["height"] == pytest.approx(expected)
+    assert terms_of(config, height=0.29)[1]["height"] == 0.0
 
 
 def test_barrier_as_printed_rewards_overshoot_and_the_step_does_not():
-    printed, step = PaperRewardOptions(barrier="printed"), PaperRewardOptions()
+    printed, step = PaperRewardConfig(barrier="printed"), PaperRewardConfig()
     assert terms_of(printed, height=0.40)[0] > terms_of(printed, height=0.30)[0]
     assert terms_of(step, height=0.40)[0] < terms_of(step, height=0.29)[0]
 
@@ -94,11 +95,12 @@ def test_every_leg_is_judged_by_itself():
     ]
     singles = [terms_of(**row)[0] for row in rows]
     many = [transition(**row) for row in rows]
-    arrays = [np.concatenate([getattr(t, f) for t in many]) for f in Transition._fields[:-1]]
-    together, _ = PaperReward(ROBOT)(Transition(*arrays, lambda: np.zeros(20)))
+    names = [field.name for field in dataclasses.fields(Transition)][:-1]
+    arrays = [np.concatenate([getattr(t, name) for t in many]) for name in names]
+    together, _ = paper_reward(ROBOT)(Transition(*arrays, lambda: np.zeros(20)))
     np.testing.assert_allclose(together, singles, rtol=1e-12)
 
 
 def test_velocity_limit_can_be_chosen():
-    options = PaperRewardOptions(velocity_limit=10.0)
-    assert terms_of(options, qd=(11.0, -12.0))[1]["velocity"] == pytest.approx(21.0 + 44.0)
+    config = PaperRewardConfig(velocity_limit=10.0)
+    assert terms_of(config, qd=(11.0, -12.0))[1]["velocity"] == pytest.approx(21.0 + 44.0)

@@ -1,0 +1,171 @@
+"""A reward as a list of terms, each a function of a ``Transition`` with a name and a weight."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+
+from hopping_leg.arrays import Array, BoolArray, IntArray
+from hopping_leg.errors import UsageError
+from hopping_leg.hop_detection import FLIGHT_CLEARANCE
+
+
+@dataclass
+class Transition:
+    """True state after a tick of n legs and the actions around it.
+
+    The arrays are live: they change with the next tick, so keep copies.
+    """
+
+    state: Array
+    """Base height, hip and knee angle, and their rates, m, rad, m/s, rad/s, (n, 6)."""
+    command: Array
+    """Desired height x^d in force during the tick, m, (n,)."""
+    action: Array
+    """Action of this tick, in [-1, 1], (n, 2)."""
+    last_action: Array
+    """Action of the tick before, zero at the start of an episode, (n, 2)."""
+    apex: BoolArray
+    """Whether the base passed an in-flight apex during the tick, (n,)."""
+    apex_height: Array
+    """Height of that apex, else NaN, m, (n,)."""
+    measure_clearance: Callable[[], Array]
+    """Computes ``foot_clearance`` for the terms that need it."""
+
+    @property
+    def height(self) -> Array:
+        """Base height x, m, (n,)."""
+        return self.state[:, 0]
+
+    @property
+    def rate(self) -> Array:
+        """Base velocity, m/s, (n,)."""
+        return self.state[:, 3]
+
+    @property
+    def q(self) -> Array:
+        """Joint positions, rad, (n, 2)."""
+        return self.state[:, 1:3]
+
+    @property
+    def qd(self) -> Array:
+        """Joint velocities, rad/s, (n, 2)."""
+        return self.state[:, 4:6]
+
+    @cached_property
+    def foot_clearance(self) -> Array:
+        """Gap between foot and ground, m, (n,)."""
+        return self.measure_clearance()
+
+    @cached_property
+    def flying(self) -> BoolArray:
+        """Whether the foot is off the ground, (n,)."""
+        return self.foot_clearance >= FLIGHT_CLEARANCE
+
+
+def sum_of_joints(values: Array) -> Array:
+    """Return the sum over hip and knee, (n,), of (n, 2), in a third of the time of ``np.sum``."""
+    total: Array = values[:, 0] + values[:, 1]
+    return total
+
+
+@runtime_checkable
+class StatefulTerm(Protocol):
+    """A term that remembers something from tick to tick."""
+
+    def __call__(self, transition: Transition) -> Array:
+        """Return the unweighted term, (n,)."""
+        ...
+
+    def reset(self, rows: IntArray) -> None:
+        """Begin new episodes of some legs."""
+        ...
+
+    def state(self) -> dict[str, Any]:
+        """Return what is remembered, as arrays and plain values."""
+        ...
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a ``state``."""
+        ...
+
+
+@runtime_checkable
+class AnnealedTerm(Protocol):
+    """A term that changes while training proceeds."""
+
+    def anneal(self, share: float) -> None:
+        """Adapt to the share of the training that is done, 0 to 1."""
+        ...
+
+
+class RewardTerm(NamedTuple):
+    """A line of a reward."""
+
+    name: str
+    """Name in ``info["reward_terms"]``."""
+    weight: float | Callable[[float], float]
+    """Factor of the term, negative for a penalty, or that factor at a share of the training."""
+    function: Callable[[Transition], Array | float] | StatefulTerm
+    """Computes the unweighted term, (n,), or one number for all."""
+
+
+class Reward:
+    """The weighted sum of a list of terms.
+
+    Args:
+        terms: In the order of a step's ``terms``.
+        scale: Factor of the whole sum, for the critic's sake.
+
+    Attributes:
+        names: Names of the terms, k in all.
+
+    Raises:
+        UsageError: Two terms have the same name.
+    """
+
+    def __init__(self, terms: Sequence[RewardTerm], scale: float = 1.0) -> None:
+        self.terms, self.scale = tuple(terms), scale
+        self.names = tuple(term.name for term in terms)
+        if len(set(self.names)) < len(self.names):
+            raise UsageError(f"Terms of a reward need names of their own, not {self.names}.")
+        self._functions = tuple(term.function for term in terms)
+        self._stateful = {
+            term.name: term.function for term in terms if isinstance(term.function, StatefulTerm)
+        }
+        self.anneal(0.0)
+
+    def with_terms(self, *terms: RewardTerm) -> "Reward":
+        """Return the same reward with more terms at its end."""
+        return Reward((*self.terms, *terms), self.scale)
+
+    def anneal(self, share: float) -> None:
+        """Adapt weights and terms to the share of the training that is done, 0 to 1."""
+        weights = (weight(share) if callable(weight) else weight for _, weight, _ in self.terms)
+        self._weights = np.array(list(weights), np.float64)
+        for function in self._functions:
+            if isinstance(function, AnnealedTerm):
+                function.anneal(share)
+
+    def __call__(self, transition: Transition) -> tuple[Array, Array]:
+        """Return the reward, (n,), and its unweighted terms, (n, k)."""
+        terms = np.empty((len(transition.state), len(self.terms)))
+        for column, function in enumerate(self._functions):
+            terms[:, column] = function(transition)
+        return self.scale * np.add.reduce(terms * self._weights, axis=1), terms
+
+    def reset(self, rows: IntArray) -> None:
+        """Begin new episodes of some legs."""
+        for term in self._stateful.values():
+            term.reset(rows)
+
+    def state(self) -> dict[str, Any]:
+        """Return what the terms remember from tick to tick, by their names."""
+        return {name: term.state() for name, term in self._stateful.items()}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a ``state``."""
+        for name, term in self._stateful.items():
+            term.restore(state[name])
