@@ -29,7 +29,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Entry, EvaluationRun, evaluate
 from hopping_leg.evaluate.entries import load_entries
 from hopping_leg.evaluate.report import render_videos, write_report
-from hopping_leg.evaluate.terminal import print_tables
+from hopping_leg.evaluate.tables import print_evaluation
 from hopping_leg.evaluate.trials import KINDS, save_traces
 from hopping_leg.io import write_atomically
 from hopping_leg.robot import load_robot
@@ -126,7 +126,7 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
     if args.json:
         write_atomically(args.json, judged.evaluation.dumps())
     console = Console()
-    print_tables(console, judged.evaluation)
+    print_evaluation(console, judged.evaluation)
     if args.traces:
         save_traces(judged.runs, args.traces)
     if args.report:

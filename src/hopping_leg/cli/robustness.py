@@ -19,7 +19,7 @@ from hopping_leg.cli.evaluate import Conditions, ShareProgress, say_written
 from hopping_leg.evaluate.figures import draw_robustness, to_svg
 from hopping_leg.evaluate.result_cache import ResultCache
 from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
-from hopping_leg.evaluate.terminal import print_robustness
+from hopping_leg.evaluate.tables import print_robustness
 from hopping_leg.io import write_atomically, write_json
 
 

@@ -13,7 +13,7 @@ from rich.console import Console
 from hopping_leg.cli.command_line import command_line
 from hopping_leg.cli.evaluate import Conditions, ShareProgress, say_written
 from hopping_leg.evaluate.skills.suite import run_skills
-from hopping_leg.evaluate.terminal import print_skills
+from hopping_leg.evaluate.tables import print_skills
 from hopping_leg.io import write_json
 
 

@@ -9,12 +9,12 @@ from typing import Any
 from markupsafe import Markup
 
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate import html_tables
+from hopping_leg.evaluate import tables
 from hopping_leg.evaluate.figures import draw_learning
-from hopping_leg.evaluate.html_tables import millimetres
 from hopping_leg.evaluate.report_figures import Picture, draw_report_figures, run_of
-from hopping_leg.evaluate.result import Evaluation, Staircase, Summary
+from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.evaluate.result_files import StoredRun
+from hopping_leg.evaluate.tables import column, millimetres
 from hopping_leg.evaluate.trials import Run
 from hopping_leg.html_page import Column, page_template, svg_uri, table
 
@@ -232,16 +232,20 @@ def write_comparison(compared: Compared, command: str = "") -> bytes:
         command: That makes the page again.
     """
     evaluation = compared.evaluation
+    rows = [training_row(label, training) for label, training in compared.trainings.items()]
+    histories = {label: training["history"] for label, training in compared.trainings.items()}
     pictures = draw_report_figures(evaluation, traces_of(compared)) if evaluation.summary else []
     page = page_template("hopping_leg.evaluate", "compare.html.j2").render(
         title=f"Compared: {', '.join(run.label for run in compared.runs)}",
         command=command,
         compared=compared,
         beside=beside_table(evaluation),
-        summary=html_tables.summary_table(evaluation.summary),
+        summary=tables.summary_table(evaluation.summary),
         pictures=[_picture(picture, evaluation) for picture in pictures],
-        learning=svg_uri(_learning(compared)) if compared.trainings else "",
-        trainings=training_table(compared),
+        learning=svg_uri(draw_learning(histories)) if histories else "",
+        trainings=table(
+            _TRAINING, list(itertools.starmap(training_row, compared.trainings.items()))
+        ),
         differences=difference_table(compared),
         commands={run.label: command_of(run) for run in compared.runs},
     )
@@ -250,48 +254,45 @@ def write_comparison(compared: Compared, command: str = "") -> bytes:
 
 def beside_table(evaluation: Evaluation) -> Markup:
     """Return median error and spread, one line per command and one column per controller."""
-    cells = {(row.command_m, row.controller): row for row in evaluation.summary}
+    cells = {
+        (row.command_m, row.controller): (
+            f"{millimetres(row.median_error_m, sign=True)} +- {millimetres(row.std_m)}"
+        )
+        for row in evaluation.summary
+    }
+
+    def of(controller: str) -> Column:
+        return Column(controller, lambda command: cells.get((command, controller), ""))
+
     columns = [Column("command / m", lambda command: f"{command:.2f}")]
-    columns += [Column(name, _cell(cells, name)) for name in evaluation.controllers]
+    columns += map(of, evaluation.controllers)
     caption = "median of apex minus command, +- standard deviation of the hops, mm"
     return table(columns, sorted({command for command, _ in cells}), caption)
 
 
-def training_table(compared: Compared) -> Markup:
-    """Return one line per training."""
-    rows = [training_row(label, result) for label, result in compared.trainings.items()]
-    return table(
-        [
-            Column("training", lambda r: r["label"]),
-            Column("recipe", lambda r: r["recipe"]),
-            Column("robot", lambda r: r["robot"]),
-            Column("seed", lambda r: f"{r['seed']}"),
-            Column("steps", lambda r: f"{r['steps']}"),
-            Column("minutes", lambda r: f"{r['minutes']:.1f}"),
-            Column("selected at step", lambda r: f"{r['selected_steps']}"),
-            Column("its score / mm", lambda r: millimetres(r["selected_score_m"])),
-        ],
-        rows,
-    )
+_TRAINING = (
+    column("training", "label"),
+    column("recipe", "recipe"),
+    column("robot", "robot"),
+    column("seed", "seed"),
+    column("steps", "steps"),
+    column("minutes", "minutes", ".1f"),
+    column("selected at step", "selected_steps"),
+    column("its score / mm", "selected_score_m", ".1f", 1e3),
+)
 
 
 def difference_table(compared: Compared) -> Markup:
     """Return the conditions that are not the same in all evaluations."""
     rows = compared.differences
-    labels = [key for key in rows[0] if key != "name"] if rows else []
-    columns = [Column("condition", lambda r: r["name"])]
-    columns += [Column(label.removeprefix("in "), _entry(label)) for label in labels]
-    return table(columns, rows)
-
-
-def _learning(compared: Compared) -> Any:  # noqa: ANN401
-    return draw_learning({label: t["history"] for label, t in compared.trainings.items()})
+    names = list(rows[0]) if rows else []
+    return table([column(name.removeprefix("in "), name) for name in names], rows)
 
 
 def _picture(picture: Picture, evaluation: Evaluation) -> dict[str, Any]:
     beside = {
-        "staircase": lambda: _staircases(evaluation),
-        "ladder": lambda: html_tables.ladder_table(evaluation.ladder),
+        "staircase": lambda: tables.staircase_table(evaluation.staircase),
+        "ladder": lambda: tables.ladder_table(evaluation.ladder),
     }
     return {
         "title": picture.title,
@@ -299,25 +300,3 @@ def _picture(picture: Picture, evaluation: Evaluation) -> dict[str, Any]:
         "source": svg_uri(picture.figure),
         "table": beside.get(picture.name, lambda: Markup(""))(),
     }
-
-
-def _staircases(evaluation: Evaluation) -> Markup:
-    """Return one table per set of steps, as runs of different legs have different ones."""
-    sets: dict[tuple[float, ...], list[Staircase]] = {}
-    for stairs in evaluation.staircase:
-        sets.setdefault(tuple(stairs.commands_m), []).append(stairs)
-    return Markup("").join(map(html_tables.staircase_table, sets.values()))
-
-
-def _cell(cells: dict[tuple[float, str], Summary], name: str) -> Callable[[Any], str]:
-    def text(command: float) -> str:
-        row = cells.get((command, name))
-        if row is None:
-            return ""
-        return f"{millimetres(row.median_error_m, sign=True)} +- {millimetres(row.std_m)}"
-
-    return text
-
-
-def _entry(label: str) -> Callable[[Any], str]:
-    return lambda row: str(row[label])

@@ -5,7 +5,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from hopping_leg.evaluate import html_tables
+from hopping_leg.evaluate import tables
 from hopping_leg.evaluate.acceptance import acceptance_lines
 from hopping_leg.evaluate.report_figures import Picture, draw_report_figures
 from hopping_leg.evaluate.result import Evaluation
@@ -61,18 +61,18 @@ def _subtitle(evaluation: Evaluation) -> str:
 def _tables(evaluation: Evaluation) -> dict[str, Markup]:
     secondary = evaluation.secondary
     return {
-        "summary": html_tables.summary_table(evaluation.summary),
-        "groups": html_tables.group_table(evaluation.groups),
-        "secondary": html_tables.summary_table(secondary.summary) if secondary else Markup(""),
-        "estimators": html_tables.estimator_table(evaluation.estimators),
+        "summary": tables.summary_table(evaluation.summary),
+        "groups": tables.group_table(evaluation.groups),
+        "secondary": tables.summary_table(secondary.summary) if secondary else Markup(""),
+        "estimators": tables.estimator_table(evaluation.estimators),
     }
 
 
 def _picture(picture: Picture, evaluation: Evaluation) -> dict[str, Any]:
     beside = {
-        "distributions": lambda: html_tables.neighbour_table(evaluation.neighbours),
-        "staircase": lambda: html_tables.staircase_table(evaluation.staircase),
-        "ladder": lambda: html_tables.ladder_table(evaluation.ladder),
+        "distributions": lambda: tables.neighbour_table(evaluation.neighbours),
+        "staircase": lambda: tables.staircase_table(evaluation.staircase),
+        "ladder": lambda: tables.ladder_table(evaluation.ladder),
     }
     files = picture.files
     shown = [*files[:2], "..."] if len(files) > 3 else files

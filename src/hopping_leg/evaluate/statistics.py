@@ -1,12 +1,13 @@
 """Are the heights different, by how much, and how sure is that?"""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import stats
 
-from hopping_leg.arrays import Array
+from hopping_leg.arrays import Array, IntArray
 
 CONFIDENCE = 0.95
 RESAMPLES = 1000
@@ -81,13 +82,33 @@ def median_interval(
     def median_of(index: Array) -> float:
         return float(np.median(np.concatenate([units[int(i)] for i in index])))
 
-    result = stats.bootstrap(
-        (np.arange(len(units)),),
-        median_of,
-        vectorized=False,
+    return bootstrap((np.arange(len(units)),), median_of, seed, resamples)
+
+
+def bootstrap(
+    samples: Sequence[Array | IntArray],
+    statistic: Callable[..., Any],
+    seed: int,
+    resamples: int = RESAMPLES,
+    *,
+    vectorized: bool = False,
+) -> tuple[float, float]:
+    """Return the 95 % percentile interval of a statistic, every sample resampled on its own.
+
+    Args:
+        samples: Each is an argument of the statistic.
+        statistic: Of the samples; if vectorized, with an argument ``axis``.
+        seed: Of the resampling.
+        resamples: How many.
+        vectorized: Whether the statistic takes many resamples at once.
+    """
+    interval = stats.bootstrap(
+        samples,
+        statistic,
+        vectorized=vectorized,
         n_resamples=resamples,
         confidence_level=CONFIDENCE,
         method="percentile",
         rng=np.random.default_rng(seed),
-    )
-    return float(result.confidence_interval.low), float(result.confidence_interval.high)
+    ).confidence_interval
+    return float(interval.low), float(interval.high)

@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from hopping_leg.arrays import IntArray
-from hopping_leg.evaluate.statistics import CONFIDENCE, RESAMPLES
+from hopping_leg.evaluate.statistics import bootstrap
 
 
 def compare(first: str, other: str, trials: Sequence[dict[str, Any]], seed: int) -> dict[str, Any]:
@@ -45,16 +44,7 @@ def compare(first: str, other: str, trials: Sequence[dict[str, Any]], seed: int)
 
     low = high = whole = ratio(np.arange(len(twins)))
     if len(twins) > 1:
-        interval = stats.bootstrap(
-            (np.arange(len(twins)),),
-            ratio,
-            vectorized=False,
-            n_resamples=RESAMPLES,
-            confidence_level=CONFIDENCE,
-            method="percentile",
-            rng=np.random.default_rng(seed),
-        ).confidence_interval
-        low, high = float(interval.low), float(interval.high)
+        low, high = bootstrap((np.arange(len(twins)),), ratio, seed)
     return {
         "method": other,
         "over": first,

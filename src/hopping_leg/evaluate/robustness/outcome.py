@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.evaluate.metrics import HopWindow, measure, pooled_apexes
 from hopping_leg.evaluate.robustness.trials import AxisTrials, RobustnessTrial
-from hopping_leg.evaluate.statistics import CONFIDENCE, RESAMPLES
+from hopping_leg.evaluate.statistics import bootstrap
 from hopping_leg.trace import Trace
 
 TOLERANCE = 0.02
@@ -113,16 +112,7 @@ def share(axes: Sequence[Sequence[Array]], seed: int) -> tuple[float, float, flo
     score = float(weights @ [level.mean() for level in levels])
     if any(len(level) < 2 for level in levels):
         return score, float("nan"), float("nan")
-    found = stats.bootstrap(
-        levels,
-        statistic,
-        vectorized=True,
-        n_resamples=RESAMPLES,
-        confidence_level=CONFIDENCE,
-        method="percentile",
-        rng=np.random.default_rng(seed),
-    ).confidence_interval
-    return score, float(found.low), float(found.high)
+    return score, *bootstrap(levels, statistic, seed, vectorized=True)
 
 
 def by_level(outcomes: Sequence[Outcome]) -> dict[float, list[Outcome]]:

@@ -1,0 +1,331 @@
+"""Results as tables, in HTML for pages and in text for the terminal; lengths in mm."""
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from markupsafe import Markup
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from hopping_leg.evaluate.acceptance import acceptance_lines
+from hopping_leg.evaluate.result import Comparison, Estimator, Evaluation, Group, Staircase, Summary
+from hopping_leg.evaluate.robustness.outcome import OVERALL
+from hopping_leg.html_page import Column, table
+
+
+def millimetres(value: float, sign: bool = False) -> str:
+    """Return a length in mm; a dash where there is none."""
+    return f"{1e3 * value:{'+' if sign else ''}.1f}" if value == value else "-"
+
+
+def column(
+    heading: str,
+    name: str,
+    form: str = "",
+    scale: float = 1.0,
+    bad: Callable[[Any], bool] = lambda _value: False,
+) -> Column:
+    """Return the column of an entry of rows, be they dataclasses or JSON values."""
+
+    def entry(row: Any) -> Any:  # noqa: ANN401
+        return row[name] if isinstance(row, dict) else getattr(row, name)
+
+    def text(row: Any) -> str:  # noqa: ANN401
+        value = entry(row)
+        if value is None or value != value:
+            return "-"
+        return format(value * scale if scale != 1 else value, form)
+
+    return Column(heading, text, lambda row: bad(entry(row)))
+
+
+def _percent(heading: str, name: str) -> Column:
+    share = column(heading, name, ".0f", 100)
+    return Column(heading, lambda row: f"{share.text(row)} %")
+
+
+def _interval(row: Summary | Group) -> str:
+    low = millimetres(row.median_error_low_m, sign=True)
+    return f"{low} .. {millimetres(row.median_error_high_m, sign=True)}"
+
+
+def _positive(value: float) -> bool:
+    return value > 0
+
+
+_CONTROLLER = column("controller", "controller")
+_FLOOR = column("floor", "floor")
+_COMMAND = column("command / m", "command_m", ".2f")
+_ERROR = column("median error / mm", "median_error_m", "+.1f", 1e3)
+_INTERVAL = Column("95 % interval", _interval)
+_STD = column("std / mm", "std_m", ".1f", 1e3)
+_HOPS = column("hops", "hops")
+_SKIPPED = column("skipped", "skipped_hops", bad=_positive)
+_CONTACTS = column("body contacts", "body_contacts", bad=_positive)
+
+_SUMMARY = (
+    _CONTROLLER,
+    _COMMAND,
+    _ERROR,
+    _INTERVAL,
+    _STD,
+    column("IQR / mm", "iqr_m", ".1f", 1e3),
+    _HOPS,
+    _SKIPPED,
+    column("hops/s", "hop_rate_hz", ".2f"),
+    _percent("flight", "flight_fraction"),
+    column("lowest base / mm", "min_base_height_m", ".0f", 1e3),
+    column("sink / mm", "max_sink_m", ".0f", 1e3),
+    _CONTACTS,
+    Column(
+        "peak torque hip, knee / N m",
+        lambda r: f"{r.peak_hip_torque_nm:.1f}, {r.peak_knee_torque_nm:.1f}",
+    ),
+    Column("RMS", lambda r: f"{r.rms_hip_torque_nm:.1f}, {r.rms_knee_torque_nm:.1f}"),
+)
+
+_LADDER = (_CONTROLLER, _COMMAND, _ERROR, _STD, _HOPS, _SKIPPED, _CONTACTS)
+
+_GROUPS = (
+    column("group", "group"),
+    _COMMAND,
+    column("policies", "policies"),
+    column("never hopped", "motionless", bad=_positive),
+    _ERROR,
+    _INTERVAL,
+    column("worst |error| / mm", "worst_abs_error_m", ".1f", 1e3),
+    column("median std / mm", "median_std_m", ".1f", 1e3),
+    _SKIPPED,
+    _CONTACTS,
+)
+
+_SHORT_SUMMARY = (
+    _CONTROLLER,
+    column("cmd", "command_m", ".0f", 1e3),
+    column("error", "median_error_m", "+.1f", 1e3),
+    column("std", "std_m", ".1f", 1e3),
+    _HOPS,
+    column("skip", "skipped_hops"),
+    column("1/s", "hop_rate_hz", ".2f"),
+    _percent("flight", "flight_fraction"),
+    column("base", "min_base_height_m", ".0f", 1e3),
+    column("contacts", "body_contacts"),
+)
+
+_COUNTED = (
+    _CONTROLLER,
+    _FLOOR,
+    _COMMAND,
+    column("asked", "asked"),
+    _percent("exact", "exact"),
+    _percent("at rest", "at_rest"),
+    column("error / mm", "median_error_m", "+.1f", 1e3),
+    column("landing / weights", "landing_force", ".1f"),
+)
+
+_CLIMBS = (
+    _CONTROLLER,
+    _FLOOR,
+    _COMMAND,
+    column("first hop / mm", "worst_first_error_m", "+.1f", 1e3),
+    column("later / mm", "worst_error_m", "+.1f", 1e3),
+    _SKIPPED,
+)
+
+_LANDINGS = (
+    column("landing by", "controller"),
+    _FLOOR,
+    column("force / weights", "peak_force", ".2f"),
+    column("hip / N m", "peak_hip_torque_nm", ".1f"),
+    column("knee / N m", "peak_knee_torque_nm", ".1f"),
+    column("rebound / mm", "rebound_m", ".2f", 1e3),
+)
+
+
+def summary_table(rows: Sequence[Summary]) -> Markup:
+    """Return the main table."""
+    return table(_SUMMARY, rows)
+
+
+def ladder_table(rows: Sequence[Summary]) -> Markup:
+    """Return the ladder in short form."""
+    return table(_LADDER, rows)
+
+
+def group_table(groups: Sequence[Group]) -> Markup:
+    """Return the aggregate over training seeds."""
+    return table(_GROUPS, groups)
+
+
+def neighbour_table(comparisons: Sequence[Comparison]) -> Markup:
+    """Return the tests between neighbouring commands."""
+    columns = (
+        Column("controller", lambda r: r[0]),
+        Column("commands / m", lambda r: f"{r[1].lower_m:.2f} and {r[1].upper_m:.2f}"),
+        Column("p, rank sum", lambda r: _p_value(r[1].p), lambda r: not r[1].p < 1e-3),
+        Column("Cliff's delta", lambda r: f"{r[1].cliffs_delta:+.3f}" if r[1].p == r[1].p else "-"),
+        Column(
+            "hops in the overlap",
+            lambda r: f"{100 * r[1].overlap:.1f} %" if r[1].p == r[1].p else "-",
+        ),
+    )
+    return table(columns, [(c.controller, pair) for c in comparisons for pair in c.neighbours])
+
+
+def _p_value(p: float) -> str:
+    if p != p:
+        return "-"
+    return "< 0.001" if p < 1e-3 else f"{p:.3f}"
+
+
+def staircase_table(stairs: Sequence[Staircase]) -> Markup:
+    """Return medians per step and what follows from them, a table per set of steps."""
+    sets: dict[tuple[float, ...], list[Staircase]] = {}
+    for one in stairs:
+        sets.setdefault(tuple(one.commands_m), []).append(one)
+    caption = "median apex at each step / mm"
+    tables = [table(_staircase_columns(steps), rows, caption) for steps, rows in sets.items()]
+    return Markup("").join(tables)
+
+
+def _staircase_columns(steps: Sequence[float]) -> list[Column]:
+    def median(index: int) -> Callable[[Staircase], str]:
+        return lambda staircase: millimetres(staircase.median_apexes_m[index])
+
+    return [
+        _CONTROLLER,
+        *(Column(f"{command:.2f} m", median(index)) for index, command in enumerate(steps)),
+        Column("monotone", lambda r: "yes" if r.monotone else "no", lambda r: not r.monotone),
+        Column("runs monotone", lambda r: f"{r.monotone_runs} of {r.runs}"),
+        _SKIPPED,
+    ]
+
+
+def estimator_table(estimators: Sequence[Estimator]) -> Markup:
+    """Return bias and spread of estimated minus true height."""
+
+    def pair(heading: str, name: str) -> Column:
+        bias = column("", f"{name}_bias_m", "+.1f", 1e3)
+        std = column("", f"{name}_std_m", ".1f", 1e3)
+        return Column(heading, lambda row: f"{bias.text(row)} +- {std.text(row)}")
+
+    columns = (
+        _CONTROLLER,
+        pair("in flight / mm", "flight"),
+        pair("in stance / mm", "stance"),
+        pair("apex, after landing / mm", "apex"),
+        _HOPS,
+    )
+    return table(columns, estimators, "estimated minus true, mean +- standard deviation")
+
+
+def print_evaluation(console: Console, evaluation: Evaluation) -> None:
+    """Print the summary, what it was measured on, and notes."""
+    for one in filter(None, (evaluation, evaluation.secondary)):
+        c = one.conditions
+        title = (
+            f"{c['robot']}, {c['floor']} floor, {c['seeds']} seed{'' if c['seeds'] == 1 else 's'}"
+            f" from {c['seed']}; heights in mm"
+        )
+        caption = (
+            "error: median of apex - command; skip: skipped hops; 1/s: hop rate;\n"
+            "base: lowest height over whole runs; contacts: of base or knee with the ground"
+        )
+        console.print(_text_table(_SHORT_SUMMARY, one.summary, title, caption))
+    lines = [
+        f"Staircase, {step.controller}: {'rises' if step.monotone else 'does not rise'} at every"
+        f" step ({step.monotone_runs} of {step.runs} runs on their own), {step.skipped_hops}"
+        " skipped hops."
+        for step in evaluation.staircase
+    ]
+    lines += acceptance_lines(map(dataclasses.asdict, evaluation.summary))
+    for line in [*lines, *(f"Note: {note}" for note in evaluation.notes)]:
+        console.print(line, highlight=False)
+
+
+def print_robustness(console: Console, result: dict[str, Any]) -> None:
+    """Print the scores on every axis, what follows a change, and notes."""
+    c = result["conditions"]
+    marked = {axis["name"]: bool(axis["leaderboard"]) for axis in result["axes"]}
+    scores = {(row["controller"], row["axis"]): _score(row) for row in result["scores"]}
+
+    def score(controller: str) -> Column:
+        return Column(controller, lambda axis: scores[controller, axis])
+
+    columns = [Column("axis", str), Column("R", lambda axis: "x" if marked.get(axis) else "")]
+    columns += map(score, dict.fromkeys(name for name, _ in scores))
+    title = f"Robustness, {c['robot']}: successful trials in %"
+    caption = (
+        f"{', '.join(f'{command:g}' for command in c['commands_m'])} m, {c['seeds']} seeds from"
+        f" {c['seed']}; in brackets the 95 % interval;\nR: on RealAIGym's leaderboard, too"
+    )
+    console.print(_text_table(columns, [*marked, OVERALL], title, caption))
+    if result["recovery"]:
+        console.print(_recovery_table(result))
+    for row in result["steps"]:
+        settled = row["settled_after_hops"]
+        console.print(
+            f"{row['controller']}, command {row['from_m']:g} to {row['to_m']:g} m:"
+            f" {'not settled' if settled is None else f'settled after {settled} hops'}.",
+            highlight=False,
+        )
+    for note in result["notes"]:
+        console.print(f"Note: {note}", highlight=False)
+
+
+def _score(row: dict[str, Any]) -> str:
+    score = f"{100 * row['score']:.0f}"
+    if not math.isfinite(row["low"]):
+        return score
+    return f"{score} [{100 * row['low']:.0f}, {100 * row['high']:.0f}]"
+
+
+def _recovery_table(result: dict[str, Any]) -> Table:
+    """Return the hops after which each controller is back, per change and command."""
+    cells = {(r["change"], r["controller"], r["command_m"]): _back(r) for r in result["recovery"]}
+
+    def back(command: float) -> Column:
+        return Column(f"{command:g} m", lambda row: cells[*row, command])
+
+    columns = [Column("change", lambda row: row[0]), Column("controller", lambda row: row[1])]
+    columns += map(back, result["conditions"]["commands_m"])
+    return _text_table(
+        columns,
+        list(dict.fromkeys(key[:2] for key in cells)),
+        "Hops until back after a change in the middle of a run",
+        f"back: within {1e3 * result['conditions']['back_m']:g} mm of the command from there on; in"
+        " brackets\nthe error of hop 6 and later in mm; -: not back",
+    )
+
+
+def _back(row: dict[str, Any]) -> str:
+    hops, later = row["back_after_hops"], row["later_abs_error_m"]
+    size = "-" if later is None else f"{1e3 * later:.0f}"
+    return f"{'-' if hops is None else hops} [{size}]"
+
+
+def print_skills(console: Console, result: dict[str, Any]) -> None:
+    """Print the tables of skills."""
+    drop = 1e3 * result["conditions"]["drop_m"]
+    for columns, name, title in (
+        (_COUNTED, "counted", "Hop so many times and stop"),
+        (_CLIMBS, "climbs", "Stairs: worst step, apex minus command above the ground of it"),
+        (_LANDINGS, "landings", f"Dropped by {drop:.0f} mm"),
+    ):
+        console.print(_text_table(columns, result[name], title))
+
+
+def _text_table(
+    columns: Sequence[Column], rows: Sequence[Any], title: str, caption: str | None = None
+) -> Table:
+    """Return a table for the terminal, within 80 columns where names allow."""
+    shown = Table(title=title, caption=caption, box=box.SIMPLE_HEAD, padding=0)
+    shown.add_column(columns[0].heading, overflow="fold", min_width=14)
+    for column in columns[1:]:
+        shown.add_column(column.heading, justify="right", overflow="fold")
+    for row in rows:
+        shown.add_row(*(column.text(row) for column in columns))
+    return shown
