@@ -243,9 +243,7 @@ def write_comparison(compared: Compared, command: str = "") -> bytes:
         summary=tables.summary_table(evaluation.summary),
         pictures=[_picture(picture, evaluation) for picture in pictures],
         learning=svg_uri(draw_learning(histories)) if histories else "",
-        trainings=table(
-            _TRAINING, list(itertools.starmap(training_row, compared.trainings.items()))
-        ),
+        trainings=table(_TRAINING, rows),
         differences=difference_table(compared),
         commands={run.label: command_of(run) for run in compared.runs},
     )
