@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hopping_leg.deploy.stop_reasons import FAULTS, Reason
+from hopping_leg.deploy.drive_link import FaultCode
+from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.server import Start
 
@@ -159,7 +160,11 @@ FAMILIES: dict[str, Family] = dict(
         _family("total loss", _faulty("silence", _nothing), _R.REPLIES_MISSING),
         _family("garbage line", _faulty("garbage_line", _few), _R.FINISHED),
         _family("encoder jump", _faulty("encoder_jump", _jump), _R.ENCODER_JUMP),
-        _family("drive fault", _faulty("drive_fault", _one_of(sorted(FAULTS))), _R.DRIVE_FAULT),
+        _family(
+            "drive fault",
+            _faulty("drive_fault", _one_of([int(code) for code in FaultCode])),
+            _R.DRIVE_FAULT,
+        ),
         _family(
             "over-temperature",
             _faulty("over_temperature", _between(100.0, 2000.0)),

@@ -5,8 +5,9 @@ import signal
 import threading
 import time
 
+from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.emulator.drive import Drive
-from hopping_leg.emulator.moteus_codes import CONTROLLING, MoteusMode
+from hopping_leg.emulator.mode_machine import CONTROLLING
 from hopping_leg.emulator.virtual_time import Lockstep
 
 _WATCHED = 0.1
@@ -88,9 +89,9 @@ class StruckClock:
 def _braking(drive: Drive) -> bool:
     """Whether a drive brakes by itself, or has no power on its windings."""
     machine, settings = drive.machine, drive.settings
-    if machine.mode is MoteusMode.TIMEOUT:
-        return int(settings["servo.timeout_mode"]) == MoteusMode.BRAKE
-    return machine.mode is MoteusMode.BRAKE or machine.mode not in CONTROLLING
+    if machine.mode is DriveMode.TIMEOUT:
+        return int(settings["servo.timeout_mode"]) == DriveMode.BRAKE
+    return machine.mode is DriveMode.BRAKE or machine.mode not in CONTROLLING
 
 
 def _kill(seconds: float) -> None:

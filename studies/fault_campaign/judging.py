@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.deploy.hardware_trials import Performance
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.supervisor import State
-from hopping_leg.emulator.moteus_codes import MoteusMode
 from hopping_leg.emulator.wire_log import WireLog
 from hopping_leg.errors import TraceError
 from studies.fault_campaign.case import Result, Scene
@@ -37,7 +37,7 @@ def judge_wire(result: Result, scene: Scene, log: WireLog, modes: Sequence[int])
     result.reaction = reaction(log, scene.limits, result.began, jumped=jumped)
     if result.reaction is not None and math.isinf(result.reaction):
         result.problems.append("no safe command followed a bad answer")
-    if MoteusMode.POSITION in modes:
+    if DriveMode.POSITION in modes:
         result.problems.append("a drive is still in torque mode at the end")
 
 

@@ -10,12 +10,12 @@ import tempfile
 import time
 from pathlib import Path
 
+from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.deploy.joint_transform import JOINTS
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.transport import opener
-from hopping_leg.emulator.moteus_codes import MoteusMode
 from hopping_leg.emulator.process import EmulatorProcess
 from hopping_leg.emulator.wire_log import WireLog
 from hopping_leg.errors import TraceError
@@ -126,7 +126,7 @@ def _gave_up(folder: Path) -> bool:
 
 def _armed(log: WireLog) -> float:
     """Return when torque was commanded for the first time, s."""
-    return next((told.time for told in log.commands if told.mode is MoteusMode.POSITION), 0.0)
+    return next((told.time for told in log.commands if told.mode is DriveMode.POSITION), 0.0)
 
 
 def _flown(emulator: EmulatorProcess, seconds: float) -> bool:
@@ -144,6 +144,6 @@ def _braked(log: WireLog, death: float) -> float | None:
     """Return the time from the host's death until both drives have left torque mode, s."""
     left: dict[int, float] = {}
     for change in log.changes:
-        if change.time >= death and change.mode is not MoteusMode.POSITION:
+        if change.time >= death and change.mode is not DriveMode.POSITION:
             left.setdefault(change.joint, change.time - death)
     return max(left.values()) if len(left) == len(JOINTS) else None

@@ -5,7 +5,7 @@ import signal
 import tempfile
 from pathlib import Path
 
-from hopping_leg.emulator.moteus_codes import MoteusMode
+from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot.parameters import Robot
@@ -46,7 +46,7 @@ def _refused(scene: Scene) -> Result:
         result.reason, result.sentence = "NOT_ARMED", str(error)
     finally:
         lockstep.link.close()
-    if any(told.mode is not MoteusMode.STOPPED for told in lockstep.robot.log.commands):
+    if any(told.mode is not DriveMode.STOPPED for told in lockstep.robot.log.commands):
         result.problems.append("a drive was powered")
     return result
 

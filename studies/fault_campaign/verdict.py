@@ -4,12 +4,12 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.deploy.safety_limits import SafetyLimits
-from hopping_leg.emulator.moteus_codes import MoteusMode
 from hopping_leg.emulator.wire_log import CommandEvent, ReplyEvent, WireLog
 from hopping_leg.robot.parameters import Robot
 
-SAFE = (MoteusMode.STOPPED, MoteusMode.BRAKE)
+SAFE = (DriveMode.STOPPED, DriveMode.BRAKE)
 """Commands that cannot move the leg."""
 
 _ROUNDING = 1e-5
@@ -34,7 +34,7 @@ class Limits:
     def bad(self, answer: ReplyEvent) -> bool:
         """Tell whether an answer shows by itself that something is wrong."""
         low, high = self.voltage
-        healthy = answer.mode is MoteusMode.POSITION
+        healthy = answer.mode is DriveMode.POSITION
         healthy &= low <= answer.voltage <= high and answer.temperature <= self.temperature
         return not healthy
 

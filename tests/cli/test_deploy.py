@@ -62,7 +62,7 @@ def test_a_python_class_is_deployed_and_stopped_by_name(emulate, tmp_path, capsy
 def test_a_fault_is_a_sentence_and_an_exit_code(emulate, tmp_path, capsys):
     emulate(faults=(Fault("drive_fault", at=0.6, drive="hip", value=33),))
     assert main([*RUN, "--yes", "--out", str(tmp_path)]) == 2
-    assert "hip: fault 33 (motor driver fault)" in capsys.readouterr().err
+    assert "hip: fault 33 (motor driver)" in capsys.readouterr().err
     assert len(list(tmp_path.glob("*.parquet"))) == 1
 
 

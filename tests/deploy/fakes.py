@@ -64,7 +64,7 @@ class FakeLink:
         self._command = outgoing
         modes = {
             Action.STOP: DriveMode.STOPPED,
-            Action.TORQUE: DriveMode.TORQUE,
+            Action.TORQUE: DriveMode.POSITION,
             Action.BRAKE: DriveMode.BRAKE,
         }
         self.mode = [modes[outgoing.action]] * 2

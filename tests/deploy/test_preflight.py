@@ -43,7 +43,7 @@ def test_healthy_drives_may_be_armed():
     [
         ({"answers": False}, "(id 2) does not answer"),
         ({"register_map": 4}, "register map 4 but this version speaks 5"),
-        ({"mode": 1, "fault": 35}, "reports fault 35 (encoder fault)"),
+        ({"mode": 1, "fault": 35}, "reports fault 35 (encoder)"),
         ({"voltage": 12.0}, "12.0 V but must lie between 18 and 42 V"),
         ({"voltage": math.nan}, "nan V but must lie"),
         ({"temperature": 70.0}, "has 70 deg C"),

@@ -57,10 +57,10 @@ def test_a_killed_host_leaves_its_record_and_drives_that_brake(emulator, tmp_pat
     process.send_signal(signal.SIGKILL)
     process.communicate()
     time.sleep(0.5)
-    assert DriveMode.TORQUE not in emulator.state().modes
+    assert DriveMode.POSITION not in emulator.state().modes
     rows = recover(box).table.height
     assert rows > BEGUN
-    assert main(["plot", str(box), "--out", str(tmp_path / "figures")]) == 0
+    assert main(["report", "figures", str(box), "--out", str(tmp_path / "figures")]) == 0
     assert Trace.load(box.with_suffix(".parquet")).table.height == rows
 
 

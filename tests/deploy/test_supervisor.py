@@ -42,7 +42,7 @@ OBSERVATIONS = st.builds(
 
 
 def good(index=0, **changes):
-    reply = Reply((0.7, -1.4)[index], 0.0, 0.0, int(DriveMode.TORQUE), 0, 24.0, 30.0, 0.0)
+    reply = Reply((0.7, -1.4)[index], 0.0, 0.0, int(DriveMode.POSITION), 0, 24.0, 30.0, 0.0)
     return replace(reply, **changes)
 
 
@@ -112,7 +112,7 @@ def at(tick, index, **changes):
     ("observation", "reason", "detail"),
     [
         (seen(2, operator=Operator.STOP), Reason.OPERATOR_STOP, ""),
-        (at(2, 1, mode=1, fault=35), Reason.DRIVE_FAULT, "knee: fault 35 (encoder fault)"),
+        (at(2, 1, mode=1, fault=35), Reason.DRIVE_FAULT, "knee: fault 35 (encoder)"),
         (at(2, 0, mode=11), Reason.DRIVE_TIMEOUT, "hip"),
         (at(2, 0, mode=0), Reason.DRIVE_LEFT_MODE, "mode 0"),
         (at(2, 0, velocity=math.nan), Reason.MEASUREMENT_NOT_FINITE, "nan rad/s"),

@@ -4,7 +4,8 @@ import moteus
 import numpy as np
 import pytest
 
-from hopping_leg.emulator.moteus_codes import FaultCode, Notice
+from hopping_leg.deploy.drive_link import FaultCode
+from hopping_leg.emulator.mode_machine import Notice
 from tests.emulator.bench import Bench, R
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from moteus.fdcanusb_device import _strip_and_validate_checksum
 
+from hopping_leg.deploy.drive_link import DriveMode, FaultCode
 from hopping_leg.emulator.faults import KINDS, Fault, load_faults
 from hopping_leg.emulator.frames import Frame, LineProtocol, QueuedReply
-from hopping_leg.emulator.moteus_codes import FaultCode, MoteusMode
 from hopping_leg.errors import UsageError
 from tests.emulator.bench import Bench, R
 
@@ -97,23 +97,23 @@ def test_an_encoder_jump_moves_what_is_reported_not_the_leg():
 )
 def test_drive_faults_switch_off_and_stay(fault, code):
     _, ticks = hopping(fault)
-    assert ticks[-1][0].values[R.MODE] == MoteusMode.FAULT
+    assert ticks[-1][0].values[R.MODE] == DriveMode.FAULT
     assert ticks[-1][0].values[R.FAULT] == code
     assert ticks[-1][0].values[R.TORQUE] == 0.0
-    assert ticks[-1][1].values[R.MODE] == MoteusMode.POSITION
+    assert ticks[-1][1].values[R.MODE] == DriveMode.POSITION
 
 
 def test_a_notice_changes_nothing_but_the_register():
     _, ticks = hopping(Fault("limit_notice", at=0.03, value=100))
     assert {replies[0].values[R.FAULT] for replies in ticks} == {0, 100}
-    assert {replies[0].values[R.MODE] for replies in ticks} == {MoteusMode.POSITION}
+    assert {replies[0].values[R.MODE] for replies in ticks} == {DriveMode.POSITION}
 
 
 def test_power_loss_stops_the_drive_and_forgets_its_home():
     bench, ticks = hopping(Fault("power_loss", at=0.03, drive="hip"), seconds=0.035)
     modes = [replies[0].values[R.MODE] for replies in ticks]
-    assert modes[0] == MoteusMode.POSITION
-    assert MoteusMode.STOPPED in modes or modes[-1] in (MoteusMode.ENABLING, MoteusMode.CALIBRATING)
+    assert modes[0] == DriveMode.POSITION
+    assert DriveMode.STOPPED in modes or modes[-1] in (DriveMode.ENABLING, DriveMode.CALIBRATING)
     assert bench.read(R.HOME_STATE) == 1
 
 
@@ -122,7 +122,7 @@ def test_a_pulled_plug_silences_the_host_and_trips_the_watchdogs():
     gone = [n for n, ids in enumerate(answered(ticks)) if not ids]
     assert 11 <= len(gone) <= 13
     back = ticks[gone[-1] + 1]
-    assert [reply.values[R.MODE] for reply in back] == [MoteusMode.TIMEOUT, MoteusMode.TIMEOUT]
+    assert [reply.values[R.MODE] for reply in back] == [DriveMode.TIMEOUT, DriveMode.TIMEOUT]
 
 
 def test_a_wrong_start_is_there_from_the_start():

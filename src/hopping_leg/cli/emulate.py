@@ -33,10 +33,11 @@ from typing import TYPE_CHECKING, Literal
 from rich.console import Console
 from rich.table import Table
 
+from hopping_leg.deploy.drive_link import DriveMode, FaultCode
 from hopping_leg.deploy.joint_transform import JOINTS
 from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
 from hopping_leg.emulator.faults import KINDS, load_faults
-from hopping_leg.emulator.moteus_codes import FaultCode, MoteusMode, Notice
+from hopping_leg.emulator.mode_machine import Notice
 from hopping_leg.errors import UsageError
 
 if TYPE_CHECKING:
@@ -187,7 +188,7 @@ class _Display:
             mode = drive.machine.mode
             if mode is not self._modes[joint]:
                 self._modes[joint] = mode
-                why = f": {_code_text(drive.machine.fault)}" if mode is MoteusMode.FAULT else ""
+                why = f": {_code_text(drive.machine.fault)}" if mode is DriveMode.FAULT else ""
                 lines.append(f"{robot.time:7.3f} s  {JOINTS[joint]}: {_mode_text(drive)}{why}")
         return lines
 

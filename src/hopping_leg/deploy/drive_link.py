@@ -9,16 +9,49 @@ Pair = tuple[float, float]
 
 
 class DriveMode(IntEnum):
-    """Modes of a drive that matter here (register 0x000)."""
+    """State of a drive, register 0x000; 2 to 4 cannot be asked for."""
 
     STOPPED = 0
     FAULT = 1
     ENABLING = 2
     CALIBRATING = 3
     CALIBRATED = 4
-    TORQUE = 10
+    PWM = 5
+    VOLTAGE = 6
+    VOLTAGE_FOC = 7
+    VOLTAGE_DQ = 8
+    CURRENT = 9
+    POSITION = 10
+    """Also pure torque: with gains of zero."""
     TIMEOUT = 11
+    ZERO_VELOCITY = 12
+    STAY_WITHIN = 13
+    MEASURE_INDUCTANCE = 14
     BRAKE = 15
+
+
+class FaultCode(IntEnum):
+    """Why a drive is in fault, register 0x00f."""
+
+    CALIBRATION = 32
+    MOTOR_DRIVER = 33
+    OVER_VOLTAGE = 34
+    ENCODER = 35
+    MOTOR_NOT_CONFIGURED = 36
+    PWM_CYCLE_OVERRUN = 37
+    OVER_TEMPERATURE = 38
+    START_OUTSIDE_LIMIT = 39
+    UNDER_VOLTAGE = 40
+    CONFIG_CHANGED = 41
+    THETA_INVALID = 42
+    POSITION_INVALID = 43
+    DRIVER_ENABLE = 44
+    STOP_POSITION_DEPRECATED = 45
+    TIMING_VIOLATION = 46
+    BEMF_FEEDFORWARD_NO_ACCEL_LIMIT = 47
+    INVALID_LIMITS = 48
+    POSITION_ERROR = 49
+    VELOCITY_ERROR = 50
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
-from hopping_leg.deploy.drive_link import DriveMode, Pair, Replies, Reply
+from hopping_leg.deploy.drive_link import DriveMode, FaultCode, Pair, Replies, Reply
 from hopping_leg.deploy.joint_transform import JOINTS
 from hopping_leg.deploy.safety_limits import SafetyLimits
 
@@ -47,33 +47,11 @@ class Reason(IntEnum):
     TORQUE_NOT_FINITE = 27, "The controller asked for a torque that is no number."
 
 
-FAULTS: dict[int, str] = {
-    32: "calibration fault",
-    33: "motor driver fault",
-    34: "over-voltage",
-    35: "encoder fault",
-    36: "motor not configured",
-    37: "control cycle overrun",
-    38: "over-temperature",
-    39: "start outside of its position limits",
-    40: "under-voltage",
-    41: "configuration changed while running",
-    42: "theta invalid",
-    43: "position invalid",
-    44: "driver not enabled",
-    45: "wrong stop position",
-    46: "timing violation",
-    47: "feedforward without ratio",
-    48: "invalid limits",
-    49: "position error too large",
-    50: "velocity error too large",
-}
-"""Fault codes of the drives' firmware; 96 to 105 are notices that a limit acts, not faults."""
-
-
 def fault_text(code: int) -> str:
     """Return a fault code with its meaning."""
-    return f"fault {code} ({FAULTS.get(code, 'unknown to this version')})"
+    known = code in set(FaultCode)
+    meaning = FaultCode(code).name.lower().replace("_", " ") if known else "unknown"
+    return f"fault {code} ({meaning})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,7 +165,7 @@ def find_cause(
 
 
 def _of_drive(reply: Reply, *, arming: bool) -> Cause | None:
-    if reply.mode == DriveMode.TORQUE:
+    if reply.mode == DriveMode.POSITION:
         return None
     if reply.mode == DriveMode.FAULT:
         return Cause(Reason.DRIVE_FAULT, fault_text(reply.fault))

@@ -109,7 +109,7 @@ def _next(
 def _arm(
     limits: SafetyLimits, before: SupervisorState, seen: SupervisorInput
 ) -> tuple[State, Cause]:
-    if all(reply is not None and reply.mode == DriveMode.TORQUE for reply in seen.replies):
+    if all(reply is not None and reply.mode == DriveMode.POSITION for reply in seen.replies):
         return State.RUNNING, Cause(Reason.DRIVES_READY)
     if not seen.time - before.since <= limits.arming_time:
         return State.DAMPING, Cause(Reason.ARMING_TOOK_TOO_LONG)

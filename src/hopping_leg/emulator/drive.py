@@ -9,15 +9,9 @@ from dataclasses import dataclass, fields
 from moteus.multiplex import F32
 from moteus.protocol import Register, scale_register
 
+from hopping_leg.deploy.drive_link import DriveMode, FaultCode
 from hopping_leg.emulator.diagnostic import Diagnostic
-from hopping_leg.emulator.moteus_codes import (
-    CONTROLLING,
-    MODES,
-    FaultCode,
-    ModeMachine,
-    MoteusMode,
-    Notice,
-)
+from hopping_leg.emulator.mode_machine import CONTROLLING, MODES, ModeMachine, Notice
 from hopping_leg.emulator.registers import Identity
 from hopping_leg.emulator.rotor_encoder import RotorEncoder
 from hopping_leg.emulator.settings import Settings
@@ -138,7 +132,7 @@ class Drive:
     def _write_mode(self, mode: int) -> int:
         if mode not in MODES:
             return INVALID_VALUE
-        self.command = Command(MoteusMode(mode))
+        self.command = Command(DriveMode(mode))
         self._commanded = True
         return 0
 
@@ -152,7 +146,7 @@ class Drive:
 
     def stop(self, time: float) -> None:
         """Stop, as ``d stop`` does."""
-        self._write_mode(MoteusMode.STOPPED)
+        self._write_mode(DriveMode.STOPPED)
         self.commit(time)
 
     def sense(self, output: float, velocity: float, torque: float) -> None:
@@ -197,16 +191,16 @@ class Drive:
     def _control(self, dt: float) -> float:
         mode, command, law = self.machine.mode, self.command, self.law
         position, velocity = self.encoder.position, self._velocity
-        if mode is MoteusMode.TIMEOUT:
-            mode = MoteusMode(int(self.settings["servo.timeout_mode"]))
+        if mode is DriveMode.TIMEOUT:
+            mode = DriveMode(int(self.settings["servo.timeout_mode"]))
             command = Command(mode, position=math.nan, kd_scale=command.kd_scale)
-        if mode is MoteusMode.POSITION:
+        if mode is DriveMode.POSITION:
             torque = law.position(command, position, velocity, dt)
-        elif mode is MoteusMode.ZERO_VELOCITY:
+        elif mode is DriveMode.ZERO_VELOCITY:
             torque = law.zero_velocity(command.kd_scale, velocity)
-        elif mode is MoteusMode.STAY_WITHIN:
+        elif mode is DriveMode.STAY_WITHIN:
             torque = law.stay_within(command, position, velocity)
-        elif mode is MoteusMode.BRAKE:
+        elif mode is DriveMode.BRAKE:
             return -self._brake * velocity
         else:
             return 0.0

@@ -8,7 +8,6 @@ import os
 import termios
 import tty
 from pathlib import Path
-from typing import Protocol
 
 import can
 
@@ -20,39 +19,6 @@ UDP_MULTICAST = "udp_multicast"
 
 DEFAULT_CHANNELS = {UDP_MULTICAST: "239.74.163.2", "socketcan": "vcan0"}
 """Interfaces of python-can that the emulator serves, with the channel that it takes by default."""
-
-
-class Port(Protocol):
-    """The adapter between host and drives."""
-
-    @property
-    def plugged(self) -> bool:
-        """Whether the host can reach it."""
-        ...
-
-    def fileno(self) -> int:
-        """Return the descriptor to wait for."""
-        ...
-
-    def receive(self) -> list[Frame]:
-        """Return frames that the host sent."""
-        ...
-
-    def send(self, item: QueuedReply) -> None:
-        """Send to the host."""
-        ...
-
-    def plug_in(self) -> None:
-        """Come back."""
-        ...
-
-    def unplug(self) -> None:
-        """Be gone for the host."""
-        ...
-
-    def close(self) -> None:
-        """End."""
-        ...
 
 
 class PtyPort:
@@ -222,3 +188,7 @@ class CanPort:
                 bitrate_switch=True,
             )
         )
+
+
+Port = PtyPort | CanPort
+"""The adapter between host and drives."""

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from moteus.protocol import Register
 
-from hopping_leg.emulator.moteus_codes import MoteusMode, Notice
+from hopping_leg.deploy.drive_link import DriveMode
+from hopping_leg.emulator.mode_machine import Notice
 from hopping_leg.emulator.settings import Settings
 
 _FIELDS = {
@@ -45,7 +46,7 @@ COMMAND_FIELDS = {int(register): name for register, name in _FIELDS.items()}
 class Command:
     """One command; a mode write starts from these defaults. Units are the drive's: rev, s, N m."""
 
-    mode: MoteusMode = MoteusMode.STOPPED
+    mode: DriveMode = DriveMode.STOPPED
     position: float = 0.0
     """NaN leaves position alone."""
     velocity: float = 0.0
@@ -198,10 +199,10 @@ class TorqueLaw:
 
 
 WITH_BOUNDS = (
-    MoteusMode.POSITION,
-    MoteusMode.STAY_WITHIN,
-    MoteusMode.ZERO_VELOCITY,
-    MoteusMode.TIMEOUT,
-    MoteusMode.CURRENT,
+    DriveMode.POSITION,
+    DriveMode.STAY_WITHIN,
+    DriveMode.ZERO_VELOCITY,
+    DriveMode.TIMEOUT,
+    DriveMode.CURRENT,
 )
 """Modes in which the position limits take outward torque away."""

@@ -2,7 +2,7 @@
 
 An event loop that has nothing to do does not sleep: it lets the emulated robot move until something
 arrives or the next timer is due. The host's loop, link and client run unchanged, down to the bytes
-on a terminal; ``MemoryTransport`` goes without the terminal.
+on a terminal.
 """
 
 import asyncio
@@ -11,12 +11,9 @@ from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
 from moteus import Transport
-from moteus.transport_device import Frame as ClientFrame
-from moteus.transport_device import TransportDevice
 
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.transport import TolerantFdcanusb
-from hopping_leg.emulator.frames import Frame, padded
 from hopping_leg.emulator.ports import Port, PtyPort
 from hopping_leg.emulator.robot import EmulatedRobot
 from hopping_leg.emulator.server import serve
@@ -169,59 +166,3 @@ class Lockstep:
         if not self._checksums:
             device._is_fdcanusb, device._checksum_active = True, False
         return Transport([device])
-
-
-class MemoryTransport(TransportDevice):  # type: ignore[misc]
-    """A device whose transactions take no time; replies that are late or lost stay away.
-
-    Args:
-        robot: Behind it.
-    """
-
-    def __init__(self, robot: EmulatedRobot) -> None:
-        super().__init__()
-        self.robot = robot
-
-    def empty_bus_tx_safe(self) -> bool:
-        """Return True: anything may be sent."""
-        return True
-
-    async def send_frame(self, frame: ClientFrame) -> None:
-        """Send a frame; replies go to the receive queue."""
-        self._send(frame)
-        for reply in self._replies():
-            await self._handle_received_frame(reply)
-
-    async def transaction(self, requests: list[Any], **_: object) -> None:
-        """Send requests; each gets the first reply that it waits for and that has arrived."""
-        for request in requests:
-            self._send(request.frame)
-        for reply in self._replies():
-            for request in requests:
-                wants = request.frame_filter is not None and request.frame_filter(reply)
-                if wants and not request.responses:
-                    request.responses.append(reply)
-                    break
-            else:
-                await self._handle_received_frame(reply)
-
-    def _send(self, frame: ClientFrame) -> None:
-        if self.robot.plugged:
-            self.robot.receive(Frame(frame.arbitration_id, padded(bytes(frame.data))))
-
-    def _replies(self) -> list[ClientFrame]:
-        """Return what arrives now; a CAN controller discards what was corrupted."""
-        items = self.robot.reply_queue.take(self.robot.time)
-        return [
-            ClientFrame(
-                arbitration_id=item.frame.arbitration_id,
-                data=item.frame.data,
-                dlc=len(item.frame.data),
-                is_extended_id=item.frame.extended,
-                is_fd=True,
-                bitrate_switch=True,
-                channel=self,
-            )
-            for item in items
-            if item.frame is not None and item.flip < 0 and self.robot.plugged
-        ]

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 from moteus.multiplex import RegisterSubframe, SubframeType
 from moteus.protocol import Register, parse_reply
 
-from hopping_leg.emulator.moteus_codes import MODES, MoteusMode
+from hopping_leg.deploy.drive_link import DriveMode
+from hopping_leg.emulator.mode_machine import MODES
 
 if TYPE_CHECKING:
     from hopping_leg.emulator.bus import Message
@@ -33,7 +34,7 @@ class CommandEvent:
 
     time: float
     joint: int
-    mode: MoteusMode
+    mode: DriveMode
     torque: float
     most: float
 
@@ -53,7 +54,7 @@ class ReplyEvent:
 
     time: float
     joint: int
-    mode: MoteusMode
+    mode: DriveMode
     fault: int
     voltage: float
     temperature: float
@@ -71,7 +72,7 @@ class ModeChange:
 
     time: float
     joint: int
-    mode: MoteusMode
+    mode: DriveMode
 
 
 _TOLD = (Register.MODE, Register.FAULT, Register.VOLTAGE, Register.TEMPERATURE)
@@ -89,7 +90,7 @@ class WireLog:
         self.commands: deque[CommandEvent] = deque(maxlen=_REMEMBERED)
         self.answers: deque[ReplyEvent] = deque(maxlen=_REMEMBERED)
         self.changes: deque[ModeChange] = deque(maxlen=_REMEMBERED)
-        self._modes = [MoteusMode.STOPPED, MoteusMode.STOPPED]
+        self._modes = [DriveMode.STOPPED, DriveMode.STOPPED]
 
     def told(self, time: float, joint: int, message: "Message", drive: "Drive") -> None:
         """Note what a message commands a drive, if it does."""
@@ -98,7 +99,7 @@ class WireLog:
             if not isinstance(s, RegisterSubframe) or s.type is not SubframeType.WRITE:
                 continue
             if s.register == Register.MODE and s.value in MODES:
-                mode = MoteusMode(int(s.value or 0))
+                mode = DriveMode(int(s.value or 0))
             elif s.register == Register.COMMAND_FEEDFORWARD_TORQUE:
                 torque = float(s.value or 0.0)
             elif s.register == Register.COMMAND_POSITION_MAX_TORQUE:
@@ -112,7 +113,7 @@ class WireLog:
         if values.keys() >= _STATE:
             mode, fault, voltage, temperature = (values[register] for register in _TOLD)
             self.answers.append(
-                ReplyEvent(time, joint, MoteusMode(int(mode)), int(fault), voltage, temperature)
+                ReplyEvent(time, joint, DriveMode(int(mode)), int(fault), voltage, temperature)
             )
 
     def stepped(self, time: float, joint: int, drive: "Drive") -> None:

@@ -8,17 +8,17 @@ from studies.fault_campaign.verdict import (
     restarts,
 )
 
-from hopping_leg.emulator.moteus_codes import MoteusMode
+from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.emulator.wire_log import CommandEvent, ReplyEvent, WireLog
 
 LIMITS = Limits((10.0, 10.0), (18.0, 42.0), 65.0)
 
 
-def told(time, mode=MoteusMode.POSITION, torque=1.0, most=10.0, joint=0):
+def told(time, mode=DriveMode.POSITION, torque=1.0, most=10.0, joint=0):
     return CommandEvent(time, joint, mode, torque, most)
 
 
-def answered(time, mode=MoteusMode.POSITION, voltage=24.0, temperature=30.0):
+def answered(time, mode=DriveMode.POSITION, voltage=24.0, temperature=30.0):
     return ReplyEvent(time, 0, mode, 0, voltage, temperature)
 
 
@@ -33,7 +33,7 @@ def test_healthy_commands_are_no_problem():
     commands = [
         told(0.0, torque=10.0),
         told(0.1, torque=-10.0),
-        told(0.2, MoteusMode.BRAKE, 0.0, 0.0),
+        told(0.2, DriveMode.BRAKE, 0.0, 0.0),
     ]
     assert problems_of_commands(commands, LIMITS) == []
 
@@ -55,18 +55,16 @@ def test_every_unsafe_command_is_found(command, word):
 
 
 def test_torque_after_a_stop_is_a_restart_only_since_the_fault():
-    before = [told(0.0, MoteusMode.STOPPED), told(0.1)]
-    assert (
-        restarts([*before, told(0.6, MoteusMode.BRAKE), told(0.7, MoteusMode.STOPPED)], 0.5) == []
-    )
-    assert restarts([*before, told(0.6, MoteusMode.BRAKE), told(0.7)], 0.5)
+    before = [told(0.0, DriveMode.STOPPED), told(0.1)]
+    assert restarts([*before, told(0.6, DriveMode.BRAKE), told(0.7, DriveMode.STOPPED)], 0.5) == []
+    assert restarts([*before, told(0.6, DriveMode.BRAKE), told(0.7)], 0.5)
 
 
 @pytest.mark.parametrize(
     "bad",
     [
-        answered(1.0, MoteusMode.FAULT),
-        answered(1.0, MoteusMode.TIMEOUT),
+        answered(1.0, DriveMode.FAULT),
+        answered(1.0, DriveMode.TIMEOUT),
         answered(1.0, voltage=43.0),
         answered(1.0, voltage=17.0),
         answered(1.0, temperature=66.0),
@@ -77,26 +75,26 @@ def test_the_reaction_counts_from_the_first_bad_answer_to_the_first_safe_command
     entries = (
         answered(0.9),
         bad,
-        answered(1.1, MoteusMode.FAULT),
+        answered(1.1, DriveMode.FAULT),
         told(1.0),
-        told(1.003, MoteusMode.BRAKE),
+        told(1.003, DriveMode.BRAKE),
     )
     assert reaction(log(*entries), LIMITS, 0.5, jumped=False) == pytest.approx(0.003)
 
 
 def test_answers_after_the_stop_are_not_reacted_to():
-    entries = answered(0.9), told(1.0, MoteusMode.BRAKE), answered(1.1, MoteusMode.BRAKE)
+    entries = answered(0.9), told(1.0, DriveMode.BRAKE), answered(1.1, DriveMode.BRAKE)
     assert reaction(log(*entries), LIMITS, 0.5, jumped=False) is None
     assert reaction(log(*entries), LIMITS, 0.5, jumped=True) == pytest.approx(0.1)
 
 
 def test_no_reaction_is_infinite():
     assert (
-        reaction(log(answered(1.0, MoteusMode.FAULT), told(1.1)), LIMITS, 0.5, jumped=False)
+        reaction(log(answered(1.0, DriveMode.FAULT), told(1.1)), LIMITS, 0.5, jumped=False)
         == math.inf
     )
 
 
 def test_an_answer_of_the_instant_at_which_a_jump_begins_knows_nothing_of_it():
-    entries = answered(0.5), answered(0.505), told(0.5055, MoteusMode.BRAKE)
+    entries = answered(0.5), answered(0.505), told(0.5055, DriveMode.BRAKE)
     assert reaction(log(*entries), LIMITS, 0.5, jumped=True) == pytest.approx(0.0005)

@@ -1,4 +1,4 @@
-"""Modes and fault codes of the drives' firmware, and the machine that leads from mode to mode.
+"""The drives' mode machine: what a command leads to, what faults and silence lead to.
 
 stopped --any command--> enabling -> calibrating --8.5 ms--> the commanded mode
 position, stay-within --silence longer than its timeout--> timeout (11)
@@ -9,51 +9,7 @@ timeout and fault leave only through stop
 import math
 from enum import IntEnum
 
-
-class MoteusMode(IntEnum):
-    """State of a drive, register 0x000; 2 to 4 cannot be asked for."""
-
-    STOPPED = 0
-    FAULT = 1
-    ENABLING = 2
-    CALIBRATING = 3
-    CALIBRATED = 4
-    PWM = 5
-    VOLTAGE = 6
-    VOLTAGE_FOC = 7
-    VOLTAGE_DQ = 8
-    CURRENT = 9
-    POSITION = 10
-    TIMEOUT = 11
-    ZERO_VELOCITY = 12
-    STAY_WITHIN = 13
-    MEASURE_INDUCTANCE = 14
-    BRAKE = 15
-
-
-class FaultCode(IntEnum):
-    """Why a drive is in fault, register 0x00f."""
-
-    NONE = 0
-    CALIBRATION = 32
-    MOTOR_DRIVER = 33
-    OVER_VOLTAGE = 34
-    ENCODER = 35
-    MOTOR_NOT_CONFIGURED = 36
-    PWM_CYCLE_OVERRUN = 37
-    OVER_TEMPERATURE = 38
-    START_OUTSIDE_LIMIT = 39
-    UNDER_VOLTAGE = 40
-    CONFIG_CHANGED = 41
-    THETA_INVALID = 42
-    POSITION_INVALID = 43
-    DRIVER_ENABLE = 44
-    STOP_POSITION_DEPRECATED = 45
-    TIMING_VIOLATION = 46
-    BEMF_FEEDFORWARD_NO_ACCEL_LIMIT = 47
-    INVALID_LIMITS = 48
-    POSITION_ERROR = 49
-    VELOCITY_ERROR = 50
+from hopping_leg.deploy.drive_link import DriveMode, FaultCode
 
 
 class Notice(IntEnum):
@@ -71,13 +27,13 @@ class Notice(IntEnum):
     FLUX_BRAKING = 105
 
 
-BETWEEN = (MoteusMode.FAULT, MoteusMode.ENABLING, MoteusMode.CALIBRATING, MoteusMode.CALIBRATED)
+BETWEEN = (DriveMode.FAULT, DriveMode.ENABLING, DriveMode.CALIBRATING, DriveMode.CALIBRATED)
 """Modes that no command can ask for."""
 
-MODES = frozenset(MoteusMode)
+MODES = frozenset(DriveMode)
 """All that a register may hold."""
 
-CONTROLLING = MODES - {MoteusMode.STOPPED, *BETWEEN}
+CONTROLLING = MODES - {DriveMode.STOPPED, *BETWEEN}
 """Modes in which the output stage is powered."""
 
 
@@ -87,22 +43,22 @@ ENABLING_TIME = 0.001
 STARTING_TIME = 0.0085
 """From stopped to the commanded mode, s."""
 
-_WATCHED = (MoteusMode.POSITION, MoteusMode.STAY_WITHIN)
+_WATCHED = (DriveMode.POSITION, DriveMode.STAY_WITHIN)
 
 
 class ModeMachine:
-    """MoteusMode, fault and watchdog of one drive."""
+    """DriveMode, fault and watchdog of one drive."""
 
     def __init__(self) -> None:
-        self.mode = MoteusMode.STOPPED
+        self.mode = DriveMode.STOPPED
         self.fault = 0
         """FaultCode code; in other modes than fault, the notice of the last step."""
-        self.wanted = MoteusMode.STOPPED
+        self.wanted = DriveMode.STOPPED
         """What was commanded last."""
         self._started = 0.0
         self._deadline = math.inf
 
-    def command(self, mode: MoteusMode, time: float, timeout: float) -> None:
+    def command(self, mode: DriveMode, time: float, timeout: float) -> None:
         """Take a command.
 
         Args:
@@ -117,8 +73,8 @@ class ModeMachine:
 
     def trip(self, fault: FaultCode | int) -> None:
         """Go to fault; a drive that is stopped or in fault already takes no notice."""
-        if self.mode not in (MoteusMode.STOPPED, MoteusMode.FAULT):
-            self.mode, self.fault = MoteusMode.FAULT, int(fault)
+        if self.mode not in (DriveMode.STOPPED, DriveMode.FAULT):
+            self.mode, self.fault = DriveMode.FAULT, int(fault)
 
     def advance(self, time: float, *, outside_limits: bool = False) -> bool:
         """Let time pass.
@@ -133,26 +89,26 @@ class ModeMachine:
         before = self.mode
         if self.wanted != self.mode:
             self._change(time, outside_limits)
-        if self.mode is MoteusMode.ENABLING and time >= self._started + ENABLING_TIME:
-            self.mode = MoteusMode.CALIBRATING
-        if self.mode is MoteusMode.CALIBRATING and time >= self._started + STARTING_TIME:
-            self.mode = MoteusMode.CALIBRATED
+        if self.mode is DriveMode.ENABLING and time >= self._started + ENABLING_TIME:
+            self.mode = DriveMode.CALIBRATING
+        if self.mode is DriveMode.CALIBRATING and time >= self._started + STARTING_TIME:
+            self.mode = DriveMode.CALIBRATED
             self._change(time, outside_limits)
         if self.mode in _WATCHED and time >= self._deadline:
-            self.mode = MoteusMode.TIMEOUT
-        if self.mode is not MoteusMode.FAULT:
+            self.mode = DriveMode.TIMEOUT
+        if self.mode is not DriveMode.FAULT:
             self.fault = 0
         return (
-            self.mode is not before and self.mode in CONTROLLING and self.mode != MoteusMode.TIMEOUT
+            self.mode is not before and self.mode in CONTROLLING and self.mode != DriveMode.TIMEOUT
         )
 
     def _change(self, time: float, outside_limits: bool) -> None:
-        if self.wanted is MoteusMode.STOPPED:
-            self.mode = MoteusMode.STOPPED
-        elif self.mode is MoteusMode.STOPPED:
-            self.mode, self._started = MoteusMode.ENABLING, time
-        elif self.mode is MoteusMode.CALIBRATED or (
-            self.mode in CONTROLLING and self.mode is not MoteusMode.TIMEOUT
+        if self.wanted is DriveMode.STOPPED:
+            self.mode = DriveMode.STOPPED
+        elif self.mode is DriveMode.STOPPED:
+            self.mode, self._started = DriveMode.ENABLING, time
+        elif self.mode is DriveMode.CALIBRATED or (
+            self.mode in CONTROLLING and self.mode is not DriveMode.TIMEOUT
         ):
             self.mode = self.wanted
             if self.wanted in _WATCHED and outside_limits:
