@@ -5,7 +5,14 @@ from types import TracebackType
 from typing import Self
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    ProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 _LINE_SECONDS = 60.0
 
@@ -77,6 +84,27 @@ class LiveProgress:
     ) -> None:
         """Stop drawing."""
         self._bar.stop()
+
+
+class ShareProgress(Progress):
+    """A bar per label that shows the share done, elapsed and remaining time."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.percentage:>3.0f}%"),
+            TimeElapsedColumn(),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+        )
+
+    def show(self, label: str, share: float, about: str = "") -> None:
+        """Show the share done, 0 to 1, of what a label, and more about it, stands for."""
+        label += about
+        known = {task.description: task.id for task in self.tasks}
+        task = known[label] if label in known else self.add_task(label, total=1.0)
+        self.update(task, completed=share)
 
 
 def minutes(seconds: float) -> str:

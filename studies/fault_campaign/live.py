@@ -12,14 +12,13 @@ from pathlib import Path
 
 from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.deploy.flight_recorder import SUFFIX, recover
-from hopping_leg.deploy.joint_transform import JOINTS
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.transport import opener
 from hopping_leg.emulator.process import EmulatorProcess
 from hopping_leg.emulator.wire_log import WireLog
 from hopping_leg.errors import TraceError
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.parameters import JOINTS, Robot
 from hopping_leg.trace import Trace
 from studies.fault_campaign.case import Case, Result, Scene, words
 from studies.fault_campaign.families import Family

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from hopping_leg.robot.parameters import JOINTS
 from studies.identification.synthetic import FIXED, HOPPING, RAIL
 
 
@@ -78,7 +79,7 @@ def _real(result: dict[str, Any]) -> list[Bar]:
         ("position_rms_rad", "mrad", 1e3, (25.0, 3.0)),
         ("torque_rms_nm", "N m", 1.0, (0.14, 0.4)),
     ):
-        for joint, (name, bar) in enumerate(zip(("hip", "knee"), pair, strict=True)):
+        for joint, (name, bar) in enumerate(zip(JOINTS, pair, strict=True)):
             worst = _worst(leg, f"closed_loop_{quantity}", joint)
             what = f"leg V2, {quantity.split('_')[0]}, {name}, worst split"
             found += [] if worst is None else [(what, bar, unit, factor * worst, False)]

@@ -11,6 +11,7 @@ from rich.table import Table
 from hopping_leg.cli.options import at_least
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot
+from hopping_leg.robot.parameters import JOINTS
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ class Reach:
             )
         table = Table("hip, N m", "knee, N m", "apex, m", "hops/s", "rms hip", "rms knee", "hits")
         for row in result["rows"]:
-            limits = [f"{row[f'{joint}_limit_nm']:g}" for joint in ("hip", "knee")]
+            limits = [f"{row[f'{joint}_limit_nm']:g}" for joint in JOINTS]
             names = ("apex_m", "hop_rate_hz", "rms_hip_torque_nm", "rms_knee_torque_nm")
             cells = [f"{row[name]:.3g}" for name in names]
             table.add_row(*limits, *cells, str(row["body_contacts"]))

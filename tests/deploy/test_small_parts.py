@@ -20,10 +20,10 @@ from hopping_leg.deploy.schedule import (
     check_schedule,
     command_range,
     parse_schedule,
-    robot_range,
 )
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import kinematics, load_robot, shipped_robots
+from hopping_leg.robot.limits import command_limits
 
 LEG = load_robot("legv2-paper")
 
@@ -54,7 +54,7 @@ def test_a_policy_is_asked_for_what_it_was_trained_for_and_others_for_what_the_l
     for height in (low - 0.01, high + 0.01, math.nan):
         with pytest.raises(UsageError, match="outside of what fast"):
             check_schedule(Schedule(((height, 1.0),)), (low, high), "fast")
-    assert command_range(load_controller("energy-shaping", LEG), LEG) == robot_range(LEG)
+    assert command_range(load_controller("energy-shaping", LEG), LEG) == command_limits(LEG)
 
 
 def test_keys_raise_lower_and_stop():

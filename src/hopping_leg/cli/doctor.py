@@ -18,12 +18,11 @@ from packaging.requirements import Requirement
 from rich.console import Console
 
 from hopping_leg.cli.motors import ask, connect, find, show
-from hopping_leg.deploy.joint_transform import JOINTS
 from hopping_leg.deploy.preflight import Finding, required_settings
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.robot import load_robot
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.parameters import JOINTS, Robot
 from hopping_leg.sim import CONTROL_RATE
 
 if TYPE_CHECKING:

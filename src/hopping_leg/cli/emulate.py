@@ -34,11 +34,11 @@ from rich.console import Console
 from rich.table import Table
 
 from hopping_leg.deploy.drive_link import DriveMode, FaultCode
-from hopping_leg.deploy.joint_transform import JOINTS
 from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
 from hopping_leg.emulator.faults import KINDS, load_faults
 from hopping_leg.emulator.mode_machine import Notice
 from hopping_leg.errors import UsageError
+from hopping_leg.robot.parameters import JOINTS
 
 if TYPE_CHECKING:
     from hopping_leg.emulator.drive import Drive

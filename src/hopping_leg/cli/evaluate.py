@@ -20,7 +20,6 @@ from typing import Literal
 
 import tyro
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from hopping_leg.cli.command_line import command_line
 from hopping_leg.cli.options import Heights
@@ -32,6 +31,7 @@ from hopping_leg.evaluate.report import render_videos, write_report
 from hopping_leg.evaluate.tables import print_evaluation
 from hopping_leg.evaluate.trials import KINDS, save_traces
 from hopping_leg.io import write_atomically
+from hopping_leg.progress import ShareProgress
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, Engine, NoiseAndDelay
 
@@ -173,24 +173,3 @@ def _judge(entries: list[Entry], setup: RolloutConfig, args: Evaluate) -> Evalua
     first = judged[0]
     secondary = judged[1].evaluation if len(judged) > 1 else None
     return replace(first, evaluation=replace(first.evaluation, secondary=secondary))
-
-
-class ShareProgress(Progress):
-    """A bar per label that shows the share done, elapsed and remaining time."""
-
-    def __init__(self) -> None:
-        super().__init__(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.percentage:>3.0f}%"),
-            TimeElapsedColumn(),
-            TimeRemainingColumn(),
-            console=Console(stderr=True),
-        )
-
-    def show(self, label: str, share: float, about: str = "") -> None:
-        """Show the share done, 0 to 1, of what a label, and more about it, stands for."""
-        label += about
-        known = {task.description: task.id for task in self.tasks}
-        task = known[label] if label in known else self.add_task(label, total=1.0)
-        self.update(task, completed=share)

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from hopping_leg.deploy.joint_transform import JOINTS
 from hopping_leg.deploy.preflight import Finding, check_drives, require_fit
 from hopping_leg.deploy.safety_limits import SafetyLimits
 from hopping_leg.errors import UsageError
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.parameters import JOINTS, Robot
 
 if TYPE_CHECKING:
     from hopping_leg.deploy.moteus_link import MoteusLink

@@ -11,10 +11,11 @@ from typing import Literal
 from rich.console import Console
 
 from hopping_leg.cli.command_line import command_line
-from hopping_leg.cli.evaluate import Conditions, ShareProgress, say_written
+from hopping_leg.cli.evaluate import Conditions, say_written
 from hopping_leg.evaluate.skills.suite import run_skills
 from hopping_leg.evaluate.tables import print_skills
 from hopping_leg.io import write_json
+from hopping_leg.progress import ShareProgress
 
 
 @dataclass(frozen=True)

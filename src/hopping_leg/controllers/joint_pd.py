@@ -12,6 +12,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
+from hopping_leg.robot.parameters import JOINTS
 from hopping_leg.sim.channel import Measurement
 
 
@@ -91,5 +92,5 @@ class JointPD:
                 ("position_command_rad", self.position),
                 ("velocity_command_rad_s", self.velocity),
             )
-            for column, joint in enumerate(("hip", "knee"))
+            for column, joint in enumerate(JOINTS)
         }

@@ -13,7 +13,7 @@ from hopping_leg.arrays import Array, IntArray
 from hopping_leg.controllers.recent import RingBuffer
 from hopping_leg.controllers.sample_history import SampleHistory
 from hopping_leg.errors import PolicyError, unknown_name
-from hopping_leg.sim.channel import SAMPLES, Measurement
+from hopping_leg.sim.channel import DELAY_DEPTH, SAMPLES, Measurement
 
 Inputs = dict[str, npt.NDArray[np.float32]]
 """Graph input to its array, (n, ...)."""
@@ -127,7 +127,7 @@ class Dated:
     shapes: ClassVar[dict[str, tuple[int, ...]]] = _dated_shapes(LAGS, TORQUE_LAGS)
 
     def __init__(self, period: float) -> None:
-        self._track = SampleHistory(max(*self.LAGS, LATEST) + 1, period)
+        self._track = SampleHistory(max(*self.LAGS, DELAY_DEPTH) + 1, period)
         self._lags, self._torque_lags = list(self.LAGS), list(self.TORQUE_LAGS)
         self.reset(0)
 
@@ -158,13 +158,13 @@ class Dated:
 
     def _take(self, measurement: Measurement) -> None:
         self._track.insert(measurement)
-        self._track.hold(LATEST)
+        self._track.hold(DELAY_DEPTH)
         self._command = measurement.command[:, 0]
 
     def inputs(self) -> Inputs:
         """Return the chosen lags of the tracks."""
         track, torques = self._track, self._torques.frames
-        age = np.argmax(track.known[:LATEST], axis=0) * track.period
+        age = np.argmax(track.known[:DELAY_DEPTH], axis=0) * track.period
         return {
             "q": track.q[self._lags].swapaxes(0, 1).astype(np.float32),
             "qd": track.qd[self._lags].swapaxes(0, 1).astype(np.float32),
@@ -201,9 +201,6 @@ class DatedLong(Dated):
     TORQUE_LAGS: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64)
     shapes: ClassVar[dict[str, tuple[int, ...]]] = _dated_shapes(LAGS, TORQUE_LAGS)
 
-
-LATEST = 10
-"""Ticks after which the paper's channel delivers a sample no more."""
 
 LAYOUTS: dict[str, Any] = {
     ThreeSamples.name: lambda period: ThreeSamples(),

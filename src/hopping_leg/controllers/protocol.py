@@ -3,9 +3,9 @@
 from typing import Protocol
 
 from hopping_leg.arrays import Array
-from hopping_leg.sim.channel import Measurement
+from hopping_leg.sim.channel import SAMPLES, Measurement
 
-__all__ = ["Controller", "Measurement"]
+__all__ = ["SAMPLES", "Controller", "Measurement"]
 
 
 class Controller(Protocol):

@@ -8,9 +8,9 @@ from typing import Any, TypeVar
 from moteus import CommandError, Stream, multiplex
 from moteus.protocol import Register
 
-from hopping_leg.deploy.joint_transform import JOINTS
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.preflight import DriveInfo, Setting, required_settings
+from hopping_leg.robot.parameters import JOINTS
 
 _ANSWER_SECONDS = 1.0
 _TRIES = 3

@@ -12,9 +12,6 @@ from dataclasses import dataclass
 
 from hopping_leg.robot.parameters import Robot
 
-JOINTS = ("hip", "knee")
-"""Order of all pairs."""
-
 
 @dataclass(frozen=True)
 class JointTransform:

@@ -9,12 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from hopping_leg.deploy.drive_link import DriveMode
-from hopping_leg.deploy.joint_transform import JOINTS, joint_transforms
+from hopping_leg.deploy.joint_transform import joint_transforms
 from hopping_leg.deploy.safety_limits import SafetyLimits
 from hopping_leg.deploy.stop_reasons import fault_text
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot.hardware import REGISTER_MAP
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.parameters import JOINTS, Robot
 
 BRAKE_MODE = 15
 """What a drive shall do when its watchdog ends a torque command; the firmware's default is limp."""

@@ -1,15 +1,12 @@
-"""SampleBuffer of both joints by tick, and what a controller sees of them."""
+"""Samples of both joints by tick, and what a controller sees of them."""
 
 import numpy as np
 
-from hopping_leg.controllers.protocol import Measurement
+from hopping_leg.controllers.protocol import SAMPLES, Measurement
 from hopping_leg.deploy.drive_link import Reply
 
 REMEMBERED = 16
 """Ticks; older samples are forgotten."""
-
-_SEEN = 3
-"""SampleBuffer that a controller sees at a tick."""
 
 _Sample = list[Reply | None]
 
@@ -58,10 +55,10 @@ class SampleBuffer:
         """
         self._commands[tick] = command
         whole = [t for t, sample in self._ticks.items() if None not in sample and t <= tick]
-        newest = sorted(whole, reverse=True)[:_SEEN]
+        newest = sorted(whole, reverse=True)[:SAMPLES]
         if not newest:
             raise ValueError("No tick has samples of both joints.")
-        newest += [newest[-1]] * (_SEEN - len(newest))
+        newest += [newest[-1]] * (SAMPLES - len(newest))
         chosen = [[reply for reply in self._ticks[t] if reply is not None] for t in newest]
         return Measurement(
             q=np.array([[[reply.position for reply in pair] for pair in chosen]]),

@@ -4,12 +4,10 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import kinematics
+from hopping_leg.robot.limits import command_limits
 from hopping_leg.robot.parameters import Robot
 
 Range = tuple[float, float]
@@ -76,13 +74,7 @@ def command_range(controller: Controller, robot: Robot) -> Range:
     """
     if isinstance(controller, Policy):
         return controller.card.command_low, controller.card.command_high
-    return robot_range(robot)
-
-
-def robot_range(robot: Robot) -> Range:
-    """Return the heights of the hip axis that a leg may reach, m."""
-    folded = np.array([robot.hip.upper, robot.knee.lower])
-    return float(kinematics.stance_height(robot, folded)), 2 * robot.straight_height
+    return command_limits(robot)
 
 
 def check_schedule(schedule: Schedule, valid: Range, name: str) -> None:

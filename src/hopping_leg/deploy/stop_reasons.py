@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 
 from hopping_leg.deploy.drive_link import DriveMode, FaultCode, Pair, Replies, Reply
-from hopping_leg.deploy.joint_transform import JOINTS
 from hopping_leg.deploy.safety_limits import SafetyLimits
+from hopping_leg.robot.parameters import JOINTS
 
 
 class Reason(IntEnum):

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.deploy.drive_link import DriveCommand, Pair, Replies
-from hopping_leg.deploy.joint_transform import JOINTS
 from hopping_leg.deploy.motion_sequence import SequenceStep
 from hopping_leg.deploy.supervisor import SupervisorState
+from hopping_leg.robot.parameters import JOINTS
 
 _LOOP = ("time_s", "command_m", "state", "reason", "part", "action")
 _TIMES = ("wake_late_s", "exchange_s", "control_s", "tick_s", "skipped_ticks")

@@ -20,11 +20,11 @@ from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
-from hopping_leg.deploy.joint_transform import JOINTS
 from hopping_leg.emulator.frames import QueuedReply, ReplyQueue
 from hopping_leg.emulator.settings import DEFAULTS
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.io import read_dataclass
+from hopping_leg.robot.parameters import JOINTS
 
 if TYPE_CHECKING:
     from hopping_leg.emulator.drive import Drive

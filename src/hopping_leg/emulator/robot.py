@@ -10,7 +10,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.deploy.joint_transform import JOINTS
 from hopping_leg.deploy.preflight import required_settings
 from hopping_leg.emulator import bus
 from hopping_leg.emulator.drive import Drive
@@ -21,7 +20,7 @@ from hopping_leg.emulator.leg import TIMESTEP, EmulatedLeg
 from hopping_leg.emulator.registers import Identity
 from hopping_leg.emulator.settings import Settings
 from hopping_leg.emulator.wire_log import WireLog
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.parameters import JOINTS, Robot
 
 NOMINAL_VOLTAGE = 26.0
 """Bus voltage at which the qdd100 has the speed limit of the robot files, V."""

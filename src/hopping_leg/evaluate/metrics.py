@@ -9,6 +9,7 @@ import numpy as np
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.evaluate.result import Estimator
 from hopping_leg.hop_detection import COLUMNS, measure_hops, trace_hops
+from hopping_leg.robot.parameters import JOINTS
 from hopping_leg.trace import Trace
 
 START_SECONDS = 2.0
@@ -76,7 +77,7 @@ def stretches(command: Array) -> list[tuple[int, int]]:
 
 def _window(trace: Trace, start: int, end: int, rate: float, drop: float) -> HopWindow:
     height, velocity, clearance = map(trace.column, COLUMNS)
-    torque = np.stack([trace.column(f"{j}_torque_nm")[start:end] for j in ("hip", "knee")])
+    torque = np.stack([trace.column(f"{j}_torque_nm")[start:end] for j in JOINTS])
     first = min(start + round(drop * rate), end)
     hops = measure_hops(height[:end], velocity[:end], clearance[:end], rate, first)
     return HopWindow(

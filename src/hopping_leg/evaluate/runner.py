@@ -24,6 +24,7 @@ from hopping_leg.evaluate.trials import (
 from hopping_leg.io import versions
 from hopping_leg.robot.limits import hopping_ranges
 from hopping_leg.robot.model import TIMESTEP
+from hopping_leg.robot.parameters import JOINTS
 from hopping_leg.sim import NO_NOISE, Engine
 
 
@@ -152,7 +153,7 @@ def _note_stopped(label: str, runs: Sequence[Run], setup: RolloutConfig) -> list
     """Say so where the supervisor of the real leg would not let a controller hop on."""
     stopped = 0
     for run in runs:
-        angles = [run.trace.column(f"{joint}_position_rad") for joint in ("hip", "knee")]
+        angles = [run.trace.column(f"{joint}_position_rad") for joint in JOINTS]
         pairs = zip(angles, hopping_ranges(setup.robot), strict=True)
         stopped += any(angle.min() < low or angle.max() > high for angle, (low, high) in pairs)
     if not stopped:

@@ -13,7 +13,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.io import safe_file_name
-from hopping_leg.robot import kinematics
+from hopping_leg.robot.limits import command_limits
 from hopping_leg.robot.model_mismatch import Ground
 from hopping_leg.robot.parameters import Contact, Robot
 from hopping_leg.trace import Trace
@@ -92,12 +92,6 @@ def paper_trials(robot: Robot, commands: Sequence[float] | None = None) -> list[
     trials.append(Trial("staircase", tuple((c, STEP_SECONDS) for c in scaled(STAIRCASE, robot))))
     trials += [Trial("ladder", ((c, FIXED_SECONDS),)) for c in scaled(LADDER, robot)]
     return trials
-
-
-def command_limits(robot: Robot) -> tuple[float, float]:
-    """Return the heights a leg can be asked for, m: folded standing to twice its length."""
-    folded = np.array([robot.hip.upper, robot.knee.lower])
-    return float(kinematics.stance_height(robot, folded)), 2 * robot.straight_height
 
 
 def check_commands(robot: Robot, commands: Sequence[float]) -> None:

@@ -8,10 +8,10 @@ import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.recording_format import JOINTS, Pair, Rig
+from hopping_leg.identify.recording_format import Pair, Rig
 from hopping_leg.robot import dynamics, kinematics
 from hopping_leg.robot.limits import MotorLimit
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.parameters import JOINTS, Robot
 
 LEAST_CLEARANCE = 0.005
 """Of base and knee above the ground, m."""

@@ -10,9 +10,9 @@ from hopping_leg.identify.cost import Scoring
 from hopping_leg.identify.initial_states import full_states
 from hopping_leg.identify.parameters import LegHypothesis, ParameterSet, choose
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.recording_format import JOINTS, PAIRS, Rig
+from hopping_leg.identify.recording_format import PAIRS, Rig
 from hopping_leg.robot.model import TIMESTEP
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.parameters import JOINTS, Robot
 from hopping_leg.robot.robot_files import load_robot
 
 _TOLERANCE = 0.2

@@ -10,8 +10,7 @@ import polars as pl
 from hopping_leg.errors import RecordingError
 from hopping_leg.io import read_dataclass
 from hopping_leg.robot.model import GRAVITY
-
-JOINTS = ("hip", "knee")
+from hopping_leg.robot.parameters import JOINTS
 
 PAIRS = {
     "position": ("hip_position_rad", "knee_position_rad"),

@@ -17,6 +17,7 @@ from hopping_leg.identify.result import Identified, as_json, parameters_json, qu
 from hopping_leg.identify.validation import RESTART, Overlay, overlays
 from hopping_leg.io import Tree
 from hopping_leg.robot import load_robot
+from hopping_leg.robot.parameters import JOINTS
 from hopping_leg.robot.robot_files import load_tree
 
 _CAD, _PAPER = "legv2", "legv2-paper"
@@ -60,7 +61,7 @@ def quality_table(identified: Identified) -> Markup:
     """Return errors on held-out data before and after the fit."""
     columns = [Column("rms error", lambda row: f"{row['error']} / {_UNITS[row['unit']][0]}")]
     for when in ("before", "after"):
-        columns += [Column(f"{when}: {j}", _scaled(f"{j}_{when}")) for j in ("hip", "knee")]
+        columns += [Column(f"{when}: {j}", _scaled(f"{j}_{when}")) for j in JOINTS]
     return table(columns, quality_json(identified))
 
 

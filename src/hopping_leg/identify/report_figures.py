@@ -11,8 +11,8 @@ from hopping_leg.arrays import Array
 from hopping_leg.figure_style import TORQUE_MAP, WIDTH, colour, styled
 from hopping_leg.identify.search import Pass
 from hopping_leg.identify.validation import Overlay
+from hopping_leg.robot.parameters import JOINTS
 
-JOINTS = ("hip", "knee")
 LABELS = {"position": "position / rad", "torque": "torque / N m"}
 
 _SHOWN = 6.0

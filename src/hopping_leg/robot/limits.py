@@ -7,6 +7,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
+from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
 
 HOPPING_MARGINS = (0.9, 0.5)
@@ -25,6 +26,12 @@ def hopping_ranges(robot: Robot) -> list[tuple[float, float]]:
         (max(joint.lower - margin, servo.lower), min(joint.upper + margin, servo.upper))
         for joint, servo, margin in joints
     ]
+
+
+def command_limits(robot: Robot) -> tuple[float, float]:
+    """Return the heights a leg can be asked for, m: folded standing to twice its length."""
+    folded = np.array([robot.hip.upper, robot.knee.lower])
+    return float(kinematics.stance_height(robot, folded)), 2 * robot.straight_height
 
 
 class MotorLimit:

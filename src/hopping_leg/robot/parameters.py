@@ -13,6 +13,9 @@ from hopping_leg.errors import RobotError
 from hopping_leg.robot.hardware import Hardware
 from hopping_leg.robot.model_mismatch import ModelMismatch
 
+JOINTS = ("hip", "knee")
+"""Actuated joints, in the order of every pair in this package."""
+
 KINDS = ("leg", "pendulum")
 """What a robot may be."""
 
@@ -177,7 +180,7 @@ class Robot:
         del values["name"], values["description"], values["kind"], values["hardware"]
         if self.reality.neutral:
             del values["reality"]
-        for joint, name in itertools.product(("hip", "knee"), ("load_friction", "torque_gain")):
+        for joint, name in itertools.product(JOINTS, ("load_friction", "torque_gain")):
             if values[joint][name] == Joint.__dataclass_fields__[name].default:
                 del values[joint][name]
         text = json.dumps(values, sort_keys=True)

@@ -13,6 +13,9 @@ from hopping_leg.sim.mismatch_simulator import MismatchSimulator
 SAMPLES = 3
 """Joint samples a controller sees at a tick: t, t-1, t-2."""
 
+DELAY_DEPTH = 10
+"""Ticks after which the paper's channel delivers a sample no more."""
+
 _DRAWS = 8
 """Random numbers per leg and tick: four for the joints, two for the delay, two for the torques."""
 
@@ -34,7 +37,7 @@ class NoiseAndDelay:
     """Lambda for the output torques."""
     delay_probability: float = 0.5
     """Chance at each tick to see samples drawn from the buffer instead of the latest."""
-    delay_buffer: int = 10
+    delay_buffer: int = DELAY_DEPTH
     """Ticks the buffer remembers."""
 
     def __post_init__(self) -> None:

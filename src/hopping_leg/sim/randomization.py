@@ -16,7 +16,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.io import replace_at
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.parameters import JOINTS, Robot
 from hopping_leg.robot.robot_files import check_physics
 
 RANDOMIZABLE = (
@@ -27,7 +27,7 @@ RANDOMIZABLE = (
     *(f"contact.{name}" for name in ("time_constant", "damping_ratio", "friction")),
     *(
         f"{joint}.{name}"
-        for joint in ("hip", "knee")
+        for joint in JOINTS
         for name in ("friction", "damping", "armature", "load_friction", "torque_gain")
     ),
     "reality.latency.command",
@@ -126,7 +126,7 @@ def _times(path: str, low: float, high: float) -> Range:
 
 
 def _both(name: str, unit: str, low: float, high: float) -> tuple[Range, ...]:
-    return tuple(Range(f"{joint}.{name}", unit, low, high, "[C]") for joint in ("hip", "knee"))
+    return tuple(Range(f"{joint}.{name}", unit, low, high, "[C]") for joint in JOINTS)
 
 
 WIDE_RANGES = (

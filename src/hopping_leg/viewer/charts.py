@@ -6,6 +6,7 @@ import numpy as np
 import viser
 
 from hopping_leg.arrays import Array
+from hopping_leg.robot.parameters import JOINTS
 from hopping_leg.viewer.scene import COLOURS, COMMAND
 from hopping_leg.viewer.tracks import Track, in_flight
 
@@ -81,7 +82,7 @@ def _curves(tracks: list[Track], shown: list[dict[str, Array]]) -> list[tuple[Ar
         return []
     heights = (_GRID, shown[0]["command_m"], *(s["height_m"] for s in shown))
     torques = []
-    for joint in ("hip", "knee"):
+    for joint in JOINTS:
         limit = np.full(_POINTS, getattr(tracks[0].robot, joint).torque_limit)
         torques.append((_GRID, limit, -limit, *(s[f"{joint}_torque_nm"] for s in shown)))
     phases = [in_flight(s["foot_clearance_m"]) for s in shown]
@@ -102,7 +103,7 @@ def _layouts(tracks: list[Track]) -> list[tuple[str, tuple[Any, ...], dict[str, 
     bounds = [_line(f"{side} limit", _LIMIT, 1, dash=(4, 4)) for side in ("upper", "lower")]
     tall = 1.5 * tracks[0].robot.straight_height
     found = [("Base height, m", ({}, command, *lines), {"range": (0.0, tall)}, 160)]
-    for joint in ("hip", "knee"):
+    for joint in JOINTS:
         limit = 1.15 * getattr(tracks[0].robot, joint).torque_limit
         title = f"{joint.capitalize()} torque, N m"
         found.append((title, ({}, *bounds, *lines), {"range": (-limit, limit)}, 120))

@@ -12,7 +12,7 @@ from operator import attrgetter
 
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.io import replace_at
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.parameters import JOINTS, Robot
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def of_both_joints(robot: Robot, path: str, value: float) -> Robot:
     """
     return reduce(
         lambda one, joint: with_numbers(one, {f"reality.{joint}.{path}": value}),
-        ("hip", "knee"),
+        JOINTS,
         robot,
     )
 
@@ -98,7 +98,7 @@ def _damped_ground(case: Case, factor: float) -> Case:
 
 def _rubbing_joints(case: Case, torque: float) -> Case:
     robot = case.robot
-    more = {f"{j}.friction": getattr(robot, j).friction + torque for j in ("hip", "knee")}
+    more = {f"{j}.friction": getattr(robot, j).friction + torque for j in JOINTS}
     return replace(case, robot=with_numbers(robot, more))
 
 

@@ -13,7 +13,7 @@ from hopping_leg.evaluate.metrics import measure
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.dynamics import potential_energy
 from hopping_leg.robot.model import GRAVITY
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.parameters import JOINTS, Robot
 from hopping_leg.trace import Trace
 
 
@@ -27,7 +27,7 @@ def ground_force(robot: Robot, trace: Trace) -> Array:
         robot: The leg.
         trace: With true heights.
     """
-    q = np.stack([trace.column(f"{joint}_position_rad") for joint in ("hip", "knee")], axis=1)
+    q = np.stack([trace.column(f"{joint}_position_rad") for joint in JOINTS], axis=1)
     weight = robot.mass * GRAVITY
     height = potential_energy(robot, trace.column("height_m"), q) / weight
     period = np.diff(trace.column("time_s")).mean()

@@ -19,7 +19,7 @@ from hopping_leg.controllers.rollout import Rollout
 from hopping_leg.rl.checkpoint import Tree
 from hopping_leg.rl.finetune.simulated import hop_many, traces_of
 from hopping_leg.rl.finetune.trial_data import TrialData
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.parameters import JOINTS, Robot
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, Range, sample
 from hopping_leg.sim.twins import TWIN_RANGES
 
@@ -174,7 +174,7 @@ def _normalised(values: Array) -> torch.Tensor:
 def _sensor_noise() -> Array:
     """Return the standing noise of leg V2's sensors as the twins have it, (6,)."""
     noise = {spread.path: spread.high for spread in TWIN_RANGES}
-    kinds, joints = ("position", "velocity", "torque"), ("hip", "knee")
+    kinds, joints = ("position", "velocity", "torque"), JOINTS
     return np.array(
         [noise[f"reality.{joint}.sensor.{kind}_noise"] for kind in kinds for joint in joints]
     )
