@@ -1,10 +1,14 @@
+import subprocess
+import sys
+
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
-from hopping_leg.envs import ENV_ID, HoppingTask, TaskConfig, paper_reward
+from hopping_leg import ENV_ID
+from hopping_leg.envs import HoppingTask, TaskConfig, paper_reward
 from hopping_leg.robot import load_robot
 
 SHORT = TaskConfig(episode=0.1)
@@ -103,3 +107,22 @@ def test_a_layout_may_be_chosen():
         observation, _ = env.reset(seed=0)
         assert env.observation_space.contains(observation)
         assert observation.shape[-1] > 15
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "import gymnasium, hopping_leg; gymnasium.make('HoppingLeg-v0')",
+        "import hopping_leg, gymnasium; gymnasium.make_vec('HoppingLeg-v0', num_envs=2)",
+        "import gymnasium; gymnasium.make('hopping_leg:HoppingLeg-v0')",
+    ],
+)
+def test_importing_the_package_registers_it_in_any_order(words):
+    subprocess.run([sys.executable, "-W", "error::UserWarning", "-c", words], check=True)
+
+
+def test_importing_the_package_does_not_import_gymnasium():
+    command = [sys.executable, "-c", "import sys, hopping_leg; print(*sys.modules)"]
+    loaded = subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()
+    assert "hopping_leg" in loaded
+    assert not {"gymnasium", "numpy", "mujoco"} & set(loaded)

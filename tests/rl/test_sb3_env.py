@@ -5,8 +5,7 @@ import pytest
 import torch
 
 from hopping_leg.envs import HoppingTask, TaskConfig
-from hopping_leg.envs.observation import SIZE
-from hopping_leg.envs.privileged_observation import PRIVILEGED
+from hopping_leg.envs.observation import PRIVILEGED, SIZE
 from hopping_leg.rl.resumable import ResumablePPO
 from hopping_leg.rl.sb3_env import TaskVecEnv
 from hopping_leg.rl.sb3_policies import AsymmetricPolicy

@@ -1,20 +1,49 @@
 """The learning problem for many legs at once: observation, reward, commands, episodes."""
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray, IntArray
-from hopping_leg.envs.observation import Array32, make_observation, sample_scaling
-from hopping_leg.envs.options import TaskConfig
-from hopping_leg.envs.privileged_observation import PRIVILEGED, privileged_observation
+from hopping_leg.envs.observation import (
+    PRIVILEGED,
+    Array32,
+    make_observation,
+    privileged_observation,
+    sample_scaling,
+)
 from hopping_leg.envs.reset import ResetSampler
 from hopping_leg.envs.rewards import Reward, Transition
-from hopping_leg.envs.step import Step
+from hopping_leg.envs.task_config import TaskConfig
 from hopping_leg.hop_detection import at_apex
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import Measurement, MujocoSimulator, Plant, randomization
+
+
+class Step(NamedTuple):
+    """Outcome of one tick of n legs; legs whose episode ended have already begun the next."""
+
+    observation: Array32
+    """Seen after the tick, (n, size)."""
+    reward: Array
+    """(n,)."""
+    terminated: BoolArray
+    """Episode over because the leg fell; never by default, (n,)."""
+    truncated: BoolArray
+    """Episode over because its time was up, (n,)."""
+    apex_error: Array
+    """Apex height minus command where a leg just passed an in-flight apex, else NaN, m, (n,)."""
+    apex_height: Array
+    """Height of that apex, else NaN, m, (n,)."""
+    height: Array
+    """Base height at the end of the tick, before any restart, m, (n,)."""
+    terms: Array
+    """Reward terms in the order of the reward's ``names``, (n, k)."""
+    final_observation: Array32 | None
+    """Observations before the restart, (n, size), where any episode ended."""
+    final_privileged: Array32 | None
+    """True states before the restart, (n, privileged_size), where any episode ended."""
 
 
 class HoppingTask:

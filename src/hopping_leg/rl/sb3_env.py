@@ -11,8 +11,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.envs.observation import Array32
-from hopping_leg.envs.step import Step
-from hopping_leg.envs.task import HoppingTask
+from hopping_leg.envs.task import HoppingTask, Step
 
 _RECENT_HOPS = 500
 """Hops that the live numbers look back over."""

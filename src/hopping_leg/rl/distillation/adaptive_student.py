@@ -16,7 +16,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from hopping_leg.envs.privileged_observation import CLEARANCE_GAIN
+from hopping_leg.envs.observation import CLEARANCE_GAIN
 from hopping_leg.rl.checkpoint import Tree
 from hopping_leg.rl.distillation.buffers import DaggerBuffer
 from hopping_leg.rl.distillation.hop_errors import HopErrors

@@ -9,8 +9,7 @@ import torch
 
 from hopping_leg.arrays import Array
 from hopping_leg.envs import TaskConfig
-from hopping_leg.envs.observation import sample_scaling
-from hopping_leg.envs.privileged_observation import PRIVILEGED, privileged_observation
+from hopping_leg.envs.observation import PRIVILEGED, privileged_observation, sample_scaling
 from hopping_leg.rl.distillation.teacher_student import TeacherStudentPolicy
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import Measurement, Simulator

@@ -14,7 +14,7 @@ import torch
 from stable_baselines3.common.type_aliases import Schedule
 
 from hopping_leg.arrays import IntArray
-from hopping_leg.envs.privileged_observation import PRIVILEGED_COMMAND
+from hopping_leg.envs.observation import PRIVILEGED_COMMAND
 from hopping_leg.rl.checkpoint import Tree
 from hopping_leg.rl.distillation.dagger import CommandCorrection, DaggerConfig
 from hopping_leg.rl.distillation.students import Student

@@ -11,7 +11,7 @@ from torch import nn
 
 from hopping_leg.controllers.observation_history import make_layout
 from hopping_leg.envs import TaskConfig
-from hopping_leg.envs.privileged_observation import (
+from hopping_leg.envs.observation import (
     PRIVILEGED_CLEARANCE,
     PRIVILEGED_COMMAND,
     PRIVILEGED_HEIGHT,

@@ -14,7 +14,7 @@ from torch import nn
 
 from hopping_leg.controllers.observation_history import make_layout
 from hopping_leg.envs import ApexRewardConfig, TaskConfig
-from hopping_leg.envs.privileged_observation import PRIVILEGED
+from hopping_leg.envs.observation import PRIVILEGED
 from hopping_leg.rl.actor import dense_network
 from hopping_leg.rl.distillation.dagger import DaggerConfig
 from hopping_leg.rl.distillation.students import WindowStudent
