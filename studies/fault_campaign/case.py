@@ -18,7 +18,7 @@ from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.schedule import Schedule
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.emulator.faults import Fault
-from hopping_leg.emulator.server import Start
+from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.robot.limits import SoftLimiter, SoftLimits
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import CONTROL_RATE
@@ -103,7 +103,7 @@ class Scene:
         self.mishap = family.draw(rng)
         faults = () if self.mishap.fault is None else (self.mishap.fault,)
         self.start = dataclasses.replace(
-            self.mishap.start or Start(faults=faults),
+            self.mishap.start or EmulatorConfig(faults=faults),
             robot=case.robot,
             seed=int(rng.integers(1 << 30)),
         )

@@ -8,7 +8,7 @@ import numpy as np
 from hopping_leg.deploy.drive_link import FaultCode
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.emulator.faults import Fault
-from hopping_leg.emulator.server import Start
+from hopping_leg.emulator.server import EmulatorConfig
 
 HOP_SECONDS = 1.0
 """Faults begin at a random time of this long after the first lift-off, s: two to three hops."""
@@ -29,7 +29,7 @@ class Mishap:
     fault: Fault | None = None
     stall: float = 0.0
     dies: bool = False
-    start: Start | None = None
+    start: EmulatorConfig | None = None
     at: float = 0.0
 
 
@@ -116,9 +116,9 @@ def _pose(rng: np.random.Generator) -> Mishap:
     if rng.random() < 0.5:
         turns = float(rng.choice([-3, -2, -1, 1, 2, 3]))
         drive = str(rng.choice(["hip", "knee", "both"]))
-        return Mishap(start=Start(faults=(Fault("boot_pose", drive=drive, value=turns),)))
+        return Mishap(start=EmulatorConfig(faults=(Fault("boot_pose", drive=drive, value=turns),)))
     hip, knee = rng.uniform(2.0, 3.0), rng.uniform(0.3, 2.0)
-    return Mishap(start=Start(pose=f"{hip:.3f},{knee:.3f}"))
+    return Mishap(start=EmulatorConfig(pose=f"{hip:.3f},{knee:.3f}"))
 
 
 _SETTINGS = {
@@ -140,7 +140,7 @@ def _configuration(rng: np.random.Generator) -> Mishap:
         name=name,
         value=float(rng.choice(_SETTINGS[name])),
     )
-    return Mishap(start=Start(faults=(fault,)))
+    return Mishap(start=EmulatorConfig(faults=(fault,)))
 
 
 def _family(

@@ -6,7 +6,7 @@ import threading
 import time
 
 from hopping_leg.deploy.drive_link import DriveMode
-from hopping_leg.emulator.drive import Drive
+from hopping_leg.emulator.drive import EmulatedDrive
 from hopping_leg.emulator.mode_machine import CONTROLLING
 from hopping_leg.emulator.virtual_time import Lockstep
 
@@ -86,7 +86,7 @@ class StruckClock:
         return braked
 
 
-def _braking(drive: Drive) -> bool:
+def _braking(drive: EmulatedDrive) -> bool:
     """Whether a drive brakes by itself, or has no power on its windings."""
     machine, settings = drive.machine, drive.settings
     if machine.mode is DriveMode.TIMEOUT:

@@ -25,7 +25,7 @@ from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.schedule import Schedule
 from hopping_leg.deploy.transport import opener
 from hopping_leg.emulator.process import EmulatorProcess
-from hopping_leg.emulator.server import Start
+from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.evaluate.metrics import START_SECONDS
 from hopping_leg.hop_detection import find_hops
@@ -107,7 +107,7 @@ def _real_time(study: Study, robot: Robot, on_progress: Callable[[str], None]) -
     notices: tuple[str, ...] = ()
     while done < wanted - 1 and len(stops) < MOST_STOPS:
         on_progress(f"{(wanted - done) / 60:.1f} minutes in real time")
-        with EmulatorProcess(Start(robot=study.robot)) as emulator, _folder() as folder:
+        with EmulatorProcess(EmulatorConfig(robot=study.robot)) as emulator, _folder() as folder:
             link, truth = MoteusLink(robot, opener(str(emulator.path))), Truth()
             part = (wanted - done) / len(study.heights)
             schedule = Schedule(tuple((height, part) for height in study.heights))
@@ -174,7 +174,7 @@ def _in_process(study: Study, robot: Robot, height: float) -> float | None:
 
 
 def _in_lockstep(study: Study, robot: Robot, height: float) -> float | None:
-    lockstep = Lockstep(Start(robot=study.robot).build())
+    lockstep = Lockstep(EmulatorConfig(robot=study.robot).build())
     schedule = Schedule(((height, study.seconds),))
     sequence = _sequence(study, robot, schedule, study.seconds)
     with _folder() as folder:

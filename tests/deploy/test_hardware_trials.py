@@ -7,7 +7,7 @@ import pytest
 
 from hopping_leg.controllers.registry import load_policy
 from hopping_leg.deploy.hardware_trials import DeployedRobot
-from hopping_leg.emulator.server import Start
+from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot import load_robot
@@ -30,7 +30,7 @@ def deployed(tmp_path, lockstep, ready=lambda seconds: None):
 
 @pytest.mark.slow
 def test_an_outing_holds_the_hops_alone_and_counts_all_of_its_time(tmp_path):
-    lockstep = Lockstep(Start(robot="legv2-paper").build())
+    lockstep = Lockstep(EmulatorConfig(robot="legv2-paper").build())
     asked = []
     outing = deployed(tmp_path, lockstep, asked.append).hop(load_policy("fast"), STEPS, 1)
     lockstep.link.close()
@@ -70,7 +70,7 @@ class Broken:
 @pytest.mark.slow
 @pytest.mark.parametrize("ticks", [10, 230])
 def test_a_stop_by_the_supervisor_comes_back_as_a_complaint(tmp_path, ticks):
-    lockstep = Lockstep(Start(robot="legv2-paper").build())
+    lockstep = Lockstep(EmulatorConfig(robot="legv2-paper").build())
     robot = deployed(tmp_path, lockstep)
     if ticks < 200:
         with pytest.raises(HardwareError, match="before it hopped"):

@@ -15,7 +15,7 @@ from hopping_leg.deploy.preflight import check_drives, require_fit
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.transport import opener
 from hopping_leg.emulator.frames import Frame, LineProtocol, received_line
-from hopping_leg.emulator.server import Start
+from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot import load_robot
 
@@ -35,7 +35,7 @@ class Adapter:
         for descriptor in (self.master, self.slave):
             tty.setraw(descriptor)
         self.path = os.ttyname(self.slave)
-        self.robot = Start(robot="legv2").build()
+        self.robot = EmulatorConfig(robot="legv2").build()
         self.spoil = lambda number, lines: lines
         self.reading = threading.Event()
         self.reading.set()

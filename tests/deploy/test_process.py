@@ -16,7 +16,7 @@ from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.deploy.flight_recorder import recover
 from hopping_leg.deploy.supervisor import State
 from hopping_leg.emulator.process import EmulatorProcess
-from hopping_leg.emulator.server import Start
+from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.errors import TraceError
 from hopping_leg.trace import Trace
 
@@ -27,7 +27,7 @@ BEGUN = 40
 
 @pytest.fixture
 def emulator():
-    with EmulatorProcess(Start(robot="legv2-paper")) as running:
+    with EmulatorProcess(EmulatorConfig(robot="legv2-paper")) as running:
         yield running
 
 

@@ -12,7 +12,7 @@ from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.schedule import Schedule
 from hopping_leg.deploy.supervisor import State
 from hopping_leg.emulator.faults import Fault
-from hopping_leg.emulator.server import Start
+from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot import load_robot
@@ -24,7 +24,7 @@ LIMITS = hopping_limits(LEG, 200.0)
 
 
 def emulated(**start):
-    return Lockstep(Start(robot="legv2-paper", **start).build())
+    return Lockstep(EmulatorConfig(robot="legv2-paper", **start).build())
 
 
 def run(lockstep, path, *, controller="energy-shaping", hop=0.5, rise=0.5):

@@ -7,7 +7,7 @@ import pytest
 from moteus.pythoncan_device import PythonCanDevice
 
 from hopping_leg.emulator.process import EmulatorProcess
-from hopping_leg.emulator.server import Start
+from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.errors import UsageError
 
 CHANNEL = f"239.74.{os.getpid() >> 8 & 0xFF}.{os.getpid() & 0xFF}"
@@ -30,7 +30,7 @@ def test_the_client_drives_the_leg_over_udp():
         finally:
             transport.close()
 
-    with EmulatorProcess(Start(interface="udp_multicast", channel=CHANNEL)) as emulator:
+    with EmulatorProcess(EmulatorConfig(interface="udp_multicast", channel=CHANNEL)) as emulator:
         assert asyncio.run(talk()) == [1, 2]
         with can.Bus(interface="udp_multicast", channel=CHANNEL, fd=True) as bus:
             bus.send(can.Message(arbitration_id=0x8003, data=b"noise", is_fd=True))
@@ -39,8 +39,8 @@ def test_the_client_drives_the_leg_over_udp():
 
 def test_interfaces_that_cannot_be_opened_are_named():
     with pytest.raises(UsageError, match="There is no interface 'usb'"):
-        Start(interface="usb").open()
+        EmulatorConfig(interface="usb").open()
     with pytest.raises(UsageError, match="Cannot open socketcan 'nowhere0'"):
-        Start(interface="socketcan", channel="nowhere0").open()
+        EmulatorConfig(interface="socketcan", channel="nowhere0").open()
     with pytest.raises(UsageError, match="a CAN bus has a channel"):
-        Start(interface="udp_multicast", link="/tmp/leg").open()
+        EmulatorConfig(interface="udp_multicast", link="/tmp/leg").open()

@@ -8,7 +8,7 @@ from moteus.fdcanusb_device import FdcanusbDevice
 
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.process import EmulatorProcess
-from hopping_leg.emulator.server import Start
+from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot
 
@@ -26,7 +26,7 @@ TORQUE = {
 
 @pytest.fixture(scope="module")
 def emulator():
-    with EmulatorProcess(Start(pose="0.7,-1.4")) as running:
+    with EmulatorProcess(EmulatorConfig(pose="0.7,-1.4")) as running:
         yield running
 
 
@@ -90,7 +90,7 @@ def test_plain_lines_and_identity():
         reply = await drives[1].custom_query(dict.fromkeys(range(0x100, 0x103), moteus.INT32))
         return reply.values, await transport.discover()
 
-    with EmulatorProcess(Start()) as emulator:
+    with EmulatorProcess(EmulatorConfig()) as emulator:
         values, found = talk(emulator, ask, checksums=False)
     assert values[moteus.Register.REGISTER_MAP_VERSION] == 5
     assert [device.can_id for device in found] == [robot.hardware.hip.id, robot.hardware.knee.id]
@@ -98,7 +98,7 @@ def test_plain_lines_and_identity():
 
 def test_a_wrong_start_is_told_to_the_parent():
     with pytest.raises(UsageError, match="There is no pose 'handstand'"):
-        EmulatorProcess(Start(pose="handstand"))
+        EmulatorProcess(EmulatorConfig(pose="handstand"))
 
 
 def test_a_plug_comes_back_under_the_same_name(tmp_path):
@@ -106,10 +106,10 @@ def test_a_plug_comes_back_under_the_same_name(tmp_path):
         return (await drives[0].query()).id
 
     link = tmp_path / "leg"
-    with EmulatorProcess(Start(link=link)) as emulator:
+    with EmulatorProcess(EmulatorConfig(link=link)) as emulator:
         assert emulator.path == link
         assert talk(emulator, ask, checksums=True) == 1
-        emulator.inflict(Fault("unplug", duration=0.3))
+        emulator.inject(Fault("unplug", duration=0.3))
         until = time.monotonic() + 10
         while link.exists() and time.monotonic() < until:
             time.sleep(0.01)
@@ -134,5 +134,5 @@ def test_an_inflicted_fault_shows_on_the_wire(emulator):
         await transport.cycle([drive.make_stop() for drive in drives])
         return codes
 
-    emulator.inflict(Fault("drive_fault", since="powered", drive="hip", value=33))
+    emulator.inject(Fault("drive_fault", since="powered", drive="hip", value=33))
     assert 33 in talk(emulator, power, checksums=True)

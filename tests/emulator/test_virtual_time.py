@@ -6,13 +6,13 @@ import pytest
 
 from hopping_leg.deploy.drive_link import LIMP, STOP
 from hopping_leg.emulator.faults import Fault
-from hopping_leg.emulator.server import Start
+from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.errors import HardwareError
 
 
 def lockstep(checksums=True, **start):
-    return Lockstep(Start(**start).build(), checksums=checksums)
+    return Lockstep(EmulatorConfig(**start).build(), checksums=checksums)
 
 
 def replies(run, ticks, outgoing=LIMP):

@@ -41,7 +41,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.robot.parameters import JOINTS
 
 if TYPE_CHECKING:
-    from hopping_leg.emulator.drive import Drive
+    from hopping_leg.emulator.drive import EmulatedDrive
     from hopping_leg.emulator.ports import Port
     from hopping_leg.emulator.robot import EmulatedRobot
 
@@ -89,9 +89,9 @@ def run(args: Emulate) -> None:
         return
     if args.seed < 0:
         raise UsageError(f"A seed of {args.seed} has no meaning; give 0 or more.")
-    from hopping_leg.emulator.server import Server, Start
+    from hopping_leg.emulator.server import EmulatorConfig, Server
 
-    start = Start(
+    start = EmulatorConfig(
         robot=args.robot,
         pose=args.start_pose,
         configured=args.configured,
@@ -207,7 +207,7 @@ class _Display:
         return " | ".join(parts)
 
 
-def _mode_text(drive: "Drive") -> str:
+def _mode_text(drive: "EmulatedDrive") -> str:
     """Return a drive's mode, with its fault or notice."""
     mode, code = drive.machine.mode, drive.machine.fault
     text = mode.name.lower().replace("_", " ")

@@ -7,7 +7,7 @@ from moteus.multiplex import FlowStreamSubframe, RegisterSubframe, StreamSubfram
 from moteus.protocol import Register
 
 from hopping_leg.emulator.diagnostic import CHANNEL
-from hopping_leg.emulator.drive import UNKNOWN_REGISTER, Drive
+from hopping_leg.emulator.drive import UNKNOWN_REGISTER, EmulatedDrive
 from hopping_leg.emulator.frames import BROADCAST, Frame
 from hopping_leg.emulator.registers import ReplyWriter
 
@@ -44,14 +44,14 @@ class Message:
             return Message(frame, tuple(subframes))
         return Message(frame, tuple(subframes))
 
-    def heard(self, drive: Drive) -> tuple[multiplex.Subframe, ...]:
+    def heard(self, drive: EmulatedDrive) -> tuple[multiplex.Subframe, ...]:
         """Return what a drive hears: nothing if another is meant."""
         if self.frame.destination not in (drive.id, BROADCAST):
             return ()
         return self.subframes if _addressed(self.subframes, drive) else ()
 
 
-def act(message: Message, drive: Drive, time: float) -> Errors:
+def act(message: Message, drive: EmulatedDrive, time: float) -> Errors:
     """Let a drive take what a message writes, if it is meant; return what it could not take."""
     errors = []
     for s in message.heard(drive):
@@ -64,7 +64,7 @@ def act(message: Message, drive: Drive, time: float) -> Errors:
     return errors
 
 
-def answer(message: Message, drive: Drive, time: float, errors: Errors) -> Frame | None:
+def answer(message: Message, drive: EmulatedDrive, time: float, errors: Errors) -> Frame | None:
     """Return a drive's answer to a message; None if it is not meant or none is wanted.
 
     Args:
@@ -84,7 +84,7 @@ def answer(message: Message, drive: Drive, time: float, errors: Errors) -> Frame
     return message.frame.reply(drive.id, reply.data) if message.frame.wants_reply else None
 
 
-def _addressed(subframes: tuple[multiplex.Subframe, ...], drive: Drive) -> bool:
+def _addressed(subframes: tuple[multiplex.Subframe, ...], drive: EmulatedDrive) -> bool:
     """Whether a frame that names a UUID, or its beginning, means this drive."""
     for s in subframes:
         if (
@@ -99,7 +99,7 @@ def _addressed(subframes: tuple[multiplex.Subframe, ...], drive: Drive) -> bool:
 
 
 def _stream(
-    subframes: tuple[multiplex.Subframe, ...], drive: Drive, reply: ReplyWriter, time: float
+    subframes: tuple[multiplex.Subframe, ...], drive: EmulatedDrive, reply: ReplyWriter, time: float
 ) -> None:
     for s in subframes:
         if not isinstance(s, StreamSubframe | FlowStreamSubframe) or s.channel != CHANNEL:
@@ -113,7 +113,9 @@ def _stream(
             reply.stream(s.channel, drive.diagnostic.poll(s.data[0]))
 
 
-def _read(subframes: tuple[multiplex.Subframe, ...], drive: Drive, reply: ReplyWriter) -> None:
+def _read(
+    subframes: tuple[multiplex.Subframe, ...], drive: EmulatedDrive, reply: ReplyWriter
+) -> None:
     """Answer reads in runs of consecutive registers of one resolution, as they were asked."""
     state = drive.state()
     run: list[float] = []

@@ -51,7 +51,7 @@ class Disturbances:
     """FaultCode code that comes up as soon as the drive is powered."""
 
 
-class Drive:
+class EmulatedDrive:
     """A moteus controller on a geared motor.
 
     Args:

@@ -27,7 +27,7 @@ from hopping_leg.io import read_dataclass
 from hopping_leg.robot.parameters import JOINTS
 
 if TYPE_CHECKING:
-    from hopping_leg.emulator.drive import Drive
+    from hopping_leg.emulator.drive import EmulatedDrive
     from hopping_leg.emulator.leg import EmulatedLeg
 
 KINDS: "dict[str, type[FaultKind]]" = {}
@@ -113,7 +113,7 @@ class FaultyRobot(Protocol):
     reply_queue: ReplyQueue
 
     @property
-    def drives(self) -> "tuple[Drive, ...]":
+    def drives(self) -> "tuple[EmulatedDrive, ...]":
         """Hip and knee."""
         ...
 
@@ -170,7 +170,7 @@ class FaultKind:
         """Refuse an entry that the kind cannot do; raises ``UsageError``."""
 
     @property
-    def drives(self) -> "list[Drive]":
+    def drives(self) -> "list[EmulatedDrive]":
         """Those that have the fault."""
         return [self.robot.drives[joint] for joint in self.fault.joints]
 

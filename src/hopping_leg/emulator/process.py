@@ -1,6 +1,6 @@
 """An emulator in a process of its own, for tests and benchmarks.
 
-with EmulatorProcess(Start(robot="legv2")) as emulator:
+with EmulatorProcess(EmulatorConfig(robot="legv2")) as emulator:
     drive(emulator.path)
     print(emulator.state().height)
 """
@@ -9,13 +9,12 @@ import multiprocessing
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
-from types import TracebackType
 
 from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.ports import PtyPort
 from hopping_leg.emulator.robot import EmulatedRobot
-from hopping_leg.emulator.server import Server, Start
+from hopping_leg.emulator.server import EmulatorConfig, Server
 from hopping_leg.emulator.wire_log import WireLog
 from hopping_leg.errors import UsageError
 
@@ -24,7 +23,7 @@ _PATIENCE = 60.0
 
 
 @dataclass(frozen=True)
-class State:
+class EmulatorState:
     """The truth about the emulated robot at one time; pairs are hip and knee.
 
     Attributes:
@@ -49,7 +48,7 @@ class State:
 
 
 @dataclass(frozen=True)
-class Record:
+class EmulatorRecord:
     """What happened since the start.
 
     Attributes:
@@ -71,7 +70,7 @@ class EmulatorProcess:
         UsageError: The process did not start; the message says why.
     """
 
-    def __init__(self, start: Start) -> None:
+    def __init__(self, start: EmulatorConfig) -> None:
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
         self._process = context.Process(target=_serve, args=(start, theirs), daemon=True)
@@ -88,21 +87,21 @@ class EmulatorProcess:
         assert self._process.pid is not None
         return self._process.pid
 
-    def state(self) -> State:
+    def state(self) -> EmulatorState:
         """Return the truth about the robot now."""
         self._pipe.send("state")
         state = self._answer()
-        assert isinstance(state, State)
+        assert isinstance(state, EmulatorState)
         return state
 
-    def record(self) -> Record:
+    def record(self) -> EmulatorRecord:
         """Return what went over the wire and which faults began."""
         self._pipe.send("record")
         record = self._answer()
-        assert isinstance(record, Record)
+        assert isinstance(record, EmulatorRecord)
         return record
 
-    def inflict(self, fault: Fault) -> None:
+    def inject(self, fault: Fault) -> None:
         """Let a fault happen; its time counts from now."""
         self._pipe.send(fault)
         self._answer()
@@ -117,12 +116,7 @@ class EmulatorProcess:
     def __enter__(self) -> "EmulatorProcess":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _answer(self) -> object:
@@ -134,7 +128,7 @@ class EmulatorProcess:
             raise UsageError("The emulator's process ended by itself.") from error
 
 
-def _serve(start: Start, pipe: Connection) -> None:
+def _serve(start: EmulatorConfig, pipe: Connection) -> None:
     """Run in the process: serve the terminal until the pipe is closed."""
     try:
         robot, port = start.build(), start.open()
@@ -160,7 +154,7 @@ def _obey(pipe: Connection, robot: EmulatedRobot, server: Server) -> bool:
             if isinstance(wish, Fault):
                 robot.fault_injector.add(wish)
             if wish == "record":
-                pipe.send(Record(robot.log, tuple(robot.fault_injector.log)))
+                pipe.send(EmulatorRecord(robot.log, tuple(robot.fault_injector.log)))
             else:
                 pipe.send(_state(robot, server))
     except (EOFError, OSError):
@@ -168,10 +162,10 @@ def _obey(pipe: Connection, robot: EmulatedRobot, server: Server) -> bool:
     return True
 
 
-def _state(robot: EmulatedRobot, server: Server) -> State:
+def _state(robot: EmulatedRobot, server: Server) -> EmulatorState:
     hip, knee = robot.drives
     q, qd = robot.leg.q, robot.leg.qd
-    return State(
+    return EmulatorState(
         time=robot.time,
         modes=(int(hip.machine.mode), int(knee.machine.mode)),
         faults=(int(hip.machine.fault), int(knee.machine.fault)),

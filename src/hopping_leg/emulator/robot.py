@@ -12,7 +12,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.deploy.preflight import required_settings
 from hopping_leg.emulator import bus
-from hopping_leg.emulator.drive import Drive
+from hopping_leg.emulator.drive import EmulatedDrive
 from hopping_leg.emulator.fault_injection import FaultInjector
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.frames import Frame, ReplyQueue
@@ -98,9 +98,9 @@ class EmulatedRobot:
         for joint, drive in enumerate(self.drives):
             errors = [] if late else bus.act(message, drive, self.time)
             answer = bus.answer(message, drive, self.time, errors)
-            self.log.told(self.time, joint, message, drive)
+            self.log.record_command(self.time, joint, message, drive)
             if answer is not None:
-                self.log.answered(self.time, joint, answer)
+                self.log.record_reply(self.time, joint, answer)
                 self.fault_injector.send(answer, joint, self.wire_time)
 
     def _step(self) -> None:
@@ -120,16 +120,16 @@ class EmulatedRobot:
     def _sense(self) -> None:
         for joint, drive in enumerate(self.drives):
             drive.sense(*self.leg.sensed(joint))
-            self.log.stepped(self.time, joint, drive)
+            self.log.record_mode(self.time, joint, drive)
 
 
-def _drive(robot: Robot, joint: int, configured: bool) -> Drive:
+def _drive(robot: Robot, joint: int, configured: bool) -> EmulatedDrive:
     servo = robot.hardware.servos[joint]
     motor = (robot.hip, robot.knee)[joint].motor
     changes: dict[str, float] = {"id.id": servo.id}
     if configured:
         changes |= {setting.name: setting.value for setting in required_settings(robot, joint)}
-    return Drive(
+    return EmulatedDrive(
         Identity(f"{robot.name} {JOINTS[joint]}"),
         Settings(**changes),
         gear_ratio=motor.gear_ratio,

@@ -31,7 +31,7 @@ PTY = "pty"
 
 
 @dataclass(frozen=True)
-class Start:
+class EmulatorConfig:
     """What is emulated and how it begins."""
 
     robot: str = "legv2"

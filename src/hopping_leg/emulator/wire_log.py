@@ -16,7 +16,7 @@ from hopping_leg.emulator.mode_machine import MODES
 
 if TYPE_CHECKING:
     from hopping_leg.emulator.bus import Message
-    from hopping_leg.emulator.drive import Drive
+    from hopping_leg.emulator.drive import EmulatedDrive
     from hopping_leg.emulator.frames import Frame
 
 
@@ -92,7 +92,9 @@ class WireLog:
         self.changes: deque[ModeChange] = deque(maxlen=_REMEMBERED)
         self._modes = [DriveMode.STOPPED, DriveMode.STOPPED]
 
-    def told(self, time: float, joint: int, message: "Message", drive: "Drive") -> None:
+    def record_command(
+        self, time: float, joint: int, message: "Message", drive: "EmulatedDrive"
+    ) -> None:
         """Note what a message commands a drive, if it does."""
         mode, torque, most = None, 0.0, 0.0
         for s in message.heard(drive):
@@ -107,7 +109,7 @@ class WireLog:
         if mode is not None:
             self.commands.append(CommandEvent(time, joint, mode, torque, most))
 
-    def answered(self, time: float, joint: int, answer: "Frame") -> None:
+    def record_reply(self, time: float, joint: int, answer: "Frame") -> None:
         """Note a drive's answer, if it tells the drive's state."""
         values = parse_reply(answer.data)
         if values.keys() >= _STATE:
@@ -116,7 +118,7 @@ class WireLog:
                 ReplyEvent(time, joint, DriveMode(int(mode)), int(fault), voltage, temperature)
             )
 
-    def stepped(self, time: float, joint: int, drive: "Drive") -> None:
+    def record_mode(self, time: float, joint: int, drive: "EmulatedDrive") -> None:
         """Note a drive's mode after a step, if it is another."""
         mode = drive.machine.mode
         if mode is not self._modes[joint]:
