@@ -9,12 +9,15 @@ from scipy import optimize
 
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.cma_strategy import seeded_strategy
-from hopping_leg.identify.cost import RobustLoss
+from hopping_leg.identify.cost import RobustLoss, total_costs
 from hopping_leg.identify.parameters import ParameterSet
 from hopping_leg.identify.run_folder import load_state, save_state
 
-Residuals = Callable[[Array], Array]
-"""Search vectors (n, k) to residuals (n, m)."""
+Evaluate = Callable[[Array], Array]
+"""Search vectors (n, k) to costs (n,) or residuals (n, m), row by row independent."""
+
+Progress = Callable[[float, float], None]
+"""Called with the share done (0 to 1) and the lowest cost so far."""
 
 _NOTHING = 1e-3
 """A cost that is nothing, as residuals are in units of errors that matter."""
@@ -55,7 +58,7 @@ class Found:
 
 
 def jacobian(
-    residuals: Residuals,
+    residuals: Evaluate,
     vector: Array,
     bounds: tuple[Array, Array],
     step: float,
@@ -96,7 +99,7 @@ def jacobian(
 
 
 def least_squares(
-    residuals: Residuals,
+    residuals: Evaluate,
     parameters: ParameterSet,
     options: LeastSquaresOptions | None = None,
     *,
@@ -105,7 +108,7 @@ def least_squares(
     start: Array | None = None,
     about: Mapping[str, object] | None = None,
     checkpoint: Path | None = None,
-    report: Callable[[int, float], None] = lambda index, cost: None,
+    report: Progress = lambda share, cost: None,
 ) -> Found:
     """Search from one start; a run that was killed resumes with its round and ends the same.
 
@@ -118,7 +121,7 @@ def least_squares(
         start: Search vector to start from, (k,); None takes the parameters' start.
         about: What else tells this search from others, e.g. the recordings' hashes.
         checkpoint: File for the state after each round.
-        report: Called with round and cost after each round.
+        report: Called after each step that is tried.
 
     Raises:
         UsageError: The checkpoint belongs to another search.
@@ -139,7 +142,7 @@ def least_squares(
         vector, evaluations = np.array(saved["vector"]), int(saved["evaluations"])
         history = list(saved["history"])
     while len(history) < options.rounds and not _settled(history, options.tolerance):
-        problem = _Problem(residuals, (low, high), options.step, loss, groups)
+        problem = _Problem(residuals, (low, high), options, loss, groups, history, report)
         result = optimize.least_squares(
             problem.values,
             vector,
@@ -153,7 +156,7 @@ def least_squares(
         history.append(cost)
         state = {"vector": vector.tolist(), "evaluations": evaluations, "history": history}
         save_state(checkpoint, identity, state)
-        report(len(history), cost)
+        report(len(history) / options.rounds, cost)
     return Found(vector, history[-1], evaluations, history)
 
 
@@ -195,23 +198,26 @@ def _settled(history: list[float], tolerance: float) -> bool:
 
 
 class _Problem:
-    """Residuals whose squares add up to the cost, and their slopes; counts candidates.
+    """Residuals whose squares add up to the cost, and their slopes; reports every step tried.
 
     The slopes are those at the levels of the moment, which make the cost's own slope exact.
     """
 
     def __init__(
         self,
-        residuals: Residuals,
+        residuals: Evaluate,
         bounds: tuple[Array, Array],
-        step: float,
+        options: LeastSquaresOptions,
         loss: RobustLoss | None,
         groups: IntArray | None,
+        history: list[float],
+        report: Progress,
     ) -> None:
-        self._residuals, self._bounds, self._step = residuals, bounds, step
-        self._loss, self._groups = loss, groups
+        self._residuals, self._bounds, self._options = residuals, bounds, options
+        self._loss, self._groups, self._report = loss, groups, report
+        self._round, self._least = len(history), history[-1] if history else np.inf
         self._at: Array = np.empty(0)
-        self.count = 0
+        self.count, self._tried = 0, 0
 
     def values(self, vector: Array) -> Array:
         """Return residuals, (m,), and with a robust loss what each group costs beside them."""
@@ -223,7 +229,7 @@ class _Problem:
 
     def slopes(self, vector: Array) -> Array:
         """Return the slopes of what ``values`` returns, (m, k)."""
-        slopes = jacobian(self._counted, vector, self._bounds, self._step, self._groups)
+        slopes = jacobian(self._counted, vector, self._bounds, self._options.step, self._groups)
         if self._loss is None:
             return slopes
         still = np.zeros((len(self._loss.sizes), len(vector)))
@@ -231,13 +237,13 @@ class _Problem:
 
     def _counted(self, vectors: Array) -> Array:
         self.count += len(vectors)
+        self._tried += len(vectors) == 1
         values = self._residuals(vectors)
         self._at = values[0]
+        self._least = min(self._least, float(total_costs(values, self._loss).min()))
+        within = min(self._tried / self._options.evaluations, 1.0)
+        self._report(min((self._round + within) / self._options.rounds, 1.0), self._least)
         return values
-
-
-Values = Callable[[Array], Array]
-"""Search vectors (n, k) to costs (n,)."""
 
 
 @dataclass(frozen=True)
@@ -264,16 +270,16 @@ _COLLAPSED = 1e-3
 
 
 def cma_es(
-    values: Values,
+    values: Evaluate,
     parameters: ParameterSet,
     options: CmaOptions | None = None,
     *,
     seed: int,
     start: Array | None = None,
-    shares: Sequence[Values] = (),
+    shares: Sequence[Evaluate] = (),
     about: Mapping[str, object] | None = None,
     checkpoint: Path | None = None,
-    report: Callable[[int, float], None] = lambda index, cost: None,
+    report: Progress = lambda share, cost: None,
 ) -> Found:
     """Search from one start.
 
@@ -294,7 +300,7 @@ def cma_es(
             turn, and what comes out by ``values``, which judges everything if there are none.
         about: What else tells this search from others, e.g. the recordings' hashes.
         checkpoint: File for the state after each generation.
-        report: Called with generation and best cost so far, or what its share makes of it.
+        report: Called after each generation with the best cost, or what its share makes of it.
 
     Raises:
         UsageError: The checkpoint belongs to another search.
@@ -331,7 +337,7 @@ def cma_es(
         if counts:
             bests.append(vectors[found.argmin()])
         history.append(least if counts else history[-1])
-        report(generation + 1, history[-1])
+        report((generation + 1) / options.generations, history[-1])
         if np.ptp(found) <= options.tolerance * abs(found.min()):
             break
         if shares and np.max(strategy.result.stds) < _COLLAPSED:

@@ -17,12 +17,13 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.cost import Objective, RobustLoss, total_costs
+from hopping_leg.identify.cost import Objective
 from hopping_leg.identify.optimizers import (
     CmaOptions,
+    Evaluate,
     Found,
     LeastSquaresOptions,
-    Residuals,
+    Progress,
     cma_es,
     least_squares,
     multi_start,
@@ -36,17 +37,11 @@ from hopping_leg.workers import RayWorkers, map_rows
 _FACTOR = 2.0
 """The paper's second pass keeps the first one's parameters within this factor."""
 
-Progress = Callable[[float, float], None]
-"""Called with the share done (0 to 1) and the lowest cost so far."""
-
 Search = Callable[[Array, Path | None, Progress], Found]
 """From a start, the checkpoint and its progress report, to where the search ended."""
 
 Report = Callable[[str, float, float], None]
 """Called with what is being done, its share done (0 to 1) and the lowest cost so far."""
-
-Evaluate = Callable[[Array], Array]
-"""Search vectors (n, k) to costs (n,) or residuals (n, m), row by row independent."""
 
 
 @dataclass(frozen=True)
@@ -155,27 +150,24 @@ class Searcher:
         return Pass(name, parameters, ends[0], tuple(end.cost for end in ends[1:]))
 
     def _least_squares(self, objective: Objective, about: Mapping[str, object]) -> Search:
-        residuals, loss = self._spread(objective.residuals), objective.loss
-        options = self.options.least_squares
+        residuals = self._spread(objective.residuals)
 
         def search(start: Array, checkpoint: Path | None, progress: Progress) -> Found:
-            rounds = _Rounds(residuals, loss, options, progress)
             return least_squares(
-                rounds,
+                residuals,
                 objective.parameters,
-                options,
-                loss=loss,
+                self.options.least_squares,
+                loss=objective.loss,
                 groups=objective.jumping,
                 start=start,
                 about=about,
                 checkpoint=checkpoint,
-                report=rounds.finished,
+                report=progress,
             )
 
         return search
 
     def _cma(self, objective: Objective, about: Mapping[str, object]) -> Search:
-        options = self.options.cma
         values = self._spread(objective)
         shares = [self._spread(share) for share in self._shares(objective)]
 
@@ -183,13 +175,13 @@ class Searcher:
             return cma_es(
                 values,
                 objective.parameters,
-                options,
+                self.options.cma,
                 seed=self.seed,
                 start=start,
                 shares=shares,
                 about=about,
                 checkpoint=checkpoint,
-                report=lambda index, cost: progress(index / options.generations, cost),
+                report=progress,
             )
 
         return search
@@ -238,35 +230,3 @@ def second_pass(
             high = min(high, max(value / _FACTOR, value * _FACTOR, value + reach))
         starts[p.name], every[p.name] = value, (low, high)
     return choose(first.base, [*first.names, *added], bounds=every, start=starts)
-
-
-class _Rounds:
-    """Residuals that tell how far least squares has come, counting the steps that it tries."""
-
-    def __init__(
-        self,
-        residuals: Residuals,
-        loss: RobustLoss | None,
-        options: LeastSquaresOptions,
-        progress: Progress,
-    ) -> None:
-        self._residuals, self._loss = residuals, loss
-        self._options, self._progress = options, progress
-        self._round, self._tried, self._least = 0, 0, np.inf
-
-    def __call__(self, vectors: Array) -> Array:
-        """Return residuals of search vectors (n, k), (n, m)."""
-        values = self._residuals(vectors)
-        self._least = min(self._least, float(total_costs(values, self._loss).min()))
-        self._tried += len(vectors) == 1
-        self._tell()
-        return values
-
-    def finished(self, rounds: int, cost: float) -> None:
-        """Note that a round is over."""
-        self._round, self._tried, self._least = rounds, 0, cost
-        self._tell()
-
-    def _tell(self) -> None:
-        within = min(self._tried / self._options.evaluations, 1.0)
-        self._progress(min((self._round + within) / self._options.rounds, 1.0), self._least)
