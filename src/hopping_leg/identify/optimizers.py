@@ -1,17 +1,20 @@
 """The searches, each resumable: bounded least squares, and CMA-ES as in the paper."""
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import optimize
 
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.cma_strategy import seeded_strategy
+from hopping_leg.errors import UsageError
 from hopping_leg.identify.cost import RobustLoss, total_costs
 from hopping_leg.identify.parameters import ParameterSet
-from hopping_leg.identify.run_folder import load_state, save_state
+from hopping_leg.io import write_atomically
 
 Evaluate = Callable[[Array], Array]
 """Search vectors (n, k) to costs (n,) or residuals (n, m), row by row independent."""
@@ -137,7 +140,7 @@ def least_squares(
     }
     history: list[float] = []
     evaluations = 0
-    saved = load_state(checkpoint, identity)
+    saved = _load_state(checkpoint, identity)
     if saved is not None:
         vector, evaluations = np.array(saved["vector"]), int(saved["evaluations"])
         history = list(saved["history"])
@@ -155,7 +158,7 @@ def least_squares(
         evaluations += problem.count
         history.append(cost)
         state = {"vector": vector.tolist(), "evaluations": evaluations, "history": history}
-        save_state(checkpoint, identity, state)
+        _save_state(checkpoint, identity, state)
         report(len(history) / options.rounds, cost)
     return Found(vector, history[-1], evaluations, history)
 
@@ -315,7 +318,7 @@ def cma_es(
         "seed": seed,
         "about": dict(about or {}),
     }
-    saved = load_state(checkpoint, identity) or {"costs": []}
+    saved = _load_state(checkpoint, identity) or {"costs": []}
     costs: list[list[float]] = saved["costs"]
     bounds = [low.tolist(), high.tolist()]
     strategy = seeded_strategy(first, options.spread, bounds, options.population, seed)
@@ -328,7 +331,7 @@ def cma_es(
         if generation == len(costs):
             judge = judges[generation % len(judges)]
             costs.append(np.asarray(judge(vectors)).tolist())
-            save_state(checkpoint, identity, {"costs": costs})
+            _save_state(checkpoint, identity, {"costs": costs})
         found = np.array(costs[generation])
         strategy.tell(list(vectors), found.tolist())
         means.append(np.array(strategy.result.xfavorite))
@@ -350,3 +353,34 @@ def cma_es(
     final = np.asarray(values(elected))
     least = float(final.min())
     return Found(elected[final.argmin()], least, count + len(elected), [*history, least])
+
+
+def _save_state(path: Path | None, identity: dict[str, Any], state: dict[str, Any]) -> None:
+    """Write what a search needs to go on, floats with every bit; nothing without a path."""
+    if path is not None:
+        text = json.dumps({"identity": identity, "state": state})
+        write_atomically(path, text.encode())
+
+
+def _load_state(path: Path | None, identity: dict[str, Any]) -> dict[str, Any] | None:
+    """Return the saved state, or None if there is none.
+
+    Raises:
+        UsageError: The file is no checkpoint, or one of another search.
+    """
+    if path is None or not path.exists():
+        return None
+    try:
+        saved = json.loads(path.read_bytes())
+        known, state = saved["identity"], saved["state"]
+    except (ValueError, KeyError, TypeError, OSError) as error:
+        raise UsageError(
+            f"{path} is no checkpoint of a search; remove it to start anew."
+        ) from error
+    if known != json.loads(json.dumps(identity)):
+        raise UsageError(
+            f"{path} belongs to a search with other parameters, data or options;"
+            " repeat those, or remove it to start anew."
+        )
+    assert isinstance(state, dict)
+    return state

@@ -1,6 +1,7 @@
 """From recordings to identified parameters, judged on data that the fit has not seen."""
 
 import dataclasses
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,15 +23,15 @@ from hopping_leg.identify.optimizers import jacobian
 from hopping_leg.identify.parameters import LegHypothesis, ParameterSet
 from hopping_leg.identify.plan import FitPlan, check_commands, check_owner, make_plan
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.recording_format import Rig
 from hopping_leg.identify.result import Identified, as_json, software_versions
-from hopping_leg.identify.run_folder import RunFolder
 from hopping_leg.identify.search import Pass, Report, Searcher, SearchOptions
-from hopping_leg.identify.validation import Validation
 from hopping_leg.identify.windows import SHORTEST, cut, duration, hold_out
+from hopping_leg.io import write_json
 from hopping_leg.robot.model_mismatch import NO_MISMATCH
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.robot.robot_files import check_physics
+
+_CONFIG, _RESULT = "config.json", "result.json"
 
 
 @dataclass(frozen=True)
@@ -105,21 +106,24 @@ def identify(
         tuple(fit), tuple(windows), plan.parameters, plan.scoring, plan.timestep, options.threads
     )
     about = {"fitted": [r.name for r in fit], "starts": options.effort.starts}
-    run = None if folder is None else RunFolder(folder, _config(objective, options, held, seed))
-    if run is not None:
-        run.begin(resume=resume)
+    run = _RunFolder(folder, _config(objective, options, held, seed))
+    run.begin(resume=resume)
     searcher = Searcher(plan, objective, options.effort, seed, folder, report, options.ray, about)
     passes = searcher.run([r.metadata.rig for r in recordings])
     report("finding intervals", 1.0, passes[-1].found.cost)
     try:
         hypothesis, known = _conclude(objective, passes[-1], options)
     except PhysicsError as error:
-        if run is not None:
-            run.finish({"failed": str(error)})
+        run.finish({"failed": str(error)})
         raise
     report("judging", 1.0, passes[-1].found.cost)
-    hypotheses, step = (plan.start, hypothesis), plan.timestep
-    before, after = (validation.validate(held, c, step, options.threads) for c in hypotheses)
+    effort = (plan.timestep, options.threads)
+    before, after = (validation.validate(held, h, *effort) for h in (plan.start, hypothesis))
+    rigs = list(dict.fromkeys(r.metadata.rig for r in held))
+    groups = {rig: [r for r in held if r.metadata.rig == rig] for rig in rigs}
+    by_rig = {}
+    if len(rigs) > 1:
+        by_rig = {rig: validation.validate(g, hypothesis, *effort) for rig, g in groups.items()}
     identified = Identified(
         hypothesis=hypothesis,
         start=plan.start,
@@ -131,26 +135,11 @@ def identify(
         split=split,
         validation=after,
         start_validation=before,
-        by_rig=_judge_rigs(held, hypothesis, step, options.threads),
+        by_rig=by_rig,
         seed=seed,
     )
-    if run is not None:
-        run.finish(as_json(identified))
+    run.finish(as_json(identified))
     return identified
-
-
-def _judge_rigs(
-    held: Sequence[Recording], hypothesis: LegHypothesis, timestep: float, threads: int
-) -> dict[Rig, Validation]:
-    """Return what a hypothesis is worth on each rig, if there are several."""
-    rigs = list(dict.fromkeys(r.metadata.rig for r in held))
-    if len(rigs) == 1:
-        return {}
-    groups = {rig: [r for r in held if r.metadata.rig == rig] for rig in rigs}
-    return {
-        rig: validation.validate(group, hypothesis, timestep, threads)
-        for rig, group in groups.items()
-    }
 
 
 def _file_bounds(robot: Robot) -> dict[str, tuple[float, float]]:
@@ -251,3 +240,58 @@ def _config(
         "seed": seed,
         "software": software_versions(),
     }
+
+
+class _RunFolder:
+    """Files of one run: what was asked for, checkpoints of its searches, result.
+
+    Args:
+        path: The folder; None keeps nothing.
+        config: What makes this run this run, as JSON values.
+    """
+
+    def __init__(self, path: Path | None, config: dict[str, Any]) -> None:
+        self._path, self._config = path, json.loads(json.dumps(config))
+
+    def begin(self, *, resume: bool) -> None:
+        """Prepare the folder; the run in it goes on if it is the same one and unfinished.
+
+        Args:
+            resume: Go on with a finished run, too, instead of replacing it.
+
+        Raises:
+            UsageError: It holds another run that is unfinished, or to be resumed, or something
+                else than a run.
+        """
+        path = self._path
+        if path is None:
+            return
+        config, result = path / _CONFIG, path / _RESULT
+        checkpoints = list(path.glob("search-*.json"))
+        if not config.exists():
+            if path.exists() and (not path.is_dir() or any(path.iterdir())):
+                raise UsageError(f"{path} is not empty and holds no run; give another folder.")
+        elif checkpoints and (resume or not result.exists()):
+            self._check_same(config)
+            return
+        for file in (*checkpoints, result):
+            file.unlink(missing_ok=True)
+        write_json(config, self._config)
+
+    def finish(self, result: dict[str, Any]) -> None:
+        """Write the result, or why there is none; either marks the run as finished."""
+        if self._path is not None:
+            write_json(self._path / _RESULT, result)
+
+    def _check_same(self, config: Path) -> None:
+        try:
+            stored = json.loads(config.read_bytes())
+            differences = [k for k, v in self._config.items() if stored.get(k) != v]
+        except (ValueError, AttributeError) as error:
+            raise UsageError(f"{config} is no run's; give another folder.") from error
+        if differences:
+            raise UsageError(
+                f"The run in {config.parent} began with another"
+                f" {differences[0].replace('_', ' ')}; go on with what it began with, or give"
+                " another --folder."
+            )
