@@ -3,7 +3,7 @@
 import contextlib
 import functools
 
-from hopping_leg.cli import deploy, record_motors
+from hopping_leg.cli import deploy, record
 from hopping_leg.deploy import hardware_trials, moteus_link, transport
 from hopping_leg.deploy.motion_sequence import SequenceTiming
 from hopping_leg.emulator.server import EmulatorConfig
@@ -17,7 +17,7 @@ def put_behind(monkeypatch, **start):
     monkeypatch.setattr(moteus_link, "MoteusLink", lambda robot, opener: lockstep.link)
     monkeypatch.setattr(hardware_trials, "RealClock", lambda: lockstep)
     quick = functools.partial(SequenceTiming, rise=0.4, settle=0.1, sink=0.5)
-    for verb in (deploy, record_motors):
+    for verb in (deploy, record):
         monkeypatch.setattr(verb, "SequenceTiming", quick)
     quiet = contextlib.nullcontext(())
     monkeypatch.setattr(hardware_trials, "keeping_time", lambda **_: quiet)

@@ -24,7 +24,6 @@ from rich.console import Console
 from rich.table import Column, Table
 
 from hopping_leg.cli.command_line import command_line
-from hopping_leg.cli.fit_progress import FitProgress
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.optimizers import CmaOptions
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
@@ -40,6 +39,7 @@ from hopping_leg.identify.result import (
 )
 from hopping_leg.identify.search import SearchOptions
 from hopping_leg.io import write_atomically, write_json
+from hopping_leg.progress import LiveProgress, minutes
 from hopping_leg.robot import load_robot
 
 _FILES = {"out": "Robot", "json": "Numbers", "report": "Report"}
@@ -97,6 +97,28 @@ class Identify:
     resume: bool = False
     """Go on with the run in the folder even if it is finished, instead of repeating it; an
     unfinished one goes on anyway."""
+
+
+class FitProgress(LiveProgress):
+    """Stage, share done, time left and cost of a fit, as a context manager."""
+
+    def __init__(self) -> None:
+        super().__init__("preparing", first_line=60.0)
+
+    def update(self, stage: str, share: float, cost: float) -> None:
+        """Show the state of the fit.
+
+        Args:
+            stage: What is being done.
+            share: Done of all, 0 to 1.
+            cost: Lowest so far.
+        """
+        left = (
+            f" · at most {minutes(self.passed * (1 - share) / share)} left" if 0 < share < 1 else ""
+        )
+        note = f"cost {cost:.5g}{left}"
+        self._bar.update(self._task, description=stage, completed=share, note=note)
+        self._line_if_due(f"{stage} {100 * share:.0f} % · {note}")
 
 
 def run(args: Identify) -> None:

@@ -12,16 +12,33 @@ Examples:
   hop record fixed-base.parquet --robot my_leg.toml --transport /dev/fdcanusb --out recordings
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import tyro
 from rich.console import Console
+
+from hopping_leg.cli.motors import ask, check, connect
+from hopping_leg.controllers.joint_pd import JointGains, JointPD
+from hopping_leg.deploy.hardware_trials import Performance, header_of, new_path, perform
+from hopping_leg.deploy.keyboard import keys
+from hopping_leg.deploy.motion_sequence import MotionSequence, Poses, SequenceTiming, hopping_poses
+from hopping_leg.deploy.safety_limits import recording_limits
+from hopping_leg.deploy.schedule import Schedule
+from hopping_leg.deploy.stop_reasons import Reason
+from hopping_leg.errors import HardwareError, UsageError
+from hopping_leg.identify.excitation import Excitation
+from hopping_leg.identify.play_excitation import recording_of
+from hopping_leg.robot.parameters import Robot
+
+if TYPE_CHECKING:
+    from hopping_leg.deploy.moteus_link import MoteusLink
+
 from rich.progress import Progress
 
-from hopping_leg.cli import record_motors
-from hopping_leg.controllers.joint_pd import JointGains
-from hopping_leg.errors import UsageError
 from hopping_leg.identify.excitation import load_excitation
 from hopping_leg.identify.play_excitation import play
 from hopping_leg.identify.recording_format import Pair
@@ -77,15 +94,7 @@ def run(args: Record) -> None:
             f"Two excitations are called '{twice[0]}' and would share a recording; rename one."
         )
     if args.transport is not None:
-        record_motors.record(
-            [(path.stem, excitation) for path, excitation in loaded],
-            robot,
-            transport=args.transport,
-            believed=believed,
-            gains=gains,
-            out=args.out,
-            yes=args.yes,
-        )
+        _record_motors(args, robot, loaded, believed, gains)
         return
     console = Console()
     with Progress(console=Console(stderr=True)) as bar:
@@ -105,3 +114,70 @@ def run(args: Record) -> None:
             console.print(f"Wrote {file}", highlight=False, soft_wrap=True)
             for warning in recording.warnings:
                 console.print(f"  {warning}", highlight=False)
+
+
+def _record_motors(
+    args: Record,
+    robot: Robot,
+    excitations: Sequence[tuple[Path, Excitation]],
+    believed: str,
+    gains: JointGains,
+) -> None:
+    """Play excitations on motors one after the other and write their recordings and traces."""
+    assert args.transport is not None
+    rates = {excitation.rate for _, excitation in excitations}
+    if len(rates) > 1:
+        raise UsageError("The excitations have different rates; record them one by one.")
+    limits, console = recording_limits(robot, rates.pop()), Console()
+    with connect(robot, args.transport) as link:
+        facts = {"transport": args.transport, "drives": check(link, robot, limits)}
+        for path, excitation in excitations:
+            name = path.stem
+            ask(
+                f"{robot.name} on the {excitation.rig} will play {name} for"
+                f" {len(excitation) / excitation.rate:.0f} s; keep a hand on the switch.",
+                yes=args.yes,
+            )
+            done = _play(link, robot, excitation, gains, args.out / "traces", facts, name)
+            cause = done.outcome.supervisor.stop_cause
+            if cause.reason is not Reason.FINISHED:
+                raise HardwareError(f"{name} was stopped: {cause} Its trace is {done.path}.")
+            file = args.out / f"{robot.name}-{name}.parquet"
+            recording = recording_of(
+                done.trace, excitation, believed=believed, gains=gains, name=file.name
+            )
+            recording.save(file)
+            for notice in (*done.notices, *recording.warnings):
+                console.print(f"  {notice}", highlight=False, soft_wrap=True)
+            console.print(f"Wrote {file}", highlight=False, soft_wrap=True)
+
+
+def _play(
+    link: "MoteusLink",
+    robot: Robot,
+    excitation: Excitation,
+    gains: JointGains,
+    folder: Path,
+    facts: dict[str, Any],
+    name: str,
+) -> Performance:
+    controller = JointPD(excitation.position, excitation.velocity, gains)
+    fixed = excitation.rig == "fixed-base"
+    rest = np.zeros(2) if fixed else hopping_poses(robot).rest
+    sequence = MotionSequence(
+        controller,
+        Schedule(((float("nan"), 1.0),)),
+        Poses(excitation.position[0], rest),
+        None,
+        SequenceTiming(hop=len(excitation) / excitation.rate),
+        gains,
+    )
+    header = header_of(robot, controller, excitation.rate, **facts)
+    return perform(
+        link,
+        sequence,
+        recording_limits(robot, excitation.rate),
+        new_path(folder, name),
+        header,
+        beside=lambda loop: keys(None, loop.stop, Console().print),
+    )
