@@ -18,7 +18,7 @@ def seeded_strategy(
         step: First step size.
         bounds: Lower and upper ones, a number or a list each.
         population: Candidates per generation.
-        seed: Of the generator.
+        seed: Seed of the generator.
     """
     rng = np.random.default_rng(seed)
     settings = {

@@ -20,13 +20,13 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 """Okabe and Ito's palette, distinct for all common kinds of colour blindness."""
 
 COMMAND_COLOUR = "0.45"
-"""Of commanded heights, as in the paper."""
+"""Colours of commanded heights, as in the paper."""
 
 TORQUE_MAP = "PuOr_r"
 """Diverging and colour-blind safe; white is no torque."""
 
 WIDTH = 8.0
-"""Of a figure, inches."""
+"""Width of a figure, inches."""
 
 _LOOK = {
     "font.size": 9,
@@ -59,9 +59,9 @@ def panels(rows: int, columns: int = 1, height: float = 2.2) -> tuple[Figure, li
     """Return a figure of panels that share their axes.
 
     Args:
-        rows: Of panels.
-        columns: Of panels.
-        height: Of a row, inches.
+        rows: Rows of panels.
+        columns: Columns of panels.
+        height: Height of a row, inches.
     """
     figure = Figure(figsize=(WIDTH, height * rows + 0.5), layout="constrained")
     axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
@@ -105,7 +105,7 @@ def encode(figure: Figure, kind: Format, width: Width = "screen") -> bytes:
 
     Args:
         figure: Is resized if ``width`` is not ``screen``.
-        kind: Of file; fonts are embedded in a PDF.
+        kind: Kind of file; fonts are embedded in a PDF.
         width: What it shall fill.
     """
     if width != "screen":

@@ -126,7 +126,7 @@ def read_dataclass(
         tree: The table: field names to values.
         origin: Where it comes from, e.g. the file, for messages.
         error: Raised where something is wrong.
-        path: Of the table in the file, e.g. ``"hip.motor"``.
+        path: Path of the table in the file, e.g. ``"hip.motor"``.
         read_quantity: Reads a number whose field has a ``unit`` in its metadata, given entry (None
             where it is missing), field and path; without it, such fields are plain numbers.
 

@@ -39,7 +39,7 @@ class Workers(Protocol):
         """Call a function once per tuple of arguments; return what it returns, in their order.
 
         Raises:
-            HoppingLegError: Of a task, as it was raised there.
+            HoppingLegError: A task raised it.
             UsageError: A worker died.
         """
         ...
@@ -50,7 +50,7 @@ def map_rows(workers: Workers, function: Callable[[Array], Array], rows: Array) 
 
     Args:
         workers: Compute a part each.
-        function: Of any number of rows, one by one independent; (n, k) to (n, ...).
+        function: Maps any number of rows, one by one independent, (n, k) to (n, ...).
         rows: Its argument.
     """
     parts = np.array_split(rows, min(workers.count, len(rows)))
@@ -85,7 +85,7 @@ class ProcessWorkers:
         """Call a function once per tuple of arguments; return what it returns, in their order.
 
         Raises:
-            HoppingLegError: Of a task, as it was raised there.
+            HoppingLegError: A task raised it.
             UsageError: A process died.
         """
         if self.count == 1:
@@ -129,8 +129,8 @@ class RayWorkers:
     """The CPUs of a Ray cluster; one that this process has joined already stays the one.
 
     Args:
-        address: Of the cluster; ``local`` or None starts one on this machine, which ends with this
-            process.
+        address: Address of the cluster; ``local`` or None starts one on this machine, which ends
+            with this process.
         count: How many tasks at once; None takes one per CPU.
 
     Raises:
@@ -161,7 +161,7 @@ class RayWorkers:
         same function, called again, is sent once.
 
         Raises:
-            HoppingLegError: Of a task, as it was raised there.
+            HoppingLegError: A task raised it.
             UsageError: Workers died again and again.
         """
         exceptions = self._ray.exceptions

@@ -8,7 +8,13 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.evaluate.statistics import median_interval
-from hopping_leg.robot.model_mismatch import Drive, Ground, Latency, MassScale, ModelMismatch
+from hopping_leg.robot.model_mismatch import (
+    DriveMismatch,
+    GroundMismatch,
+    Latency,
+    MassScale,
+    ModelMismatch,
+)
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim_to_real.hopping import Hop
 
@@ -20,7 +26,7 @@ _SEED = 0
 
 def _drives(*names: str) -> Without:
     """Return what makes attributes of both drives neutral."""
-    neutral = {name: getattr(Drive(), name) for name in names}
+    neutral = {name: getattr(DriveMismatch(), name) for name in names}
 
     def without(reality: ModelMismatch) -> ModelMismatch:
         hip, knee = (dataclasses.replace(d, **neutral) for d in (reality.hip, reality.knee))
@@ -38,7 +44,9 @@ EFFECTS: dict[str, Without] = {
     "backlash": _drives("backlash"),
     "belt": _drives("stiffness", "stiffness_damping"),
     "sensors": _drives("sensor"),
-    "masses": lambda reality: dataclasses.replace(reality, mass=MassScale(), ground=Ground()),
+    "masses": lambda reality: dataclasses.replace(
+        reality, mass=MassScale(), ground=GroundMismatch()
+    ),
 }
 """Effects of ``[reality]`` by name, and what takes each away."""
 

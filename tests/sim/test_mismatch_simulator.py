@@ -6,19 +6,19 @@ import pytest
 from hopping_leg.errors import RobotError
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.model_mismatch import (
-    Drive,
-    Ground,
+    DriveMismatch,
+    GroundMismatch,
     Latency,
     MassScale,
     ModelMismatch,
-    Sensor,
+    SensorMismatch,
 )
 from hopping_leg.sim import NO_NOISE, MujocoSimulator, NoiseAndDelay, Plant
 from hopping_leg.sim.mismatch_model import mismatch_model
 
 CAD = load_robot("legv2")
 POSTURE = np.array([0.7, -1.4])
-IDLE = Drive(stiction_speed=1.0)
+IDLE = DriveMismatch(stiction_speed=1.0)
 """Differs from the neutral drive in a number without effect, so that the effects' code runs."""
 
 
@@ -74,7 +74,7 @@ def test_effects_without_effect_leave_every_byte(name):
 def test_a_neutral_table_does_not_change_the_digest():
     assert load_robot("legv2-paper").digest == "9634a0cc2dd452ea"
     assert load_robot("legv2").digest == "a599bb119353a5f1"
-    assert with_reality(hip=Drive(backlash=1e-3)).digest != CAD.digest
+    assert with_reality(hip=DriveMismatch(backlash=1e-3)).digest != CAD.digest
 
 
 def test_same_seed_same_bytes_at_any_thread_count():
@@ -156,7 +156,7 @@ def test_backlash_leaves_a_dead_band_of_its_width(joint, stiffness):
         hip=dataclasses.replace(CAD.hip, friction=5.0),
         knee=dataclasses.replace(CAD.knee, friction=5.0),
     )
-    drive = Drive(backlash=width, stiffness=stiffness, stiffness_damping=0.01)
+    drive = DriveMismatch(backlash=width, stiffness=stiffness, stiffness_damping=0.01)
     legs = hanging(with_reality(limp, **{joint: drive}))
     gaps = []
     for side in (-1.0, 1.0):
@@ -173,8 +173,8 @@ def test_backlash_leaves_a_dead_band_of_its_width(joint, stiffness):
 
 def test_a_belt_yields_by_torque_over_stiffness():
     limp = dataclasses.replace(CAD, knee=dataclasses.replace(CAD.knee, friction=5.0))
-    soft = Drive(stiffness=20.0, stiffness_damping=0.05)
-    legs = hanging(with_reality(limp, knee=soft, hip=Drive(stiction_speed=1.0)))
+    soft = DriveMismatch(stiffness=20.0, stiffness_damping=0.05)
+    legs = hanging(with_reality(limp, knee=soft, hip=DriveMismatch(stiction_speed=1.0)))
     legs.place(slice(None), 1.0, np.array([0.0, -np.pi / 2]))
     for _ in range(600):
         legs.step(20 * (np.zeros(2) - legs.measured_q) * [1, 0] - 0.5 * legs.measured_qd * [1, 0])
@@ -185,12 +185,12 @@ def test_a_belt_yields_by_torque_over_stiffness():
 
 def test_a_belt_too_stiff_for_the_step_is_refused():
     with pytest.raises(RobotError, match=r"reality.knee.stiffness"):
-        MujocoSimulator(with_reality(knee=Drive(stiffness=1e6)), 1, threads=1)
+        MujocoSimulator(with_reality(knee=DriveMismatch(stiffness=1e6)), 1, threads=1)
 
 
 def test_gain_lag_and_limits_shape_the_motor_torque():
-    drive = Drive(torque_gain=0.9, torque_lag=0.01, torque_limit=4.0)
-    legs = hanging(with_reality(hip=drive, knee=Drive(torque_limit=8.0)))
+    drive = DriveMismatch(torque_gain=0.9, torque_lag=0.01, torque_limit=4.0)
+    legs = hanging(with_reality(hip=drive, knee=DriveMismatch(torque_limit=8.0)))
     seen = []
     for _ in range(20):
         legs.step(np.array([[3.0, 0.0]]))
@@ -213,7 +213,7 @@ def test_a_lower_voltage_lowers_the_speed_line():
 
 
 def test_a_gear_takes_from_driving_and_adds_to_braking():
-    legs = MujocoSimulator(with_reality(knee=Drive(efficiency=0.8)), 2, threads=1)
+    legs = MujocoSimulator(with_reality(knee=DriveMismatch(efficiency=0.8)), 2, threads=1)
     legs.place(slice(None), 5.0, np.zeros(2))
     legs.qd[:, 1] = [5.0, -5.0]
     given = legs.step(np.array([[0.0, 1.0], [0.0, 1.0]]))[:, 1]
@@ -223,7 +223,7 @@ def test_a_gear_takes_from_driving_and_adds_to_braking():
 
 
 def test_ripple_repeats_with_the_motor_angle_and_has_its_amplitude():
-    drive = with_reality(hip=Drive(ripple=0.1, ripple_periods=8.0))
+    drive = with_reality(hip=DriveMismatch(ripple=0.1, ripple_periods=8.0))
     legs = MujocoSimulator(drive, 64, rate=2000, threads=1, clamped=True)
     angles = np.linspace(0, 2 * np.pi / 8, 64, endpoint=False)
     legs.place(slice(None), 1.0, np.stack([angles, np.zeros(64)], axis=1))
@@ -234,7 +234,7 @@ def test_ripple_repeats_with_the_motor_angle_and_has_its_amplitude():
 @pytest.mark.parametrize(("torque", "moves"), [(0.55, False), (0.7, True)])
 def test_stiction_holds_up_to_its_share_of_friction(torque, moves):
     sticky = dataclasses.replace(CAD, hip=dataclasses.replace(CAD.hip, friction=0.4))
-    legs = hanging(with_reality(sticky, hip=Drive(stiction=1.5)))
+    legs = hanging(with_reality(sticky, hip=DriveMismatch(stiction=1.5)))
     for _ in range(20):
         legs.step(np.array([[torque, 0.0]]))
     # MuJoCo's friction creeps; only what moves leaves the neighbourhood of zero.
@@ -246,9 +246,13 @@ def test_stiction_holds_up_to_its_share_of_friction(torque, moves):
 
 
 def test_readings_are_multiples_of_the_sensors_steps():
-    sensor = Sensor(0.003, 0.02, 0.01, position_noise=1e-3, velocity_noise=0.1, torque_noise=0.05)
+    sensor = SensorMismatch(
+        0.003, 0.02, 0.01, position_noise=1e-3, velocity_noise=0.1, torque_noise=0.05
+    )
     legs = MujocoSimulator(
-        with_reality(hip=Drive(sensor=sensor), knee=Drive(sensor=sensor)), 4, threads=1
+        with_reality(hip=DriveMismatch(sensor=sensor), knee=DriveMismatch(sensor=sensor)),
+        4,
+        threads=1,
     )
     legs.stand(slice(None), POSTURE)
     for _ in range(10):
@@ -260,8 +264,8 @@ def test_readings_are_multiples_of_the_sensors_steps():
 
 
 def test_noise_has_the_stated_spread_and_leaves_the_physics_alone():
-    noisy = Sensor(position_noise=2e-3, velocity_noise=0.1, torque_noise=0.05)
-    legs = MujocoSimulator(with_reality(hip=Drive(sensor=noisy)), 2000, threads=1)
+    noisy = SensorMismatch(position_noise=2e-3, velocity_noise=0.1, torque_noise=0.05)
+    legs = MujocoSimulator(with_reality(hip=DriveMismatch(sensor=noisy)), 2000, threads=1)
     legs.place(slice(None), 5.0, POSTURE)
     legs.step(np.ones((2000, 2)))
     error = legs.measured_q - legs.q
@@ -273,7 +277,7 @@ def test_noise_has_the_stated_spread_and_leaves_the_physics_alone():
 
 
 def test_true_masses_and_ground_reach_the_physics_alone():
-    robot = with_reality(mass=MassScale(thigh=1.2), ground=Ground(time_constant=0.05))
+    robot = with_reality(mass=MassScale(thigh=1.2), ground=GroundMismatch(time_constant=0.05))
     model = mismatch_model(robot, 5e-4, clamped=False).model
     assert model.body("thigh").mass[0] == pytest.approx(1.2 * CAD.thigh.mass)
     assert model.body("thigh").inertia.max() == pytest.approx(1.2 * CAD.thigh.inertia)

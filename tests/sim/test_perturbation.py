@@ -7,7 +7,7 @@ import pytest
 
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot
-from hopping_leg.robot.model_mismatch import Drive, Latency, ModelMismatch, Sensor
+from hopping_leg.robot.model_mismatch import DriveMismatch, Latency, ModelMismatch, SensorMismatch
 from hopping_leg.sim import MujocoSimulator
 from hopping_leg.sim.perturbation import Perturbation, Perturber
 
@@ -20,14 +20,14 @@ def real(**parts):
 
 
 def both(**numbers):
-    return {"hip": Drive(**numbers), "knee": Drive(**numbers)}
+    return {"hip": DriveMismatch(**numbers), "knee": DriveMismatch(**numbers)}
 
 
 DIFFERENT = (
     real(latency=Latency(command=0.004, measurement=0.001)),
     real(**both(torque_gain=0.8, torque_lag=0.003)),
     real(voltage=0.5),
-    real(**both(sensor=Sensor(position_step=0.01))),
+    real(**both(sensor=SensorMismatch(position_step=0.01))),
     dataclasses.replace(LEG, rail=dataclasses.replace(LEG.rail, friction=3.0)),
 )
 

@@ -5,7 +5,7 @@ import pytest
 
 from hopping_leg.errors import PhysicsError, RobotError, UsageError
 from hopping_leg.robot import load_robot
-from hopping_leg.robot.model_mismatch import Ground
+from hopping_leg.robot.model_mismatch import GroundMismatch
 from hopping_leg.viewer.live import Live
 from hopping_leg.viewer.world import World, usual_world
 
@@ -168,7 +168,7 @@ def test_a_leg_with_effects_of_reality_takes_changes_too():
 
 def test_the_ground_of_reality_changes_with_that_of_the_robot():
     robot = load_robot("twin")
-    own = dataclasses.replace(robot.reality, ground=Ground(time_constant=0.08))
+    own = dataclasses.replace(robot.reality, ground=GroundMismatch(time_constant=0.08))
     robot = dataclasses.replace(robot, reality=own)
     assert usual_world(robot).time_constant == 0.08
     changed = World(time_constant=0.03).of(robot)

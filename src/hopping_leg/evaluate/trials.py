@@ -14,7 +14,7 @@ from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.io import safe_file_name
 from hopping_leg.robot.limits import command_limits
-from hopping_leg.robot.model_mismatch import Ground
+from hopping_leg.robot.model_mismatch import GroundMismatch
 from hopping_leg.robot.parameters import Contact, Robot
 from hopping_leg.trace import Trace
 
@@ -158,7 +158,7 @@ def floor_robot(robot: Robot, floor: str) -> Robot:
         raise UsageError(unknown_name("floor", floor, FLOORS))
     if floor == "soft":
         return robot
-    reality = replace(robot.reality, ground=Ground())
+    reality = replace(robot.reality, ground=GroundMismatch())
     return replace(robot, contact=Contact(0.02, 1.0, robot.contact.friction), reality=reality)
 
 

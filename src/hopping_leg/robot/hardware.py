@@ -50,7 +50,7 @@ class Hardware:
     voltage_high: float = _number(42.0, "V")
     """Bus voltage above which the leg does not run; the drives trip at 46 V."""
     temperature_limit: float = _number(65.0, "deg C")
-    """Of the drives' electronics; they derate from 50 and trip at 75."""
+    """Highest temperature of the drives' electronics; they derate from 50 and trip at 75."""
 
     def __post_init__(self) -> None:
         for name, default_id, reach in (("hip", 1.0, math.pi), ("knee", 2.0, 2.7)):
@@ -76,8 +76,8 @@ def _or(value: float, default: float) -> float:
     return default if math.isnan(value) else value
 
 
-def mistake(hardware: Hardware) -> str | None:
-    """Return what no single field can tell: a sentence, or None if all is well."""
+def contradiction(hardware: Hardware) -> str | None:
+    """Return a sentence about fields that contradict each other, or None."""
     for name, servo in (("hip", hardware.hip), ("knee", hardware.knee)):
         if servo.id not in range(1, 127):
             return f"'hardware.{name}.id' is {servo.id:g} but must be a whole number, 1 to 126."

@@ -35,7 +35,7 @@ class Latency:
 
 
 @dataclass(frozen=True)
-class Sensor:
+class SensorMismatch:
     """Encoder and torque measurement of one joint, at the joint's side."""
 
     position_step: float = _value(0.0, "rad")
@@ -49,7 +49,7 @@ class Sensor:
 
 
 @dataclass(frozen=True)
-class Drive:
+class DriveMismatch:
     """Motor, gear and belt of one joint; all numbers at the joint's side."""
 
     torque_limit: float | None = _positive(None, "N m")
@@ -63,7 +63,7 @@ class Drive:
     ripple_periods: float = _positive(1.0, "1")
     """Periods of the ripple per turn of the joint."""
     efficiency: float = _positive(1.0, "1")
-    """Of the gear, in both directions of power; the torque measurement does not show it."""
+    """Efficiency of the gear in both directions of power, which measured torque does not show."""
     stiction: float = _positive(1.0, "1")
     """Friction at rest over the joint's Coulomb friction."""
     stiction_speed: float = _positive(0.05, "rad/s")
@@ -71,10 +71,10 @@ class Drive:
     backlash: float = _value(0.0, "rad")
     """Whole width of the dead band between motor and link."""
     stiffness: float | None = _positive(None, "N m/rad")
-    """Of the belt between motor and link; without it, rigid."""
+    """Stiffness of the belt between motor and link; without it, rigid."""
     stiffness_damping: float = _value(0.0, "N m s/rad")
     """Damping between motor and link, beside the stiffness."""
-    sensor: Sensor = field(default_factory=Sensor)
+    sensor: SensorMismatch = field(default_factory=SensorMismatch)
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class MassScale:
 
 
 @dataclass(frozen=True)
-class Ground:
+class GroundMismatch:
     """The true ground, where it differs from ``[contact]``."""
 
     time_constant: float | None = _positive(None, "s")
@@ -102,10 +102,10 @@ class ModelMismatch:
     voltage: float = _positive(1.0, "1")
     """Battery over the voltage that the motors' peak torque and no-load speed belong to."""
     latency: Latency = field(default_factory=Latency)
-    hip: Drive = field(default_factory=Drive)
-    knee: Drive = field(default_factory=Drive)
+    hip: DriveMismatch = field(default_factory=DriveMismatch)
+    knee: DriveMismatch = field(default_factory=DriveMismatch)
     mass: MassScale = field(default_factory=MassScale)
-    ground: Ground = field(default_factory=Ground)
+    ground: GroundMismatch = field(default_factory=GroundMismatch)
 
     @property
     def neutral(self) -> bool:

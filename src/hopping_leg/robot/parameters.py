@@ -31,7 +31,7 @@ class Base:
 
     mass: float = field(metadata={"unit": "kg"})
     radius: float = field(metadata={"unit": "m"})
-    """Of the sphere that touches the ground."""
+    """Radius of the sphere that touches the ground."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Motor:
 
     gear_ratio: float = field(metadata={"unit": "1"})
     rotor_inertia: float = field(metadata={"unit": "kg m2"})
-    """Of the rotor itself, before the gear."""
+    """Inertia of the rotor itself, before the gear."""
     torque_limit: float = field(metadata={"unit": "N m"})
     """What the software allows."""
     peak_torque: float = field(metadata={"unit": "N m"})

@@ -184,7 +184,7 @@ def _read_quantity(origin: str, entry: object, spec: Field, path: str) -> float:
 
 
 def check_physics(robot: Robot, origin: str) -> None:
-    """Check what no single field can tell.
+    """Check that fields do not contradict each other.
 
     Raises:
         RobotError: Naming the fields that contradict each other.
@@ -215,7 +215,7 @@ def check_physics(robot: Robot, origin: str) -> None:
             " for a robot that only swings write kind = 'pendulum'."
         )
     _check_mismatch(robot, origin)
-    wiring = hardware.mistake(robot.hardware)
+    wiring = hardware.contradiction(robot.hardware)
     if wiring is not None:
         raise RobotError(f"{origin}: {wiring}")
     least = 2 * TIMESTEP
@@ -227,7 +227,7 @@ def check_physics(robot: Robot, origin: str) -> None:
 
 
 def _check_mismatch(robot: Robot, origin: str) -> None:
-    """Check what no single field of ``[reality]`` can tell."""
+    """Check that the fields of ``[reality]`` do not contradict each other."""
     reality = robot.reality
     for name, joint, drive in (("hip", robot.hip, reality.hip), ("knee", robot.knee, reality.knee)):
         at = f"reality.{name}"

@@ -46,7 +46,7 @@ class EncoderEffects:
         self._step = step[:, self._rounded]
 
     def watch(self, q: Array, qd: Array, torque: Array) -> None:
-        """Take in the true state after a physics step.
+        """Record the true state after a physics step.
 
         Args:
             q: Motor angle at the joint's side, rad, (n, 2).

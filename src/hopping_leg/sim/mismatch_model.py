@@ -17,7 +17,7 @@ import numpy as np
 from hopping_leg.arrays import IntArray
 from hopping_leg.errors import RobotError
 from hopping_leg.robot.model import compile_spec, get_spec
-from hopping_leg.robot.model_mismatch import Drive
+from hopping_leg.robot.model_mismatch import DriveMismatch
 from hopping_leg.robot.parameters import Contact, Joint, Link, Robot
 
 _HARD = (0.99, 0.999, 1e-4, 0.5, 2.0)
@@ -100,7 +100,7 @@ def _scaled(link: Link, scale: float) -> Link:
     return replace(link, mass=link.mass * scale, inertia=link.inertia * scale)
 
 
-def _limited(joint: Joint, drive: Drive, voltage: float) -> Joint:
+def _limited(joint: Joint, drive: DriveMismatch, voltage: float) -> Joint:
     """A lower voltage moves the whole torque-speed line down; its slope is the winding's."""
     motor = joint.motor
     limit = motor.torque_limit
@@ -117,7 +117,7 @@ def _between(joint: str) -> str:
     return f"{joint}_transmission"
 
 
-def _harden_friction(spec: mujoco.MjSpec, name: str, drive: Drive, timestep: float) -> None:
+def _harden_friction(spec: mujoco.MjSpec, name: str, drive: DriveMismatch, timestep: float) -> None:
     """Let friction hold: by default MuJoCo's creeps faster than where Stribeck's curve falls."""
     if drive.stiction > 1:
         joint = spec.joint(name)
@@ -125,7 +125,9 @@ def _harden_friction(spec: mujoco.MjSpec, name: str, drive: Drive, timestep: flo
         joint.solimp_friction = _HARD
 
 
-def _add_transmission(spec: mujoco.MjSpec, name: str, drive: Drive, timestep: float) -> None:
+def _add_transmission(
+    spec: mujoco.MjSpec, name: str, drive: DriveMismatch, timestep: float
+) -> None:
     if not drive.backlash and drive.stiffness is None:
         return
     hinge = spec.body(_BODIES[name]).add_joint(

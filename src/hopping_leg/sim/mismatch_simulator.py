@@ -21,7 +21,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.encoder_effects import DRAWS, EncoderEffects
 from hopping_leg.sim.mismatch_model import mismatch_model
-from hopping_leg.sim.model_fields import JointFriction, rubs_under_load, set_model_fields
+from hopping_leg.sim.model_fields import JointFriction, friction_grows_with_load, set_model_fields
 from hopping_leg.sim.motor_effects import MotorEffects
 
 
@@ -82,11 +82,11 @@ class MismatchSimulator:
         self.sensors.set_robots([robot.reality for robot in robots])
 
     def _set_models(self, robots: Sequence[Robot], *, differ: bool) -> None:
-        """Take on the robots' models, if they differ, and their friction, if it changes."""
+        """Set the robots' models, if they differ, and their friction, if it changes."""
         if differ:
             set_model_fields(self.batch, self._models(robots))
         self._friction: JointFriction | None = None
-        if self._excess.any() or rubs_under_load(robots):
+        if self._excess.any() or friction_grows_with_load(robots):
             self._friction = JointFriction(robots, self.batch, self._motor)
 
     def _models(self, robots: Sequence[Robot]) -> list[mujoco.MjModel]:
@@ -98,9 +98,7 @@ class MismatchSimulator:
                 " give all of them a small one."
             )
         if any((robot.reality.of_drives("stiction") > 1).any() for robot in distinct.values()):
-            raise UsageError(
-                "Legs with stiction cannot differ or become others; leave 'stiction' at 1."
-            )
+            raise UsageError("Legs with stiction cannot differ or change; leave 'stiction' at 1.")
         models = {
             key: mismatch_model(robot, self._timestep, clamped=self._clamped).model
             for key, robot in distinct.items()

@@ -57,7 +57,7 @@ class JointFriction:
         self._joints, self._loss = joints, simulation.expand("dof_frictionloss")
 
     def set(self, torque: Array, further: Array | float = 0.0) -> None:
-        """Let the joints rub.
+        """Set the friction of the joints.
 
         Args:
             torque: That the motors give, N m at the joints, (n, 2).
@@ -66,6 +66,6 @@ class JointFriction:
         self._loss[:, self._joints] = self._coulomb + self._load * np.abs(torque) + further
 
 
-def rubs_under_load(robots: Sequence[Robot]) -> bool:
-    """Tell whether any leg's gears do."""
+def friction_grows_with_load(robots: Sequence[Robot]) -> bool:
+    """Tell whether any leg's friction grows with load."""
     return any(robot.of_joints("load_friction").any() for robot in robots)

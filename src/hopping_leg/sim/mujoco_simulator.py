@@ -12,7 +12,7 @@ from hopping_leg.robot.limits import MotorLimit
 from hopping_leg.robot.model import TIMESTEP, build_model
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.mismatch_simulator import MismatchSimulator
-from hopping_leg.sim.model_fields import JointFriction, rubs_under_load, set_model_fields
+from hopping_leg.sim.model_fields import JointFriction, friction_grows_with_load, set_model_fields
 from hopping_leg.sim.simulator import CONTROL_RATE, Simulator
 
 _JOINTS = np.array([1, 2])
@@ -101,7 +101,7 @@ class MujocoSimulator(Simulator):
     def _set_load_friction(self, robots: Sequence[Robot]) -> None:
         """Let friction change with torque where it does for some leg."""
         self._friction: JointFriction | None = None
-        if rubs_under_load(robots):
+        if friction_grows_with_load(robots):
             self._friction = JointFriction(robots, self.batch, _JOINTS)
 
     def _is_plain(self, robots: Sequence[Robot]) -> bool:
@@ -134,7 +134,7 @@ class MujocoSimulator(Simulator):
         """Go on as other robots, one per leg, in the present state.
 
         Raises:
-            UsageError: They have effects that these legs cannot take on while they move.
+            UsageError: They have effects that these legs cannot get while they move.
         """
         if self.mismatch is not None:
             self.mismatch.set_robots(robots)
@@ -145,7 +145,7 @@ class MujocoSimulator(Simulator):
             self._set_command_delay(robots)
         else:
             raise UsageError(
-                f"Legs of {self.robot.name} cannot take on another [reality] while they move; make"
+                f"Legs of {self.robot.name} cannot get another [reality] while they move; make"
                 " them with 'detailed'."
             )
 
@@ -180,7 +180,7 @@ class MujocoSimulator(Simulator):
 
         Args:
             ids: Which legs.
-            height: Of the base above the ground, m, (k,).
+            height: Height of the base above the ground, m, (k,).
             q: Joint angles, rad, (k, 2) or (2,).
         """
         rows = np.arange(self.count)[ids]

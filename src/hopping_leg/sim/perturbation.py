@@ -1,4 +1,4 @@
-"""What befalls legs and no one tells their controller: other robots, pushes, uneven ground.
+"""Perturbations unknown to the controller: other robots, pushes, uneven ground.
 
 All of it is fixed before a run begins, so that every controller meets the same.
 """
@@ -15,7 +15,7 @@ from hopping_leg.sim.mujoco_simulator import MujocoSimulator
 
 @dataclass(frozen=True)
 class Perturbation:
-    """What befalls n legs in a run.
+    """Perturbations of n legs in a run.
 
     Attributes:
         robots: What each leg is, whatever its controller believes, n of them.
@@ -36,7 +36,7 @@ class Perturbation:
 
 
 class Perturber:
-    """Lets a perturbation befall legs, tick by tick.
+    """Applies a perturbation to legs, tick by tick.
 
     Args:
         perturbation: What happens.

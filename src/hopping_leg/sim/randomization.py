@@ -142,7 +142,7 @@ WIDE_RANGES = (
     Range("reality.latency.command", "s", 0.0, 0.0149, "[C]", bounds="additions", step=5e-3),
 )
 """What may surprise any leg: a payload, heavy links, a worn or dry rail, hard and soft ground,
-motors that give less or more than they should, joints that rub, commands that come later."""
+motors that give less or more than they should, joints with friction, commands that arrive later."""
 
 
 def sample(

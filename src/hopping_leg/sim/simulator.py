@@ -72,7 +72,7 @@ class Simulator(ABC):
 
         Args:
             ids: Which legs.
-            height: Of the base above the ground, m, (k,).
+            height: Height of the base above the ground, m, (k,).
             q: Joint angles, rad, (k, 2) or (2,).
         """
 

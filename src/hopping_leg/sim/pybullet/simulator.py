@@ -31,7 +31,7 @@ class PyBulletSimulator(Simulator):
 
     Raises:
         UsageError: PyBullet is not installed, the physics step does not divide the control period,
-            or the robot has a ``reality`` or gears that rub under load.
+            or the robot has a ``reality`` or friction that grows with load.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class PyBulletSimulator(Simulator):
 
         Args:
             ids: Which legs.
-            height: Of the base above the ground, m, (k,).
+            height: Height of the base above the ground, m, (k,).
             q: Joint angles, rad, (k, 2) or (2,).
         """
         self._applied = np.zeros((self.count, 2))
