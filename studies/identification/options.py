@@ -9,7 +9,7 @@ from typing import Any, Self
 from rich.console import Console
 from rich.table import Table
 
-from hopping_leg.cli.fit_progress import FitProgress
+from hopping_leg.cli.identify import FitProgress
 from hopping_leg.cli.options import at_least
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.search import Report
