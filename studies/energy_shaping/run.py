@@ -8,8 +8,8 @@ import numpy as np
 import polars as pl
 
 from hopping_leg.controllers import RolloutConfig, rollout
-from hopping_leg.controllers.baselines import paper_energy_shaping, tuned_energy_shaping
-from hopping_leg.controllers.energy_shaping import EnergyShaping
+from hopping_leg.controllers.energy_shaping import paper_energy_shaping, tuned_energy_shaping
+from hopping_leg.controllers.energy_shaping.controller import EnergyShaping
 from hopping_leg.evaluate.metrics import (
     ESTIMATED_APEX,
     HopWindow,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.controllers.phases import Phase
+from hopping_leg.controllers.energy_shaping.phases import Phase
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 
 Truth = dict[str, Array]

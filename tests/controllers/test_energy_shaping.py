@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from hopping_leg.controllers import RolloutConfig, rollout
-from hopping_leg.controllers.baselines import paper_energy_shaping, tuned_energy_shaping
-from hopping_leg.controllers.phases import Phase
+from hopping_leg.controllers.energy_shaping import paper_energy_shaping, tuned_energy_shaping
+from hopping_leg.controllers.energy_shaping.phases import Phase
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.metrics import measure
 from hopping_leg.robot import load_robot

@@ -3,8 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hopping_leg.controllers.gain_files import GainFile, load_gains, save_gains
-from hopping_leg.controllers.shaping_gains import ShapingGains, scale_gains
+from hopping_leg.controllers.energy_shaping.gains import (
+    GainFile,
+    ShapingGains,
+    load_gains,
+    save_gains,
+    scale_gains,
+)
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot
 

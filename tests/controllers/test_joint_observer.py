@@ -1,6 +1,6 @@
 import numpy as np
 
-from hopping_leg.controllers.joint_observer import DatedObserver, LatestObserver
+from hopping_leg.controllers.energy_shaping.observer import DatedObserver, LatestObserver
 from hopping_leg.sim.channel import Channel, NoiseAndDelay
 
 PERIOD = 0.005

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from hopping_leg.controllers.leg_view import LegView
-from hopping_leg.controllers.liftoff_detector import LiftoffDetector
+from hopping_leg.controllers.energy_shaping.virtual_leg import LegView
+from hopping_leg.controllers.stand_hop_land import LiftoffDetector
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.model import GRAVITY
 

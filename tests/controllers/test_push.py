@@ -1,9 +1,14 @@
 import numpy as np
 import pytest
 
-from hopping_leg.controllers import height_estimate, push
-from hopping_leg.controllers.cartesian import foot_force_torque, leg_force
-from hopping_leg.controllers.posture import retraction, smooth_step, smooth_step_rate
+from hopping_leg.controllers.energy_shaping import equations
+from hopping_leg.controllers.energy_shaping.virtual_leg import (
+    foot_force_torque,
+    leg_force,
+    retraction,
+    smooth_step,
+    smooth_step_rate,
+)
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.model import GRAVITY
 
@@ -12,37 +17,37 @@ ROBOT = load_robot("legv2-paper")
 
 def test_feedforward_force_does_the_work_of_the_climb():
     command, start, end = np.array([0.3]), np.array([0.15]), np.array([0.25])
-    force = push.feedforward_force(ROBOT, command, start, end)
+    force = equations.feedforward_force(ROBOT, command, start, end)
     climb = command - start - ROBOT.foot.radius
     assert force * (end - start) == pytest.approx(ROBOT.mass * GRAVITY * climb)
 
 
 def test_feedforward_force_stays_bounded_for_an_extended_leg():
-    force = push.feedforward_force(ROBOT, np.array([0.35]), np.array([0.26]), np.array([0.25]))
+    force = equations.feedforward_force(ROBOT, np.array([0.35]), np.array([0.26]), np.array([0.25]))
     assert 0 < force < 200
 
 
 @pytest.mark.parametrize("exponent", [0.5, 1.0, 2.0])
 def test_gain_rests_at_the_desired_height_and_moves_towards_it(exponent):
     one, desired = np.ones(3), np.full(3, 0.3)
-    gain = push.updated_gain(one, desired, np.array([0.27, 0.30, 0.33]), exponent)
+    gain = equations.updated_gain(one, desired, np.array([0.27, 0.30, 0.33]), exponent)
     assert gain[0] > 1 > gain[2]
     assert gain[1] == 1
 
 
 def test_paper_exponent_squares_the_energy_ratio():
-    gain = push.updated_gain(np.ones(1), np.array([0.30]), np.array([0.27]), 2.0)
+    gain = equations.updated_gain(np.ones(1), np.array([0.30]), np.array([0.27]), 2.0)
     assert gain == pytest.approx((0.30 / 0.27) ** 2)
 
 
 @pytest.mark.parametrize("reached", [0.0, -1.0, 1.2])
 def test_absurd_estimates_move_the_gain_a_bounded_step(reached):
-    gain = push.updated_gain(np.ones(1), np.array([0.3]), np.array([reached]), 2.0)
-    assert push.STEP[0] ** 2 <= gain[0] <= push.STEP[1] ** 2
+    gain = equations.updated_gain(np.ones(1), np.array([0.3]), np.array([reached]), 2.0)
+    assert equations.STEP[0] ** 2 <= gain[0] <= equations.STEP[1] ** 2
 
 
 def test_share_of_period_ends_the_push_where_it_should():
-    share = push.share_of_period(
+    share = equations.share_of_period(
         np.array([0.245, 0.2, 0.26]), np.full(3, 2.0), np.full(3, 0.25), 0.005
     )
     np.testing.assert_allclose(share, [0.5, 1.0, 0.0])
@@ -51,11 +56,11 @@ def test_share_of_period_ends_the_push_where_it_should():
 def test_both_apex_estimates_agree_on_a_parabola():
     height, speed = np.array([0.25]), np.array([1.2])
     airborne = np.array([0.3])
-    touchdown = height_estimate.ballistic_height(height, speed, airborne)
-    apex = height_estimate.ballistic_apex(height, speed)
-    timed = height_estimate.flight_time_apex(height, touchdown, airborne)
+    touchdown = equations.ballistic_height(height, speed, airborne)
+    apex = equations.ballistic_apex(height, speed)
+    timed = equations.flight_time_apex(height, touchdown, airborne)
     np.testing.assert_allclose(timed, apex)
-    peak = height_estimate.ballistic_height(height, speed, speed / GRAVITY)
+    peak = equations.ballistic_height(height, speed, speed / GRAVITY)
     np.testing.assert_allclose(peak, apex)
 
 

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from hopping_leg.controllers import RolloutConfig, rollout
-from hopping_leg.controllers.landing import LandingGains
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.controllers.stand_hop_land import STAND_SECONDS, Mode, StandHopLand
+from hopping_leg.controllers.stand_hop_land import STAND_SECONDS, LandingGains, Mode, StandHopLand
 from hopping_leg.errors import UsageError
 from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import load_robot

@@ -11,7 +11,7 @@ from studies.probing.targets import TARGETS
 
 from hopping_leg.cli import main
 from hopping_leg.controllers import RolloutConfig, rollout
-from hopping_leg.controllers.phases import Phase
+from hopping_leg.controllers.energy_shaping.phases import Phase
 from hopping_leg.controllers.registry import load_policy
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.hidden import expose_hidden

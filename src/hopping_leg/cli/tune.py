@@ -28,7 +28,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from hopping_leg.cli.options import at_least
-from hopping_leg.controllers.gain_search import Search, Tuned, tune
+from hopping_leg.controllers.energy_shaping.tuning import Search, Tuned, tune
 from hopping_leg.io import write_atomically, write_json
 from hopping_leg.robot import load_robot
 

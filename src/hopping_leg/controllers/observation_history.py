@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hopping_leg.arrays import Array, IntArray
-from hopping_leg.controllers.recent import RingBuffer
-from hopping_leg.controllers.sample_history import SampleHistory
+from hopping_leg.controllers.sample_history import RingBuffer, SampleHistory
 from hopping_leg.errors import PolicyError, unknown_name
 from hopping_leg.sim.channel import DELAY_DEPTH, SAMPLES, Measurement
 

@@ -5,7 +5,7 @@ from functools import partial
 from importlib import resources
 from pathlib import Path
 
-from hopping_leg.controllers.baselines import paper_energy_shaping, tuned_energy_shaping
+from hopping_leg.controllers.energy_shaping import paper_energy_shaping, tuned_energy_shaping
 from hopping_leg.controllers.policy import OtherRobot, Policy
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.controllers.user_controllers import is_user_controller, load_user_controller
@@ -73,7 +73,7 @@ def load_controller(
 
     Args:
         name_or_path: One of ``controller_names()``, the path of an ``.onnx`` file or of a gain
-            file (``.toml``) for energy shaping, or a Python class, see ``plug_in``.
+            file (``.toml``) for energy shaping, or a Python class, see ``user_controllers``.
         robot: The leg it shall drive.
         rate: Control rate, Hz.
         other: What to do with a policy that was trained for another robot.

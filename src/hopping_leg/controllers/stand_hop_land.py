@@ -3,25 +3,184 @@
 A thin layer around any controller, since none was made to stand; it feels the joints alone.
 """
 
+from dataclasses import dataclass, fields
 from enum import IntEnum
 
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.controllers.cartesian import foot_force_torque, leg_force
-from hopping_leg.controllers.gain_files import load_gains
-from hopping_leg.controllers.joint_observer import DatedObserver
+from hopping_leg.controllers.energy_shaping.gains import load_gains, scale_gains
+from hopping_leg.controllers.energy_shaping.observer import DatedObserver
+from hopping_leg.controllers.energy_shaping.phases import FLIGHT_LIMIT, TouchdownDetector
+from hopping_leg.controllers.energy_shaping.virtual_leg import (
+    LegView,
+    foot_force_torque,
+    leg_force,
+    per_joint,
+    retraction,
+    view_leg,
+)
 from hopping_leg.controllers.joint_pd import JointGains
-from hopping_leg.controllers.landing import Landing, LandingGains
-from hopping_leg.controllers.leg_view import LegView, view_leg
-from hopping_leg.controllers.liftoff_detector import LiftoffDetector
-from hopping_leg.controllers.posture import retraction
 from hopping_leg.controllers.protocol import Controller, Measurement
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.errors import UsageError
+from hopping_leg.robot import kinematics, load_robot
 from hopping_leg.robot.model import GRAVITY
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import CONTROL_RATE
+
+
+@dataclass(frozen=True)
+class LandingGains:
+    """Of the landing, in units of the leg's weight, length and time (length / gravity)^(1/2).
+
+    Raises:
+        UsageError: A value has no meaning.
+    """
+
+    length: float = 0.85
+    """Leg length at which the foot waits for the ground; a longer leg has more way to brake."""
+    stiffness: float = 3.0
+    """Of the spring."""
+    damping: float = 1.5
+    """Of the damper."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            if not 0 <= getattr(self, field.name) < float("inf"):
+                raise UsageError(
+                    f"'{field.name}' of the landing is {getattr(self, field.name)} but must be zero"
+                    " or more and finite."
+                )
+        if not 0 < self.length < 1:
+            raise UsageError(f"'length' of the landing is {self.length} but must be below 1.")
+
+
+class Landing:
+    """Lands n legs; flight PD, touchdown detection and retraction are those of energy shaping.
+
+    Args:
+        robot: The leg.
+        count: Number of legs n.
+        standing: Leg length to end at, m.
+        gains: Of the landing.
+    """
+
+    def __init__(
+        self, robot: Robot, count: int, standing: float, gains: LandingGains | None = None
+    ) -> None:
+        shipped = load_gains()
+        self.robot = robot
+        self._shared = scale_gains(shipped.gains, load_robot(shipped.robot), robot)
+        gains = gains or LandingGains()
+        reach = robot.thigh.length + robot.shank.length
+        self._weight, self._standing = robot.mass * GRAVITY, standing
+        self._stiffness = gains.stiffness * self._weight / reach
+        self._damping = gains.damping * self._weight / np.sqrt(reach * GRAVITY)
+        self._waiting = landing_posture(robot, gains)
+        self._detector = TouchdownDetector(count, debounced=True)
+        self._from = np.tile(self._waiting, (count, 1))
+
+    def begin(self, who: BoolArray, q: Array) -> None:
+        """Let some legs begin to move to the landing posture from where they are, rad, (n, 2)."""
+        self._from = np.where(who[:, None], q, self._from)
+
+    def wait(self, leg: LegView, clock: Array) -> tuple[Array, BoolArray]:
+        """Return the torques of flight, N m, (n, 2), and which legs have met the ground, (n,).
+
+        Args:
+            leg: State of the legs.
+            clock: Time since the legs left the ground, s, (n,).
+        """
+        gains = self._shared
+        target, rate = retraction(self._from, self._waiting, clock, gains.retract_time)
+        torque = per_joint(gains.hip_stiffness, gains.knee_stiffness) * (target - leg.q)
+        torque += per_joint(gains.hip_damping, gains.knee_damping) * (rate - leg.qd)
+        along = kinematics.jacobian(self.robot, leg.q)[:, 0]
+        met = self._detector.update(
+            leg.rate - np.einsum("ni,ni->n", along, rate),
+            leg_force(self.robot, leg.q, torque),
+            gains.touchdown_rate,
+            gains.touchdown_force,
+        )
+        return torque, (met & (clock >= gains.flight_min)) | (clock > FLIGHT_LIMIT)
+
+    def brake(self, leg: LegView) -> Array:
+        """Return the torques of spring and damper, N m, (n, 2); they never pull the ground."""
+        spring = self._stiffness * (self._standing - leg.length)
+        push = np.maximum(self._weight + spring - self._damping * leg.rate, 0.0)
+        side = -self._shared.kp_y * leg.y - self._shared.kd_y * leg.y_rate
+        return foot_force_torque(self.robot, leg.q, push, side)
+
+    @property
+    def blind(self) -> float:
+        """Time after lift-off in which no touchdown is believed, s."""
+        return float(self._shared.flight_min)
+
+
+def landing_posture(robot: Robot, gains: LandingGains | None = None) -> Array:
+    """Return the posture in which a leg waits for the ground, foot below the hip, rad, (2,)."""
+    length = (gains or LandingGains()).length * (robot.thigh.length + robot.shank.length)
+    return kinematics.joint_angles(robot, np.array([length, 0.0]))
+
+
+_SMOOTHING = 0.25
+"""Share of the newest force in the pressing force."""
+
+_LEAST_PRESS = 1 / 3
+"""Pressing force that begins a push, weights."""
+
+_BEGIN, _END, _LEAST = 0.2, 0.06, 0.3
+"""Leg rate that begins a push, ends it, and must have been reached, sqrt(gravity x height)."""
+
+_SUDDEN = 0.15
+"""Time between the fastest leg rate and the end of a push, s; who only rises slows down for longer.
+"""
+
+_BLIND = 0.9
+"""Share of the ballistic flight in which no push is believed."""
+
+
+class LiftoffDetector:
+    """Tells when n legs leave the ground.
+
+    Args:
+        robot: The leg.
+        period: Control period, s.
+        count: Number of legs n.
+    """
+
+    def __init__(self, robot: Robot, period: float, count: int) -> None:
+        self._period, self._weight = period, robot.mass * GRAVITY
+        self._speed = float(np.sqrt(GRAVITY * robot.straight_height))
+        self._press, self._fastest = np.zeros(count), np.zeros(count)
+        self._pushing = np.zeros(count, np.bool_)
+        self._blind, self._slowing = np.zeros(count), np.zeros(count)
+
+    def update(self, leg: LegView, force: Array) -> BoolArray:
+        """Return which legs have just left the ground, (n,).
+
+        Args:
+            leg: State of the legs.
+            force: Along the leg, that the joints' torques press with, N, (n,).
+        """
+        bounded = np.clip(force, -4 * self._weight, 8 * self._weight)
+        self._press += _SMOOTHING * (bounded - self._press)
+        self._blind = np.maximum(self._blind - self._period, 0.0)
+        begins = (self._press > _LEAST_PRESS * self._weight) & (leg.rate > _BEGIN * self._speed)
+        begins &= ~self._pushing & (self._blind == 0)
+        self._fastest = np.where(begins, 0.0, self._fastest)
+        self._pushing |= begins
+        faster = leg.rate > self._fastest
+        self._slowing = np.where(faster, 0.0, self._slowing + self._period)
+        self._fastest = np.where(faster, leg.rate, self._fastest)
+        over = self._pushing & ((leg.rate < _END * self._speed) | (self._press < 0))
+        self._pushing &= ~over
+        left: BoolArray = over & (self._fastest > _LEAST * self._speed)
+        left &= self._slowing < _SUDDEN
+        self._blind = np.where(left, _BLIND * 2 * self._fastest / GRAVITY, self._blind)
+        return left
+
 
 STAND_SECONDS = 1.0
 """The leg stands so long before it hops."""

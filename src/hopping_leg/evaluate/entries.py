@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hopping_leg.controllers import Controller
-from hopping_leg.controllers.energy_shaping import EnergyShaping
+from hopping_leg.controllers.energy_shaping.controller import EnergyShaping
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_controller, shipped_policies
 from hopping_leg.errors import PolicyError, UsageError

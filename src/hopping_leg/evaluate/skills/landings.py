@@ -7,8 +7,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.controllers.joint_pd import JointPD
-from hopping_leg.controllers.landing import landing_posture
-from hopping_leg.controllers.stand_hop_land import StandHopLand
+from hopping_leg.controllers.stand_hop_land import StandHopLand, landing_posture
 from hopping_leg.evaluate.metrics import measure
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.dynamics import potential_energy

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.controllers.height_estimate import flight_time_apex
+from hopping_leg.controllers.energy_shaping.equations import flight_time_apex
 from hopping_leg.controllers.rollout import Rollout
 from hopping_leg.hop_detection import find_hops
 from hopping_leg.rl.finetune.contact import Contact

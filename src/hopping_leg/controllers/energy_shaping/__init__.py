@@ -1,12 +1,13 @@
-"""The energy shaping controllers that are shipped and compared."""
+"""Energy shaping, the paper's baseline: the controllers that are shipped and compared."""
 
-from hopping_leg.controllers.energy_shaping import EnergyShaping
-from hopping_leg.controllers.gain_files import TUNED, load_gains
-from hopping_leg.controllers.shaping_gains import (
+from hopping_leg.controllers.energy_shaping.controller import EnergyShaping
+from hopping_leg.controllers.energy_shaping.gains import (
     LITERAL,
     ROBUST,
     TRUE_CONTACT,
+    TUNED,
     ShapingGains,
+    load_gains,
     scale_gains,
 )
 from hopping_leg.robot import load_robot

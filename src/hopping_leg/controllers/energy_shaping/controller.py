@@ -8,14 +8,25 @@ from typing import Protocol
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.controllers import height_estimate, push
-from hopping_leg.controllers.cartesian import foot_force_torque, leg_force
-from hopping_leg.controllers.contact_detector import TouchdownDetector
-from hopping_leg.controllers.joint_observer import DatedObserver, LatestObserver
-from hopping_leg.controllers.leg_view import LegView, view_leg
-from hopping_leg.controllers.phases import BRAKE_LIMIT, FLIGHT_LIMIT, PUSH_LIMIT, Phase, Phases
-from hopping_leg.controllers.posture import per_joint, retraction
-from hopping_leg.controllers.shaping_gains import Gain, ShapingGains, ShapingOptions
+from hopping_leg.controllers.energy_shaping import equations
+from hopping_leg.controllers.energy_shaping.gains import Gain, ShapingGains, ShapingOptions
+from hopping_leg.controllers.energy_shaping.observer import DatedObserver, LatestObserver
+from hopping_leg.controllers.energy_shaping.phases import (
+    BRAKE_LIMIT,
+    FLIGHT_LIMIT,
+    PUSH_LIMIT,
+    Phase,
+    Phases,
+    TouchdownDetector,
+)
+from hopping_leg.controllers.energy_shaping.virtual_leg import (
+    LegView,
+    foot_force_torque,
+    leg_force,
+    per_joint,
+    retraction,
+    view_leg,
+)
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
@@ -142,8 +153,8 @@ class EnergyShaping:
         """Return the force along the leg: k F_f in the push, spring and damper before, N, (n,)."""
         gains = self.gains
         final = gains.push_rate + gains.push_rate_slope * (command - gains.reference)
-        intended = push.intended_rate(leg.length, self._length_0, liftoff, final)
-        forward = push.feedforward_force(self.robot, command, self._length_0, liftoff)
+        intended = equations.intended_rate(leg.length, self._length_0, liftoff, final)
+        forward = equations.feedforward_force(self.robot, command, self._length_0, liftoff)
         thrust = self._gain(command) * forward + gains.push_damping * (intended - leg.rate)
         brake = gains.touchdown_stiffness * (landing - leg.length)
         brake = brake - gains.touchdown_damping * leg.rate
@@ -156,7 +167,7 @@ class EnergyShaping:
         """Return how much of the coming period the foot presses the ground, 0 to 1, (n,)."""
         share = np.where(self._phases.are(Phase.FLIGHT), 0.0, 1.0)
         if self.options.liftoff == "timed":
-            until = push.share_of_period(leg.length, leg.rate, liftoff, self.period)
+            until = equations.share_of_period(leg.length, leg.rate, liftoff, self.period)
             share = np.where(self._phases.are(Phase.LIFTOFF), until, share)
         return share
 
@@ -207,14 +218,14 @@ class EnergyShaping:
         """
         gains, options = self.gains, self.options
         airborne = np.maximum(airborne, self.period)
-        ballistic = height_estimate.ballistic_apex(self._liftoff_height, self._liftoff_rate)
-        timed = height_estimate.flight_time_apex(self._liftoff_height, leg.stand, airborne)
+        ballistic = equations.ballistic_apex(self._liftoff_height, self._liftoff_rate)
+        timed = equations.flight_time_apex(self._liftoff_height, leg.stand, airborne)
         raw = {"ballistic": ballistic, "flight_time": timed, "true": self._highest}[options.height]
         lean = raw - gains.reference
         apex = gains.reference + gains.height_offset + gains.height_scale * lean
         self._apex = np.where(who, np.stack([apex, ballistic, timed]), self._apex)
         desired = self._pushed if options.desired == "pushed" else command
-        gain = push.updated_gain(self._k_ratio, desired, apex, gains.exponent)
+        gain = equations.updated_gain(self._k_ratio, desired, apex, gains.exponent)
         self._k_ratio = np.where(who, gain, self._k_ratio)
 
     def _end_touchdown(self, leg: LegView, command: Array) -> None:
@@ -228,7 +239,7 @@ class EnergyShaping:
 
     def _estimate_height(self, leg: LegView) -> None:
         """Ballistic in flight, forward kinematics on the ground."""
-        flying = height_estimate.ballistic_height(
+        flying = equations.ballistic_height(
             self._liftoff_height, self._liftoff_rate, self._phases.clock
         )
         self._height = np.where(self._phases.are(Phase.FLIGHT), flying, leg.stand)

@@ -3,10 +3,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hopping_leg.controllers import RolloutConfig, gain_search
-from hopping_leg.controllers.gain_cost import CommandScore, calibrated, cost
-from hopping_leg.controllers.gain_files import load_gains
-from hopping_leg.controllers.gain_search import SPACE, Search, evaluate, from_unit, search, to_unit
+from hopping_leg.controllers import RolloutConfig
+from hopping_leg.controllers.energy_shaping import tuning
+from hopping_leg.controllers.energy_shaping.gains import load_gains
+from hopping_leg.controllers.energy_shaping.tuning import (
+    SPACE,
+    CommandScore,
+    Search,
+    calibrated,
+    cost,
+    evaluate,
+    from_unit,
+    search,
+    to_unit,
+)
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot
 
@@ -19,7 +29,7 @@ def scores(shift=0.0, scale=1.0, **changed):
         replace(
             CommandScore(c, 0.3 + shift + scale * (c - 0.3), 0.002, 2.0, 0.4, 0.03, 0.08), **changed
         )
-        for c in gain_search.COMMANDS
+        for c in tuning.COMMANDS
     ]
 
 
@@ -63,7 +73,7 @@ def test_calibration_moves_the_estimate_by_what_the_medians_missed():
 
 
 def test_search_goes_down_and_resumes_without_simulating(tmp_path, monkeypatch):
-    monkeypatch.setattr(gain_search, "evaluate", fake_evaluate)
+    monkeypatch.setattr(tuning, "evaluate", fake_evaluate)
     start, log = replace(GAINS, exponent=1.9), tmp_path / "log.jsonl"
     found = search(start, SETUP, Search(generations=15), 3, log, quiet)
     assert abs(found.exponent - 1.0) < 0.3
@@ -71,12 +81,12 @@ def test_search_goes_down_and_resumes_without_simulating(tmp_path, monkeypatch):
     log.write_text("\n".join(lines[:7]) + "\n" + lines[7][:20])
     again = search(start, SETUP, Search(generations=15), 3, log, quiet)
     assert again == found
-    monkeypatch.setattr(gain_search, "evaluate", None)
+    monkeypatch.setattr(tuning, "evaluate", None)
     assert search(start, SETUP, Search(generations=15), 3, log, quiet) == found
 
 
 def test_log_of_another_search_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(gain_search, "evaluate", fake_evaluate)
+    monkeypatch.setattr(tuning, "evaluate", fake_evaluate)
     log = tmp_path / "log.jsonl"
     search(GAINS, SETUP, Search(generations=1), 3, log, quiet)
     with pytest.raises(UsageError, match="seed 3"):
