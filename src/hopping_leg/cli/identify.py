@@ -68,7 +68,7 @@ class Identify:
     robot: str | None = None
     """Where the fit begins: a shipped robot or a .toml file; default: the recordings' own."""
     seed: int = 0
-    """Of the split and the search."""
+    """Seed of the split and the search."""
     out: Path = Path("identified.toml")
     """Robot file to write; its name without .toml is the robot's."""
     json: Path | None = None
@@ -85,15 +85,15 @@ class Identify:
     starts: int = 1
     """Searches from different starts; the best one counts."""
     generations: int = CmaOptions().generations
-    """Of CMA-ES, in each pass."""
+    """Generations of CMA-ES, in each pass."""
     population: int = CmaOptions().population
     """Candidates in a generation of CMA-ES."""
     threads: int = 0
-    """Of the physics; 0 takes every core. They change no bit of the result."""
+    """Threads of the physics; 0 takes every core. They change no bit of the result."""
     ray: str | None = None
     """Simulate on the Ray cluster at this address; `local` starts one on this machine."""
     folder: Path | None = None
-    """For checkpoints and the result; default: runs/identify-NAME, after --out."""
+    """Folder for checkpoints and the result; default: runs/identify-NAME, after --out."""
     resume: bool = False
     """Go on with the run in the folder even if it is finished, instead of repeating it; an
     unfinished one goes on anyway."""

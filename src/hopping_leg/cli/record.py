@@ -65,11 +65,11 @@ class Record:
     """Robot that the recordings are filed under, where identification begins; default: the one
     that --robot extends, or --robot itself if it extends none or the motors are real."""
     seed: int = 0
-    """Of jitter and sensor noise."""
+    """Seed of jitter and sensor noise."""
     stiffness: Pair = JointGains().stiffness
-    """Of the joint PD, hip and knee, N m/rad."""
+    """Stiffness of the joint PD, hip and knee, N m/rad."""
     damping: Pair = JointGains().damping
-    """Of the joint PD, hip and knee, N m s/rad."""
+    """Damping of the joint PD, hip and knee, N m s/rad."""
     timestep: float = TIMESTEP
     """Physics step, s."""
 

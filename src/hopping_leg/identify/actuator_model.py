@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.errors import RecordingError, RobotError
+from hopping_leg.errors import RobotError
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.recording_format import Rig
@@ -50,7 +50,7 @@ def build_rig_model(
         robot: Parameters of the leg.
         rig: A fixed base has no rail joint and touches nothing.
         timestep: Physics step, s.
-        gravity: Of the base in free flight, m/s2.
+        gravity: Acceleration of the base in free flight, m/s2.
 
     Raises:
         RobotError: MuJoCo refuses the parameters.
@@ -91,9 +91,6 @@ def model_field(model: mujoco.MjModel, name: str) -> np.ndarray:
     return value
 
 
-_UNLIMITED = 1e9
-
-
 def drive_values(hypotheses: Sequence[LegHypothesis], name: str) -> Array:
     """Return an attribute of both drives, (hypotheses, 2)."""
     return np.array([[getattr(c.drive.hip, name), getattr(c.drive.knee, name)] for c in hypotheses])
@@ -114,25 +111,11 @@ def recorded_gains(recording: Recording, name: str) -> Array:
     return np.where(np.isnan(rows), values, rows)
 
 
-def require_gains(gains: Array, name: str, recording: Recording) -> Array:
-    """Return the gains.
-
-    Raises:
-        RecordingError: Neither the recording nor the hypothesis says what a gain is.
-    """
-    if np.isnan(gains).any():
-        raise RecordingError(
-            f"{recording.name} does not say the {name} of its on-board PD; state it in the"
-            f" sidecar, or fit 'drive.hip.{name}' and 'drive.knee.{name}'."
-        )
-    return gains
-
-
 class MotorBounds:
     """Smallest and largest torque of each joint at its speed, as ``robot.limits.MotorLimit``.
 
     Args:
-        hypotheses: Whose motors and drive limits.
+        hypotheses: Legs with the motors and their limits.
         recordings: One per window; a limit in the metadata replaces the robot's software limit.
     """
 

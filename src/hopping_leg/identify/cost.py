@@ -70,7 +70,7 @@ def total_costs(residuals: Array, loss: RobustLoss | None) -> Array:
     """Return the costs of hypotheses' residuals (n, size), (n,).
 
     Args:
-        residuals: Of every hypothesis.
+        residuals: Residuals of every vector.
         loss: None counts every residual in full.
     """
     if loss is None:

@@ -47,7 +47,7 @@ class OffsetFinder:
     """What the encoders of one recording show when the leg hangs straight down.
 
     Args:
-        recording: Of a clamped base, with velocities and torques that command the motors.
+        recording: Run of a clamped base, with velocities and torques that command the motors.
     """
 
     def __init__(self, recording: Recording) -> None:

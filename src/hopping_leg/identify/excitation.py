@@ -1,4 +1,4 @@
-"""Excitations: what the joints are told to do, in a file that all who play it share."""
+"""Excitations: targets of the joints over time, in a file that every player reads."""
 
 import hashlib
 import math
@@ -96,7 +96,7 @@ def _wave(time: Array, frequencies: Array, phases: Array) -> Array:
 
 
 RATE = 200.0
-"""Of the paper's recordings, Hz."""
+"""Rate of the paper's recordings, Hz."""
 
 _KEY = "excitation"
 
@@ -186,7 +186,7 @@ def make_excitation(
     Args:
         template: The trajectory.
         robot: The leg.
-        rate: Of the samples, Hz.
+        rate: Samples per second, Hz.
         limits: How far the real joints turn.
         track_velocity: Let the velocity targets be the positions' derivative, as in the lab's
             recordings; otherwise they are zero, as the paper says.

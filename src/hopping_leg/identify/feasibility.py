@@ -14,7 +14,7 @@ from hopping_leg.robot.limits import MotorLimit
 from hopping_leg.robot.parameters import JOINTS, Robot
 
 LEAST_CLEARANCE = 0.005
-"""Of base and knee above the ground, m."""
+"""Least clearance of base and knee above the ground, m."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Demand:
         position: rad, (ticks, 2).
         velocity: rad/s, (ticks, 2).
         torque: N m, (ticks, 2).
-        clearance: Of base and knee above the ground on which the foot stands, m, (ticks, 2);
+        clearance: Height of base and knee above the ground on which the foot stands, m, (ticks, 2);
             infinite where the base is clamped.
     """
 
@@ -88,7 +88,7 @@ def demand(robot: Robot, rig: Rig, position: Array, rate: float) -> Demand:
         robot: The leg.
         rig: Whether the base is clamped.
         position: rad, (ticks, 2).
-        rate: Of the samples, Hz.
+        rate: Samples per second, Hz.
     """
     velocity = np.gradient(position, 1 / rate, axis=0)
     inner = np.diff(position, 2, axis=0) * rate**2
@@ -108,7 +108,7 @@ def check_demand(robot: Robot, wanted: Demand, rate: float, limits: HardwareRang
     Args:
         robot: The leg, for its motors' torque-speed lines.
         wanted: Speeds and torques.
-        rate: Of the samples, Hz.
+        rate: Samples per second, Hz.
         limits: How far the real joints turn.
 
     Raises:

@@ -28,7 +28,7 @@ class Identifiability:
     Attributes:
         names: Parameters in order.
         values: Best values, SI, (k,).
-        half_width: Of the 95 % intervals, (k,); infinite where the data say nothing.
+        half_width: Half widths of the 95 % intervals, (k,); infinite where the data say nothing.
         correlation: (k, k).
         at_bound: Whether a value stands at a bound of its search, (k,).
         statements: What these data cannot tell, a sentence each.
@@ -51,7 +51,7 @@ def identifiability(
         parameters: What was fitted.
         vector: Best search vector, (k,).
         residuals: There, (m,), in the order of time.
-        jacobian: Of the residuals, (m, k).
+        jacobian: Slopes of the residuals, (m, k).
     """
     covariance, blind = _covariance(jacobian, _variance(residuals, len(vector)))
     deviation = np.sqrt(np.diag(covariance))

@@ -54,7 +54,7 @@ def base_rate(recording: Recording, robot: Robot) -> Array:
 
     Args:
         recording: With the base's height.
-        robot: Whose lengths say when the foot is on the ground.
+        robot: Leg whose lengths say when the foot is on the ground.
     """
     time, height = recording.time, recording.trace.column("height_m")
     position, velocity = full_states(recording)

@@ -38,7 +38,7 @@ class LeastSquaresOptions:
     evaluations: int = 6
     """Steps tried in a round."""
     step: float = 1e-3
-    """Of finite differences, in units of the parameters' scales."""
+    """Finite difference, in units of the parameters' scales."""
     tolerance: float = 1e-4
     """A round that lowers the cost by a smaller share ends the search."""
 
@@ -119,8 +119,8 @@ def least_squares(
         residuals: Function of search vectors.
         parameters: Bounds and scales.
         options: How.
-        loss: Of residuals that no parameters explain; None counts every one in full.
-        groups: Of residuals that jump now and then, as ``jacobian`` takes them.
+        loss: Weighs residuals that no parameters explain; None counts every one in full.
+        groups: Groups of residuals that jump now and then, as for ``jacobian``.
         start: Search vector to start from, (k,); None takes the parameters' start.
         about: What else tells this search from others, e.g. the recordings' hashes.
         checkpoint: File for the state after each round.
@@ -172,7 +172,7 @@ def multi_start(
         search: From the start's number and vector to where it ended.
         parameters: Starts are drawn within the bounds, up to three scales from the start.
         starts: How many.
-        seed: Of the draws.
+        seed: Seed of the draws.
     """
     low, high = parameters.bounds
     rng = np.random.default_rng(seed)
@@ -297,7 +297,7 @@ def cma_es(
         values: Function of search vectors.
         parameters: Bounds and scales.
         options: How.
-        seed: Of all randomness.
+        seed: Seed of all randomness.
         start: Search vector to start from, (k,); None takes the parameters' start.
         shares: Functions whose sum is ``values``; each generation is judged by the next one in
             turn, and what comes out by ``values``, which judges everything if there are none.

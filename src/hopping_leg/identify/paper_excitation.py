@@ -18,7 +18,7 @@ from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
 
 DURATION = 240.0
-"""Of the paper's recordings, s."""
+"""Duration of the paper's recordings, s."""
 
 LAB_MARGIN = 0.005
 """How far from straight the lab kept the leg in its recordings, m; the paper says nothing."""
@@ -139,7 +139,7 @@ def fixed_base(
         amplitudes: A, m.
         periods: T1, s.
         swings: T2, s.
-        duration: Of all strokes, s, divided evenly.
+        duration: Duration of all strokes, s, divided evenly.
         margin: From the straight leg, m.
         bend: Side of the knee.
         every_pair: Combine every amplitude with every period; otherwise the first with the first
@@ -218,7 +218,7 @@ def adapt(
     Args:
         strokes: The paper's template.
         robot: The leg.
-        rate: Of the samples, Hz.
+        rate: Samples per second, Hz.
         limits: How far the real joints turn.
 
     Raises:

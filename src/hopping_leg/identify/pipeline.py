@@ -75,9 +75,9 @@ def identify(
         robot: Its values before the fit; a table [reality] is left out.
         validate: Recordings to judge by.
         options: What and how.
-        folder: For checkpoints and the result; None keeps none.
+        folder: Folder for checkpoints and the result; None keeps none.
         resume: Go on with the folder's run, if there is one.
-        seed: Of all randomness.
+        seed: Seed of all randomness.
         report: Called with the progress.
 
     Raises:

@@ -141,7 +141,7 @@ def make_plan(
     """Decide how to identify a robot.
 
     Args:
-        recordings: Of one robot; rigs may differ.
+        recordings: Recordings of one robot; rigs may differ.
         robot: Its values before the fit.
         parameters: What to fit; None decides by what the recordings can tell.
         bounds: Bounds that differ from the widest ones.
@@ -277,7 +277,7 @@ def _speed_bounds(recordings: Sequence[Recording], robot: Robot) -> dict[str, tu
 
 
 def _start(recordings: Sequence[Recording], robot: Robot) -> LegHypothesis:
-    """Return the robot with the drives that the recordings tell of."""
+    """Return the robot with the drives that the recordings state."""
     values = {}
     for name in _open_gains(recordings):
         _, joint, gain = name.split(".")

@@ -38,8 +38,8 @@ def play(
         excitation: What the joints shall do.
         robot: The leg that plays the real one; its ``reality`` holds.
         believed: Robot file that the recording is filed under, where identification begins.
-        seed: Of jitter and sensor noise.
-        gains: Of the PD.
+        seed: Seed of jitter and sensor noise.
+        gains: Gains of the PD.
         timestep: Physics step, s.
         on_tick: Called with (ticks done, ticks in all).
 
@@ -125,11 +125,11 @@ def recording_of(
     a reply have no measurement. The joint PD runs on the host, once per row.
 
     Args:
-        trace: Of the run, with the targets of the PD in its columns.
-        excitation: That was played.
+        trace: Trace of the run, with the targets of the PD in its columns.
+        excitation: What was played.
         believed: Robot file that the recording is filed under, where identification begins.
-        gains: Of the PD.
-        name: Of the recording, for messages.
+        gains: Gains of the PD.
+        name: Name of the recording, for messages.
 
     Raises:
         RecordingError: The excitation was not played, or the recording cannot be believed.

@@ -101,11 +101,11 @@ class RecordingMetadata:
     for a period and computes its torque once per row (``zoh``), or one at many kHz
     (``continuous``)."""
     stiffness: Pair | None = None
-    """Of the on-board PD, N m/rad at the joint; none where unknown."""
+    """Stiffness of the on-board PD, N m/rad at the joint; none where unknown."""
     damping: Pair | None = None
-    """Of the on-board PD, N m s/rad at the joint; none where unknown."""
+    """Damping of the on-board PD, N m s/rad at the joint; none where unknown."""
     integral: Pair | None = None
-    """Of the on-board PID, N m/(rad s) at the joint; none where unknown or absent."""
+    """Integral gain of the on-board PID, N m/(rad s) at the joint; none where unknown or absent."""
     gains_exact: bool = True
     """False where the gains are estimates that a fit should refine."""
     zeroed: bool = False

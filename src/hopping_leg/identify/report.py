@@ -32,7 +32,7 @@ def write_fit_report(identified: Identified, command: str = "", threads: int = 0
 
     Args:
         identified: What was found.
-        command: That made it.
+        command: Command that made it.
         threads: Worker threads of the simulations to draw, 0 for one per core.
     """
     candidates = (identified.start, identified.hypothesis)

@@ -22,7 +22,7 @@ _SAMPLES = 4000
 """Residuals that a spectrum takes at most; more change nothing that can be seen."""
 
 _FREQUENCIES = 500
-"""Of a spectrum, from slow to half the rate."""
+"""Frequencies of a spectrum, from slow to half the rate."""
 
 
 @styled

@@ -57,7 +57,7 @@ class RowResampling:
     (hypotheses, windows, rows, k). Windows with fewer rows than the longest repeat their last.
 
     Args:
-        times: Of each window's rows since its first, s, (rows of that window,).
+        times: Times of each window's rows since its first, s, (rows of that window,).
         tick: Time between two ticks, s.
 
     Attributes:

@@ -35,10 +35,10 @@ class Identified:
         fit: Recordings, or parts of them, that were fitted.
         held: Recordings, or parts of them, that judge; the fit has not seen them.
         split: ``held-out stretches`` or ``validation recordings``.
-        validation: Of the result on what was held.
-        start_validation: Of the start, likewise.
-        by_rig: Of the result on each rig, if there are several.
-        seed: Of all randomness.
+        validation: Errors of the result on what was held.
+        start_validation: Errors of the start, likewise.
+        by_rig: Errors of the result on each rig, if there are several.
+        seed: Seed of all randomness.
     """
 
     hypothesis: LegHypothesis
@@ -223,8 +223,8 @@ def _identified_tree(identified: Identified, tree: Tree, name: str) -> Tree:
 
     Args:
         identified: What was found.
-        tree: Of the robot that the fit began with, ``extends`` resolved.
-        name: Of the new robot.
+        tree: Tables of the robot that the fit began with, ``extends`` resolved.
+        name: Name of the new robot.
     """
     tree = {key: copy.deepcopy(value) for key, value in tree.items() if key != "reality"}
     tree["name"] = name

@@ -92,7 +92,7 @@ class Searcher:
         objective: Cost of the plan's parameters; a pass with others gets its own.
         options: How hard.
         seed: Seed of all randomness.
-        folder: For checkpoints; None keeps none.
+        folder: Folder for checkpoints; None keeps none.
         report: Called with the progress.
         ray: Address of a Ray cluster that simulates, ``local`` for one on this machine; None
             simulates here.

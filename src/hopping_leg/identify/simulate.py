@@ -7,7 +7,7 @@ import numpy as np
 from mujoco import batch
 
 from hopping_leg.arrays import Array
-from hopping_leg.errors import UsageError
+from hopping_leg.errors import RecordingError, UsageError
 from hopping_leg.identify.actuator_model import (
     FIELDS,
     DelayLine,
@@ -17,7 +17,6 @@ from hopping_leg.identify.actuator_model import (
     drive_values,
     model_field,
     recorded_gains,
-    require_gains,
 )
 from hopping_leg.identify.encoder_offsets import OffsetFinder, find_offsets, has_encoder_offsets
 from hopping_leg.identify.initial_states import base_rate, start_states
@@ -33,7 +32,7 @@ _BLOCK = 256
 """Ticks whose commands are prepared at once."""
 
 _TICKS_PER_PERIOD = 5
-"""Of a drive that closes its own loop: how often its target, integral and limits are renewed."""
+"""Ticks per period at which a drive that closes its own loop renews target, integral and limits."""
 
 _WILD = 1e4
 """Joint velocity beyond which a simulation has broken down, rad/s."""
@@ -272,7 +271,11 @@ class WindowGroup:
         if self._metadata.onboard == "torque":
             gains[...] = 0.0
         for index, name in enumerate(("stiffness", "damping")):
-            require_gains(gains[:, index], name, self._recordings[0])
+            if np.isnan(gains[:, index]).any():
+                raise RecordingError(
+                    f"{self._recordings[0].name} does not say the {name} of its on-board PD; state"
+                    f" it in the sidecar, or fit 'drive.hip.{name}' and 'drive.knee.{name}'."
+                )
         return commands.reshape(len(ticks), -1, 6), gains.reshape(len(ticks), 3, -1, 2)
 
 
@@ -284,7 +287,7 @@ class Simulated:
         position: rad, (hypotheses, windows, rows, 2).
         velocity: rad/s, (hypotheses, windows, rows, 2).
         torque: As the rig would have measured it, N m, (hypotheses, windows, rows, 2).
-        height: Of the base, m, (hypotheses, windows, rows); NaN where it is fixed.
+        height: Height of the base, m, (hypotheses, windows, rows); NaN where it is fixed.
     """
 
     position: Array

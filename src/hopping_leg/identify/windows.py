@@ -38,7 +38,7 @@ def cut(
 
     Args:
         recordings: What to cut.
-        duration: Of a window, s; None makes one window of each recording, as the paper does.
+        duration: Duration of a window, s; None makes one of each recording, as the paper does.
         stride: From one window's start to the next, s; None leaves no gap and no overlap.
         unscored: Beginning of each window that does not count, s.
 
