@@ -107,8 +107,8 @@ class Scene:
             robot=case.robot,
             seed=int(rng.integers(1 << 30)),
         )
-        self.envelope = hopping_limits(robot, CONTROL_RATE)
-        self.limits = Limits.of(robot, self.envelope)
+        self.safety_limits = hopping_limits(robot, CONTROL_RATE)
+        self.limits = Limits.of(robot, self.safety_limits)
         self.height = float(rng.choice(HEIGHTS))
         self.checksums = bool(rng.random() < 0.5)
         self.killed_after = float(rng.uniform(0, 0.01))
@@ -120,7 +120,7 @@ class Scene:
         Raises:
             HardwareError: They may not be armed.
         """
-        require_fit(check_drives(self.robot, self.envelope, inspect(link)))
+        require_fit(check_drives(self.robot, self.safety_limits, inspect(link)))
 
     def perform(
         self, link: MoteusLink, folder: Path, clock: Clock | None, *, realtime: bool
@@ -143,7 +143,7 @@ class Scene:
         done = perform(
             link,
             sequence,
-            self.envelope,
+            self.safety_limits,
             folder / "run.parquet",
             header_of(self.robot, controller, CONTROL_RATE),
             clock=clock,

@@ -1,4 +1,4 @@
-"""What was wrong with a trial: the wire, the trace and the black box are asked one by one."""
+"""What was wrong with a trial: the wire, trace and flight recording are asked one by one."""
 
 import math
 from collections.abc import Collection, Sequence
@@ -63,7 +63,7 @@ def judge_trace(result: Result, done: Performance, reasons: Collection[Reason]) 
 
 
 def problems_of_box(folder: Path) -> list[str]:
-    """Return what is wrong with the black box of a killed host."""
+    """Return what is wrong with the flight recording of a killed host."""
     boxes = list(folder.glob(f"*{SUFFIX}"))
     if len(boxes) != 1:
         return [f"there are {len(boxes)} black boxes after kill -9"]

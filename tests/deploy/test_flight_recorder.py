@@ -102,7 +102,7 @@ def test_a_full_disk_never_stops_the_loop(tmp_path):
 
 def test_foreign_and_missing_files_get_a_sentence(tmp_path):
     (tmp_path / "b.blackbox").write_text("hello")
-    for name, sentence in (("b", "is no black box"), ("c", "Cannot read")):
+    for name, sentence in (("b", "is no flight recording"), ("c", "Cannot read")):
         with pytest.raises(TraceError, match=sentence):
             read_recording(tmp_path / f"{name}.blackbox")
     write(tmp_path / "d.blackbox")

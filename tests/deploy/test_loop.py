@@ -65,16 +65,21 @@ def test_an_operator_may_stop_before_and_after_arming(tmp_path):
             assert outcome.supervisor.stop_cause.reason is Reason.OPERATOR_STOP
 
 
-def test_a_controller_that_raises_damps_the_leg_and_its_words_are_kept(tmp_path):
-    outcome, _, trace = run(tmp_path, Still(fail_after=10))
-    assert outcome.supervisor.stop_cause.reason is Reason.CONTROLLER_FAILED
-    errors = [e["controller_error"] for e in trace.header["events"] if "controller_error" in e]
-    assert errors == ["ArithmeticError: lost the thread"]
-
-
-def test_a_controller_that_asks_for_nan_sends_none(tmp_path):
-    outcome, link, _ = run(tmp_path, Still((math.nan, 0.0)))
-    assert outcome.supervisor.stop_cause.reason is Reason.TORQUE_NOT_FINITE
+@pytest.mark.parametrize(
+    ("controller", "reason", "said"),
+    [
+        (Still(fail_after=10), Reason.CONTROLLER_FAILED, ["ArithmeticError: lost the thread"]),
+        (Still((math.nan, 0.0)), Reason.TORQUE_NOT_FINITE, []),
+    ],
+)
+def test_a_controller_that_fails_damps_the_leg_and_its_words_are_kept(
+    tmp_path, controller, reason, said
+):
+    outcome, link, trace = run(tmp_path, controller)
+    assert outcome.supervisor.stop_cause.reason is reason
+    assert [
+        e["controller_error"] for e in trace.header["events"] if "controller_error" in e
+    ] == said
     assert np.isfinite([out.torque for out in link.told]).all()
 
 

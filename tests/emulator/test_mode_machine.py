@@ -78,11 +78,3 @@ def test_modes_in_between_cannot_be_commanded():
     for mode in BETWEEN:
         machine.command(mode, time, math.nan)
         assert run(machine, STEP, time)[1][-1] is DriveMode.POSITION
-
-
-def test_position_mode_does_not_begin_outside_its_limits():
-    machine = ModeMachine()
-    machine.command(DriveMode.POSITION, 0.0, math.nan)
-    for n in range(40):
-        machine.advance(n * STEP, outside_limits=True)
-    assert (machine.mode, machine.fault) == (DriveMode.FAULT, FaultCode.START_OUTSIDE_LIMIT)

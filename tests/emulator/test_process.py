@@ -10,18 +10,11 @@ from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.process import EmulatorProcess
 from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import load_robot
 
 PATIENT = 1.0
 """Watchdog of the tests, s: this machine may be busy."""
 
-TORQUE = {
-    "position": math.nan,
-    "velocity": 0.0,
-    "kp_scale": 0.0,
-    "kd_scale": 0.0,
-    "watchdog_timeout": PATIENT,
-}
+TORQUE = {"position": math.nan, "kp_scale": 0.0, "kd_scale": 0.0, "watchdog_timeout": PATIENT}
 
 
 @pytest.fixture(scope="module")
@@ -83,19 +76,6 @@ def test_a_client_without_checksums_learns_that_they_are_wanted(emulator):
     assert emulator_wants_them
 
 
-def test_plain_lines_and_identity():
-    robot = load_robot("legv2")
-
-    async def ask(transport, drives):
-        reply = await drives[1].custom_query(dict.fromkeys(range(0x100, 0x103), moteus.INT32))
-        return reply.values, await transport.discover()
-
-    with EmulatorProcess(EmulatorConfig()) as emulator:
-        values, found = talk(emulator, ask, checksums=False)
-    assert values[moteus.Register.REGISTER_MAP_VERSION] == 5
-    assert [device.can_id for device in found] == [robot.hardware.hip.id, robot.hardware.knee.id]
-
-
 def test_a_wrong_start_is_told_to_the_parent():
     with pytest.raises(UsageError, match="There is no pose 'handstand'"):
         EmulatorProcess(EmulatorConfig(pose="handstand"))
@@ -119,20 +99,3 @@ def test_a_plug_comes_back_under_the_same_name(tmp_path):
         assert talk(emulator, ask, checksums=True) == 1
         assert [fault.kind for _, fault in emulator.record().faults] == ["unplug"]
     assert not link.is_symlink()
-
-
-def test_an_inflicted_fault_shows_on_the_wire(emulator):
-    async def power(transport, drives):
-        frames = [drive.make_position(**TORQUE, query=True) for drive in drives]
-        codes = set()
-        for _ in range(200):
-            results = await transport.cycle(frames)
-            codes |= {int(result.values[moteus.Register.FAULT]) for result in results}
-            if 33 in codes:
-                break
-            await asyncio.sleep(0.01)
-        await transport.cycle([drive.make_stop() for drive in drives])
-        return codes
-
-    emulator.inject(Fault("drive_fault", since="powered", drive="hip", value=33))
-    assert 33 in talk(emulator, power, checksums=True)

@@ -136,7 +136,7 @@ def test_what_cannot_be_followed_is_refused(tmp_path):
         Follow(tmp_path / "none")
     foreign = tmp_path / f"foreign{SUFFIX}"
     foreign.write_bytes(b"something else altogether")
-    with pytest.raises(TraceError, match="no black box"):
+    with pytest.raises(TraceError, match="no flight recording"):
         Follow(foreign).advance(1.0)
     unknown = box(tmp_path / f"unknown{SUFFIX}", robot="mine")
     write(unknown, 0, 1)

@@ -3,7 +3,7 @@
 The drives are checked first; the leg is armed only when all is well and you agree. It rises to the
 start pose, hops, sinks down and stops. Space, Enter, q, Ctrl-C and SIGTERM stop it at once, and a
 stop stays until you call this again. Everything is recorded, also when the process is killed:
-`hop report figures` reads the trace, or the black box that a killed run leaves behind.
+`hop report figures` reads the trace, or the flight recording that a killed run leaves behind.
 
 CONTROLLER is a name (fast, paper, energy-shaping), a policy (.onnx), a gain file (.toml), a Python
 class (path/to/file.py:Class), or a joint trajectory from `hop excite` (.parquet), which a joint PD

@@ -62,7 +62,7 @@ class Emulate:
     interface: Literal["pty", "udp_multicast", "socketcan"] = "pty"
     """pty is a serial terminal like an fdcanusb's; the others are buses of python-can."""
     channel: str | None = None
-    """Of a CAN bus: multicast group or interface name; default 239.74.163.2 or vcan0."""
+    """Channel of a CAN bus: multicast group or interface name; default 239.74.163.2 or vcan0."""
     link: Path | None = None
     """Also offer the terminal under this path, which stays the same when it is plugged again."""
     configured: bool = True
@@ -72,7 +72,7 @@ class Emulate:
     held: bool = True
     """Somebody holds the leg until both drives are powered."""
     seed: int = 0
-    """Of sensor noise and jitter."""
+    """Seed of sensor noise and jitter."""
     realtime: bool = True
     """Take real-time priority where that is permitted, so that the drives answer in time."""
     seconds: float | None = None

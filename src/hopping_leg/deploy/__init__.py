@@ -1,1 +1,1 @@
-"""The robot driven for real: wire, supervisor, loop, black box, and an emulator to prove it."""
+"""The robot driven for real: the way to its drives, supervisor, control loop, flight recorder."""

@@ -64,7 +64,7 @@ def home(link: MoteusLink, angles: Sequence[float]) -> None:
 
     Args:
         link: To the drives; they must be stopped.
-        angles: Of hip and knee, rad, within a twelfth of a turn of the motors' outputs.
+        angles: Hip and knee, rad, within a twelfth of a turn of the motors' outputs.
 
     Raises:
         HardwareError: A drive does not answer.

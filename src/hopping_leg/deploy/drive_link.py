@@ -5,7 +5,7 @@ from enum import Enum, IntEnum
 from typing import Protocol
 
 Pair = tuple[float, float]
-"""Of hip and knee."""
+"""Values of hip and knee."""
 
 
 class DriveMode(IntEnum):
@@ -64,8 +64,8 @@ class Reply:
         torque: At the joint, N m.
         mode: As in ``DriveMode``; others occur.
         fault: Code, 0 for none.
-        voltage: Of the bus, V.
-        temperature: Of the drive's electronics, deg C.
+        voltage: Bus voltage, V.
+        temperature: Drive's electronics, deg C.
         taken: When it was measured, s on the host's clock.
     """
 
@@ -80,7 +80,7 @@ class Reply:
 
 
 Replies = tuple[Reply | None, Reply | None]
-"""Of hip and knee; None where no fresh reply came."""
+"""Replies of hip and knee; None where no fresh reply came."""
 
 
 class Action(Enum):
@@ -135,12 +135,9 @@ class DriveLink(Protocol):
             outgoing: What they shall do.
             until: When to stop waiting, s on the loop's clock.
         """
-        ...
 
     def send(self, outgoing: DriveCommand) -> None:
         """Tell both drives what to do; returns at once."""
-        ...
 
     def close(self) -> None:
         """Give the adapter back."""
-        ...

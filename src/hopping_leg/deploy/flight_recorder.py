@@ -1,4 +1,4 @@
-"""The black box: what happened, tick by tick, on disk while it happens.
+"""The flight recorder: what happened, tick by tick, on disk while it happens.
 
 A file of frames, each ``kind, length, content, CRC-32``: one header (JSON), rows of floats, events
 (JSON). The loop only puts a frame into a queue; a thread writes it at once. When the process is
@@ -27,7 +27,7 @@ HEADER, ROW, EVENT = range(3)
 """Kinds of frames."""
 
 SUFFIX = ".blackbox"
-"""Of the files."""
+"""End of the files' names."""
 
 MAGIC = b"HOPBOX1\n"
 """What every file begins with."""
@@ -44,7 +44,7 @@ class FlightRecorder:
 
     Args:
         path: File to create; ends in ``SUFFIX``.
-        columns: Of the rows.
+        columns: Names of the rows' values.
         header: Facts about the run, JSON.
 
     Raises:
@@ -108,10 +108,10 @@ class FlightRecorder:
 
 @dataclass(frozen=True)
 class FlightRecording:
-    """What a black box holds.
+    """What a flight recording holds.
 
     Attributes:
-        columns: Of the rows.
+        columns: Names of the rows' values.
         header: Facts about the run.
         rows: (ticks, columns).
         events: In order.
@@ -130,17 +130,17 @@ class FlightRecording:
 
 
 def read_recording(path: Path) -> FlightRecording:
-    """Read a black box, also of a process that was killed.
+    """Read a flight recording, also of a process that was killed.
 
     Raises:
-        TraceError: The file is missing, or no black box.
+        TraceError: The file is missing, or no flight recording.
     """
     try:
         content = path.read_bytes()
     except OSError as error:
         raise TraceError(f"Cannot read {path}: {error.strerror}.") from error
     if not content.startswith(MAGIC):
-        raise TraceError(f"{path} is no black box of `hop deploy`.")
+        raise TraceError(f"{path} is no flight recording of `hop deploy`.")
     found = list(_frames(content, len(MAGIC)))
     if not found or found[0][0] != HEADER:
         raise TraceError(f"{path} ends before its header; the run had not begun.")
@@ -157,12 +157,12 @@ def read_recording(path: Path) -> FlightRecording:
 
 
 def recover(path: Path) -> Trace:
-    """Return the common trace of a run from its black box.
+    """Return the common trace of a run from its flight recording.
 
     Columns of the true height, which hardware does not know, hold NaN.
 
     Raises:
-        TraceError: The file is missing, no black box, or holds no tick.
+        TraceError: The file is missing, no flight recording, or holds no tick.
     """
     box = read_recording(path)
     if not len(box.rows):
@@ -175,11 +175,11 @@ def recover(path: Path) -> Trace:
 
 
 class FlightRecorderTail:
-    """Reads what is new in a black box.
+    """Reads what is new in a flight recording.
 
     Attributes:
-        path: Of the file.
-        columns: Of the rows; empty until the header is there.
+        path: The file.
+        columns: Names of the rows' values; empty until the header is there.
         header: Facts about the run; empty until the header is there.
 
     Args:
@@ -206,7 +206,7 @@ class FlightRecorderTail:
         """Return the rows that were written since the last call, (ticks, columns).
 
         Raises:
-            TraceError: The file is no black box.
+            TraceError: The file is no flight recording.
         """
         content = self._rest + self._file.read()
         at = 0
@@ -215,7 +215,7 @@ class FlightRecorderTail:
                 self._rest = content
                 return np.empty((0, 0))
             if not content.startswith(MAGIC):
-                raise TraceError(f"{self.path} is no black box of `hop deploy`.")
+                raise TraceError(f"{self.path} is no flight recording of `hop deploy`.")
             at, self._begun = len(MAGIC), True
         found = []
         for kind, data, end in _frames(content, at):

@@ -44,7 +44,7 @@ class Performance:
     Attributes:
         outcome: How it ended.
         trace: What happened.
-        path: Of the trace on disk.
+        path: Trace on disk.
         notices: What the computer did not permit.
     """
 
@@ -71,29 +71,29 @@ def perform(
         link: To drives that were found fit.
         sequence: What the leg does.
         limits: The supervisor's limits.
-        path: Of the trace; the black box lies beside it as long as the run lasts.
-        header: Of the trace.
+        path: File of the trace; the flight recording lies beside it as long as the run lasts.
+        header: Header of the trace.
         clock: The time; none takes the computer's.
         realtime: Ask for priority and locked memory.
         beside: Makes what is open while the loop runs, e.g. a keyboard that stops it.
 
     Raises:
-        TraceError: The black box cannot be written.
+        TraceError: The flight recording cannot be written.
     """
-    box_path = path.with_suffix(SUFFIX)
-    box = FlightRecorder(box_path, columns(sequence.controller), header)
-    loop = ControlLoop(link, sequence, limits, box, clock or RealClock())
+    recording = path.with_suffix(SUFFIX)
+    recorder = FlightRecorder(recording, columns(sequence.controller), header)
+    loop = ControlLoop(link, sequence, limits, recorder, clock or RealClock())
     notices: tuple[str, ...] = ()
     try:
         with _stopped_by_signals(loop), beside(loop), keeping_time(realtime=realtime) as notices:
             outcome = _run(loop)
     finally:
         if link.trouble:
-            box.event(link_trouble=link.trouble)
-        box.close()
-    trace = recover(box_path)
+            recorder.event(link_trouble=link.trouble)
+        recorder.close()
+    trace = recover(recording)
     trace.save(path)
-    box_path.unlink()
+    recording.unlink()
     return Performance(outcome, trace, path, notices)
 
 
@@ -182,7 +182,7 @@ class DeployedRobot:
 
     @property
     def name(self) -> str:
-        """Of the robot."""
+        """Name of the robot."""
         return self.robot.name
 
     def hop(self, controller: Controller, steps: Steps, seed: int) -> HardwareTrial:

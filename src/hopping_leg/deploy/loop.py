@@ -56,7 +56,7 @@ class ControlLoop:
         link: To the drives.
         sequence: What the leg does.
         limits: The supervisor's limits.
-        box: Where everything is recorded.
+        recorder: Where everything is recorded.
         clock: The time; shared with the link.
     """
 
@@ -65,11 +65,11 @@ class ControlLoop:
         link: DriveLink,
         sequence: MotionSequence,
         limits: SafetyLimits,
-        box: FlightRecorder,
+        recorder: FlightRecorder,
         clock: Clock,
     ) -> None:
-        self._link, self._sequence, self._envelope = link, sequence, limits
-        self._box, self._clock = box, clock
+        self._link, self._sequence, self._limits = link, sequence, limits
+        self._recorder, self._clock = recorder, clock
         self._samples = SampleBuffer(limits.period)
         self._internals = telemetry.internal_names(sequence.controller)
         self._stop, self._complaint = threading.Event(), ""
@@ -80,7 +80,7 @@ class ControlLoop:
 
     def run(self) -> LoopOutcome:
         """Arm, run the sequence, damp, stop; return when the drives have been told to stop."""
-        start = self._clock.now() + self._envelope.period
+        start = self._clock.now() + self._limits.period
         state, held = SupervisorState(since=start), STOP
         tick = ticks = skipped = told = 0
         stepped = 1
@@ -89,7 +89,7 @@ class ControlLoop:
                 state, held = self._tick(start, tick, stepped - 1, state, held)
                 told = told + 1 if state.state is State.STOPPED else 0
                 ticks, skipped = ticks + 1, skipped + stepped - 1
-                behind = (self._clock.now() - start) / self._envelope.period
+                behind = (self._clock.now() - start) / self._limits.period
                 following = max(tick + 1, math.floor(behind))
                 tick, stepped = following, following - tick
         finally:
@@ -100,7 +100,7 @@ class ControlLoop:
     def _tick(
         self, start: float, tick: int, skipped: int, state: SupervisorState, held: DriveCommand
     ) -> tuple[SupervisorState, DriveCommand]:
-        period, clock = self._envelope.period, self._clock
+        period, clock = self._limits.period, self._clock
         deadline = start + tick * period
         woke = clock.wait_until(deadline)
         until = max(deadline + REPLY_SHARE * period, woke + _LEAST_WAIT * period)
@@ -116,16 +116,14 @@ class ControlLoop:
             self._operator(tick, state),
             self._sequence.finished,
         )
-        after, outgoing = supervise(self._envelope, state, seen)
+        after, outgoing = supervise(self._limits, state, seen)
         if outgoing != held:
             self._link.send(outgoing)
         sent = clock.now()
         if after.state is not state.state:
             self._note(after, deadline - start)
-        timings = telemetry.Timings(
-            woke - deadline, replied - woke, sent - replied, sent - deadline, skipped
-        )
-        self._box.row(
+        timings = (woke - deadline, replied - woke, sent - replied, sent - deadline, skipped)
+        self._recorder.row(
             telemetry.row(
                 deadline - start,
                 step,
@@ -143,7 +141,7 @@ class ControlLoop:
             if reply is not None:
                 self._samples.put(tick, joint, reply)
         for joint, reply in exchange.late:
-            ago = math.ceil((deadline - reply.taken) / self._envelope.period)
+            ago = math.ceil((deadline - reply.taken) / self._limits.period)
             if ago > 0:
                 self._samples.put(tick - ago, joint, reply)
 
@@ -159,7 +157,7 @@ class ControlLoop:
             return sequence.step(time, measurement)
         except Exception as error:
             self._complaint = f"{type(error).__name__}: {error}"
-            self._box.event(time_s=time, controller_error=self._complaint)
+            self._recorder.event(time_s=time, controller_error=self._complaint)
             return SequenceStep((0.0, 0.0), sequence.command(time), Part.DONE)
 
     def _operator(self, tick: int, state: SupervisorState) -> Operator:
@@ -171,7 +169,7 @@ class ControlLoop:
 
     def _note(self, state: SupervisorState, time: float) -> None:
         """Record a transition; begin the sequence with it."""
-        self._box.event(
+        self._recorder.event(
             time_s=time,
             state=state.state.name.lower(),
             reason=state.cause.reason.name.lower(),

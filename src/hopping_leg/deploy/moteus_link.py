@@ -32,7 +32,6 @@ class Client(Protocol):
 
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Begin work; never waits for the motors."""
-        ...
 
     def call(self, work: Coroutine[Any, Any, Result], seconds: float) -> Result:
         """Do work and wait for its result.
@@ -40,11 +39,9 @@ class Client(Protocol):
         Raises:
             HardwareError: It took too long.
         """
-        ...
 
     def close(self) -> None:
         """End it."""
-        ...
 
 
 class ClientThread:

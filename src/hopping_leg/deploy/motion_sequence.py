@@ -20,7 +20,7 @@ from hopping_leg.robot.limits import SoftLimiter
 from hopping_leg.robot.parameters import Robot
 
 _ROUNDING = 1e-6
-"""Of times of ticks, s; far less than a tick."""
+"""Rounding of tick times, s; far less than a tick."""
 
 
 class Part(IntEnum):
@@ -43,7 +43,7 @@ class SequenceTiming:
     settle: float = 0.5
     sink: float = 1.5
     fade: float = 0.3
-    """Of the gains at the end of the sinking."""
+    """Fading of the gains at the end of the sinking."""
 
     def phase(self, elapsed: float) -> tuple[Part, float]:
         """Return the part at a time since the start, and how long it has lasted."""
@@ -64,7 +64,7 @@ class Poses:
     """Where the sequence leads, rad, (2,) each."""
 
     start: Array
-    """Of the first hop."""
+    """Pose of the first hop."""
     rest: Array
     """Where the leg sinks to before the drives brake."""
 
@@ -103,8 +103,8 @@ class MotionSequence:
         commands: What it is told.
         poses: Start and rest.
         limiter: Soft limits; None goes without.
-        timing: Of the parts.
-        gains: Of rising and sinking.
+        timing: Length of each part.
+        gains: Joint PD of rising and sinking.
     """
 
     controller: Controller

@@ -78,12 +78,12 @@ class DriveInfo:
         answers: Whether it answers at all; if not, nothing else is known.
         firmware: Version of its firmware, as the register holds it.
         register_map: Version of its register map.
-        serial: Of its controller, 24 hex digits.
+        serial: Serial number of its controller, 24 hex digits.
         home: 2 where it has been told where its output is.
         position: Joint angle as it believes, rad.
         mode: As in ``DriveMode``.
         fault: Code.
-        voltage: Of the bus, V.
+        voltage: Bus voltage, V.
         temperature: deg C.
         settings: Name to value; NaN where the firmware does not know the name.
     """

@@ -16,15 +16,12 @@ class Clock(Protocol):
 
     def now(self) -> float:
         """Return the time."""
-        ...
 
     def wait_until(self, deadline: float) -> float:
         """Return at a deadline, or at once if it is over; returns the time."""
-        ...
 
     def patience(self, until: float) -> float:
         """Return how many of the computer's seconds something due at a time is worth waiting."""
-        ...
 
 
 class RealClock:
@@ -56,7 +53,7 @@ class RealClock:
 
 
 PRIORITY = 60
-"""Of SCHED_FIFO, 1 to 99; above ordinary work, below the kernel's own threads."""
+"""Priority in SCHED_FIFO, 1 to 99; above ordinary work, below the kernel's own threads."""
 
 _NOTICE = (
     "No permission for real-time priority (SCHED_FIFO): ticks may be late under load; run as root"

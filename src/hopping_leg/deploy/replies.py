@@ -39,7 +39,7 @@ class DriveClock:
         """Return when a reply was measured, s on the host's clock.
 
         Args:
-            counter: Of the drive, ms; wraps after 49 days.
+            counter: Drive's counter, ms; wraps after 49 days.
             arrived: On the host's clock, s.
 
         Returns:
@@ -81,8 +81,8 @@ class Question:
     Lives between two threads: the client's puts frames in, the loop's waits for ``done``.
 
     Args:
-        transforms: Of both joints.
-        clocks: Of both drives; shared from tick to tick.
+        transforms: Both joints' transforms.
+        clocks: Both drives' clocks; shared from tick to tick.
         asked: When it leaves, s.
     """
 
@@ -102,7 +102,7 @@ class Question:
 
         Args:
             joint: 0 for the hip, 1 for the knee.
-            frame: Of the client library.
+            frame: A frame of the client library.
             now: When it arrived, s.
         """
         if self._fresh[joint] is not None:
@@ -131,8 +131,8 @@ def read_reply(
 
     Args:
         data: The frame's payload.
-        transform: Of the joint.
-        clock: Of the drive.
+        transform: The joint's transform.
+        clock: The drive's clock.
         now: When the frame arrived, s.
 
     Returns:

@@ -60,7 +60,7 @@ def hopping_limits(robot: Robot, rate: float) -> SafetyLimits:
         robot: The leg.
         rate: Control rate, Hz.
     """
-    return _envelope(robot, rate, hopping_ranges(robot))
+    return _limits(robot, rate, hopping_ranges(robot))
 
 
 def recording_limits(robot: Robot, rate: float) -> SafetyLimits:
@@ -74,10 +74,10 @@ def recording_limits(robot: Robot, rate: float) -> SafetyLimits:
         (servo.lower - RECORDING_MARGIN, servo.upper + RECORDING_MARGIN)
         for servo in robot.hardware.servos
     ]
-    return _envelope(robot, rate, ranges)
+    return _limits(robot, rate, ranges)
 
 
-def _envelope(robot: Robot, rate: float, ranges: list[Pair]) -> SafetyLimits:
+def _limits(robot: Robot, rate: float, ranges: list[Pair]) -> SafetyLimits:
     (hip_lower, hip_upper), (knee_lower, knee_upper) = ranges
     hip, knee, hardware = robot.hip, robot.knee, robot.hardware
     return SafetyLimits(

@@ -19,7 +19,6 @@ class Commands(Protocol):
 
     def at(self, elapsed: float) -> float:
         """Return the height commanded at a time since the first hop, m."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -83,7 +83,7 @@ class SupervisorInput:
     """Everything that a decision of the supervisor depends on.
 
     Attributes:
-        time: Of the tick, s.
+        time: Tick's deadline, s.
         late: How long after its deadline the tick began, s.
         replies: Fresh in this tick.
         wanted: Joint torques that the sequence asks for, N m; None if the controller failed.

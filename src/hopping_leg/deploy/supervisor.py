@@ -45,8 +45,8 @@ class SupervisorState:
     Attributes:
         state: Now.
         since: When it was entered, s.
-        cause: Of the last transition.
-        stop_cause: Of the last transition into ``damping``.
+        cause: Why the last transition happened.
+        stop_cause: Why ``damping`` was entered last.
         counts: What only several ticks together tell.
     """
 

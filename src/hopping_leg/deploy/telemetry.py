@@ -1,11 +1,10 @@
-"""A tick as a row of the black box: the trace's columns and what only hardware has."""
+"""A tick as a row of the flight recording: the trace's columns and what only hardware has."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from hopping_leg.controllers.protocol import Controller
-from hopping_leg.deploy.drive_link import DriveCommand, Pair, Replies
+from hopping_leg.deploy.drive_link import DriveCommand, Replies
 from hopping_leg.deploy.motion_sequence import SequenceStep
 from hopping_leg.deploy.supervisor import SupervisorState
 from hopping_leg.robot.parameters import JOINTS
@@ -15,27 +14,6 @@ _TIMES = ("wake_late_s", "exchange_s", "control_s", "tick_s", "skipped_ticks")
 _MEASURED = ("position_rad", "velocity_rad_s", "torque_nm")
 _DRIVE = ("mode", "fault", "voltage_v", "temperature_c", "fresh")
 _ASKED = ("command_nm", "sent_nm")
-
-_NAN_PAIR: Pair = (math.nan, math.nan)
-
-
-@dataclass(frozen=True, slots=True)
-class Timings:
-    """How a tick went, s.
-
-    Attributes:
-        late: From the deadline to the tick's beginning.
-        exchange: From there until the replies were in or given up.
-        control: From there until the torques had left.
-        tick: From the deadline to the end.
-        skipped: Ticks that were left out before this one.
-    """
-
-    late: float
-    exchange: float
-    control: float
-    tick: float
-    skipped: int
 
 
 def columns(controller: Controller) -> tuple[str, ...]:
@@ -56,10 +34,15 @@ def row(
     state: SupervisorState,
     outgoing: DriveCommand,
     fresh: Replies,
-    timings: Timings,
+    timings: Sequence[float],
     internals: Sequence[float],
 ) -> list[float]:
-    """Return the row of a tick; measurements are NaN where no fresh reply came."""
+    """Return the row of a tick; measurements are NaN where no fresh reply came.
+
+    Timings are from the deadline to the tick's beginning, from there until the replies were in or
+    given up, from there until the torques had left, from the deadline to the end, all in s, and the
+    ticks that were left out before this one.
+    """
     values: list[float] = [
         time,
         step.command,
@@ -67,11 +50,7 @@ def row(
         state.cause.reason,
         step.phase,
         outgoing.action.value,
-        timings.late,
-        timings.exchange,
-        timings.control,
-        timings.tick,
-        timings.skipped,
+        *timings,
     ]
     last = state.counts.last
     for name in ("position", "velocity", "torque"):

@@ -24,14 +24,14 @@ _FORMS = (
 class TolerantFdcanusb(FdcanusbDevice):  # type: ignore[misc]
     """The client library's fdcanusb without what would silence or hang it.
 
-    Of ``moteus`` 1.1: a line that is no answer, or a broken one, ends its reader task without a
+    In ``moteus`` 1.1 a line that is no answer, or a broken one, ends its reader task without a
     word; an adapter that is gone wakes the event loop forever; and a closed port stays registered
     with the loop, so that the next one with its number never reads.
 
     Must be made inside of a running event loop.
 
     Args:
-        path: Of the serial port.
+        path: Serial port.
 
     Attributes:
         garbage: Lines that were skipped.

@@ -71,7 +71,7 @@ def answer(message: Message, drive: EmulatedDrive, time: float, errors: Errors) 
         message: From the host.
         drive: On the bus.
         time: Now, s.
-        errors: Of its writes.
+        errors: Its writes that failed.
     """
     subframes = message.heard(drive)
     if not subframes:

@@ -7,7 +7,7 @@ from hopping_leg.emulator.settings import Settings
 from hopping_leg.errors import UsageError
 
 CHANNEL = 1
-"""Of the console."""
+"""Stream channel of the console."""
 
 _OK = b"OK\r\n"
 _PACKETS = 256
@@ -19,8 +19,8 @@ class Diagnostic:
     The host writes lines and polls for the answers, with or without packet numbers.
 
     Args:
-        settings: Of the drive.
-        encoder: Of the drive.
+        settings: Configuration of the drive.
+        encoder: Encoder of the drive.
         stop: Stops the drive at a time, s.
     """
 

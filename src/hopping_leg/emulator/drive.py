@@ -59,7 +59,7 @@ class EmulatedDrive:
         settings: Its configuration.
         gear_ratio: True turns of the rotor per turn of the output.
         brake: Damping of the output with the phases shorted, N m s/rad.
-        voltage: Of the bus, V.
+        voltage: Bus voltage, V.
     """
 
     def __init__(
@@ -91,12 +91,12 @@ class EmulatedDrive:
 
     @property
     def voltage(self) -> float:
-        """Of the bus, V."""
+        """Bus voltage, V."""
         return self.nominal_voltage + self.disturbances.voltage
 
     @property
     def temperature(self) -> float:
-        """Of the output stage, degrees C."""
+        """Temperature of the output stage, degrees C."""
         return AMBIENT + self._warmth + self.disturbances.temperature
 
     @property
@@ -154,7 +154,7 @@ class EmulatedDrive:
 
         Args:
             output: Position of the output, revolutions.
-            velocity: Of the output, rev/s.
+            velocity: Velocity of the output, rev/s.
             torque: What the motor gave, at the output, N m.
         """
         self.encoder.watch(output)

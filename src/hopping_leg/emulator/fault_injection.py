@@ -19,7 +19,7 @@ class FaultInjector:
     Args:
         robot: That has them.
         faults: The script.
-        rng: Of the bits that flip.
+        rng: Chooses the bits that flip.
 
     Attributes:
         log: Which fault began when, s.

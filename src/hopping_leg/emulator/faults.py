@@ -115,7 +115,6 @@ class FaultyRobot(Protocol):
     @property
     def drives(self) -> "tuple[EmulatedDrive, ...]":
         """Hip and knee."""
-        ...
 
 
 @dataclass
@@ -138,7 +137,7 @@ class FaultKind:
 
     Attributes:
         text: What happens.
-        unit: Of the fault's value; empty if it has none.
+        unit: Unit of the fault's value; empty if it has none.
         value: Default value.
         duration: Default duration, s; NaN where a number of replies is meant.
         at_start: Whether the robot starts with it, whatever the script says of its time.
@@ -146,7 +145,7 @@ class FaultKind:
     Args:
         fault: Entry of the script.
         robot: That has it.
-        rng: Of the bits that flip.
+        rng: Chooses the bits that flip.
     """
 
     text: ClassVar[str]

@@ -25,7 +25,7 @@ class EmulatedLeg:
     Args:
         robot: What is simulated; its ``reality`` holds.
         q: Joint angles at the start, rad, (2,); the foot stands on the ground.
-        seed: Of sensor noise.
+        seed: Seed of sensor noise.
         timestep: Physics step, s.
     """
 
@@ -46,12 +46,12 @@ class EmulatedLeg:
 
     @property
     def height(self) -> float:
-        """Of the base above the ground, m."""
+        """Height of the base above the ground, m."""
         return float(self._legs.height[0])
 
     @property
     def height_rate(self) -> float:
-        """Of the base, m/s."""
+        """Rate of the base's height, m/s."""
         return float(self._legs.height_rate[0])
 
     @property

@@ -116,7 +116,7 @@ class CanPort:
 
     Args:
         interface: One of ``DEFAULT_CHANNELS``.
-        channel: Of the interface; none takes the default.
+        channel: Channel of the interface; none takes the default.
 
     Raises:
         UsageError: The bus cannot be opened.

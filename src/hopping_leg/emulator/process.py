@@ -28,11 +28,11 @@ class EmulatorState:
 
     Attributes:
         time: Since the start, s.
-        modes: Of the drives.
+        modes: Modes of the drives.
         faults: Codes or notices of the drives.
         q: Joint angles, rad.
         qd: Joint velocities, rad/s.
-        height: Of the base, m.
+        height: Height of the base, m.
         lost: Time that was not simulated for want of the processor, s.
         flown: When the foot left the ground for the first time, s; infinite if it did not yet.
     """
@@ -52,7 +52,7 @@ class EmulatorRecord:
     """What happened since the start.
 
     Attributes:
-        log: Of the wire.
+        log: Commands and answers on the wire.
         faults: Those that began, with when, s.
     """
 
@@ -83,7 +83,7 @@ class EmulatorProcess:
 
     @property
     def pid(self) -> int:
-        """Of the process."""
+        """Number of the process."""
         assert self._process.pid is not None
         return self._process.pid
 

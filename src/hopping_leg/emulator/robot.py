@@ -38,7 +38,7 @@ class EmulatedRobot:
             firmware is delivered, but for their ids.
         homed: Whether somebody homed the drives already.
         held: Whether the leg is held until the drives are powered.
-        seed: Of sensor noise and jitter.
+        seed: Seed of sensor noise and jitter.
         faults: What goes wrong, and when.
         timestep: Physics step, s.
     """

@@ -17,7 +17,7 @@ class RotorEncoder:
     """Position of one drive's output as its firmware knows it.
 
     Args:
-        settings: Of the drive.
+        settings: Configuration of the drive.
         gear_ratio: Turns of the rotor per turn of the output: the truth, whatever is configured.
     """
 

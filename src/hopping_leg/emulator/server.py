@@ -45,13 +45,13 @@ class EmulatorConfig:
     held: bool = True
     """Somebody holds the leg until both drives are powered."""
     seed: int = 0
-    """Of sensor noise and jitter."""
+    """Seed of sensor noise and jitter."""
     faults: tuple[Fault, ...] = ()
     """What goes wrong, and when."""
     interface: str = PTY
     """How the host reaches it: ``pty`` or a bus of python-can, see ``ports``."""
     channel: str | None = None
-    """Of a bus; none takes the interface's default."""
+    """Channel of a bus; none takes the interface's default."""
     link: Path | None = None
     """Also offer the terminal under this path, which stays the same when it is plugged again."""
 

@@ -75,7 +75,7 @@ class TorqueLaw:
     """The position controller of one drive and the limits behind it.
 
     Args:
-        settings: Of the drive.
+        settings: Configuration of the drive.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -122,9 +122,9 @@ class TorqueLaw:
 
         Args:
             torque: Asked for.
-            position: Of the output, as reported, revolutions.
-            velocity: Of the output, as reported, rev/s.
-            temperature: Of the output stage, degrees C.
+            position: Position of the output, as reported, revolutions.
+            velocity: Velocity of the output, as reported, rev/s.
+            temperature: Temperature of the output stage, degrees C.
             bounds: Whether the position limits hold.
         """
         if bounds:

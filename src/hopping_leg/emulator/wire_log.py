@@ -1,7 +1,7 @@
 """What went over the wire: every command of the host, every answer of a drive, every change.
 
 It tells, independently of what the host believes, whether anything unsafe was commanded and how
-soon after a bad answer the host reacted.
+soon after a bad answer the host reacted. Times are in s; joint 0 is the hip, 1 the knee.
 """
 
 from collections import deque
@@ -22,15 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class CommandEvent:
-    """A command that wrote a drive's mode.
-
-    Attributes:
-        time: When it arrived, s.
-        joint: 0 for the hip, 1 for the knee.
-        mode: Commanded.
-        torque: Feedforward at the motor's output, N m.
-        most: Largest torque allowed to the drive, N m.
-    """
+    """A command that wrote a drive's mode: feedforward and its largest torque, N m at the motor."""
 
     time: float
     joint: int
@@ -41,16 +33,7 @@ class CommandEvent:
 
 @dataclass(frozen=True, slots=True)
 class ReplyEvent:
-    """The state that a drive's answer tells, rounded as it travels.
-
-    Attributes:
-        time: When it left, s.
-        joint: 0 for the hip, 1 for the knee.
-        mode: Of the drive.
-        fault: Code or notice.
-        voltage: Of the bus, V.
-        temperature: Of the output stage, degrees C.
-    """
+    """The state that a drive's answer tells, rounded as it travels; V and degrees C."""
 
     time: float
     joint: int
@@ -62,13 +45,7 @@ class ReplyEvent:
 
 @dataclass(frozen=True, slots=True)
 class ModeChange:
-    """A drive's change of mode.
-
-    Attributes:
-        time: When, s.
-        joint: 0 for the hip, 1 for the knee.
-        mode: From then on.
-    """
+    """A drive's change of mode."""
 
     time: float
     joint: int

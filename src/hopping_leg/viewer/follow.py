@@ -54,7 +54,7 @@ class Follow:
 
         Raises:
             RobotError: The run's robot is no shipped one and none was given.
-            TraceError: The file is no black box.
+            TraceError: The file is no flight recording.
         """
         self._wait -= seconds
         if self._wait <= 0:
