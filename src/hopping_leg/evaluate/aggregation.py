@@ -14,7 +14,7 @@ from hopping_leg.evaluate.metrics import (
     skipped_in_run,
 )
 from hopping_leg.evaluate.result import Comparison, Evaluation, Group, Staircase, Summary
-from hopping_leg.evaluate.statistics import Neighbours, compare, median_interval
+from hopping_leg.evaluate.statistics import Neighbours, compare, median_interval, of
 from hopping_leg.evaluate.trials import Run
 
 
@@ -26,11 +26,11 @@ def tabulate(runs: Sequence[Run], controllers: Sequence[str], seed: int) -> Eval
         controllers: Their names in the order of the rows.
         seed: Of the bootstrap.
     """
-    of = {name: [run for run in runs if run.controller == name] for name in controllers}
-    fixed = {name: _windows(of[name], "fixed") for name in controllers}
-    sequence = {name: _windows(of[name], "sequence") for name in controllers}
+    own = {name: [run for run in runs if run.controller == name] for name in controllers}
+    fixed = {name: _windows(own[name], "fixed") for name in controllers}
+    sequence = {name: _windows(own[name], "sequence") for name in controllers}
     pooled = {name: fixed[name] + sequence[name] for name in controllers}
-    ladder = {name: _windows(of[name], "ladder") for name in controllers}
+    ladder = {name: _windows(own[name], "ladder") for name in controllers}
     robot = str(runs[0].trace.header.get("robot", "")) if runs else ""
 
     def rows(windows: dict[str, list[HopWindow]]) -> list[Summary]:
@@ -41,7 +41,7 @@ def tabulate(runs: Sequence[Run], controllers: Sequence[str], seed: int) -> Eval
         ]
 
     apexes = {name: _apexes(pooled[name]) for name in controllers}
-    stairs = {n: [run for run in of[n] if run.trial.kind == "staircase"] for n in controllers}
+    stairs = {n: [run for run in own[n] if run.trial.kind == "staircase"] for n in controllers}
     return Evaluation(
         summary=rows(pooled),
         sequence=rows(sequence),
@@ -56,7 +56,7 @@ def tabulate(runs: Sequence[Run], controllers: Sequence[str], seed: int) -> Eval
         estimators=[
             found
             for name in controllers
-            if (found := judge_estimator(name, [run.trace for run in of[name]]))
+            if (found := judge_estimator(name, [run.trace for run in own[name]]))
         ],
     )
 
@@ -83,8 +83,8 @@ def _compare(apexes: dict[float, Array]) -> list[Neighbours]:
 def _staircase(label: str, runs: Sequence[Run]) -> Staircase:
     measured = [measure(run.trace) for run in runs]
     steps = [list(group) for group in zip(*measured, strict=True)]
-    medians = np.array([_median(pooled_apexes(step)) for step in steps])
-    per_run = np.array([[_median(w.apex) for w in run] for run in measured])
+    medians = np.array([of(np.median, pooled_apexes(step)) for step in steps])
+    per_run = np.array([[of(np.median, w.apex) for w in run] for run in measured])
     return Staircase(
         controller=label,
         commands_m=[step[0].command for step in steps],
@@ -94,10 +94,6 @@ def _staircase(label: str, runs: Sequence[Run]) -> Staircase:
         runs=len(runs),
         skipped_hops=sum(skipped_in_run(run.trace) for run in runs),
     )
-
-
-def _median(values: Array) -> float:
-    return float(np.median(values)) if len(values) else float("nan")
 
 
 def summarise(
@@ -123,11 +119,11 @@ def summarise(
         controller=controller,
         robot=robot,
         command_m=command,
-        median_error_m=_of(np.median, apex - command),
+        median_error_m=of(np.median, apex - command),
         median_error_low_m=low,
         median_error_high_m=high,
-        mean_abs_error_m=_of(np.mean, np.abs(apex - command)),
-        std_m=_of(np.std, apex),
+        mean_abs_error_m=of(np.mean, np.abs(apex - command)),
+        std_m=of(np.std, apex),
         iqr_m=float(quartiles[1] - quartiles[0]),
         hops=len(apex),
         skipped_hops=sum(w.skipped for w in windows),
@@ -136,7 +132,7 @@ def summarise(
         flight_fraction=sum(w.flight for w in windows) * per_second,
         min_base_height_m=min(w.min_height for w in windows),
         max_sink_m=max(w.max_sink for w in windows),
-        body_contacts=sum(w.base_contacts + w.knee_contacts for w in windows),
+        body_contacts=sum(w.body_contacts for w in windows),
         base_contacts=sum(w.base_contacts for w in windows),
         knee_contacts=sum(w.knee_contacts for w in windows),
         peak_hip_torque_nm=float(peak[0]),
@@ -146,10 +142,6 @@ def summarise(
         measured_s=settled,
         runs=len(windows),
     )
-
-
-def _of(statistic: "np.ufunc | object", values: Array) -> float:
-    return float(statistic(values)) if len(values) else float("nan")  # type: ignore[operator]
 
 
 def pool_group(group: str, rows: Sequence[Summary], seed: int) -> list[Group]:
@@ -176,11 +168,11 @@ def _group_row(group: str, command: float, rows: Sequence[Summary], seed: int) -
         command_m=command,
         policies=len(rows),
         motionless=len(rows) - len(known),
-        median_error_m=_of(np.median, known),
+        median_error_m=of(np.median, known),
         median_error_low_m=low,
         median_error_high_m=high,
-        worst_abs_error_m=_of(np.max, np.abs(known)),
-        median_std_m=_of(np.median, spreads[np.isfinite(spreads)]),
+        worst_abs_error_m=of(np.max, np.abs(known)),
+        median_std_m=of(np.median, spreads[np.isfinite(spreads)]),
         skipped_hops=sum(row.skipped_hops for row in rows),
         body_contacts=sum(row.body_contacts for row in rows),
     )

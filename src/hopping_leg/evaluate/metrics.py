@@ -8,6 +8,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.evaluate.result import Estimator
+from hopping_leg.evaluate.statistics import of
 from hopping_leg.hop_detection import COLUMNS, measure_hops, trace_hops
 from hopping_leg.robot.parameters import JOINTS
 from hopping_leg.trace import Trace
@@ -53,6 +54,11 @@ class HopWindow:
     knee_contacts: int
     peak_torque: Array
     rms_torque: Array
+
+    @property
+    def body_contacts(self) -> int:
+        """Times base or knee touched the ground."""
+        return self.base_contacts + self.knee_contacts
 
     @property
     def error(self) -> Array:
@@ -149,12 +155,12 @@ def judge_estimator(controller: str, traces: Sequence[Trace]) -> Estimator | Non
     apex = np.concatenate([apex_errors(trace) for trace in estimating])
     return Estimator(
         controller=controller,
-        flight_bias_m=_mean(flight),
-        flight_std_m=_std(flight),
-        stance_bias_m=_mean(stance),
-        stance_std_m=_std(stance),
-        apex_bias_m=_mean(apex),
-        apex_std_m=_std(apex),
+        flight_bias_m=of(np.mean, flight),
+        flight_std_m=of(np.std, flight),
+        stance_bias_m=of(np.mean, stance),
+        stance_std_m=of(np.std, stance),
+        apex_bias_m=of(np.mean, apex),
+        apex_std_m=of(np.std, apex),
         hops=len(apex),
     )
 
@@ -184,11 +190,3 @@ def apex_errors(trace: Trace) -> Array:
         if counts and len(changes):
             errors.append(estimate[start + changes[0] + 1] - apex)
     return np.array(errors)
-
-
-def _mean(values: Array) -> float:
-    return float(np.mean(values)) if len(values) else float("nan")
-
-
-def _std(values: Array) -> float:
-    return float(np.std(values)) if len(values) else float("nan")

@@ -6,7 +6,6 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from hopping_leg.controllers import RolloutConfig
-from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.aggregation import pool_group, tabulate
 from hopping_leg.evaluate.entries import Entry, check_labels, check_range
 from hopping_leg.evaluate.result import Evaluation, Group, Summary
@@ -15,7 +14,7 @@ from hopping_leg.evaluate.trials import (
     KINDS,
     Run,
     Trial,
-    check_commands,
+    check_repeats,
     on_floor,
     paper_trials,
     run_trials,
@@ -60,13 +59,15 @@ def evaluate(
         on_progress: Called with a label and the share done of its runs.
 
     Raises:
-        UsageError: A command is out of reach or out of a entry's range, a name is taken twice,
+        UsageError: A command is out of reach or out of an entry's range, a name is taken twice,
             or there is nothing to do.
     """
-    _check(entries, setup, commands, repeats)
-    trials = [t for t in paper_trials(setup.robot, commands) if t.kind in kinds]
+    check_repeats(repeats)
+    trials = paper_trials(setup.robot, commands)
+    _check(entries, trials, asked=commands is not None)
+    trials = [trial for trial in trials if trial.kind in kinds]
     world = on_floor(setup, floor)
-    notes = _note_coarse(setup.timestep) + _note_twice(setup)
+    notes = _note_setup(setup)
     runs: list[Run] = []
     for entry in entries:
         fitting = [t for t in trials if within(t, entry.command_range)]
@@ -96,46 +97,30 @@ def evaluate(
     )
 
 
-def _check(
-    entries: Sequence[Entry],
-    setup: RolloutConfig,
-    commands: Sequence[float] | None,
-    repeats: int,
-) -> None:
+def _check(entries: Sequence[Entry], trials: Sequence[Trial], *, asked: bool) -> None:
+    """Refuse commands that were asked for by name, or ranges that leave none of the fixed ones."""
     check_labels(entries)
-    if repeats < 1:
-        raise UsageError(f"{repeats} seeds are too few; give --seeds 1 or more.")
-    if commands is not None:
-        check_commands(setup.robot, commands)
-    fixed = [t for t in paper_trials(setup.robot, commands) if t.kind == "fixed"]
+    fixed = [trial for trial in trials if trial.kind == "fixed"]
     for entry in entries:
-        _check_range(entry, fixed, asked=commands is not None)
+        outside = [trial for trial in fixed if not within(trial, entry.command_range)]
+        if asked or len(outside) == len(fixed):
+            check_range(entry, [height for trial in outside for height, _ in trial.steps])
 
 
-def _check_range(entry: Entry, fixed: Sequence[Trial], *, asked: bool) -> None:
-    """Refuse commands that were asked for by name, or a range that leaves none."""
-    outside = [trial for trial in fixed if not within(trial, entry.command_range)]
-    if asked or len(outside) == len(fixed):
-        check_range(entry, [height for trial in outside for height, _ in trial.steps])
-
-
-def _note_coarse(timestep: float) -> list[str]:
-    if timestep <= TIMESTEP:
-        return []
-    return [
-        f"The physics step of {timestep:g} s is coarser than {TIMESTEP:g} s; heights may be"
-        " wrong: `python -m studies.physics_step` measures by how much."
-    ]
-
-
-def _note_twice(setup: RolloutConfig) -> list[str]:
-    """Say so where noise and delay come from two sides."""
-    if setup.robot.reality.only_delays or setup.disturbance == NO_NOISE:
-        return []
-    return [
-        f"{setup.robot.name} brings latency, noise and losses of its own, and the paper's noise and"
-        " delay came on top; --no-noise meets it as it is."
-    ]
+def _note_setup(setup: RolloutConfig) -> list[str]:
+    """Say so where the physics step is coarse, or noise and delay come from two sides."""
+    notes = []
+    if setup.timestep > TIMESTEP:
+        notes.append(
+            f"The physics step of {setup.timestep:g} s is coarser than {TIMESTEP:g} s; heights may"
+            " be wrong: `python -m studies.physics_step` measures by how much."
+        )
+    if not setup.robot.reality.only_delays and setup.disturbance != NO_NOISE:
+        notes.append(
+            f"{setup.robot.name} brings latency, noise and losses of its own, and the paper's noise"
+            " and delay came on top; --no-noise meets it as it is."
+        )
+    return notes
 
 
 def _note_left_out(entry: Entry, trials: Sequence[Trial], fitting: Sequence[Trial]) -> list[str]:
@@ -178,20 +163,15 @@ def _conditions(
     world: RolloutConfig, setup: RolloutConfig, floor: str, repeats: int, seed: int
 ) -> dict[str, Any]:
     return {
-        "robot": setup.robot.name,
-        "robot_digest": setup.robot.digest,
+        **setup_conditions(setup),
         "floor": floor,
         "floor_meaning": _FLOOR_MEANINGS.get(world.ground, FLOORS[floor]),
         "engine": world.engine,
         "ground": world.ground,
         "contact_time_constant_s": world.robot.contact.time_constant,
         "contact_damping_ratio": world.robot.contact.damping_ratio,
-        "disturbance": asdict(setup.disturbance),
         "seed": seed,
         "seeds": repeats,
-        "timestep_s": setup.timestep,
-        "rate_hz": setup.rate,
-        "start_length_m": setup.standing_length,
     }
 
 
@@ -199,6 +179,18 @@ _FLOOR_MEANINGS = {
     "spring": "the spring and damper of the robot's contact as PyBullet's",
     "rigid": "PyBullet's own rigid contact",
 }
+
+
+def setup_conditions(setup: RolloutConfig) -> dict[str, Any]:
+    """Return what results depend on of what controllers believe, as JSON values."""
+    return {
+        "robot": setup.robot.name,
+        "robot_digest": setup.robot.digest,
+        "disturbance": asdict(setup.disturbance),
+        "timestep_s": setup.timestep,
+        "rate_hz": setup.rate,
+        "start_length_m": setup.standing_length,
+    }
 
 
 def software_versions(engine: Engine = "mujoco") -> dict[str, str]:

@@ -13,6 +13,11 @@ CONFIDENCE = 0.95
 RESAMPLES = 1000
 
 
+def of(statistic: Callable[[Array], Any], values: Array) -> float:
+    """Return a statistic of values, NaN where there are none."""
+    return float(statistic(values)) if len(values) else float("nan")
+
+
 @dataclass(frozen=True)
 class Neighbours:
     """Two neighbouring commands compared, as in the paper's Fig. 9.

@@ -3,6 +3,7 @@
 import functools
 import itertools
 import math
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -84,8 +85,7 @@ def paper_trials(robot: Robot, commands: Sequence[float] | None = None) -> list[
     Raises:
         UsageError: A command is out of the leg's reach.
     """
-    chosen = scaled(COMMANDS, robot) if commands is None else tuple(sorted(set(commands)))
-    check_commands(robot, chosen)
+    chosen = choose_commands(robot, commands)
     trials = [Trial("fixed", ((c, FIXED_SECONDS),)) for c in chosen]
     if len(chosen) > 1:
         trials.append(Trial("sequence", tuple((c, STEP_SECONDS) for c in chosen)))
@@ -94,12 +94,14 @@ def paper_trials(robot: Robot, commands: Sequence[float] | None = None) -> list[
     return trials
 
 
-def check_commands(robot: Robot, commands: Sequence[float]) -> None:
-    """Refuse heights that no controller can make this leg hop to.
+def choose_commands(robot: Robot, commands: Sequence[float] | None) -> tuple[float, ...]:
+    """Return rising heights to hop to, m: those asked for, or the paper's scaled to the leg.
 
     Raises:
-        UsageError: Naming the height and the range.
+        UsageError: No controller can make this leg hop to one of them.
     """
+    if commands is None:
+        return scaled(COMMANDS, robot)
     low, high = command_limits(robot)
     if not commands:
         raise UsageError("No commands were given; give heights in m, e.g. --commands 0.25,0.30.")
@@ -109,6 +111,17 @@ def check_commands(robot: Robot, commands: Sequence[float]) -> None:
                 f"A command of {height:g} m is out of reach of {robot.name}; give heights of the"
                 f" hip axis from {low:.2f} to {high:.2f} m."
             )
+    return tuple(sorted(set(commands)))
+
+
+def check_repeats(repeats: int) -> None:
+    """Refuse to run nothing.
+
+    Raises:
+        UsageError: There is no realisation of noise and delay.
+    """
+    if repeats < 1:
+        raise UsageError(f"{repeats} seeds are too few; give --seeds 1 or more.")
 
 
 def within(trial: Trial, bounds: tuple[float, float] | None) -> bool:
@@ -194,8 +207,9 @@ def run_trials(
         seed: All of them follow from it.
         on_progress: Called with the share done.
     """
+    seconds = operator.attrgetter("seconds")
     batches = [
-        list(group) for _, group in itertools.groupby(sorted(trials, key=_seconds), key=_seconds)
+        list(group) for _, group in itertools.groupby(sorted(trials, key=seconds), key=seconds)
     ]
     total = sum(len(b) * b[0].seconds for b in batches)
     done = 0.0
@@ -207,10 +221,6 @@ def run_trials(
         done += share
     order = {trial.name: i for i, trial in enumerate(trials)}
     return sorted(runs, key=lambda run: (order[run.trial.name], run.repeat))
-
-
-def _seconds(trial: Trial) -> float:
-    return trial.seconds
 
 
 def _report(on_progress: Progress, done: float, share: float, tick: int, ticks: int) -> None:

@@ -73,7 +73,7 @@ def judge(trial: RobustnessTrial, trace: Trace) -> Outcome:
         trial.repeat,
         _worst([_median_error(windows, command) for command in {w.command for w in windows}]),
         sum(w.skipped for w in windows),
-        sum(w.base_contacts + w.knee_contacts for w in windows),
+        sum(w.body_contacts for w in windows),
     )
 
 

@@ -1,13 +1,11 @@
 """The whole benchmark: every controller on every axis, each result kept."""
 
-import dataclasses
 import functools
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from hopping_leg.controllers import Controller, RolloutConfig
-from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.entries import Entry, check_labels, check_range, fingerprint
 from hopping_leg.evaluate.result_cache import ResultCache
 from hopping_leg.evaluate.robustness import changes
@@ -16,7 +14,6 @@ from hopping_leg.evaluate.robustness.axes import (
     JOINT,
     JOINT_LEVELS,
     NOMINAL,
-    Axis,
     axis_named,
     axis_names,
 )
@@ -28,8 +25,8 @@ from hopping_leg.evaluate.robustness.outcome import (
     score_rows,
 )
 from hopping_leg.evaluate.robustness.trials import JOINT_POINTS, SECONDS, make_trials
-from hopping_leg.evaluate.runner import software_versions
-from hopping_leg.evaluate.trials import COMMANDS, check_commands, scaled
+from hopping_leg.evaluate.runner import setup_conditions, software_versions
+from hopping_leg.evaluate.trials import check_repeats, choose_commands
 from hopping_leg.io import safe_file_name
 
 RECOVERY = "recovery"
@@ -59,23 +56,25 @@ class Suite:
     seconds: float = SECONDS
     """Of each trial."""
 
-    def asked(self, controller: Controller, axis: str) -> dict[str, Any]:
-        """Return all that a result depends on, as JSON values."""
-        setup = self.setup
-        limits = setup.soft_limits
+    @property
+    def conditions(self) -> dict[str, Any]:
+        """What all results depend on, as JSON values."""
         return {
-            "controller": fingerprint(controller),
-            "levels": _levels(axis),
-            "robot": setup.robot.digest,
-            "disturbance": asdict(setup.disturbance),
-            "soft_limits": asdict(limits) if limits else None,
-            "timestep_s": setup.timestep,
-            "rate_hz": setup.rate,
-            "start_length_m": setup.standing_length,
+            **setup_conditions(self.setup),
             "commands_m": self.commands,
             "seeds": self.repeats,
             "seed": self.seed,
             "seconds": self.seconds,
+        }
+
+    def asked(self, controller: Controller, axis: str) -> dict[str, Any]:
+        """Return all that a result depends on, as JSON values."""
+        limits = self.setup.soft_limits
+        return {
+            **self.conditions,
+            "controller": fingerprint(controller),
+            "levels": _levels(axis),
+            "soft_limits": asdict(limits) if limits else None,
             "versions": software_versions(),
         }
 
@@ -105,10 +104,8 @@ def make_suite(
     for name in axes:
         if name != JOINT:
             axis_named(name)
-    if repeats < 1:
-        raise UsageError(f"{repeats} seeds are too few; give --seeds 1 or more.")
-    chosen = scaled(COMMANDS, setup.robot) if commands is None else tuple(sorted(set(commands)))
-    check_commands(setup.robot, chosen)
+    check_repeats(repeats)
+    chosen = choose_commands(setup.robot, commands)
     names = tuple(name for name in axis_names() if not axes or name in axes)
     return Suite(setup, names, chosen, repeats, seed, recovery=not axes, seconds=seconds)
 
@@ -119,7 +116,7 @@ def run_suite(
     cache: ResultCache,
     on_progress: Callable[[str, float], None] = lambda label, share: None,
 ) -> dict[str, Any]:
-    """Let every entry meet every axis.
+    """Let every controller meet every axis.
 
     Args:
         entries: What is judged.
@@ -132,7 +129,7 @@ def run_suite(
         ``notes``, as JSON values.
 
     Raises:
-        UsageError: A command is out of a entry's range, or a name is taken twice.
+        UsageError: A command is out of an entry's range, or a name is taken twice.
     """
     check_labels(entries)
     for entry in entries:
@@ -148,7 +145,7 @@ def run_suite(
                 f"{safe_file_name(entry.label)}-{part}",
                 f"{entry.label}: {part}",
                 suite.asked(entry.controller, part),
-                functools.partial(_run_part, entry, suite, part, tick),
+                functools.partial(_run_part, entry.controller, suite, part, tick),
             )
             if part == RECOVERY:
                 for name in ("recovery", "steps"):
@@ -162,30 +159,30 @@ def run_suite(
         result["scores"] += score_rows(entry.label, outcomes, suite.seed)
     return {
         **result,
-        "axes": [_described(axis) for axis in AXES if axis.name in suite.axes] + _joint(suite),
-        "conditions": _conditions(suite),
+        "axes": _axes(suite),
+        "conditions": {
+            **suite.conditions,
+            "joint_points": JOINT_POINTS,
+            "tolerance_m": TOLERANCE,
+            "back_m": changes.BACK,
+            "change_at_s": changes.AT,
+            "changes": list(changes.CHANGES),
+            "runs_per_change": changes.RUNS * suite.repeats,
+        },
         "versions": software_versions(),
         "notes": [note for entry in entries for note in entry.notes],
     }
 
 
 def _run_part(
-    entry: Entry, suite: Suite, part: str, on_tick: Callable[[int, int], None]
+    controller: Controller, suite: Suite, part: str, on_tick: Callable[[int, int], None]
 ) -> dict[str, Any]:
-    setup, controller = suite.setup, entry.controller
+    setup, commands, repeats, seed = suite.setup, suite.commands, suite.repeats, suite.seed
     if part == RECOVERY:
-        return changes.study_changes(
-            controller, setup, suite.commands, changes.RUNS * suite.repeats, suite.seed, on_tick
-        )
-    plan = make_trials(
-        part,
-        setup.robot,
-        suite.commands,
-        suite.repeats,
-        suite.seed,
-        rate=setup.rate,
-        seconds=suite.seconds,
-    )
+        runs = changes.RUNS * repeats
+        return changes.study_changes(controller, setup, commands, runs, seed, on_tick)
+    robot, rate, seconds = setup.robot, setup.rate, suite.seconds
+    plan = make_trials(part, robot, commands, repeats, seed, rate=rate, seconds=seconds)
     return {"outcomes": [asdict(one) for one in run_axis(controller, setup, plan, on_tick)]}
 
 
@@ -200,12 +197,18 @@ def _report(
     on_progress(label, (number + tick / ticks) / parts)
 
 
-def _described(axis: Axis) -> dict[str, Any]:
-    return {
-        field.name: getattr(axis, field.name)
-        for field in dataclasses.fields(axis)
-        if field.name != "alter"
-    }
+def _axes(suite: Suite) -> list[dict[str, Any]]:
+    rows = [
+        {name: value for name, value in vars(axis).items() if name != "alter"}
+        for axis in AXES
+        if axis.name in suite.axes
+    ]
+    if JOINT in suite.axes:
+        meaning = "all axes at once, this share of the way to points of their moderate ranges"
+        row = {"name": JOINT, "meaning": meaning, "unit": "1", "neutral": 0.0}
+        row |= {"levels": JOINT_LEVELS, "moderate": (0.0, 1.0), "leaderboard": ""}
+        rows.append(row)
+    return rows
 
 
 def _levels(axis: str) -> Any:  # noqa: ANN401
@@ -215,35 +218,3 @@ def _levels(axis: str) -> Any:  # noqa: ANN401
     if axis == RECOVERY:
         return [*changes.CHANGES, changes.RUNS]
     return [one.levels for one in AXES if one.name == axis]
-
-
-def _joint(suite: Suite) -> list[dict[str, Any]]:
-    if JOINT not in suite.axes:
-        return []
-    meaning = (
-        "all axes at once, this share of the way to a Latin hypercube of their moderate ranges"
-    )
-    about = {"unit": "1", "neutral": 0.0, "levels": JOINT_LEVELS, "moderate": (0.0, 1.0)}
-    return [{"name": JOINT, "meaning": meaning, **about, "leaderboard": ""}]
-
-
-def _conditions(suite: Suite) -> dict[str, Any]:
-    setup = suite.setup
-    return {
-        "robot": setup.robot.name,
-        "robot_digest": setup.robot.digest,
-        "disturbance": asdict(setup.disturbance),
-        "commands_m": suite.commands,
-        "seeds": suite.repeats,
-        "seed": suite.seed,
-        "seconds": suite.seconds,
-        "joint_points": JOINT_POINTS,
-        "tolerance_m": TOLERANCE,
-        "back_m": changes.BACK,
-        "change_at_s": changes.AT,
-        "changes": list(changes.CHANGES),
-        "runs_per_change": changes.RUNS * suite.repeats,
-        "timestep_s": setup.timestep,
-        "rate_hz": setup.rate,
-        "start_length_m": setup.standing_length,
-    }

@@ -9,6 +9,7 @@ from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.controllers.stand_hop_land import STAND_SECONDS, StandHopLand
 from hopping_leg.evaluate.metrics import measure
 from hopping_leg.evaluate.skills.landings import last_touchdown, peak_force
+from hopping_leg.evaluate.statistics import of
 from hopping_leg.hop_detection import trace_hops
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import Trace
@@ -98,10 +99,10 @@ def _row(
         fewest=min(made),
         most=max(made),
         at_rest=float(np.mean([_rests(trace) for trace in traces])),
-        median_error_m=float(np.median(errors)) if len(errors) else float("nan"),
-        worst_abs_error_m=float(np.abs(errors).max()) if len(errors) else float("nan"),
+        median_error_m=of(np.median, errors),
+        worst_abs_error_m=of(np.max, np.abs(errors)),
         landing_force=float(np.median([_landing_force(robot, trace) for trace in traces])),
-        body_contacts=sum(w.base_contacts + w.knee_contacts for w in windows),
+        body_contacts=sum(w.body_contacts for w in windows),
         runs=len(traces),
     )
 

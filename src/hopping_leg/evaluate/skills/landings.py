@@ -155,6 +155,6 @@ def _row(robot: Robot, drop: float, floor: str, traces: list[Trace]) -> Landed:
         rebound_m=float(np.median([over for over, _ in bounces])),
         foot_rebound_m=float(np.median([foot for _, foot in bounces])),
         lowest_base_m=float(min(w.min_height for w in windows)),
-        body_contacts=sum(w.base_contacts + w.knee_contacts for w in windows),
+        body_contacts=sum(w.body_contacts for w in windows),
         runs=len(traces),
     )

@@ -8,6 +8,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.evaluate.metrics import START_SECONDS, measure, skipped_in_run
+from hopping_leg.evaluate.statistics import of
 from hopping_leg.hop_detection import trace_hops
 from hopping_leg.sim.perturbation import Perturbation
 from hopping_leg.trace import Trace
@@ -114,7 +115,7 @@ def _whole(steps: Sequence[Stair], traces: Sequence[Trace]) -> Stairs:
         worst_first_error_m=_worst([step.first_error_m for step in steps]),
         worst_error_m=_worst([step.median_error_m for step in steps]),
         skipped_hops=sum(skipped_in_run(trace) for trace in traces),
-        body_contacts=sum(w.base_contacts + w.knee_contacts for w in windows),
+        body_contacts=sum(w.body_contacts for w in windows),
         runs=len(traces),
     )
 
@@ -135,8 +136,8 @@ def _row(
         command_m=command,
         step=step,
         ground_m=level,
-        first_error_m=float(np.median(first)) if len(first) else float("nan"),
-        median_error_m=float(np.median(later)) if len(later) else float("nan"),
+        first_error_m=of(np.median, first),
+        median_error_m=of(np.median, later),
         hops=sum(len(e) for e in errors),
         runs=len(errors),
     )

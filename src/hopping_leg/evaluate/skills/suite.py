@@ -7,11 +7,11 @@ from typing import Any
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.entries import Entry, check_labels, check_range
-from hopping_leg.evaluate.runner import software_versions
+from hopping_leg.evaluate.runner import setup_conditions, software_versions
 from hopping_leg.evaluate.skills.counted import COUNTS, count_hops
 from hopping_leg.evaluate.skills.landings import DROP, land
 from hopping_leg.evaluate.skills.stairs import STAIRS, climb
-from hopping_leg.evaluate.trials import COMMANDS, PAPER_HEIGHT, check_commands, on_floor, scaled
+from hopping_leg.evaluate.trials import PAPER_HEIGHT, check_repeats, choose_commands, on_floor
 
 SCHEMA = 1
 """Version of the JSON, raised when a name changes its meaning."""
@@ -42,15 +42,13 @@ def run_skills(
         ``counted``, ``stairs``, ``climbs``, ``landings``, ``conditions``, ``versions``, ``notes``.
 
     Raises:
-        UsageError: A command is out of reach or of a entry's range, or the engine is not
+        UsageError: A command is out of reach or of an entry's range, or the engine is not
             MuJoCo.
     """
     if setup.engine != "mujoco":
         raise UsageError("Stairs and drops need the engine mujoco; leave --engine out.")
-    if repeats < 1:
-        raise UsageError(f"{repeats} seeds are too few; give --seeds 1 or more.")
-    chosen = scaled(COMMANDS, setup.robot) if commands is None else tuple(sorted(set(commands)))
-    check_commands(setup.robot, chosen)
+    check_repeats(repeats)
+    chosen = choose_commands(setup.robot, commands)
     check_labels(entries)
     for entry in entries:
         check_range(entry, chosen)
@@ -60,24 +58,13 @@ def run_skills(
     for entry in entries:
         for number, floor in enumerate(floors):
             world = on_floor(setup, floor)
-            label, controller = entry.label, entry.controller
-            rows["counted"] += count_hops(
-                label, controller, world, chosen, repeats=repeats, seed=seed, floor=floor
-            )
-            on_progress(label, (number + 0.5) / len(floors))
-            steps, wholes = climb(
-                label,
-                controller,
-                world,
-                chosen,
-                stairs=stairs,
-                repeats=repeats,
-                seed=seed,
-                floor=floor,
-            )
-            rows["stairs"] += steps
-            rows["climbs"] += wholes
-            on_progress(label, (number + 1) / len(floors))
+            what = (entry.label, entry.controller, world, chosen)
+            rows["counted"] += count_hops(*what, repeats=repeats, seed=seed, floor=floor)
+            on_progress(entry.label, (number + 0.5) / len(floors))
+            found = climb(*what, stairs=stairs, repeats=repeats, seed=seed, floor=floor)
+            rows["stairs"] += found[0]
+            rows["climbs"] += found[1]
+            on_progress(entry.label, (number + 1) / len(floors))
     for floor in floors:
         world = on_floor(setup, floor)
         rows["landings"] += land(world, drop=drop, repeats=repeats, seed=seed, floor=floor)
@@ -85,9 +72,7 @@ def run_skills(
         "schema": SCHEMA,
         **{name: [asdict(row) for row in found] for name, found in rows.items()},
         "conditions": {
-            "robot": setup.robot.name,
-            "robot_digest": setup.robot.digest,
-            "disturbance": asdict(setup.disturbance),
+            **setup_conditions(setup),
             "commands_m": chosen,
             "counts": COUNTS,
             "stairs_m": stairs,
@@ -95,8 +80,6 @@ def run_skills(
             "floors": list(floors),
             "seeds": repeats,
             "seed": seed,
-            "timestep_s": setup.timestep,
-            "rate_hz": setup.rate,
         },
         "versions": software_versions(),
         "notes": [note for entry in entries for note in entry.notes],
