@@ -75,7 +75,7 @@ def set_beside(runs: Sequence[StoredRun]) -> Compared:
     evaluations = {run.label: run.evaluation for run in judged if run.evaluation is not None}
     _check_commands(evaluations)
     differences = _differences({label: e.conditions for label, e in evaluations.items()})
-    notes = _robot_notes(runs) + _condition_notes(differences) + _lonely_notes(runs)
+    notes = _notes(runs, differences)
     return Compared(tuple(runs), _merge(evaluations), differences, trainings, notes)
 
 
@@ -86,7 +86,8 @@ def traces_of(compared: Compared) -> list[Run]:
         evaluation = stored.evaluation
         if evaluation is None or stored.traces is None:
             continue
-        name = _namer(compared, stored.label)
+        others = {r.label: r.evaluation for r in compared.runs if r.evaluation}
+        name = _name(others, stored.label)
         for kind in _DRAWN:
             runs = [run_of(path) for path in sorted(stored.traces.glob(f"*-{kind}-0.parquet"))]
             known = [run for run in runs if run.controller in evaluation.controllers]
@@ -161,10 +162,6 @@ def _renamed(evaluation: Evaluation, name: Callable[[str], str]) -> Evaluation:
     return dataclasses.replace(evaluation, **fields)
 
 
-def _namer(compared: Compared, label: str) -> Callable[[str], str]:
-    return _name({r.label: r.evaluation for r in compared.runs if r.evaluation}, label)
-
-
 def _name(evaluations: dict[str, Evaluation], label: str) -> Callable[[str], str]:
     """Return how a run's controllers are called: with its label where another has the same."""
     others = {c for name, e in evaluations.items() if name != label for c in e.controllers}
@@ -192,36 +189,31 @@ def _flat(entries: dict[str, Any]) -> dict[str, str]:
     return found
 
 
-def _robot_notes(runs: Sequence[StoredRun]) -> list[str]:
+def _notes(runs: Sequence[StoredRun], differences: list[dict[str, str]]) -> list[str]:
+    """Return what makes a comparison less than fair."""
     robots: dict[tuple[str, str], list[str]] = {}
     for run in runs:
         for source in (run.evaluation.conditions if run.evaluation else None, run.training):
             if source:
                 key = (str(source.get("robot", "?")), str(source.get("robot_digest", "?")))
                 robots.setdefault(key, []).append(run.label)
-    if len(robots) < 2:
-        return []
-    told = "; ".join(
-        f"{robot} ({digest}) in {', '.join(dict.fromkeys(labels))}"
-        for (robot, digest), labels in robots.items()
-    )
-    return [f"The robots differ: {told}. Numbers of different legs are not the same task."]
-
-
-def _condition_notes(differences: list[dict[str, str]]) -> list[str]:
+    notes = []
+    if len(robots) > 1:
+        told = "; ".join(
+            f"{robot} ({digest}) in {', '.join(dict.fromkeys(labels))}"
+            for (robot, digest), labels in robots.items()
+        )
+        notes.append(f"The robots differ: {told}. Numbers of different legs are not the same task.")
     names = [row["name"] for row in differences if not row["name"].startswith("robot")]
-    return [f"The conditions differ: {', '.join(names)}; see the table."] if names else []
-
-
-def _lonely_notes(runs: Sequence[StoredRun]) -> list[str]:
-    """Say what is shown without anything of its kind beside it."""
-    judged = [run.label for run in runs if run.evaluation is not None]
-    trained = [run.label for run in runs if run.training is not None]
-    return [
-        f"{labels[0]} is the only {kind} here; nothing of its kind stands beside it."
-        for labels, kind in ((judged, "evaluation"), (trained, "training"))
-        if len(labels) == 1
-    ]
+    if names:
+        notes.append(f"The conditions differ: {', '.join(names)}; see the table.")
+    for kind in ("evaluation", "training"):
+        labels = [run.label for run in runs if getattr(run, kind) is not None]
+        if len(labels) == 1:
+            notes.append(
+                f"{labels[0]} is the only {kind} here; nothing of its kind stands beside it."
+            )
+    return notes
 
 
 def write_comparison(compared: Compared, command: str = "") -> bytes:

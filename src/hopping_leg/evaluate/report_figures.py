@@ -1,6 +1,6 @@
 """All figures that a set of runs allows, for the report and for `hop report`."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,16 +39,6 @@ class Picture:
     files: tuple[str, ...]
 
 
-def draw_report_figures(evaluation: Evaluation, runs: Sequence[Run]) -> list[Picture]:
-    """Draw every figure that the runs allow."""
-    pictures: list[Picture] = []
-    pictures += _heights(evaluation, runs)
-    pictures += _tables(evaluation, runs)
-    for run in _examples(evaluation, runs):
-        pictures += _per_controller(run)
-    return pictures
-
-
 _HEIGHTS = {
     "sequence": (
         "All commands in turn",
@@ -60,84 +50,74 @@ _HEIGHTS = {
         "Base height while the command rises by 0.02 m (for this leg's size) every 5 s, as in the"
         " paper's Fig. 5.",
     ),
+    "heights": (
+        "Heights over time",
+        "Base height over time. Dots: apexes with the foot off the ground.",
+    ),
 }
 
 
-def _heights(evaluation: Evaluation, runs: Sequence[Run]) -> list[Picture]:
-    pictures = []
-    for kind, (title, caption) in _HEIGHTS.items():
-        shown = _first_of_each(run for run in runs if run.trial.kind == kind)
-        if shown:
-            pictures.append(_height_picture(kind, title, caption, shown))
-    if not pictures:
-        shown = _examples(evaluation, runs)
-        caption = "Base height over time. Dots: apexes with the foot off the ground."
-        if shown:
-            pictures.append(_height_picture("heights", "Heights over time", caption, shown))
-    return pictures
-
-
-def _height_picture(name: str, title: str, caption: str, runs: Sequence[Run]) -> Picture:
-    figure = draw_heights({run.controller: run.trace for run in runs})
-    return Picture(name, title, caption, figure, tuple(run.file_name for run in runs))
-
-
-def _tables(evaluation: Evaluation, runs: Sequence[Run]) -> list[Picture]:
-    pictures = []
-    if any(row.hops for row in evaluation.summary):
-        used = (run.file_name for run in runs if run.trial.kind in ("fixed", "sequence"))
-        pictures.append(
-            Picture(
-                "distributions",
-                "Distributions of the apex",
-                "Every apex of the fixed trials and the sequence, pooled as in the paper's Fig. 9."
-                " Coloured lines: medians; grey lines: commands.",
-                draw_distributions(evaluation),
-                tuple(used),
-            )
-        )
-    if evaluation.ladder:
-        used = (run.file_name for run in runs if run.trial.kind == "ladder")
-        pictures.append(
-            Picture(
-                "ladder",
-                "Ladder of commands",
-                "Commands between and beyond the trained ones, 15 s each.",
-                draw_ladder(evaluation),
-                tuple(used),
-            )
-        )
-    return pictures
-
-
-def _per_controller(run: Run) -> list[Picture]:
-    command = run.trial.steps[0][0]
-    about = f"{run.controller}, command {command:.2f} m"
-    safe = run.file_name.removesuffix(".parquet")
+def draw_report_figures(evaluation: Evaluation, runs: Sequence[Run]) -> list[Picture]:
+    """Draw every figure that the runs allow."""
+    examples = _examples(runs)
+    shown = {
+        kind: _first_of_each(run for run in runs if run.trial.kind == kind)
+        for kind in ("sequence", "staircase")
+    }
+    if not any(shown.values()):
+        shown = {"heights": examples}
     pictures = [
         Picture(
-            f"phase-space-{safe}",
-            f"Knee torque in phase space: {run.controller}",
-            "Torque asked of the knee at every configuration met in 10 s, as in the paper's Fig. 6."
-            " Line: one phase from its start (circle) to its end (diamond).",
-            draw_phase_space(run.trace, about),
+            kind,
+            *_HEIGHTS[kind],
+            draw_heights({run.controller: run.trace for run in found}),
+            tuple(run.file_name for run in found),
+        )
+        for kind, found in shown.items()
+        if found
+    ]
+    if any(row.hops for row in evaluation.summary):
+        caption = (
+            "Every hop of the fixed trials and the sequence, pooled as in the paper's Fig. 9."
+            " Coloured lines: medians; grey lines: commands."
+        )
+        figure, files = draw_distributions(evaluation), _files(runs, "fixed", "sequence")
+        pictures.append(
+            Picture("distributions", "Distributions of the apex", caption, figure, files)
+        )
+    if evaluation.ladder:
+        caption = "Commands between and beyond the trained ones, 15 s each."
+        figure, files = draw_ladder(evaluation), _files(runs, "ladder")
+        pictures.append(Picture("ladder", "Ladder of commands", caption, figure, files))
+    return pictures + [picture for run in examples for picture in _per_controller(run)]
+
+
+def _files(runs: Sequence[Run], *kinds: str) -> tuple[str, ...]:
+    return tuple(run.file_name for run in runs if run.trial.kind in kinds)
+
+
+def _per_controller(run: Run) -> Iterator[Picture]:
+    about = f"{run.controller}, command {run.trial.steps[0][0]:.2f} m"
+    safe = run.file_name.removesuffix(".parquet")
+    yield Picture(
+        f"phase-space-{safe}",
+        f"Knee torque in phase space: {run.controller}",
+        "Torque asked of the knee at every configuration met in 10 s, as in the paper's Fig. 6."
+        " Line: one phase from its start (circle) to its end (diamond).",
+        draw_phase_space(run.trace, about),
+        (run.file_name,),
+    )
+    if has_estimate(run.trace):
+        yield Picture(
+            f"estimate-{safe}",
+            f"Estimated height: {run.controller}",
+            "Height as the controller estimates it from its joints, beside the true height.",
+            draw_estimate(run.trace, about),
             (run.file_name,),
         )
-    ]
-    if has_estimate(run.trace):
-        pictures.append(
-            Picture(
-                f"estimate-{safe}",
-                f"Estimated height: {run.controller}",
-                "Height as the controller estimates it from its joints, beside the true height.",
-                draw_estimate(run.trace, about),
-                (run.file_name,),
-            )
-        )
-    return pictures
 
 
-def _examples(evaluation: Evaluation, runs: Sequence[Run]) -> list[Run]:
+def _examples(runs: Sequence[Run]) -> list[Run]:
     """Return one fixed run per controller: the middle command, the first repeat."""
     fixed = [run for run in runs if len(run.trial.steps) == 1]
     examples = []

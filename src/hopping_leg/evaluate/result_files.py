@@ -2,29 +2,19 @@
 
 import dataclasses
 import json
+import typing
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.result import (
-    SCHEMA,
-    Comparison,
-    Estimator,
-    Evaluation,
-    Group,
-    Staircase,
-    Summary,
-)
-from hopping_leg.evaluate.statistics import Neighbours
+from hopping_leg.evaluate.result import SCHEMA, Evaluation
 
 _EVALUATION, _TRAINING = "evaluation.json", "result.json"
 _WHAT = (
     "name a folder or JSON file of `hop evaluate` (the paper's suite) or a folder of `hop train`"
 )
-
-Record = TypeVar("Record")
 
 
 @dataclass(frozen=True)
@@ -70,34 +60,26 @@ def _split(name: str) -> tuple[str, Path]:
 
 def _labels(paths: Sequence[Path]) -> list[str]:
     """Return the last parts of each path, as many as it takes to tell all apart."""
-    parts = [_parts(path) for path in paths]
-    for depth in range(1, max((len(p) for p in parts), default=1) + 1):
+    whole = [
+        p.parent if p.name in (_EVALUATION, _TRAINING) else p for p in map(Path.resolve, paths)
+    ]
+    parts = [p.with_suffix("").parts if p.suffix == ".json" else p.parts for p in whole]
+    labels: list[str] = []
+    for depth in range(1, max(map(len, parts), default=1) + 1):
         labels = ["/".join(p[-depth:]) for p in parts]
         if len(set(labels)) == len(labels):
-            return labels
-    return ["/".join(p) for p in parts]
-
-
-def _parts(path: Path) -> tuple[str, ...]:
-    """Return a path's parts without the file name that every evaluation has."""
-    whole = path.resolve()
-    if whole.name in (_EVALUATION, _TRAINING):
-        whole = whole.parent
-    return whole.with_suffix("").parts if whole.suffix == ".json" else whole.parts
+            break
+    return labels
 
 
 def _read(label: str, path: Path) -> StoredRun:
-    if path.is_dir():
-        return _read_folder(label, path)
     if not path.exists():
         raise UsageError(f"There is no {path}; {_WHAT}.")
-    content = _load(path)
-    if "history" in content and "recipe" in content:
-        return StoredRun(label, path, training=content)
-    return StoredRun(label, path, evaluation=_evaluation(content, path))
-
-
-def _read_folder(label: str, path: Path) -> StoredRun:
+    if not path.is_dir():
+        content = _load(path)
+        if "history" in content and "recipe" in content:
+            return StoredRun(label, path, training=content)
+        return StoredRun(label, path, evaluation=_evaluation(content, path))
     evaluation, training, traces = path / _EVALUATION, path / _TRAINING, path / "traces"
     measured = _evaluation(_load(evaluation), evaluation) if evaluation.exists() else None
     trained = _load(training) if training.exists() else None
@@ -109,9 +91,8 @@ def _read_folder(label: str, path: Path) -> StoredRun:
                 f"The training in {path} is not finished; go on with `hop train --resume`."
             )
         raise UsageError(f"{path} is not a run: it holds neither {_EVALUATION} nor {_TRAINING}.")
-    return StoredRun(
-        label, path, measured, trained, traces if measured and traces.is_dir() else None
-    )
+    kept = traces if measured and traces.is_dir() else None
+    return StoredRun(label, path, measured, trained, kept)
 
 
 def _load(path: Path) -> dict[str, Any]:
@@ -140,31 +121,18 @@ def _evaluation(content: dict[str, Any], path: Path) -> Evaluation:
 
 def evaluation_from(content: dict[str, Any]) -> Evaluation:
     """Return the evaluation that ``Evaluation.to_json`` wrote; numbers that are null are NaN."""
-    kinds = {
-        "summary": Summary,
-        "sequence": Summary,
-        "ladder": Summary,
-        "staircase": Staircase,
-        "estimators": Estimator,
-        "groups": Group,
-    }
-    fields: dict[str, Any] = {name: _records(kind, content[name]) for name, kind in kinds.items()}
-    for name in ("distributions", "conditions", "versions", "notes", "command"):
-        fields[name] = content[name]
-    fields["neighbours"] = [
-        Comparison(c["controller"], _records(Neighbours, c["neighbours"]))
-        for c in content["neighbours"]
-    ]
     secondary = content["secondary"]
-    return Evaluation(**fields, secondary=secondary and evaluation_from(secondary))
+    fields = {k: v for k, v in content.items() if k not in ("schema", "secondary")}
+    fields["secondary"] = secondary and evaluation_from(secondary)
+    evaluation: Evaluation = _filled(Evaluation, fields)
+    return evaluation
 
 
-def _records(kind: type[Record], rows: list[dict[str, Any]]) -> list[Record]:
-    numbers = {f.name for f in dataclasses.fields(kind) if f.type is float}  # type: ignore[arg-type]
-    return [kind(**{key: _known(key in numbers, v) for key, v in row.items()}) for row in rows]
-
-
-def _known(number: bool, value: Any) -> Any:  # noqa: ANN401
-    if isinstance(value, list):
-        return [float("nan") if entry is None else entry for entry in value]
-    return float("nan") if number and value is None else value
+def _filled(kind: Any, value: Any) -> Any:  # noqa: ANN401
+    """Return a value of JSON as a type, dataclasses in lists included."""
+    if dataclasses.is_dataclass(kind) and isinstance(value, dict):
+        hints = typing.get_type_hints(kind)
+        return kind(**{name: _filled(hints[name], entry) for name, entry in value.items()})  # type: ignore[operator]
+    if typing.get_origin(kind) is list and isinstance(value, list):
+        return [_filled(typing.get_args(kind)[0], entry) for entry in value]
+    return float("nan") if kind is float and value is None else value
