@@ -1,19 +1,10 @@
-import dataclasses
-
 import mujoco
 import numpy as np
 import pytest
 
 from hopping_leg.robot import build_model, kinematics, load_robot
 from hopping_leg.sim.pybullet.ground_law import GroundLaw
-
-
-def without_joint_friction(robot):
-    joints = {
-        name: dataclasses.replace(getattr(robot, name), friction=0.0)
-        for name in ("rail", "hip", "knee")
-    }
-    return dataclasses.replace(robot, **joints)
+from tests.sim.legs import without_friction
 
 
 def random_contacts(robot, rng, count):
@@ -37,7 +28,7 @@ def mujoco_force(robot, model, state, torque):
 
 @pytest.mark.parametrize("name", ["legv2-paper", "legv2"])
 def test_the_law_is_mujocos_contact(name):
-    robot = without_joint_friction(load_robot(name))
+    robot = without_friction(load_robot(name), damping=True)
     model, law = build_model(robot), GroundLaw(robot)
     states, torques = random_contacts(robot, np.random.default_rng(0), 200)
     cases = zip(states, torques, strict=True)
@@ -56,7 +47,7 @@ def test_the_foot_in_the_air_feels_nothing():
 
 def test_the_spring_is_the_law_at_rest():
     """A foot that neither moves nor accelerates feels the spring alone."""
-    robot = without_joint_friction(load_robot("legv2-paper"))
+    robot = without_friction(load_robot("legv2-paper"), damping=True)
     law, model = GroundLaw(robot), build_model(robot)
     data = mujoco.MjData(model)
     data.qpos[:] = [kinematics.stance_height(robot, np.zeros(2)), 0.0, 0.0]

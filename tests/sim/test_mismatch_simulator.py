@@ -15,9 +15,9 @@ from hopping_leg.robot.model_mismatch import (
 )
 from hopping_leg.sim import NO_NOISE, MujocoSimulator, NoiseAndDelay, Plant
 from hopping_leg.sim.mismatch_model import mismatch_model
+from tests.sim.legs import POSTURE
 
 CAD = load_robot("legv2")
-POSTURE = np.array([0.7, -1.4])
 IDLE = DriveMismatch(stiction_speed=1.0)
 """Differs from the neutral drive in a number without effect, so that the effects' code runs."""
 

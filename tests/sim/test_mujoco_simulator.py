@@ -5,80 +5,25 @@ import pytest
 
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot
-from hopping_leg.robot.dynamics import kinetic_energy, potential_energy
 from hopping_leg.robot.limits import SoftLimits
-from hopping_leg.robot.model import GRAVITY
 from hopping_leg.sim import MujocoSimulator, NoiseAndDelay, Plant
+from tests.sim.legs import POSTURE, without_friction
 
 PAPER = load_robot("legv2-paper")
 CAD = load_robot("legv2")
 
 
-def frictionless():
-    joints = {
-        name: dataclasses.replace(getattr(CAD, name), friction=0.0, damping=0.0)
-        for name in ("hip", "knee")
-    }
-    return dataclasses.replace(
-        CAD, rail=dataclasses.replace(CAD.rail, friction=0, damping=0), **joints
-    )
-
-
-def energy(robot, legs):
-    kinetic = kinetic_energy(robot, legs.q, legs.height_rate, legs.qd)
-    return kinetic + potential_energy(robot, legs.height, legs.q)
-
-
-@pytest.mark.parametrize("timestep", [5e-4, 1.25e-4])
-def test_energy_is_conserved_without_friction(timestep):
-    robot = frictionless()
-    legs = MujocoSimulator(robot, 8, timestep=timestep, threads=1)
-    rng = np.random.default_rng(0)
-    legs.place(slice(None), 3.0, rng.uniform(-2, 2, (8, 2)))
-    legs.qd[:] = rng.normal(0, 5, (8, 2))
-    before = energy(robot, legs)
-    for _ in range(60):
-        legs.step(np.zeros((8, 2)))
-    assert legs.height.min() > 1.0
-    # The integrator is of first order: the drift shrinks with the step.
-    np.testing.assert_allclose(energy(robot, legs), before, atol=60 * timestep)
-
-
-def test_free_fall_follows_the_parabola():
-    legs = MujocoSimulator(frictionless(), 1, threads=1)
-    legs.place(slice(None), 3.0, np.array([0.4, -1.0]))
-    for tick in range(1, 101):
-        legs.step(np.zeros((1, 2)))
-        time = tick * legs.period
-        # Semi-implicit Euler falls by g t dt / 2 more than the continuous leg.
-        fall = GRAVITY * time * (time + legs.timestep) / 2
-        np.testing.assert_allclose(legs.height, 3.0 - fall, atol=1e-9)
-        np.testing.assert_allclose(legs.height_rate, -GRAVITY * time, atol=1e-9)
-
-
-def test_drop_on_the_rail_follows_friction_and_damping():
-    """A straight leg falls as a point mass: m v' = -m g + Fc - b v, the closed form beside it."""
-    legs = MujocoSimulator(PAPER, 1, threads=1)
-    legs.place(slice(None), 3.0, np.zeros(2))
-    damping, force = PAPER.rail.damping, PAPER.mass * GRAVITY - PAPER.rail.friction
-    for _ in range(100):
-        legs.step(np.zeros((1, 2)))
-    speed = force / damping * (1 - np.exp(-damping * 0.5 / PAPER.mass))
-    np.testing.assert_allclose(legs.height_rate, -speed, rtol=2e-3)
-    np.testing.assert_allclose(legs.q, 0.0, atol=1e-9)
-
-
 def test_a_standing_leg_rests_on_the_ground():
     legs = MujocoSimulator(CAD, 1, threads=1)
-    legs.stand(slice(None), np.array([0.7, -1.4]))
+    legs.stand(slice(None), POSTURE)
     np.testing.assert_allclose(legs.foot_clearance(), 0.0, atol=1e-12)
-    legs.stand(slice(None), np.array([0.7, -1.4]), clearance=0.05)
+    legs.stand(slice(None), POSTURE, clearance=0.05)
     np.testing.assert_allclose(legs.foot_clearance(), 0.05, atol=1e-12)
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_a_motor_never_drives_beyond_its_no_load_speed(sign):
-    legs = MujocoSimulator(frictionless(), 1, threads=1)
+    legs = MujocoSimulator(without_friction(CAD), 1, threads=1)
     legs.place(slice(None), 50.0, np.zeros(2))
     limit, speed = CAD.of_joints("torque_limit"), CAD.of_joints("no_load_speed")
     fastest = 0.0
@@ -122,13 +67,13 @@ def test_a_loaded_gear_holds_a_joint_that_would_move_without():
 def run_plant(threads):
     legs = MujocoSimulator(PAPER, 5, threads=threads)
     plant = Plant(legs, NoiseAndDelay(), SoftLimits(), np.random.default_rng(3))
-    legs.stand(slice(None), np.array([0.7, -1.4]), clearance=0.05)
+    legs.stand(slice(None), POSTURE, clearance=0.05)
     command = np.full(5, 0.3)
     plant.channel.restart(slice(None), legs.q, legs.qd, command)
     seen = []
     for _ in range(80):
         measurement = plant.sense(command)
-        torque = 20 * (np.array([0.7, -1.4]) - measurement.q[:, 0])
+        torque = 20 * (POSTURE - measurement.q[:, 0])
         seen += [measurement.q.tobytes(), plant.drive(torque).tobytes()]
     return seen, legs.batch.state.tobytes()
 
@@ -140,7 +85,7 @@ def test_same_seed_same_bytes_at_any_thread_count():
 def test_soft_limits_hold_a_pushed_joint_near_its_bounds():
     legs = MujocoSimulator(CAD, 2, threads=1)
     plant = Plant(legs, NoiseAndDelay(0.0, 0.0, 0.0), SoftLimits(), np.random.default_rng(0))
-    legs.place(slice(None), 20.0, np.array([0.7, -1.4]))
+    legs.place(slice(None), 20.0, POSTURE)
     for _ in range(150):
         plant.drive(np.array([[2.0, 2.0], [-2.0, -2.0]]))
         outside = np.maximum(legs.q - CAD.of_joints("upper"), CAD.of_joints("lower") - legs.q)

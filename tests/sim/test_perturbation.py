@@ -10,9 +10,9 @@ from hopping_leg.robot import load_robot
 from hopping_leg.robot.model_mismatch import DriveMismatch, Latency, ModelMismatch, SensorMismatch
 from hopping_leg.sim import MujocoSimulator
 from hopping_leg.sim.perturbation import Perturbation, Perturber
+from tests.sim.legs import POSTURE, without_friction
 
 LEG = load_robot("legv2")
-POSTURE = np.array([0.7, -1.4])
 
 
 def real(**parts):
@@ -103,9 +103,7 @@ def perturbed(legs, force=0.0, ground=0.0, ticks=40):
 
 @pytest.mark.parametrize("detailed", [False, True])
 def test_a_push_changes_the_base_speed_by_impulse_over_mass(detailed):
-    frictionless = dataclasses.replace(
-        LEG, rail=dataclasses.replace(LEG.rail, friction=0, damping=0)
-    )
+    frictionless = without_friction(LEG)
     pushed, free = (
         MujocoSimulator(frictionless, 1, threads=1, detailed=detailed) for _ in range(2)
     )

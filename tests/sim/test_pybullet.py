@@ -1,4 +1,3 @@
-import dataclasses
 import sys
 
 import numpy as np
@@ -8,29 +7,20 @@ from hopping_leg.errors import UsageError
 from hopping_leg.robot import dynamics, load_robot
 from hopping_leg.robot.kinematics import joint_angles
 from hopping_leg.robot.limits import SoftLimits
-from hopping_leg.robot.model import GRAVITY
 from hopping_leg.sim import MujocoSimulator, NoiseAndDelay, Plant
 from hopping_leg.sim.pybullet.simulator import PyBulletSimulator
 from tests.robot.legs import random_state
+from tests.sim.legs import POSTURE, without_friction
 
 pybullet = pytest.importorskip("pybullet", reason="needs the extra 'bullet'")
 
 PAPER = load_robot("legv2-paper")
 CAD = load_robot("legv2")
-CROUCH = np.array([0.7, -1.4])
-
-
-def frictionless(robot):
-    joints = {
-        name: dataclasses.replace(getattr(robot, name), friction=0.0, damping=0.0)
-        for name in ("rail", "hip", "knee")
-    }
-    return dataclasses.replace(robot, **joints)
 
 
 @pytest.mark.parametrize("robot", [PAPER, CAD], ids=lambda r: r.name)
 def test_torques_in_the_air_accelerate_as_the_closed_form_with_armature(robot):
-    robot, step = frictionless(robot), 1e-5
+    robot, step = without_friction(robot), 1e-5
     legs = PyBulletSimulator(robot, 10, rate=1 / step, timestep=step)
     rng = np.random.default_rng(0)
     height, rate, q, qd = random_state(rng, 10)
@@ -46,46 +36,6 @@ def test_torques_in_the_air_accelerate_as_the_closed_form_with_armature(robot):
     np.testing.assert_allclose(gained, expected, rtol=1e-5, atol=1e-3)
 
 
-def test_energy_is_conserved_without_friction():
-    robot, timestep = frictionless(CAD), 5e-4
-    legs = PyBulletSimulator(robot, 4, timestep=timestep)
-    rng = np.random.default_rng(0)
-    legs.place(slice(None), 3.0, rng.uniform(-2, 2, (4, 2)))
-    legs.qd[:] = rng.normal(0, 5, (4, 2))
-
-    def energy():
-        kinetic = dynamics.kinetic_energy(robot, legs.q, legs.height_rate, legs.qd)
-        return kinetic + dynamics.potential_energy(robot, legs.height, legs.q)
-
-    before, posture = energy(), legs.q.copy()
-    for _ in range(60):
-        legs.step(np.zeros((4, 2)))
-    # The integrator is of first order, as MuJoCo's.
-    np.testing.assert_allclose(energy(), before, atol=60 * timestep)
-    assert np.abs(legs.q - posture).max() > 0.5
-
-
-def test_free_fall_follows_the_parabola():
-    legs = PyBulletSimulator(frictionless(CAD), 1)
-    legs.place(slice(None), 3.0, np.array([0.4, -1.0]))
-    for _ in range(60):
-        legs.step(np.zeros((1, 2)))
-    time = 60 * legs.period
-    fall = GRAVITY * time * (time + legs.timestep) / 2
-    np.testing.assert_allclose(legs.height, 3.0 - fall, atol=1e-9)
-    np.testing.assert_allclose(legs.height_rate, -GRAVITY * time, atol=1e-9)
-
-
-def test_drop_on_the_rail_follows_friction_and_damping():
-    legs = PyBulletSimulator(PAPER, 1)
-    legs.place(slice(None), 3.0, np.zeros(2))
-    damping, force = PAPER.rail.damping, PAPER.mass * GRAVITY - PAPER.rail.friction
-    for _ in range(60):
-        legs.step(np.zeros((1, 2)))
-    speed = force / damping * (1 - np.exp(-damping * 0.3 / PAPER.mass))
-    np.testing.assert_allclose(legs.height_rate, -speed, rtol=2e-3)
-
-
 @pytest.mark.parametrize(("share", "moves"), [(0.9, False), (1.2, True)])
 def test_coulomb_friction_holds_a_joint_against_smaller_torques(share, moves):
     legs = PyBulletSimulator(PAPER, 1)
@@ -97,10 +47,10 @@ def test_coulomb_friction_holds_a_joint_against_smaller_torques(share, moves):
 
 def sink_and_rest(legs):
     """Drop a leg whose joints are held from 0.1 m; return the deepest sink and the last, m."""
-    legs.stand(slice(None), CROUCH, clearance=0.1)
+    legs.stand(slice(None), POSTURE, clearance=0.1)
     depths = []
     for _ in range(round(0.8 * legs.rate)):
-        legs.step(60 * (CROUCH - legs.q) - 0.3 * legs.qd)
+        legs.step(60 * (POSTURE - legs.q) - 0.3 * legs.qd)
         depths.append(-legs.foot_clearance()[0])
     return max(depths), depths[-1]
 
@@ -121,12 +71,12 @@ def test_pybullets_own_ground_is_rigid():
 def hop(count, ground):
     legs = PyBulletSimulator(PAPER, count, timestep=1e-3, ground=ground)
     plant = Plant(legs, NoiseAndDelay(), SoftLimits(), np.random.default_rng(3))
-    legs.stand(slice(None), CROUCH, clearance=0.01)
+    legs.stand(slice(None), POSTURE, clearance=0.01)
     command = np.full(count, 0.3)
     plant.channel.restart(slice(None), legs.q, legs.qd, command)
     for _ in range(20):
         measurement = plant.sense(command)
-        plant.drive(20 * (CROUCH - measurement.q[:, 0]))
+        plant.drive(20 * (POSTURE - measurement.q[:, 0]))
     return legs.state.tobytes()
 
 

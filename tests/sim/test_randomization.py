@@ -8,6 +8,7 @@ import pytest
 
 from hopping_leg.envs import HoppingTask, TaskConfig, paper_reward
 from hopping_leg.errors import RobotError, UsageError
+from hopping_leg.io import replace_at
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.model_mismatch import Latency, ModelMismatch
 from hopping_leg.sim import MujocoSimulator
@@ -18,53 +19,50 @@ from hopping_leg.sim.randomization import (
     normalized,
     sample,
 )
+from tests.sim.legs import POSTURE, assert_as_alone, states
 
 LEG = load_robot("legv2")
-POSTURE = np.array([0.7, -1.4])
 
 
 def drawn(count, seed=0, ranges=IDENTIFIABLE_RANGES):
     return sample(LEG, ranges, count, np.random.default_rng(seed))
 
 
-def states(legs, ticks=60):
-    """Return the states of legs that push off and land, (ticks, n, 6)."""
-    legs.stand(slice(None), POSTURE, 0.05)
-    rng = np.random.default_rng(1)
-    found = []
-    for _ in range(ticks):
-        legs.step(np.tile(rng.uniform(-4, 4, 2), (legs.count, 1)))
-        found.append(legs.state.copy())
-    return np.stack(found)
+def late(delay, **effects):
+    return dataclasses.replace(
+        LEG, reality=ModelMismatch(latency=Latency(command=delay), **effects)
+    )
 
 
-def test_every_leg_moves_as_its_own_robot_does_alone():
-    robots = drawn(4)
-    together = states(MujocoSimulator(LEG, 4, threads=1, robots=robots))
-    for index, robot in enumerate(robots):
-        alone = states(MujocoSimulator(robot, 1, threads=1))
-        np.testing.assert_array_equal(together[:, index], alone[:, 0])
-    assert np.ptp(together[-1, :, 0]) > 1e-3
+def with_each(path, *values):
+    return [replace_at(LEG, path, value) for value in values]
 
 
-def test_gears_that_rub_under_load_do_so_in_every_leg_as_alone():
-    loads = [Range("hip.load_friction", "1", v, v, "test") for v in (0.02, 0.1)]
-    robots = [sample(LEG, [load], 1, np.random.default_rng(0))[0] for load in loads]
-    together = states(MujocoSimulator(LEG, 2, threads=1, robots=robots))
-    for index, robot in enumerate(robots):
-        alone = states(MujocoSimulator(robot, 1, threads=1))
-        np.testing.assert_array_equal(together[:, index], alone[:, 0])
+@pytest.mark.parametrize(
+    "robots",
+    [
+        drawn(4),
+        with_each("hip.load_friction", 0.02, 0.1),
+        with_each("knee.torque_gain", 0.7, 1.2),
+        [late(0.01), late(0.0), late(0.015)],
+        [late(0.012), late(0.002), late(0.017)],
+    ],
+    ids=["identifiable", "load friction", "torque gain", "late", "late by parts of a tick"],
+)
+def test_every_leg_moves_as_its_own_robot_does_alone(robots):
+    count = len(robots)
+    legs = MujocoSimulator(LEG, count, threads=1, robots=robots)
+    assert legs.mismatch is None
+    together = assert_as_alone(legs, robots)
+    assert np.ptp(together[-1, :, 0]) > 1e-5
+    turned = MujocoSimulator(LEG, count, threads=1, robots=robots[::-1])
+    turned.set_robots(robots)
+    np.testing.assert_array_equal(states(turned), together)
 
 
-def test_motors_that_give_less_do_so_in_every_leg_as_alone():
-    gains = [Range("knee.torque_gain", "1", v, v, "test") for v in (0.7, 1.2)]
-    robots = [sample(LEG, [gain], 1, np.random.default_rng(0))[0] for gain in gains]
-    legs = MujocoSimulator(LEG, 2, threads=1, robots=robots[::-1])
-    legs.set_robots(robots)
-    for together in (states(MujocoSimulator(LEG, 2, threads=1, robots=robots)), states(legs)):
-        for index, robot in enumerate(robots):
-            alone = states(MujocoSimulator(robot, 1, threads=1))
-            np.testing.assert_array_equal(together[:, index], alone[:, 0])
+def test_delays_that_differ_by_parts_of_a_tick_are_left_to_the_twins_physics():
+    robots = [late(5e-3), late(7e-3)]
+    assert MujocoSimulator(LEG, 2, threads=1, robots=robots).mismatch is not None
 
 
 @pytest.mark.parametrize("spread", IDENTIFIABLE_RANGES, ids=lambda spread: spread.path)
@@ -85,23 +83,32 @@ def test_places_tell_where_numbers_lie_in_their_ranges():
     assert np.ptp(found, axis=0).min() > 1
 
 
-def test_a_relative_range_is_of_what_the_robot_has():
-    spread = Range("base.mass", "1", 0.5, 2.0, "test", "logarithmic", "factors")
-    robots = sample(LEG, [spread], 200, np.random.default_rng(0))
-    shares = np.array([robot.base.mass for robot in robots]) / LEG.base.mass
-    assert 0.5 <= shares.min() < 0.55
-    assert 1.8 < shares.max() <= 2.0
-    np.testing.assert_allclose(normalized(LEG, robots, [spread])[:, 0], np.log2(shares), atol=1e-9)
-
-
-def test_additions_are_to_what_the_robot_has():
-    spread = Range("reality.latency.command", "s", 0.0, 1e-2, "test", bounds="additions")
-    robots = sample(late(3e-3), [spread], 200, np.random.default_rng(0))
-    delays = np.array([robot.reality.latency.command for robot in robots])
-    assert 3e-3 <= delays.min() < 3.5e-3
-    assert 1.25e-2 < delays.max() <= 1.3e-2
-    found = normalized(late(3e-3), robots, [spread])[:, 0]
-    np.testing.assert_allclose(found, (delays - 8e-3) / 5e-3, atol=1e-9)
+@pytest.mark.parametrize(
+    ("spread", "low", "high", "position"),
+    [
+        (
+            Range("base.mass", "1", 0.5, 2.0, "test", "logarithmic", "factors"),
+            0.5 * LEG.base.mass,
+            2.0 * LEG.base.mass,
+            lambda mass: np.log2(mass / LEG.base.mass),
+        ),
+        (
+            Range("reality.latency.command", "s", 0.0, 1e-2, "test", bounds="additions"),
+            3e-3,
+            1.3e-2,
+            lambda delay: (delay - 8e-3) / 5e-3,
+        ),
+    ],
+    ids=["factors", "additions"],
+)
+def test_a_range_may_be_relative_to_what_the_robot_has(spread, low, high, position):
+    leg = late(3e-3)
+    robots = sample(leg, [spread], 200, np.random.default_rng(0))
+    values = np.array([attrgetter(spread.path)(robot) for robot in robots])
+    assert low <= values.min() < low + 0.05 * (high - low)
+    assert high - 0.1 * (high - low) < values.max() <= high
+    found = normalized(leg, robots, [spread])[:, 0]
+    np.testing.assert_allclose(found, position(values), atol=1e-9)
 
 
 @pytest.mark.parametrize("delay", [0.0, 4.56e-3])
@@ -182,12 +189,6 @@ def test_a_critic_may_see_in_which_leg_it_is():
     assert len(np.unique(numbers, axis=0)) == 5
 
 
-def late(delay, **effects):
-    return dataclasses.replace(
-        LEG, reality=ModelMismatch(latency=Latency(command=delay), **effects)
-    )
-
-
 @pytest.mark.parametrize("delay", [5e-4, 2e-3, 5e-3, 7.5e-3, 1.2e-2])
 def test_a_constant_delay_is_the_one_that_twins_have(delay):
     fast, slow = (
@@ -198,22 +199,6 @@ def test_a_constant_delay_is_the_one_that_twins_have(delay):
     assert slow.mismatch is not None
     np.testing.assert_allclose(states(fast), states(slow), atol=1e-8)
     assert np.abs(states(fast) - states(MujocoSimulator(LEG, 3, threads=1))).max() > 1e-3
-
-
-@pytest.mark.parametrize("rest", [0.0, 2e-3])
-def test_every_leg_is_as_late_as_alone(rest):
-    robots = [late(rest + ticks * 5e-3) for ticks in (2, 0, 3)]
-    legs = MujocoSimulator(LEG, 3, threads=1, robots=robots)
-    assert legs.mismatch is None
-    together = states(legs)
-    for index, robot in enumerate(robots):
-        alone = states(MujocoSimulator(robot, 1, threads=1))
-        np.testing.assert_array_equal(together[:, index], alone[:, 0])
-
-
-def test_delays_that_differ_by_parts_of_a_tick_are_left_to_the_twins_physics():
-    robots = [late(5e-3), late(7e-3)]
-    assert MujocoSimulator(LEG, 2, threads=1, robots=robots).mismatch is not None
 
 
 def test_legs_in_motion_become_later_without_losing_a_command():

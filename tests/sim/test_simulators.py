@@ -1,0 +1,61 @@
+"""The mechanics that every simulator obeys."""
+
+import numpy as np
+import pytest
+
+from hopping_leg.robot import load_robot
+from hopping_leg.robot.model import GRAVITY
+from hopping_leg.sim import make_simulator
+from tests.sim.legs import energy, without_friction
+
+PAPER = load_robot("legv2-paper")
+FRICTIONLESS = without_friction(load_robot("legv2"))
+
+
+@pytest.fixture(params=["mujoco", "pybullet"])
+def make(request):
+    """Return a function that makes simulators."""
+    if request.param == "pybullet":
+        pytest.importorskip("pybullet", reason="needs the extra 'bullet'")
+    return lambda robot, count, **options: make_simulator(
+        robot, count, engine=request.param, threads=1, **options
+    )
+
+
+@pytest.mark.parametrize("timestep", [5e-4, 1.25e-4])
+def test_energy_is_conserved_without_friction(make, timestep):
+    legs = make(FRICTIONLESS, 4, timestep=timestep)
+    rng = np.random.default_rng(0)
+    legs.place(slice(None), 3.0, rng.uniform(-2, 2, (4, 2)))
+    legs.qd[:] = rng.normal(0, 5, (4, 2))
+    before, posture = energy(legs), legs.q.copy()
+    for _ in range(60):
+        legs.step(np.zeros((4, 2)))
+    assert legs.height.min() > 1.0
+    assert np.abs(legs.q - posture).max() > 0.5
+    # The integrator is of first order: the drift shrinks with the step.
+    np.testing.assert_allclose(energy(legs), before, atol=60 * timestep)
+
+
+def test_free_fall_follows_the_parabola(make):
+    legs = make(FRICTIONLESS, 1)
+    legs.place(slice(None), 3.0, np.array([0.4, -1.0]))
+    for tick in range(1, 61):
+        legs.step(np.zeros((1, 2)))
+        time = tick * legs.period
+        # Semi-implicit Euler falls by g t dt / 2 more than the continuous leg.
+        fall = GRAVITY * time * (time + legs.timestep) / 2
+        np.testing.assert_allclose(legs.height, 3.0 - fall, atol=1e-9)
+        np.testing.assert_allclose(legs.height_rate, -GRAVITY * time, atol=1e-9)
+
+
+def test_drop_on_the_rail_follows_friction_and_damping(make):
+    """A straight leg falls as a point mass: m v' = -m g + Fc - b v, the closed form beside it."""
+    legs = make(PAPER, 1)
+    legs.place(slice(None), 3.0, np.zeros(2))
+    damping, force = PAPER.rail.damping, PAPER.mass * GRAVITY - PAPER.rail.friction
+    for _ in range(60):
+        legs.step(np.zeros((1, 2)))
+    speed = force / damping * (1 - np.exp(-damping * 0.3 / PAPER.mass))
+    np.testing.assert_allclose(legs.height_rate, -speed, rtol=2e-3)
+    np.testing.assert_allclose(legs.q, 0.0, atol=1e-9)
