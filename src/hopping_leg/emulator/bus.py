@@ -92,7 +92,7 @@ def _addressed(subframes: tuple[multiplex.Subframe, ...], drive: EmulatedDrive) 
             and s.register in _UUID_MASKS
             and s.type is SubframeType.WRITE
         ):
-            own = drive.identity.register(s.register - Register.UUID_MASK1 + Register.UUID1)
+            own = drive.identity.get(s.register - Register.UUID_MASK1 + Register.UUID1)
             if own != s.value:
                 return False
     return True

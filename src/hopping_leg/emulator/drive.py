@@ -4,6 +4,7 @@ Time comes as an argument; between two steps nothing changes but the command reg
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
 from moteus.multiplex import F32
@@ -12,7 +13,6 @@ from moteus.protocol import Register, scale_register
 from hopping_leg.deploy.drive_link import DriveMode, FaultCode
 from hopping_leg.emulator.diagnostic import Diagnostic
 from hopping_leg.emulator.mode_machine import CONTROLLING, MODES, ModeMachine, Notice
-from hopping_leg.emulator.registers import Identity
 from hopping_leg.emulator.rotor_encoder import RotorEncoder
 from hopping_leg.emulator.settings import Settings
 from hopping_leg.emulator.torque_law import (
@@ -55,7 +55,7 @@ class EmulatedDrive:
     """A moteus controller on a geared motor.
 
     Args:
-        identity: Numbers that it was made with.
+        identity: Registers that tell what it was made with.
         settings: Its configuration.
         gear_ratio: True turns of the rotor per turn of the output.
         brake: Damping of the output with the phases shorted, N m s/rad.
@@ -64,7 +64,7 @@ class EmulatedDrive:
 
     def __init__(
         self,
-        identity: Identity,
+        identity: Mapping[int, int],
         settings: Settings,
         *,
         gear_ratio: float,
@@ -228,7 +228,7 @@ class EmulatedDrive:
         name = COMMAND_FIELDS.get(register)
         if name is not None:
             return float(getattr(self.command, name))
-        return self.identity.register(register)
+        return self.identity.get(register)
 
     def state(self) -> dict[int, float]:
         """Return the registers that tell how the drive is, in its units."""

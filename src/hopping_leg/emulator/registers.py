@@ -7,7 +7,6 @@ import hashlib
 import io
 import struct
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
 from moteus import multiplex
 from moteus.protocol import Register, Writer
@@ -20,50 +19,22 @@ REGISTER_MAP = 5
 """Version of the register map that the client library speaks."""
 
 
-@dataclass(frozen=True)
-class Identity:
-    """Numbers that a drive was made with.
+def identity(seed: str) -> dict[int, int]:
+    """Return the registers that tell what a drive was made with: versions, serial number, UUID.
 
-    Attributes:
+    Args:
         seed: Makes serial number and UUID; two drives on a bus need different ones.
-        firmware: Version.
-        register_map: Version; a drive with another one means something else by its registers.
     """
-
-    seed: str
-    firmware: int = FIRMWARE
-    register_map: int = REGISTER_MAP
-
-    @property
-    def serial(self) -> tuple[int, int, int]:
-        """Serial number, three positive 31-bit words."""
-        a, b, c = struct.unpack("<3I", self._digest[:12])
-        return a & 0x7FFFFFFF, b & 0x7FFFFFFF, c & 0x7FFFFFFF
-
-    @property
-    def uuid(self) -> bytes:
-        """16 bytes."""
-        return b"".join(struct.pack("<I", w & 0x7FFFFFFF) for w in self._words)
-
-    @property
-    def _words(self) -> tuple[int, ...]:
-        return struct.unpack("<4I", self._digest[12:28])
-
-    @property
-    def _digest(self) -> bytes:
-        return hashlib.sha256(self.seed.encode()).digest()
-
-    def register(self, register: int) -> float | None:
-        """Return an identity register, None if it is none."""
-        values: dict[int, int] = {
-            Register.MODEL_NUMBER: MODEL,
-            Register.FIRMWARE_VERSION: self.firmware,
-            Register.REGISTER_MAP_VERSION: self.register_map,
-            Register.UUID_MASK_CAPABLE: 1,
-        }
-        values |= {Register.SERIAL_NUMBER + k: w for k, w in enumerate(self.serial)}
-        values |= {Register.UUID1 + k: w for k, w in enumerate(struct.unpack("<4i", self.uuid))}
-        return values.get(register)
+    words = struct.unpack("<7I", hashlib.sha256(seed.encode()).digest()[:28])
+    registers: dict[int, int] = {
+        Register.MODEL_NUMBER: MODEL,
+        Register.FIRMWARE_VERSION: FIRMWARE,
+        Register.REGISTER_MAP_VERSION: REGISTER_MAP,
+        Register.UUID_MASK_CAPABLE: 1,
+    }
+    numbers = [Register.SERIAL_NUMBER + k for k in range(3)]
+    numbers += [Register.UUID1 + k for k in range(4)]
+    return registers | {n: word & 0x7FFFFFFF for n, word in zip(numbers, words, strict=True)}
 
 
 _MAX_RUN = 3

@@ -17,7 +17,7 @@ from hopping_leg.emulator.fault_injection import FaultInjector
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.frames import Frame, ReplyQueue
 from hopping_leg.emulator.leg import TIMESTEP, EmulatedLeg
-from hopping_leg.emulator.registers import Identity
+from hopping_leg.emulator.registers import identity
 from hopping_leg.emulator.settings import Settings
 from hopping_leg.emulator.wire_log import WireLog
 from hopping_leg.robot.parameters import JOINTS, Robot
@@ -130,7 +130,7 @@ def _drive(robot: Robot, joint: int, configured: bool) -> EmulatedDrive:
     if configured:
         changes |= {setting.name: setting.value for setting in required_settings(robot, joint)}
     return EmulatedDrive(
-        Identity(f"{robot.name} {JOINTS[joint]}"),
+        identity(f"{robot.name} {JOINTS[joint]}"),
         Settings(**changes),
         gear_ratio=motor.gear_ratio,
         brake=motor.peak_torque / motor.no_load_speed,

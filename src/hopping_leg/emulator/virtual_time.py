@@ -24,6 +24,9 @@ Result = TypeVar("Result")
 _BUSY = 20
 """Rounds that a busy loop may go without a look at the line."""
 
+WIRE_TIME = 5e-4
+"""Time from a question to its answer, s, as measured with two motors on an fdcanusb."""
+
 _FOREVER = 60.0
 """Virtual time after which nobody waits for anything any more, s."""
 
@@ -70,21 +73,42 @@ class _Waiting(selectors.SelectSelector):
         return ready
 
 
-class SteppedClient:
-    """Stands for the thread in which the host's client runs; whoever asks does the work.
+class Lockstep:
+    """The clock that moves an emulated robot, the link to it, and the client behind the link.
+
+    Whoever asks the client does its work, in the place of a thread.
 
     Args:
-        robot: Behind the port.
-        port: That the client opens.
-        on_error: Told what went wrong inside of the loop, in a few words.
+        robot: Behind the wire.
+        checksums: Whether the lines have checksums; a plain fdcanusb's have none.
+
+    Attributes:
+        truth: Time and base height at every tick, s and m, and the foot's clearance, m.
     """
 
-    def __init__(
-        self, robot: EmulatedRobot, port: Port, on_error: Callable[[str], None] = lambda _: None
-    ) -> None:
-        self._port = port
-        self.loop = VirtualTime(robot, port)
-        self.loop.set_exception_handler(lambda _, context: on_error(_words(context)))
+    def __init__(self, robot: EmulatedRobot, *, checksums: bool = True) -> None:
+        self.robot = robot
+        robot.wire_time = WIRE_TIME
+        self.truth: list[tuple[float, float, float]] = []
+        self._port, self._checksums = PtyPort(), checksums
+        self.loop = VirtualTime(robot, self._port)
+        self.link = MoteusLink(robot.robot, self._open, self, self._as_client)
+
+    def now(self) -> float:
+        """Return the robot's time."""
+        return self.robot.time
+
+    def wait_until(self, deadline: float) -> float:
+        """Let the robot move until a deadline."""
+        if deadline > self.robot.time:
+            self.loop.run_until_complete(asyncio.sleep(deadline - self.robot.time))
+        leg = self.robot.leg
+        self.truth.append((self.robot.time, leg.height, leg.foot_clearance))
+        return max(self.robot.time, deadline)
+
+    def patience(self, until: float) -> float:
+        """Return the time that is left, s: none once the client has done its work."""
+        return max(until - self.robot.time, 0.0)
 
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Do work now, until it is done."""
@@ -101,11 +125,6 @@ class SteppedClient:
         except TimeoutError as error:
             raise HardwareError(f"The adapter did not answer within {seconds:g} s.") from error
 
-    def wait(self, until: float) -> None:
-        """Let the robot move until a time, s."""
-        if until > self.loop.time():
-            self.loop.run_until_complete(asyncio.sleep(until - self.loop.time()))
-
     def close(self) -> None:
         """End all that is under way, and take the port away."""
         for task in asyncio.all_tasks(self.loop):
@@ -115,51 +134,11 @@ class SteppedClient:
         if self._port.plugged:
             self._port.close()
 
-
-def _words(context: dict[str, Any]) -> str:
-    return str(context.get("exception") or context.get("message", "unknown"))
-
-
-WIRE_TIME = 5e-4
-"""Time from a question to its answer, s, as measured with two motors on an fdcanusb."""
-
-
-class Lockstep:
-    """A clock that moves an emulated robot, and the link to it.
-
-    Args:
-        robot: Behind the wire.
-        checksums: Whether the lines have checksums; a plain fdcanusb's have none.
-
-    Attributes:
-        truth: Time and base height at every tick, s and m, and the foot's clearance, m.
-    """
-
-    def __init__(self, robot: EmulatedRobot, *, checksums: bool = True) -> None:
-        self.robot = robot
-        robot.wire_time = WIRE_TIME
-        self.truth: list[tuple[float, float, float]] = []
-        self._port, self._checksums = PtyPort(), checksums
-        self.link = MoteusLink(robot.robot, self._open, self, self._make_client)
-
-    def now(self) -> float:
-        """Return the robot's time."""
-        return self.robot.time
-
-    def wait_until(self, deadline: float) -> float:
-        """Let the robot move until a deadline."""
-        self._client.wait(deadline)
-        leg = self.robot.leg
-        self.truth.append((self.robot.time, leg.height, leg.foot_clearance))
-        return max(self.robot.time, deadline)
-
-    def patience(self, until: float) -> float:
-        """Return the time that is left, s: none once the client has done its work."""
-        return max(until - self.robot.time, 0.0)
-
-    def _make_client(self, on_error: Callable[[str], None]) -> SteppedClient:
-        self._client = SteppedClient(self.robot, self._port, on_error)
-        return self._client
+    def _as_client(self, on_error: Callable[[str], None]) -> "Lockstep":
+        self.loop.set_exception_handler(
+            lambda _, context: on_error(str(context.get("exception") or context["message"]))
+        )
+        return self
 
     def _open(self) -> Any:  # noqa: ANN401
         device = TolerantFdcanusb(str(self._port.path))
