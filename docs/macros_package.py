@@ -38,17 +38,17 @@ def trace_columns() -> str:
 
 def search_space(recipe: str) -> str:
     """Return what `hop tune` searches of a recipe as a table."""
-    from hopping_leg.rl.recipes import get_recipe
-    from hopping_leg.rl.search_space import SPACES, OneOf, dimensions
+    from hopping_leg.rl.recipes import SPACES, get_recipe
+    from hopping_leg.rl.search_space import OneOf
 
     rows, shipped = [], get_recipe(recipe)
-    for name, found in dimensions(SPACES[recipe]).items():
+    for name, found in SPACES[recipe].items():
         if isinstance(found, OneOf):
             where = ", ".join(str(found.stored(choice)) for choice in found.choices)
         else:
             values = dataclasses.asdict(found)  # type: ignore[call-overload]
             where = "{low:g} to {high:g}".format(**values) + (", log" if values["log"] else "")
-        rows.append([f"`{name}`", where, str(found.stored(getattr(shipped, name)))])
+        rows.append([f"`{name}`", where, str(found.stored(shipped.value(name)))])
     return grid(["number", "searched", "recipe"], rows)
 
 

@@ -5,7 +5,6 @@ controller that hops well, the default here is only enough to see every part wor
 on when it is run again; finished, its policy hops again.
 """
 
-import dataclasses
 import sys
 from pathlib import Path
 
@@ -13,13 +12,13 @@ import numpy as np
 
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.rl.recipes.fast import FastRecipe
+from hopping_leg.rl.recipes.fast import FAST
 from hopping_leg.rl.train import train
 from hopping_leg.robot import load_robot
 
 steps = int(sys.argv[1]) if len(sys.argv) > 1 else 200_000
 leg = load_robot(str(Path(__file__).parent / "my_leg.toml"))
-recipe = dataclasses.replace(FastRecipe(), steps=steps, n_steps=32, eval_start=0.0)
+recipe = FAST.replace(steps=steps, n_steps=32, eval_start=0.0)
 folder = Path(f"runs/my_leg-{steps}")
 file = folder / "policy.onnx"
 if file.exists():

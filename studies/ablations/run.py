@@ -2,14 +2,13 @@
 
 import functools
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.evaluate.runner import software_versions
+from hopping_leg.rl.recipes import VARIANTS
 from hopping_leg.robot.parameters import Robot
-from studies.ablations.variants import ABLATIONS
 from studies.training_time.run import bench_training, over_commands
 
 _OF_A_RUN = ("seed", "minutes", "teacher_scores_m")
@@ -44,25 +43,26 @@ def bench_ablation(
     Raises:
         UsageError: There are no ablations of the recipe, or none of a name.
     """
-    if recipe not in ABLATIONS:
-        raise UsageError(unknown_name("recipe with ablations", recipe, ABLATIONS))
-    known = {ablation.name: ablation for ablation in ABLATIONS[recipe]()}
+    if recipe not in VARIANTS:
+        raise UsageError(unknown_name("recipe with ablations", recipe, VARIANTS))
+    known = VARIANTS[recipe]
     for name in variants:
         if name not in known:
             raise UsageError(unknown_name(f"variant of {recipe}", name, known))
     rows: list[dict[str, Any]] = []
     found: list[dict[str, Any]] = []
-    for ablation in [known[name] for name in known if not variants or name in variants]:
+    for name in [name for name in known if not variants or name in variants]:
+        meaning, variant = known[name]
         result = bench_training(
-            replace(ablation.recipe, steps=steps, eval_every=max(1, steps // 5)),
+            variant.replace(steps=steps, eval_every=max(1, steps // 5)),
             robot,
-            out / ablation.name,
+            out / name,
             training_seeds=training_seeds,
             evaluation_seeds=evaluation_seeds,
             threads=threads,
-            on_progress=functools.partial(_named, on_progress, ablation.name),
+            on_progress=functools.partial(_named, on_progress, name),
         )
-        named = {"variant": ablation.name, "meaning": ablation.meaning}
+        named = {"variant": name, "meaning": meaning}
         rows += [{**named, **row} for row in result["rows"]]
         found += [
             {

@@ -5,11 +5,11 @@ from pathlib import Path
 
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.checkpoint import list_checkpoints, read_checkpoint
+from hopping_leg.rl.distillation.distillation import make_teacher
 from hopping_leg.rl.distillation.teacher import Teacher
+from hopping_leg.rl.legacy_names import upgrade_config
 from hopping_leg.rl.recipes import recipe_of
-from hopping_leg.rl.recipes.precise import PreciseRecipe
 from hopping_leg.rl.resumable import restore_learner
-from hopping_leg.rl.scale import fit
 from hopping_leg.robot.parameters import Robot
 
 
@@ -27,12 +27,12 @@ def teacher_of_run(run: Path, robot: Robot) -> Teacher:
     found = list_checkpoints(run / "checkpoints")
     if not file.exists() or not found:
         raise UsageError(f"{run} holds no run with a checkpoint; train one with `hop train`.")
-    config = json.loads(file.read_text(encoding="utf-8"))
-    recipe = fit(recipe_of(config["recipe"], config["options"]), robot)
-    if not isinstance(recipe, PreciseRecipe):
+    config = upgrade_config(json.loads(file.read_text(encoding="utf-8")))
+    recipe = recipe_of(config["recipe"], config["options"]).fit(robot)
+    if recipe.distillation is None:
         raise UsageError(
             f"The run in {run} is of recipe '{recipe.name}', which has no teacher; take one of"
-            " 'precise', 'adaptive' or 'recurrent'."
+            " 'precise' or 'adaptive'."
         )
     if config["robot_digest"] != robot.digest:
         raise UsageError(
@@ -41,4 +41,4 @@ def teacher_of_run(run: Path, robot: Robot) -> Teacher:
         )
     model = recipe.make_model(recipe.make_env(robot, config["seed"]), config["seed"])
     restore_learner(model, read_checkpoint(found[-1])["model"])
-    return recipe.make_teacher(model.policy, robot)
+    return make_teacher(model.policy, robot, recipe.task)

@@ -1,6 +1,6 @@
 """Options of the study of training."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +50,7 @@ class Training:
             raise UsageError("--training-seeds names no seed; give e.g. --training-seeds 0 1 2.")
         recipe = change(get_recipe(self.recipe), self.set)
         if self.steps is not None:
-            recipe = replace(recipe, steps=self.steps)
+            recipe = recipe.replace(steps=self.steps)
         console = Console()
         result = bench_training(
             recipe,

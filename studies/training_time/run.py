@@ -132,7 +132,7 @@ def _judge(
     judged = evaluate(
         entries,
         RolloutConfig(robot),
-        commands=recipe.eval_commands,
+        commands=recipe.selection.eval_commands,
         repeats=seeds,
         seed=JUDGING_SEED,
         kinds=("fixed",),

@@ -10,7 +10,7 @@ from hopping_leg.cli import evaluate, main
 from hopping_leg.cli.reproduce import NOTHING_MEANT
 
 pytest.importorskip("torch")
-from hopping_leg.rl.recipes.fast import FastRecipe
+from hopping_leg.rl.recipes.fast import FAST
 from hopping_leg.sim_to_real import run as transfer_run
 
 NUMBERS = {"rows": [], "methods": [], "comparison": []}
@@ -50,7 +50,7 @@ def test_it_goes_from_a_twin_to_a_judged_policy(calls, tmp_path, capsys):
 def test_the_paper_sizes_have_every_twin_method_and_second(calls, tmp_path):
     assert main(["reproduce", "--full", "--out", str(tmp_path)]) == 0
     [(study, _)] = calls["transfer"]
-    assert (study.seconds, len(study.twins), study.steps) == (240.0, 5, FastRecipe.steps)
+    assert (study.seconds, len(study.twins), study.steps) == (240.0, 5, FAST.schedule.steps)
     names = {method.name for method in study.methods}
     assert names >= {"identified", "cad", "table-1", "randomised", "two-pass", "one-pass"}
 

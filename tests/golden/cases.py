@@ -153,11 +153,12 @@ RECIPES = {
         "draws=2",
     ],
     "recurrent": [
-        "batch_size=64",
-        "teacher_share=0.5",
-        "dagger.gradient_steps=4",
-        "dagger.batch_size=64",
+        "batch_size=64", "teacher_share=0.5", "teachers=1", "n_epochs=4", "task.command_skew=1",
+        "student.memory=gru", "dagger.gradient_steps=4", "dagger.batch_size=64",
     ],
+}
+MADE = {
+    "recurrent": ("--recipe", "precise", "--observation", "dated", "--heights", 0.2, 0.42),
 }
 # fmt: on
 """What makes a training of a recipe short: two rollouts, of teacher and student each."""
@@ -171,7 +172,8 @@ def _trained(folder: Path, recipe: str) -> Values:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(policy_evaluation, "_SECONDS", 0.5)
         hop(
-            "train", "--recipe", recipe, "--seed", 3, "--threads", 1, "--out", folder / "run",
+            "train", *MADE.get(recipe, ("--recipe", recipe)), "--seed", 3, "--threads", 1,
+            "--out", folder / "run",
             "--steps", 128 * rollouts, "--set", *numbers,
         )  # fmt: skip
     files = [*sorted((folder / "run" / "snapshots").iterdir()), folder / "run" / "policy.onnx"]

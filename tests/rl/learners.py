@@ -3,6 +3,7 @@
 import dataclasses
 
 import torch
+from hopping_leg.rl.recipes.recurrent import RecurrentRecipe
 from stable_baselines3.common.logger import configure
 
 from hopping_leg.rl.distillation.dagger import DaggerConfig
@@ -10,7 +11,6 @@ from hopping_leg.rl.recipes.adaptive import AdaptiveRecipe
 from hopping_leg.rl.recipes.fast import FastRecipe
 from hopping_leg.rl.recipes.paper import PaperRecipe
 from hopping_leg.rl.recipes.precise import PreciseRecipe
-from hopping_leg.rl.recipes.recurrent import RecurrentRecipe
 from hopping_leg.rl.resumable import ResumablePPO
 from hopping_leg.robot import load_robot
 

@@ -1,11 +1,11 @@
 import dataclasses
 
 import pytest
+from hopping_leg.rl.scale import fit
 
 from hopping_leg.rl.recipes.fast import FastRecipe
 from hopping_leg.rl.recipes.paper import PaperRecipe
 from hopping_leg.rl.recipes.precise import PreciseRecipe
-from hopping_leg.rl.scale import fit
 from hopping_leg.robot import load_robot, shipped_robots
 
 LEGS = [

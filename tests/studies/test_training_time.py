@@ -26,7 +26,9 @@ def judge(policies, recipe, _robot, _seeds):
     """Say that every policy is 1 mm off at every command."""
     fields = {"median_error_m": -0.001, "std_m": 0.002}
     return [
-        {"controller": p, "command_m": c, **fields} for p in policies for c in recipe.eval_commands
+        {"controller": p, "command_m": c, **fields}
+        for p in policies
+        for c in recipe.selection.eval_commands
     ]
 
 

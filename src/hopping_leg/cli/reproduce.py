@@ -125,7 +125,7 @@ def run(args: Reproduce) -> None:
 
 def make_study(args: Reproduce) -> Study:
     """Return what is done with how many twins."""
-    from hopping_leg.rl.recipes.fast import FastRecipe
+    from hopping_leg.rl.recipes.fast import FAST
 
     folder = args.folder / "transfer"
     count = "5" if args.full else "1"
@@ -136,7 +136,7 @@ def make_study(args: Reproduce) -> Study:
         twins,
         tuple(choose_methods(_PAPER if args.full else _MINIATURE)),
         seeds=(args.seed,),
-        steps=FastRecipe.steps if args.full else steps,
+        steps=FAST.schedule.steps if args.full else steps,
         seconds=240.0 if args.full else SHORTEST,
         least_squares=_GLANCE if args.quick else USUAL_FIT,
         repeats=1 if args.quick else 3,

@@ -13,7 +13,6 @@ Examples:
   hop evaluate runs/mine/policy.onnx
 """
 
-import dataclasses
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,8 +29,8 @@ class Options:
 
     recipe: str = "fast"
     """How to train: `fast` for accurate hopping soon, `precise` for more accurate hopping later,
-    `adaptive` for one that corrects itself on legs that differ, `recurrent` for one that remembers
-    by itself, `paper` for the paper's method."""
+    `adaptive` for one that corrects itself on legs that differ, `paper` for the paper's method; or
+    FILE.py:NAME, a recipe of your own."""
     robot: str = "legv2-paper"
     """A shipped robot or the path of a .toml file."""
     seed: int = 0
@@ -80,15 +79,14 @@ def run(args: Options) -> None:
     if args.steps is not None:
         if args.steps < 1:
             raise UsageError(f"--steps is {args.steps} but must be at least 1.")
-        recipe = dataclasses.replace(recipe, steps=args.steps)
+        recipe = recipe.replace(steps=args.steps)
     recipe = change(recipe, args.set)
     if args.randomise is not None:
         recipe = randomise(recipe, args.randomise)
     if args.observation is not None:
-        task = dataclasses.replace(recipe.task, observation=args.observation)
-        recipe = dataclasses.replace(recipe, task=task)
-    recipe = dataclasses.replace(recipe, heights=args.heights)
-    out = args.out or Path("runs") / f"{args.recipe}-seed{args.seed}"
+        recipe = recipe.replace({"task.observation": args.observation})
+    recipe = recipe.replace(heights=args.heights)
+    out = args.out or Path("runs") / f"{recipe.name}-seed{args.seed}"
     robot = load_robot(args.robot)
     try:
         trained = ParallelSeeds(

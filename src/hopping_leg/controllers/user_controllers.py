@@ -230,18 +230,7 @@ def load_user_controller(name: str, robot: Robot, rate: float) -> PlugIn:
     Raises:
         ControllerError: There is no such file, module or class, it fails, or is no controller.
     """
-    source, _, wanted = name.rpartition(":")
-    if name.endswith(".py"):
-        source, wanted = name, ""
-    module = _load_file(Path(source)) if source.endswith(".py") else _load_module(source)
-    kind = getattr(module, wanted, None) if wanted else None
-    if not callable(kind):
-        classes = [n for n, v in vars(module).items() if _defined_here(v, module)]
-        if not wanted:
-            raise ControllerError(
-                f"'{name}' names no class; write {source}:CLASS, one of: {', '.join(classes)}."
-            )
-        raise ControllerError(f"In {source}: " + unknown_name("class", wanted, classes))
+    module, kind, wanted = _find(name, "class", callable)
     make: Callable[[], Any] = functools.partial(kind, robot, rate=rate)
     controller = attempt(name, make, f"could not be made as {wanted}(robot, rate={rate:g})")
     if not callable(getattr(controller, "act", None)) and callable(
@@ -259,6 +248,37 @@ def load_user_controller(name: str, robot: Robot, rate: float) -> PlugIn:
     guard = type(f"{PlugIn.__name__}_{_digest(module)}", (PlugIn,), {})
     made: PlugIn = guard(controller, name)
     return made
+
+
+def load_user_object(name: str) -> Any:  # noqa: ANN401
+    """Return what a Python file or module holds under a name.
+
+    Args:
+        name: ``path/to/file.py:NAME``, or ``package.module:NAME``.
+
+    Raises:
+        ControllerError: There is no such file, module or name, or importing it fails.
+    """
+    _, found, _ = _find(name, "name", lambda value: value is not None)
+    return found
+
+
+def _find(name: str, what: str, suits: Callable[[object], bool]) -> tuple[ModuleType, Any, str]:
+    """Return module, object and its name; errors list what the module defines."""
+    source, _, wanted = name.rpartition(":")
+    if name.endswith(".py"):
+        source, wanted = name, ""
+    module = _load_file(Path(source)) if source.endswith(".py") else _load_module(source)
+    found = getattr(module, wanted, None) if wanted else None
+    if not suits(found):
+        known = [n for n, v in vars(module).items() if _defined_here(v, module)]
+        if not wanted:
+            raise ControllerError(
+                f"'{name}' names no {what}; write {source}:{what.upper()}, one of:"
+                f" {', '.join(known)}."
+            )
+        raise ControllerError(f"In {source}: " + unknown_name(what, wanted, known))
+    return module, found, wanted
 
 
 def attempt(origin: str, work: Callable[[], T], failure: str = "failed") -> T:

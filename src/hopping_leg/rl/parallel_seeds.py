@@ -26,7 +26,6 @@ from hopping_leg.rl.policy_evaluation import (
 )
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.run_folder import RunFolder, read_result
-from hopping_leg.rl.scale import fit
 from hopping_leg.rl.train import Trained, check, train
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.workers import ProcessWorkers
@@ -88,7 +87,7 @@ class ParallelSeeds:
                 "--source begins from one run's checkpoint; leave --parallel-seeds out."
             )
         check(self.robot, self.minutes, self.log)
-        recipe = fit(self.recipe, self.robot)
+        recipe = self.recipe.fit(self.robot)
         folder = RunFolder(
             self.out, recipe, self.robot, self.seed, self.minutes, parallel_seeds=self.count
         )
@@ -151,7 +150,7 @@ class ParallelSeeds:
         """Try the policy of a finished training at every centimetre."""
         began = time.monotonic()
         policy = Policy((folder / "policy.onnx").read_bytes(), folder.name, self.recipe.name)
-        commands = every_centimetre(fit(self.recipe, self.robot).eval_commands)
+        commands = every_centimetre(self.recipe.fit(self.robot).selection.eval_commands)
         rate = self.recipe.task.rate
         results = evaluate_policy(policy, self.robot, commands, DECIDING_SEEDS, rate, self.threads)
         minutes = read_result(folder)["minutes"] + (time.monotonic() - began) / 60

@@ -8,8 +8,9 @@ from typing import Any
 from hopping_leg.errors import UsageError
 from hopping_leg.io import versions, write_json
 from hopping_leg.rl.checkpoint import Tree, list_checkpoints, read_checkpoint
+from hopping_leg.rl.legacy_names import upgrade_checkpoint, upgrade_config
 from hopping_leg.rl.recipe import Recipe
-from hopping_leg.rl.recipes import words_of
+from hopping_leg.rl.recipes import RECIPES, words_of
 from hopping_leg.robot.parameters import Robot
 
 _LIBRARIES = ("hopping-leg", "mujoco", "numpy", "onnxruntime", "stable-baselines3", "torch")
@@ -45,7 +46,7 @@ class RunFolder:
         parallel_seeds: int = 1,
     ) -> None:
         self.path, self._source = path, source
-        self._defaults = _as_stored(asdict(type(recipe)()))
+        self._defaults = _as_stored(asdict(RECIPES.get(recipe.name, recipe)))
         self.config = _as_stored(
             {
                 "recipe": recipe.name,
@@ -74,7 +75,13 @@ class RunFolder:
     def command(self) -> str:
         """The command that makes such a run."""
         config = self.config
-        words = ["hop train", "--recipe", config["recipe"], "--robot", config["robot"]]
+        words = [
+            "hop train",
+            "--recipe",
+            config["options"]["source"] or config["recipe"],
+            "--robot",
+            config["robot"],
+        ]
         words += ["--seed", str(config["seed"])]
         if config["source"] is not None:
             words += ["--source", config["source"]]
@@ -109,7 +116,7 @@ class RunFolder:
             raise UsageError(f"The run in {self.path} is finished; its policy is {self.policy}.")
         found = list_checkpoints(self.checkpoints)
         if found:
-            return read_checkpoint(found[-1])
+            return upgrade_checkpoint(read_checkpoint(found[-1]))
         return self._from_source() if self._source else None
 
     def _from_source(self) -> Tree:
@@ -117,7 +124,7 @@ class RunFolder:
         found = list_checkpoints(self._source / "checkpoints")
         if not found:
             raise UsageError(f"{self._source} holds no checkpoint to begin from.")
-        return {**read_checkpoint(found[-1]), "history": []}
+        return {**upgrade_checkpoint(read_checkpoint(found[-1])), "history": []}
 
     def write(self, name: str, content: Any) -> None:  # noqa: ANN401
         """Write a JSON file of the folder, whole or not at all."""
@@ -133,7 +140,7 @@ class RunFolder:
         Raises:
             UsageError: It was not; the message names the first difference.
         """
-        stored = json.loads(self._config_file.read_text(encoding="utf-8"))
+        stored = upgrade_config(json.loads(self._config_file.read_text(encoding="utf-8")))
         # A run from before an option existed was asked for what is now its default.
         _complete(stored.get("options", {}), self._defaults)
         stored.setdefault("parallel_seeds", 1)
@@ -155,7 +162,7 @@ def _complete(options: dict[str, Any], defaults: dict[str, Any]) -> None:
 
 def _as_stored(values: dict[str, Any]) -> dict[str, Any]:
     """Return values as JSON gives them back."""
-    stored: dict[str, Any] = json.loads(json.dumps(values))
+    stored: dict[str, Any] = json.loads(json.dumps(values, default=_name))
     return stored
 
 
@@ -175,6 +182,10 @@ def read_result(path: Path) -> dict[str, Any]:
 def library_versions() -> dict[str, str]:
     """Return the versions of the libraries that decide about a training's result."""
     return {k: v for k, v in versions(*_LIBRARIES).items() if k != "python"}
+
+
+def _name(function: object) -> str:
+    return str(getattr(function, "__qualname__", type(function).__qualname__))
 
 
 def _short(value: Any) -> str:  # noqa: ANN401

@@ -33,7 +33,7 @@ class Selection:
     @property
     def next_at(self) -> int:
         """Steps after which the next snapshot is due."""
-        every = self._recipe.eval_every
+        every = self._recipe.selection.eval_every
         return every * (self.rows[-1]["steps"] // every + 1) if self.rows else every
 
     def add(self, steps: int, minutes: float, content: bytes) -> dict[str, Any]:
@@ -72,6 +72,6 @@ class Selection:
         recipe = self._recipe
         policy = Policy(content, "snapshot", recipe.name)
         results = evaluate_policy(
-            policy, self._robot, recipe.eval_commands, seeds, recipe.task.rate
+            policy, self._robot, recipe.selection.eval_commands, seeds, recipe.task.rate
         )
         return {"score_m": score(results), "trials": as_rows(results)}

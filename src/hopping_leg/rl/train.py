@@ -20,7 +20,6 @@ from hopping_leg.rl.onnx_export import build_policy
 from hopping_leg.rl.progress import TrainingProgress
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.run_folder import RunFolder
-from hopping_leg.rl.scale import fit
 from hopping_leg.rl.selection import Selection
 from hopping_leg.robot.parameters import Robot
 
@@ -92,7 +91,7 @@ def train(
     """
     check(robot, minutes, log)
     torch.set_num_threads(max(threads, 1))
-    recipe = fit(recipe, robot)
+    recipe = recipe.fit(robot)
     folder = RunFolder(out, recipe, robot, seed, minutes, source)
     tree = folder.begin(resume=resume)
     trainer = Trainer(recipe, robot, seed, folder, minutes, threads)
@@ -174,17 +173,17 @@ class Trainer:
         self._restored = True
         self._began = time.monotonic()
         done = self.model.num_timesteps
-        self.model._update_current_progress_remaining(done, self.recipe.steps)
+        self.model._update_current_progress_remaining(done, self.recipe.schedule.steps)
 
     def run(self, progress: TrainingProgress) -> Trained:
         """Learn until steps or time are used up; write the selected policy."""
         self._progress = progress
         model, recipe = self.model, self.recipe
-        if self.elapsed < self._seconds and model.num_timesteps < recipe.steps:
+        if self.elapsed < self._seconds and model.num_timesteps < recipe.schedule.steps:
             model.learn(
-                recipe.steps - model.num_timesteps,
+                recipe.schedule.steps - model.num_timesteps,
                 callback=_Watch(self),
-                log_interval=recipe.log_every,
+                log_interval=recipe.schedule.log_every,
                 reset_num_timesteps=not self._restored,
             )
         self._evaluate()
@@ -214,9 +213,12 @@ class Trainer:
         share = 1 - self.model._current_progress_remaining
         self.recipe.anneal(self.model, self.env, share)
         self._tell_early_score()
-        if share >= self.recipe.eval_start and self.model.num_timesteps >= self.selection.next_at:
+        if (
+            share >= self.recipe.selection.eval_start
+            and self.model.num_timesteps >= self.selection.next_at
+        ):
             self._evaluate()
-        if time.monotonic() - self._saved >= self.recipe.checkpoint_seconds:
+        if time.monotonic() - self._saved >= self.recipe.schedule.checkpoint_seconds:
             self.checkpoint()
 
     def _tell_early_score(self) -> None:
@@ -254,7 +256,7 @@ class Trainer:
             steps=int(self.model.num_timesteps),
             versions=self.folder.config["versions"],
         )
-        return build_policy(recipe.network(self.model, self.env), card)
+        return build_policy(recipe.actor(self.model, self.env), card)
 
     def _evaluate(self) -> None:
         steps = int(self.model.num_timesteps)
@@ -276,7 +278,7 @@ class Trainer:
             return
         self._shown = now
         steps = int(self.model.num_timesteps)
-        share = max(steps / self.recipe.steps, self.elapsed / self._seconds)
+        share = max(steps / self.recipe.schedule.steps, self.elapsed / self._seconds)
         self._progress.update(
             min(share, 1.0), steps, self.env.hops, self.env.apex_error, self.selection.describe()
         )

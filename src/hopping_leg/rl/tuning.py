@@ -26,9 +26,9 @@ from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.io import plain
 from hopping_leg.rl.policy_evaluation import FINAL_SEEDS, FIRST_SEED
 from hopping_leg.rl.recipe import Recipe
-from hopping_leg.rl.recipes import change, get_recipe
+from hopping_leg.rl.recipes import SPACES, change, get_recipe
 from hopping_leg.rl.run_folder import read_result
-from hopping_leg.rl.search_space import SPACES, defaults, dimensions, suggest
+from hopping_leg.rl.search_space import SearchSpace, defaults, suggest
 from hopping_leg.rl.train import train
 from hopping_leg.rl.trial_record import ERROR, FOLDER, record
 from hopping_leg.robot import load_robot
@@ -209,7 +209,7 @@ def _lock_before_reading(engine: Engine) -> None:
 def _run_trial(trial: Trial, tuning: Tuning) -> float:
     """Train with a trial's numbers; return the score of the policy it selects, m."""
     space = SPACES[tuning.recipe]
-    recipe = dataclasses.replace(_recipe(tuning), **suggest(trial, space))
+    recipe = _recipe(tuning).replace(suggest(trial, space))
     folder = tuning.out / f"trial-{trial.user_attrs.get(FOLDER, trial.number):04d}"
     if (folder / "policy.onnx").exists():
         return float(read_result(folder)["selected"]["score_m"])
@@ -276,17 +276,15 @@ def _over(study: Study, tuning: Tuning) -> bool:
 
 def _recipe(tuning: Tuning) -> Recipe:
     """Return the recipe with what all trials share."""
-    recipe = dataclasses.replace(
-        get_recipe(tuning.recipe),
-        steps=tuning.steps,
-        eval_every=max(tuning.steps // tuning.snapshots, 1),
+    recipe = get_recipe(tuning.recipe).replace(
+        steps=tuning.steps, eval_every=max(tuning.steps // tuning.snapshots, 1)
     )
     return change(recipe, tuning.fixed)
 
 
-def _searched(tuning: Tuning) -> dict[str, Any]:
+def _searched(tuning: Tuning) -> SearchSpace:
     if tuning.recipe not in SPACES:
         raise UsageError(
             f"Recipe '{tuning.recipe}' has no search space; valid: {', '.join(SPACES)}."
         )
-    return dict(dimensions(SPACES[tuning.recipe]))
+    return SPACES[tuning.recipe]

@@ -107,8 +107,7 @@ class Train:
 
     def _folder(self) -> "RunFolder":
         from hopping_leg.rl.run_folder import RunFolder
-        from hopping_leg.rl.scale import fit
 
         robot = self.robot
-        recipe = fit(self.recipe(), robot)
+        recipe = self.recipe().fit(robot)
         return RunFolder(self.path, recipe, robot, self.seed, None)

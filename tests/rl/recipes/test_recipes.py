@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from hopping_leg.rl.scale import fit
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -18,7 +19,6 @@ from hopping_leg.rl.recipes import (
     recipe_of,
 )
 from hopping_leg.rl.run_folder import RunFolder
-from hopping_leg.rl.scale import fit
 from hopping_leg.robot import load_robot
 from hopping_leg.sim.randomization import Range
 

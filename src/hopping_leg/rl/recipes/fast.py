@@ -5,124 +5,72 @@ PPO on many legs at once. What makes it fast, largest lever first: state-depende
 they were taken, episodes that begin on the hop they should end in.
 """
 
-import math
-from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from hopping_leg.envs import ApexRewardConfig, TaskConfig
+from hopping_leg.rl.algorithms import NetworkConfig, PPOConfig
+from hopping_leg.rl.recipe import Recipe, Schedule, SelectionConfig
+from hopping_leg.rl.search_space import LAYERS, OneOf, Real, SearchSpace
 
-import torch
-from torch import nn
+FAST = Recipe(
+    name="fast",
+    task=TaskConfig(
+        observation="dated",
+        command_range=(0.22, 0.40),
+        command_resampling_time=(1.0, 5.0),
+        reset_distribution="hop",
+        random_episode_start=True,
+        timestep=1e-3,
+    ),
+    reward=ApexRewardConfig(),
+    algorithm=PPOConfig(),
+    network=NetworkConfig(actor=(128, 64), critic=(256, 128)),
+    schedule=Schedule(num_envs=512, steps=6_000_000, log_every=4),
+    selection=SelectionConfig(eval_every=600_000),
+)
 
-from hopping_leg.envs import ApexRewardConfig, Reward, TaskConfig, apex_reward
-from hopping_leg.rl.recipe import Recipe
-from hopping_leg.rl.resumable import ResumablePPO
-from hopping_leg.rl.sb3_env import TaskVecEnv
-from hopping_leg.rl.sb3_policies import AsymmetricPolicy
-from hopping_leg.robot.parameters import Robot
+SEARCH_SPACE: SearchSpace = {
+    "learning_rate": Real(2e-4, 4e-3, log=True),
+    "actor": OneOf(LAYERS),
+    "critic": OneOf(LAYERS),
+    "gamma": Real(0.97, 0.997),
+    "gae_lambda": Real(0.90, 0.99),
+    "sde_sample_freq": OneOf((0, 8, 16, 24, 40)),
+    "n_steps": OneOf((32, 64, 128)),
+    "batch_size": OneOf((1024, 2048, 4096, 8192)),
+    "n_epochs": OneOf((2, 4, 8)),
+    "log_std_until": Real(0.3, 1.0),
+}
 
+# gSDE's noise over its weights' noise early in training is e^1.6, the norm of the last layer.
+_WHITE = {"sde_sample_freq": 0, "log_std": (-2.0 + 1.6, -3.8 + 1.6)}
 
-@dataclass(frozen=True)
-class FastRecipe(Recipe):
-    """PPO + gSDE on dated joint samples, with an asymmetric critic and the apex reward."""
-
-    name: ClassVar[str] = "fast"
-
-    task: TaskConfig = field(
-        default_factory=lambda: TaskConfig(
-            observation="dated",
-            command_range=(0.22, 0.40),
-            command_resampling_time=(1.0, 5.0),
-            reset_distribution="hop",
-            random_episode_start=True,
-            timestep=1e-3,
-        )
-    )
-    reward: ApexRewardConfig = field(default_factory=ApexRewardConfig)
-    """Apex reward."""
-    num_envs: int = 512
-    """Legs that gather experience at once."""
-    steps: int = 6_000_000
-    """Control steps of experience in all, summed over the legs."""
-    eval_every: int = 600_000
-    """Control steps between two trials of the deterministic policy, for checkpoint selection."""
-    log_every: int = 4
-    """Updates between two entries in the TensorBoard log."""
-    actor: tuple[int, ...] = (128, 64)
-    """Hidden layers of the actor, tanh."""
-    critic: tuple[int, ...] = (256, 128)
-    """Hidden layers of the critic, tanh."""
-    learning_rate: float = 1e-3
-    """At the start; falls along a cosine to a fiftieth, so that late snapshots do not drift."""
-    n_steps: int = 64
-    """Ticks between updates, each leg."""
-    batch_size: int = 4096
-    """Ticks per gradient step."""
-    n_epochs: int = 4
-    """Passes over a rollout."""
-    gamma: float = 0.99
-    """Discount per tick."""
-    gae_lambda: float = 0.97
-    """Of the advantage estimate."""
-    sde_sample_freq: int = 24
-    """Ticks that gSDE keeps its noise, 0.12 s: about a push-off; 0 explores with white noise."""
-    log_std: tuple[float, float] = (-2.0, -3.8)
-    """Log standard deviation of gSDE's weights at the start and from ``log_std_until`` on."""
-    log_std_until: float = 0.6
-    """Share of the training after which exploration quietens no more."""
-
-    def make_reward(self, robot: Robot) -> Reward:
-        """Build the apex reward."""
-        return apex_reward(robot, self.reward, self.task.rate)
-
-    def make_model(self, env: TaskVecEnv, seed: int) -> ResumablePPO:
-        """Build PPO with gSDE and an asymmetric critic."""
-        seen = {"actor_size": env.task.observation.size} if self.privileged_critic else {}
-        return ResumablePPO(
-            AsymmetricPolicy if self.privileged_critic else "MlpPolicy",
-            env,
-            **self.ppo_options(seed),
-            policy_kwargs={**self.network_options(), **seen},
-        )
-
-    def ppo_options(self, seed: int) -> dict[str, Any]:
-        """Return what PPO is built with, the policy's options apart."""
-        return {
-            "learning_rate": self.rate,
-            "n_steps": self.n_steps,
-            "batch_size": self.batch_size,
-            "n_epochs": self.n_epochs,
-            "gamma": self.gamma,
-            "gae_lambda": self.gae_lambda,
-            "ent_coef": 0.0,
-            "vf_coef": 1.0,
-            "max_grad_norm": 1.0,
-            "use_sde": self.sde_sample_freq > 0,
-            "sde_sample_freq": self.sde_sample_freq or -1,
-            "seed": seed,
-            "device": "cpu",
-        }
-
-    def network_options(self) -> dict[str, Any]:
-        """Return what actor and critic are built with."""
-        return {
-            "net_arch": {"pi": list(self.actor), "vf": list(self.critic)},
-            "activation_fn": nn.Tanh,
-            "log_std_init": self.log_std[0],
-        }
-
-    def rate(self, left: float) -> float:
-        """Return the learning rate where a share of the training is left, 1 to 0."""
-        return self.learning_rate * cosine(left)
-
-    def anneal(self, model: Any, env: TaskVecEnv, share: float) -> None:  # noqa: ANN401
-        """Sharpen the reward and quieten exploration."""
-        env.task.reward.anneal(share)
-        first, last = self.log_std
-        with torch.no_grad():
-            model.policy.log_std.fill_(
-                first + (last - first) * min(1.0, share / self.log_std_until)
-            )
-
-
-def cosine(left: float) -> float:
-    """Fall from 1 to 0.02 as the share of the budget that is left falls from 1 to 0."""
-    return 0.02 + 0.98 * (1 + math.cos(math.pi * (1 - left))) / 2
+VARIANTS = {
+    "recipe": ("the recipe", FAST),
+    "three-samples": (
+        "the paper's three samples, which do not tell their age",
+        FAST.replace({"task.observation": "three-samples"}),
+    ),
+    "cheap-jerk": (
+        "a third of the price for jerky actions, the paper's",
+        FAST.replace({"reward.jerk": 0.05}),
+    ),
+    "white-noise": (
+        "white exploration noise of the same size instead of gSDE",
+        FAST.replace(_WHITE),
+    ),
+    "blind-critic": (
+        "critic on the actor's observation",
+        FAST.replace(privileged_critic=False),
+    ),
+    "no-event": ("no reward at the apex", FAST.replace({"reward.apex": 0})),
+    "no-patience": (
+        "the apex pays alike however soon it follows the last",
+        FAST.replace({"reward.full_period": 1e-9}),
+    ),
+    "no-prediction": ("no predicted apex in flight", FAST.replace({"reward.predicted": 0})),
+    "standing-starts": (
+        "every episode starts standing",
+        FAST.replace({"task.reset_distribution": "standing"}),
+    ),
+    "coarse-physics": ("physics at 2.5 ms in training", FAST.replace({"task.timestep": 2.5e-3})),
+}
+"""By name, what is different in words, and the recipe without one of its parts."""
