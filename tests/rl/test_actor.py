@@ -1,5 +1,3 @@
-import dataclasses
-
 import numpy as np
 import pytest
 import torch
@@ -8,7 +6,7 @@ from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.envs.observation import PaperObservation, sample_scaling
 from hopping_leg.rl.onnx_export import build_policy
 from hopping_leg.sim.channel import Measurement
-from tests.rl.learners import ROBOT, TINY, TINY_FAST, TinyPPO, learner
+from tests.rl.learners import ROBOT, TINY, TINY_FAST, TINY_PPO, learner
 
 
 def measurement(count):
@@ -21,9 +19,9 @@ def measurement(count):
     )
 
 
-@pytest.mark.parametrize("recipe", [TINY, TinyPPO()], ids=["sac", "ppo"])
+@pytest.mark.parametrize("recipe", [TINY, TINY_PPO], ids=["sac", "ppo"])
 def test_policy_file_gives_the_actors_torques(recipe):
-    recipe = dataclasses.replace(recipe, hidden=(32, 32), privileged_critic=False)
+    recipe = recipe.replace(actor=(32, 32), critic=(32, 32), privileged_critic=False)
     model = learner(recipe)
     with torch.no_grad():
         for parameter in model.policy.parameters():
@@ -31,7 +29,7 @@ def test_policy_file_gives_the_actors_torques(recipe):
     env = model.env
     scale = recipe.task.action_torque
     card = Card("test", recipe.task.observation, 0.25, 0.35, scale, ROBOT.name, ROBOT.digest, 200.0)
-    policy = Policy(build_policy(recipe.network(model, env), card), "memory", "test")
+    policy = Policy(build_policy(recipe.actor(model, env), card), "memory", "test")
     policy.reset(50)
     m = measurement(50)
     samples = np.concatenate([m.q, m.qd, m.command[..., None]], axis=-1)
@@ -44,11 +42,11 @@ def test_policy_file_gives_the_actors_torques(recipe):
 
 def test_a_dated_policy_file_sees_what_its_task_shows():
     """Run beside the task on the same measurements, the file gives the actor's torques."""
-    recipe = dataclasses.replace(TINY_FAST, task=dataclasses.replace(TINY_FAST.task, episode=100.0))
+    recipe = TINY_FAST.replace({"task.episode": 100.0})
     model = learner(recipe)
     task, scale = model.env.task, recipe.task.action_torque
     card = Card("test", "dated", 0.22, 0.4, scale, ROBOT.name, ROBOT.digest, 200.0)
-    policy = Policy(build_policy(recipe.network(model, model.env), card), "memory", "test")
+    policy = Policy(build_policy(recipe.actor(model, model.env), card), "memory", "test")
     seen = model.env.reset()
     policy.reset(task.count)
     for _ in range(30):

@@ -15,6 +15,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.rl import parallel_seeds as module
 from hopping_leg.rl import policy_evaluation
 from hopping_leg.rl.checkpoint import list_checkpoints
+from hopping_leg.rl.distillation.distillation import Distillation
 from hopping_leg.rl.parallel_seeds import ParallelSeeds
 from hopping_leg.rl.policy_evaluation import (
     DECIDING_SEEDS,
@@ -78,7 +79,7 @@ def test_the_best_goes_on_with_the_threads_of_all(scores, best, finished, tmp_pa
 
 def test_a_start_stops_at_the_exam_of_its_teacher_and_goes_on_from_there(tmp_path, monkeypatch):
     monkeypatch.setattr(policy_evaluation, "_SECONDS", 0.5)
-    monkeypatch.setattr(TINY_PRECISE.__class__, "evaluate_teacher", lambda *_args: 0.005)
+    monkeypatch.setattr(Distillation, "evaluate_teacher", lambda *_args: 0.005)
     several = ParallelSeeds(TINY_PRECISE, ROBOT, 1, tmp_path, 2, quiet=True)
     several.work(1)
     run = several.folder(1)
@@ -87,7 +88,7 @@ def test_a_start_stops_at_the_exam_of_its_teacher_and_goes_on_from_there(tmp_pat
     (last,) = list_checkpoints(run / "checkpoints")
     stopped = int(last.name.split("-")[-1])
     # Each of three teachers learns for a third of 0.4 of the steps.
-    assert TINY_PRECISE.steps * 0.4 / 3 <= stopped < TINY_PRECISE.steps / 2
+    assert TINY_PRECISE.schedule.steps * 0.4 / 3 <= stopped < TINY_PRECISE.schedule.steps / 2
     assert not (run / "policy.onnx").exists()
     several.work(1)
     assert list_checkpoints(run / "checkpoints") == [last]
@@ -146,11 +147,11 @@ def test_no_start_and_several_from_one_source_are_refused(count, says, tmp_path)
 
 
 _SEVERAL = """
-import dataclasses, sys
+import sys
 from pathlib import Path
 from hopping_leg.rl.parallel_seeds import ParallelSeeds
 from tests.rl.learners import ROBOT, TINY
-recipe = dataclasses.replace(TINY, steps=1600, checkpoint_seconds=0.0, eval_commands=(0.3,))
+recipe = TINY.replace(steps=1600, checkpoint_seconds=0.0, eval_commands=(0.3,))
 ParallelSeeds(recipe, ROBOT, 1, Path(sys.argv[1]), 2, quiet=True).train(resume=True)
 """
 

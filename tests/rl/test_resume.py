@@ -1,4 +1,3 @@
-import dataclasses
 import json
 import os
 import subprocess
@@ -21,15 +20,13 @@ from tests.rl.learners import (
     TINY,
     TINY_ADAPTIVE,
     TINY_FAST,
+    TINY_GRU,
+    TINY_PPO,
     TINY_PRECISE,
-    TINY_RECURRENT,
-    TinyPPO,
     learner,
 )  # fmt: skip
 
-SURPRISED = dataclasses.replace(
-    TINY_PRECISE, task=dataclasses.replace(TINY_PRECISE.task, randomised=WIDE_RANGES)
-)
+SURPRISED = TINY_PRECISE.replace({"task.randomised": WIDE_RANGES})
 
 
 def disturb_all_generators():
@@ -41,11 +38,11 @@ def disturb_all_generators():
     "recipe",
     [
         TINY,
-        TinyPPO(),
+        TINY_PPO,
         TINY_FAST,
         TINY_PRECISE,
         SURPRISED,
-        TINY_RECURRENT,
+        TINY_GRU,
         TINY_ADAPTIVE,
     ],
     ids=["sac", "ppo", "fast", "precise", "surprised", "recurrent", "adaptive"],
@@ -55,21 +52,21 @@ def test_resuming_equals_never_having_stopped(recipe, tmp_path):
     trees = []
 
     def keep():
-        if straight.num_timesteps >= recipe.steps // 2 and not trees:
+        if straight.num_timesteps >= recipe.schedule.steps // 2 and not trees:
             trees.append(write_checkpoint(tmp_path, straight.num_timesteps, state_of(straight)))
 
     def boundary(model):
         recipe.anneal(model, model.env, 1 - model._current_progress_remaining)
 
     straight.on_boundary = lambda: (boundary(straight), keep())
-    straight.learn(recipe.steps)
+    straight.learn(recipe.schedule.steps)
     disturb_all_generators()
     # Which legs there are is drawn from the seed; all else comes from the checkpoint.
     resumed = learner(recipe, seed=3 if recipe.task.randomised else 99)
     resumed.on_boundary = lambda: boundary(resumed)
     restore(resumed, read_checkpoint(trees[0]))
-    assert 0 < resumed.num_timesteps < recipe.steps
-    resumed.learn(recipe.steps - resumed.num_timesteps, reset_num_timesteps=False)
+    assert 0 < resumed.num_timesteps < recipe.schedule.steps
+    resumed.learn(recipe.schedule.steps - resumed.num_timesteps, reset_num_timesteps=False)
     assert resumed.num_timesteps == straight.num_timesteps
     before, after = straight.policy.state_dict(), resumed.policy.state_dict()
     assert all(torch.equal(before[name], after[name]) for name in before)
@@ -107,7 +104,7 @@ def test_no_checkpoint_holds_a_pickle(tmp_path):
 def test_a_run_is_never_overwritten_or_mixed(tmp_path, monkeypatch):
     monkeypatch.setattr(policy_evaluation, "_SECONDS", 0.5)
     out = tmp_path / "run"
-    recipe = dataclasses.replace(TINY, steps=64, eval_every=32, learning_starts=32)
+    recipe = TINY.replace(steps=64, eval_every=32, learning_starts=32)
     done = module.train(recipe, ROBOT, 0, out, quiet=True)
     content = done.policy.read_bytes()
     with pytest.raises(UsageError, match="--resume"):
@@ -123,11 +120,10 @@ _KILLED = """
 import sys
 from pathlib import Path
 from tests.rl.learners import ROBOT, TINY
-import dataclasses
 from hopping_leg.rl import policy_evaluation
 from hopping_leg.rl.train import train
 policy_evaluation._SECONDS = 0.5
-recipe = dataclasses.replace(TINY, steps=1600, checkpoint_seconds=0.0, eval_every=800)
+recipe = TINY.replace(steps=1600, checkpoint_seconds=0.0, eval_every=800)
 train(recipe, ROBOT, 0, Path(sys.argv[1]), resume=True, quiet=True)
 """
 
@@ -161,13 +157,11 @@ def test_killed_runs_end_like_the_run_that_was_left_alone(tmp_path):
 def test_a_run_can_begin_where_another_stopped(tmp_path, monkeypatch):
     monkeypatch.setattr(policy_evaluation, "_SECONDS", 0.5)
     first, second = tmp_path / "first", tmp_path / "second"
-    recipe = dataclasses.replace(
-        TINY, steps=128, eval_every=64, learning_starts=32, checkpoint_seconds=0
-    )
+    recipe = TINY.replace(steps=128, eval_every=64, learning_starts=32, checkpoint_seconds=0)
     module.train(recipe, ROBOT, 0, first, quiet=True)
     with pytest.raises(UsageError, match="no checkpoint"):
         module.train(recipe, ROBOT, 0, second, source=tmp_path, quiet=True)
-    longer = dataclasses.replace(recipe, steps=256, learning_rate=1e-4)
+    longer = recipe.replace(steps=256, learning_rate=1e-4)
     shares = []
     monkeypatch.setattr(type(longer), "anneal", lambda *args: shares.append(args[-1]))
     trained = module.train(longer, ROBOT, 0, second, source=first, quiet=True)

@@ -1,5 +1,3 @@
-import dataclasses
-
 import numpy as np
 import pytest
 import torch
@@ -64,5 +62,5 @@ def test_asymmetric_actor_ignores_the_true_state_and_the_critic_uses_it():
         policy._predict(a, deterministic=True), policy._predict(b, deterministic=True)
     )
     assert not torch.allclose(policy.predict_values(a), policy.predict_values(b))
-    network = dataclasses.replace(TINY).network(model, model.env)
+    network = TINY.actor(model, model.env)
     assert network.layers[0][0].shape == (8, SIZE)

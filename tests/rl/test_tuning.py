@@ -15,8 +15,8 @@ from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.evaluate.figures import to_svg
 from hopping_leg.evaluate.figures.tuning import FIGURES
 from hopping_leg.rl import policy_evaluation, tuning
-from hopping_leg.rl.recipes import RECIPES
-from hopping_leg.rl.search_space import SPACES, defaults, dimensions
+from hopping_leg.rl.recipes import RECIPES, SPACES
+from hopping_leg.rl.search_space import defaults
 from hopping_leg.rl.tuning import Tuning, open_study, tune
 from tests.clusters import local
 
@@ -36,7 +36,7 @@ def trained(monkeypatch):
 
     def train(recipe, robot, seed, folder, *, resume, quiet, on_snapshot):
         calls.append((recipe, folder))
-        score = abs(recipe.learning_rate - 1e-3) + 0.01
+        score = abs(recipe.algorithm.learning_rate - 1e-3) + 0.01
         for steps in (25, 50, 75, 100):
             on_snapshot(steps, score * (2 - steps / 100))
         folder.mkdir(parents=True, exist_ok=True)
@@ -49,8 +49,8 @@ def trained(monkeypatch):
 
 @pytest.mark.parametrize("name", SPACES)
 def test_every_searched_number_is_the_recipes_and_its_own_value_can_be_found(name):
-    recipe = RECIPES[name]()
-    assert dimensions(SPACES[name]).keys() <= {f.name for f in dataclasses.fields(recipe)}
+    recipe = RECIPES[name]
+    assert SPACES[name].keys() <= dict(recipe.paths()).keys()
     stored = defaults(recipe, SPACES[name])
     assert all(isinstance(value, int | float | str) for value in stored.values())
 
@@ -58,9 +58,9 @@ def test_every_searched_number_is_the_recipes_and_its_own_value_can_be_found(nam
 def test_the_first_trial_is_the_recipe_as_it_is_and_all_are_recorded(small, trained):
     result = tune(small)
     (first, folder), *_ = trained
-    assert first.learning_rate == RECIPES["fast"]().learning_rate
-    assert first.actor == RECIPES["fast"]().actor
-    assert (first.steps, first.eval_every) == (100, 25)
+    fast = RECIPES["fast"]
+    assert (first.algorithm, first.network) == (fast.algorithm, fast.network)
+    assert (first.schedule.steps, first.selection.eval_every) == (100, 25)
     assert folder == small.out / "trial-0000"
     trials = result["trials"]
     assert [trial["number"] for trial in trials] == list(range(6))

@@ -38,7 +38,7 @@ def test_a_study_can_change_the_recipe_but_for_its_steps(tmp_path):
     )
     recipe = Train(one, one.twins[0], one.methods[0], 0).recipe()
     assert recipe.task.fall_penalty == 0.7
-    assert recipe.steps == 5
+    assert recipe.schedule.steps == 5
 
 
 def test_a_training_that_goes_beyond_its_steps_is_done_once(tmp_path):

@@ -2,7 +2,8 @@
 
 import pytest
 from studies.ablations import run as bench
-from studies.ablations.variants import ABLATIONS
+
+from hopping_leg.rl.recipes import VARIANTS
 
 
 def row(command, error, skipped):
@@ -20,13 +21,13 @@ def test_all_variants_train_as_long_and_are_summed_up(monkeypatch, tmp_path, rob
     trained = []
 
     def train(recipe, _robot, out, **_options):
-        trained.append((out.name, recipe.steps))
+        trained.append((out.name, recipe.schedule.steps))
         hops = None if out.name == "no-event" else -0.003
         return trained_to(row(0.25, 0.001, 0), row(0.35, hops, 2), exams=[0.004])
 
     monkeypatch.setattr(bench, "bench_training", train)
     result = bench.bench_ablation("fast", robot, tmp_path, steps=1000)
-    assert trained == [(a.name, 1000) for a in ABLATIONS["fast"]()]
+    assert trained == [(name, 1000) for name in VARIANTS["fast"]]
     found = {variant["variant"]: variant for variant in result["variants"]}
     assert found["recipe"]["worst_abs_median_error_m"] == pytest.approx(0.003)
     assert found["recipe"]["mean_abs_median_error_m"] == pytest.approx(0.002)

@@ -8,6 +8,7 @@ from studies.limits.teacher_of_run import teacher_of_run
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.checkpoint import write_checkpoint
+from hopping_leg.rl.distillation.distillation import make_teacher
 from hopping_leg.rl.recipes import change, get_recipe
 from hopping_leg.rl.resumable import learner_state
 from hopping_leg.rl.run_folder import RunFolder
@@ -75,7 +76,7 @@ def test_its_torques_can_err_as_an_imitators_do(tmp_path):
     model = stop_early(tmp_path)
     task, recipe = model.env.task, get_recipe("precise")
     right, wrong = (
-        recipe.make_teacher(model.policy, ROBOT, teacher_action_noise)
+        make_teacher(model.policy, ROBOT, recipe.task, teacher_action_noise)
         for teacher_action_noise in (0.0, 0.05)
     )
 

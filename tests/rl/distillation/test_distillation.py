@@ -1,19 +1,30 @@
 """The precise recipe: a teacher on the true state, a student that comes to act like it."""
 
-import dataclasses
 from unittest.mock import Mock
 
 import numpy as np
 import pytest
 import torch
 
+from hopping_leg.rl.distillation import distillation
 from hopping_leg.rl.distillation.teacher_student import shift_to_arrival
-from hopping_leg.rl.recipes import precise
-from hopping_leg.rl.recipes.precise import PreciseRecipe
+from hopping_leg.rl.recipes.precise import PRECISE
 from hopping_leg.sim.randomization import WIDE_RANGES
 from tests.rl.learners import ROBOT, TINY_PRECISE, learner
 
-RECIPE = PreciseRecipe(num_envs=8, batch_size=512)
+RECIPE = PRECISE.replace(num_envs=8, batch_size=512)
+DISTILLATION = PRECISE.distillation
+RATE = PRECISE.algorithm.learning_rate
+COMMANDS = PRECISE.selection.eval_commands
+
+
+def rate(left):
+    """Return the learning rate where no teacher is accepted before the last one."""
+    return DISTILLATION.pace(1 - left, (), RATE)
+
+
+def evaluate(policy):
+    return DISTILLATION.evaluate_teacher(policy, ROBOT, RECIPE.task, COMMANDS)
 
 
 @pytest.fixture(scope="module")
@@ -57,28 +68,28 @@ def test_the_teacher_learns_first_and_guides_the_student_ever_less(model):
     mixing = []
     for share in shares:
         RECIPE.anneal(model, model.env, share)
-        assert policy.student_learns == (share >= RECIPE.teacher_share)
+        assert policy.student_learns == (share >= DISTILLATION.teacher_share)
         mixing.append(policy.mixing)
-    student_progress = np.array(mixing)[shares >= RECIPE.teacher_share]
+    student_progress = np.array(mixing)[shares >= DISTILLATION.teacher_share]
     assert student_progress[0] > 0.8
     assert (np.diff(student_progress) <= 0).all()
     assert student_progress[-1] == 0
 
 
 def test_learning_rates_fall_for_the_teacher_and_again_for_the_student():
-    left = 1 - RECIPE.teacher_share
-    assert RECIPE.rate(1.0) == RECIPE.learning_rate
-    assert RECIPE.rate(left + 1e-6) < 0.03 * RECIPE.learning_rate
-    assert RECIPE.rate(left - 1e-6) > 0.9 * RECIPE.learning_rate
-    assert RECIPE.rate(0.0) < 0.03 * RECIPE.learning_rate
+    left = 1 - DISTILLATION.teacher_share
+    assert rate(1.0) == RATE
+    assert rate(left + 1e-6) < 0.03 * RATE
+    assert rate(left - 1e-6) > 0.9 * RATE
+    assert rate(0.0) < 0.03 * RATE
 
 
 def test_every_teacher_learns_from_the_start_at_the_full_rate():
-    each = RECIPE.teacher_share / RECIPE.teachers
-    for number in range(RECIPE.teachers):
+    each = DISTILLATION.teacher_share / DISTILLATION.teachers
+    for number in range(DISTILLATION.teachers):
         begun = 1 - number * each
-        assert RECIPE.rate(begun - 1e-6) > 0.9 * RECIPE.learning_rate
-        assert RECIPE.rate(begun - each + 1e-6) < 0.03 * RECIPE.learning_rate
+        assert rate(begun - 1e-6) > 0.9 * RATE
+        assert rate(begun - each + 1e-6) < 0.03 * RATE
 
 
 def test_the_teacher_with_the_best_score_teaches():
@@ -91,7 +102,7 @@ def test_the_teacher_with_the_best_score_teaches():
 
     chooser = learner(TINY_PRECISE)
     chooser._evaluate_teacher = evaluate_teacher
-    learnt = np.linspace(0, TINY_PRECISE.teacher_share, 7)
+    learnt = np.linspace(0, TINY_PRECISE.distillation.teacher_share, 7)
     for share in learnt:
         TINY_PRECISE.anneal(chooser, chooser.env, share)
         with torch.no_grad():
@@ -111,11 +122,11 @@ def test_the_teacher_with_the_best_score_teaches():
 
 
 def test_a_teacher_that_passes_gives_the_time_of_the_next_ones_to_the_policy():
-    recipe = dataclasses.replace(TINY_PRECISE, teacher_accept_score=0.01)
+    recipe = TINY_PRECISE.replace(teacher_accept_score=0.01)
     scores = iter([0.03, 0.005])
     chooser = learner(recipe)
     chooser._evaluate_teacher = lambda policy: next(scores)
-    until = recipe.teacher_share * 2 / recipe.teachers
+    until = recipe.distillation.teacher_share * 2 / recipe.distillation.teachers
     for share in (0.0, until / 2, until - 1e-3):
         recipe.anneal(chooser, chooser.env, share)
         assert not chooser.policy.student_learns
@@ -123,60 +134,39 @@ def test_a_teacher_that_passes_gives_the_time_of_the_next_ones_to_the_policy():
     assert chooser.teacher_scores == [0.03, 0.005]
     assert chooser.policy.student_learns
     assert chooser.policy.mixing == 1.0
-    recipe.anneal(chooser, chooser.env, recipe.teacher_share)
+    recipe.anneal(chooser, chooser.env, recipe.distillation.teacher_share)
     assert len(chooser.teacher_scores) == 2
     assert chooser.policy.mixing < 1.0
 
 
 def test_the_policys_rate_falls_from_when_its_teacher_passed():
-    teacher_scores = [*[0.03] * len(RECIPE.exam_at), RECIPE.teacher_accept_score]
-    until = RECIPE.student_from(teacher_scores)
-    assert until == pytest.approx(RECIPE.teacher_share * (1 + RECIPE.exam_at[0]) / RECIPE.teachers)
-    assert RECIPE.pace(until, teacher_scores) == pytest.approx(RECIPE.learning_rate)
-    middle, end = (RECIPE.pace(share, teacher_scores) for share in ((1 + until) / 2, 1.0))
-    assert RECIPE.learning_rate > middle > end
-    assert RECIPE.student_progress(until, teacher_scores) == 0
-    assert RECIPE.student_progress(1.0, teacher_scores) == 1
-
-
-def test_a_teacher_is_examined_several_times_and_its_best_counts():
-    recipe = dataclasses.replace(TINY_PRECISE, teachers=2, exam_at=(0.5, 1.0))
-    scores = iter([0.02, 0.9, 0.04, 0.03])
-    kept = []
-
-    def evaluate_teacher(policy):
-        kept.append(policy.action_net.bias.detach().clone())
-        return next(scores)
-
-    chooser = learner(recipe)
-    chooser._evaluate_teacher = evaluate_teacher
-    for share in recipe.teacher_share * np.array([0.0, 0.24, 0.25, 0.49, 0.5, 0.75, 1.0]):
-        recipe.anneal(chooser, chooser.env, share)
-        assert len(chooser.teacher_scores) == 4 * share // recipe.teacher_share
-        with torch.no_grad():
-            chooser.policy.action_net.bias += 1.0
-    with torch.no_grad():
-        chooser.policy.action_net.bias -= 1.0
-    assert chooser.teacher_scores == [0.02, 0.9, 0.04, 0.03]
-    torch.testing.assert_close(chooser.policy.action_net.bias.detach(), kept[0])
+    teacher_scores = [0.03, DISTILLATION.teacher_accept_score]
+    until = DISTILLATION.student_from(teacher_scores)
+    assert until == pytest.approx(DISTILLATION.teacher_share * 2 / DISTILLATION.teachers)
+    assert DISTILLATION.pace(until, teacher_scores, RATE) == pytest.approx(RATE)
+    middle, end = (
+        DISTILLATION.pace(share, teacher_scores, RATE) for share in ((1 + until) / 2, 1.0)
+    )
+    assert RATE > middle > end
+    assert DISTILLATION.student_progress(until, teacher_scores) == 0
+    assert DISTILLATION.student_progress(1.0, teacher_scores) == 1
 
 
 def test_a_single_teacher_takes_no_exam():
-    alone = dataclasses.replace(TINY_PRECISE, teachers=1)
+    alone = TINY_PRECISE.replace(teachers=1)
     model = learner(alone)
-    for share in (0.0, alone.teacher_share, 1.0):
+    for share in (0.0, alone.distillation.teacher_share, 1.0):
         alone.anneal(model, model.env, share)
     assert model.teacher_scores == []
     assert alone.extra_results(model) == {}
 
 
 def test_an_exam_tells_a_teacher_that_does_not_hop():
-    recipe = dataclasses.replace(TINY_PRECISE, eval_commands=(0.25, 0.35))
-    model = learner(recipe)
+    model = learner(TINY_PRECISE)
     with torch.no_grad():
         for weight in model.policy.action_net.parameters():
             weight.zero_()
-    assert recipe.evaluate_teacher(model.policy, ROBOT) >= 1.0
+    assert evaluate(model.policy) >= 1.0
 
 
 def test_an_exam_counts_the_worst_height_under_errors(monkeypatch):
@@ -187,12 +177,12 @@ def test_an_exam_counts_the_worst_height_under_errors(monkeypatch):
         scores = dict.fromkeys(commands, 0.002) | {commands[1]: 0.01}
         return [Mock(score=score, flight_fraction=0.6) for score in scores.values()]
 
-    monkeypatch.setattr(precise, "evaluate_policy", judged)
-    monkeypatch.setattr(precise, "command_score", lambda result: result.score)
-    assert RECIPE.evaluate_teacher(learner(TINY_PRECISE).policy, ROBOT) == 0.01
-    assert asked["teacher_action_noise"] == RECIPE.teacher_action_noise > 0
+    monkeypatch.setattr(distillation, "evaluate_policy", judged)
+    monkeypatch.setattr(distillation, "command_score", lambda result: result.score)
+    assert evaluate(learner(TINY_PRECISE).policy) == 0.01
+    assert asked["teacher_action_noise"] == DISTILLATION.teacher_action_noise > 0
     heights = asked["commands"]
-    assert (heights[0], heights[-1]) == (min(RECIPE.eval_commands), max(RECIPE.eval_commands))
+    assert (heights[0], heights[-1]) == (min(COMMANDS), max(COMMANDS))
     assert np.diff(heights).max() < 0.011
 
 
@@ -202,10 +192,10 @@ def test_an_exam_counts_time_on_the_ground_beyond_half(monkeypatch):
     def judged(teacher, robot, commands, rate, threads):
         return [Mock(score=0.003, flight_fraction=next(flights))]
 
-    monkeypatch.setattr(precise, "evaluate_policy", judged)
-    monkeypatch.setattr(precise, "command_score", lambda result: result.score)
+    monkeypatch.setattr(distillation, "evaluate_policy", judged)
+    monkeypatch.setattr(distillation, "command_score", lambda result: result.score)
     policy = learner(TINY_PRECISE).policy
-    scores = [RECIPE.evaluate_teacher(policy, ROBOT) for _ in range(3)]
+    scores = [evaluate(policy) for _ in range(3)]
     assert scores == pytest.approx([0.003, 0.003, 0.011])
 
 
@@ -231,7 +221,7 @@ def test_imitation_brings_the_student_to_its_teacher_and_leaves_the_teacher_alon
 
 
 def test_the_exported_network_is_the_student(model, seen):
-    network = RECIPE.network(model, model.env)
+    network = RECIPE.actor(model, model.env)
     x = seen[:, : model.env.task.observation.size].double().numpy()
     for weight, bias in network.layers[:-1]:
         x = np.tanh(x @ weight.T + bias)
@@ -243,13 +233,12 @@ def test_the_exported_network_is_the_student(model, seen):
 
 def test_its_range_lies_within_what_the_leg_reaches():
     low, high = RECIPE.task.command_bounds
-    assert low < min(RECIPE.eval_commands) < max(RECIPE.eval_commands) < high
+    assert low < min(COMMANDS) < max(COMMANDS) < high
     assert ROBOT.straight_height > low
 
 
 def test_the_papers_observation_can_be_taught_too():
-    task = dataclasses.replace(TINY_PRECISE.task, observation="three-samples")
-    model = learner(dataclasses.replace(TINY_PRECISE, task=task))
+    model = learner(TINY_PRECISE.replace({"task.observation": "three-samples"}))
     model.on_boundary = lambda: setattr(model.policy, "student_learns", True)
     model.learn(128)
     assert model.policy.measured == 15
@@ -257,11 +246,10 @@ def test_the_papers_observation_can_be_taught_too():
 
 
 def test_legs_differ_for_the_policy_but_not_for_its_teacher():
-    task = dataclasses.replace(TINY_PRECISE.task, randomised=WIDE_RANGES)
-    recipe = dataclasses.replace(TINY_PRECISE, task=task)
+    recipe = TINY_PRECISE.replace({"task.randomised": WIDE_RANGES})
     model = learner(recipe)
     apart = []
-    for share in (0.0, recipe.teacher_share):
+    for share in (0.0, recipe.distillation.teacher_share):
         recipe.anneal(model, model.env, share)
         legs = model.env.task.legs
         legs.stand(slice(None), [0.7, -1.4], 0.05)

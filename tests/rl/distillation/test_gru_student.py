@@ -1,26 +1,21 @@
 """The recurrent recipe: its policy file remembers as its student does."""
 
-import dataclasses
-
 import numpy as np
 import torch
 
 from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.envs.task import HoppingTask
 from hopping_leg.rl.onnx_export import build_policy
-from tests.rl.learners import ROBOT, TINY_RECURRENT, learner
+from tests.rl.learners import ROBOT, TINY_GRU, learner
 
 
 def test_the_policy_file_acts_as_the_student():
-    recipe = dataclasses.replace(
-        TINY_RECURRENT,
-        task=dataclasses.replace(
-            TINY_RECURRENT.task, reset_distribution="standing", random_episode_start=False
-        ),
+    recipe = TINY_GRU.replace(
+        {"task.reset_distribution": "standing", "task.random_episode_start": False}
     )
     model = learner(recipe)
     task: HoppingTask = model.env.task
-    network = recipe.network(model, model.env)
+    network = recipe.actor(model, model.env)
     card = Card(
         "recurrent", recipe.task.observation, *recipe.task.command_bounds,
         recipe.task.action_torque, ROBOT.name, ROBOT.digest, recipe.task.rate,

@@ -19,19 +19,16 @@ def policy_of(recipe, model):
         "adaptive", recipe.task.observation, *recipe.task.command_bounds,
         recipe.task.action_torque, ROBOT.name, ROBOT.digest, recipe.task.rate,
     )  # fmt: skip
-    return Policy(build_policy(recipe.network(model, model.env), card), "a test", "adaptive")
+    return Policy(build_policy(recipe.actor(model, model.env), card), "a test", "adaptive")
 
 
 def test_the_policy_file_acts_as_the_student_and_aims_as_it_does():
-    recipe = dataclasses.replace(
-        TINY_ADAPTIVE,
-        command_integrator=dataclasses.replace(
-            TINY_ADAPTIVE.command_integrator, start=0.0, share=5.0
-        ),
-        task=dataclasses.replace(
-            TINY_ADAPTIVE.task, reset_distribution="standing", random_episode_start=False
-        ),
-    )
+    recipe = TINY_ADAPTIVE.replace(
+        {
+            "integrator.start": 0.0, "integrator.share": 5.0,
+            "task.reset_distribution": "standing", "task.random_episode_start": False,
+        }
+    )  # fmt: skip
     model = learner(recipe)
     model.policy.student.trust = 1.0
     task, student = model.env.task, model.policy.student
@@ -72,7 +69,7 @@ def test_an_aim_follows_the_truth_by_its_share_of_every_hop(command):
     pass_by(command - 0.5, 0.0, 22 + 5)
     shares = np.array([(1 - command) / 2, (1 + command) / 2])
     aim = student._memory[0, :2].numpy() @ shares
-    assert aim == pytest.approx(0.1 * TINY_ADAPTIVE.command_integrator.share, rel=1e-4)
+    assert aim == pytest.approx(0.1 * TINY_ADAPTIVE.value("integrator.share"), rel=1e-4)
 
 
 def test_an_identified_leg_may_differ_too():
@@ -87,7 +84,7 @@ def test_an_identified_leg_may_differ_too():
     for draw in (1, 2):
         env.task.randomize(draw)
         for _ in range(10):
-            env.step_async(np.full((TINY_ADAPTIVE.num_envs, 2), 0.3, np.float32))
+            env.step_async(np.full((TINY_ADAPTIVE.schedule.num_envs, 2), 0.3, np.float32))
             seen, reward, _, _ = env.step_wait()
         assert np.isfinite(seen).all()
         assert np.isfinite(reward).all()
@@ -121,7 +118,7 @@ def test_what_a_student_learns_from_is_what_it_was_told():
 def test_the_aims_of_ever_more_legs_follow_what_is_felt():
     model = learner(TINY_ADAPTIVE)
     trust = []
-    for share in np.linspace(TINY_ADAPTIVE.teacher_share, 1, 21):
+    for share in np.linspace(TINY_ADAPTIVE.distillation.teacher_share, 1, 21):
         TINY_ADAPTIVE.anneal(model, model.env, share)
         trust.append(model.policy.student.trust)
     assert trust[0] == 0
@@ -130,13 +127,16 @@ def test_the_aims_of_ever_more_legs_follow_what_is_felt():
 
 
 def test_legs_are_alike_until_the_policy_can_act_and_change_from_then_on():
-    draws = [TINY_ADAPTIVE.draw(student_progress) for student_progress in np.linspace(-0.5, 1, 301)]
-    alike = np.linspace(-0.5, 1, 301) < TINY_ADAPTIVE.alike
+    draws = [
+        TINY_ADAPTIVE.distillation.draw(student_progress)
+        for student_progress in np.linspace(-0.5, 1, 301)
+    ]
+    alike = np.linspace(-0.5, 1, 301) < TINY_ADAPTIVE.distillation.alike
     assert not np.array(draws)[alike].any()
     later = np.array(draws)[~alike]
     assert later[0] == 1
     assert set(np.diff(later)) == {0, 1}
-    assert later[-1] == TINY_ADAPTIVE.draws + 1
+    assert later[-1] == TINY_ADAPTIVE.distillation.draws + 1
 
 
 def test_it_can_learn_to_feel():

@@ -1,18 +1,16 @@
 """The fast recipe: the actor never sees the true state, annealing depends on progress alone."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 import torch
 
-from hopping_leg.rl.recipes.fast import FastRecipe
+from hopping_leg.rl.recipes.fast import FAST
 from hopping_leg.robot import load_robot
 
 
 @pytest.fixture(scope="module")
 def learner():
-    recipe = dataclasses.replace(FastRecipe(), num_envs=8, batch_size=256)
+    recipe = FAST.replace(num_envs=8, batch_size=256)
     env = recipe.make_env(load_robot("legv2-paper"), seed=3)
     return recipe, env, recipe.make_model(env, seed=3)
 
@@ -44,7 +42,7 @@ def test_annealing_depends_on_progress_alone(learner):
     recipe.anneal(model, env, 0.5)
     half = model.policy.log_std.detach().clone()
     recipe.anneal(model, env, 1.0)
-    assert model.policy.log_std.max().item() == pytest.approx(recipe.log_std[1])
+    assert model.policy.log_std.max().item() == pytest.approx(recipe.algorithm.log_std[1])
     recipe.anneal(model, env, 0.5)
     torch.testing.assert_close(model.policy.log_std.detach(), half)
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.recipes import (
     RECIPES,
+    VARIANTS,
     change,
     changes_of,
     get_recipe,
@@ -30,9 +32,7 @@ from hopping_leg.sim.randomization import Range
     privileged=st.booleans(),
 )
 def test_a_cards_changes_give_the_recipe_again(name, steps, rate, privileged):
-    recipe = dataclasses.replace(
-        get_recipe(name), steps=steps, learning_rate=rate, privileged_critic=privileged
-    )
+    recipe = get_recipe(name).replace(steps=steps, learning_rate=rate, privileged_critic=privileged)
     stored = dataclasses.asdict(recipe)
     assert change(get_recipe(name), changes_of(name, stored)) == recipe
 
@@ -42,17 +42,11 @@ def test_numbers_of_a_part_are_changed_by_its_name():
     changed = change(usual, ["reward.jerk=0.5", "reward.energy_beyond=0.03", "dagger.batch_size=7"])
     assert (changed.reward.jerk, changed.reward.energy_beyond) == (0.5, 0.03)
     assert changed.reward.width == usual.reward.width
-    assert (changed.dagger.batch_size, changed.steps) == (7, usual.steps)
+    assert (changed.value("dagger.batch_size"), changed.schedule) == (7, usual.schedule)
     stored = dataclasses.asdict(changed)
     assert change(usual, changes_of("precise", stored)) == changed
     del stored["reward"]["energy_beyond"]
     assert "reward.energy_beyond=0.03" not in changes_of("precise", stored)
-
-
-def test_a_run_from_before_a_number_existed_did_without_it():
-    stored = dataclasses.asdict(get_recipe("precise"))
-    del stored["task"]["command_skew"]
-    assert changes_of("precise", stored) == ["task.command_skew=1.0"]
 
 
 @pytest.mark.parametrize(
@@ -72,7 +66,7 @@ def test_changes_without_meaning_get_a_sentence(entry, named):
 
 
 def test_a_randomised_recipe_trains_legs_that_differ():
-    recipe = dataclasses.replace(get_recipe("fast"), num_envs=3)
+    recipe = get_recipe("fast").replace(num_envs=3)
     robot = load_robot("legv2")
     plain, mixed = recipe.make_env(robot, 0), randomise(recipe, "twins").make_env(robot, 0)
     for env in (plain, mixed):
@@ -99,8 +93,7 @@ def test_a_run_says_how_it_was_randomised_and_older_ones_were_not(tmp_path):
 
 def test_a_run_on_ranges_of_ones_own_still_says_how_it_was_made(tmp_path):
     own = Range("base.mass", "kg", 0.3, 0.5, "scales")
-    task = dataclasses.replace(get_recipe("fast").task, randomised=(own,))
-    recipe = dataclasses.replace(get_recipe("fast"), task=task)
+    recipe = get_recipe("fast").replace({"task.randomised": (own,)})
     folder = RunFolder(tmp_path, recipe, load_robot("legv2"), 0, None)
     assert folder.command.startswith("hop train --recipe fast")
     assert "--randomise" not in folder.command
@@ -109,8 +102,7 @@ def test_a_run_on_ranges_of_ones_own_still_says_how_it_was_made(tmp_path):
 def test_a_run_says_what_its_policy_saw_where_that_is_not_the_recipes(tmp_path):
     recipe, robot = get_recipe("precise"), load_robot("legv2")
     assert "--observation" not in RunFolder(tmp_path, recipe, robot, 0, None).command
-    task = dataclasses.replace(recipe.task, observation="three-samples")
-    bare = dataclasses.replace(recipe, task=task)
+    bare = recipe.replace({"task.observation": "three-samples"})
     command = RunFolder(tmp_path, bare, robot, 0, None).command
     assert "--observation three-samples" in command
 
@@ -118,7 +110,7 @@ def test_a_run_says_what_its_policy_saw_where_that_is_not_the_recipes(tmp_path):
 def test_a_run_says_for_which_heights_it_was_asked(tmp_path):
     recipe, robot = get_recipe("precise"), load_robot("legv2")
     assert "--heights" not in RunFolder(tmp_path, recipe, robot, 0, None).command
-    wide = fit(dataclasses.replace(recipe, heights=(0.2, 0.46)), robot)
+    wide = recipe.replace(heights=(0.2, 0.46)).fit(robot)
     assert "--heights 0.2 0.46" in RunFolder(tmp_path, wide, robot, 0, None).command
 
 
@@ -130,11 +122,39 @@ def test_a_run_says_for_which_heights_it_was_asked(tmp_path):
     observation=st.sampled_from([None, "three-samples", "dated"]),
 )
 def test_a_runs_recipe_is_read_from_its_options(name, steps, ranges, heights, observation):
-    recipe = dataclasses.replace(change(get_recipe(name), [f"steps={steps}"]), heights=heights)
+    recipe = change(get_recipe(name), [f"steps={steps}"]).replace(heights=heights)
     if ranges is not None:
         recipe = randomise(recipe, ranges)
     if observation is not None:
-        task = dataclasses.replace(recipe.task, observation=observation)
-        recipe = dataclasses.replace(recipe, task=task)
+        recipe = recipe.replace({"task.observation": observation})
     stored = json.loads(json.dumps(dataclasses.asdict(recipe)))
     assert recipe_of(name, stored) == recipe
+
+
+@pytest.mark.parametrize("recipe", VARIANTS)
+def test_the_recipe_comes_first_and_every_variant_differs(recipe):
+    first, *others = (variant for _, variant in VARIANTS[recipe].values())
+    assert first == get_recipe(recipe)
+    options = [dataclasses.asdict(variant) for variant in (first, *others)]
+    assert all(options.count(one) == 1 for one in options)
+
+
+def test_a_memory_is_chosen_by_its_name():
+    gru = change(get_recipe("precise"), ["student.memory=gru"])
+    assert gru.distillation.student.memory == "gru"
+    assert changes_of("precise", dataclasses.asdict(gru)) == ["student.memory=gru"]
+    with pytest.raises(UsageError, match="window"):
+        change(gru, ["student.memory=lstm"])
+
+
+def test_a_recipe_of_ones_own_is_named_by_its_file(tmp_path):
+    file = str(Path(__file__).parents[2] / "examples" / "custom_reward.py")
+    quiet = get_recipe(f"{file}:QUIET")
+    robot = load_robot("legv2-paper")
+    assert quiet.make_reward(robot).names[-1] == "torque"
+    folder = RunFolder(tmp_path, quiet, robot, 0, None)
+    assert f"--recipe {file}:QUIET" in folder.command
+    folder.write("config.json", folder.config)
+    RunFolder(tmp_path, get_recipe(f"{file}:QUIET"), robot, 0, None).check_same()
+    with pytest.raises(UsageError, match="is no recipe"):
+        get_recipe(f"{file}:Path")
