@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hopping_leg.rl.scale import fit
 from hypothesis import given
 from hypothesis import strategies as st
 
