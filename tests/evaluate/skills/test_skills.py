@@ -59,13 +59,13 @@ def test_landing_is_softer_than_a_pd(setup):
 
 @pytest.mark.slow
 def test_energy_shaping_counts_and_climbs(setup, shaping):
-    single, several = count_hops("es", shaping, setup, [0.3], repeats=2, seed=1)
+    single, several = count_hops(shaping, setup, [0.3], repeats=2, seed=1)
     assert (single.asked, several.asked) == (1, 5)
     for row in (single, several):
         assert row.exact == row.at_rest == 1
         assert row.fewest == row.most == row.asked
         assert abs(row.median_error_m) < 0.03
-    rows, (whole,) = climb("es", shaping, setup, [0.3], stairs=[0, 0.02, 0], repeats=2, seed=1)
+    rows, (whole,) = climb(shaping, setup, [0.3], stairs=[0, 0.02, 0], repeats=2, seed=1)
     assert [row.ground_m for row in rows] == [0, 0.02, 0]
     assert all(abs(row.median_error_m) < 0.01 and row.hops >= 3 for row in rows)
     assert whole.skipped_hops == 0

@@ -28,8 +28,6 @@ _REST_SECONDS, _STILL = 0.5, 0.005
 class Counted:
     """One controller asked for so many hops at one command; shares and medians over runs."""
 
-    controller: str
-    floor: str
     command_m: float
     asked: int
     """Hops."""
@@ -50,25 +48,21 @@ class Counted:
 
 
 def count_hops(
-    label: str,
     controller: Controller,
     setup: RolloutConfig,
     commands: Sequence[float],
     *,
     repeats: int,
     seed: int,
-    floor: str = "soft",
 ) -> list[Counted]:
     """Ask a controller for each of ``COUNTS`` at each command, all from standing.
 
     Args:
-        label: The controller's name in tables.
         controller: Hops.
         setup: The world.
         commands: Desired apex heights, m.
         repeats: Realisations of noise and delay.
         seed: All of them follow from it.
-        floor: Its name, for the rows.
     """
     rows: list[Counted] = []
     for asked in COUNTS:
@@ -79,20 +73,16 @@ def count_hops(
         traces = [run.trace(leg) for leg in range(len(each))]
         for k, command in enumerate(commands):
             own = traces[k * repeats : (k + 1) * repeats]
-            rows.append(_row(label, floor, command, asked, own, setup.robot))
+            rows.append(_row(command, asked, own, setup.robot))
     return rows
 
 
-def _row(
-    label: str, floor: str, command: float, asked: int, traces: Sequence[Trace], robot: Robot
-) -> Counted:
+def _row(command: float, asked: int, traces: Sequence[Trace], robot: Robot) -> Counted:
     apexes = [trace_hops(trace).apex for trace in traces]
     made = [len(apex) for apex in apexes]
     errors = np.concatenate(apexes) - command
     windows = [window for trace in traces for window in measure(trace)]
     return Counted(
-        controller=label,
-        floor=floor,
         command_m=command,
         asked=asked,
         exact=float(np.mean([count == asked for count in made])),

@@ -72,10 +72,9 @@ _SECONDS = 3.0
 
 @dataclass(frozen=True)
 class Landed:
-    """One way to land, on one floor; medians over runs."""
+    """One way to land; medians over runs."""
 
     controller: str
-    floor: str
     drop_m: float
     """Clearance of the foot at the beginning."""
     peak_force: float
@@ -94,9 +93,7 @@ class Landed:
     runs: int
 
 
-def land(
-    setup: RolloutConfig, *, drop: float, repeats: int, seed: int, floor: str = "soft"
-) -> list[Landed]:
+def land(setup: RolloutConfig, *, drop: float, repeats: int, seed: int) -> list[Landed]:
     """Drop legs in the landing posture.
 
     Args:
@@ -104,15 +101,12 @@ def land(
         drop: Clearance of the foot, m.
         repeats: Realisations of noise and delay.
         seed: All of them follow from it.
-        floor: Its name, for the rows.
     """
     robot = setup.robot
     posture = landing_posture(robot)
     landing = StandHopLand(None, robot, 0, rate=setup.rate, dropped=True)
     ways: list[Controller] = [landing, JointPD(posture[None])]
-    return [
-        _row(robot, drop, floor, _drop(way, setup, posture, drop, repeats, seed)) for way in ways
-    ]
+    return [_row(robot, drop, _drop(way, setup, posture, drop, repeats, seed)) for way in ways]
 
 
 def _drop(
@@ -131,7 +125,7 @@ def _drop(
     return [run.trace(leg) for leg in range(repeats)]
 
 
-def _row(robot: Robot, drop: float, floor: str, traces: list[Trace]) -> Landed:
+def _row(robot: Robot, drop: float, traces: list[Trace]) -> Landed:
     first = [int((trace.column("foot_clearance_m") <= 0).argmax()) for trace in traces]
     pairs = list(zip(traces, first, strict=True))
     forces = [peak_force(robot, trace, start) for trace, start in pairs]
@@ -146,7 +140,6 @@ def _row(robot: Robot, drop: float, floor: str, traces: list[Trace]) -> Landed:
 
     return Landed(
         controller=str(traces[0].header["controller"]),
-        floor=floor,
         drop_m=drop,
         peak_force=float(np.median(forces)),
         worst_force=max(forces),

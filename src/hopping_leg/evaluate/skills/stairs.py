@@ -24,8 +24,6 @@ _SECONDS = 3.0
 class Stair:
     """One controller on one step; heights are above the ground of the moment."""
 
-    controller: str
-    floor: str
     command_m: float
     step: int
     """Number of the step."""
@@ -44,8 +42,6 @@ class Stair:
 class Stairs:
     """One controller at one command, the whole way up and down."""
 
-    controller: str
-    floor: str
     command_m: float
     worst_first_error_m: float
     """Of all steps, the largest ``first_error_m`` by magnitude."""
@@ -57,7 +53,6 @@ class Stairs:
 
 
 def climb(
-    label: str,
     controller: Controller,
     setup: RolloutConfig,
     commands: Sequence[float],
@@ -65,19 +60,16 @@ def climb(
     stairs: Sequence[float],
     repeats: int,
     seed: int,
-    floor: str = "soft",
 ) -> tuple[list[Stair], list[Stairs]]:
     """Let a controller hop over stairs.
 
     Args:
-        label: The controller's name in tables.
         controller: Hops.
         setup: The world; its engine is MuJoCo.
         commands: Desired apex heights, m.
         stairs: Height of the ground on each step, m.
         repeats: Realisations of noise and delay.
         seed: All of them follow from it.
-        floor: Its name, for the rows.
     """
     each = np.repeat(np.asarray(commands, float), repeats)
     ticks, count = round(_SECONDS * setup.rate), len(each)
@@ -101,7 +93,7 @@ def climb(
             begin = step * ticks if step else round(START_SECONDS * setup.rate)
             rise = level - stairs[step - 1] if step else 0.0
             errors = [_errors(trace, range(begin, (step + 1) * ticks), rise) for trace in own]
-            rows.append(_row(label, floor, command, step, level, errors))
+            rows.append(_row(command, step, level, errors))
         wholes.append(_whole(rows[-len(stairs) :], own))
     return rows, wholes
 
@@ -109,8 +101,6 @@ def climb(
 def _whole(steps: Sequence[Stair], traces: Sequence[Trace]) -> Stairs:
     windows = [window for trace in traces for window in measure(trace)]
     return Stairs(
-        controller=steps[0].controller,
-        floor=steps[0].floor,
         command_m=steps[0].command_m,
         worst_first_error_m=_worst([step.first_error_m for step in steps]),
         worst_error_m=_worst([step.median_error_m for step in steps]),
@@ -125,14 +115,10 @@ def _worst(errors: Sequence[float]) -> float:
     return max((e for e in errors if np.isfinite(e)), key=abs, default=float("nan"))
 
 
-def _row(
-    label: str, floor: str, command: float, step: int, level: float, errors: list[Array]
-) -> Stair:
+def _row(command: float, step: int, level: float, errors: list[Array]) -> Stair:
     first = np.array([e[0] for e in errors if len(e)])
     later = np.concatenate([e[1:] for e in errors])
     return Stair(
-        controller=label,
-        floor=floor,
         command_m=command,
         step=step,
         ground_m=level,

@@ -1,7 +1,6 @@
 """All skills of all entries, as JSON values."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from hopping_leg.controllers import RolloutConfig
@@ -54,23 +53,27 @@ def run_skills(
         check_range(entry, chosen)
     size = setup.robot.straight_height / PAPER_HEIGHT
     stairs, drop = [size * level for level in STAIRS], size * DROP
-    rows: dict[str, list[Any]] = {"counted": [], "stairs": [], "climbs": [], "landings": []}
+    tables: dict[str, list[dict[str, Any]]] = {}
+
+    def add(name: str, found: Iterable[Any], **where: str) -> None:
+        tables.setdefault(name, []).extend({**where, **vars(row)} for row in found)
+
     for entry in entries:
         for number, floor in enumerate(floors):
-            world = on_floor(setup, floor)
-            what = (entry.label, entry.controller, world, chosen)
-            rows["counted"] += count_hops(*what, repeats=repeats, seed=seed, floor=floor)
+            what = (entry.controller, on_floor(setup, floor), chosen)
+            where = {"controller": entry.label, "floor": floor}
+            add("counted", count_hops(*what, repeats=repeats, seed=seed), **where)
             on_progress(entry.label, (number + 0.5) / len(floors))
-            found = climb(*what, stairs=stairs, repeats=repeats, seed=seed, floor=floor)
-            rows["stairs"] += found[0]
-            rows["climbs"] += found[1]
+            steps, wholes = climb(*what, stairs=stairs, repeats=repeats, seed=seed)
+            add("stairs", steps, **where)
+            add("climbs", wholes, **where)
             on_progress(entry.label, (number + 1) / len(floors))
     for floor in floors:
-        world = on_floor(setup, floor)
-        rows["landings"] += land(world, drop=drop, repeats=repeats, seed=seed, floor=floor)
+        landed = land(on_floor(setup, floor), drop=drop, repeats=repeats, seed=seed)
+        add("landings", landed, floor=floor)
     return {
         "schema": SCHEMA,
-        **{name: [asdict(row) for row in found] for name, found in rows.items()},
+        **tables,
         "conditions": {
             **setup_conditions(setup),
             "commands_m": chosen,
