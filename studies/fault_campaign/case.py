@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.drive_info import inspect
 from hopping_leg.deploy.hardware_trials import Performance, header_of, perform
@@ -15,7 +16,6 @@ from hopping_leg.deploy.motion_sequence import MotionSequence, SequenceTiming, h
 from hopping_leg.deploy.preflight import check_drives, require_fit
 from hopping_leg.deploy.realtime import Clock
 from hopping_leg.deploy.safety_limits import hopping_limits
-from hopping_leg.deploy.schedule import Schedule
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.server import EmulatorConfig
@@ -134,7 +134,7 @@ class Scene:
         controller = load_controller(self.case.controller, self.robot)
         sequence = MotionSequence(
             controller,
-            Schedule(((self.height, 100.0),)),
+            CommandSchedule(((self.height, 100.0),)),
             hopping_poses(self.robot),
             SoftLimiter(self.robot, SoftLimits()),
             dataclasses.replace(_TIMING, hop=_FIRST_HOP + self.mishap.at + _AFTERWARDS),

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.controllers.hardware_trial import Steps
+from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.io import write_json
 from hopping_leg.rl.finetune.config import FinetuneConfig, Method
@@ -121,12 +121,12 @@ def _judge(study: Study, twin: Robot, policy: Policy, method: str, seed: int | N
         stored = json.loads(path.read_text(encoding="utf-8"))
         if stored["asked"] == asked:
             return list(stored["rows"])
-    steps: Steps = tuple((command, _SECONDS) for command in study.eval_commands)
+    schedule = CommandSchedule(tuple((c, _SECONDS) for c in study.eval_commands))
     rows = []
     for judge in range(FIRST_JUDGE, FIRST_JUDGE + study.judges):
-        outing = Simulated(twin, study.guard).hop(policy, steps, judge)
+        outing = Simulated(twin, study.guard).hop(policy, schedule, judge)
         assert outing.truth is not None
-        found = score(outing.truth, steps, outing.complaint)
+        found = score(outing.truth, schedule, outing.complaint)
         rows += [
             {
                 "twin": twin.name,

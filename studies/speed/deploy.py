@@ -16,13 +16,13 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import RolloutConfig, rollout
+from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.hardware_trials import Performance, header_of, perform
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
 from hopping_leg.deploy.safety_limits import hopping_limits
-from hopping_leg.deploy.schedule import Schedule
 from hopping_leg.deploy.transport import opener
 from hopping_leg.emulator.process import EmulatorProcess
 from hopping_leg.emulator.server import EmulatorConfig
@@ -110,7 +110,7 @@ def _real_time(study: Study, robot: Robot, on_progress: Callable[[str], None]) -
         with EmulatorProcess(EmulatorConfig(robot=study.robot)) as emulator, _folder() as folder:
             link, truth = MoteusLink(robot, opener(str(emulator.path))), Truth()
             part = (wanted - done) / len(study.heights)
-            schedule = Schedule(tuple((height, part) for height in study.heights))
+            schedule = CommandSchedule(tuple((height, part) for height in study.heights))
             sequence = _sequence(study, robot, schedule, wanted - done)
             performance = _perform(
                 link,
@@ -175,7 +175,7 @@ def _in_process(study: Study, robot: Robot, height: float) -> float | None:
 
 def _in_lockstep(study: Study, robot: Robot, height: float) -> float | None:
     lockstep = Lockstep(EmulatorConfig(robot=study.robot).build())
-    schedule = Schedule(((height, study.seconds),))
+    schedule = CommandSchedule(((height, study.seconds),))
     sequence = _sequence(study, robot, schedule, study.seconds)
     with _folder() as folder:
         performance = _perform(
@@ -187,7 +187,9 @@ def _in_lockstep(study: Study, robot: Robot, height: float) -> float | None:
     return _median([apex for _, apex in apexes_of(performance.trace, truth)])
 
 
-def _sequence(study: Study, robot: Robot, schedule: Schedule, seconds: float) -> MotionSequence:
+def _sequence(
+    study: Study, robot: Robot, schedule: CommandSchedule, seconds: float
+) -> MotionSequence:
     controller = load_controller(study.controller, robot)
     limiter = SoftLimiter(robot, SoftLimits())
     return MotionSequence(

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.deploy.drive_link import Action, DriveMode, Exchange, Reply
 from hopping_leg.deploy.flight_recorder import FlightRecorder
 from hopping_leg.deploy.loop import ControlLoop
 from hopping_leg.deploy.motion_sequence import MotionSequence, Poses, SequenceTiming
 from hopping_leg.deploy.safety_limits import hopping_limits
-from hopping_leg.deploy.schedule import Schedule
 from hopping_leg.deploy.telemetry import columns
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.limits import SoftLimiter, SoftLimits
@@ -117,7 +117,7 @@ def make_loop(tmp_path, controller=None, *, link=None, timing=SHORT, soft=None, 
     controller = controller or Still()
     sequence = MotionSequence(
         controller,
-        Schedule(((0.3, 100.0),)),
+        CommandSchedule(((0.3, 100.0),)),
         POSES,
         SoftLimiter(LEG, soft or SoftLimits()),
         timing,

@@ -5,6 +5,7 @@ import contextlib
 import numpy as np
 import pytest
 
+from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.registry import load_policy
 from hopping_leg.deploy.hardware_trials import DeployedRobot
 from hopping_leg.emulator.server import EmulatorConfig
@@ -13,7 +14,7 @@ from hopping_leg.errors import HardwareError
 from hopping_leg.robot import load_robot
 
 ROBOT = load_robot("legv2-paper")
-STEPS = ((0.3, 1.0), (0.25, 0.5))
+SCHEDULE = CommandSchedule(((0.3, 1.0), (0.25, 0.5)))
 
 
 def deployed(tmp_path, lockstep, ready=lambda seconds: None):
@@ -32,7 +33,7 @@ def deployed(tmp_path, lockstep, ready=lambda seconds: None):
 def test_an_outing_holds_the_hops_alone_and_counts_all_of_its_time(tmp_path):
     lockstep = Lockstep(EmulatorConfig(robot="legv2-paper").build())
     asked = []
-    outing = deployed(tmp_path, lockstep, asked.append).hop(load_policy("fast"), STEPS, 1)
+    outing = deployed(tmp_path, lockstep, asked.append).hop(load_policy("fast"), SCHEDULE, 1)
     lockstep.link.close()
     assert asked == [1.5]
     assert not outing.complaint
@@ -74,9 +75,9 @@ def test_a_stop_by_the_supervisor_comes_back_as_a_complaint(tmp_path, ticks):
     robot = deployed(tmp_path, lockstep)
     if ticks < 200:
         with pytest.raises(HardwareError, match="before it hopped"):
-            robot.hop(Broken(ticks), STEPS, 1)
+            robot.hop(Broken(ticks), SCHEDULE, 1)
     else:
-        outing = robot.hop(Broken(ticks), STEPS, 1)
+        outing = robot.hop(Broken(ticks), SCHEDULE, 1)
         assert "error" in outing.complaint
         assert len(outing.trace.table) <= ticks + 1
     lockstep.link.close()

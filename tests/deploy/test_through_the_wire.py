@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.drive_info import configure, home, inspect
 from hopping_leg.deploy.hardware_trials import header_of, perform
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
 from hopping_leg.deploy.preflight import check_drives, require_fit, required_settings
 from hopping_leg.deploy.safety_limits import hopping_limits
-from hopping_leg.deploy.schedule import Schedule
 from hopping_leg.deploy.supervisor import State
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.server import EmulatorConfig
@@ -31,7 +31,7 @@ def run(lockstep, path, *, controller="energy-shaping", hop=0.5, rise=0.5):
     controller = load_controller(controller, LEG)
     sequence = MotionSequence(
         controller,
-        Schedule(((0.3, 100.0),)),
+        CommandSchedule(((0.3, 100.0),)),
         hopping_poses(LEG),
         SoftLimiter(LEG, SoftLimits()),
         SequenceTiming(hop=hop, rise=rise, settle=0.2, sink=0.6),

@@ -86,7 +86,7 @@ def test_repeats_differ_in_their_noise(judged):
 
 
 def test_trials_of_different_length_keep_their_order_and_length(setup, spring):
-    trials = [Trial("staircase", ((0.3, 0.2), (0.32, 0.2))), Trial("fixed", ((0.3, 0.1),))]
+    trials = [Trial(((0.3, 0.2), (0.32, 0.2)), "staircase"), Trial(((0.3, 0.1),), "fixed")]
     runs = run_trials("spring", spring, setup, trials, repeats=2, seed=1)
     assert [(r.trial.kind, r.repeat) for r in runs] == [
         ("staircase", 0),

@@ -25,9 +25,9 @@ def seeds(monkeypatch):
             super().__init__()
             self.name = robot.name
 
-        def hop(self, controller, steps, seed):
+        def hop(self, controller, schedule, seed):
             used.append(seed)
-            return super().hop(controller, steps, seed)
+            return super().hop(controller, schedule, seed)
 
     monkeypatch.setattr(module, "Simulated", Sent)
     return used

@@ -26,6 +26,12 @@ import tyro
 from rich.console import Console
 
 from hopping_leg.cli.motors import ask, check, connect
+from hopping_leg.controllers.command_schedule import (
+    CommandSchedule,
+    Range,
+    check_schedule,
+    command_range,
+)
 from hopping_leg.controllers.joint_pd import JointPD
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.protocol import Controller
@@ -35,13 +41,6 @@ from hopping_leg.deploy.height_page import HeightPage
 from hopping_leg.deploy.keyboard import LiveHeight, keys
 from hopping_leg.deploy.motion_sequence import MotionSequence, SequenceTiming, hopping_poses
 from hopping_leg.deploy.safety_limits import hopping_limits
-from hopping_leg.deploy.schedule import (
-    Range,
-    Schedule,
-    check_schedule,
-    command_range,
-    parse_schedule,
-)
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.identify.excitation import load_excitation
@@ -94,7 +93,7 @@ class Plan:
 
     controller: Controller
     rate: float
-    schedule: Schedule
+    schedule: CommandSchedule
     seconds: float
     valid: Range
 
@@ -135,14 +134,14 @@ def _plan(args: Deploy, robot: Robot) -> Plan:
     return Plan(controller, rate, schedule, seconds, valid)
 
 
-def _schedule(args: Deploy, controller: Controller, valid: Range) -> Schedule:
+def _schedule(args: Deploy, controller: Controller, valid: Range) -> CommandSchedule:
     if args.schedule is not None and args.command is not None:
         raise UsageError("--command and --schedule exclude each other; give one of them.")
     if args.schedule is not None:
-        return parse_schedule(args.schedule)
+        return CommandSchedule.parse(args.schedule)
     middle = sum(valid) / 2 if isinstance(controller, Policy) else 0.30
     height = middle if args.command is None else args.command
-    return Schedule(((height, _SECONDS),))
+    return CommandSchedule(((height, _SECONDS),))
 
 
 def _perform(args: Deploy, robot: Robot, plan: Plan) -> Performance:

@@ -22,12 +22,12 @@ import tyro
 from rich.console import Console
 
 from hopping_leg.cli.motors import ask, check, connect
+from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.joint_pd import JointGains, JointPD
 from hopping_leg.deploy.hardware_trials import Performance, header_of, new_path, perform
 from hopping_leg.deploy.keyboard import keys
 from hopping_leg.deploy.motion_sequence import MotionSequence, Poses, SequenceTiming, hopping_poses
 from hopping_leg.deploy.safety_limits import recording_limits
-from hopping_leg.deploy.schedule import Schedule
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.identify.excitation import Excitation
@@ -166,7 +166,7 @@ def _play(
     rest = np.zeros(2) if fixed else hopping_poses(robot).rest
     sequence = MotionSequence(
         controller,
-        Schedule(((float("nan"), 1.0),)),
+        CommandSchedule(((float("nan"), 1.0),)),
         Poses(excitation.position[0], rest),
         None,
         SequenceTiming(hop=len(excitation) / excitation.rate),

@@ -7,15 +7,12 @@ is a trace. The simulated twin and the drives behind a wire are both reached lik
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
 import polars as pl
 
 from hopping_leg.arrays import Array
+from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.trace import Trace
-
-Steps = tuple[tuple[float, float], ...]
-"""Commanded heights in order, each with how long it is commanded, m and s."""
 
 
 @dataclass(frozen=True)
@@ -46,25 +43,15 @@ class TrialRobot(Protocol):
         """Of the robot."""
         ...
 
-    def hop(self, controller: Controller, steps: Steps, seed: int) -> HardwareTrial:
+    def hop(self, controller: Controller, schedule: CommandSchedule, seed: int) -> HardwareTrial:
         """Let a controller hop from standing.
 
         Args:
             controller: Has the leg.
-            steps: Heights in order.
+            schedule: Heights in order.
             seed: Of the outing's own randomness, where there is any to choose.
         """
         ...
-
-
-def by_tick(steps: Steps, rate: float) -> Array:
-    """Return the commanded height of every tick, m, (ticks,).
-
-    Args:
-        steps: Heights in order.
-        rate: Control rate, Hz.
-    """
-    return np.concatenate([np.full(round(seconds * rate), height) for height, seconds in steps])
 
 
 MEASURED = {

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from hopping_leg.controllers.hardware_trial import HardwareTrial, Steps
+from hopping_leg.controllers.command_schedule import CommandSchedule
+from hopping_leg.controllers.hardware_trial import HardwareTrial
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.deploy.drive_link import Action
@@ -21,7 +22,6 @@ from hopping_leg.deploy.loop import ControlLoop, LoopOutcome
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
 from hopping_leg.deploy.realtime import Clock, RealClock, keeping_time
 from hopping_leg.deploy.safety_limits import SafetyLimits, hopping_limits
-from hopping_leg.deploy.schedule import Schedule
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.supervisor import State
 from hopping_leg.deploy.telemetry import columns
@@ -185,13 +185,12 @@ class DeployedRobot:
         """Name of the robot."""
         return self.robot.name
 
-    def hop(self, controller: Controller, steps: Steps, seed: int) -> HardwareTrial:
+    def hop(self, controller: Controller, schedule: CommandSchedule, seed: int) -> HardwareTrial:
         """Let a controller hop from standing.
 
         Raises:
             HardwareError: The operator stopped the leg, or it was stopped before it hopped.
         """
-        schedule = Schedule(steps)
         sequence = MotionSequence(
             controller,
             schedule,

@@ -10,7 +10,7 @@ import threading
 import tty
 from collections.abc import Callable, Iterator
 
-from hopping_leg.deploy.schedule import Range
+from hopping_leg.controllers.command_schedule import Range
 
 STEP = 0.01
 """Change of the commanded height by one key, m."""

@@ -10,11 +10,11 @@ from enum import IntEnum
 import numpy as np
 
 from hopping_leg.arrays import Array
+from hopping_leg.controllers.command_schedule import Commands
 from hopping_leg.controllers.joint_pd import JointGains
 from hopping_leg.controllers.protocol import Controller, Measurement
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.deploy.drive_link import Pair
-from hopping_leg.deploy.schedule import Commands
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.limits import SoftLimiter
 from hopping_leg.robot.parameters import Robot

@@ -149,7 +149,7 @@ def run_of(path: Path) -> Run:
     default = "fixed" if len(steps) == 1 else "sequence"
     return Run(
         controller=str(header.get("controller", path.stem)),
-        trial=Trial(str(header.get("kind", default)), steps),
+        trial=Trial(steps, str(header.get("kind", default))),
         repeat=int(header.get("repeat", 0)),
         trace=trace,
     )

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
+from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.io import safe_file_name
 from hopping_leg.robot.limits import command_limits
@@ -39,34 +39,19 @@ STEP_SECONDS = 5.0
 
 
 @dataclass(frozen=True)
-class Trial:
-    """One command schedule, started from standing.
+class Trial(CommandSchedule):
+    """A command schedule, started from standing.
 
     Attributes:
         kind: One of ``KINDS``.
-        steps: (command in m, duration in s) in order.
     """
 
     kind: str
-    steps: tuple[tuple[float, float], ...]
 
     @property
     def name(self) -> str:
         """Short and unique within an evaluation, fit for a file name."""
         return f"{self.kind}-{self.steps[0][0]:.3f}" if len(self.steps) == 1 else self.kind
-
-    @property
-    def seconds(self) -> float:
-        """Duration, s."""
-        return sum(seconds for _, seconds in self.steps)
-
-    def commands(self, rate: float) -> Array:
-        """Return the command of every control period, m, (ticks,).
-
-        Args:
-            rate: Control rate, Hz.
-        """
-        return np.concatenate([np.full(round(s * rate), height) for height, s in self.steps])
 
 
 def scaled(heights: Sequence[float], robot: Robot) -> tuple[float, ...]:
@@ -86,11 +71,11 @@ def paper_trials(robot: Robot, commands: Sequence[float] | None = None) -> list[
         UsageError: A command is out of the leg's reach.
     """
     chosen = choose_commands(robot, commands)
-    trials = [Trial("fixed", ((c, FIXED_SECONDS),)) for c in chosen]
+    trials = [Trial(((c, FIXED_SECONDS),), "fixed") for c in chosen]
     if len(chosen) > 1:
-        trials.append(Trial("sequence", tuple((c, STEP_SECONDS) for c in chosen)))
-    trials.append(Trial("staircase", tuple((c, STEP_SECONDS) for c in scaled(STAIRCASE, robot))))
-    trials += [Trial("ladder", ((c, FIXED_SECONDS),)) for c in scaled(LADDER, robot)]
+        trials.append(Trial(tuple((c, STEP_SECONDS) for c in chosen), "sequence"))
+    trials.append(Trial(tuple((c, STEP_SECONDS) for c in scaled(STAIRCASE, robot)), "staircase"))
+    trials += [Trial(((c, FIXED_SECONDS),), "ladder") for c in scaled(LADDER, robot)]
     return trials
 
 

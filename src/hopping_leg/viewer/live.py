@@ -1,8 +1,8 @@
 """A live simulation: one leg, or two side by side, that take commands while they hop."""
 
+from hopping_leg.controllers.command_schedule import Range, command_range
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.deploy.schedule import Range, command_range
 from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.parameters import Robot

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from hopping_leg.controllers.hardware_trial import HardwareTrial, by_tick, measured_table
+from hopping_leg.controllers.hardware_trial import HardwareTrial, measured_table
 from hopping_leg.controllers.registry import load_policy
 from hopping_leg.rl.finetune.apex_estimate import ApexEstimator
 from hopping_leg.rl.finetune.config import FinetuneConfig
@@ -44,8 +44,8 @@ class Imagined:
     def __init__(self, off=0.02, complain_from=10**9):
         self.off, self.complain_from, self.outings = off, complain_from, 0
 
-    def hop(self, controller, steps, seed):
-        command = by_tick(steps, 1 / PERIOD)
+    def hop(self, controller, schedule, seed):
+        command = schedule.commands(1 / PERIOD)
         rng = np.random.default_rng(seed)
         joints = {name: rng.normal(0, 0.1, (len(command), 2)) for name in ("q", "qd", "torque")}
         joints["q"] += [0.6, -1.3]

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.controllers.hardware_trial import HardwareTrial, Steps, TrialRobot
+from hopping_leg.controllers.command_schedule import CommandSchedule
+from hopping_leg.controllers.hardware_trial import HardwareTrial, TrialRobot
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.envs import apex_reward
@@ -91,11 +92,11 @@ class Finetuning:
         while not (reason := self._reason()):
             check = self._check_is_due()
             number = len(self.rows)
-            steps = self._check_steps() if check else self._exploring_steps(number)
+            schedule = self._check_schedule() if check else self._exploring_schedule(number)
             controller = self._controller(check=check, number=number)
-            outing = self._robot.hop(controller, steps, self._seed(number, 0))
+            outing = self._robot.hop(controller, schedule, self._seed(number, 0))
             outing.trace.save(self._trace(number))
-            self._take(outing, steps, check=check)
+            self._take(outing, schedule, check=check)
             self._checkpoint()
             self._on_outing(self.rows[-1])
         return Finetuned(self._content(*self._best), reason, self.rows)
@@ -131,14 +132,14 @@ class Finetuning:
         latest = [row["kind"] for row in self.rows[-self._options.explorations :]]
         return not self._learns_weights() or "check" not in latest
 
-    def _check_steps(self) -> Steps:
+    def _check_schedule(self) -> CommandSchedule:
         o = self._options
-        return tuple((command, o.outing / len(o.commands)) for command in o.commands)
+        return CommandSchedule(tuple((c, o.outing / len(o.commands)) for c in o.commands))
 
-    def _exploring_steps(self, number: int) -> Steps:
+    def _exploring_schedule(self, number: int) -> CommandSchedule:
         o, rng = self._options, np.random.default_rng((self._task.seed, number, 1))
-        return tuple((float(c), o.hold) for c in
-                     rng.uniform(*self._task.commands, round(o.outing / o.hold)))  # fmt: skip
+        drawn = rng.uniform(*self._task.commands, round(o.outing / o.hold))
+        return CommandSchedule(tuple((float(command), o.hold) for command in drawn))
 
     def _controller(self, *, check: bool, number: int) -> Controller:
         content = self._content(self._network, self._aim)
@@ -151,12 +152,12 @@ class Finetuning:
             content, card, self._learner.spread, self._options.sde_sample_freq, rng
         )
 
-    def _take(self, outing: HardwareTrial, steps: Steps, *, check: bool) -> None:
+    def _take(self, outing: HardwareTrial, schedule: CommandSchedule, *, check: bool) -> None:
         """Judge an outing, learn from it, note it."""
         data = TrialData.of([outing.trace])
         estimate = self._estimator(data)
         apexes = estimated(outing, estimate)
-        judged = score(apexes, steps, outing.complaint)
+        judged = score(apexes, schedule, outing.complaint)
         row: Row = {
             "outing": len(self.rows),
             "kind": "check" if check else "exploration",
@@ -166,7 +167,7 @@ class Finetuning:
             **_numbers(judged, ""),
         }
         if outing.truth is not None:
-            row |= _numbers(score(outing.truth, steps, outing.complaint), "true_")
+            row |= _numbers(score(outing.truth, schedule, outing.complaint), "true_")
         row["rolled_back"] = False
         self.rows.append(row)
         if check or outing.complaint:
@@ -174,7 +175,7 @@ class Finetuning:
         if self._learns_weights():
             self._learn(outing, len(data.command), explored=not check)
         elif not row["rolled_back"]:
-            counted = settled(apexes, steps)
+            counted = settled(apexes, schedule)
             errors = counted[:, 2] - counted[:, 1]
             self._aim = self._aim.corrected(counted[:, 1], errors, self._options.aim)
 

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.hardware_trial import HardwareTrial, Steps
+from hopping_leg.controllers.command_schedule import CommandSchedule
+from hopping_leg.controllers.hardware_trial import HardwareTrial
 from hopping_leg.rl.finetune.apex_estimate import ApexEstimate
 
 SETTLING = 1.0
@@ -42,25 +43,25 @@ def estimated(outing: HardwareTrial, estimate: ApexEstimate) -> Array:
     return np.stack([time - begin, command, height], axis=1)
 
 
-def settled(apexes: Array, steps: Steps) -> Array:
+def settled(apexes: Array, schedule: CommandSchedule) -> Array:
     """Return the apexes that no change of the command disturbed, (hops, 3)."""
-    switches = np.cumsum([0.0, *(seconds for _, seconds in steps)])
+    switches = np.cumsum([0.0, *(seconds for _, seconds in schedule.steps)])
     since = apexes[:, :1] - switches[None, :]
     calm: Array = apexes[np.where(since >= 0, since, np.inf).min(axis=1) >= SETTLING]
     return calm
 
 
-def score(apexes: Array, steps: Steps, complaint: str) -> Score:
+def score(apexes: Array, schedule: CommandSchedule, complaint: str) -> Score:
     """Return how well commands were met.
 
     Args:
         apexes: Time, command and height of every apex, (hops, 3).
-        steps: What was commanded.
+        schedule: What was commanded.
         complaint: Why the outing was ended early, if it was.
     """
-    counted = settled(apexes, steps)
+    counted = settled(apexes, schedule)
     errors, offsets = {}, {}
-    for command in sorted({height for height, _ in steps}):
+    for command in sorted(set(schedule.heights)):
         off = counted[np.isclose(counted[:, 1], command), 2] - command
         errors[command] = float(np.median(np.abs(off))) if len(off) else command
         offsets[command] = float(np.median(off)) if len(off) else -command

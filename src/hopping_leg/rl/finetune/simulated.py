@@ -10,11 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
+from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.hardware_trial import (
     MEASURED,
     HardwareTrial,
-    Steps,
-    by_tick,
     measured_table,
 )
 from hopping_leg.controllers.protocol import Controller, Measurement
@@ -62,9 +61,9 @@ class Simulated:
         self.name, self._robot, self._guard = robot.name, robot, guard
         self._setup = RolloutConfig(robot, NO_NOISE, threads=threads)
 
-    def hop(self, controller: Controller, steps: Steps, seed: int) -> HardwareTrial:
+    def hop(self, controller: Controller, schedule: CommandSchedule, seed: int) -> HardwareTrial:
         """Let a controller hop from standing."""
-        commands = by_tick(steps, self._setup.rate)[:, None]
+        commands = schedule.commands(self._setup.rate)[:, None]
         witness = Witness(controller, self._guard)
         run = rollout(witness, self._setup, commands, seed)
         ended = int(witness.ended[0])

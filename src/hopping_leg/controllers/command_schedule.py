@@ -1,9 +1,12 @@
-"""Which height is commanded when."""
+"""Which height is commanded when, and which heights a controller can be asked for."""
 
 import math
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
+from hopping_leg.arrays import Array
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.errors import UsageError
@@ -22,7 +25,7 @@ class Commands(Protocol):
 
 
 @dataclass(frozen=True)
-class Schedule:
+class CommandSchedule:
     """Steps of height; the last one stays.
 
     Attributes:
@@ -30,6 +33,37 @@ class Schedule:
     """
 
     steps: tuple[tuple[float, float], ...]
+
+    @staticmethod
+    def parse(text: str) -> "CommandSchedule":
+        """Read a schedule such as ``0.25:5,0.30:5``: height in m and duration in s of each step.
+
+        Raises:
+            UsageError: It is no schedule.
+        """
+        steps = []
+        for part in text.split(","):
+            try:
+                height, seconds = (float(number) for number in part.split(":"))
+            except ValueError:
+                height = seconds = math.nan
+            if not (math.isfinite(height) and 0 < seconds < math.inf):
+                raise UsageError(
+                    f"'{part}' is no step of a schedule; give height in m and duration in s, e.g."
+                    " 0.25:5,0.30:5."
+                )
+            steps.append((height, seconds))
+        return CommandSchedule(tuple(steps))
+
+    @property
+    def heights(self) -> tuple[float, ...]:
+        """Height of each step, m."""
+        return tuple(height for height, _ in self.steps)
+
+    @property
+    def seconds(self) -> float:
+        """Length of all steps, s."""
+        return sum(seconds for _, seconds in self.steps)
 
     def at(self, elapsed: float) -> float:
         """Return the height commanded at a time since the first hop, m."""
@@ -39,31 +73,13 @@ class Schedule:
             elapsed -= seconds
         return self.steps[-1][0]
 
-    @property
-    def seconds(self) -> float:
-        """Length of all steps, s."""
-        return sum(seconds for _, seconds in self.steps)
+    def commands(self, rate: float) -> Array:
+        """Return the height commanded in every control period, m, (ticks,).
 
-
-def parse_schedule(text: str) -> Schedule:
-    """Read a schedule such as ``0.25:5,0.30:5``: height in m and duration in s of each step.
-
-    Raises:
-        UsageError: It is no schedule.
-    """
-    steps = []
-    for part in text.split(","):
-        try:
-            height, seconds = (float(number) for number in part.split(":"))
-        except ValueError:
-            height = seconds = math.nan
-        if not (math.isfinite(height) and 0 < seconds < math.inf):
-            raise UsageError(
-                f"'{part}' is no step of a schedule; give height in m and duration in s, e.g."
-                " 0.25:5,0.30:5."
-            )
-        steps.append((height, seconds))
-    return Schedule(tuple(steps))
+        Args:
+            rate: Control rate, Hz.
+        """
+        return np.concatenate([np.full(round(s * rate), height) for height, s in self.steps])
 
 
 def command_range(controller: Controller, robot: Robot) -> Range:
@@ -76,14 +92,14 @@ def command_range(controller: Controller, robot: Robot) -> Range:
     return command_limits(robot)
 
 
-def check_schedule(schedule: Schedule, valid: Range, name: str) -> None:
+def check_schedule(schedule: CommandSchedule, valid: Range, name: str) -> None:
     """Refuse heights out of a controller's range.
 
     Raises:
         UsageError: Naming the height and the range.
     """
     slack = 1e-9
-    for height, _ in schedule.steps:
+    for height in schedule.heights:
         if not valid[0] - slack <= height <= valid[1] + slack:
             raise UsageError(
                 f"A command of {height:g} m is outside of what {name} can be asked for; give"
