@@ -1,4 +1,5 @@
 import dataclasses
+import json
 
 import numpy as np
 import pytest
@@ -68,36 +69,25 @@ def test_a_search_by_shares_ends_where_they_agree():
     np.testing.assert_allclose(found.vector, [1.0, -0.5], atol=3e-3)
 
 
-def test_a_killed_cma_es_resumes_exactly(tmp_path):
-    def values(vectors):
-        return np.square(bowl(vectors)).sum(1)
-
-    options = CmaOptions(20, population=6)
-    whole = cma_es(values, TWO, options, seed=1)
-    file = tmp_path / "state.json"
+@pytest.mark.parametrize("shares", [(), SHARES], ids=["whole", "shares"])
+def test_a_killed_cma_es_resumes_exactly(tmp_path, shares):
+    options, file = CmaOptions(20, population=6), tmp_path / "state.json"
+    whole = cma_es(sum_of_shares, TWO, options, seed=1, shares=shares)
+    broken = [killed(share, 2) for share in shares]
     with pytest.raises(KeyboardInterrupt):
-        cma_es(killed(values, 7), TWO, options, seed=1, checkpoint=file)
+        cma_es(killed(sum_of_shares, 7), TWO, options, seed=1, shares=broken, checkpoint=file)
+    done = len(json.loads(file.read_text())["state"]["costs"])
     counted = []
+    shares = [lambda v, s=share: counted.append(1) or s(v) for share in shares]
     resumed = cma_es(
-        lambda v: counted.append(1) or values(v), TWO, options, seed=1, checkpoint=file
-    )
-    assert len(counted) == 13
+        lambda v: counted.append(1) or sum_of_shares(v),
+        TWO, options, seed=1, shares=shares, checkpoint=file,
+    )  # fmt: skip
+    assert len(counted) == 20 - done + bool(shares)
     assert resumed.history == whole.history
     np.testing.assert_array_equal(resumed.vector, whole.vector)
     with pytest.raises(UsageError, match="belongs to a search with other"):
-        cma_es(values, TWO, options, seed=2, checkpoint=file)
-
-
-def test_a_killed_search_by_shares_resumes_exactly(tmp_path):
-    options = CmaOptions(20, population=6)
-    whole = cma_es(sum_of_shares, TWO, options, seed=1, shares=SHARES)
-    file = tmp_path / "state.json"
-    broken = [killed(share, 2) for share in SHARES]
-    with pytest.raises(KeyboardInterrupt):
-        cma_es(sum_of_shares, TWO, options, seed=1, shares=broken, checkpoint=file)
-    resumed = cma_es(sum_of_shares, TWO, options, seed=1, shares=SHARES, checkpoint=file)
-    assert resumed.history == whole.history
-    np.testing.assert_array_equal(resumed.vector, whole.vector)
+        cma_es(sum_of_shares, TWO, options, seed=2, checkpoint=file)
 
 
 def test_least_squares_finds_the_twin():
@@ -144,12 +134,17 @@ def test_many_starts_return_the_best_first():
     np.testing.assert_array_equal(seen[0], [0.0, 0.0])
 
 
-def test_differences_stay_inside_the_bounds():
+@pytest.mark.parametrize("groups", [None, np.arange(2)], ids=["one-sided", "two-sided"])
+def test_differences_stay_inside_the_bounds(groups):
     low, high = TWO.bounds
-    seen = []
-    slopes = jacobian(lambda v: seen.append(v) or bowl(v), low, (low, high), 1e-3)
-    assert (np.concatenate(seen) >= low).all()
-    np.testing.assert_allclose(slopes, np.array([[2.0, 0.3], [0.1, 1.0]]).T, rtol=1e-6)
+    for start in (low, high, 0.5 * (low + high)):
+        seen = []
+        slopes = jacobian(
+            lambda v, s=seen: s.append(v) or bowl(v), start, (low, high), 1e-3, groups
+        )
+        assert (np.concatenate(seen) >= low).all()
+        assert (np.concatenate(seen) <= high).all()
+        np.testing.assert_allclose(slopes, np.array([[2.0, 0.3], [0.1, 1.0]]).T, rtol=1e-6)
 
 
 def test_slopes_do_not_take_a_jump_for_a_slope():
@@ -164,16 +159,6 @@ def test_slopes_do_not_take_a_jump_for_a_slope():
         slopes = jacobian(jumping, np.array([start]), bounds, 1e-3, groups)
         np.testing.assert_allclose(slopes, [[3.0], [2.0]], rtol=1e-6)
     assert jacobian(jumping, np.zeros(1), bounds, 1e-3)[0, 0] > 100
-
-
-def test_two_differences_stay_inside_the_bounds_too():
-    low, high = TWO.bounds
-    groups = np.arange(bowl(low[None]).shape[1])
-    for start in (low, high, 0.5 * (low + high)):
-        seen = []
-        jacobian(lambda v, s=seen: s.append(v) or bowl(v), start, (low, high), 1e-3, groups)
-        assert (np.concatenate(seen) >= low).all()
-        assert (np.concatenate(seen) <= high).all()
 
 
 def test_a_recording_that_the_model_cannot_explain_hardly_moves_the_estimate():

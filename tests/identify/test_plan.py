@@ -42,20 +42,9 @@ def test_the_paper_counts_positions_only():
     assert "thigh.inertia" in plan.parameters.names
 
 
-@pytest.mark.parametrize(
-    ("options", "sentence"),
-    [
-        ({"search": "gradient"}, "least-squares"),
-        ({"parameters": ("hip.frction",)}, "Did you mean 'hip.friction'"),
-        ({"bounds": {"hip.friction": (0.5, 1.0)}}, "exclude its start"),
-    ],
-)
-def test_impossible_plans_get_a_sentence(options, sentence):
-    with pytest.raises(UsageError, match=sentence):
-        make_plan([FIXED], LEG, **options)
-
-
-def test_no_recording_no_plan():
+def test_impossible_plans_get_a_sentence():
+    with pytest.raises(UsageError, match="least-squares"):
+        make_plan([FIXED], LEG, search="gradient")
     with pytest.raises(UsageError, match="at least one recording"):
         make_plan([], LEG)
 
@@ -94,8 +83,7 @@ def test_friction_that_grows_with_load_shows_where_torques_are_known_and_carry_w
         return "knee.load_friction" in make_plan(recordings, LEG).parameters.names
 
     def on(rig, onboard):
-        metadata = dataclasses.replace(FIXED.metadata, rig=rig, onboard=onboard)
-        return dataclasses.replace(FIXED, metadata=metadata)
+        return FIXED.with_metadata(rig=rig, onboard=onboard)
 
     assert fitted(TORQUES)
     assert not fitted(FIXED)

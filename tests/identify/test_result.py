@@ -66,18 +66,21 @@ def test_without_a_closed_loop_its_pairs_are_null_and_nobody_tells_of_it():
     ]
 
 
-def test_the_file_is_the_robot_that_was_identified(tmp_path):
-    path = tmp_path / "mine.toml"
-    save_robot(identified(), path, "legv2")
-    robot = load_robot(path)
+@pytest.fixture
+def saved(tmp_path):
+    """Return the robot file of the identification."""
+    save_robot(identified(), tmp_path / "mine.toml", "legv2")
+    return tmp_path / "mine.toml"
+
+
+def test_the_file_is_the_robot_that_was_identified(saved):
+    robot = load_robot(saved)
     assert robot.name == "mine"
     assert robot.digest == identified().robot.digest
 
 
-def test_every_identified_number_says_so_and_all_others_stay(tmp_path):
-    path = tmp_path / "mine.toml"
-    save_robot(identified(), path, "legv2")
-    tree, before = load_tree(path), load_tree("legv2")
+def test_every_identified_number_says_so_and_all_others_stay(saved):
+    tree, before = load_tree(saved), load_tree("legv2")
     assert tree["hip"]["friction"]["source"].startswith("identified: 95 % ")
     assert "start 0.0412" in tree["hip"]["friction"]["source"]
     for name in TRUTH:
@@ -86,18 +89,9 @@ def test_every_identified_number_says_so_and_all_others_stay(tmp_path):
     assert {**tree, "name": "", "description": ""} == {**before, "name": "", "description": ""}
 
 
-def test_provenance_stands_above_the_numbers(tmp_path):
-    path = tmp_path / "mine.toml"
-    save_robot(identified(), path, "legv2")
-    comments = [line for line in path.read_text().splitlines() if line.startswith("#")]
-    text = "\n".join(comments)
-    for part in (
-        "swing 0.0, 0.0-4.5 s",
-        "seed 0",
-        "mujoco",
-        "least-squares",
-        "position, closed loop: ",
-    ):
+def test_provenance_stands_above_the_numbers(saved):
+    text = "".join(line for line in saved.open() if line.startswith("#"))
+    for part in ("swing 0.0, 0.0-4.5 s", "seed 0", "mujoco", "least-squares", "closed loop: "):
         assert part in text
 
 
