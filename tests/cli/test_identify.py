@@ -67,10 +67,7 @@ def test_from_recordings_to_robot_numbers_and_report(recordings, tmp_path, capsy
     assert main(["robots", "check", str(out)]) == 0
     assert main(["robots", "show", str(out)]) == 0
 
-    html = page.read_text()
-    assert "Table I" in html
-    assert not re.search(r'(?:src|href)="(?!data:)', html)
-    assert html.count("data:image/svg+xml") == 4
+    assert not re.search(r'(?:src|href)="(?!data:)', page.read_text())
 
 
 def test_the_same_seed_gives_the_same_bytes(recordings, tmp_path):

@@ -6,7 +6,7 @@ from hopping_leg.identify.cost import Objective, Scoring
 from hopping_leg.identify.parameters import choose
 from hopping_leg.identify.windows import cut
 from tests.identify.searches import CAD, RUN, TWO
-from tests.identify.twin import STEP, record, swing
+from tests.identify.twin import STEP, changed, record, swing
 
 HERE = np.zeros((1, 2))
 """The CAD's values among vectors of two parameters."""
@@ -33,15 +33,11 @@ def test_a_robust_cost_counts_small_errors_alike_and_large_ones_less():
 
 
 def test_unmeasured_samples_do_not_count():
-    table = RUN.trace.table.with_columns(hip_torque_nm=None)
-    run = RUN.__class__(RUN.trace.__class__(table), RUN.metadata, "partial")
+    run = changed(RUN, hip_torque_nm=None)
     both, one = (objective(Scoring(None, None, 1.0), [r]).groups.size for r in (RUN, run))
     assert one == both / 2
-    gone = run.__class__(
-        run.trace.__class__(table.with_columns(knee_torque_nm=None)), run.metadata, "none"
-    )
     with pytest.raises(RecordingError, match="no measured sample"):
-        objective(Scoring(None, None, 1.0), [gone]).residuals(HERE)
+        objective(Scoring(None, None, 1.0), [changed(run, knee_torque_nm=None)]).residuals(HERE)
 
 
 def test_the_height_of_the_base_tells_of_the_rail():

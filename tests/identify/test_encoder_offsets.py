@@ -1,5 +1,3 @@
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -8,9 +6,9 @@ from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording_format import PAIRS
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.validation import open_loop
-from hopping_leg.identify.windows import cut
+from hopping_leg.identify.windows import cut, part
 from hopping_leg.robot.robot_files import load_robot
-from tests.identify.twin import STEP, record, swing
+from tests.identify.twin import STEP, changed, record, swing
 
 PENDULUM = load_robot("doublependulum")
 TRUE = LegHypothesis(PENDULUM)
@@ -23,9 +21,7 @@ def off_zero(run):
         (run.trace.table[name] + off).alias(name)
         for name, off in zip(PAIRS["position"], OFF, strict=True)
     ]
-    table = run.trace.table.with_columns(columns)
-    moved = dataclasses.replace(run, trace=dataclasses.replace(run.trace, table=table))
-    return moved.with_metadata(zeroed=True)
+    return changed(run, *columns).with_metadata(zeroed=True)
 
 
 RUN = off_zero(record(PENDULUM, swing(3.0, rate=500.0), rate=500.0, onboard="torque"))
@@ -49,10 +45,7 @@ def test_simulations_show_what_the_encoders_show():
 
 
 def test_what_tells_the_zeros_is_not_predicted():
-    short = RUN.with_metadata(zeroed=True)
-    first = dataclasses.replace(
-        short, trace=dataclasses.replace(short.trace, table=short.trace.table[:550])
-    )
+    first = part(RUN, 0, 550)
     assert np.isnan(open_loop([first], TRUE, 0.2, STEP)).all()
     assert max(open_loop([RUN], TRUE, 0.2, STEP)) < 2e-3
 

@@ -1,5 +1,6 @@
 import mujoco
 import numpy as np
+import pytest
 
 from hopping_leg.identify.actuator_model import build_rig_model
 from hopping_leg.identify.initial_states import base_rate, full_states, start_states
@@ -23,15 +24,10 @@ def noisy(run, seed=0):
     return make_recording(table, run.metadata, "noisy")
 
 
-def test_states_start_from_what_was_measured():
-    for states in (full_states, start_states):
-        position, velocity = states(RUN)
-        np.testing.assert_array_equal(position, RUN.array("position"))
-        np.testing.assert_array_equal(velocity, RUN.array("velocity"))
-
-
-def test_clean_sensors_are_believed():
-    np.testing.assert_array_equal(start_states(FAST)[1], FAST.array("velocity"))
+@pytest.mark.parametrize("run", [RUN, FAST], ids=["200 Hz", "500 Hz"])
+@pytest.mark.parametrize("states", [full_states, start_states])
+def test_clean_sensors_are_believed(states, run):
+    np.testing.assert_array_equal(states(run), [run.array("position"), run.array("velocity")])
 
 
 def test_smoothing_comes_nearer_to_the_truth():

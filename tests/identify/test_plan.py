@@ -1,5 +1,3 @@
-import dataclasses
-
 import numpy as np
 import polars as pl
 import pytest
@@ -7,7 +5,7 @@ import pytest
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.plan import make_plan
 from hopping_leg.robot.model import TIMESTEP
-from tests.identify.twin import LEG, record, swing
+from tests.identify.twin import LEG, changed, record, swing
 
 FIXED = record(LEG, swing(1.0))
 STANDING = record(LEG, swing(1.0, "rail"), "rail")
@@ -66,8 +64,7 @@ def test_a_motor_is_not_believed_slower_than_its_joint_was_seen():
     name = "knee.motor.no_load_speed"
 
     def low(factor):
-        table = FIXED.trace.table.with_columns(pl.col("knee_velocity_rad_s") * factor)
-        fast = dataclasses.replace(FIXED, trace=dataclasses.replace(FIXED.trace, table=table))
+        fast = changed(FIXED, pl.col("knee_velocity_rad_s") * factor)
         (parameter,) = make_plan([fast], LEG, parameters=(name,)).parameters.parameters
         return parameter.low
 

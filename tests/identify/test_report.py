@@ -8,7 +8,7 @@ from hopping_leg.identify.report_figures import residual_spectrum, worst_stretch
 from hopping_leg.identify.validation import overlays
 from hopping_leg.robot import load_robot
 from tests.identify.fitting import identified, run
-from tests.identify.twin import LEG, record, swing
+from tests.identify.twin import LEG, changed, record, swing
 
 
 @pytest.fixture(scope="module")
@@ -71,14 +71,8 @@ def test_torque_driven_recordings_are_started_anew():
 def test_a_long_recording_is_drawn_where_it_fits_worst():
     table = run().trace.table
     bent = np.where(np.arange(600) > 400, 0.2, 0.0) + table["hip_position_rad"].to_numpy()
-    long = dataclasses.replace(
-        run(),
-        trace=dataclasses.replace(
-            run().trace,
-            table=table.with_columns(hip_position_rad=bent, time_s=3 * table["time_s"].to_numpy()),
-        ),
-        metadata=dataclasses.replace(run().metadata, rate_hz=100 / 3),
-    )
+    long = changed(run(), hip_position_rad=bent, time_s=3 * table["time_s"].to_numpy())
+    long = long.with_metadata(rate_hz=100 / 3)
     (overlay,) = drawn([long])
     rows = worst_stretch(overlay)
     assert rows.start > 300

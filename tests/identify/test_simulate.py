@@ -1,5 +1,3 @@
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -7,7 +5,7 @@ from hopping_leg.errors import RecordingError
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import cut
-from tests.identify.twin import LEG, STEP, record, swing
+from tests.identify.twin import LEG, STEP, changed, record, swing
 
 TRUE = LegHypothesis(LEG)
 OTHER = TRUE.replace({"hip.friction": 0.3, "shank.inertia": 4e-4, "contact.time_constant": 0.05})
@@ -69,9 +67,7 @@ def test_rows_between_ticks_are_met():
     jitter = np.random.default_rng(0).uniform(-0.4, 0.4, len(run)) * run.metadata.period
     jitter[0] = 0.0
     time = run.time + jitter
-    table = run.trace.table.with_columns(time_s=time)
-    moved = dataclasses.replace(run, trace=dataclasses.replace(run.trace, table=table))
-    simulated = simulator([moved]).run([TRUE]).position[0, 0]
+    simulated = simulator([changed(run, time_s=time)]).run([TRUE]).position[0, 0]
     exact = simulator([run]).run([TRUE]).position[0, 0]
     between = np.stack([np.interp(time, run.time, p) for p in exact.T], axis=1)
     assert np.abs(simulated - between)[:20].max() < 2e-3
@@ -103,13 +99,8 @@ def test_an_unknown_gain_gets_a_sentence():
 
 def test_a_candidate_that_breaks_down_spoils_no_other():
     run = record(LEG, swing(0.5), onboard="torque")
-    wild = TRUE.replace(
-        {
-            "hip.torque_gain": 1e9,
-            "drive.hip.torque_limit": 1e12,
-            "hip.motor.peak_torque": 1e12,
-        }
-    )
+    limits = {"drive.hip.torque_limit": 1e12, "hip.motor.peak_torque": 1e12}
+    wild = TRUE.replace({"hip.torque_gain": 1e9, **limits})
     got = simulator([run]).run([wild, TRUE]).position
     assert np.isnan(got[0]).all()
     np.testing.assert_allclose(got[1, 0], run.array("position"), atol=1e-9)

@@ -3,7 +3,7 @@ import pytest
 
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.validation import validate
-from tests.identify.twin import LEG, STEP, record, swing
+from tests.identify.twin import LEG, STEP, changed, record, swing
 
 TRUE = LegHypothesis(LEG)
 WRONG = TRUE.replace({"hip.friction": 0.4})
@@ -30,9 +30,7 @@ def test_a_wrong_robot_errs_the_more_the_longer_it_predicts():
 
 
 def test_without_torques_there_is_no_open_loop():
-    run = record(LEG, swing(2.0))
-    table = run.trace.table.with_columns(hip_torque_nm=None, knee_torque_nm=None)
-    bare = run.__class__(run.trace.__class__(table), run.metadata, "bare")
+    bare = changed(record(LEG, swing(2.0)), hip_torque_nm=None, knee_torque_nm=None)
     validation = validate([bare], TRUE, STEP)
     assert np.isnan(validation.closed_loop_torque).all()
     assert np.isnan(validation.open_loop_position[0.2]).all()

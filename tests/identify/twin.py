@@ -1,5 +1,7 @@
 """Recordings of a leg that is known exactly: simulated with a plain loop over mj_step."""
 
+import dataclasses
+
 import mujoco
 import numpy as np
 import polars as pl
@@ -58,3 +60,9 @@ def record(robot, targets, rig="fixed-base", rate=200.0, onboard="zoh", name="tw
         columns["height_m"] = height
     metadata = RecordingMetadata(rig, rate, "legv2", "simulated", onboard=onboard, **GAINS)
     return make_recording(pl.DataFrame(columns), metadata, name)
+
+
+def changed(run, *expressions, **columns):
+    """Return a recording with other columns, unchecked."""
+    table = run.trace.table.with_columns(*expressions, **columns)
+    return dataclasses.replace(run, trace=dataclasses.replace(run.trace, table=table))
