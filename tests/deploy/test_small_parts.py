@@ -17,7 +17,7 @@ from hopping_leg.controllers.command_schedule import (
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy import realtime
 from hopping_leg.deploy.drive_link import Reply
-from hopping_leg.deploy.keyboard import LiveHeight, act_on
+from hopping_leg.deploy.keyboard import LiveHeight, handle_key
 from hopping_leg.deploy.motion_sequence import Part, SequenceTiming, hopping_poses
 from hopping_leg.deploy.sample_buffer import SampleBuffer
 from hopping_leg.errors import UsageError
@@ -59,16 +59,16 @@ def test_a_policy_is_asked_for_what_it_was_trained_for_and_others_for_what_the_l
 def test_keys_raise_lower_and_stop():
     height, stops = LiveHeight(0.30, (0.25, 0.35)), []
     for _ in range(3):
-        act_on(b"+", height, lambda: stops.append(1))
+        handle_key(b"+", height, lambda: stops.append(1))
     assert height.at(0) == pytest.approx(0.33)
     for _ in range(20):
-        act_on(b"\x1b[B", height, lambda: stops.append(1))
+        handle_key(b"\x1b[B", height, lambda: stops.append(1))
     assert height.at(0) == 0.25
-    assert act_on(b"x", height, lambda: stops.append(1)) == ""
-    assert act_on(b"+", None, lambda: stops.append(1)) == ""
+    assert handle_key(b"x", height, lambda: stops.append(1)) == ""
+    assert handle_key(b"+", None, lambda: stops.append(1)) == ""
     assert not stops
     for key in (b" ", b"q", b"\n"):
-        assert act_on(key, height, lambda: stops.append(1)) == "stopping"
+        assert handle_key(key, height, lambda: stops.append(1)) == "stopping"
     assert len(stops) == 3
 
 

@@ -166,9 +166,9 @@ class DeployedRobot:
         robot: As its file says.
         rate: Control rate, Hz.
         folder: For the whole traces.
-        connect: Opens the link to its drives for one outing.
+        connect: Opens the link to its drives for one trial.
         check: Refuses drives that are not fit; returns what was found, for the trace.
-        ready: Called before every outing; returns once the operator agrees.
+        ready: Called before every trial; returns once the operator agrees.
         clock: The time; none takes the computer's.
     """
 

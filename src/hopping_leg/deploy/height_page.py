@@ -101,7 +101,7 @@ class HeightPage:
         wanted = asked.get("height")
         if path != "/height" or isinstance(wanted, bool) or not isinstance(wanted, int | float):
             return False
-        self._height.aim(float(wanted))
+        self._height.set(float(wanted))
         return True
 
     def _state(self) -> bytes:

@@ -39,7 +39,7 @@ class LiveHeight:
         """Return the height commanded now, m."""
         return self._height
 
-    def aim(self, height: float) -> float:
+    def set(self, height: float) -> float:
         """Command a height, brought into its range; return it, m. What is no number is left."""
         low, high = self.valid
         if not math.isnan(height):
@@ -48,11 +48,11 @@ class LiveHeight:
 
     def change(self, by: float) -> float:
         """Raise or lower the height, within its range; return it, m."""
-        return self.aim(self._height + by)
+        return self.set(self._height + by)
 
 
-def act_on(key: bytes, height: LiveHeight | None, stop: Callable[[], None]) -> str:
-    """Do what a key asks for; return what to tell the operator.
+def handle_key(key: bytes, height: LiveHeight | None, stop: Callable[[], None]) -> str:
+    """Do what a key asks for; return what to show the operator.
 
     Args:
         key: As the terminal sends it.
@@ -69,14 +69,14 @@ def act_on(key: bytes, height: LiveHeight | None, stop: Callable[[], None]) -> s
 
 @contextlib.contextmanager
 def keys(
-    height: LiveHeight | None, stop: Callable[[], None], tell: Callable[[str], None]
+    height: LiveHeight | None, stop: Callable[[], None], show: Callable[[str], None]
 ) -> Iterator[None]:
     """Listen to the keyboard in a thread; do nothing where there is no terminal.
 
     Args:
         height: To be changed; None where a schedule commands.
         stop: Stops the leg.
-        tell: Shows the operator a line.
+        show: Shows the operator a line.
     """
     if not sys.stdin.isatty():
         yield
@@ -89,9 +89,9 @@ def keys(
         while not over.is_set():
             ready, _, _ = select.select([descriptor], [], [], _PATIENCE)
             if ready:
-                words = act_on(os.read(descriptor, 8), height, stop)
+                words = handle_key(os.read(descriptor, 8), height, stop)
                 if words:
-                    tell(words)
+                    show(words)
 
     thread = threading.Thread(target=listen, name="keyboard", daemon=True)
     tty.setcbreak(descriptor)

@@ -82,18 +82,18 @@ class ControlLoop:
         """Arm, run the sequence, damp, stop; return when the drives have been told to stop."""
         start = self._clock.now() + self._limits.period
         state, held = SupervisorState(since=start), STOP
-        tick = ticks = skipped = told = 0
+        tick = ticks = skipped = stops_sent = 0
         stepped = 1
         try:
-            while told < _STOP_TICKS:
+            while stops_sent < _STOP_TICKS:
                 state, held = self._tick(start, tick, stepped - 1, state, held)
-                told = told + 1 if state.state is State.STOPPED else 0
+                stops_sent = stops_sent + 1 if state.state is State.STOPPED else 0
                 ticks, skipped = ticks + 1, skipped + stepped - 1
                 behind = (self._clock.now() - start) / self._limits.period
                 following = max(tick + 1, math.floor(behind))
                 tick, stepped = following, following - tick
         finally:
-            if told < _STOP_TICKS:
+            if stops_sent < _STOP_TICKS:
                 self._link.send(BRAKE)
         return LoopOutcome(state, ticks, skipped)
 

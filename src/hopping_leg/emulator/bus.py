@@ -44,8 +44,8 @@ class Message:
             return Message(frame, tuple(subframes))
         return Message(frame, tuple(subframes))
 
-    def heard(self, drive: EmulatedDrive) -> tuple[multiplex.Subframe, ...]:
-        """Return what a drive hears: nothing if another is meant."""
+    def subframes_for(self, drive: EmulatedDrive) -> tuple[multiplex.Subframe, ...]:
+        """Return what is meant for a drive: nothing if another is addressed."""
         if self.frame.destination not in (drive.id, BROADCAST):
             return ()
         return self.subframes if _addressed(self.subframes, drive) else ()
@@ -54,7 +54,7 @@ class Message:
 def act(message: Message, drive: EmulatedDrive, time: float) -> Errors:
     """Let a drive take what a message writes, if it is meant; return what it could not take."""
     errors = []
-    for s in message.heard(drive):
+    for s in message.subframes_for(drive):
         if isinstance(s, RegisterSubframe) and s.type is SubframeType.WRITE:
             assert s.value is not None
             error = drive.write(s.register, s.resolution, s.value)
@@ -73,7 +73,7 @@ def answer(message: Message, drive: EmulatedDrive, time: float, errors: Errors) 
         time: Now, s.
         errors: Its writes that failed.
     """
-    subframes = message.heard(drive)
+    subframes = message.subframes_for(drive)
     if not subframes:
         return None
     reply = ReplyWriter()

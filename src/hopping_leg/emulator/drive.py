@@ -149,15 +149,15 @@ class EmulatedDrive:
         self._write_mode(DriveMode.STOPPED)
         self.commit(time)
 
-    def sense(self, output: float, velocity: float, torque: float) -> None:
-        """Take in what the sensors see after a step of physics.
+    def update_sensors(self, output: float, velocity: float, torque: float) -> None:
+        """Set what the sensors see after a step of physics.
 
         Args:
             output: Position of the output, revolutions.
             velocity: Velocity of the output, rev/s.
             torque: What the motor gave, at the output, N m.
         """
-        self.encoder.watch(output)
+        self.encoder.update(output)
         self._velocity = self.encoder.velocity(velocity)
         self._torque = torque if self.active else 0.0
 

@@ -334,7 +334,7 @@ class _BootPose(FaultKind, kind="boot_pose"):
 
     def begin(self) -> None:
         for drive in self.drives:
-            drive.encoder.misplace(self.fault.amount)
+            drive.encoder.shift_rotor(self.fault.amount)
 
 
 class _Configuration(FaultKind, kind="configuration"):

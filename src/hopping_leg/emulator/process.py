@@ -142,18 +142,18 @@ def _serve(start: EmulatorConfig, pipe: Connection) -> None:
     with uninterrupted():
         while running:
             server.turn()
-            running = _obey(pipe, robot, server)
+            running = _answer_parent(pipe, robot, server)
     port.close()
 
 
-def _obey(pipe: Connection, robot: EmulatedRobot, server: Server) -> bool:
+def _answer_parent(pipe: Connection, robot: EmulatedRobot, server: Server) -> bool:
     """Answer what the parent asked; return whether it is still there."""
     try:
         while pipe.poll():
-            wish = pipe.recv()
-            if isinstance(wish, Fault):
-                robot.fault_injector.add(wish)
-            if wish == "record":
+            request = pipe.recv()
+            if isinstance(request, Fault):
+                robot.fault_injector.add(request)
+            if request == "record":
                 pipe.send(EmulatorRecord(robot.log, tuple(robot.fault_injector.log)))
             else:
                 pipe.send(_state(robot, server))

@@ -119,7 +119,7 @@ class EmulatedRobot:
 
     def _sense(self) -> None:
         for joint, drive in enumerate(self.drives):
-            drive.sense(*self.leg.sensed(joint))
+            drive.update_sensors(*self.leg.sensed(joint))
             self.log.record_mode(self.time, joint, drive)
 
 

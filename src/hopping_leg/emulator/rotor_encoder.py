@@ -43,13 +43,13 @@ class RotorEncoder:
         self._shift = -float(round(self._rotor))
         self.jump, self.home = 0.0, HOMED_ROTOR
 
-    def misplace(self, turns: float) -> None:
+    def shift_rotor(self, turns: float) -> None:
         """Err by turns of the rotor, as after power-up in another pose; homing is lost."""
         self._shift += turns
         self.home = HOMED_ROTOR
 
-    def watch(self, output: float) -> None:
-        """Take in the true position of the output, revolutions."""
+    def update(self, output: float) -> None:
+        """Set the true position of the output, revolutions."""
         self._rotor = output * self.gear_ratio
 
     @property

@@ -74,7 +74,7 @@ class WireLog:
     ) -> None:
         """Note what a message commands a drive, if it does."""
         mode, torque, most = None, 0.0, 0.0
-        for s in message.heard(drive):
+        for s in message.subframes_for(drive):
             if not isinstance(s, RegisterSubframe) or s.type is not SubframeType.WRITE:
                 continue
             if s.register == Register.MODE and s.value in MODES:
