@@ -107,6 +107,17 @@ def replace_at(tree: Kind, path: str, value: object) -> Kind:
     return dataclasses.replace(tree, **{name: inner})  # type: ignore[type-var]
 
 
+def quantity(unit: str, default: float | None, **valid: bool) -> Any:  # noqa: ANN401
+    """Return a field of a dataclass that is a number with a unit, and may be left out.
+
+    Args:
+        unit: Unit of the number.
+        default: Its value where it is left out.
+        valid: ``zero`` or ``signed`` where zero, or any sign, is valid beside positive numbers.
+    """
+    return dataclasses.field(default=default, metadata={"unit": unit, **valid})
+
+
 def read_dataclass(
     kind: type[Kind],
     tree: object,

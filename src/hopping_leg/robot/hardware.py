@@ -5,33 +5,31 @@ left out; the defaults are leg V2's: mjbots qdd100 at 24 V, hip 1, knee 2.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
+
+from hopping_leg.io import quantity
 
 REGISTER_MAP = 5
 """Version of the drives' register map that this package speaks (register 0x102)."""
-
-
-def _number(default: float, unit: str, **metadata: bool) -> Any:  # noqa: ANN401
-    return field(default=default, metadata={"unit": unit, **metadata})
 
 
 @dataclass(frozen=True)
 class Servo:
     """One joint's drive; angles are the joint's, behind gear and belt."""
 
-    id: float = _number(math.nan, "1")
+    id: float = quantity("1", math.nan)
     """CAN id; by default 1 at the hip, 2 at the knee."""
-    sign: float = _number(1.0, "1", signed=True)
+    sign: float = quantity("1", 1.0, signed=True)
     """1 where the motor turns with the joint, -1 where it turns against it."""
-    zero_offset: float = _number(0.0, "rad", signed=True)
+    zero_offset: float = quantity("rad", 0.0, signed=True)
     """Joint angle at which the motor reads zero."""
-    lower: float = _number(math.nan, "rad")
+    lower: float = quantity("rad", math.nan, signed=True)
     """Mechanical stop of the joint; by default what recordings of leg V2 show: half a turn of the
     hip, 2.7 rad of the knee, to either side."""
-    upper: float = _number(math.nan, "rad")
+    upper: float = quantity("rad", math.nan, signed=True)
     """See ``lower``."""
-    max_current: float = _number(100.0, "A")
+    max_current: float = quantity("A", 100.0)
     """Phase current that the drive is configured for (``servo.max_current_A``)."""
     serial: str = ""
     """Serial number of the drive's controller, 24 hex digits; empty accepts any."""
@@ -43,37 +41,28 @@ class Hardware:
 
     hip: Servo = field(default_factory=Servo)
     knee: Servo = field(default_factory=Servo)
-    watchdog: float = _number(0.02, "s")
+    watchdog: float = quantity("s", 0.02)
     """Time without a command after which a drive brakes by itself: four ticks at 200 Hz."""
-    voltage_low: float = _number(18.0, "V")
+    voltage_low: float = quantity("V", 18.0)
     """Bus voltage below which the leg does not run."""
-    voltage_high: float = _number(42.0, "V")
+    voltage_high: float = quantity("V", 42.0)
     """Bus voltage above which the leg does not run; the drives trip at 46 V."""
-    temperature_limit: float = _number(65.0, "deg C")
+    temperature_limit: float = quantity("deg C", 65.0)
     """Highest temperature of the drives' electronics; they derate from 50 and trip at 75."""
 
     def __post_init__(self) -> None:
         for name, default_id, reach in (("hip", 1.0, math.pi), ("knee", 2.0, 2.7)):
-            given: Servo = getattr(self, name)
-            filled = Servo(
-                id=_or(given.id, default_id),
-                sign=given.sign,
-                zero_offset=given.zero_offset,
-                lower=_or(given.lower, -reach),
-                upper=_or(given.upper, reach),
-                max_current=given.max_current,
-                serial=given.serial,
-            )
-            object.__setattr__(self, name, filled)
+            servo: Servo = getattr(self, name)
+            defaults = {"id": default_id, "lower": -reach, "upper": reach}
+            left_out: dict[str, Any] = {
+                k: v for k, v in defaults.items() if math.isnan(getattr(servo, k))
+            }
+            object.__setattr__(self, name, replace(servo, **left_out))
 
     @property
     def servos(self) -> tuple[Servo, Servo]:
         """Hip and knee."""
         return self.hip, self.knee
-
-
-def _or(value: float, default: float) -> float:
-    return default if math.isnan(value) else value
 
 
 def contradiction(hardware: Hardware) -> str | None:

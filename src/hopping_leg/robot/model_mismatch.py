@@ -5,32 +5,22 @@ training believe; only ``hopping_leg.sim`` makes the leg behave as stated here.
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
 from hopping_leg.arrays import Array
-
-
-def _value(default: float | None, unit: str) -> Any:  # noqa: ANN401
-    """Return a field that may be left out; zero and more are valid."""
-    return field(default=default, metadata={"unit": unit, "zero": True})
-
-
-def _positive(default: float | None, unit: str) -> Any:  # noqa: ANN401
-    """Return a field that may be left out; zero is not valid."""
-    return field(default=default, metadata={"unit": unit})
+from hopping_leg.io import quantity
 
 
 @dataclass(frozen=True)
 class Latency:
     """Time between the controller and the leg, in whole physics steps when simulated."""
 
-    command: float = _value(0.0, "s")
+    command: float = quantity("s", 0.0, zero=True)
     """From the controller's decision to the motor's torque."""
-    measurement: float = _value(0.0, "s")
+    measurement: float = quantity("s", 0.0, zero=True)
     """Age of the newest measurement when the controller gets it."""
-    jitter: float = _value(0.0, "s")
+    jitter: float = quantity("s", 0.0, zero=True)
     """Each command is late by a further time, uniform between zero and this."""
 
 
@@ -38,41 +28,41 @@ class Latency:
 class SensorMismatch:
     """Encoder and torque measurement of one joint, at the joint's side."""
 
-    position_step: float = _value(0.0, "rad")
+    position_step: float = quantity("rad", 0.0, zero=True)
     """Quantisation; zero has none."""
-    velocity_step: float = _value(0.0, "rad/s")
-    torque_step: float = _value(0.0, "N m")
-    position_noise: float = _value(0.0, "rad")
+    velocity_step: float = quantity("rad/s", 0.0, zero=True)
+    torque_step: float = quantity("N m", 0.0, zero=True)
+    position_noise: float = quantity("rad", 0.0, zero=True)
     """Standard deviation of white noise, added before quantisation."""
-    velocity_noise: float = _value(0.0, "rad/s")
-    torque_noise: float = _value(0.0, "N m")
+    velocity_noise: float = quantity("rad/s", 0.0, zero=True)
+    torque_noise: float = quantity("N m", 0.0, zero=True)
 
 
 @dataclass(frozen=True)
 class DriveMismatch:
     """Motor, gear and belt of one joint; all numbers at the joint's side."""
 
-    torque_limit: float | None = _positive(None, "N m")
+    torque_limit: float | None = quantity("N m", None)
     """Where the motor saturates; without it, where the software limits."""
-    torque_gain: float = _positive(1.0, "1")
+    torque_gain: float = quantity("1", 1.0)
     """Motor torque over commanded torque; the torque measurement shows it."""
-    torque_lag: float = _value(0.0, "s")
+    torque_lag: float = quantity("s", 0.0, zero=True)
     """Time constant with which the motor torque follows, of first order."""
-    ripple: float = _value(0.0, "N m")
+    ripple: float = quantity("N m", 0.0, zero=True)
     """Amplitude of the torque that depends on the motor's angle (cogging)."""
-    ripple_periods: float = _positive(1.0, "1")
+    ripple_periods: float = quantity("1", 1.0)
     """Periods of the ripple per turn of the joint."""
-    efficiency: float = _positive(1.0, "1")
+    efficiency: float = quantity("1", 1.0)
     """Efficiency of the gear in both directions of power, which measured torque does not show."""
-    stiction: float = _positive(1.0, "1")
+    stiction: float = quantity("1", 1.0)
     """Friction at rest over the joint's Coulomb friction."""
-    stiction_speed: float = _positive(0.05, "rad/s")
+    stiction_speed: float = quantity("rad/s", 0.05)
     """Speed at which friction has fallen to Coulomb's (Stribeck)."""
-    backlash: float = _value(0.0, "rad")
+    backlash: float = quantity("rad", 0.0, zero=True)
     """Whole width of the dead band between motor and link."""
-    stiffness: float | None = _positive(None, "N m/rad")
+    stiffness: float | None = quantity("N m/rad", None)
     """Stiffness of the belt between motor and link; without it, rigid."""
-    stiffness_damping: float = _value(0.0, "N m s/rad")
+    stiffness_damping: float = quantity("N m s/rad", 0.0, zero=True)
     """Damping between motor and link, beside the stiffness."""
     sensor: SensorMismatch = field(default_factory=SensorMismatch)
 
@@ -81,25 +71,25 @@ class DriveMismatch:
 class MassScale:
     """True mass over the file's; a link's inertia scales along."""
 
-    base: float = _positive(1.0, "1")
-    thigh: float = _positive(1.0, "1")
-    shank: float = _positive(1.0, "1")
+    base: float = quantity("1", 1.0)
+    thigh: float = quantity("1", 1.0)
+    shank: float = quantity("1", 1.0)
 
 
 @dataclass(frozen=True)
 class GroundMismatch:
     """The true ground, where it differs from ``[contact]``."""
 
-    time_constant: float | None = _positive(None, "s")
-    damping_ratio: float | None = _positive(None, "1")
-    friction: float | None = _positive(None, "1")
+    time_constant: float | None = quantity("s", None)
+    damping_ratio: float | None = quantity("1", None)
+    friction: float | None = quantity("1", None, zero=True)
 
 
 @dataclass(frozen=True)
 class ModelMismatch:
     """Every effect that the simulator for training does not know."""
 
-    voltage: float = _positive(1.0, "1")
+    voltage: float = quantity("1", 1.0)
     """Battery over the voltage that the motors' peak torque and no-load speed belong to."""
     latency: Latency = field(default_factory=Latency)
     hip: DriveMismatch = field(default_factory=DriveMismatch)

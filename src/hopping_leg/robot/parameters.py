@@ -10,6 +10,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RobotError
+from hopping_leg.io import quantity
 from hopping_leg.robot.hardware import Hardware
 from hopping_leg.robot.model_mismatch import ModelMismatch
 
@@ -38,9 +39,9 @@ class Base:
 class Rail:
     """The passive vertical rail."""
 
-    friction: float = field(metadata={"unit": "N"})
+    friction: float = field(metadata={"unit": "N", "zero": True})
     """Coulomb friction."""
-    damping: float = field(metadata={"unit": "N s/m"})
+    damping: float = field(metadata={"unit": "N s/m", "zero": True})
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ class Contact:
 
     time_constant: float = field(metadata={"unit": "s"})
     damping_ratio: float = field(metadata={"unit": "1"})
-    friction: float = field(metadata={"unit": "1"})
+    friction: float = field(metadata={"unit": "1", "zero": True})
 
 
 @dataclass(frozen=True)
@@ -91,21 +92,21 @@ class Motor:
 class Joint:
     """An actuated joint behind a motor and a belt."""
 
-    friction: float = field(metadata={"unit": "N m"})
+    friction: float = field(metadata={"unit": "N m", "zero": True})
     """Coulomb friction."""
-    damping: float = field(metadata={"unit": "N m s/rad"})
+    damping: float = field(metadata={"unit": "N m s/rad", "zero": True})
     belt_ratio: float = field(metadata={"unit": "1"})
     """Turns of the motor's output per turn of the joint."""
-    lower: float = field(metadata={"unit": "rad"})
+    lower: float = field(metadata={"unit": "rad", "signed": True})
     """Soft limit q^l of the paper."""
-    upper: float = field(metadata={"unit": "rad"})
+    upper: float = field(metadata={"unit": "rad", "signed": True})
     """Soft limit q^h of the paper."""
     motor: Motor
-    armature: float = field(default=float("nan"), metadata={"unit": "kg m2"})
+    armature: float = quantity("kg m2", float("nan"))
     """Reflected inertia at the joint; a file without it gets what rotor, gear and belt give."""
-    load_friction: float = field(default=0.0, metadata={"unit": "1", "zero": True})
+    load_friction: float = quantity("1", 0.0, zero=True)
     """Gear loss: further Coulomb friction per torque that the motor gives."""
-    torque_gain: float = field(default=1.0, metadata={"unit": "1"})
+    torque_gain: float = quantity("1", 1.0)
     """Torque that the motor gives per torque asked for, within its limits."""
 
     def __post_init__(self) -> None:

@@ -10,13 +10,11 @@ from typing import Any
 
 from hopping_leg.errors import RobotError, unknown_name
 from hopping_leg.io import Field, Tree, is_number, read_dataclass
-from hopping_leg.robot import hardware
+from hopping_leg.robot.hardware import contradiction
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.robot.parameters import KINDS, Robot
 
 _SHIPPED = resources.files("hopping_leg.robot") / "robots"
-_MAY_BE_ZERO = {"friction", "damping"}
-_MAY_BE_NEGATIVE = {"lower", "upper"}
 
 
 def shipped_robots() -> list[str]:
@@ -175,9 +173,8 @@ def _read_quantity(origin: str, entry: object, spec: Field, path: str) -> float:
         raise RobotError(f"{origin}: '{path}' is in {entry['unit']!r} but must be in '{unit}'.")
     if not isinstance(entry["source"], str) or not entry["source"].strip():
         raise RobotError(f"{origin}: '{path}' has no source; say where {value} comes from.")
-    zero_is_valid = spec.name in _MAY_BE_ZERO or spec.metadata.get("zero", False)
-    signed = spec.name in _MAY_BE_NEGATIVE or spec.metadata.get("signed", False)
-    if not signed and (value < 0 or (value == 0 and not zero_is_valid)):
+    zero_is_valid = spec.metadata.get("zero", False)
+    if not spec.metadata.get("signed") and (value < 0 or (value == 0 and not zero_is_valid)):
         least = "zero or more" if zero_is_valid else "more than zero"
         raise RobotError(f"{origin}: '{path}' is {value} {unit} but must be {least}.")
     return float(value)
@@ -191,21 +188,19 @@ def check_physics(robot: Robot, origin: str) -> None:
     """
     for name, joint in (("hip", robot.hip), ("knee", robot.knee)):
         motor = joint.motor
-        _below(origin, (f"{name}.lower", joint.lower), (f"{name}.upper", joint.upper), "rad")
+        bounds = (f"{name}.lower", joint.lower), (f"{name}.upper", joint.upper)
+        _check_order(origin, *bounds, "rad", equal=False)
         for smaller in ("torque_limit", "rated_torque"):
-            _at_most(
-                origin,
-                (f"{name}.motor.{smaller}", getattr(motor, smaller)),
-                (f"{name}.motor.peak_torque", motor.peak_torque),
-                "N m",
-            )
+            limit = (f"{name}.motor.{smaller}", getattr(motor, smaller))
+            peak = (f"{name}.motor.peak_torque", motor.peak_torque)
+            _check_order(origin, limit, peak, "N m")
         if joint.load_friction >= 1:
             raise RobotError(
                 f"{origin}: '{name}.load_friction' is {joint.load_friction:g} but a gear that takes"
                 " all that it gets never turns; give less than 1."
             )
     for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
-        _at_most(origin, (f"{name}.com", link.com), (f"{name}.length", link.length), "m")
+        _check_order(origin, (f"{name}.com", link.com), (f"{name}.length", link.length), "m")
     if robot.kind not in KINDS:
         raise RobotError(f"{origin}: 'kind': {unknown_name('kind of robot', robot.kind, KINDS)}")
     if robot.kind == "leg" and (robot.knee.lower < -math.pi or robot.knee.upper > 0):
@@ -215,8 +210,7 @@ def check_physics(robot: Robot, origin: str) -> None:
             " for a robot that only swings write kind = 'pendulum'."
         )
     _check_mismatch(robot, origin)
-    wiring = hardware.contradiction(robot.hardware)
-    if wiring is not None:
+    if wiring := contradiction(robot.hardware):
         raise RobotError(f"{origin}: {wiring}")
     least = 2 * TIMESTEP
     if robot.contact.time_constant < least:
@@ -244,7 +238,7 @@ def _check_mismatch(robot: Robot, origin: str) -> None:
         if drive.torque_limit is not None:
             peak = joint.motor.peak_torque * joint.belt_ratio
             limit = (f"{at}.torque_limit", drive.torque_limit)
-            _at_most(origin, limit, (f"{name}.motor.peak_torque x belt_ratio", peak), "N m")
+            _check_order(origin, limit, (f"{name}.motor.peak_torque x belt_ratio", peak), "N m")
     softest = reality.ground.time_constant
     if softest is not None and softest < 2 * TIMESTEP:
         raise RobotError(
@@ -253,15 +247,11 @@ def _check_mismatch(robot: Robot, origin: str) -> None:
         )
 
 
-def _below(origin: str, low: tuple[str, float], high: tuple[str, float], unit: str) -> None:
-    if low[1] >= high[1]:
+def _check_order(
+    origin: str, low: tuple[str, float], high: tuple[str, float], unit: str, *, equal: bool = True
+) -> None:
+    if low[1] > high[1] or (low[1] == high[1] and not equal):
+        relation = "must not exceed" if equal else "must lie below"
         raise RobotError(
-            f"{origin}: '{low[0]}' ({low[1]:g} {unit}) must lie below '{high[0]}' ({high[1]:g})."
-        )
-
-
-def _at_most(origin: str, low: tuple[str, float], high: tuple[str, float], unit: str) -> None:
-    if low[1] > high[1]:
-        raise RobotError(
-            f"{origin}: '{low[0]}' ({low[1]:g} {unit}) must not exceed '{high[0]}' ({high[1]:g})."
+            f"{origin}: '{low[0]}' ({low[1]:g} {unit}) {relation} '{high[0]}' ({high[1]:g})."
         )
