@@ -169,6 +169,7 @@ wheel: $(STAMP)
 	$(PYTHON) -m venv build/wheel/venv
 	build/wheel/venv/bin/python -m pip --disable-pip-version-check install -q -c constraints.txt build/wheel/*.whl
 	cd build/wheel && venv/bin/python -c 'import hopping_leg, sys; assert "torch" not in sys.modules'
+	cd build/wheel && venv/bin/python -c 'import gymnasium; gymnasium.make("HoppingLeg-v0")'
 	cd build/wheel && venv/bin/hop robots list && venv/bin/hop export urdf --out leg.urdf
 	cd build/wheel && venv/bin/hop evaluate energy-shaping --commands 0.3 --seeds 1 --floor soft --out report
 	build/wheel/venv/bin/python -m pip --disable-pip-version-check install -q -c constraints.txt "$$(echo build/wheel/*.whl)[view]"

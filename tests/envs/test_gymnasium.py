@@ -112,12 +112,13 @@ def test_a_layout_may_be_chosen():
 @pytest.mark.parametrize(
     "words",
     [
+        "import gymnasium; gymnasium.make('HoppingLeg-v0')",
         "import gymnasium, hopping_leg; gymnasium.make('HoppingLeg-v0')",
         "import hopping_leg, gymnasium; gymnasium.make_vec('HoppingLeg-v0', num_envs=2)",
         "import gymnasium; gymnasium.make('hopping_leg:HoppingLeg-v0')",
     ],
 )
-def test_importing_the_package_registers_it_in_any_order(words):
+def test_gymnasium_knows_it_imported_or_not(words):
     subprocess.run([sys.executable, "-W", "error::UserWarning", "-c", words], check=True)
 
 
