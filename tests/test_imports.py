@@ -1,6 +1,7 @@
 """The rooms of the house: data flows one way, and the core needs no torch."""
 
 import ast
+import graphlib
 import subprocess
 import sys
 from pathlib import Path
@@ -74,6 +75,29 @@ def test_no_room_imports_a_later_one_or_a_study(path):
         elif name.split(".")[0] in TRAINING:
             assert here == "rl", f"{relative} imports {name}"
         assert name.split(".")[0] not in {"studies", "pickle", "dill", "cloudpickle", "joblib"}
+
+
+def files_imported(path, names):
+    """Yield the modules among ``names`` that a file imports; a submodule, not its package."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in names)
+        elif isinstance(node, ast.ImportFrom):
+            inner = {f"{node.module}.{alias.name}" for alias in node.names}
+            yield from inner & names
+            if not inner <= names and node.module in names:
+                yield node.module
+
+
+def test_no_files_import_each_other_in_a_circle():
+    dotted = {
+        ".".join(("hopping_leg", *p.relative_to(ROOT).with_suffix("").parts)).removesuffix(
+            ".__init__"
+        ): p
+        for p in MODULES
+    }
+    graph = {name: set(files_imported(path, dotted.keys())) for name, path in dotted.items()}
+    graphlib.TopologicalSorter(graph).prepare()
 
 
 def run_without_training_extra(code):
