@@ -3,19 +3,8 @@ import re
 
 import pytest
 
-from hopping_leg.cli import evaluate as verb
 from hopping_leg.cli import main
-from hopping_leg.evaluate import Entry
 from hopping_leg.trace import Trace
-from tests.evaluate.conftest import Spring
-
-
-@pytest.fixture
-def spring(monkeypatch):
-    def load(names, robot, rate):
-        return [Entry(name, Spring(robot), (0.29, 0.31)) for name in names]
-
-    monkeypatch.setattr(verb, "load_entries", load)
 
 
 def test_one_folder_receives_numbers_report_and_traces(spring, tmp_path, capsys):

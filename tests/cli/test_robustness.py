@@ -2,21 +2,10 @@ import json
 
 import pytest
 
-from hopping_leg.cli import evaluate as verb
 from hopping_leg.cli import main
-from hopping_leg.evaluate import Entry
-from tests.evaluate.conftest import Spring
 
 WORDS = ["robustness", "spring", "--commands", "0.3", "--seeds", "2"]
 AXES = ["--axes", "pushes"]
-
-
-@pytest.fixture
-def spring(monkeypatch):
-    def load(names, robot, rate):
-        return [Entry(name, Spring(robot), (0.29, 0.31)) for name in names]
-
-    monkeypatch.setattr(verb, "load_entries", load)
 
 
 def test_one_folder_receives_numbers_figure_and_what_goes_on(spring, tmp_path, capsys):

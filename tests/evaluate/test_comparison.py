@@ -10,19 +10,14 @@ from hopping_leg.evaluate.result_files import evaluation_from, read_runs
 from hopping_leg.evaluate.trials import save_traces
 
 TRAINING = {
-    "recipe": "fast",
-    "robot": "legv2-paper",
-    "robot_digest": "abc",
-    "seed": 0,
-    "minutes": 5.0,
-    "steps": 200,
-    "selected": {"steps": 200, "score_m": 0.004},
+    "recipe": "fast", "robot": "legv2-paper", "robot_digest": "abc", "seed": 0,
+    "minutes": 5.0, "steps": 200, "selected": {"steps": 200, "score_m": 0.004},
     "history": [
         {"steps": 100, "minutes": 2.0, "score_m": 0.02},
         {"steps": 200, "minutes": 4.0, "score_m": 0.005},
     ],
     "command": "hop train --recipe fast",
-}
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,6 @@
 import dataclasses
 import json
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,11 +9,15 @@ import pytest
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Entry, evaluate
+from hopping_leg.evaluate.result_cache import ResultCache
+from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
 from hopping_leg.evaluate.runner import _note_stopped
+from hopping_leg.evaluate.skills.suite import run_skills
 from hopping_leg.evaluate.trials import Trial, floor_robot, run_trials, save_traces
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 from hopping_leg.trace import Trace
+from tests.evaluate.conftest import Spring
 
 
 def test_summary_rows_pool_fixed_trials_and_the_sequence(judged):
@@ -34,25 +39,12 @@ def test_summary_rows_pool_fixed_trials_and_the_sequence(judged):
 def test_the_json_has_the_promised_names_and_no_nan(judged):
     data = json.loads(judged.evaluation.dumps())
     promised = {
-        "controller",
-        "robot",
-        "command_m",
-        "median_error_m",
-        "std_m",
-        "hops",
-        "skipped_hops",
-        "flight_fraction",
-        "hop_rate_hz",
-        "min_base_height_m",
-        "body_contacts",
-        "max_sink_m",
-    }
+        "controller", "robot", "command_m", "median_error_m", "std_m", "hops", "skipped_hops",
+        "flight_fraction", "hop_rate_hz", "min_base_height_m", "body_contacts", "max_sink_m",
+    }  # fmt: skip
     assert promised <= data["summary"][0].keys()
     assert data["conditions"]["robot_digest"]
     assert data["conditions"]["seeds"] == 2
-
-
-def test_numbers_that_do_not_exist_are_null(judged):
     row = dataclasses.replace(judged.evaluation.summary[0], median_error_m=float("nan"))
     empty = dataclasses.replace(judged.evaluation, summary=[row])
     assert json.loads(empty.dumps())["summary"][0]["median_error_m"] is None
@@ -78,11 +70,7 @@ def test_traces_are_stored_one_per_run(judged, tmp_path):
     trace = Trace.load(paths[0])
     assert trace.header["trial"] == "fixed-0.250"
     assert trace.table.equals(judged.runs[0].trace.table)
-
-
-def test_repeats_differ_in_their_noise(judged):
-    first, second = judged.runs[:2]
-    assert not np.array_equal(first.trace.column("height_m"), second.trace.column("height_m"))
+    assert not Trace.load(paths[1]).table.equals(trace.table), "repeats differ in their noise"
 
 
 def test_trials_of_different_length_keep_their_order_and_length(setup, spring):
@@ -105,11 +93,6 @@ def test_the_stiff_floor_changes_the_contact_only(robot):
         floor_robot(robot, "lava")
 
 
-def test_commands_outside_a_controllers_range_are_refused(setup, spring):
-    with pytest.raises(UsageError, match=r"'spring' cannot be asked for 0\.35 m.*0\.2 to 0\.3 m"):
-        evaluate([Entry("spring", spring, (0.2, 0.3))], setup, commands=[0.25, 0.35])
-
-
 def test_what_is_left_out_or_coarse_is_noted(setup, spring):
     result = evaluate(
         [Entry("spring", spring, (0.29, 0.33))],
@@ -123,13 +106,25 @@ def test_what_is_left_out_or_coarse_is_noted(setup, spring):
     assert "left out: staircase, ladder 0.22 m" in result.notes[0]
 
 
-def test_nothing_to_do_is_said(setup, spring):
-    with pytest.raises(UsageError, match="No controller"):
-        evaluate([], setup)
-    with pytest.raises(UsageError, match="named twice"):
-        evaluate([Entry("a", spring), Entry("a", spring)], setup)
-    with pytest.raises(UsageError, match="0 seeds are too few"):
-        evaluate([Entry("a", spring)], setup, repeats=0)
+def robustness(entries, setup, **options):
+    run_suite(entries, make_suite(setup, axes=["links"], **options), ResultCache(Path("unused")))
+
+
+@pytest.mark.parametrize("suite", [evaluate, robustness, run_skills])
+@pytest.mark.parametrize(
+    ("names", "options", "sentence"),
+    [
+        ("", {}, "No controller"),
+        ("aa", {}, "named twice"),
+        ("a", {"repeats": 0}, "0 seeds are too few"),
+        ("a", {"commands": [3.0]}, "out of reach"),
+        ("a", {"commands": [0.25, 0.35]}, r"'a' cannot be asked for 0\.35 m.*0\.2 to 0\.3 m"),
+    ],
+)
+def test_every_suite_refuses_bad_input_in_a_sentence(setup, suite, names, options, sentence):
+    entries = [Entry(name, Spring(setup.robot), (0.2, 0.3)) for name in names]
+    with pytest.raises(UsageError, match=sentence):
+        suite(entries, setup, **{"commands": [0.25], **options})
 
 
 def test_a_twin_under_the_papers_disturbance_is_noted(spring):

@@ -67,7 +67,7 @@ def check_labels(entries: Sequence[Entry]) -> None:
 
 
 def check_range(entry: Entry, commands: Sequence[float]) -> None:
-    """Check that a entry may be asked for heights, m.
+    """Check that an entry may be asked for heights, m.
 
     Raises:
         UsageError: One is outside of the range that it was trained for.
@@ -90,7 +90,7 @@ def fingerprint(controller: Controller) -> str:
 
 
 def _expand(text: str) -> list[tuple[str, str]]:
-    """Return the label and source of everything that an text names."""
+    """Return the label and source of everything that a text names."""
     if not any(sign in text for sign in "*?["):
         label, _, source = (text, "", text) if Path(text).exists() else text.rpartition("=")
         return [(label or source, source)]

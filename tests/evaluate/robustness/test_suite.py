@@ -6,7 +6,6 @@ import json
 import pytest
 
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Entry
 from hopping_leg.evaluate.entries import fingerprint
 from hopping_leg.evaluate.figures import draw_robustness, to_svg
@@ -62,18 +61,3 @@ def test_controllers_are_told_apart_by_what_they_do(robot, spring):
     prints.append(fingerprint(spring))
     assert len(set(prints)) == len(prints)
     assert fingerprint(load_controller("energy-shaping", robot)) == prints[0]
-
-
-def test_bad_input_is_one_sentence(setup, spring, tiny, tmp_path):
-    with pytest.raises(UsageError, match=r"no axis 'wind'"):
-        make_suite(setup, axes=["wind"])
-    with pytest.raises(UsageError, match="0 seeds"):
-        make_suite(setup, repeats=0)
-    with pytest.raises(UsageError, match="out of reach"):
-        make_suite(setup, commands=[3.0])
-    with pytest.raises(UsageError, match=r"0\.32 m: it was trained for 0\.2 to 0\.3 m"):
-        run_suite([Entry("low", spring, (0.2, 0.3))], tiny, ResultCache(tmp_path))
-    with pytest.raises(UsageError, match="named twice"):
-        run_suite([Entry("a", spring), Entry("a", spring)], tiny, ResultCache(tmp_path))
-    with pytest.raises(UsageError, match="No controller"):
-        run_suite([], tiny, ResultCache(tmp_path))

@@ -123,14 +123,6 @@ def by_level(outcomes: Sequence[Outcome]) -> dict[float, list[Outcome]]:
     }
 
 
-def successes(outcomes: Sequence[Outcome]) -> list[Array]:
-    """Return 1 for every successful trial, 0 for the others, per level, (trials,) each."""
-    return [
-        np.array([one.success for one in group], np.float64)
-        for group in by_level(outcomes).values()
-    ]
-
-
 def level_rows(controller: str, axis: str, outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
     """Return what is told of each level of an axis, by rising level."""
     return [
@@ -158,23 +150,21 @@ def score_rows(
         outcomes: Trials by axis.
         seed: Of the bootstrap.
     """
-    levels = {axis: successes(found) for axis, found in outcomes.items()}
-    rows = [_row(controller, axis, [groups], seed) for axis, groups in levels.items()]
-    return [*rows, _row(controller, OVERALL, list(levels.values()), seed)]
-
-
-def _row(
-    controller: str, axis: str, groups: Sequence[Sequence[Array]], seed: int
-) -> dict[str, Any]:
-    score, low, high = share(groups, seed)
-    return {
-        "controller": controller,
-        "axis": axis,
-        "score": score,
-        "low": low,
-        "high": high,
-        "trials": sum(len(level) for levels in groups for level in levels),
+    levels = {
+        axis: [
+            np.array([one.success for one in group], np.float64)
+            for group in by_level(found).values()
+        ]
+        for axis, found in outcomes.items()
     }
+    rows = []
+    for axis in (*levels, OVERALL):
+        groups = list(levels.values()) if axis == OVERALL else [levels[axis]]
+        score, low, high = share(groups, seed)
+        trials = sum(len(level) for group in groups for level in group)
+        row = {"controller": controller, "axis": axis, "score": score, "low": low, "high": high}
+        rows.append({**row, "trials": trials})
+    return rows
 
 
 def _median_size(errors: Sequence[float | None]) -> float | None:

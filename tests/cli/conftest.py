@@ -1,0 +1,15 @@
+import pytest
+
+from hopping_leg.cli import evaluate as verb
+from hopping_leg.evaluate import Entry
+from tests.evaluate.conftest import Spring
+
+
+@pytest.fixture
+def spring(monkeypatch):
+    """Every controller that is named is a spring made for 0.29 to 0.31 m."""
+
+    def load(names, robot, rate):
+        return [Entry(name, Spring(robot), (0.29, 0.31)) for name in names]
+
+    monkeypatch.setattr(verb, "load_entries", load)
