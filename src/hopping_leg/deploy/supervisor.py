@@ -73,11 +73,11 @@ def supervise(
     counts = before.counts.after(limits, seen)
     state, cause = _next(limits, before, counts, seen)
     if state is before.state:
-        before = SupervisorState(state, before.since, before.cause, before.stop_cause, counts)
+        after = SupervisorState(state, before.since, before.cause, before.stop_cause, counts)
     else:
         stop_cause = cause if state is State.DAMPING else before.stop_cause
-        before = SupervisorState(state, seen.time, cause, stop_cause, counts)
-    return before, _outgoing(limits, state, seen)
+        after = SupervisorState(state, seen.time, cause, stop_cause, counts)
+    return after, _outgoing(limits, state, seen)
 
 
 def _next(
