@@ -21,7 +21,16 @@ from rich.table import Table
 from hopping_leg.identify import excitation as excitations
 from hopping_leg.identify.excitation import RATE, Excitation, make_excitation
 from hopping_leg.identify.feasibility import HardwareRange, demand
-from hopping_leg.identify.paper_excitation import DURATION, Bend, adapt, fixed_base, moving_base
+from hopping_leg.identify.paper_excitation import (
+    AMPLITUDES,
+    DURATION,
+    PERIODS,
+    SWINGS,
+    Bend,
+    adapt,
+    fixed_base,
+    moving_base,
+)
 from hopping_leg.identify.recording_format import Pair
 from hopping_leg.io import write_json
 from hopping_leg.robot import Robot, load_robot
@@ -52,9 +61,9 @@ class Common:
 class Grid:
     """The paper's template."""
 
-    amplitudes: tuple[float, ...] = (0.15, 0.1, 0.05)
+    amplitudes: tuple[float, ...] = AMPLITUDES
     """A of the paper, m."""
-    periods: tuple[float, ...] = (0.75, 0.5, 0.25)
+    periods: tuple[float, ...] = PERIODS
     """T1 of the paper, s."""
     duration: float = DURATION
     """All in all, s."""
@@ -72,7 +81,7 @@ class Grid:
 class FixedBase(Common, Grid):
     """The paper's fixed-base trajectory: the foot strokes while the leg swings."""
 
-    swings: tuple[float, ...] = (10.0, 20.0)
+    swings: tuple[float, ...] = SWINGS
     """T2 of the paper, s."""
 
 

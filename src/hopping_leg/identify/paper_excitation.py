@@ -20,6 +20,9 @@ from hopping_leg.robot.parameters import Robot
 DURATION = 240.0
 """Duration of the paper's recordings, s."""
 
+AMPLITUDES, PERIODS, SWINGS = (0.15, 0.1, 0.05), (0.75, 0.5, 0.25), (10.0, 20.0)
+"""A in m, T1 and T2 in s of the paper's recordings."""
+
 LAB_MARGIN = 0.005
 """How far from straight the lab kept the leg in its recordings, m; the paper says nothing."""
 
@@ -124,9 +127,9 @@ class Strokes:
 
 
 def fixed_base(
-    amplitudes: tuple[float, ...] = (0.15, 0.1, 0.05),
-    periods: tuple[float, ...] = (0.75, 0.5, 0.25),
-    swings: tuple[float, ...] = (10.0, 20.0),
+    amplitudes: tuple[float, ...] = AMPLITUDES,
+    periods: tuple[float, ...] = PERIODS,
+    swings: tuple[float, ...] = SWINGS,
     *,
     duration: float = DURATION,
     margin: float = 0.0,
@@ -150,8 +153,8 @@ def fixed_base(
 
 
 def moving_base(
-    amplitudes: tuple[float, ...] = (0.15, 0.1, 0.05),
-    periods: tuple[float, ...] = (0.75, 0.5, 0.25),
+    amplitudes: tuple[float, ...] = AMPLITUDES,
+    periods: tuple[float, ...] = PERIODS,
     *,
     duration: float = DURATION,
     margin: float = 0.0,

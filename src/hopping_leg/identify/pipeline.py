@@ -20,7 +20,7 @@ from hopping_leg.identify import validation
 from hopping_leg.identify.cost import Objective, Scoring
 from hopping_leg.identify.identifiability import Identifiability, identifiability
 from hopping_leg.identify.optimizers import jacobian
-from hopping_leg.identify.parameters import LegHypothesis, ParameterSet
+from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import FitPlan, check_commands, check_owner, make_plan
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.result import Identified, as_json, software_versions
@@ -99,7 +99,12 @@ def identify(
         search=options.search,
         scoring=options.scoring,
     )
-    _check_bounds(options.bounds, plan.parameters)
+    for name in options.bounds:
+        if name not in plan.parameters.names:
+            raise UsageError(
+                f"There are bounds for '{name}', which is not fitted."
+                f" {unknown_name('fitted parameter', name, plan.parameters.names)}"
+            )
     fit, held, split = _split(recordings, validate, plan, seed)
     windows = cut(fit, plan.window, stride=plan.stride, unscored=plan.unscored)
     objective = Objective(
@@ -157,15 +162,6 @@ def _file_bounds(robot: Robot) -> dict[str, tuple[float, float]]:
         )
         for name, motor in motors.items()
     }
-
-
-def _check_bounds(bounds: Mapping[str, tuple[float, float]], parameters: ParameterSet) -> None:
-    for name in bounds:
-        if name not in parameters.names:
-            raise UsageError(
-                f"There are bounds for '{name}', which is not fitted."
-                f" {unknown_name('fitted parameter', name, parameters.names)}"
-            )
 
 
 def _split(

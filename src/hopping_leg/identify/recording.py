@@ -75,22 +75,13 @@ def read_csv(content: bytes, origin: str) -> pl.DataFrame:
     return pl.DataFrame([_parse(n, list(c), origin) for n, c in zip(header, columns, strict=True)])
 
 
-def as_numbers(table: pl.DataFrame, origin: str) -> pl.DataFrame:
-    """Return a foreign table with numbers as floats and words where words belong.
-
-    Raises:
-        RecordingError: Naming file and column of what is neither.
-    """
-    columns = []
-    for column in table.get_columns():
-        kind = pl.String if column.name in _TEXT_COLUMNS else pl.Float64
-        try:
-            columns.append(column.cast(kind))
-        except pl.exceptions.PolarsError as error:
-            raise RecordingError(
-                f"{origin}: column '{column.name}' holds {column.dtype} but must hold {kind}."
-            ) from error
-    return pl.DataFrame(columns)
+def _cast(column: pl.Series, kind: type[pl.DataType], origin: str) -> pl.Series:
+    try:
+        return column.cast(kind)
+    except pl.exceptions.PolarsError as error:
+        raise RecordingError(
+            f"{origin}: column '{column.name}' holds {column.dtype} but must hold {kind}."
+        ) from error
 
 
 def _text(content: bytes, origin: str) -> str:
@@ -300,9 +291,11 @@ def _native(path: Path) -> tuple[pl.DataFrame, dict[str, Any]]:
         if text is not None:
             trace = Trace.load(path)
             return trace.table, dict(trace.header)
-        return as_numbers(pl.read_parquet(path), str(path)), {}
+        columns = pl.read_parquet(path).get_columns()
     except (pl.exceptions.PolarsError, OSError) as error:
         raise RecordingError(f"{path} is not a readable Parquet file: {error}.") from error
+    kinds = (pl.String if c.name in _TEXT_COLUMNS else pl.Float64 for c in columns)
+    return pl.DataFrame([_cast(c, k, str(path)) for c, k in zip(columns, kinds, strict=False)]), {}
 
 
 def _sidecar(path: Path) -> tuple[str, dict[str, Any]] | None:
@@ -338,14 +331,6 @@ def _apply(
 
 def _typed(table: pl.DataFrame, origin: str) -> pl.DataFrame:
     """Return the columns of a recording in their types; others are left out."""
-    series = []
-    for name, (dtype, _) in COLUMNS.items():
-        if name not in table.columns:
-            continue
-        try:
-            series.append(table[name].cast(dtype))
-        except pl.exceptions.PolarsError as error:
-            raise RecordingError(
-                f"{origin}: column '{name}' holds {table[name].dtype} but must hold {dtype}."
-            ) from error
+    known = [(name, kind) for name, (kind, _) in COLUMNS.items() if name in table.columns]
+    series = [_cast(table[name], kind, origin) for name, kind in known]
     return pl.DataFrame(series).with_columns(pl.selectors.float().fill_nan(None))

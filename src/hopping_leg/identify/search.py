@@ -11,6 +11,7 @@ import dataclasses
 import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,6 @@ from hopping_leg.identify.optimizers import (
     Evaluate,
     Found,
     LeastSquaresOptions,
-    Progress,
     cma_es,
     least_squares,
     multi_start,
@@ -36,9 +36,6 @@ from hopping_leg.workers import RayWorkers, map_rows
 
 _FACTOR = 2.0
 """The paper's second pass keeps the first one's parameters within this factor."""
-
-Search = Callable[[Array, Path | None, Progress], Found]
-"""From a start, the checkpoint and its progress report, to where the search ended."""
 
 Report = Callable[[str, float, float], None]
 """Called with what is being done, its share done (0 to 1) and the lowest cost so far."""
@@ -131,10 +128,8 @@ class Searcher:
         """Search from every start and report within a share of the whole."""
         threads = self.objective.threads if self.ray is None else 1
         objective = dataclasses.replace(self.objective, parameters=parameters, threads=threads)
-        about = {**objective.about(), **self.about}
+        searched = self._search_of(objective, {**objective.about(), **self.about})
         starts = self.options.starts
-        find = self._least_squares if self.plan.search == "least-squares" else self._cma
-        searched = find(objective, about)
 
         def search(number: int, start: Array) -> Found:
             stage = name if starts == 1 else f"{name}, start {number + 1} of {starts}"
@@ -144,47 +139,32 @@ class Searcher:
                 self.report(stage, begin + share * (number + done) / starts, cost)
 
             checkpoint = None if self.folder is None else self.folder / file
-            return searched(start, checkpoint, progress)
+            return searched(start=start, checkpoint=checkpoint, report=progress)
 
         ends = multi_start(search, parameters, starts, self.seed)
         return Pass(name, parameters, ends[0], tuple(end.cost for end in ends[1:]))
 
-    def _least_squares(self, objective: Objective, about: Mapping[str, object]) -> Search:
-        residuals = self._spread(objective.residuals)
-
-        def search(start: Array, checkpoint: Path | None, progress: Progress) -> Found:
-            return least_squares(
-                residuals,
+    def _search_of(self, objective: Objective, about: Mapping[str, object]) -> Callable[..., Found]:
+        """Return the plan's search, which still takes start, checkpoint and report."""
+        if self.plan.search == "least-squares":
+            return partial(
+                least_squares,
+                self._spread(objective.residuals),
                 objective.parameters,
                 self.options.least_squares,
                 loss=objective.loss,
                 groups=objective.jumping,
-                start=start,
                 about=about,
-                checkpoint=checkpoint,
-                report=progress,
             )
-
-        return search
-
-    def _cma(self, objective: Objective, about: Mapping[str, object]) -> Search:
-        values = self._spread(objective)
-        shares = [self._spread(share) for share in self._shares(objective)]
-
-        def search(start: Array, checkpoint: Path | None, progress: Progress) -> Found:
-            return cma_es(
-                values,
-                objective.parameters,
-                self.options.cma,
-                seed=self.seed,
-                start=start,
-                shares=shares,
-                about=about,
-                checkpoint=checkpoint,
-                report=progress,
-            )
-
-        return search
+        return partial(
+            cma_es,
+            self._spread(objective),
+            objective.parameters,
+            self.options.cma,
+            seed=self.seed,
+            shares=[self._spread(share) for share in self._shares(objective)],
+            about=about,
+        )
 
     def _shares(self, objective: Objective) -> list[Objective]:
         """Return what judges generations in turn; nothing if all windows can judge each."""

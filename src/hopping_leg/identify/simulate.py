@@ -280,7 +280,7 @@ class WindowGroup:
 
 
 @dataclass(frozen=True)
-class Simulated:
+class SimulatedWindows:
     """What recordings would have been, row by row; NaN beyond a window's end or a failure.
 
     Attributes:
@@ -335,7 +335,7 @@ class WindowSimulator:
             for ids in kinds.values()
         ]
 
-    def run(self, hypotheses: Sequence[LegHypothesis]) -> Simulated:
+    def run(self, hypotheses: Sequence[LegHypothesis]) -> SimulatedWindows:
         """Simulate every window with every hypothesis.
 
         Raises:
@@ -349,4 +349,4 @@ class WindowSimulator:
             parts = group.run(hypotheses)
             for whole, part in zip((position, velocity, torque, height), parts, strict=True):
                 whole[:, ids, : part.shape[2]] = part
-        return Simulated(position, velocity, torque, height)
+        return SimulatedWindows(position, velocity, torque, height)
