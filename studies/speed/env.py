@@ -1,4 +1,4 @@
-"""Speed of the environment against the bare physics inside it and against Gymnasium's Hopper-v5.
+"""Speed of the environment against the bare physics inside it and against Gymnasium's LiveLeg-v5.
 
 The environment first runs once while its motor torques are recorded. Then it runs again from the
 same state, in turn with bare physics that gets the recorded torques: both simulate the very same
@@ -72,14 +72,14 @@ def bench_env(
 
     Returns:
         ``batched_env_steps_per_s``, ``batched_env_over_bare_physics`` (throughput, 1 is free),
-        ``single_env_cost_over_bare_physics`` (time, 1 is free), ratios to Hopper-v5, and more.
+        ``single_env_cost_over_bare_physics`` (time, 1 is free), ratios to LiveLeg-v5, and more.
     """
     functions, steps = _functions(benchmark)
     taken = interleave(functions, benchmark.repeats, on_repeat)
     rate = {name: float(np.median(steps[name] / taken[name])) for name in taken}
     batched = taken["batched_env"] / steps["batched_env"]
     single = taken["single_env"] / steps["single_env"]
-    hopper = taken["hopper_v5"] / steps["hopper_v5"]
+    leg = taken["hopper_v5"] / steps["hopper_v5"]
     bare = taken["single_mj_step"] / steps["single_mj_step"]
     return {
         "batched_env_steps_per_s": rate["batched_env"],
@@ -94,8 +94,8 @@ def bench_env(
         "batched_physics_steps_per_s": rate["batched_physics"],
         "single_physics_steps_per_s": rate["single_mj_step"],
         "hopper_v5_steps_per_s": rate["hopper_v5"],
-        "single_env_over_hopper_v5": median_ratio(hopper, single),
-        "batched_env_over_hopper_v5": median_ratio(hopper, batched),
+        "single_env_over_hopper_v5": median_ratio(leg, single),
+        "batched_env_over_hopper_v5": median_ratio(leg, batched),
         "single_env_overhead_us": float(np.median(single - bare) * 1e6),
         "setup": _setup(benchmark),
         "host": host(),
@@ -138,17 +138,17 @@ def _functions(benchmark: EnvBenchmark) -> tuple[Mapping[str, Timed], Mapping[st
         robot, benchmark.count, timestep=benchmark.timestep, threads=benchmark.threads
     )
     lone = MujocoSimulator(robot, 1, timestep=benchmark.timestep, threads=1)
-    hopper = gymnasium.make(
-        "Hopper-v5", frame_skip=bare.substeps, terminate_when_unhealthy=False
+    leg = gymnasium.make(
+        "LiveLeg-v5", frame_skip=bare.substeps, terminate_when_unhealthy=False
     ).unwrapped
-    hopper.reset(seed=benchmark.seed)
+    leg.reset(seed=benchmark.seed)
     functions = {
         "batched_env": lambda: _run_task(task, many),
         "batched_physics": lambda: _run_batch(bare, many),
         "single_env": lambda: _run_env(env, one),
         "single_batch": lambda: _run_batch(lone, one),
         "single_mj_step": _mj_step(lone, one),
-        "hopper_v5": lambda: _run_hopper(hopper, benchmark.single_ticks),
+        "hopper_v5": lambda: _run_hopper(leg, benchmark.single_ticks),
     }
     legs = {"batched_env": benchmark.count, "batched_physics": benchmark.count}
     ticks = {"batched_env": benchmark.ticks, "batched_physics": benchmark.ticks}
@@ -210,8 +210,8 @@ def _mj_step(legs: MujocoSimulator, motion: Motion) -> Timed:
     return run
 
 
-def _run_hopper(hopper: Any, ticks: int) -> None:  # noqa: ANN401
-    """Step Hopper-v5 with random actions, as a policy at the start of training would."""
-    hopper.reset()
-    for action in hopper.np_random.uniform(-1, 1, (ticks, 3)):
-        hopper.step(action)
+def _run_hopper(leg: Any, ticks: int) -> None:  # noqa: ANN401
+    """Step LiveLeg-v5 with random actions, as a policy at the start of training would."""
+    leg.reset()
+    for action in leg.np_random.uniform(-1, 1, (ticks, 3)):
+        leg.step(action)

@@ -15,7 +15,7 @@ from hopping_leg.robot.model import TIMESTEP
 
 @dataclass(frozen=True)
 class Env:
-    """Time the environment against bare physics and Gymnasium's Hopper-v5."""
+    """Time the environment against bare physics and Gymnasium's LiveLeg-v5."""
 
     robot: str = "legv2-paper"
     """A shipped name or the path of a .toml file."""

@@ -23,8 +23,10 @@ from PIL import Image
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically
-from hopping_leg.viewer import graphics
-from hopping_leg.viewer.browser import (
+from hopping_leg.viewer import scene
+from hopping_leg.viewer.live_leg import LiveSimulation
+from hopping_leg.viewer.viewer import FRAME_RATE, Viewer
+from studies.speed.browser import (
     SIZE,
     SMALL_SIZE,
     chromium,
@@ -32,8 +34,6 @@ from hopping_leg.viewer.browser import (
     running,
     wait_for_leg,
 )
-from hopping_leg.viewer.live import Live
-from hopping_leg.viewer.viewer import PICTURES, Viewer
 from studies.timing import host
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ class ViewBenchmark:
     """Where to leave a picture of the page."""
 
 
-class _Noting(Live):
+class _Noting(LiveSimulation):
     """A simulation that notes when a new height first reached the controllers."""
 
     def __init__(self, controllers: tuple[str, ...], robot: str, height: float) -> None:
@@ -111,7 +111,7 @@ def bench_view(
         tell("starting `hop view` as a user does")
         start = _start_seconds(browser, benchmark)
         live = _Noting(benchmark.controllers, benchmark.robot, 0.30)
-        viewer = Viewer(live, benchmark.robot, port=0, detail=graphics.detail())
+        viewer = Viewer(live, benchmark.robot, port=0, detail=scene.pixel_ratio())
         with running(viewer):
             page = new_page(browser)
             received: list[float] = []
@@ -142,8 +142,8 @@ def bench_view(
             "robot": benchmark.robot,
             "seconds": benchmark.seconds,
             "commands": benchmark.commands,
-            "intended_pictures_per_s": PICTURES,
-            "detail": graphics.detail(),
+            "intended_pictures_per_s": FRAME_RATE,
+            "detail": scene.pixel_ratio(),
             "browser": name,
             "viser": version("viser"),
         },
@@ -178,7 +178,7 @@ def _resize(page: "Page", window: tuple[int, int]) -> None:
 def _watch(
     page: "Page",
     viewer: Viewer,
-    live: Live,
+    live: LiveSimulation,
     received: list[float],
     seconds: float,
     window: tuple[int, int],
@@ -187,11 +187,11 @@ def _watch(
     _resize(page, window)
     page.evaluate(_COUNT)
     page.wait_for_timeout(100)
-    first = (time.monotonic(), live.now, viewer.pictures, len(received))
+    first = (time.monotonic(), live.now, viewer.frames, len(received))
     page.evaluate("window.drawn.length = 0")
     page.wait_for_timeout(1e3 * seconds)
     drawn = np.array(json.loads(page.evaluate("JSON.stringify(window.drawn)")))
-    last = (time.monotonic(), live.now, viewer.pictures, len(received))
+    last = (time.monotonic(), live.now, viewer.frames, len(received))
     size, renderer = json.loads(page.evaluate(_CANVAS))
     wall, shown, pictures, messages = np.subtract(last, first)
     return {

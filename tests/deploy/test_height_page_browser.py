@@ -5,9 +5,10 @@ import pytest
 pytest.importorskip("viser", reason="the extra 'view' is not installed")
 pytest.importorskip("playwright", reason="playwright is not installed")
 
+from studies.speed.browser import chromium, find_chromium, new_page
+
 from hopping_leg.deploy.height_page import HeightPage
 from hopping_leg.deploy.keyboard import LiveHeight
-from hopping_leg.viewer.browser import chromium, find_chromium, new_page
 
 pytestmark = [
     pytest.mark.slow,

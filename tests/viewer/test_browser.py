@@ -10,12 +10,7 @@ pytest.importorskip("viser", reason="the extra 'view' is not installed")
 pytest.importorskip("playwright", reason="playwright is not installed")
 
 from PIL import Image
-
-from hopping_leg.controllers.registry import load_controller
-from hopping_leg.controllers.rollout import RolloutConfig, rollout
-from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorder
-from hopping_leg.robot import load_robot
-from hopping_leg.viewer.browser import (
+from studies.speed.browser import (
     PATIENCE,
     chromium,
     find_chromium,
@@ -23,10 +18,14 @@ from hopping_leg.viewer.browser import (
     running,
     wait_for_leg,
 )
-from hopping_leg.viewer.follow import Follow
-from hopping_leg.viewer.live import Live
-from hopping_leg.viewer.live_panel import HEIGHT_STEP, KEY_STEP
-from hopping_leg.viewer.replay import Replay
+
+from hopping_leg.controllers.registry import load_controller
+from hopping_leg.controllers.rollout import RolloutConfig, rollout
+from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorder
+from hopping_leg.robot import load_robot
+from hopping_leg.viewer.data_source import RecorderSource, ReplaySource
+from hopping_leg.viewer.live_leg import LiveSimulation
+from hopping_leg.viewer.panels import HEIGHT_STEP, KEY_STEP
 from hopping_leg.viewer.viewer import Viewer
 
 pytestmark = [
@@ -86,7 +85,7 @@ def choose(page, label, option):
 
 
 def test_the_slider_changes_how_high_the_leg_hops(page):
-    live = Live(("energy-shaping",), ROBOT, 0.26)
+    live = LiveSimulation(("energy-shaping",), ROBOT, 0.26)
     viewer = Viewer(live, ROBOT, port=0)
     with running(viewer):
         wait_for_leg(page, viewer)
@@ -106,7 +105,7 @@ def test_the_slider_changes_how_high_the_leg_hops(page):
 
 
 def test_keys_change_height_pause_step_and_push(page):
-    live = Live(("fast",), ROBOT, 0.30)
+    live = LiveSimulation(("fast",), ROBOT, 0.30)
     viewer = Viewer(live, ROBOT, port=0)
     with running(viewer):
         wait_for_leg(page, viewer)
@@ -119,7 +118,7 @@ def test_keys_change_height_pause_step_and_push(page):
         page.keyboard.press("p")
         until(lambda: live._force > 0)
         page.keyboard.press("Space")
-        until(lambda: viewer.pace.paused)
+        until(lambda: viewer.clock.paused)
         time.sleep(0.2)
         still = live.now
         page.keyboard.press("s")
@@ -128,16 +127,16 @@ def test_keys_change_height_pause_step_and_push(page):
         until(lambda: live.now > still + 0.3)
 
 
-def test_world_controller_robot_and_a_second_leg_change_while_it_hops(page):
-    live = Live(("fast",), ROBOT, 0.30)
+def test_settings_controller_robot_and_a_second_leg_change_while_it_hops(page):
+    live = LiveSimulation(("fast",), ROBOT, 0.30)
     viewer = Viewer(live, ROBOT, port=0)
     with running(viewer):
         wait_for_leg(page, viewer)
         for label in ("Payload, kg", "Ground, ms", "Delay, ms"):
             slider(page, label).focus()
             page.keyboard.press("ArrowRight")
-        until(lambda: live.world.payload > 0 and live.world.delay > 0)
-        assert live.world.time_constant == pytest.approx(0.0921, abs=1e-4)
+        until(lambda: live.settings.payload > 0 and live.settings.delay > 0)
+        assert live.settings.time_constant == pytest.approx(0.0921, abs=1e-4)
         choose(page, "Controller", "energy-shaping")
         until(lambda: live.names == ("energy-shaping",))
         choose(page, "Beside it", "paper")
@@ -149,7 +148,7 @@ def test_world_controller_robot_and_a_second_leg_change_while_it_hops(page):
 
 
 def test_the_picture_shows_something_and_moves(page):
-    live = Live(("fast",), ROBOT, 0.30)
+    live = LiveSimulation(("fast",), ROBOT, 0.30)
     viewer = Viewer(live, ROBOT, port=0)
     with running(viewer):
         wait_for_leg(page, viewer)
@@ -172,12 +171,12 @@ def test_a_trace_is_replayed(page, tmp_path):
     run = rollout(controller, RolloutConfig(robot, threads=1), np.full((600, 1), 0.3), seed=0)
     path = tmp_path / "run.parquet"
     run.trace(0).save(path)
-    replay = Replay((path,))
+    replay = ReplaySource((path,))
     viewer = Viewer(replay, port=0)
     with running(viewer):
         wait_for_leg(page, viewer)
         page.keyboard.press("Space")
-        until(lambda: viewer.pace.paused)
+        until(lambda: viewer.clock.paused)
         handle = slider(page, "Time, s")
         # It shows where the replay stands, also where that stopped between two of its updates.
         until(lambda: value_of(handle) == pytest.approx(replay.now, abs=0.006))
@@ -195,7 +194,7 @@ def test_a_trace_is_replayed(page, tmp_path):
 def test_a_run_on_the_leg_is_followed(page, tmp_path):
     columns = ("time_s", "command_m", "hip_position_rad", "knee_position_rad", "hip_torque_nm")
     header = {"robot": ROBOT, "controller": "fast"}
-    follow = Follow(tmp_path)
+    follow = RecorderSource(tmp_path)
     viewer = Viewer(follow, port=0)
     with running(viewer):
         page.goto(viewer.address)
@@ -208,7 +207,7 @@ def test_a_run_on_the_leg_is_followed(page, tmp_path):
 
 
 def test_fewer_pixels_are_drawn_where_asked_for(page):
-    viewer = Viewer(Live(("fast",), ROBOT, 0.3), ROBOT, port=0, detail=0.25)
+    viewer = Viewer(LiveSimulation(("fast",), ROBOT, 0.3), ROBOT, port=0, detail=0.25)
     with running(viewer):
         wait_for_leg(page, viewer)
         canvas = page.locator("canvas[data-engine]")

@@ -5,7 +5,7 @@ import pytest
 from hopping_leg.errors import RobotError, TraceError, UsageError
 from hopping_leg.robot import load_robot
 from hopping_leg.trace import Trace
-from hopping_leg.viewer.replay import Replay
+from hopping_leg.viewer.data_source import ReplaySource
 from hopping_leg.viewer.tracks import FIELDS
 
 
@@ -19,7 +19,7 @@ def stored(path, seconds=1.0, start=0.0, **header):
 
 
 def test_a_replay_plays_and_begins_again(tmp_path):
-    replay = Replay((stored(tmp_path / "a.parquet", start=7.0),))
+    replay = ReplaySource((stored(tmp_path / "a.parquet", start=7.0),))
     assert replay.length == pytest.approx(1.0)
     replay.advance(0.5)
     assert replay.tracks[0].moment(replay.now)[0] == pytest.approx(0.3)
@@ -28,7 +28,7 @@ def test_a_replay_plays_and_begins_again(tmp_path):
 
 
 def test_seeking_stays_within_the_trace(tmp_path):
-    replay = Replay((stored(tmp_path / "a.parquet"),))
+    replay = ReplaySource((stored(tmp_path / "a.parquet"),))
     for wanted, shown in ((-1.0, 0.0), (0.3, 0.3), (5.0, 1.0)):
         replay.seek(wanted)
         assert replay.now == pytest.approx(shown)
@@ -36,7 +36,7 @@ def test_seeking_stays_within_the_trace(tmp_path):
 
 def test_two_traces_begin_together_and_the_shorter_one_waits(tmp_path):
     paths = (stored(tmp_path / "a.parquet"), stored(tmp_path / "b.parquet", 2.0, start=3.0))
-    replay = Replay(paths)
+    replay = ReplaySource(paths)
     replay.seek(1.5)
     heights = [track.moment(replay.now)[0] for track in replay.tracks]
     assert replay.length == pytest.approx(2.0)
@@ -47,22 +47,22 @@ def test_other_parameters_are_told(tmp_path):
     digest = load_robot("legv2").digest
     same = stored(tmp_path / "same.parquet", robot_digest=digest)
     other = stored(tmp_path / "other.parquet", robot_digest="0" * 16)
-    assert Replay((same,)).notices == []
-    assert "other parameters" in Replay((other,)).notices[0]
+    assert ReplaySource((same,)).notices == []
+    assert "other parameters" in ReplaySource((other,)).notices[0]
 
 
 def test_an_unknown_robot_asks_for_its_file(tmp_path):
     path = stored(tmp_path / "a.parquet", robot="mine")
     with pytest.raises(RobotError, match="--robot"):
-        Replay((path,))
-    assert Replay((path,), "legv1").tracks[0].robot.name == "legv1"
+        ReplaySource((path,))
+    assert ReplaySource((path,), "legv1").tracks[0].robot.name == "legv1"
 
 
 def test_what_cannot_be_replayed_is_refused(tmp_path):
     path = stored(tmp_path / "a.parquet")
     with pytest.raises(UsageError, match="one, or two"):
-        Replay((path,) * 3)
+        ReplaySource((path,) * 3)
     with pytest.raises(TraceError, match="no trace file"):
-        Replay((tmp_path / "none.parquet",))
+        ReplaySource((tmp_path / "none.parquet",))
     with pytest.raises(RobotError, match="cannot hop"):
-        Replay((stored(tmp_path / "p.parquet", robot="doublependulum"),))
+        ReplaySource((stored(tmp_path / "p.parquet", robot="doublependulum"),))

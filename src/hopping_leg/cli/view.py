@@ -27,7 +27,7 @@ from rich.console import Console
 from hopping_leg.errors import UsageError
 
 if TYPE_CHECKING:
-    from hopping_leg.viewer.source import Source
+    from hopping_leg.viewer.data_source import DataSource
 
 _ROBOT = "legv2-paper"
 _MOST_DETAIL = 4.0
@@ -38,28 +38,28 @@ class View:
     """What is shown, and where the page is."""
 
     controllers: Annotated[tuple[str, ...], tyro.conf.Positional] = ("fast",)
-    """One, or two side by side: names, .onnx or gain files."""
+    """One controller, or two side by side: shipped names, .onnx files or gain files."""
     robot: str | None = None
     """A shipped robot or a .toml file; default legv2-paper, or the one that a trace names."""
     height: float = 0.30
-    """Commanded first, m."""
+    """Desired height at the start, m."""
     seed: int = 0
-    """Of noise and random delay."""
+    """Seed of noise and random delay."""
     trace: tuple[Path, ...] = ()
-    """Replay these instead, one or two side by side."""
+    """Traces to replay, one or two side by side."""
     box: Path | None = None
-    """Follow a black box instead, or whichever is newest in a folder."""
+    """A flight recording to follow instead, or a folder whose newest one is followed."""
     host: str = "127.0.0.1"
     """Address of this computer to serve at; 0.0.0.0 lets everyone in the network look and steer."""
     port: int = 8080
-    """To serve at; a taken one gives the next that is free."""
+    """Port to serve at; if it is in use, the next free one."""
     detail: float | None = None
     """Pixels drawn per pixel of the screen, each way; default: so few that the motion stays smooth
     where this computer has no GPU, else as many as the browser keeps up with."""
     browser: bool = True
-    """Open the page, where there is a screen."""
+    """Whether to open the page where there is a screen."""
     seconds: float = float("inf")
-    """Stop after this time."""
+    """Time after which the viewer stops, s."""
 
 
 def run(args: View) -> None:
@@ -70,7 +70,7 @@ def run(args: View) -> None:
             " 1 draws every pixel of the screen."
         )
     source = _source(args)
-    from hopping_leg.viewer import graphics
+    from hopping_leg.viewer import scene
     from hopping_leg.viewer.viewer import Viewer
 
     viewer = Viewer(
@@ -78,7 +78,7 @@ def run(args: View) -> None:
         args.robot or _ROBOT,
         host=args.host,
         port=args.port,
-        detail=graphics.detail() if args.detail is None else args.detail,
+        detail=scene.pixel_ratio() if args.detail is None else args.detail,
     )
     console = Console()
     console.print(f"Open {viewer.address} in a browser; Ctrl-C stops.", highlight=False)
@@ -92,19 +92,18 @@ def run(args: View) -> None:
         viewer.close()
 
 
-def _source(args: View) -> "Source":
+def _source(args: View) -> "DataSource":
     """Return what is to be shown; whatever can be wrong with it is found here."""
-    from hopping_leg.viewer.follow import Follow
-    from hopping_leg.viewer.live import Live
-    from hopping_leg.viewer.replay import Replay
+    from hopping_leg.viewer.data_source import RecorderSource, ReplaySource
+    from hopping_leg.viewer.live_leg import LiveSimulation
 
     if args.trace and args.box is not None:
         raise UsageError("--trace and --box exclude each other; give one of them.")
     if args.trace:
-        return Replay(args.trace, args.robot)
+        return ReplaySource(args.trace, args.robot)
     if args.box is not None:
-        return Follow(args.box, args.robot)
-    return Live(args.controllers, args.robot or _ROBOT, args.height, args.seed)
+        return RecorderSource(args.box, args.robot)
+    return LiveSimulation(args.controllers, args.robot or _ROBOT, args.height, args.seed)
 
 
 def _has_screen() -> bool:

@@ -1,7 +1,9 @@
-"""The picture: legs side by side, the commanded height, the last apex of each."""
+"""The scene: legs side by side, the commanded height, the last apex of each."""
 
 import math
+import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import viser
@@ -156,3 +158,25 @@ def _add_floor(scene: viser.SceneApi) -> None:
         thickness=1.0,
         thickness_units="screen",
     )
+
+
+COARSE = 0.4
+"""Pixels drawn per pixel of the screen, each way, where a processor has to shade them."""
+
+_DEVICES = ("dri/renderD*", "nvidia[0-9]*", "dxg")
+
+
+def has_gpu(devices: Path = Path("/dev")) -> bool:
+    """Tell whether this computer has something to draw with, as far as its system shows it.
+
+    Args:
+        devices: Where Linux lists its devices; other systems always have one.
+    """
+    if sys.platform != "linux":
+        return True
+    return any(found for pattern in _DEVICES for found in devices.glob(pattern))
+
+
+def pixel_ratio() -> float | None:
+    """Return how many pixels to draw per pixel of the screen, each way; None: the page decides."""
+    return None if has_gpu() else COARSE

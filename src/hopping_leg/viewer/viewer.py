@@ -12,18 +12,13 @@ import viser
 from hopping_leg.errors import UsageError
 from hopping_leg.sim import CONTROL_RATE
 from hopping_leg.viewer.charts import Charts
-from hopping_leg.viewer.controls import TimeControls
-from hopping_leg.viewer.follow import Follow
-from hopping_leg.viewer.inbox import Inbox
-from hopping_leg.viewer.live import Live
-from hopping_leg.viewer.live_panel import LivePanel
-from hopping_leg.viewer.pace import Pace
-from hopping_leg.viewer.replay import Replay
-from hopping_leg.viewer.replay_panel import ReplayPanel
+from hopping_leg.viewer.data_source import DataSource, RecorderSource, ReplaySource
+from hopping_leg.viewer.live_leg import LiveSimulation
+from hopping_leg.viewer.panels import GuiQueue, LivePanel, ReplayPanel, TimeControls
+from hopping_leg.viewer.playback_clock import PlaybackClock
 from hopping_leg.viewer.scene import COLOURS, Scene
-from hopping_leg.viewer.source import Source
 
-PICTURES = 60.0
+FRAME_RATE = 60.0
 """Per second."""
 
 _SLOW = 6
@@ -38,14 +33,14 @@ class Viewer:
 
     Attributes:
         address: Of the page.
-        pace: How fast time passes.
-        pictures: Shown so far.
+        clock: How fast time passes.
+        frames: Number of frames shown.
 
     Args:
         source: What is shown.
         robot: Name or file that a live simulation was started with.
         host: Address of this computer to listen at.
-        port: To listen at; a taken one gives the next that is free.
+        port: Port to listen at; if it is in use, the next free one.
         detail: Pixels that the page draws per pixel of the screen, each way; None lets it draw as
             many as it keeps up with, down to three quarters.
 
@@ -55,7 +50,7 @@ class Viewer:
 
     def __init__(
         self,
-        source: Source,
+        source: DataSource,
         robot: str = "",
         *,
         host: str = "127.0.0.1",
@@ -68,8 +63,8 @@ class Viewer:
         self.address = f"http://{reached_at}:{self._server.get_port()}"
         if detail is not None:
             self.address += f"/?fixedDpr={detail:g}"
-        self.pace = Pace(1 / CONTROL_RATE)
-        self._inbox = Inbox()
+        self.clock = PlaybackClock(1 / CONTROL_RATE)
+        self._queue = GuiQueue()
         gui = self._server.gui
         gui.configure_theme(show_logo=False, show_share_button=False, brand_color=COLOURS[0])
         gui.set_panel_label("Hopping leg")
@@ -77,37 +72,37 @@ class Viewer:
         gui.main_panel.set_width(290)
         self._status = gui.add_html("")
         self._replay_panel: ReplayPanel | None = None
-        if isinstance(source, Live):
-            LivePanel(self._server, self._inbox, source, robot)
-        if isinstance(source, Replay):
-            self._replay_panel = ReplayPanel(self._server, self._inbox, source)
-        if not isinstance(source, Follow):
-            TimeControls(self._server, self._inbox, self.pace)
+        if isinstance(source, LiveSimulation):
+            LivePanel(self._server, self._queue, source, robot)
+        if isinstance(source, ReplaySource):
+            self._replay_panel = ReplayPanel(self._server, self._queue, source)
+        if not isinstance(source, RecorderSource):
+            TimeControls(self._server, self._queue, self.clock)
         panel = gui.add_panel()
         self._charts = Charts(self._server, panel.add_tab("Last seconds"))
         panel.dock_right()
         panel.set_width(390)
         self._scene = Scene(self._server)
-        self.pictures = 0
+        self.frames = 0
         self._stopped = False
 
     def run(self, seconds: float = math.inf) -> None:
         """Simulate and show until the time is over, ``stop`` or Ctrl-C."""
         begun = last = next_at = time.monotonic()
         while last - begun < seconds and not self._stopped:
-            self._notify(self._inbox.work())
+            self._notify(self._queue.run())
             now = time.monotonic()
-            self._source.advance(self.pace.due(now - last))
+            self._source.advance(self.clock.due(now - last))
             last = now
-            self.picture()
-            next_at = max(next_at + 1 / PICTURES, time.monotonic())
+            self.render()
+            next_at = max(next_at + 1 / FRAME_RATE, time.monotonic())
             time.sleep(max(next_at - time.monotonic(), 0.0))
 
-    def picture(self) -> None:
-        """Show what is now; plots and text every few pictures."""
+    def render(self) -> None:
+        """Show what is now; plots and text every few frames."""
         source = self._source
         self._scene.show(source.tracks, source.now)
-        turn = self.pictures % _SLOW
+        turn = self.frames % _SLOW
         self._charts.show(source.tracks, source.now, turn)
         if turn == _SLOW - 1:
             self._scene.mark(source.now)
@@ -116,7 +111,7 @@ class Viewer:
                 self._replay_panel.show()
             self._notify(source.notices)
             source.notices.clear()
-        self.pictures += 1
+        self.frames += 1
 
     def stop(self) -> None:
         """End ``run`` after the present picture; any thread may."""
@@ -145,9 +140,11 @@ class Viewer:
             )
             if track.note:
                 lines.append(html.escape(track.note))
-        if isinstance(source, Live):
+        if isinstance(source, LiveSimulation):
             lines.insert(0, f'Commanded: <b><span id="command">{source.height:.3f}</span> m</b>')
-        keeps = "" if math.isnan(self.pace.real_time) else f", real time {self.pace.real_time:.2f}"
+        keeps = (
+            "" if math.isnan(self.clock.real_time) else f", real time {self.clock.real_time:.2f}"
+        )
         lines.append(f'<span style="color:#77767b">{source.now:.2f} s{keeps}</span>')
         return f'<div style="padding:0.4em 1em;line-height:1.5">{"<br>".join(lines)}</div>'
 

@@ -8,7 +8,7 @@ from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorder, FlightRec
 from hopping_leg.deploy.telemetry import columns
 from hopping_leg.errors import RobotError, TraceError, UsageError
 from hopping_leg.robot import kinematics, load_robot
-from hopping_leg.viewer.follow import Follow
+from hopping_leg.viewer.data_source import RecorderSource
 
 COLUMNS = ("time_s", "command_m", "hip_position_rad", "knee_position_rad", "hip_torque_nm")
 
@@ -49,7 +49,7 @@ def test_a_tail_returns_each_row_once_wherever_the_file_was_cut(tmp_path):
 def test_a_run_is_shown_as_it_grows_until_it_is_over(tmp_path):
     path = tmp_path / f"fast-1{SUFFIX}"
     writer = box(path)
-    follow = Follow(path)
+    follow = RecorderSource(path)
     follow.advance(1 / 60)
     assert follow.tracks == []
     write(writer, 0, 3)
@@ -85,7 +85,7 @@ def test_what_hop_deploy_records_is_shown_with_the_estimate_of_the_controller(tm
     }
     writer.row(list(row.values()))
     writer.close()
-    follow = Follow(tmp_path)
+    follow = RecorderSource(tmp_path)
     follow.advance(1.0)
     (track,) = follow.tracks
     assert track.moment(follow.now)[0] == 0.33
@@ -97,7 +97,7 @@ def test_what_hop_deploy_records_is_shown_with_the_estimate_of_the_controller(tm
 def test_joints_without_a_reply_stay_as_they_were(tmp_path):
     path = tmp_path / f"fast-1{SUFFIX}"
     writer = box(path)
-    follow = Follow(path)
+    follow = RecorderSource(path)
     write(writer, 0, 3)
     follow.advance(1 / 60)
     write(writer, 3, 3, hip=float("nan"))
@@ -113,13 +113,13 @@ def test_of_boxes_written_in_one_tick_the_last_by_name_is_followed(tmp_path):
         writer.close()
     for number in (1, 2):
         os.utime(tmp_path / f"fast-{number}{SUFFIX}", ns=(10**18, 10**18))
-    follow = Follow(tmp_path)
+    follow = RecorderSource(tmp_path)
     follow.advance(1.0)
     assert follow.notices[-1] == f"Following fast-2{SUFFIX}."
 
 
 def test_a_folder_waits_for_a_run_and_turns_to_a_newer_one(tmp_path):
-    follow = Follow(tmp_path)
+    follow = RecorderSource(tmp_path)
     follow.advance(1.0)
     assert "Waiting" in follow.notices[0]
     for number, count in ((1, 3), (2, 5)):
@@ -133,13 +133,13 @@ def test_a_folder_waits_for_a_run_and_turns_to_a_newer_one(tmp_path):
 
 def test_what_cannot_be_followed_is_refused(tmp_path):
     with pytest.raises(UsageError, match="There is no"):
-        Follow(tmp_path / "none")
+        RecorderSource(tmp_path / "none")
     foreign = tmp_path / f"foreign{SUFFIX}"
     foreign.write_bytes(b"something else altogether")
     with pytest.raises(TraceError, match="no flight recording"):
-        Follow(foreign).advance(1.0)
+        RecorderSource(foreign).advance(1.0)
     unknown = box(tmp_path / f"unknown{SUFFIX}", robot="mine")
     write(unknown, 0, 1)
     unknown.close()
     with pytest.raises(RobotError, match="--robot"):
-        Follow(unknown.path).advance(1.0)
+        RecorderSource(unknown.path).advance(1.0)

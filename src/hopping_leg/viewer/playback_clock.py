@@ -11,7 +11,7 @@ LONGEST = 0.1
 _WINDOW = 2.0
 
 
-class Pace:
+class PlaybackClock:
     """Turns time on the wall into time to be shown.
 
     Attributes:

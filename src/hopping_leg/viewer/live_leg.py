@@ -1,15 +1,20 @@
-"""A live simulation: one leg, or two side by side, that take commands while they hop."""
+"""A live simulation of one leg, or two side by side, that follow commands while they hop."""
 
+import numpy as np
+from mujoco import batch
+
+from hopping_leg.arrays import Array
 from hopping_leg.controllers.command_schedule import Range, command_range
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.controllers.registry import load_controller
+from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.robot import load_robot
+from hopping_leg.robot.limits import SoftLimits
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim import CONTROL_RATE
-from hopping_leg.viewer.hopper import Hopper
-from hopping_leg.viewer.tracks import Track
-from hopping_leg.viewer.world import PUSH, World, usual_world
+from hopping_leg.sim import CONTROL_RATE, MujocoSimulator, Plant
+from hopping_leg.viewer.live_settings import PUSH, LiveSettings, default_settings
+from hopping_leg.viewer.tracks import FIELDS, Track
 
 MOST = 2
 """Legs side by side."""
@@ -21,14 +26,14 @@ PUSH_SECONDS = 0.05
 """How long a push lasts."""
 
 
-class Live:
+class LiveSimulation:
     """The simulation behind the page; knows nothing of it.
 
     Attributes:
         robot: What the controllers believe.
         names: Of the controllers, as they were asked for.
         height: Commanded, m.
-        world: What the legs are in.
+        settings: Ground, payload, delay and noise of all legs.
         tracks: One per leg.
         now: Simulated time, s.
         notices: What the reader should be told; whoever shows them empties the list.
@@ -53,11 +58,11 @@ class Live:
         self._force, self._push_ticks = 0.0, 0
         self.height = height
         self.robot = load_robot(robot)
-        self.world = usual_world(self.robot)
+        self.settings = default_settings(self.robot)
         self.names: tuple[str, ...] = ()
         self.tracks: list[Track] = []
         self._controllers: list[Controller] = []
-        self._hoppers: list[Hopper] = []
+        self._legs: list[LiveLeg] = []
         self._begin(controllers, self.robot)
 
     @property
@@ -74,15 +79,15 @@ class Live:
         """Let one control period pass; a leg whose physics fails stands up again."""
         force = self._force if self._push_ticks else 0.0
         self._push_ticks = max(self._push_ticks - 1, 0)
-        for hopper, track in zip(self._hoppers, self.tracks, strict=True):
+        for leg, track in zip(self._legs, self.tracks, strict=True):
             try:
-                track.append(self.now, hopper.tick(self.height, force))
+                track.append(self.now, leg.tick(self.height, force))
             except PhysicsError as error:
                 self.notices.append(f"{error} The leg stands up again.")
-                hopper.stand(self.height)
+                leg.stand(self.height)
         self.now += 1 / CONTROL_RATE
 
-    def aim(self, height: float) -> float:
+    def set_height(self, height: float) -> float:
         """Command a height, brought into what is valid; return it, m."""
         low, high = self.valid
         self.height = round(min(max(height, low), high), 4)
@@ -99,18 +104,18 @@ class Live:
         self._force = force
         self._push_ticks = round(PUSH_SECONDS * CONTROL_RATE)
 
-    def change_world(self, world: World) -> None:
-        """Change the world while the legs hop; their controllers are not told."""
-        self.world = world
-        for hopper in self._hoppers:
-            hopper.become(self.world, self.height)
+    def set_settings(self, settings: LiveSettings) -> None:
+        """Change the settings while the legs hop; their controllers are not told."""
+        self.settings = settings
+        for leg in self._legs:
+            leg.set_settings(self.settings, self.height)
 
     def stand(self) -> None:
         """Let all legs begin anew, standing."""
-        for hopper in self._hoppers:
-            hopper.stand(self.height)
+        for leg in self._legs:
+            leg.stand(self.height)
 
-    def take_controllers(self, names: tuple[str, ...]) -> None:
+    def set_controllers(self, names: tuple[str, ...]) -> None:
         """Go on with other controllers in the present state; another number of legs begins anew.
 
         Raises:
@@ -127,16 +132,16 @@ class Live:
             new if other else old
             for new, old, other in zip(loaded, self._controllers, changed, strict=True)
         ]
-        self.aim(self.height)
-        for hopper, track, controller, other in zip(
-            self._hoppers, self.tracks, self._controllers, changed, strict=True
+        self.set_height(self.height)
+        for leg, track, controller, other in zip(
+            self._legs, self.tracks, self._controllers, changed, strict=True
         ):
             if other:
                 track.name = controller.name
-                hopper.take(controller, self.height)
+                leg.set_controller(controller, self.height)
 
-    def take_robot(self, robot: str) -> None:
-        """Begin anew with another robot in its own world.
+    def set_robot(self, robot: str) -> None:
+        """Begin anew with another robot and its own settings.
 
         Raises:
             RobotError: As for the constructor; everything stays as it was.
@@ -148,10 +153,10 @@ class Live:
         loaded = _load(names, robot)
         _shared_range(loaded, robot)
         if robot != self.robot:
-            self.world = usual_world(robot)
+            self.settings = default_settings(robot)
         self.robot, self.names, self._controllers = robot, names, loaded
-        self.aim(self.height)
-        self._hoppers = [Hopper(c, robot, self.world, self.height, self._seed) for c in loaded]
+        self.set_height(self.height)
+        self._legs = [LiveLeg(c, robot, self.settings, self.height, self._seed) for c in loaded]
         depth = round(KEPT_SECONDS * CONTROL_RATE)
         self.tracks = [Track(c.name, robot, depth=depth) for c in loaded]
 
@@ -169,3 +174,87 @@ def _shared_range(controllers: list[Controller], robot: Robot) -> Range:
         names = " and ".join(controller.name for controller in controllers)
         raise UsageError(f"{names} share no height that both can be asked for; show them in turn.")
     return low, high
+
+
+_ALL = slice(None)
+_IMPOSSIBLE = 1e4
+"""Joint speed that no leg reaches, rad/s."""
+
+
+class LiveLeg:
+    """A leg that hops.
+
+    Args:
+        controller: Believes that the leg is ``robot``.
+        robot: The leg as its file has it.
+        settings: Ground, payload, delay and noise.
+        height: Commanded first, m.
+        seed: Of noise and random delay.
+    """
+
+    def __init__(
+        self, controller: Controller, robot: Robot, settings: LiveSettings, height: float, seed: int
+    ) -> None:
+        self.controller, self.robot, self.settings = controller, robot, settings
+        self._rng = np.random.default_rng(seed)
+        self._force = 0.0
+        self._make()
+        self.stand(height)
+
+    def stand(self, height: float) -> None:
+        """Begin anew, standing; ``height`` is what is commanded, m."""
+        self._legs.stand(_ALL, RolloutConfig(self.robot).start_posture)
+        self._legs.push(np.zeros(1))
+        self._force = 0.0
+        self.set_controller(self.controller, height)
+
+    def set_controller(self, controller: Controller, height: float) -> None:
+        """Go on with another controller, or the same one anew, in the present state."""
+        self.controller = controller
+        controller.reset(1)
+        self._plant.channel.restart(_ALL, self._legs.q, self._legs.qd, np.array([height]))
+
+    def set_settings(self, settings: LiveSettings, height: float) -> None:
+        """Change the settings in the present state; the controller is not told."""
+        state = self._legs.state.copy()
+        self.settings = settings
+        self._make()
+        self._legs.place(_ALL, state[:, 0], state[0, 1:3])
+        self._legs.state[:] = state
+        self._legs.push(np.array([self._force]))
+        self._plant.channel.restart(_ALL, self._legs.q, self._legs.qd, np.array([height]))
+
+    def tick(self, height: float, force: float) -> Array:
+        """Let one control period pass; return its row, (fields of a track,).
+
+        Args:
+            height: Commanded, m.
+            force: Upward push on the base, N.
+
+        Raises:
+            PhysicsError: The simulation became unstable.
+        """
+        legs = self._legs
+        if force != self._force:
+            self._force = force
+            legs.push(np.array([force]))
+        command = np.array([height])
+        row = np.empty(len(FIELDS))
+        row[:3] = height, legs.height[0], legs.height_rate[0]
+        row[3:5] = legs.q[0]
+        row[7] = legs.foot_clearance()[0]
+        torque = self.controller.act(self._plant.sense(command))
+        try:
+            row[5:7] = self._plant.drive(torque)[0]
+        except batch.SimulationError as error:
+            raise PhysicsError(f"The simulation of {self.robot.name} failed: {error}.") from error
+        row[8] = self.controller.internals().get("phase", np.array([np.nan]))[0]
+        if not np.abs(legs.qd).max() < _IMPOSSIBLE:
+            raise PhysicsError(f"The simulation of {self.robot.name} became unstable.")
+        return row
+
+    def _make(self) -> None:
+        self._legs = MujocoSimulator(
+            self.settings.apply(self.robot), 1, rate=CONTROL_RATE, threads=1
+        )
+        self._plant = Plant(self._legs, self.settings.noise_and_delay, SoftLimits(), self._rng)

@@ -6,15 +6,15 @@ import pytest
 from hopping_leg.errors import PhysicsError, RobotError, UsageError
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.model_mismatch import GroundMismatch
-from hopping_leg.viewer.live import Live
-from hopping_leg.viewer.world import World, usual_world
+from hopping_leg.viewer.live_leg import LiveSimulation
+from hopping_leg.viewer.live_settings import LiveSettings, default_settings
 
 ROBOT = "legv2-paper"
 
 
 def quiet(*controllers, robot=ROBOT, height=0.3):
-    live = Live(controllers or ("energy-shaping",), robot, height)
-    live.change_world(dataclasses.replace(live.world, noise=False))
+    live = LiveSimulation(controllers or ("energy-shaping",), robot, height)
+    live.set_settings(dataclasses.replace(live.settings, noise=False))
     return live
 
 
@@ -30,7 +30,7 @@ def test_the_leg_hops_to_what_is_commanded_while_it_runs():
     live = quiet(height=0.28)
     live.advance(3.0)
     low = last_apexes(live)
-    assert live.aim(0.34) == 0.34
+    assert live.set_height(0.34) == 0.34
     live.advance(3.0)
     high = last_apexes(live)
     assert np.median(low) == pytest.approx(0.28, abs=0.015)
@@ -40,24 +40,24 @@ def test_the_leg_hops_to_what_is_commanded_while_it_runs():
 def test_heights_are_brought_into_what_every_controller_can_be_asked_for():
     live = quiet("fast", "energy-shaping")
     low, high = live.valid
-    assert live.aim(9.0) == pytest.approx(high, abs=1e-3)
-    assert live.aim(0.0) == pytest.approx(low, abs=1e-3)
+    assert live.set_height(9.0) == pytest.approx(high, abs=1e-3)
+    assert live.set_height(0.0) == pytest.approx(low, abs=1e-3)
     live.advance(0.05)
     assert quiet("energy-shaping").valid[1] > high
 
 
 def test_the_same_seed_gives_the_same_hops():
-    first, second = (Live(("fast",), ROBOT, 0.3, seed=3) for _ in range(2))
+    first, second = (LiveSimulation(("fast",), ROBOT, 0.3, seed=3) for _ in range(2))
     for live in (first, second):
         live.advance(0.3)
     np.testing.assert_array_equal(heights(first), heights(second))
 
 
-def test_a_change_of_the_world_keeps_the_state_of_the_leg():
+def test_changed_settings_keeps_the_state_of_the_leg():
     live, other = quiet(), quiet()
     for one in (live, other):
         one.advance(0.5)
-    live.change_world(dataclasses.replace(live.world, payload=0.5, delay=0.004))
+    live.set_settings(dataclasses.replace(live.settings, payload=0.5, delay=0.004))
     for one in (live, other):
         one.tick()
     before, at = heights(live)[-2:]
@@ -68,10 +68,10 @@ def test_a_change_of_the_world_keeps_the_state_of_the_leg():
 @pytest.mark.parametrize(
     "change", [{"payload": 0.6}, {"time_constant": 0.02}, {"delay": 0.02}, {"noise": True}]
 )
-def test_every_change_of_the_world_is_felt(change):
+def test_every_setting_changes_the_motion(change):
     live, same = quiet(), quiet()
-    live.change_world(dataclasses.replace(live.world, **change))
-    same.change_world(same.world)
+    live.set_settings(dataclasses.replace(live.settings, **change))
+    same.set_settings(same.settings)
     for one in (live, same):
         one.advance(1.0)
     assert np.abs(heights(live) - heights(same)).max() > 1e-3
@@ -81,7 +81,7 @@ def test_changing_nothing_changes_next_to_nothing():
     live, other = quiet(), quiet()
     live.advance(0.5)
     other.advance(0.5)
-    live.change_world(live.world)
+    live.set_settings(live.settings)
     for one in (live, other):
         one.advance(0.1)
     np.testing.assert_allclose(heights(live), heights(other), atol=2e-3)
@@ -95,14 +95,14 @@ def test_a_push_moves_the_base_and_ends():
     for live in (pushed, left):
         live.advance(0.08)
     assert heights(pushed)[-1] > heights(left)[-1] + 0.005
-    assert pushed._hoppers[0]._force == 0.0
+    assert pushed._legs[0]._force == 0.0
 
 
 def test_a_controller_takes_over_in_the_present_state():
     live = quiet("energy-shaping")
     live.advance(0.5)
     before = heights(live)[-1]
-    live.take_controllers(("fast",))
+    live.set_controllers(("fast",))
     live.tick()
     assert live.tracks[0].name == "fast"
     assert abs(heights(live)[-1] - before) < 0.02
@@ -112,16 +112,16 @@ def test_a_controller_takes_over_in_the_present_state():
 
 def test_a_height_that_the_next_controller_does_not_know_is_brought_into_its_range():
     live = quiet("energy-shaping")
-    live.aim(0.45)
+    live.set_height(0.45)
     live.advance(0.2)
-    live.take_controllers(("fast",))
+    live.set_controllers(("fast",))
     live.advance(0.2)
     assert live.height == pytest.approx(live.valid[1], abs=1e-3)
 
 
 def test_a_second_leg_hops_beside_the_first():
     live = quiet("energy-shaping")
-    live.take_controllers(("energy-shaping", "energy-shaping"))
+    live.set_controllers(("energy-shaping", "energy-shaping"))
     live.advance(0.4)
     assert len(live.tracks) == 2
     np.testing.assert_array_equal(heights(live, 0), heights(live, 1))
@@ -131,13 +131,13 @@ def test_a_refused_wish_changes_nothing():
     live = quiet("energy-shaping")
     tracks = live.tracks
     with pytest.raises(UsageError, match="no controller 'nobody'"):
-        live.take_controllers(("nobody",))
+        live.set_controllers(("nobody",))
     with pytest.raises(RobotError):
-        live.take_robot("nothing")
+        live.set_robot("nothing")
     with pytest.raises(RobotError, match="cannot hop"):
-        live.take_robot("doublependulum")
+        live.set_robot("doublependulum")
     with pytest.raises(UsageError, match="one, or two"):
-        live.take_controllers(("fast",) * 3)
+        live.set_controllers(("fast",) * 3)
     with pytest.raises(UsageError, match="out of range"):
         live.push(float("nan"))
     assert live.names == ("energy-shaping",)
@@ -146,11 +146,11 @@ def test_a_refused_wish_changes_nothing():
     live.advance(0.05)
 
 
-def test_another_robot_begins_anew_in_its_own_world():
+def test_another_robot_begins_anew_with_its_own_settings():
     live = quiet("energy-shaping")
-    live.change_world(dataclasses.replace(live.world, payload=0.5))
-    live.take_robot("legv2")
-    assert live.world == usual_world(load_robot("legv2"))
+    live.set_settings(dataclasses.replace(live.settings, payload=0.5))
+    live.set_robot("legv2")
+    assert live.settings == default_settings(load_robot("legv2"))
     live.advance(0.3)
     assert live.tracks[0].robot.name == "legv2"
 
@@ -159,10 +159,10 @@ def test_a_leg_with_effects_of_reality_takes_changes_too():
     live = quiet("energy-shaping", robot="twin")
     live.advance(0.2)
     before = heights(live)[-1]
-    live.change_world(dataclasses.replace(live.world, time_constant=0.05, delay=0.005))
+    live.set_settings(dataclasses.replace(live.settings, time_constant=0.05, delay=0.005))
     live.tick()
     assert abs(heights(live)[-1] - before) < 0.02
-    late = live.world.of(live.robot).reality.latency.command
+    late = live.settings.apply(live.robot).reality.latency.command
     assert late == pytest.approx(live.robot.reality.latency.command + 0.005)
 
 
@@ -170,27 +170,27 @@ def test_the_ground_of_reality_changes_with_that_of_the_robot():
     robot = load_robot("twin")
     own = dataclasses.replace(robot.reality, ground=GroundMismatch(time_constant=0.08))
     robot = dataclasses.replace(robot, reality=own)
-    assert usual_world(robot).time_constant == 0.08
-    changed = World(time_constant=0.03).of(robot)
+    assert default_settings(robot).time_constant == 0.08
+    changed = LiveSettings(time_constant=0.03).apply(robot)
     assert changed.reality.ground.time_constant == changed.contact.time_constant == 0.03
 
 
 def test_an_unstable_leg_stands_up_again_and_says_so(monkeypatch):
     live = quiet()
     live.advance(0.3)
-    hopper = live._hoppers[0]
+    leg = live._legs[0]
 
     def fail(*_):
         monkeypatch.undo()
         raise PhysicsError("The simulation became unstable.")
 
-    monkeypatch.setattr(hopper, "tick", fail)
+    monkeypatch.setattr(leg, "tick", fail)
     live.advance(0.3)
     assert "stands up again" in live.notices[0]
     assert np.isfinite(heights(live)).all()
 
 
 @pytest.mark.parametrize("wrong", [{"payload": -0.1}, {"delay": 1.0}, {"time_constant": 0.0}])
-def test_a_world_out_of_range_is_refused(wrong):
+def test_settings_out_of_range_is_refused(wrong):
     with pytest.raises(UsageError, match="must lie between"):
-        World(**({"time_constant": 0.05} | wrong))
+        LiveSettings(**({"time_constant": 0.05} | wrong))

@@ -1,4 +1,4 @@
-"""What may change in the world while a leg hops, unknown to its controller."""
+"""Settings of a live simulation that change while the leg hops; its controller is not told."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ PAYLOAD: Range = (0.0, 1.0)
 """Mass that can be put on the base, kg."""
 
 TIME_CONSTANT: Range = (0.005, 0.15)
-"""Of the ground, s: from hard to soft."""
+"""Time constant of the ground, s: from hard to soft."""
 
 DELAY: Range = (0.0, 0.03)
 """Further delay of commands, s."""
@@ -23,19 +23,19 @@ PUSH: Range = (5.0, 60.0)
 
 
 @dataclass(frozen=True)
-class World:
-    """The world beside the robot file.
+class LiveSettings:
+    """Ground, payload, delay and noise beside the robot file.
 
     Raises:
         UsageError: A value is out of its range.
     """
 
     time_constant: float
-    """Of the ground, s; small is hard."""
+    """Time constant of the ground, s; small is hard."""
     payload: float = 0.0
-    """On the base, kg."""
+    """Mass on the base, kg."""
     delay: float = 0.0
-    """Of commands, beyond the robot's own, s."""
+    """Delay of commands beyond the robot's own, s."""
     noise: bool = True
     """The paper's noise and random delay of measurements."""
 
@@ -49,12 +49,12 @@ class World:
                 )
 
     @property
-    def disturbance(self) -> NoiseAndDelay:
-        """What befalls measurements and torques."""
+    def noise_and_delay(self) -> NoiseAndDelay:
+        """Noise and delay of measurements and torques."""
         return NoiseAndDelay() if self.noise else NO_NOISE
 
-    def of(self, robot: Robot) -> Robot:
-        """Return what a robot is in this world."""
+    def apply(self, robot: Robot) -> Robot:
+        """Return the robot with these settings."""
         reality = robot.reality
         latency = reality.latency
         ground = reality.ground
@@ -72,8 +72,8 @@ class World:
         )
 
 
-def usual_world(robot: Robot) -> World:
-    """Return the world of the robot file, its ground brought into what can be set."""
+def default_settings(robot: Robot) -> LiveSettings:
+    """Return the settings of the robot file, its ground clipped to what can be set."""
     own = robot.reality.ground.time_constant or robot.contact.time_constant
     low, high = TIME_CONSTANT
-    return World(time_constant=min(max(own, low), high))
+    return LiveSettings(time_constant=min(max(own, low), high))

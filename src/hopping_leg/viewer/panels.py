@@ -1,0 +1,286 @@
+"""Inputs of the page and the queue that carries them to the thread that simulates."""
+
+import dataclasses
+from collections.abc import Callable, Coroutine
+from queue import Empty, SimpleQueue
+from typing import Any
+
+import viser
+
+from hopping_leg.controllers.registry import controller_names
+from hopping_leg.errors import HoppingLegError
+from hopping_leg.robot import load_robot
+from hopping_leg.robot.robot_files import shipped_robots
+from hopping_leg.viewer import live_settings as ranges
+from hopping_leg.viewer.data_source import ReplaySource
+from hopping_leg.viewer.live_leg import LiveSimulation
+from hopping_leg.viewer.playback_clock import SPEEDS, PlaybackClock
+
+Action = Callable[[], None]
+
+
+def put_value(handle: Any, value: object) -> None:  # noqa: ANN401
+    """Set an input of the page; viser's types take its values for read-only."""
+    handle.value = value
+
+
+class GuiQueue:
+    """Actions in the order in which they came; callbacks of the page only put them in."""
+
+    def __init__(self) -> None:
+        self._actions: SimpleQueue[Action] = SimpleQueue()
+
+    def put(self, action: Action) -> None:
+        """Queue an action; any thread may."""
+        self._actions.put(action)
+
+    def run(self) -> list[str]:
+        """Run all queued actions; return the sentences of those that failed."""
+        complaints: list[str] = []
+        while True:
+            try:
+                action = self._actions.get_nowait()
+            except Empty:
+                return complaints
+            try:
+                action()
+            except HoppingLegError as error:
+                complaints.append(str(error))
+
+    def from_page(self, action: Action) -> Callable[[Any], Coroutine[Any, Any, None]]:
+        """Return a callback for an input or button; what the server itself sets is no action."""
+
+        async def callback(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:
+                self.put(action)
+
+        return callback
+
+    def from_keys(self, action: Action) -> Callable[[Any], Coroutine[Any, Any, None]]:
+        """Return a callback for a key."""
+
+        async def callback(_: object) -> None:
+            self.put(action)
+
+        return callback
+
+
+NOBODY = "nobody"
+"""Beside the leg."""
+
+HEIGHT_STEP = 0.005
+"""Of the slider, m."""
+
+KEY_STEP = 0.01
+"""Of the keys K and J, m; arrows are the slider's own once it has the focus."""
+
+
+class LivePanel:
+    """Puts what the page asks for to a live simulation.
+
+    Args:
+        server: Of the page.
+        queue: For what is asked.
+        live: The simulation.
+        robot: Name or file that it was started with.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, queue: GuiQueue, live: LiveSimulation, robot: str
+    ) -> None:
+        self._live = live
+        gui = server.gui
+        low, high = live.valid
+        self._height = gui.add_slider(
+            "Height, m",
+            min=low,
+            max=high,
+            step=HEIGHT_STEP,
+            initial_value=live.height,
+            hint="Commanded apex; keys K and J",
+        )
+        self._height.on_update(queue.from_page(lambda: self._set_height(self._height.value)))
+        names = (*controller_names(), *(n for n in live.names if n not in controller_names()))
+        self._first = gui.add_dropdown("Controller", names, initial_value=live.names[0])
+        beside = live.names[1] if len(live.names) > 1 else NOBODY
+        self._second = gui.add_dropdown("Beside it", (NOBODY, *names), initial_value=beside)
+        for dropdown in (self._first, self._second):
+            dropdown.on_update(queue.from_page(self._controllers))
+        legs = [name for name in shipped_robots() if load_robot(name).kind == "leg"]
+        robots = tuple(legs if robot in legs else [*legs, robot])
+        self._robot = gui.add_dropdown("Robot", robots, initial_value=robot)
+        self._robot.on_update(queue.from_page(self._set_robot))
+        stand = gui.add_button("Stand up", icon=viser.Icon.RELOAD, hint="Begin anew; key R")
+        stand.on_click(queue.from_page(live.stand))
+        with gui.add_folder("Not told to the controller"):
+            self._add_settings(gui, queue)
+        with gui.add_folder("Push the base"):
+            force = _slider(gui, "Force, N", ranges.PUSH, 1.0, 30.0)
+            up = gui.add_button("Push up", icon=viser.Icon.ARROW_UP, hint="Key P")
+            down = gui.add_button("Push down", icon=viser.Icon.ARROW_DOWN, hint="Key O")
+        up.on_click(queue.from_page(lambda: live.push(force.value)))
+        down.on_click(queue.from_page(lambda: live.push(-force.value)))
+        keys = (
+            ("Higher", "K", lambda: self._change(KEY_STEP)),
+            ("Lower", "J", lambda: self._change(-KEY_STEP)),
+            ("Push up", "P", lambda: live.push(force.value)),
+            ("Push down", "O", lambda: live.push(-force.value)),
+            ("Stand up", "R", live.stand),
+        )
+        for label, key, action in keys:
+            gui.add_command(label, hotkey=key).on_trigger(queue.from_keys(action))  # type: ignore[arg-type]
+
+    def _add_settings(self, gui: viser.GuiApi, queue: GuiQueue) -> None:
+        settings = self._live.settings
+        self._payload = _slider(gui, "Payload, kg", ranges.PAYLOAD, 0.05, settings.payload)
+        self._ground = _slider(
+            gui,
+            "Ground, ms",
+            _thousandfold(ranges.TIME_CONSTANT),
+            1.0,
+            1e3 * settings.time_constant,
+            "Time constant; small is hard",
+        )
+        self._delay = _slider(
+            gui,
+            "Delay, ms",
+            _thousandfold(ranges.DELAY),
+            0.5,
+            1e3 * settings.delay,
+            "Of commands, beyond the robot's own",
+        )
+        self._noise = gui.add_checkbox(
+            "Noise", settings.noise, hint="The paper's noise and random delay of measurements"
+        )
+        for handle in (self._payload, self._ground, self._delay, self._noise):
+            handle.on_update(queue.from_page(self._settings))
+
+    def _set_height(self, height: float) -> None:
+        self._live.set_height(height)
+
+    def _change(self, by: float) -> None:
+        put_value(self._height, self._live.set_height(self._live.height + by))
+
+    def _controllers(self) -> None:
+        beside = self._second.value
+        names = (self._first.value,) if beside == NOBODY else (self._first.value, beside)
+        try:
+            self._live.set_controllers(names)
+        finally:
+            self._show()
+
+    def _set_robot(self) -> None:
+        try:
+            self._live.set_robot(self._robot.value)
+        finally:
+            self._show()
+
+    def _settings(self) -> None:
+        self._live.set_settings(
+            dataclasses.replace(
+                self._live.settings,
+                payload=self._payload.value,
+                time_constant=1e-3 * self._ground.value,
+                delay=1e-3 * self._delay.value,
+                noise=self._noise.value,
+            )
+        )
+
+    def _show(self) -> None:
+        """Bring all inputs in line with the simulation, which may have refused."""
+        live = self._live
+        self._height.min, self._height.max = live.valid
+        put_value(self._height, live.height)
+        put_value(self._first, live.names[0])
+        put_value(self._second, live.names[1] if len(live.names) > 1 else NOBODY)
+        put_value(self._payload, live.settings.payload)
+        put_value(self._noise, live.settings.noise)
+        put_value(self._ground, 1e3 * live.settings.time_constant)
+        put_value(self._delay, 1e3 * live.settings.delay)
+
+
+def _slider(
+    gui: viser.GuiApi,
+    label: str,
+    bounds: ranges.Range,
+    step: float,
+    value: float,
+    hint: str | None = None,
+) -> viser.GuiSliderHandle[float]:
+    low, high = bounds
+    return gui.add_slider(label, min=low, max=high, step=step, initial_value=value, hint=hint)
+
+
+def _thousandfold(bounds: ranges.Range) -> ranges.Range:
+    return 1e3 * bounds[0], 1e3 * bounds[1]
+
+
+class ReplayPanel:
+    """A slider for the time, which follows the replay as it plays.
+
+    Args:
+        server: Of the page.
+        queue: For what is asked.
+        replay: To be steered.
+    """
+
+    def __init__(self, server: viser.ViserServer, queue: GuiQueue, replay: ReplaySource) -> None:
+        self._replay = replay
+        self._time = server.gui.add_slider(
+            "Time, s", min=0.0, max=replay.length, step=0.01, initial_value=0.0
+        )
+        self._time.on_update(queue.from_page(self._seek))
+        self._shown = 0.0
+
+    def show(self) -> None:
+        """Bring the slider in line with the replay, unless it was the slider that moved it."""
+        if self._replay.now != self._shown:
+            self._shown = self._replay.now
+            put_value(self._time, round(self._shown, 2))
+
+    def _seek(self) -> None:
+        self._replay.seek(self._time.value)
+        self._shown = self._replay.now
+
+
+STEP_TICKS = 1
+"""Control periods of a single step."""
+
+
+class TimeControls:
+    """Pause, step and speed, by buttons and keys.
+
+    Args:
+        server: Of the page.
+        queue: For what is asked.
+        clock: To be changed.
+    """
+
+    def __init__(self, server: viser.ViserServer, queue: GuiQueue, clock: PlaybackClock) -> None:
+        self._clock = clock
+        gui = server.gui
+        self._pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE, hint="Space")
+        step = gui.add_button("Single step", icon=viser.Icon.PLAYER_SKIP_FORWARD, hint="Key S")
+        names = tuple(f"{speed:g}" for speed in SPEEDS)
+        speed = gui.add_dropdown("Speed", names, initial_value="1", hint="1 is real time")
+        self._pause.on_click(queue.from_page(self.pause))
+        step.on_click(queue.from_page(self.step))
+        speed.on_update(queue.from_page(lambda: clock.set_speed(float(speed.value))))
+        keys = (("Pause or go on", "space", self.pause), ("Single step", "S", self.step))
+        for label, key, action in keys:
+            gui.add_command(label, hotkey=key).on_trigger(queue.from_keys(action))  # type: ignore[arg-type]
+
+    def pause(self) -> None:
+        """Pause, or go on."""
+        self._clock.paused = not self._clock.paused
+        self._label()
+
+    def step(self) -> None:
+        """Pause, and show one control period more."""
+        self._clock.step(STEP_TICKS)
+        self._label()
+
+    def _label(self) -> None:
+        paused = self._clock.paused
+        self._pause.label = "Go on" if paused else "Pause"
+        self._pause.icon = viser.Icon.PLAYER_PLAY if paused else viser.Icon.PLAYER_PAUSE
