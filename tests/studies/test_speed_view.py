@@ -6,10 +6,9 @@ pytest.importorskip("playwright", reason="playwright is not installed")
 
 from PIL import Image
 from studies.shared import main
+from studies.speed import browser
 from studies.speed.view import ViewBenchmark, bench_view
 from studies.speed.view_options import View
-
-from hopping_leg.viewer import browser
 
 
 @pytest.mark.slow
