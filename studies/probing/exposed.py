@@ -9,7 +9,7 @@ import onnxruntime
 
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import RolloutConfig, rollout
-from hopping_leg.controllers.observation_history import Inputs, make_layout
+from hopping_leg.controllers.observation_history import Inputs, make_observation_history
 from hopping_leg.controllers.policy import MEMORY, NEXT_MEMORY, Policy
 from hopping_leg.controllers.protocol import Measurement
 from hopping_leg.evaluate.metrics import START_SECONDS
@@ -73,7 +73,7 @@ class Exposed:
 
     def __init__(self, policy: Policy, graph: bytes) -> None:
         self.name, self._policy = policy.name, policy
-        self._layout = make_layout(policy.card.layout, 1 / policy.card.rate)
+        self._layout = make_observation_history(policy.card.layout, 1 / policy.card.rate)
         self._graph = Graph(graph)
         self.seen: list[Inputs] = []
         self.given: list[dict[str, npt.NDArray[np.float32]]] = []

@@ -41,6 +41,7 @@ def test_a_training_leaves_policy_card_and_json(tiny, tmp_path, capsys):
         (["--set", "num_envs=2.5"], "a whole number"),
         (["--heights", "0.4", "0.2"], "the smaller first"),
         (["--robot", "legv9"], "There is no robot"),
+        (["--observation", "dates"], "dated, dated-long"),
         (["--robot", "twin"], "has effects in [reality] that training does not know"),
     ],
 )

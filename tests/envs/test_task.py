@@ -1,9 +1,11 @@
 import json
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
+from hopping_leg.controllers.observation_history import OBSERVATION_HISTORIES, ThreeSamples
 from hopping_leg.envs import HoppingTask, TaskConfig, paper_reward
 from hopping_leg.envs.observation import sample_scaling
 from hopping_leg.errors import UsageError
@@ -261,3 +263,17 @@ def test_some_legs_stay_the_robot_itself():
 def test_options_without_meaning_are_refused(wrong):
     with pytest.raises(UsageError):
         task(TaskConfig(**wrong), count=1)
+
+
+def test_an_observation_history_of_ones_own_is_a_class_and_an_entry(monkeypatch):
+    class Newest(ThreeSamples):
+        name = "newest"
+        shapes: ClassVar = {"q": (1, 2), "qd": (1, 2), "command": (1,)}
+
+        def inputs(self):
+            return {name: values[:, :1] for name, values in super().inputs().items()}
+
+    monkeypatch.setitem(OBSERVATION_HISTORIES, Newest.name, Newest)
+    own, usual = task(TaskConfig(observation="newest")), task(TaskConfig())
+    seen, whole = own.step(np.zeros((6, 2))).observation, usual.step(np.zeros((6, 2))).observation
+    np.testing.assert_allclose(seen, whole[:, :5], atol=1e-5)

@@ -47,8 +47,9 @@ class Options:
     """What each leg in training draws for itself instead of the recipe's: nothing; friction,
     inertia and ground from the twins' ranges; or whatever may surprise a leg, from a payload to
     late commands."""
-    observation: Literal["three-samples", "dated", "dated-long"] | None = None
-    """What the policy sees instead of what the recipe shows it; three-samples is the paper's."""
+    observation: str | None = None
+    """Observation history that the policy sees instead of the recipe's, e.g. the paper's
+    `three-samples`, or `dated-long`; an unknown name lists all."""
     heights: tuple[float, float] | None = None
     """Lowest and highest height that the policy can be told, m, instead of the recipe's."""
     minutes: float | None = None

@@ -18,13 +18,20 @@ Inputs = dict[str, npt.NDArray[np.float32]]
 """Graph input to its array, (n, ...)."""
 
 
-class Layout(Protocol):
-    """Turns measurements into a policy's inputs; may remember past ticks."""
+class ObservationHistory(Protocol):
+    """Turns measurements into a policy's inputs; may remember past ticks.
+
+    One of your own needs a class and an entry in ``OBSERVATION_HISTORIES``.
+    """
 
     name: ClassVar[str]
     """As stored in policy files."""
     shapes: ClassVar[dict[str, tuple[int, ...]]]
     """Graph inputs, in the order in which the network sees them, without the leading n."""
+
+    def __init__(self, period: float) -> None:
+        """Take the control period, s."""
+        ...
 
     def reset(self, count: int) -> None:
         """Forget the past of all legs; the next measurement has ``count`` rows."""
@@ -68,6 +75,9 @@ class ThreeSamples:
         "qd": (SAMPLES, 2),
         "command": (SAMPLES,),
     }
+
+    def __init__(self, period: float) -> None:
+        pass
 
     def reset(self, count: int) -> None:
         """Do nothing: the measurement holds all three samples."""
@@ -201,21 +211,18 @@ class DatedLong(Dated):
     shapes: ClassVar[dict[str, tuple[int, ...]]] = _dated_shapes(LAGS, TORQUE_LAGS)
 
 
-LAYOUTS: dict[str, Any] = {
-    ThreeSamples.name: lambda period: ThreeSamples(),
-    Dated.name: Dated,
-    DatedLong.name: DatedLong,
+OBSERVATION_HISTORIES: dict[str, type[ObservationHistory]] = {
+    history.name: history for history in (ThreeSamples, Dated, DatedLong)
 }
-"""Layout names that policy files may carry, to their makers."""
+"""Classes by the names that policy files, tasks and ``hop train --observation`` know them by."""
 
 
-def make_layout(name: str, period: float) -> Layout:
-    """Return a fresh layout for a control period, s.
+def make_observation_history(name: str, period: float) -> ObservationHistory:
+    """Return a fresh observation history for a control period, s.
 
     Raises:
         PolicyError: No layout has that name.
     """
-    if name not in LAYOUTS:
-        raise PolicyError(unknown_name("observation layout", name, LAYOUTS))
-    layout: Layout = LAYOUTS[name](period)
-    return layout
+    if name not in OBSERVATION_HISTORIES:
+        raise PolicyError(unknown_name("observation layout", name, OBSERVATION_HISTORIES))
+    return OBSERVATION_HISTORIES[name](period)

@@ -15,7 +15,7 @@ import numpy as np
 import onnxruntime
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.observation_history import Layout, make_layout
+from hopping_leg.controllers.observation_history import ObservationHistory, make_observation_history
 from hopping_leg.errors import PolicyError, UsageError
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.channel import Measurement
@@ -44,7 +44,7 @@ class Card:
     recipe: str
     """Training recipe."""
     layout: str
-    """Observation layout, one of ``controllers.observation_history.LAYOUTS``."""
+    """Observation layout, one of ``controllers.observation_history.OBSERVATION_HISTORIES``."""
     command_low: float
     """Lowest command of the training, m."""
     command_high: float
@@ -119,7 +119,7 @@ class Policy:
                 f"{origin} is an ONNX file but not a policy; make one with `hop train`."
             )
         self.card = Card.from_json(text, origin)
-        self._layout: Layout = make_layout(self.card.layout, 1 / self.card.rate)
+        self._layout = make_observation_history(self.card.layout, 1 / self.card.rate)
         self._memory_size = _check_signature(self._session, self._layout, origin)
         self.reset(0)
 
@@ -243,7 +243,7 @@ def _open(content: bytes, origin: str) -> Any:  # noqa: ANN401
         ) from error
 
 
-def _check_signature(session: Any, layout: Layout, origin: str) -> int:  # noqa: ANN401
+def _check_signature(session: Any, layout: ObservationHistory, origin: str) -> int:  # noqa: ANN401
     """Check a graph's inputs and outputs; return the entries of its memory, 0 if it has none."""
     found = {i.name: tuple(i.shape[1:]) for i in session.get_inputs()}
     outputs = [tuple(o.shape[1:]) for o in session.get_outputs()]

@@ -13,7 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hopping_leg.arrays import Array, IntArray
-from hopping_leg.controllers.observation_history import Layout, ThreeSamples, make_layout
+from hopping_leg.controllers.observation_history import (
+    ObservationHistory,
+    ThreeSamples,
+    make_observation_history,
+)
 from hopping_leg.envs.task_config import TaskConfig
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import SAMPLES, Channel, Simulator
@@ -129,7 +133,9 @@ class PaperObservation:
 class LayoutObservation:
     """The inputs of any policy layout, made by the very code that makes them on the robot."""
 
-    def __init__(self, layout: Layout, scaling: Scaling, torque: Array, count: int) -> None:
+    def __init__(
+        self, layout: ObservationHistory, scaling: Scaling, torque: Array, count: int
+    ) -> None:
         self._layout, self.layout, self.scaling = layout, layout.name, scaling
         self._torque = torque
         self.size = len(scaling.offset)
@@ -175,7 +181,7 @@ def make_observation(robot: Robot, options: TaskConfig, count: int) -> Observati
     sample = sample_scaling(robot, options)
     if options.observation == ThreeSamples.name:
         return PaperObservation(sample, count)
-    layout = make_layout(options.observation, 1 / options.rate)
+    layout = make_observation_history(options.observation, 1 / options.rate)
     torque = np.array(options.action_torque)
     parts = {
         "q": (sample.offset[0:2], sample.gain[0:2]),

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
+from hopping_leg.controllers.observation_history import OBSERVATION_HISTORIES
 from hopping_leg.errors import UsageError
 from hopping_leg.robot.limits import SoftLimits
 from hopping_leg.robot.model import TIMESTEP
@@ -12,16 +13,14 @@ from hopping_leg.sim.randomization import Range
 
 ResetDistribution = Literal["standing", "drop", "mixed", "hop"]
 
-See = Literal["three-samples", "dated", "dated-long"]
-
 
 @dataclass(frozen=True)
 class TaskConfig:
     """The learning problem around the leg."""
 
-    observation: See = "three-samples"
-    """Policy layout whose inputs the learner sees: the paper's three samples, however late, or more
-    samples, each in its place in time, and the own past torques."""
+    observation: str = "three-samples"
+    """Observation history whose inputs the learner sees: the paper's three samples, however late,
+    or more samples, each in its place in time, and the own past torques."""
     action_torque: tuple[float, float] = (6.0, 6.0)
     """Joint torque of a full action at hip and knee, N m."""
     commands: tuple[float, ...] = (0.25, 0.30, 0.35)
@@ -104,7 +103,7 @@ def _check(options: TaskConfig) -> None:
             f"'action_torque' is {options.action_torque} but both torques must be positive, N m."
         )
     for name, valid in (
-        ("observation", get_args(See)),
+        ("observation", tuple(OBSERVATION_HISTORIES)),
         ("reset_distribution", get_args(ResetDistribution)),
     ):
         if getattr(options, name) not in valid:

@@ -12,7 +12,7 @@ import onnx
 from onnx import helper
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.observation_history import make_layout
+from hopping_leg.controllers.observation_history import make_observation_history
 from hopping_leg.controllers.policy import MEMORY, METADATA_KEY, NEXT_MEMORY, Card
 from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically
@@ -63,7 +63,7 @@ def build_policy(network: Network, card: Card) -> bytes:
         network: The actor; its input is the layout's arrays, flattened row by row and joined.
         card: Stored in the metadata.
     """
-    shapes = make_layout(card.layout, 1 / card.rate).shapes
+    shapes = make_observation_history(card.layout, 1 / card.rate).shapes
     graph = Graph()
     apply, constant = graph.apply, graph.constant
     flat = [

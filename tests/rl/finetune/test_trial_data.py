@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.controllers import RolloutConfig, rollout
-from hopping_leg.controllers.observation_history import make_layout
+from hopping_leg.controllers.observation_history import make_observation_history
 from hopping_leg.errors import TraceError
 from hopping_leg.rl.finetune.simulated import Witness, traces_of
 from hopping_leg.rl.finetune.trial_data import TrialData
@@ -20,7 +20,7 @@ class Shown:
     name = "shown"
 
     def __init__(self):
-        self.layout = make_layout(POLICY.card.layout, PERIOD)
+        self.layout = make_observation_history(POLICY.card.layout, PERIOD)
 
     def reset(self, count):
         POLICY.reset(count)
@@ -49,7 +49,7 @@ def run():
 def test_inputs_rebuilt_from_traces_are_those_that_the_network_saw(run):
     shown, traces = run
     data = TrialData.of(traces)
-    layout = make_layout(POLICY.card.layout, PERIOD)
+    layout = make_observation_history(POLICY.card.layout, PERIOD)
     layout.reset(2)
     last = np.zeros((2, 2))
     for tick, measurement in enumerate(data.measurements()):

@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from torch import nn
 
-from hopping_leg.controllers.observation_history import make_layout
+from hopping_leg.controllers.observation_history import make_observation_history
 from hopping_leg.envs import TaskConfig
 from hopping_leg.envs.observation import (
     PRIVILEGED,
@@ -157,7 +157,7 @@ class Distillation:
             return RecurrentStudent(measured, config.size, room, env.num_envs)
         if config.memory == "window":
             return WindowStudent(measured, size, list(config.hidden), room, nn.Tanh)
-        if make_layout(task.observation, 1 / task.rate).shapes["command"] != (1,):
+        if make_observation_history(task.observation, 1 / task.rate).shapes["command"] != (1,):
             raise UsageError(
                 "A student with an integrator is told another command than the one it is given and"
                 f" needs an observation with a single one, not '{task.observation}'; choose"
@@ -317,7 +317,7 @@ def make_teacher(
 
 def last_torque(task: TaskConfig) -> list[int]:
     """Return where the torques of the last control step stand in an observation, if they do."""
-    shapes = make_layout(task.observation, 1 / task.rate).shapes
+    shapes = make_observation_history(task.observation, 1 / task.rate).shapes
     if "past_torque" not in shapes:
         return []
     before = list(shapes)[: list(shapes).index("past_torque")]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.observation_history import make_layout
+from hopping_leg.controllers.observation_history import make_observation_history
 from hopping_leg.controllers.policy import Card
 from hopping_leg.rl.finetune.lines import robust_line
 from hopping_leg.rl.onnx_export import Network
@@ -86,7 +86,7 @@ class CommandCorrection:
 
 def command_columns(card: Card) -> list[int]:
     """Return where commands stand among a policy's joined inputs."""
-    shapes = make_layout(card.layout, 1 / card.rate).shapes
+    shapes = make_observation_history(card.layout, 1 / card.rate).shapes
     sizes = {name: int(np.prod(shape)) for name, shape in shapes.items()}
     first = sum(sizes[name] for name in list(sizes)[: list(sizes).index("command")])
     return list(range(first, first + sizes["command"]))

@@ -8,7 +8,7 @@ import numpy as np
 import onnxruntime
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.observation_history import make_layout
+from hopping_leg.controllers.observation_history import make_observation_history
 from hopping_leg.controllers.policy import Card
 from hopping_leg.controllers.protocol import Measurement
 from hopping_leg.rl.hidden import PREFIX, expose_hidden
@@ -32,7 +32,7 @@ class ExploringPolicy:
         self, content: bytes, card: Card, spread: Array, hold: int, rng: np.random.Generator
     ) -> None:
         self.name = f"exploring {card.recipe}"
-        self._layout = make_layout(card.layout, 1 / card.rate)
+        self._layout = make_observation_history(card.layout, 1 / card.rate)
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = options.inter_op_num_threads = 1
         self._session = onnxruntime.InferenceSession(

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.observation_history import make_layout
+from hopping_leg.controllers.observation_history import make_observation_history
 from hopping_leg.controllers.policy import Card
 from hopping_leg.envs import Reward
 from hopping_leg.envs.observation import Array32
@@ -103,7 +103,7 @@ class TransitionWriter:
     def actor_inputs(self, data: TrialData) -> Array:
         """Return what the network computes with at every tick, normalised, (ticks, n, size)."""
         card, network = self._card, self._network
-        layout = make_layout(card.layout, 1 / card.rate)
+        layout = make_observation_history(card.layout, 1 / card.rate)
         layout.reset(data.command.shape[1])
         last = np.zeros(data.asked.shape[1:])
         rows = []
