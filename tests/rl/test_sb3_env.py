@@ -37,6 +37,18 @@ def test_an_episode_ends_as_stable_baselines_wants_it(privileged):
     assert infos[0]["terminal_observation"].shape == env.observation_space.shape
 
 
+def test_terms_of_the_reward_are_means_since_they_were_last_taken():
+    env, task = make(), make().task
+    env.reset()
+    task.reset()
+    assert env.take_reward_terms() == {}
+    for ticks in (4, 2):
+        expected = np.mean([task.step(np.full((3, 2), 0.5)).terms for _ in range(ticks)], (0, 1))
+        for _ in range(ticks):
+            env.step(np.full((3, 2), 0.5))
+        assert list(env.take_reward_terms().values()) == pytest.approx(expected.tolist())
+
+
 def test_state_continues_exactly():
     env, other = make(True), make(True)
     env.reset()

@@ -35,6 +35,7 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
         super().__init__(task.count, space, gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32))
         self.hops = 0
         self._recent: deque[tuple[float, float]] = deque(maxlen=_RECENT_HOPS)
+        self._terms, self._steps = np.zeros(len(task.reward.names)), 0
         self._return = np.zeros(task.count)
         self._length = np.zeros(task.count, np.int64)
         self._started = time.monotonic()
@@ -53,6 +54,14 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
         commands, errors = np.array(self._recent).reshape(-1, 2).T
         return commands, errors
 
+    def take_reward_terms(self) -> dict[str, float]:
+        """Return the reward's unweighted terms by name, mean per tick since the last call."""
+        if not self._steps:
+            return {}
+        means = self._terms / self._steps
+        self._terms, self._steps = np.zeros_like(self._terms), 0
+        return dict(zip(self.task.reward.names, means.tolist(), strict=True))
+
     def reset(self) -> Array32:
         """Begin new episodes of all legs."""
         self._return[:], self._length[:] = 0.0, 0
@@ -66,6 +75,8 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
         """Step all legs; legs whose episode ended have begun the next."""
         command = self.task.command.copy()
         step = self.task.step(self._action)
+        self._terms += np.mean(step.terms, axis=0)
+        self._steps += 1
         self._return += step.reward
         self._length += 1
         if step.apex_error is not None:

@@ -211,6 +211,8 @@ class Trainer:
 
     def _at_boundary(self) -> None:
         share = 1 - self.model._current_progress_remaining
+        for name, mean in self.env.take_reward_terms().items():
+            self.model.logger.record_mean(f"reward/{name}", mean)
         self.recipe.anneal(self.model, self.env, share)
         self._tell_early_score()
         if (
