@@ -1,4 +1,4 @@
-"""An outing on emulated drives comes back as the trace of what was hopped."""
+"""Host and emulated drives in lockstep: the real client, the real frames, no clock on the wall."""
 
 import contextlib
 
@@ -6,20 +6,182 @@ import numpy as np
 import pytest
 
 from hopping_leg.controllers.command_schedule import CommandSchedule
-from hopping_leg.controllers.registry import load_policy
-from hopping_leg.deploy.hardware_trials import DeployedRobot
+from hopping_leg.controllers.registry import load_controller, load_policy
+from hopping_leg.deploy.drive_info import configure, home, inspect
+from hopping_leg.deploy.hardware_trials import DeployedRobot, header_of, perform
+from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
+from hopping_leg.deploy.preflight import check_drives, require_fit, required_settings
+from hopping_leg.deploy.safety_limits import hopping_limits
+from hopping_leg.deploy.supervisor import State
+from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot import load_robot
+from hopping_leg.robot.limits import SoftLimiter, SoftLimits
+from hopping_leg.trace import Trace
+from tests.deploy.fakes import Still
 
-ROBOT = load_robot("legv2-paper")
+LEG = load_robot("legv2-paper")
+LIMITS = hopping_limits(LEG, 200.0)
+
+
+def emulated(**start):
+    return Lockstep(EmulatorConfig(robot="legv2-paper", **start).build())
+
+
+def run(lockstep, path, *, controller="energy-shaping", hop=0.5, rise=0.5):
+    controller = load_controller(controller, LEG)
+    sequence = MotionSequence(
+        controller,
+        CommandSchedule(((0.3, 100.0),)),
+        hopping_poses(LEG),
+        SoftLimiter(LEG, SoftLimits()),
+        SequenceTiming(hop=hop, rise=rise, settle=0.2, sink=0.6),
+    )
+    header = header_of(LEG, controller, 200.0)
+    try:
+        return perform(
+            lockstep.link, sequence, LIMITS, path, header, clock=lockstep, realtime=False
+        )
+    finally:
+        lockstep.link.close()
+
+
+def test_healthy_drives_pass_every_check_and_say_who_they_are():
+    lockstep = emulated()
+    facts = inspect(lockstep.link)
+    findings = check_drives(LEG, LIMITS, facts)
+    require_fit(findings)
+    assert {f.joint for f in findings} == {0, 1}
+    assert len(findings) == 2 * 14
+    assert facts[0].serial != facts[1].serial
+    np.testing.assert_allclose([f.position for f in facts], lockstep.robot.leg.q, atol=1e-3)
+    lockstep.link.close()
+
+
+@pytest.mark.parametrize(
+    ("start", "words"),
+    [
+        ({"homed": False}, "hip is not homed"),
+        ({"configured": False}, "timeout_mode is 12 but must be 15"),
+        ({"pose": "zero"}, "knee stands at"),
+        ({"faults": (Fault("boot_pose", drive="knee"),)}, "knee is not homed"),
+        (
+            {"faults": (Fault("configuration", name="servo.max_current_A", value=20.0),)},
+            "servo.max_current_A is 20 but must be 100",
+        ),
+        ({"faults": (Fault("silence", since="start", drive="knee"),)}, "knee's drive (id 2) does"),
+    ],
+)
+def test_a_drive_that_is_not_fit_is_refused_with_the_reason(start, words):
+    lockstep = emulated(**start)
+    lockstep.robot.advance(0.01)
+    findings = check_drives(LEG, LIMITS, inspect(lockstep.link))
+    complaints = [finding.complaint for finding in findings]
+    assert any(words in complaint for complaint in complaints), complaints
+    with pytest.raises(HardwareError, match="Not armed"):
+        require_fit(findings)
+    lockstep.link.close()
+
+
+def test_configuring_and_homing_make_a_delivered_drive_fit():
+    lockstep = emulated(configured=False, homed=False)
+    findings = check_drives(LEG, LIMITS, inspect(lockstep.link))
+    for joint in (0, 1):
+        wrong = {f.setting for f in findings if f.joint == joint and f.setting}
+        assert "servo.timeout_mode" in wrong
+        configure(
+            lockstep.link, joint, [s for s in required_settings(LEG, joint) if s.name in wrong]
+        )
+    home(lockstep.link, lockstep.robot.leg.q + np.array([0.1, -0.1]))
+    facts = inspect(lockstep.link)
+    require_fit(check_drives(LEG, LIMITS, facts))
+    np.testing.assert_allclose([f.position for f in facts], lockstep.robot.leg.q, atol=1e-3)
+    lockstep.robot.drives[0].settings.load()
+    assert lockstep.robot.drives[0].settings["servo.timeout_mode"] == 15
+    lockstep.link.close()
+
+
+def test_a_run_is_a_trace_like_any_other(tmp_path):
+    lockstep = emulated()
+    done = run(lockstep, tmp_path / "run.parquet", hop=1.0)
+    assert done.outcome.supervisor.stop_cause.reason.name == "FINISHED"
+    assert done.outcome.skipped == 0
+    trace = Trace.load(tmp_path / "run.parquet")
+    assert list(tmp_path.iterdir()) == [tmp_path / "run.parquet"]
+    assert trace.header["robot_digest"] == LEG.digest
+    assert trace.header["codes"]["state"]["2"] == "running"
+    hopping = trace.column("part") == Part.HOP
+    assert hopping.sum() == pytest.approx(200, abs=1)
+    assert (trace.column("phase")[hopping] >= 0).all()
+    assert np.isnan(trace.column("phase")[~hopping]).all()
+    running = trace.column("state") == State.RUNNING
+    assert (trace.column("knee_mode")[running][1:] == 10).all()
+    assert max(height for _, height, _ in lockstep.truth) > 0.27
+    final = [drive.machine.mode for drive in lockstep.robot.drives]
+    assert final == [0, 0]
+
+
+def test_the_motors_give_what_was_sent(tmp_path):
+    trace = run(emulated(), tmp_path / "run.parquet").trace
+    hopping = trace.column("part") == Part.HOP
+    for joint in ("hip", "knee"):
+        sent, given = trace.column(f"{joint}_sent_nm"), trace.column(f"{joint}_torque_nm")
+        difference = (given[1:] - sent[:-1])[hopping[1:]]
+        assert np.median(np.abs(difference)) < 1e-3
+
+
+QUICK = [
+    (Fault("drive_fault", at=0.9, drive="knee", value=35), "DRIVE_FAULT"),
+    (Fault("silence", at=0.9), "REPLIES_MISSING"),
+    (Fault("drop_reply", at=0.9), "FINISHED"),
+]
+OTHERS = [
+    (Fault("encoder_jump", at=0.9, drive="hip"), "ENCODER_JUMP"),
+    (Fault("over_voltage", at=0.9, value=44.0), "VOLTAGE_HIGH"),
+    (Fault("under_voltage", at=0.9, value=12.0), "VOLTAGE_LOW"),
+    (Fault("over_temperature", at=0.9, value=500.0), "TOO_HOT"),
+    (Fault("power_loss", at=0.9, drive="hip"), "DRIVE_LEFT_MODE"),
+    (Fault("limit_notice", at=0.9), "FINISHED"),
+]
+CASES = [
+    *(("energy-shaping", *case) for case in QUICK),
+    *(pytest.param("fast", *case, marks=pytest.mark.slow) for case in QUICK),
+    *(
+        pytest.param(controller, *case, marks=pytest.mark.slow)
+        for controller in ("energy-shaping", "fast")
+        for case in OTHERS
+    ),
+]
+
+
+@pytest.mark.parametrize(("controller", "fault", "reason"), CASES)
+def test_each_fault_ends_the_run_for_its_reason_and_nothing_starts_again(
+    tmp_path, controller, fault, reason
+):
+    lockstep = emulated(faults=(fault,))
+    done = run(lockstep, tmp_path / "run.parquet", controller=controller)
+    assert done.outcome.supervisor.stop_cause.reason.name == reason
+    trace = done.trace
+    states = trace.column("state")
+    assert (np.diff(states) >= 0).all()
+    stopped = states >= State.DAMPING
+    for joint, limit in zip(("hip", "knee"), LIMITS.torque, strict=True):
+        sent = trace.column(f"{joint}_sent_nm")
+        assert np.isfinite(sent).all()
+        assert np.abs(sent).max() <= limit
+        assert not sent[stopped].any()
+    events = [event.get("reason") for event in trace.header["events"]]
+    assert reason.lower() in events
+
+
 SCHEDULE = CommandSchedule(((0.3, 1.0), (0.25, 0.5)))
 
 
 def deployed(tmp_path, lockstep, ready=lambda seconds: None):
     return DeployedRobot(
-        ROBOT,
+        LEG,
         200.0,
         tmp_path,
         lambda: contextlib.nullcontext(lockstep.link),
@@ -30,54 +192,33 @@ def deployed(tmp_path, lockstep, ready=lambda seconds: None):
 
 
 @pytest.mark.slow
-def test_an_outing_holds_the_hops_alone_and_counts_all_of_its_time(tmp_path):
-    lockstep = Lockstep(EmulatorConfig(robot="legv2-paper").build())
+def test_a_trial_holds_the_hops_alone_and_counts_all_of_its_time(tmp_path):
+    lockstep = emulated()
     asked = []
-    outing = deployed(tmp_path, lockstep, asked.append).hop(load_policy("fast"), SCHEDULE, 1)
+    trial = deployed(tmp_path, lockstep, asked.append).hop(load_policy("fast"), SCHEDULE, 1)
     lockstep.link.close()
     assert asked == [1.5]
-    assert not outing.complaint
-    assert len(outing.trace.table) == 300
-    assert outing.seconds > 1.5 + 2.0 + 1.5
-    assert outing.truth is None
-    command = outing.trace.column("command_m")
+    assert not trial.complaint
+    assert len(trial.trace.table) == 300
+    assert trial.seconds > 1.5 + 2.0 + 1.5
+    assert trial.truth is None
+    command = trial.trace.column("command_m")
     np.testing.assert_allclose(command[[0, -1]], [0.3, 0.25])
-    torque = [outing.trace.column(f"{joint}_command_nm") for joint in ("hip", "knee")]
+    torque = [trial.trace.column(f"{joint}_command_nm") for joint in ("hip", "knee")]
     assert np.abs(torque).max() <= 6.0
     assert len(list(tmp_path.glob("*.parquet"))) == 1
-
-
-class Broken:
-    """Fails at once, or after some ticks."""
-
-    name = "broken"
-
-    def __init__(self, ticks):
-        self.ticks = ticks
-
-    def reset(self, count):
-        self.tick = 0
-
-    def act(self, measurement):
-        self.tick += 1
-        if self.tick > self.ticks:
-            raise ValueError("broken")
-        return np.zeros((1, 2))
-
-    def internals(self):
-        return {}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("ticks", [10, 230])
 def test_a_stop_by_the_supervisor_comes_back_as_a_complaint(tmp_path, ticks):
-    lockstep = Lockstep(EmulatorConfig(robot="legv2-paper").build())
+    lockstep = emulated()
     robot = deployed(tmp_path, lockstep)
     if ticks < 200:
         with pytest.raises(HardwareError, match="before it hopped"):
-            robot.hop(Broken(ticks), SCHEDULE, 1)
+            robot.hop(Still(fail_after=ticks), SCHEDULE, 1)
     else:
-        outing = robot.hop(Broken(ticks), SCHEDULE, 1)
-        assert "error" in outing.complaint
-        assert len(outing.trace.table) <= ticks + 1
+        trial = robot.hop(Still(fail_after=ticks), SCHEDULE, 1)
+        assert "error" in trial.complaint
+        assert len(trial.trace.table) <= ticks + 1
     lockstep.link.close()
