@@ -21,7 +21,7 @@ from hopping_leg.identify.cost import Objective, Scoring
 from hopping_leg.identify.identifiability import Identifiability, identifiability
 from hopping_leg.identify.optimizers import jacobian
 from hopping_leg.identify.parameters import LegHypothesis
-from hopping_leg.identify.plan import FitPlan, check_commands, check_owner, make_plan
+from hopping_leg.identify.plan import FitPlan, check_recordings, make_plan
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.result import Identified, as_json, software_versions
 from hopping_leg.identify.search import Pass, Report, Searcher, SearchOptions
@@ -89,8 +89,7 @@ def identify(
     if seed < 0 or options.threads < 0:
         raise UsageError("The seed and the number of threads must not be negative.")
     robot = dataclasses.replace(robot, reality=NO_MISMATCH)
-    check_owner([*recordings, *validate], robot)
-    check_commands([*recordings, *validate])
+    check_recordings([*recordings, *validate], robot)
     plan = make_plan(
         recordings,
         robot,

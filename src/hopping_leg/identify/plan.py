@@ -36,13 +36,21 @@ def robot_of(recordings: Sequence[Recording]) -> str:
     return names[0]
 
 
-def check_owner(recordings: Sequence[Recording], robot: Robot) -> None:
-    """Refuse a robot whose kind or links are not those of the recordings' own.
+def check_recordings(recordings: Sequence[Recording], robot: Robot) -> None:
+    """Refuse recordings of another leg, or without the commands that their rig was driven by.
 
     Raises:
-        RecordingError: A recording belongs to another leg.
+        RecordingError: Naming the file and what is wrong.
     """
     for recording in recordings:
+        torques = recording.metadata.onboard == "torque"
+        wanted = "torque_command" if torques else "position_command"
+        if not recording.has(wanted):
+            what = "commanded torques" if torques else "targets of its on-board PD"
+            raise RecordingError(
+                f"{recording.name} has no {what} ({', '.join(PAIRS[wanted])}), so that nothing says"
+                " what moved the leg; record them."
+            )
         try:
             own = load_robot(recording.metadata.robot)
         except RobotError:
@@ -60,23 +68,6 @@ def check_owner(recordings: Sequence[Recording], robot: Robot) -> None:
                     f" {measured:g} m long, but that of '{robot.name}' is {given:g} m: another"
                     " leg's robot file; leave --robot out or give this leg's."
                 )
-
-
-def check_commands(recordings: Sequence[Recording]) -> None:
-    """Refuse recordings without the commands that their rig was driven by.
-
-    Raises:
-        RecordingError: Naming file and columns.
-    """
-    for recording in recordings:
-        torques = recording.metadata.onboard == "torque"
-        wanted = "torque_command" if torques else "position_command"
-        if not recording.has(wanted):
-            what = "commanded torques" if torques else "targets of its on-board PD"
-            raise RecordingError(
-                f"{recording.name} has no {what} ({', '.join(PAIRS[wanted])}), so that nothing says"
-                " what moved the leg; record them."
-            )
 
 
 SEARCHES = ("least-squares", "cma", "two-pass")

@@ -146,15 +146,13 @@ def _fit(overlay: Overlay) -> dict[str, str]:
 
 def _subtitle(identified: Identified) -> str:
     rigs = ", ".join(dict.fromkeys(r.metadata.rig for r in (*identified.fit, *identified.held)))
-    seconds = [sum(float(r.time[-1] - r.time[0]) for r in p) for p in _sides(identified)]
+    seconds = [
+        sum(float(r.time[-1] - r.time[0]) for r in p) for p in (identified.fit, identified.held)
+    ]
     return (
         f"{identified.start.robot.name} on {rigs}; {seconds[0]:.0f} s fitted, {seconds[1]:.0f} s"
         f" held out to judge ({identified.split}); search: {identified.plan.search}"
     )
-
-
-def _sides(identified: Identified) -> tuple[Any, Any]:
-    return identified.fit, identified.held
 
 
 def _provenance(tree: dict[str, Any]) -> dict[str, str]:

@@ -233,21 +233,6 @@ def _proportion(x: Array, y: Array) -> tuple[float, float] | None:
     return (product / power, product / size) if size else None
 
 
-@dataclass(frozen=True)
-class Agreement:
-    """How the way compares with the integral of velocity.
-
-    Attributes:
-        factor: Way over integral.
-        correlation: Correlation of the two.
-        worst: Index of the row that ends the block where they differ most.
-    """
-
-    factor: float
-    correlation: float
-    worst: int
-
-
 def check_velocity(inspection: Inspection) -> None:
     """Leave out a velocity that is not the derivative of its position.
 
@@ -257,13 +242,14 @@ def check_velocity(inspection: Inspection) -> None:
     time = inspection.floats("time_s")
     for placed, moving in zip(PAIRS["position"], PAIRS["velocity"], strict=True):
         velocity = inspection.floats(moving)
-        agreement = compare(time, inspection.floats(placed), velocity)
-        if agreement is None:
+        compared = _compare(time, inspection.floats(placed), velocity)
+        if compared is None:
             continue
-        factor, worst = agreement.factor, inspection.row(agreement.worst)
+        factor, correlation, worst = compared
+        worst = inspection.row(worst)
         for column, units in ((placed, _POSITION_UNITS), (moving, _VELOCITY_UNITS)):
             unit = _unit_of(factor, units)
-            if unit and agreement.correlation >= _ALIKE:
+            if unit and correlation >= _ALIKE:
                 raise inspection.refusal(
                     f"{inspection.named(column)} seems to be in {unit}: in {_BLOCK * 1e3:g} ms,"
                     f" position moves {factor:.3g} times the integral of velocity, most in row"
@@ -271,22 +257,26 @@ def check_velocity(inspection: Inspection) -> None:
                 )
         dense = np.mean(~np.isnan(velocity)) > _DENSE
         tolerance, least = (0.1, 0.97) if dense else (0.3, 0.9)
-        if abs(factor - 1) > tolerance or agreement.correlation < least:
+        if abs(factor - 1) > tolerance or correlation < least:
             inspection.warn(
                 f"{inspection.named(moving)} is not the derivative of"
                 f" {inspection.named(placed)}, most in row {worst} (way over integral"
-                f" {factor:.3g}, correlation {agreement.correlation:.2f}); left out"
+                f" {factor:.3g}, correlation {correlation:.2f}); left out"
             )
             inspection.drop(moving)
 
 
-def compare(time: Array, position: Array, velocity: Array) -> Agreement | None:
-    """Compare a position with its velocity, or return none where they cannot tell.
+def _compare(time: Array, position: Array, velocity: Array) -> tuple[float, float, int] | None:
+    """Compare the way with the integral of velocity, or return none where they cannot tell.
 
     Args:
         time: (ticks,), s.
         position: (ticks,), rad; NaN where not measured.
         velocity: (ticks,), rad/s; NaN where not measured.
+
+    Returns:
+        Way over integral, their correlation, and the row that ends the block where they differ
+        most.
     """
     moving = np.flatnonzero(~np.isnan(velocity))
     placed = np.flatnonzero(~np.isnan(position))
@@ -312,4 +302,4 @@ def compare(time: Array, position: Array, velocity: Array) -> Agreement | None:
     if proportion is None or np.sqrt(np.mean(actual**2)) < _LEAST_WAY:
         return None
     worst = int(end[np.argmax(np.abs(actual - integral))])
-    return Agreement(*proportion, worst)
+    return *proportion, worst
