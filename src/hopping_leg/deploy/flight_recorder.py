@@ -181,9 +181,6 @@ class FlightRecorderTail:
         path: The file.
         columns: Names of the rows' values; empty until the header is there.
         header: Facts about the run; empty until the header is there.
-
-    Args:
-        path: As above.
     """
 
     def __init__(self, path: Path) -> None:

@@ -26,10 +26,6 @@ class LiveHeight:
 
     Attributes:
         valid: Lowest and highest, m.
-
-    Args:
-        height: To begin with, m.
-        valid: As above.
     """
 
     def __init__(self, height: float, valid: Range) -> None:

@@ -47,12 +47,7 @@ class Setting:
 
 
 def required_settings(robot: Robot, joint: int) -> tuple[Setting, ...]:
-    """Return the configuration of one joint's drive.
-
-    Args:
-        robot: Whose drives.
-        joint: 0 for the hip, 1 for the knee.
-    """
+    """Return the configuration of one joint's drive: 0 for the hip, 1 for the knee."""
     servo, transform = robot.hardware.servos[joint], joint_transforms(robot)[joint]
     motor = getattr(robot, JOINTS[joint]).motor
     ends = sorted(transform.motor_position(angle) for angle in (servo.lower, servo.upper))

@@ -129,12 +129,6 @@ def read_reply(
 ) -> Reply | None:
     """Return the state that a frame reports.
 
-    Args:
-        data: The frame's payload.
-        transform: The joint's transform.
-        clock: The drive's clock.
-        now: When the frame arrived, s.
-
     Returns:
         None for a frame that lacks something, makes no sense, or was seen before.
     """

@@ -54,22 +54,12 @@ class SafetyLimits:
 
 
 def hopping_limits(robot: Robot, rate: float) -> SafetyLimits:
-    """Return the limits for a hopping leg: its soft limits and a margin.
-
-    Args:
-        robot: The leg.
-        rate: Control rate, Hz.
-    """
+    """Return the limits for a hopping leg at a rate, Hz: its soft limits and a margin."""
     return _limits(robot, rate, hopping_ranges(robot))
 
 
 def recording_limits(robot: Robot, rate: float) -> SafetyLimits:
-    """Return the limits for excitations, which use the whole mechanical range.
-
-    Args:
-        robot: The leg.
-        rate: Control rate, Hz.
-    """
+    """Return the limits for excitations at a rate, Hz: the whole mechanical range and a margin."""
     ranges = [
         (servo.lower - RECORDING_MARGIN, servo.upper + RECORDING_MARGIN)
         for servo in robot.hardware.servos

@@ -62,11 +62,6 @@ def supervise(
 ) -> tuple[SupervisorState, DriveCommand]:
     """Decide a tick.
 
-    Args:
-        limits: The limits.
-        before: From the last tick.
-        seen: At this tick.
-
     Returns:
         What to remember and what may leave: always finite and within the limits.
     """

@@ -30,9 +30,6 @@ class TolerantFdcanusb(FdcanusbDevice):  # type: ignore[misc]
 
     Must be made inside of a running event loop.
 
-    Args:
-        path: Serial port.
-
     Attributes:
         garbage: Lines that were skipped.
     """
@@ -78,9 +75,6 @@ class TolerantFdcanusb(FdcanusbDevice):  # type: ignore[misc]
 
 def opener(name: str) -> Opener:
     """Return what opens a transport.
-
-    Args:
-        name: As on the command line.
 
     Raises:
         UsageError: It names no transport.

@@ -17,11 +17,6 @@ class Diagnostic:
     """The console of one drive.
 
     The host writes lines and polls for the answers, with or without packet numbers.
-
-    Args:
-        settings: Configuration of the drive.
-        encoder: Encoder of the drive.
-        stop: Stops the drive at a time, s.
     """
 
     def __init__(

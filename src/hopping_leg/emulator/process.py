@@ -63,9 +63,6 @@ class EmulatorRecord:
 class EmulatorProcess:
     """A running emulator; ``path`` is the terminal that the host opens, empty for a CAN bus.
 
-    Args:
-        start: What is emulated.
-
     Raises:
         UsageError: The process did not start; the message says why.
     """

@@ -118,12 +118,7 @@ _FURTHEST = 0.02
 
 
 class Server:
-    """Runs an emulated robot behind a port.
-
-    Args:
-        robot: Behind the wire.
-        port: Towards the host.
-    """
+    """Runs an emulated robot behind a port."""
 
     def __init__(self, robot: EmulatedRobot, port: Port) -> None:
         self.robot, self.port = robot, port

@@ -72,11 +72,7 @@ TORQUE_CONSTANT = 0.0275
 
 
 class TorqueLaw:
-    """The position controller of one drive and the limits behind it.
-
-    Args:
-        settings: Configuration of the drive.
-    """
+    """The position controller of one drive and the limits behind it."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings

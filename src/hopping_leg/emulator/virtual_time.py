@@ -32,12 +32,7 @@ _FOREVER = 60.0
 
 
 class VirtualTime(asyncio.SelectorEventLoop):
-    """An event loop whose time is the emulated robot's.
-
-    Args:
-        robot: That moves while the loop waits.
-        port: Between both.
-    """
+    """An event loop whose time is the emulated robot's."""
 
     def __init__(self, robot: EmulatedRobot, port: Port) -> None:
         super().__init__(_Waiting(robot, port))
