@@ -1,8 +1,9 @@
-"""Fills documentation pages with numbers from docs/results and from the package, at build time.
+"""Fills documentation pages with numbers from the studies and from the package, at build time.
 
 A page may hold ``{{ table(...) }}``, ``{{ value(...) }}``, ``{{ robot(...) }}``,
 ``{{ usage(...) }}`` and the like; a missing file or entry stops the build, so no page can show a
-number that no longer exists. mkdocs puts this folder on the path while it loads this hook.
+number that no longer exists. ``results/STUDY/FILE`` on the site is ``studies/STUDY/results/FILE``
+or a figure of the study. mkdocs puts this folder on the path while it loads this hook.
 """
 
 import contextlib
@@ -13,14 +14,13 @@ from typing import Any
 
 import jinja2
 import macros_package
-import macros_precision
 import macros_results
-import macros_studies
 from mkdocs.exceptions import PluginError
+from mkdocs.structure.files import File, Files
 
 from hopping_leg import cli
 
-EXAMPLES = Path(__file__).parent.parent / "examples"
+ROOT = Path(__file__).parent.parent
 
 
 def usage(*arguments: str) -> str:
@@ -34,7 +34,7 @@ def usage(*arguments: str) -> str:
 
 def example(file: str) -> str:
     """Return a file of examples/ as it is."""
-    return (EXAMPLES / file).read_text(encoding="utf-8").rstrip()
+    return (ROOT / "examples" / file).read_text(encoding="utf-8").rstrip()
 
 
 def page(file: str, title: str) -> str:
@@ -44,14 +44,20 @@ def page(file: str, title: str) -> str:
 
 MACROS = {
     **macros_results.MACROS,
-    **macros_precision.MACROS,
-    **macros_studies.MACROS,
     **macros_package.MACROS,
     "example": example,
     "page": page,
     "usage": usage,
     "verbs": list(cli.VERBS),
 }
+
+
+def on_files(files: Files, config: Any) -> Files:  # noqa: ANN401
+    """Put results and figures of the studies beside the pages (called by mkdocs)."""
+    for path in sorted([*ROOT.glob("studies/*/results/*"), *ROOT.glob("studies/*/figures/*")]):
+        address = f"results/{path.parts[-3]}/{path.name}"
+        files.append(File.generated(config, address, abs_src_path=str(path)))
+    return files
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:  # noqa: ANN401

@@ -1,18 +1,19 @@
-"""Numbers and tables from docs/results, each with the command that makes it."""
+"""Numbers and tables from the studies' results, each with the command that makes it.
+
+A result is named ``STUDY/FILE``, e.g. ``speed/env.json``.
+"""
 
 import dataclasses
 import json
-import re
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
 from mkdocs.exceptions import PluginError
 
-RESULTS = Path(__file__).parent / "results"
-MAKEFILE = Path(__file__).parent.parent / "Makefile"
+from hopping_leg.evaluate.acceptance import HIGHEST, LEAST_FLIGHT, LOWER, accuracies
 
-_FOREACH = r"\$\(foreach (\w+),([^,]*),((?:\$\(\w+\)|[^()])*)\)"
-"""Of make: a variable, its values and the text that is repeated."""
+STUDIES = Path(__file__).parent.parent / "studies"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,8 +61,9 @@ def number(value: Any) -> str:  # noqa: ANN401
 
 
 def read(file: str) -> Any:  # noqa: ANN401
-    """Return the content of a file in docs/results."""
-    return json.loads((RESULTS / file).read_text(encoding="utf-8"))
+    """Return the content of a result."""
+    study, name = file.split("/")
+    return json.loads((STUDIES / study / "results" / name).read_text(encoding="utf-8"))
 
 
 def pick(tree: Any, path: str) -> Any:  # noqa: ANN401
@@ -72,97 +74,173 @@ def pick(tree: Any, path: str) -> Any:  # noqa: ANN401
 
 
 def value(file: str, path: str, factor: float | None = None, digits: int | None = None) -> str:
-    """Return one number of a results file, times a factor, with so many digits after the point."""
+    """Return one number of a result, times a factor, with so many digits after the point."""
     found = scaled(pick(read(file), path), factor)
     return number(found) if digits is None else f"{found:.{digits}f}"
 
 
 def table(file: str, path: str, *columns: str, **where: Any) -> str:  # noqa: ANN401
-    """Return a list of records in a results file as a table, with the command that makes it.
+    """Return a list of records in a result as a table, with the command that makes it.
 
     Args:
-        file: In docs/results.
+        file: Name of the result.
         path: Dotted path of the list.
         columns: See ``Column``; default: every key of the first record.
         where: Show only records with these entries.
     """
-    content = read(file)
-    rows = [row for row in pick(content, path) if all(row[k] == v for k, v in where.items())]
-    if not rows:
-        raise PluginError(f"docs/results/{file} has no rows at '{path}' with {where}.")
+    rows = _rows(file, path, where)
     shown = [Column.parse(text) for text in columns or rows[0]]
     cells = [[column.cell(row) for column in shown] for row in rows]
-    return grid([column.title for column in shown], cells) + origin(file, content)
+    return grid([column.title for column in shown], cells) + origin(file)
 
 
-def bullets(file: str, path: str) -> str:
-    """Return a list of sentences in a results file as a list."""
-    return "\n".join(f"- {sentence}" for sentence in pick(read(file), path))
+def pivot(file: str, path: str, row: str, column: str, cell: str, **where: Any) -> str:  # noqa: ANN401
+    """Return records as a table with a line for each value of one key, a column for each of another.
+
+    Args:
+        file: Name of the result.
+        path: Dotted path of the list.
+        row: Key of the lines.
+        column: Key of the columns.
+        cell: How a record's entries are shown, e.g. ``{score:.0%}``.
+        where: Show only records with these entries.
+    """
+    cells = {(r[row], r[column]): cell.format(**r) for r in _rows(file, path, where)}
+    titles = list(dict.fromkeys(title for _, title in cells))
+    lines = [[key, *(cells[key, t] for t in titles)] for key in dict.fromkeys(k for k, _ in cells)]
+    return grid([row, *titles], lines) + origin(file)
+
+
+def _rows(file: str, path: str, where: dict[str, Any]) -> list[dict[str, Any]]:
+    rows = [r for r in pick(read(file), path) if all(r[k] == v for k, v in where.items())]
+    if not rows:
+        raise PluginError(f"The result {file} has no rows at '{path}' with {where}.")
+    return rows
 
 
 def entries(file: str) -> str:
-    """Return every number of a results file with its path; lists of records are tables."""
+    """Return the numbers of a result as a table."""
     content = read(file)
-    return "\n\n".join(_parts(content, "")) + origin(file, content)
+    lines = [[f"`{k}`", number(v)] for k, v in content.items() if isinstance(v, int | float)]
+    return grid(["name", "value"], lines) + origin(file)
 
 
-def _parts(tree: dict[str, Any], prefix: str) -> list[str]:
-    plain = [[f"`{prefix}{k}`", number(v)] for k, v in tree.items() if not _is_nested(v)]
-    parts = [grid(["name", "value"], plain)] if plain else []
-    for key, entry in tree.items():
-        if isinstance(entry, dict):
-            parts += _parts(entry, f"{prefix}{key}.")
-        elif _is_nested(entry):
-            columns = [Column.parse(name) for name in entry[0]]
-            rows = [[column.cell(row) for column in columns] for row in entry]
-            parts += [f"`{prefix}{key}`:", grid([column.title for column in columns], rows)]
-    return parts
+def percentiles(file: str, **titles: str) -> str:
+    """Return entries that hold percentiles as a table, a line each.
+
+    Args:
+        file: Name of the result.
+        titles: Entry to what is measured.
+    """
+    content = read(file)
+    names = list(content[next(iter(titles))])
+    rows = [[title, *(number(content[entry][n]) for n in names)] for entry, title in titles.items()]
+    return grid(["", *names], rows) + origin(file)
 
 
-def _is_nested(entry: Any) -> bool:  # noqa: ANN401
-    records = isinstance(entry, list) and bool(entry) and isinstance(entry[0], dict)
-    return isinstance(entry, dict) or records
+def bullets(file: str, path: str) -> str:
+    """Return a list of sentences in a result as a list."""
+    return "\n".join(f"- {sentence}" for sentence in pick(read(file), path))
 
 
-def exists(file: str, path: str = "") -> bool:
-    """Tell whether a results file, and an entry that is not empty in it, has been measured."""
-    try:
-        return bool(pick(read(file), path))
-    except (OSError, LookupError):
-        return False
+def recoveries(file: str) -> str:
+    """Return how controllers recover in a robustness result: a row per change, the worst command.
+
+    The last rows count changes and commands after which they are back.
+    """
+    content = read(file)
+    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for row in content["recovery"]:
+        groups.setdefault((row["change"], row["controller"]), []).append(row)
+    controllers = list(dict.fromkeys(controller for _, controller in groups))
+    rows = [
+        [change, *(_recovered(groups[change, name]) for name in controllers)]
+        for change in dict.fromkeys(change for change, _ in groups)
+    ]
+    for title, entry in (
+        ("back, of all changes and commands", "back_after_hops"),
+        ("in the median of the hops' errors", "centred_after_hops"),
+    ):
+        rows.append([title, *(_backs(content, entry, name) for name in controllers)])
+    return grid(["change", *controllers], rows) + origin(file)
 
 
-def pictures() -> list[str]:
-    """Return the names of all figures that ``hop report figures`` left in docs/results/figures."""
-    return sorted(path.name for path in (RESULTS / "figures").glob("*.svg"))
+def _recovered(rows: list[dict[str, Any]]) -> str:
+    first = _worst([error for row in rows for error in row["hop_abs_errors_m"]], 1000)
+    later = _worst([row["later_abs_error_m"] for row in rows], 1000)
+    return f"{_worst([row['back_after_hops'] for row in rows])} [{first}, {later}]"
 
 
-def origin(file: str, content: Any) -> str:  # noqa: ANN401
-    """Return the line under a table that says where it comes from."""
-    command = content.get("command") if isinstance(content, dict) else None
-    command = command or commands().get(file)
-    made = f", made by `{command}`" if command else ""
-    return f"\n\nFrom [`{file}`](results/{file}){made}.\n"
+def _backs(content: dict[str, Any], entry: str, controller: str) -> str:
+    hops = [row[entry] for row in content["recovery"] if row["controller"] == controller]
+    return f"{sum(one is not None for one in hops)} of {len(hops)}"
+
+
+def _worst(values: list[float | None], factor: float = 1) -> str:
+    """Return the largest; what does not exist is worse than any number."""
+    known = [value for value in values if value is not None]
+    return number(round(factor * max(known))) if len(known) == len(values) else number(None)
+
+
+def precision(file: str, high: float = 1.0) -> str:
+    """Return how near hops come to commands of an evaluation: a row per controller, in mm.
+
+    Args:
+        file: Name of the result.
+        high: The highest command that counts, m; up to ``HIGHEST`` the table also says whether
+            all is as asked.
+    """
+    judged, rows = high <= HIGHEST, []
+    for name, one in accuracies(read(file)["summary"], high).items():
+        values = astuple(one)
+        cells = [*(1e3 * v for v in values[:5]), *values[5:8], *(100 * v for v in values[8:])]
+        rows.append([name, *map(number, cells), *([number(one.as_asked)] if judged else [])])
+    titles = [
+        "controller", "worst error, mm", "mean", f"worst std up to {LOWER} m", "of all",
+        "mean std", "skipped hops", "body contacts", "fewest hops/s", "least flight, %", "mean",
+        *(["as asked"] if judged else []),
+    ]  # fmt: skip
+    return grid(titles, rows) + origin(file)
+
+
+def against(file: str, rival: str) -> str:
+    """Return at how many commands controllers are nearer than a rival: a row per controller.
+
+    Of all commands, and of those at which the rival flies for half of the time, as asked of all.
+    """
+    rows_of: dict[str, dict[float, dict[str, Any]]] = {}
+    for row in read(file)["summary"]:
+        rows_of.setdefault(row["controller"], {})[row["command_m"]] = row
+    other = rows_of.pop(rival)
+    flying = [command for command, row in other.items() if row["flight_fraction"] >= LEAST_FLIGHT]
+    rows = []
+    for name, mine in rows_of.items():
+        cells = []
+        for commands in (list(other), flying):
+            for column in ("median_error_m", "std_m", "mean_abs_error_m"):
+                nearer = [abs(mine[c][column]) < abs(other[c][column]) for c in commands]
+                cells.append(f"{sum(nearer)} of {len(nearer)}")
+        rows.append([name, *cells])
+    measures = ("error smaller at", "std", "mean distance")
+    half = f"where `{rival}` flies {100 * LEAST_FLIGHT:.0f} %"
+    titles = ["controller", *measures, f"error, {half}", *(f"{m}, there" for m in measures[1:])]
+    return grid(titles, rows) + origin(file)
+
+
+def pictures(study: str) -> list[str]:
+    """Return the names of a study's figures."""
+    return sorted(path.name for path in (STUDIES / study / "figures").glob("*.svg"))
 
 
 def commands() -> dict[str, str]:
-    """Return the command behind each results file, as ``make results`` runs it."""
-    text = MAKEFILE.read_text(encoding="utf-8").replace("\\\n", " ").replace("$(BIN)/", "")
-    for name, meaning in re.findall(r"^(\w+) := (.*)$", text, re.MULTILINE):
-        text = text.replace(f"$({name})", meaning)
-    text = re.sub(_FOREACH, _each, text)
-    found = {}
-    for line in text.splitlines():
-        target = re.search(r"--json docs/results/(\S+)", line)
-        if target:
-            found[target[1]] = " ".join(line.split())
-    return found
+    """Return the command behind every result, by its name."""
+    files = [f"{p.parts[-3]}/{p.name}" for p in sorted(STUDIES.glob("*/results/*.json"))]
+    return {file: read(file)["command"] for file in files}
 
 
-def _each(match: re.Match[str]) -> str:
-    """Return what make's ``foreach`` comes to."""
-    name, words, body = match.groups()
-    return " ".join(body.replace(f"$({name})", word) for word in words.split())
+def origin(file: str) -> str:
+    """Return the line under a table that says where it comes from."""
+    return f"\n\nFrom [`{file}`](results/{file}), made by `{read(file)['command']}`.\n"
 
 
 def grid(titles: list[str], rows: list[list[str]]) -> str:
@@ -174,11 +252,15 @@ def grid(titles: list[str], rows: list[list[str]]) -> str:
 
 
 MACROS = {
+    "against": against,
     "bullets": bullets,
     "commands": commands(),
     "entries": entries,
-    "exists": exists,
+    "percentiles": percentiles,
     "pictures": pictures,
+    "pivot": pivot,
+    "precision": precision,
+    "recoveries": recoveries,
     "table": table,
     "value": value,
 }

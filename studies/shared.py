@@ -1,32 +1,52 @@
-"""What every study's command shares: options, errors in a sentence, the JSON with its command."""
+"""What every study's command shares: options, errors in a sentence, the results that it stores.
+
+A study's ``RESULTS`` are the shell commands behind ``studies/NAME/results`` and ``figures``;
+``python -m studies.NAME --results`` runs them.
+"""
 
 import importlib
 import inspect
+import json
+import os
+import shlex
+import subprocess
 import sys
 from collections.abc import Collection, Sequence
+from pathlib import Path
 from typing import Any, get_args
 
 from hopping_leg.cli import guard, read_options
 from hopping_leg.cli.command_line import KEPT, command_line, verb_of
-from hopping_leg.io import write_json
+from hopping_leg.errors import UsageError
+from hopping_leg.io import write_atomically, write_json
+
+ROOT = Path(__file__).parent.parent
+
+LONGEST = 30
+"""Longest list of numbers in a stored result; what is longer is raw and stays with who measures."""
+
+NOT_SHOWN = ("groups", "ladder", "neighbours", "sequence")
+"""Parts of an evaluation at many heights that no page shows."""
 
 
 def main(
     name: str,
-    options: Any,  # noqa: ANN401
+    options: Any = None,  # noqa: ANN401
     arguments: Sequence[str] | None = None,
     keep_out: Collection[str] = (),
 ) -> int:
     """Run a study, print its numbers, write the JSON; return the exit code.
 
     Args:
-        name: Of the study, as in ``python -m studies.NAME``.
+        name: Name of the study, as in ``python -m studies.NAME``.
         options: Its options: a dataclass with a field ``json`` and a method ``measure``, or a union
-            of such dataclasses, one for each part.
-        arguments: Behind the name; default: those of the process.
+            of such dataclasses, one for each part; None for a study that is only its results.
+        arguments: Words behind the name; default: those of the process.
         keep_out: Options that the stored command shall not name.
     """
     given = sys.argv[1:] if arguments is None else arguments
+    if options is None or list(given) == ["--results"]:
+        return guard(lambda: run_results(name))
     return guard(lambda: _run(name, options, given, keep_out))
 
 
@@ -42,3 +62,64 @@ def _run(name: str, options: Any, given: Sequence[str], keep_out: Collection[str
         write_json(args.json, result)
         print(f"Wrote {args.json}.")
     return 0
+
+
+def results(name: str) -> tuple[str, ...]:
+    """Return the commands behind a study's stored results."""
+    commands: tuple[str, ...] = importlib.import_module(f"studies.{name}").RESULTS
+    return commands
+
+
+def stored_file(command: str) -> Path | None:
+    """Return the file that a command's ``--json`` names, from the root; None without one."""
+    words = shlex.split(command)
+    return Path(words[words.index("--json") + 1]) if "--json" in words else None
+
+
+def run_results(name: str) -> int:
+    """Run the commands behind a study's stored results, one after the other."""
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+    for command in results(name):
+        print(command, flush=True)
+        done = subprocess.run(command, shell=True, cwd=ROOT, env={**os.environ, "PATH": path})
+        if done.returncode:
+            raise UsageError(f"`{command}` failed with exit code {done.returncode}; see above.")
+        if file := stored_file(command):
+            store(ROOT / file, command)
+    return 0
+
+
+def store(file: Path, command: str) -> None:
+    """Rewrite a result as it is stored: with its command, without raw numbers, a line a record."""
+    content = json.loads(file.read_text(encoding="utf-8"))
+    if len(content.get("summary", ())) > 2 * LONGEST:
+        content = {key: entry for key, entry in content.items() if key not in NOT_SHOWN}
+    content = condensed({**content, "command": command})
+    write_atomically(file, f"{_lines(content)}\n".encode())
+
+
+def condensed(tree: Any) -> Any:  # noqa: ANN401
+    """Return JSON values without long lists of numbers, and numbers to six digits."""
+    if isinstance(tree, dict):
+        return {key: condensed(entry) for key, entry in tree.items() if not _raw(entry)}
+    if isinstance(tree, list):
+        return [condensed(entry) for entry in tree]
+    return float(f"{tree:.6g}") if isinstance(tree, float) else tree
+
+
+def _raw(entry: object) -> bool:
+    numbers = isinstance(entry, list) and not any(isinstance(x, dict | list | str) for x in entry)
+    return numbers and isinstance(entry, list) and len(entry) > LONGEST
+
+
+def _lines(tree: Any, indent: str = "") -> str:  # noqa: ANN401
+    """Return JSON in which what holds no records stands on one line."""
+    inner = f"{indent} "
+    if isinstance(tree, dict) and any(isinstance(entry, dict | list) for entry in tree.values()):
+        parts = [f"{json.dumps(key)}: {_lines(entry, inner)}" for key, entry in tree.items()]
+    elif isinstance(tree, list) and any(isinstance(entry, dict | list) for entry in tree):
+        parts = [_lines(entry, inner) for entry in tree]
+    else:
+        return json.dumps(tree, ensure_ascii=False)
+    left, right = "{}" if isinstance(tree, dict) else "[]"
+    return f"{left}\n" + ",\n".join(f"{inner}{part}" for part in parts) + f"\n{indent}{right}"

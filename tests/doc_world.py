@@ -163,7 +163,9 @@ def _killed_run() -> None:
 def _stored_runs() -> None:
     for name, source in (("first", "evaluation"), ("second", "precise")):
         Path(f"runs/{name}").mkdir()
-        shutil.copy(ROOT / f"docs/results/{source}.json", f"runs/{name}/evaluation.json")
+        shutil.copy(
+            ROOT / f"studies/evaluation/results/{source}.json", f"runs/{name}/evaluation.json"
+        )
     for seed in (0, 1):
         Path(f"runs/fast-seed{seed}").mkdir()
         Path(f"runs/fast-seed{seed}/result.json").write_text(json.dumps({**TRAINED, "seed": seed}))

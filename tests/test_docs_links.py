@@ -15,7 +15,7 @@ from tests.doc_pages import PAGES, ROOT
 CLICKS = 2
 """From the front page to any other."""
 
-_FILES = re.compile(r"`((?:examples|docs|src|tests|benchmarks)/[\w./-]*)`")
+_FILES = re.compile(r"`((?:examples|docs|src|tests|studies)/[\w./-]*)`")
 _LINKS = re.compile(r"\]\(([^)\s]+)\)")
 
 

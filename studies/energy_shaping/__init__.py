@@ -1,1 +1,10 @@
 """What is each part of energy shaping worth?"""
+
+RESULTS = (
+    "python -m studies.energy_shaping --json studies/energy_shaping/results/energy_shaping.json",
+    "hop tune energy-shaping --start energy-shaping --flight 0.52 --generations 40 "
+    "--population 16 --step 0.2 --out runs/flying-0",
+    "hop tune energy-shaping --start runs/flying-0/gains.toml --seed 1 --flight 0.52 "
+    "--generations 40 --population 16 --step 0.1 --out runs/flying --json "
+    "studies/energy_shaping/results/flying.json",
+)

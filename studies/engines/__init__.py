@@ -1,1 +1,3 @@
 """Do controllers hop in another physics engine as well?"""
+
+RESULTS = ("python -m studies.engines --json studies/engines/results/engines.json",)

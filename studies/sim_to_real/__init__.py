@@ -15,3 +15,9 @@ Examples:
   python -m studies.sim_to_real --twins 10 --seeds 0 1 2 --jobs 8
   python -m studies.sim_to_real --twins my_twin.toml other_twin.toml --methods identified cad
 """
+
+RESULTS = (
+    "python -m studies.sim_to_real --recipe fast --folder runs/transfer-fast --json "
+    "studies/sim_to_real/results/fast.json",
+    "python -m studies.sim_to_real prediction --json studies/sim_to_real/results/prediction.json",
+)

@@ -1,0 +1,51 @@
+"""What the studies store: each result is made by a command of the study, and is small."""
+
+import json
+import shlex
+from pathlib import Path
+
+import pytest
+
+from hopping_leg.cli import VERBS
+from studies.shared import LONGEST, ROOT, condensed, results, store, stored_file
+
+NAMES = sorted(path.parent.name for path in ROOT.glob("studies/*/__init__.py"))
+LARGEST = 2_000_000
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_result_is_made_by_a_command_of_the_study(name):
+    made = {file: command for command in results(name) if (file := stored_file(command))}
+    stored = {path.relative_to(ROOT) for path in ROOT.glob(f"studies/{name}/results/*")}
+    assert stored == set(made)
+    for file, command in made.items():
+        assert json.loads((ROOT / file).read_text())["command"] == command
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_commands_are_verbs_or_studies_and_figures_are_theirs(name):
+    for command in results(name):
+        words = shlex.split(command)
+        if words[0] == "hop":
+            assert words[1] in VERBS
+        elif words[0] == "python":
+            assert words[:2] == ["python", "-m"]
+            assert words[2].removeprefix("studies.") in NAMES
+        else:
+            assert words[0] == "cp"
+    assert (ROOT / "studies" / name / "README.md").is_file()
+
+
+def test_results_are_small():
+    files = [p for p in ROOT.glob("studies/*/results/*") if p.is_file()]
+    assert sum(path.stat().st_size for path in files) < LARGEST
+
+
+def test_what_is_stored_is_without_raw_numbers(tmp_path):
+    raw = {"raw": [0.5] * (LONGEST + 1), "rows": [{"a": 0.123456789, "names": ["x"] * 99}]}
+    assert condensed(raw) == {"rows": [{"a": 0.123457, "names": ["x"] * 99}]}
+    file = tmp_path / "e.json"
+    file.write_text(json.dumps(raw))
+    store(file, "hop evaluate")
+    assert json.loads(file.read_text()) == {**condensed(raw), "command": "hop evaluate"}
+    assert Path(file).read_text().count("\n") == 9
