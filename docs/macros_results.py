@@ -95,7 +95,7 @@ def table(file: str, path: str, *columns: str, **where: Any) -> str:  # noqa: AN
 
 
 def pivot(file: str, path: str, row: str, column: str, cell: str, **where: Any) -> str:  # noqa: ANN401
-    """Return records as a table with a line for each value of one key, a column for each of another.
+    """Return records as a table with a line for each value of one key, a column per other.
 
     Args:
         file: Name of the result.
@@ -107,8 +107,10 @@ def pivot(file: str, path: str, row: str, column: str, cell: str, **where: Any) 
     """
     cells = {(r[row], r[column]): cell.format(**r) for r in _rows(file, path, where)}
     titles = list(dict.fromkeys(title for _, title in cells))
-    lines = [[key, *(cells[key, t] for t in titles)] for key in dict.fromkeys(k for k, _ in cells)]
-    return grid([row, *titles], lines) + origin(file)
+    lines = [
+        [str(key), *(cells[key, t] for t in titles)] for key in dict.fromkeys(k for k, _ in cells)
+    ]
+    return grid([row, *map(str, titles)], lines) + origin(file)
 
 
 def _rows(file: str, path: str, where: dict[str, Any]) -> list[dict[str, Any]]:

@@ -11,6 +11,7 @@ RESULTS = (
     "quarter-seed3=runs/bench-quarter/precise-seed3/policy.onnx "
     "quarter-seed4=runs/bench-quarter/precise-seed4/policy.onnx --seeds 5 --floor soft "
     "--no-video --commands "
-    "0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.3,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.4,0.41,0.42,0.43,0.44,0.45 "
+    "0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.3,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.4,"
+    "0.41,0.42,0.43,0.44,0.45 "
     "--json studies/training_time/results/precise_hops.json",
 )

@@ -5,9 +5,9 @@ import shlex
 from pathlib import Path
 
 import pytest
+from studies.shared import LONGEST, ROOT, condensed, results, store, stored_file
 
 from hopping_leg.cli import VERBS
-from studies.shared import LONGEST, ROOT, condensed, results, store, stored_file
 
 NAMES = sorted(path.parent.name for path in ROOT.glob("studies/*/__init__.py"))
 LARGEST = 2_000_000
@@ -33,7 +33,6 @@ def test_commands_are_verbs_or_studies_and_figures_are_theirs(name):
             assert words[2].removeprefix("studies.") in NAMES
         else:
             assert words[0] == "cp"
-    assert (ROOT / "studies" / name / "README.md").is_file()
 
 
 def test_results_are_small():
