@@ -4,7 +4,7 @@ import time
 import pytest
 
 from hopping_leg.progress import LiveProgress, minutes
-from hopping_leg.rl.progress import TrainingProgress
+from hopping_leg.rl.train import TrainingProgress
 from hopping_leg.sim_to_real.board import Board
 
 

@@ -44,8 +44,7 @@ class Finetune:
     def measure(self) -> dict[str, Any]:
         """Run it, print a table, return every number."""
         from hopping_leg.figure_style import to_svg
-        from hopping_leg.rl.finetune.config import FinetuneConfig
-        from hopping_leg.rl.finetune.stopping_rules import StoppingRules
+        from hopping_leg.rl.finetune.config import FinetuneConfig, StoppingRules
         from studies.finetuning.figure import draw_finetuning
         from studies.finetuning.run import Study, measure
 

@@ -20,7 +20,7 @@ from hopping_leg.rl.finetune.finetuning import Row
 from hopping_leg.rl.finetune.hops import score
 from hopping_leg.rl.finetune.pretraining import Task
 from hopping_leg.rl.finetune.running import POLICY, RESULT, finetune
-from hopping_leg.rl.finetune.simulated import Guard, Simulated
+from hopping_leg.rl.finetune.simulated import Guard, SimulatedTrials
 from hopping_leg.robot.parameters import Robot
 
 FIRST_JUDGE = 1000
@@ -98,7 +98,7 @@ def _run(
         span = (min(study.options.commands), max(study.options.commands))
         finetune(
             Task(study.policy, study.believed, span, seed),
-            Simulated(twin, study.guard),
+            SimulatedTrials(twin, study.guard),
             replace(study.options, method=method),
             folder,
             resume=True,
@@ -124,7 +124,7 @@ def _judge(study: Study, twin: Robot, policy: Policy, method: str, seed: int | N
     schedule = CommandSchedule(tuple((c, _SECONDS) for c in study.eval_commands))
     rows = []
     for judge in range(FIRST_JUDGE, FIRST_JUDGE + study.judges):
-        outing = Simulated(twin, study.guard).hop(policy, schedule, judge)
+        outing = SimulatedTrials(twin, study.guard).hop(policy, schedule, judge)
         assert outing.truth is not None
         found = score(outing.truth, schedule, outing.complaint)
         rows += [

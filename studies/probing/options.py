@@ -37,7 +37,7 @@ class Probe:
         from hopping_leg.controllers.registry import load_policy
         from hopping_leg.evaluate.figures import to_svg
         from hopping_leg.io import write_atomically
-        from hopping_leg.rl.hidden import expose_hidden
+        from hopping_leg.rl.onnx_export import expose_hidden
         from studies.probing.figure import draw_probe
         from studies.probing.run import run_study
 

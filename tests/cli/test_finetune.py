@@ -52,7 +52,7 @@ def test_an_outings_line_says_what_happened():
 @pytest.mark.slow
 def test_a_run_leaves_policy_card_and_numbers(tmp_path, monkeypatch, capsys):
     from hopping_leg.rl.finetune import finetuning
-    from hopping_leg.rl.finetune.contact import ContactConfig
+    from hopping_leg.rl.finetune.apex_estimate import ContactConfig
     from hopping_leg.rl.finetune.pretraining import prepare
 
     few = ContactConfig(num_envs=4, seconds=3.0, steps=50, hidden=(8,))

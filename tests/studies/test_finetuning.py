@@ -29,7 +29,7 @@ def seeds(monkeypatch):
             used.append(seed)
             return super().hop(controller, schedule, seed)
 
-    monkeypatch.setattr(module, "Simulated", Sent)
+    monkeypatch.setattr(module, "SimulatedTrials", Sent)
     return used
 
 

@@ -14,7 +14,7 @@ from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.energy_shaping.phases import Phase
 from hopping_leg.controllers.registry import load_policy
 from hopping_leg.errors import UsageError
-from hopping_leg.rl.hidden import expose_hidden
+from hopping_leg.rl.onnx_export import expose_hidden
 
 RNG = np.random.default_rng(3)
 BY_NAME = {target.name: target for target in TARGETS}

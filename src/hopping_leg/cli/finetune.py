@@ -73,10 +73,9 @@ class Finetune:
 
 def run(args: Finetune) -> None:
     """Continue the training, say how it went."""
-    from hopping_leg.rl.finetune.config import FinetuneConfig
+    from hopping_leg.rl.finetune.config import FinetuneConfig, StoppingRules
     from hopping_leg.rl.finetune.pretraining import Task
     from hopping_leg.rl.finetune.running import POLICY, finetune
-    from hopping_leg.rl.finetune.stopping_rules import StoppingRules
 
     policy, robot = load_policy(args.policy), load_robot(args.robot)
     _refuse(args, policy, robot)
@@ -159,9 +158,9 @@ def _refuse(args: Finetune, policy: "Policy", robot: Robot) -> None:
 
 def _outings(args: Finetune, robot: Robot, policy: "Policy") -> "TrialRobot":
     if args.on is not None:
-        from hopping_leg.rl.finetune.simulated import Simulated
+        from hopping_leg.rl.finetune.simulated import SimulatedTrials
 
-        return Simulated(load_robot(args.on), guard_of(robot, policy.card.rate))
+        return SimulatedTrials(load_robot(args.on), guard_of(robot, policy.card.rate))
     assert args.transport is not None
     return _deployed(args, robot, policy.card.rate, args.transport)
 

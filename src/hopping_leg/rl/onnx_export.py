@@ -1,23 +1,230 @@
-"""Write a policy file: an ONNX graph built from numpy weights.
+"""Policy files: ONNX graphs built from numpy weights, and read back.
 
 Graph: inputs (flattened, joined) -> (x - offset) * gain -> dense layers -> squash -> torque scale;
 what remembers stands before the dense layers.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
+import numpy.typing as npt
 import onnx
-from onnx import helper
+from onnx import TensorProto, helper, numpy_helper
 
 from hopping_leg.arrays import Array
 from hopping_leg.controllers.observation_history import make_observation_history
 from hopping_leg.controllers.policy import MEMORY, METADATA_KEY, NEXT_MEMORY, Card
-from hopping_leg.errors import UsageError
+from hopping_leg.errors import PolicyError, UsageError
 from hopping_leg.io import write_atomically
-from hopping_leg.rl.graph import ACTIVATIONS, Graph, Layers, array_info
-from hopping_leg.rl.memories import Memory
+
+ACTIVATIONS = {"relu": "Relu", "tanh": "Tanh", "elu": "Elu"}
+"""Activation of hidden layers, to its ONNX operator."""
+
+Layers = Sequence[tuple[Array, Array]]
+"""Weight (out, in) and bias (out,) of every dense layer."""
+
+
+class Graph:
+    """Nodes and weights in the order in which they are made.
+
+    Attributes:
+        nodes: Of the graph.
+        weights: Its initializers.
+    """
+
+    def __init__(self) -> None:
+        self.nodes: list[Any] = []
+        self.weights: list[Any] = []
+
+    def constant(self, name: str, value: npt.ArrayLike) -> str:
+        """Store numbers, in single precision unless they are integers; return their name."""
+        array = np.asarray(value)
+        kind = array.dtype if array.dtype == np.int64 else np.float32
+        self.weights.append(numpy_helper.from_array(np.ascontiguousarray(array, kind), name))
+        return name
+
+    def apply(self, operator: str, inputs: Sequence[str], output: str, **attributes: float) -> str:
+        """Add a node with one output; return its name."""
+        self.add(operator, inputs, [output], name=output, **attributes)
+        return output
+
+    def add(
+        self,
+        operator: str,
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        **attributes: Any,  # noqa: ANN401
+    ) -> None:
+        """Add any node."""
+        self.nodes.append(helper.make_node(operator, inputs, outputs, **attributes))
+
+    def dense(self, x: str, layers: Layers, activation: str, prefix: str = "") -> str:
+        """Put dense layers behind values; return what the last one gives.
+
+        Args:
+            x: Values, (n, in).
+            layers: Of which all but the last have the activation.
+            activation: One of ``ACTIVATIONS``.
+            prefix: Of all names.
+        """
+        for index, (weight, bias) in enumerate(layers):
+            names = [
+                x,
+                self.constant(f"{prefix}weight_{index}", weight.T),
+                self.constant(f"{prefix}bias_{index}", bias),
+            ]
+            x = self.apply("Gemm", names, f"{prefix}dense_{index}")
+            if index < len(layers) - 1:
+                x = self.apply(ACTIVATIONS[activation], [x], f"{prefix}hidden_{index}")
+        return x
+
+    def clip(self, x: str, least: float, most: float, output: str, prefix: str = "") -> str:
+        """Bound values; return their name. The bounds' names begin with the prefix."""
+        bounds = [self.constant(f"{prefix}least", least), self.constant(f"{prefix}most", most)]
+        return self.apply("Clip", [x, *bounds], output)
+
+
+def array_info(name: str, *shape: int) -> Any:  # noqa: ANN401
+    """Describe an input or output of the graph, (n, ...)."""
+    return helper.make_tensor_value_info(name, TensorProto.FLOAT, ["n", *shape])
+
+
+class Memory(Protocol):
+    """A part in front of a policy's dense layers."""
+
+    @property
+    def size(self) -> int:
+        """Entries that are remembered."""
+        ...
+
+    def build(self, graph: Graph, x: str, inputs: int) -> str:
+        """Put it behind the normalised inputs; return what the dense layers see.
+
+        Args:
+            graph: Under construction; gets the values ``NEXT_MEMORY``.
+            x: The normalised inputs, (n, inputs).
+            inputs: How many.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class RecurrentUnit:
+    """A gated recurrent unit with its gates reset, update and candidate in this order, as torch's.
+
+    Attributes:
+        of_input: (3 k, size).
+        of_memory: (3 k, k).
+        bias_of_input: (3 k,).
+        bias_of_memory: (3 k,).
+    """
+
+    of_input: Array
+    of_memory: Array
+    bias_of_input: Array
+    bias_of_memory: Array
+
+    @property
+    def size(self) -> int:
+        """Entries k of its memory."""
+        return int(self.of_memory.shape[1])
+
+    def build(self, graph: Graph, x: str, inputs: int) -> str:
+        """Show the dense layers what is remembered.
+
+        ONNX wants a sequence, here of one tick, and the gates in the order update, reset,
+        candidate.
+        """
+
+        def ordered(weights: Array) -> Array:
+            reset, update, candidate = np.split(weights, 3)
+            return np.concatenate([update, reset, candidate])[None]
+
+        biases = np.concatenate([ordered(b)[0] for b in (self.bias_of_input, self.bias_of_memory)])
+        first = graph.constant("first_axis", np.array([0], np.int64))
+        graph.add("Unsqueeze", [x, first], ["sequence"])
+        graph.add("Unsqueeze", [MEMORY, first], ["memory_before"])
+        graph.add(
+            "GRU",
+            [
+                "sequence",
+                graph.constant("gru_of_input", ordered(self.of_input)),
+                graph.constant("gru_of_memory", ordered(self.of_memory)),
+                graph.constant("gru_bias", biases[None]),
+                "",
+                "memory_before",
+            ],
+            ["", "memory_after"],
+            hidden_size=self.size,
+            linear_before_reset=1,
+        )
+        graph.add("Squeeze", ["memory_after", first], [NEXT_MEMORY])
+        return NEXT_MEMORY
+
+
+@dataclass(frozen=True)
+class CommandIntegrator:
+    """Where a policy aims so that its hops come true, see ``rl.distillation.adaptive_student``.
+
+    Remembers the aim at both ends of the range of commands and the command of late, all as the
+    command is normalised, which must be the last input.
+
+    Attributes:
+        layers: Of the network that feels from inputs and command of late, (n, inputs + 1), how far
+            the last hop was off; tanh.
+        rate: Share of that by which the aim moves in a tick.
+        most: Largest error that is felt, in the network's scale.
+        farthest: Largest aim.
+        beyond: How far outside of the commands' range, -1 to 1, the dense layers may be told.
+        follow: Share of its distance by which the command of late follows in a tick.
+    """
+
+    layers: Layers
+    rate: float
+    most: float
+    farthest: float
+    beyond: float
+    follow: float
+    size: ClassVar[int] = 3
+
+    def build(self, graph: Graph, x: str, inputs: int) -> str:
+        """Tell the dense layers the aim instead of the command."""
+        apply, constant = graph.apply, graph.constant
+        sizes = constant("input_sizes", np.array([inputs - 1, 1], np.int64))
+        graph.add("Split", [x, sizes], ["samples", "asked"], axis=1)
+        graph.add(
+            "Split",
+            [MEMORY, constant("memory_sizes", np.array([2, 1], np.int64))],
+            ["ends", "late"],
+            axis=1,
+        )
+        across = constant("across", np.array([1], np.int64))
+        slopes, middle = constant("slopes", [[-0.5, 0.5]]), constant("middle", [0.5, 0.5])
+        leaning = apply("Gemm", ["asked", slopes, middle], "leaning")
+        shares = graph.clip(leaning, 0.0, 1.0, "shares", "shares_")
+        weighted = apply("Mul", ["ends", shares], "weighted")
+        aim = apply("ReduceSum", [weighted, across], "aim", keepdims=1)
+        bound = 1 + self.beyond
+        told = graph.clip(apply("Add", ["asked", aim], "aimed"), -bound, bound, "told", "told_")
+
+        noticed = apply("Concat", [x, "late"], "noticed", axis=1)
+        shown = graph.dense(noticed, self.layers, "tanh", "felt_")
+        felt = graph.clip(shown, -self.most, self.most, "felt", "felt_")
+        moved = apply("Mul", [felt, constant("rate", self.rate)], "moved")
+        squares = apply("Mul", [shares, shares], "squares")
+        both = apply("ReduceSum", [squares, across], "both", keepdims=1)
+        steps = apply("Mul", [apply("Div", [moved, both], "scaled"), shares], "steps")
+        moved_ends = apply("Sub", ["ends", steps], "moved_ends")
+        ends = graph.clip(moved_ends, -self.farthest, self.farthest, "next_ends", "ends_")
+        distance = apply("Sub", ["asked", "late"], "distance")
+        following = apply("Mul", [distance, constant("follow", self.follow)], "following")
+        late = apply("Add", ["late", following], "next_late")
+        apply("Concat", [ends, late], NEXT_MEMORY, axis=1)
+        return apply("Concat", ["samples", told], "told_inputs", axis=1)
+
 
 SQUASHES = ("tanh", "clip")
 """How the last layer's output is brought to -1..1."""
@@ -101,3 +308,73 @@ def build_policy(network: Network, card: Card) -> bytes:
 def save_policy(path: Path, network: Network, card: Card) -> None:
     """Write a policy file; an existing one is replaced only once the new one is complete."""
     write_atomically(path, build_policy(network, card))
+
+
+def read_network(content: bytes) -> Network:
+    """Return the actor in a policy file.
+
+    Args:
+        content: As ``export`` wrote it.
+
+    Raises:
+        PolicyError: The graph was made elsewhere, or remembers.
+    """
+    graph = onnx.load_from_string(content).graph
+    if MEMORY in (given.name for given in graph.input):
+        raise PolicyError("The policy remembers; only weights of one that does not can be read.")
+    stored = {w.name: numpy_helper.to_array(w).astype(np.float64) for w in graph.initializer}
+    hidden = {node.op_type for node in graph.node if node.output[0].startswith("hidden_")}
+    names = {operator: name for name, operator in ACTIVATIONS.items()}
+    count = sum(name.startswith("weight_") for name in stored)
+    if not {"offset", "gain", "weight_0"} <= stored.keys() or len(hidden & names.keys()) != 1:
+        raise PolicyError("The policy's graph has no dense layers as `hop train` writes them.")
+    layers: list[tuple[Array, Array]] = [
+        (stored[f"weight_{i}"].T.copy(), stored[f"bias_{i}"]) for i in range(count)
+    ]
+    squash = "tanh" if graph.node[-2].op_type == "Tanh" else "clip"
+    bound = stored["most"].item() if "most" in stored else float("inf")
+    return Network(stored["offset"], stored["gain"], layers, names[hidden.pop()], squash, bound)
+
+
+PREFIX = "hidden_"
+"""Of the names that ``export`` gives to hidden layers."""
+
+_LEARNT = ("weight_", "bias_", "gru_", "felt_weight_", "felt_bias_")
+"""Beginnings of the names that ``export`` and ``memories`` give to what is learnt."""
+
+
+def expose_hidden(content: bytes, shuffle: int | None = None) -> bytes:
+    """Return a policy's graph with its hidden layers as further outputs, in order.
+
+    Args:
+        content: The policy file.
+        shuffle: Seed with which the entries of weights and biases change places, of every hidden
+            layer and of what fills the memory: a network of the same size and sizes of weights that
+            has learnt nothing.
+
+    Raises:
+        PolicyError: The graph names no hidden layer and remembers nothing.
+    """
+    model = onnx.load_from_string(content)
+    graph = model.graph
+    names = [name for node in graph.node for name in node.output if name.startswith(PREFIX)]
+    inside = [*names, *(given.name for given in graph.output if given.name == NEXT_MEMORY)]
+    if not inside:
+        raise PolicyError("The policy's graph names no hidden layer; export it with `hop train`.")
+    if shuffle is not None:
+        rng = np.random.default_rng(shuffle)
+        hidden = {i for node in graph.node[: _last(graph, inside)] for i in node.input}
+        for stored in graph.initializer:
+            if stored.name in hidden and stored.name.startswith(_LEARNT):
+                values = numpy_helper.to_array(stored)
+                mixed = rng.permutation(values.ravel()).reshape(values.shape)
+                stored.CopyFrom(numpy_helper.from_array(mixed, stored.name))
+    for name in names:
+        graph.output.append(helper.make_tensor_value_info(name, TensorProto.FLOAT, ["n", None]))
+    extended: bytes = model.SerializeToString(deterministic=True)
+    return extended
+
+
+def _last(graph: onnx.GraphProto, names: list[str]) -> int:
+    """Return the number of nodes up to the last that gives one of these values."""
+    return max(i for i, node in enumerate(graph.node) if set(names) & set(node.output)) + 1

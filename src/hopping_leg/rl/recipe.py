@@ -18,11 +18,11 @@ from hopping_leg.envs import (
     paper_reward,
 )
 from hopping_leg.io import replace_at
-from hopping_leg.rl.actor import network_of
 from hopping_leg.rl.algorithms import NetworkConfig, PPOConfig, SACConfig
 from hopping_leg.rl.distillation.distillation import Distillation
 from hopping_leg.rl.onnx_export import Network
 from hopping_leg.rl.sb3_env import TaskVecEnv
+from hopping_leg.rl.sb3_policies import network_of
 from hopping_leg.robot.parameters import Robot
 
 HEIGHT = 0.30

@@ -4,14 +4,22 @@ Only in training: the critic is thrown away afterwards. ``TaskVecEnv`` with ``pr
 both to one observation, actor's part first.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
 import torch
+from stable_baselines3 import SAC
+from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.policies import ActorCriticPolicy, ContinuousCritic
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.sac.policies import Actor, SACPolicy
 from torch import nn
+
+from hopping_leg.arrays import Array
+from hopping_leg.envs.observation import Observation
+from hopping_leg.errors import UsageError
+from hopping_leg.rl.onnx_export import Network
 
 
 class _Split(nn.Module):
@@ -119,3 +127,63 @@ def dense(inputs: int, hidden: list[int], activation: type[nn.Module]) -> nn.Seq
         layers += [nn.Linear(inputs, size), activation()]
         inputs = size
     return nn.Sequential(*layers)
+
+
+_NAMES = {nn.ReLU: "relu", nn.Tanh: "tanh", nn.ELU: "elu"}
+
+
+def network_of(model: BaseAlgorithm, observation: Observation) -> Network:
+    """Return a model's actor with the task's normalisation, for the observation's layout.
+
+    Args:
+        model: SAC, or PPO with separate networks of plain layers.
+        observation: Of the task it learns.
+
+    Raises:
+        UsageError: The actor is no stack of dense layers.
+    """
+    if isinstance(model, SAC):
+        return dense_network([model.actor.latent_pi, model.actor.mu], observation, "tanh")
+    policy = model.policy
+    return dense_network([policy.mlp_extractor.policy_net, policy.action_net], observation, "clip")
+
+
+def dense_network(parts: Sequence[nn.Module], observation: Observation, squash: str) -> Network:
+    """Return dense layers with the task's normalisation, for the observation's layout.
+
+    Args:
+        parts: Layers and activations in order, or modules of such.
+        observation: Of the task.
+        squash: How the output is brought to -1..1.
+
+    Raises:
+        UsageError: They are no stack of dense layers.
+    """
+    modules = [leaf for part in parts for leaf in flatten(part)]
+    bound = float("inf")
+    if isinstance(modules[-1], nn.Hardtanh):
+        bound = float(modules[-1].max_val)
+        modules = modules[:-1]
+    layers = [layer_weights(m) for m in modules if isinstance(m, nn.Linear)]
+    kinds = {type(m) for m in modules} - {nn.Linear}
+    if len(kinds) != 1 or not kinds <= _NAMES.keys():
+        raise UsageError(
+            f"An actor of {sorted(k.__name__ for k in kinds)} cannot be exported; use dense layers"
+            f" with one of {', '.join(_NAMES.values())}."
+        )
+    layers[0] = (layers[0][0][:, observation.order], layers[0][1])
+    scaling = observation.scaling
+    return Network(scaling.offset, scaling.gain, layers, _NAMES[kinds.pop()], squash, bound)
+
+
+def flatten(module: nn.Module) -> list[nn.Module]:
+    """Return the layers of nested sequences in order."""
+    if isinstance(module, nn.Sequential):
+        return [leaf for child in module for leaf in flatten(child)]
+    return [module]
+
+
+def layer_weights(layer: nn.Linear) -> tuple[Array, Array]:
+    """Return weight (out, in) and bias (out,) of a layer."""
+    with torch.no_grad():
+        return layer.weight.double().numpy(), layer.bias.double().numpy()

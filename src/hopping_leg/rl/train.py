@@ -1,5 +1,6 @@
 """Train a recipe: learn, checkpoint, try snapshots, choose the best, write the policy."""
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,21 +8,58 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from rich.progress import TextColumn, TimeRemainingColumn
 from stable_baselines3.common.callbacks import BaseCallback
 
 from hopping_leg.controllers.policy import Card
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.io import write_atomically
+from hopping_leg.progress import LiveProgress
 from hopping_leg.rl import resumable
 from hopping_leg.rl.checkpoint import write_checkpoint
 from hopping_leg.rl.loggers import Log, check_log, make_logger
 from hopping_leg.rl.model_card import write_card
 from hopping_leg.rl.onnx_export import build_policy
-from hopping_leg.rl.progress import TrainingProgress
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.run_folder import RunFolder
 from hopping_leg.rl.selection import Selection
 from hopping_leg.robot.parameters import Robot
+
+
+class TrainingProgress(LiveProgress):
+    """Live numbers of a training, as a context manager.
+
+    Args:
+        title: What is trained.
+        quiet: Show nothing.
+    """
+
+    def __init__(self, title: str, *, quiet: bool = False) -> None:
+        super().__init__(title, columns=(TextColumn("left"), TimeRemainingColumn()), quiet=quiet)
+        self._title = title
+        self._first_steps: int | None = None
+
+    def update(self, share: float, steps: int, hops: int, error: float, best: str) -> None:
+        """Show the state of the training.
+
+        Args:
+            share: Of the budget that is used, 0 to 1.
+            steps: Control steps so far.
+            hops: Hops so far.
+            error: Mean |apex - command| of the latest hops, m; NaN before the first.
+            best: About the best snapshot.
+        """
+        if self._first_steps is None:
+            self._first_steps = steps
+        note = f"{hops} hops"
+        if math.isfinite(error):
+            note += f" · apex error {1000 * error:.0f} mm"
+        if steps > self._first_steps:
+            note += f" · {(steps - self._first_steps) / max(self.passed, 1e-9):.0f} steps/s"
+        note += best
+        self._bar.update(self._task, completed=share, note=note)
+        self._line_if_due(f"{self._title} {100 * share:.0f} % · {note}")
+
 
 SHOWN_EVERY = 0.5
 """Time between two updates of the progress bar, s."""

@@ -14,6 +14,7 @@ from typing import Any
 
 import optuna
 from optuna.exceptions import ExperimentalWarning
+from optuna.importance import get_param_importances
 from optuna.pruners import MedianPruner
 from optuna.samplers import TPESampler
 from optuna.storages import RDBStorage
@@ -23,16 +24,53 @@ from sqlalchemy import Connection, Engine, event
 from sqlalchemy.exc import SQLAlchemyError
 
 from hopping_leg.errors import PhysicsError, UsageError
-from hopping_leg.io import plain
+from hopping_leg.io import plain, versions
 from hopping_leg.rl.policy_evaluation import FINAL_SEEDS, FIRST_SEED
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes import SPACES, change, get_recipe
 from hopping_leg.rl.run_folder import read_result
 from hopping_leg.rl.search_space import SearchSpace, defaults, suggest
 from hopping_leg.rl.train import train
-from hopping_leg.rl.trial_record import ERROR, FOLDER, record
 from hopping_leg.robot import load_robot
 from hopping_leg.workers import ProcessWorkers, RayWorkers
+
+FOLDER, ERROR = "folder", "error"
+"""Attributes of a trial: number of the trial whose folder it goes on in; why it failed."""
+
+
+def record(study: Study) -> dict[str, Any]:
+    """Return all trials, the best, and each number's importance, as JSON values."""
+    trials = study.get_trials(deepcopy=False)
+    done = [t for t in trials if t.state is TrialState.COMPLETE]
+    best = min(done, key=lambda t: float(t.value or 0.0)) if done else None
+    return {
+        "trials": [_row(trial) for trial in trials],
+        "best": None if best is None else _row(best),
+        "importance": _importance(study, done),
+        "versions": versions("hopping-leg", "optuna", "torch", "mujoco"),
+    }
+
+
+def _importance(study: Study, done: list[FrozenTrial]) -> dict[str, float]:
+    """Return how much each number matters (PED-ANOVA), empty where too few trials tell."""
+    if len(done) < 4 or len({trial.value for trial in done}) < 2:
+        return {}
+    return {name: float(share) for name, share in get_param_importances(study).items()}
+
+
+def _row(trial: FrozenTrial) -> dict[str, Any]:
+    began, ended = trial.datetime_start, trial.datetime_complete or None
+    return {
+        "number": trial.number,
+        "state": trial.state.name.lower(),
+        "score_m": trial.value if trial.state is TrialState.COMPLETE else None,
+        "snapshots_m": [trial.intermediate_values[k] for k in sorted(trial.intermediate_values)],
+        "params": trial.params,
+        "minutes": (ended - began).total_seconds() / 60 if began and ended else None,
+        "goes_on_from": trial.user_attrs.get(FOLDER),
+        "error": trial.user_attrs.get(ERROR),
+    }
+
 
 _FAILURES = (PhysicsError, ValueError, FloatingPointError)
 """What a training with bad numbers may end in; the study goes on."""

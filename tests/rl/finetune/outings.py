@@ -6,11 +6,9 @@ import numpy as np
 
 from hopping_leg.controllers.hardware_trial import HardwareTrial, measured_table
 from hopping_leg.controllers.registry import load_policy
-from hopping_leg.rl.finetune.apex_estimate import ApexEstimator
-from hopping_leg.rl.finetune.config import FinetuneConfig
-from hopping_leg.rl.finetune.contact import Contact, ContactConfig
+from hopping_leg.rl.finetune.apex_estimate import ApexEstimator, ContactConfig, ContactEstimator
+from hopping_leg.rl.finetune.config import FinetuneConfig, StoppingRules
 from hopping_leg.rl.finetune.learner import SacConfig
-from hopping_leg.rl.finetune.stopping_rules import StoppingRules
 from hopping_leg.robot import kinematics, load_robot
 from hopping_leg.robot.model import GRAVITY
 from hopping_leg.trace import Trace
@@ -82,7 +80,7 @@ def flying_leg(hops, noise=0.0):
     return q, height, flying
 
 
-class Known(Contact):
+class Known(ContactEstimator):
     """Knows who flies."""
 
     def __init__(self, flying):

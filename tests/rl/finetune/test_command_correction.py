@@ -5,16 +5,18 @@ import pytest
 
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_policy
-from hopping_leg.rl.finetune.command_correction import CommandCorrection, CommandCorrectionConfig
-from hopping_leg.rl.network_file import read_network
-from hopping_leg.rl.onnx_export import build_policy
+from hopping_leg.rl.finetune.command_correction import (
+    CommandCorrectionConfig,
+    LinearCommandCorrection,
+)
+from hopping_leg.rl.onnx_export import build_policy, read_network
 from hopping_leg.sim.channel import Measurement
 
 
 @pytest.mark.parametrize("name", ["fast", "paper", "precise"])
 def test_an_aimed_policy_acts_as_the_policy_does_at_the_command_it_is_told(name):
     policy = load_policy(name)
-    aim = CommandCorrection(0.25, 0.35, (-0.02, 0.01))
+    aim = LinearCommandCorrection(0.25, 0.35, (-0.02, 0.01))
     content = build_policy(aim.applied(read_network(policy.content), policy.card), policy.card)
     aimed = Policy(content, "aimed", "aimed")
     rng = np.random.default_rng(1)
@@ -30,7 +32,7 @@ def test_an_aimed_policy_acts_as_the_policy_does_at_the_command_it_is_told(name)
 
 
 def test_integration_ends_where_a_leg_with_offset_and_slope_hops_true():
-    aim, options = CommandCorrection(0.25, 0.35), CommandCorrectionConfig()
+    aim, options = LinearCommandCorrection(0.25, 0.35), CommandCorrectionConfig()
     command = np.repeat([0.25, 0.30, 0.35], 8)
     for _ in range(12):
         apex = 0.03 + 0.85 * aim.told(command) + 0.05
@@ -42,13 +44,15 @@ def test_hops_that_fail_do_not_move_the_aim_of_those_that_do_not():
     command = np.repeat([0.25, 0.30, 0.35], 9)
     error = np.full(27, 0.01)
     error[::9] = -0.2
-    aim = CommandCorrection(0.25, 0.35).corrected(command, error, CommandCorrectionConfig(rate=1.0))
+    aim = LinearCommandCorrection(0.25, 0.35).corrected(
+        command, error, CommandCorrectionConfig(rate=1.0)
+    )
     np.testing.assert_allclose(aim.shift, [-0.01, 0.0], atol=1e-3)
 
 
 def test_the_aim_never_strays_far_and_stays_without_hops():
     options = CommandCorrectionConfig(farthest=0.03)
-    aim = CommandCorrection(0.25, 0.35)
+    aim = LinearCommandCorrection(0.25, 0.35)
     assert aim.corrected(np.empty(0), np.empty(0), options) is aim
     for _ in range(50):
         aim = aim.corrected(np.array([0.25, 0.35]), np.array([0.5, -0.2]), options)

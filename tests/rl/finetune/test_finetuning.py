@@ -11,12 +11,12 @@ from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.finetune import pretraining
+from hopping_leg.rl.finetune.config import StoppingRules
 from hopping_leg.rl.finetune.finetuning import Finetuning
 from hopping_leg.rl.finetune.pretraining import Task, prepare
 from hopping_leg.rl.finetune.running import POLICY as FILE
 from hopping_leg.rl.finetune.running import finetune
-from hopping_leg.rl.finetune.simulated import Guard, Simulated
-from hopping_leg.rl.finetune.stopping_rules import StoppingRules
+from hopping_leg.rl.finetune.simulated import Guard, SimulatedTrials
 from hopping_leg.robot import load_robot
 
 from .outings import OPTIONS, POLICY, ROBOT, Imagined
@@ -122,8 +122,8 @@ def test_a_folder_with_another_run_is_refused(tmp_path, ready):
 
 def test_a_simulated_outing_tells_what_was_measured_and_keeps_the_truth_apart():
     twin = load_robot("twin")
-    outing = Simulated(twin, None).hop(POLICY, CommandSchedule(((0.3, 2.0),)), 1)
-    again = Simulated(twin, None).hop(POLICY, CommandSchedule(((0.3, 2.0),)), 1)
+    outing = SimulatedTrials(twin, None).hop(POLICY, CommandSchedule(((0.3, 2.0),)), 1)
+    again = SimulatedTrials(twin, None).hop(POLICY, CommandSchedule(((0.3, 2.0),)), 1)
     assert outing.trace.table.equals(again.trace.table)
     assert not {"height_m", "foot_clearance_m"} & set(outing.trace.table.columns)
     noise = np.diff(outing.trace.column("hip_velocity_rad_s")[:20])
@@ -134,7 +134,7 @@ def test_a_simulated_outing_tells_what_was_measured_and_keeps_the_truth_apart():
 
 def test_a_guard_takes_the_leg_away_and_ends_the_outing():
     narrow = Guard(np.array([-9.0, -9.0]), np.array([9.0, 9.0]), np.array([9.0, 9.0]))
-    outing = Simulated(ROBOT, narrow).hop(POLICY, CommandSchedule(((0.3, 2.0),)), 1)
+    outing = SimulatedTrials(ROBOT, narrow).hop(POLICY, CommandSchedule(((0.3, 2.0),)), 1)
     assert "faster" in outing.complaint
     assert 0 < outing.seconds < 2.0
     speed = outing.trace.column("knee_velocity_rad_s")

@@ -7,11 +7,9 @@ import pytest
 import torch
 
 from hopping_leg.controllers.registry import load_policy
-from hopping_leg.rl.finetune.exploring import EDGE, ExploringPolicy
 from hopping_leg.rl.finetune.learner import Learner, SacConfig
-from hopping_leg.rl.finetune.replay import CRITIC_SIZE, Transitions
-from hopping_leg.rl.network_file import read_network
-from hopping_leg.rl.onnx_export import build_policy
+from hopping_leg.rl.finetune.replay import CRITIC_SIZE, EDGE, ExploringPolicy, Transitions
+from hopping_leg.rl.onnx_export import build_policy, read_network
 from hopping_leg.sim.channel import Measurement
 
 TINY = SacConfig(critic=(8, 8), batch_size=16, actor_share=1.0, change=np.inf)

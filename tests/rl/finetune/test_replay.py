@@ -13,7 +13,7 @@ from hopping_leg.rl.finetune.config import FinetuneConfig
 from hopping_leg.rl.finetune.replay import CRITIC_SIZE, TransitionWriter
 from hopping_leg.rl.finetune.simulated import Witness, traces_of
 from hopping_leg.rl.finetune.trial_data import TrialData
-from hopping_leg.rl.network_file import read_network
+from hopping_leg.rl.onnx_export import read_network
 from hopping_leg.sim import NO_NOISE
 
 from .outings import POLICY, ROBOT

@@ -7,6 +7,7 @@ does. The network that feels learns from the true heights, the other one from a 
 that is told the same aim.
 """
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
@@ -16,12 +17,79 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from hopping_leg.envs.observation import CLEARANCE_GAIN
+from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.envs.observation import CLEARANCE_GAIN, Observation
+from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.rl.checkpoint import Tree
-from hopping_leg.rl.distillation.buffers import DaggerBuffer
-from hopping_leg.rl.distillation.hop_errors import HopErrors
-from hopping_leg.rl.distillation.students import Bools, Wanted
-from hopping_leg.rl.sb3_policies import dense
+from hopping_leg.rl.distillation.students import Bools, DaggerBuffer, Wanted
+from hopping_leg.rl.onnx_export import CommandIntegrator, Network
+from hopping_leg.rl.sb3_policies import dense, dense_network, flatten, layer_weights
+
+FROM, UNTIL = 0.03, 0.11
+"""Time after touchdown in which a hop's error is told, s: its last samples have arrived, and the
+foot still stands."""
+
+_SHORTEST = 0.1
+"""Shortest flight that counts as a hop, s."""
+
+
+class HopErrors:
+    """Follows flights tick by tick.
+
+    Args:
+        count: Legs.
+        period: Length of a tick, s.
+
+    Attributes:
+        first: Ticks after touchdown from which on a hop's error is told.
+        last: Ticks after touchdown until which it is.
+    """
+
+    def __init__(self, count: int, period: float) -> None:
+        times = (_SHORTEST, FROM, UNTIL)
+        self._shortest, self.first, self.last = (round(time / period) for time in times)
+        self._flying = np.zeros(count, np.int64)
+        self._standing = np.full(count, self.last)
+        self._top = np.zeros(count)
+        self._command = np.zeros(count)
+        self._error = np.zeros(count)
+
+    def see(self, height: Array, clearance: Array, command: Array, begun: BoolArray) -> Array:
+        """Take in a tick; return what is told of the last hop in it.
+
+        Args:
+            height: Of the bases, any unit.
+            clearance: Under the feet, m.
+            command: In the heights' unit.
+            begun: Whose episode began with this tick.
+
+        Returns:
+            Apex minus command in the ticks that tell it, 0 in all others and where the command has
+            changed since the foot left the ground, (n,).
+        """
+        self._flying[begun], self._standing[begun] = 0, self.last
+        flies = clearance >= FLIGHT_CLEARANCE
+        left = flies & (self._flying == 0)
+        landed = ~flies & (self._flying >= self._shortest)
+        self._error = np.where(landed, self._top - self._command, self._error)
+        self._standing = np.where(flies, self.last, np.where(landed, 0, self._standing + 1))
+        self._top = np.where(left, height, np.maximum(self._top, height))
+        self._command = np.where(left, command, self._command)
+        self._flying = np.where(flies, self._flying + 1, 0)
+        tells = (self._standing >= self.first) & (self._standing < self.last)
+        tells &= self._command == command
+        return np.where(tells, self._error, 0.0)
+
+    def state(self) -> Tree:
+        """Return everything needed to go on."""
+        arrays = {n: value for n, value in vars(self).items() if isinstance(value, np.ndarray)}
+        return {name: value.copy() for name, value in arrays.items()}
+
+    def restore(self, state: Tree) -> None:
+        """Go on from a ``state``."""
+        for name, value in state.items():
+            setattr(self, name, np.array(value))
+
 
 _NOTES = 3
 """Of every tick beside what is seen: aim, command of late, error that is told."""
@@ -177,6 +245,23 @@ class AdaptiveStudent(nn.Module):
         observation[:, self._places.true_command] += aim
         acted = functional.mse_loss(self.layers(self._told(seen, aim)), wanted(observation))
         return acted + functional.mse_loss(felt, error.clamp(-most, most))
+
+    def network(self, observation: Observation) -> Network:
+        """Return both networks and the memory of where to aim."""
+        network = dense_network([self.layers], observation, "clip")
+        layers = [layer_weights(m) for m in flatten(self.feeling) if isinstance(m, nn.Linear)]
+        order = np.append(observation.order, observation.size)
+        layers[0] = (layers[0][0][:, order], layers[0][1])
+        config = self.command_integrator
+        memory = CommandIntegrator(
+            layers,
+            rate=self.rate * config.scale,
+            most=config.most,
+            farthest=config.farthest,
+            beyond=config.beyond,
+            follow=self.follow,
+        )
+        return dataclasses.replace(network, memory=memory)
 
     def state(self) -> Tree:
         """Return the lessons, the memory and what was seen of the last hops."""

@@ -21,17 +21,19 @@ from hopping_leg.envs.observation import (
     PRIVILEGED_HEIGHT,
 )
 from hopping_leg.errors import UsageError
-from hopping_leg.rl.actor import adaptive_network, dense_network, recurrent_network
 from hopping_leg.rl.algorithms import NetworkConfig, PPOConfig, cosine
 from hopping_leg.rl.distillation.adaptive_student import (
     AdaptiveStudent,
     CommandIntegratorConfig,
     Places,
 )
-from hopping_leg.rl.distillation.dagger import DaggerConfig
 from hopping_leg.rl.distillation.students import RecurrentStudent, WindowStudent
 from hopping_leg.rl.distillation.teacher import Teacher
-from hopping_leg.rl.distillation.teacher_student import TeacherStudentPolicy, TeacherStudentPPO
+from hopping_leg.rl.distillation.teacher_student import (
+    DaggerConfig,
+    TeacherStudentPolicy,
+    TeacherStudentPPO,
+)
 from hopping_leg.rl.onnx_export import Network
 from hopping_leg.rl.policy_evaluation import command_score, evaluate_policy, every_centimetre
 from hopping_leg.rl.sb3_env import TaskVecEnv
@@ -268,12 +270,8 @@ class Distillation:
 
     def network(self, model: Any, env: TaskVecEnv) -> Network:  # noqa: ANN401
         """Return the student as it stands."""
-        student, observation = model.policy.student, env.task.observation
-        if self.student.memory == "gru":
-            return recurrent_network(student.unit, [student.readout], observation, "clip")
-        if self.student.memory == "window":
-            return dense_network([student.layers], observation, "clip")
-        return adaptive_network(student, observation, "clip")
+        network: Network = model.policy.student.network(env.task.observation)
+        return network
 
     def _accepted(self, scores: Sequence[float]) -> bool:
         return len(scores) > 0 and scores[-1] <= self.teacher_accept_score

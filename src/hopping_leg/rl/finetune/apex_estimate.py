@@ -1,25 +1,192 @@
-"""How high the base was, reckoned afterwards from the joints (paper, "Jumping height estimation").
+"""When the foot was in the air and how high the base went, read off the joints afterwards.
 
-On the ground the leg's length tells. In the air a parabola goes through the heights at lift-off and
-touchdown, its apex by the time between the two (``height_estimate.flight_time_apex``). The rail's
-drag makes true apexes lower than that; by how much is learnt in simulation, on the legs on which
-contact was learnt.
+No sensor tells contact, and a threshold on the contact force needs frictions that nobody knows. A
+small network learns it in simulation, on legs drawn from what is known of leg V2: from the joints'
+positions, velocities and torques shortly before *and after* a control step. A controller cannot
+have the second half, which makes the question easy.
+
+On the ground the leg's length tells the height. In the air a parabola goes through the heights at
+lift-off and touchdown, its apex by the time between the two (paper, "Jumping height estimation").
+The rail's drag makes true apexes lower; by how much is learnt on the same simulated legs.
 """
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
+import torch
+from torch import nn
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.controllers.energy_shaping.equations import flight_time_apex
+from hopping_leg.controllers.protocol import Controller
 from hopping_leg.controllers.rollout import Rollout
 from hopping_leg.hop_detection import find_hops
-from hopping_leg.rl.finetune.contact import Contact
-from hopping_leg.rl.finetune.lines import robust_line
-from hopping_leg.rl.finetune.simulated import traces_of
+from hopping_leg.rl.checkpoint import Tree
+from hopping_leg.rl.finetune.command_correction import robust_line
+from hopping_leg.rl.finetune.simulated import hop_many, traces_of
 from hopping_leg.rl.finetune.trial_data import TrialData
 from hopping_leg.robot import kinematics
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.parameters import JOINTS, Robot
+from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, Range, sample
+from hopping_leg.sim.twins import TWIN_RANGES
+
+_CHOSEN = "[C]"
+
+DOUBTS = (
+    *(spread for spread in IDENTIFIABLE_RANGES if not spread.path.endswith("armature")),
+    Range("hip.armature", "kg m2", 2e-5, 3.8e-3, "Table I to the lab's", "logarithmic"),
+    Range("knee.armature", "kg m2", 5e-5, 1.5e-2, "Table I to the lab's", "logarithmic"),
+    Range("hip.torque_gain", "1", 0.8, 1.05, f"{_CHOSEN} motors and gears that give less"),
+    Range("knee.torque_gain", "1", 0.8, 1.05, f"{_CHOSEN} motors and gears that give less"),
+    Range("base.mass", "1", 0.95, 1.05, f"{_CHOSEN} cables and screws", bounds="factors"),
+)
+"""What the legs differ in on which contact is learnt."""
+
+_MIDDLE = np.array([0.6, -1.3, 0.0, 0.0, 0.0, 0.0])
+_SPREAD = np.array([0.4, 0.5, 8.0, 12.0, 3.0, 3.0])
+"""Of positions, velocities and torques: what the network sees is about 1 in size."""
+
+
+@dataclass(frozen=True)
+class ContactConfig:
+    """How contact is learnt."""
+
+    num_envs: int = 192
+    """That differ."""
+    seconds: float = 12.0
+    """For which each of them hops."""
+    hold: float = 1.5
+    """Time between new commands, s."""
+    reach: int = 16
+    """Ticks before and after that the network sees."""
+    hidden: tuple[int, ...] = (128, 64)
+    """Its hidden layers."""
+    steps: int = 6000
+    """Gradient steps."""
+    batch_size: int = 1024
+    """Ticks per gradient step."""
+    learning_rate: float = 2e-3
+    """Falls along a cosine."""
+    seed: int = 5
+    """Of legs, commands and weights: runs of one policy and robot share what is learnt."""
+
+
+class ContactEstimator:
+    """The network; more than zero is in the air.
+
+    Args:
+        options: Its size.
+    """
+
+    def __init__(self, options: ContactConfig) -> None:
+        self._options = options
+        sizes = (6 * (2 * options.reach + 1), *options.hidden)
+        layers: list[nn.Module] = []
+        for size, following in itertools.pairwise(sizes):
+            layers += [nn.Linear(size, following), nn.ELU()]
+        self._net = nn.Sequential(*layers, nn.Linear(sizes[-1], 1))
+
+    def airborne(self, data: TrialData) -> Array:
+        """Return how surely the foot was in the air, (ticks, n)."""
+        seen = _normalised(data.filled())
+        rows = torch.arange(data.ticks)
+        with torch.no_grad():
+            legs = [self._judge(seen[:, leg], rows) for leg in range(seen.shape[1])]
+        return torch.stack(legs, dim=1).double().numpy()
+
+    def learn(self, data: TrialData, flying: Array, seed: int) -> None:
+        """Learn from legs of which it is known.
+
+        Args:
+            data: What they measured.
+            flying: Whether the foot was in the air, (ticks, n).
+            seed: Of weights, noise and batches.
+        """
+        o, rng = self._options, np.random.default_rng(seed)
+        noise = rng.standard_normal((*data.q.shape[:2], 6)) * _sensor_noise()
+        seen, truth = _normalised(data.filled() + noise), torch.from_numpy(flying).float()
+        ticks, count = flying.shape
+        with torch.random.fork_rng():
+            torch.manual_seed(seed)
+            for layer in self._net:
+                if isinstance(layer, nn.Linear):
+                    layer.reset_parameters()
+            optimizer = torch.optim.Adam(self._net.parameters(), o.learning_rate)
+            schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, o.steps)
+            for _ in range(o.steps):
+                tick, leg = (
+                    torch.randint(ticks, (o.batch_size,)),
+                    torch.randint(count, (o.batch_size,)),
+                )
+                guess = self._judge(seen, tick, leg)
+                loss = nn.functional.binary_cross_entropy_with_logits(guess, truth[tick, leg])
+                optimizer.zero_grad()
+                torch.autograd.backward(loss)
+                optimizer.step()
+                schedule.step()
+
+    def state(self) -> Tree:
+        """Return its weights."""
+        return {name: w.numpy().copy() for name, w in self._net.state_dict().items()}
+
+    def restore(self, state: Tree) -> None:
+        """Take weights from a ``state``."""
+        self._net.load_state_dict({name: torch.from_numpy(w) for name, w in state.items()})
+
+    def _judge(
+        self, seen: torch.Tensor, tick: torch.Tensor, leg: torch.Tensor | None = None
+    ) -> torch.Tensor:
+        reach = self._options.reach
+        around = (tick[:, None] + torch.arange(-reach, reach + 1)).clamp(0, len(seen) - 1)
+        windows = seen[around] if leg is None else seen[around, leg[:, None]]
+        judged: torch.Tensor = self._net(windows.flatten(1))[:, 0]
+        return judged
+
+
+def doubtful_legs(
+    controller: Controller,
+    robot: Robot,
+    commands: tuple[float, float],
+    seed: int,
+    o: ContactConfig,
+) -> Rollout:
+    """Let a controller hop on legs that each differ from the believed one.
+
+    Args:
+        controller: Has the legs.
+        robot: The believed one.
+        commands: Lowest and highest, m.
+        seed: Of legs, commands and simulation.
+        o: How many and how long.
+    """
+    rng = np.random.default_rng(seed)
+    robots = sample(robot, DOUBTS, o.num_envs, rng)
+    held = round(o.hold * 200)
+    steps = rng.uniform(*commands, (round(o.seconds / o.hold), o.num_envs))
+    return hop_many(controller, robot, robots, np.repeat(steps, held, axis=0), seed)
+
+
+def learn_contact(run: Rollout, seed: int, options: ContactConfig) -> ContactEstimator:
+    """Return a network that has learnt contact from a run of ``doubtful_legs``."""
+    contact = ContactEstimator(options)
+    data = TrialData.of(traces_of(run))
+    contact.learn(data, (run.data["foot_clearance_m"] > 0).astype(np.float64), seed)
+    return contact
+
+
+def _normalised(values: Array) -> torch.Tensor:
+    return torch.from_numpy((values - _MIDDLE) / _SPREAD).float()
+
+
+def _sensor_noise() -> Array:
+    """Return the standing noise of leg V2's sensors as the twins have it, (6,)."""
+    noise = {spread.path: spread.high for spread in TWIN_RANGES}
+    kinds, joints = ("position", "velocity", "torque"), JOINTS
+    return np.array(
+        [noise[f"reality.{joint}.sensor.{kind}_noise"] for kind in kinds for joint in joints]
+    )
+
 
 _SHORTEST = 0.08
 """Of a flight, s: one of 8 mm."""
@@ -57,7 +224,7 @@ class ApexEstimator:
         drag: Constant and slope over height of what flight time overestimates apexes by, m, (2,).
     """
 
-    def __init__(self, robot: Robot, contact: Contact, drag: Array | None = None) -> None:
+    def __init__(self, robot: Robot, contact: ContactEstimator, drag: Array | None = None) -> None:
         self.robot, self.contact = robot, contact
         self.drag = np.zeros(2) if drag is None else drag
 

@@ -14,8 +14,30 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.controllers.observation_history import make_observation_history
 from hopping_leg.controllers.policy import Card
-from hopping_leg.rl.finetune.lines import robust_line
 from hopping_leg.rl.onnx_export import Network
+
+_ROUNDS = 30
+_NEAR = 1e-3
+"""Errors below which all points weigh the same, m."""
+
+
+def robust_line(x: Array, y: Array, doubt: float = 0.0) -> Array:
+    """Return constant and slope of the line, (2,).
+
+    Args:
+        x: (n,).
+        y: m, (n,).
+        doubt: Points' worth of evidence that the slope is zero.
+    """
+    columns = np.stack([np.ones_like(x), x], axis=1)
+    ridge = np.diag([1e-9, 1e-9 + doubt])
+    weight = np.ones_like(y)
+    for _ in range(_ROUNDS):
+        weighted = columns * weight[:, None]
+        line = np.linalg.solve(weighted.T @ columns + ridge, weighted.T @ y)
+        weight = 1 / np.maximum(np.abs(y - columns @ line), _NEAR)
+        weight *= len(y) / weight.sum()
+    return np.asarray(line)
 
 
 @dataclass(frozen=True)
@@ -31,7 +53,7 @@ class CommandCorrectionConfig:
 
 
 @dataclass(frozen=True)
-class CommandCorrection:
+class LinearCommandCorrection:
     """Where a network is told to hop.
 
     Attributes:
@@ -51,7 +73,7 @@ class CommandCorrection:
 
     def corrected(
         self, command: Array, error: Array, options: CommandCorrectionConfig
-    ) -> "CommandCorrection":
+    ) -> "LinearCommandCorrection":
         """Return the aim after hops.
 
         Args:

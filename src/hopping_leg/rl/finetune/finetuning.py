@@ -24,16 +24,14 @@ from hopping_leg.rl.checkpoint import (
     read_checkpoint,
     write_checkpoint,
 )
-from hopping_leg.rl.finetune.command_correction import CommandCorrection
+from hopping_leg.rl.finetune.command_correction import LinearCommandCorrection
 from hopping_leg.rl.finetune.config import FinetuneConfig
-from hopping_leg.rl.finetune.exploring import ExploringPolicy
 from hopping_leg.rl.finetune.hops import Score, estimated, score, settled
 from hopping_leg.rl.finetune.learner import Learner
 from hopping_leg.rl.finetune.pretraining import Task, believed_rows, prepare
-from hopping_leg.rl.finetune.replay import TransitionWriter
+from hopping_leg.rl.finetune.replay import ExploringPolicy, TransitionWriter
 from hopping_leg.rl.finetune.trial_data import TrialData
-from hopping_leg.rl.network_file import read_network
-from hopping_leg.rl.onnx_export import Network, build_policy
+from hopping_leg.rl.onnx_export import Network, build_policy, read_network
 from hopping_leg.trace import Trace
 
 Row = dict[str, Any]
@@ -80,7 +78,7 @@ class Finetuning:
         self._on_outing = on_outing
         self._estimator = prepare(task, options.contact, pretraining or folder / "pretraining")
         self._network = read_network(task.policy.content)
-        self._aim = CommandCorrection(*task.commands)
+        self._aim = LinearCommandCorrection(*task.commands)
         self._learner: Learner | None = None
         self._best = self._origin = (self._network, self._aim)
         self._explored = 0
@@ -235,7 +233,7 @@ class Finetuning:
         scaled = self._aim.applied(self._network, card)
         return TransitionWriter(card, scaled, self._task.robot, reward, o.penalty)
 
-    def _content(self, network: Network, aim: CommandCorrection) -> bytes:
+    def _content(self, network: Network, aim: LinearCommandCorrection) -> bytes:
         policy = self._task.policy
         card = replace(
             policy.card,
@@ -278,13 +276,13 @@ class Finetuning:
         self._network, self._aim = self._from_tree(tree["now"])
         self._best = self._from_tree(tree["best"])
 
-    def _from_tree(self, tree: Tree) -> tuple[Network, CommandCorrection]:
+    def _from_tree(self, tree: Tree) -> tuple[Network, LinearCommandCorrection]:
         layers = [(np.array(weight), np.array(bias)) for weight, bias in tree["layers"]]
         a, b = tree["shift"]
         return replace(self._network, layers=layers), replace(self._aim, shift=(a, b))
 
 
-def _as_tree(network: Network, aim: CommandCorrection) -> Tree:
+def _as_tree(network: Network, aim: LinearCommandCorrection) -> Tree:
     return {"layers": [list(layer) for layer in network.layers], "shift": list(aim.shift)}
 
 

@@ -20,8 +20,7 @@ from torch import nn
 
 from hopping_leg.arrays import Array
 from hopping_leg.rl.checkpoint import Tree
-from hopping_leg.rl.finetune.exploring import EDGE
-from hopping_leg.rl.finetune.replay import CRITIC_SIZE, Transitions
+from hopping_leg.rl.finetune.replay import CRITIC_SIZE, EDGE, Transitions
 from hopping_leg.rl.onnx_export import Network
 from hopping_leg.rl.resumable import learner_state, restore_learner
 from hopping_leg.rl.sb3_policies import AsymmetricSACPolicy

@@ -7,10 +7,14 @@ import numpy as np
 
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.rl.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
-from hopping_leg.rl.finetune.apex_estimate import ApexEstimator
-from hopping_leg.rl.finetune.contact import Contact, ContactConfig, doubtful_legs, learn_contact
-from hopping_leg.rl.finetune.exploring import ExploringPolicy
-from hopping_leg.rl.finetune.replay import Transitions, TransitionWriter
+from hopping_leg.rl.finetune.apex_estimate import (
+    ApexEstimator,
+    ContactConfig,
+    ContactEstimator,
+    doubtful_legs,
+    learn_contact,
+)
+from hopping_leg.rl.finetune.replay import ExploringPolicy, Transitions, TransitionWriter
 from hopping_leg.rl.finetune.simulated import hop_many, traces_of
 from hopping_leg.rl.finetune.trial_data import TrialData
 from hopping_leg.robot.parameters import Robot
@@ -53,7 +57,7 @@ def prepare(task: Task, options: ContactConfig, folder: Path) -> ApexEstimator:
         options: How.
         folder: Where it is kept.
     """
-    contact = Contact(options)
+    contact = ContactEstimator(options)
     for path in list_checkpoints(folder):
         tree = read_checkpoint(path)
         if tree["asked"] == task.asked(options):

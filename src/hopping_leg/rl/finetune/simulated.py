@@ -48,7 +48,7 @@ class Guard:
         return ""
 
 
-class Simulated:
+class SimulatedTrials:
     """A simulated leg; implements ``TrialRobot``.
 
     Args:

@@ -7,11 +7,15 @@ import onnxruntime
 import pytest
 
 from hopping_leg.controllers.policy import Policy
-from hopping_leg.controllers.registry import load_policy
+from hopping_leg.controllers.registry import load_policy, shipped_policies
 from hopping_leg.errors import PolicyError
-from hopping_leg.rl.hidden import expose_hidden
-from hopping_leg.rl.memories import RecurrentUnit
-from hopping_leg.rl.onnx_export import Network, build_policy
+from hopping_leg.rl.onnx_export import (
+    Network,
+    RecurrentUnit,
+    build_policy,
+    expose_hidden,
+    read_network,
+)
 
 POLICY = load_policy("fast")
 
@@ -79,3 +83,33 @@ def test_a_policy_that_remembers_needs_no_hidden_layer_and_is_shuffled_whole():
     own, mixed = (outputs(expose_hidden(policy.content, seed), feeds) for seed in (None, 1))
     np.testing.assert_array_equal(own["next_memory"], plain["next_memory"])
     assert np.abs(own["next_memory"] - mixed["next_memory"]).max() > 0.01
+
+
+@pytest.mark.parametrize("name", shipped_policies())
+def test_a_policy_written_again_has_the_same_bytes_or_is_refused_for_its_memory(name):
+    policy = load_policy(name)
+    if policy.remembers:
+        with pytest.raises(PolicyError, match="remembers"):
+            read_network(policy.content)
+        return
+    assert build_policy(read_network(policy.content), policy.card) == policy.content
+
+
+def test_a_changed_weight_changes_the_file():
+    policy = load_policy("fast")
+    network = read_network(policy.content)
+    weight, bias = network.layers[-1]
+    changed = dataclasses.replace(network, layers=[*network.layers[:-1], (weight, bias + 0.1)])
+    again = read_network(build_policy(changed, policy.card))
+    np.testing.assert_allclose(again.layers[-1][1] - bias, 0.1, atol=1e-6)
+
+
+def test_a_foreign_graph_is_refused():
+    import onnx
+    from onnx import helper
+
+    node = helper.make_node("Identity", ["x"], ["y"])
+    value = [helper.make_tensor_value_info(n, onnx.TensorProto.FLOAT, ["n"]) for n in "xy"]
+    model = helper.make_model(helper.make_graph([node], "g", value[:1], value[1:]))
+    with pytest.raises(PolicyError, match="dense layers"):
+        read_network(model.SerializeToString())

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from hopping_leg.rl.distillation.dagger import CommandCorrection
+from hopping_leg.rl.distillation.teacher_student import CommandCorrection
 
 
 def aim():

@@ -1,6 +1,6 @@
 """When a policy is rolled back, and when its training ends."""
 
-from hopping_leg.rl.finetune.stopping_rules import StoppingRules
+from hopping_leg.rl.finetune.config import StoppingRules
 
 RULES = StoppingRules(minutes=2.0, tolerance=0.004, margin=0.01, patience=3, gain=0.001, confirm=2)
 
