@@ -77,7 +77,7 @@ def accuracies(rows: Iterable[Mapping[str, Any]], highest: float = HIGHEST) -> d
     """Return the accuracy of every controller of an evaluation.
 
     Args:
-        rows: Of an evaluation's ``summary``, as JSON values.
+        rows: An evaluation's ``summary``, as JSON values.
         highest: Commands above this do not count, m.
     """
     rows_of: dict[str, list[Mapping[str, Any]]] = {}

@@ -22,9 +22,9 @@ def tabulate(runs: Sequence[Run], controllers: Sequence[str], seed: int) -> Eval
     """Measure runs and arrange the numbers; conditions, versions and notes stay empty.
 
     Args:
-        runs: Of all controllers.
+        runs: Runs of all controllers.
         controllers: Their names in the order of the rows.
-        seed: Of the bootstrap.
+        seed: Seed of the bootstrap.
     """
     own = {name: [run for run in runs if run.controller == name] for name in controllers}
     fixed = {name: _windows(own[name], "fixed") for name in controllers}
@@ -106,7 +106,7 @@ def summarise(
         robot: Name of the leg.
         command: Desired apex height, m.
         windows: One per run and stretch at this command.
-        seed: Of the bootstrap.
+        seed: Seed of the bootstrap.
     """
     apex = pooled_apexes(windows)
     low, high = median_interval([w.error for w in windows], seed)
@@ -150,7 +150,7 @@ def pool_group(group: str, rows: Sequence[Summary], seed: int) -> list[Group]:
     Args:
         group: Name of the recipe or pattern.
         rows: Summary rows of all its policies.
-        seed: Of the bootstrap.
+        seed: Seed of the bootstrap.
     """
     return [
         _group_row(group, command, [row for row in rows if row.command_m == command], seed)

@@ -12,7 +12,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import tables
 from hopping_leg.evaluate.figures import draw_learning
 from hopping_leg.evaluate.report_figures import Picture, draw_report_figures, run_of
-from hopping_leg.evaluate.result import Evaluation
+from hopping_leg.evaluate.result import Evaluation, flat_conditions
 from hopping_leg.evaluate.result_files import StoredRun
 from hopping_leg.evaluate.tables import column, millimetres
 from hopping_leg.evaluate.trials import Run
@@ -169,7 +169,7 @@ def _name(evaluations: dict[str, Evaluation], label: str) -> Callable[[str], str
 
 
 def _differences(conditions: dict[str, dict[str, Any]]) -> list[dict[str, str]]:
-    flat = {label: _flat(entries) for label, entries in conditions.items()}
+    flat = {label: flat_conditions(entries) for label, entries in conditions.items()}
     names = dict.fromkeys(name for entries in flat.values() for name in entries)
     rows = []
     for name in names:
@@ -177,16 +177,6 @@ def _differences(conditions: dict[str, dict[str, Any]]) -> list[dict[str, str]]:
         if len(set(texts.values())) > 1:
             rows.append({"name": name, **{f"in {label}": text for label, text in texts.items()}})
     return rows
-
-
-def _flat(entries: dict[str, Any]) -> dict[str, str]:
-    found: dict[str, str] = {}
-    for name, value in entries.items():
-        inner = value if isinstance(value, dict) else {"": value}
-        for key, entry in inner.items():
-            text = f"{entry:g}" if isinstance(entry, float) else str(entry)
-            found[f"{name} {key}".strip().replace("_", " ")] = text
-    return found
 
 
 def _notes(runs: Sequence[StoredRun], differences: list[dict[str, str]]) -> list[str]:
@@ -199,11 +189,13 @@ def _notes(runs: Sequence[StoredRun], differences: list[dict[str, str]]) -> list
                 robots.setdefault(key, []).append(run.label)
     notes = []
     if len(robots) > 1:
-        told = "; ".join(
+        named = "; ".join(
             f"{robot} ({digest}) in {', '.join(dict.fromkeys(labels))}"
             for (robot, digest), labels in robots.items()
         )
-        notes.append(f"The robots differ: {told}. Numbers of different legs are not the same task.")
+        notes.append(
+            f"The robots differ: {named}. Numbers of different legs are not the same task."
+        )
     names = [row["name"] for row in differences if not row["name"].startswith("robot")]
     if names:
         notes.append(f"The conditions differ: {', '.join(names)}; see the table.")

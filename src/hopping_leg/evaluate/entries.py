@@ -19,7 +19,7 @@ class Entry:
     """A controller to be judged.
 
     Attributes:
-        label: Its name in all tables.
+        label: Name in all tables.
         controller: What is run.
         command_range: Heights it was made for, m, or None for any.
         group: Name shared by policies of one recipe that differ in the training seed.
@@ -82,7 +82,7 @@ def check_range(entry: Entry, commands: Sequence[float]) -> None:
 
 
 def fingerprint(controller: Controller) -> str:
-    """Return what tells a controller from others of its name, as far as it can be told."""
+    """Return what distinguishes a controller from others of its name, as far as is known."""
     if isinstance(controller, EnergyShaping):
         return repr((controller.gains, controller.options))
     named = f"{type(controller).__module__}.{type(controller).__qualname__}"

@@ -8,7 +8,7 @@ from markupsafe import Markup
 from hopping_leg.evaluate import tables
 from hopping_leg.evaluate.acceptance import acceptance_lines
 from hopping_leg.evaluate.report_figures import Picture, draw_report_figures
-from hopping_leg.evaluate.result import Evaluation
+from hopping_leg.evaluate.result import Evaluation, flat_conditions
 from hopping_leg.evaluate.runner import EvaluationRun
 from hopping_leg.evaluate.video import Video, fixed_traces, render_video
 from hopping_leg.html_page import data_uri, page_template, svg_uri
@@ -33,7 +33,7 @@ def write_report(judged: EvaluationRun, videos: dict[str, Video] | None = None) 
         acceptance=acceptance_lines(map(dataclasses.asdict, evaluation.summary)),
         pictures=[_picture(p, evaluation) for p in draw_report_figures(evaluation, judged.runs)],
         videos=[_video(name, video) for name, video in (videos or {}).items()],
-        conditions=_conditions(evaluation),
+        conditions=flat_conditions({**evaluation.conditions, **evaluation.versions}),
     )
     return page.encode()
 
@@ -89,17 +89,3 @@ def _picture(picture: Picture, evaluation: Evaluation) -> dict[str, Any]:
 def _video(name: str, video: Video) -> dict[str, str]:
     source = data_uri(video.content, "image/webp") if video.content else ""
     return {"controller": name, "source": source, "reason": video.reason}
-
-
-def _conditions(evaluation: Evaluation) -> dict[str, str]:
-    rows: dict[str, str] = {}
-    for name, value in {**evaluation.conditions, **evaluation.versions}.items():
-        if isinstance(value, dict):
-            rows |= {f"{name}: {key}": _text(entry) for key, entry in value.items()}
-        else:
-            rows[name] = _text(value)
-    return {name.replace("_", " "): value for name, value in rows.items()}
-
-
-def _text(value: object) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)

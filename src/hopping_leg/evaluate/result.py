@@ -125,7 +125,7 @@ class Evaluation:
         estimators: One entry per controller that estimates its height.
         groups: One row per group of policies and command.
         conditions: Robot, digest, floor, disturbance, seeds, steps, rates.
-        versions: Of the software.
+        versions: Versions of the software.
         notes: What was left out and why.
         command: What makes this evaluation again.
         secondary: The same on another floor, if that was asked for.
@@ -161,6 +161,17 @@ class Evaluation:
     def dumps(self) -> bytes:
         """Return readable JSON."""
         return json_text(self.to_json()).encode()
+
+
+def flat_conditions(entries: dict[str, Any]) -> dict[str, str]:
+    """Return conditions as texts, those of an inner table with its name before theirs."""
+    found: dict[str, str] = {}
+    for name, value in entries.items():
+        inner = value if isinstance(value, dict) else {"": value}
+        for key, entry in inner.items():
+            text = f"{entry:g}" if isinstance(entry, float) else str(entry)
+            found[f"{name} {key}".strip().replace("_", " ")] = text
+    return found
 
 
 def _rounded(value: Any) -> Any:  # noqa: ANN401

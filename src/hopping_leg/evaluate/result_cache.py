@@ -27,7 +27,7 @@ class ResultCache:
         """Return the kept result of the same work, or do it and keep its result.
 
         Args:
-            name: Of the result's file.
+            name: Name of the result's file.
             words: What the work is, for whoever waits.
             asked: All that the result depends on, as JSON values.
             work: Returns JSON values.

@@ -22,7 +22,7 @@ class StoredRun:
     """One run to be compared."""
 
     label: str
-    """Its name in all tables and figures."""
+    """Name in all tables and figures."""
     path: Path
     """As it was named."""
     evaluation: Evaluation | None = None

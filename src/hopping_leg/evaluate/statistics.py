@@ -25,7 +25,7 @@ class Neighbours:
     Attributes:
         lower_m: The lower command, m.
         upper_m: The higher command, m.
-        p: Of the two-sided Wilcoxon rank-sum test, normal approximation.
+        p: P-value of the two-sided Wilcoxon rank-sum test, normal approximation.
         cliffs_delta: P(upper > lower) - P(upper < lower) over all pairs of hops; 1 is full
             separation in the right order.
         overlap: Share of all hops that lie between the smallest of the higher and the largest of
@@ -44,9 +44,9 @@ def compare(lower_m: float, lower: Array, upper_m: float, upper: Array) -> Neigh
 
     Args:
         lower_m: The lower command, m.
-        lower: Its apexes, m, (hops,).
+        lower: Apexes there, m, (hops,).
         upper_m: The higher command, m.
-        upper: Its apexes, m, (hops,).
+        upper: Apexes there, m, (hops,).
     """
     if not len(lower) or not len(upper):
         return Neighbours(lower_m, upper_m, float("nan"), float("nan"), float("nan"))
@@ -72,7 +72,7 @@ def median_interval(
 
     Args:
         runs: Values of each run, (hops,) each.
-        seed: Of the resampling.
+        seed: Seed of the resampling.
         resamples: How many.
 
     Returns:
@@ -102,8 +102,8 @@ def bootstrap(
 
     Args:
         samples: Each is an argument of the statistic.
-        statistic: Of the samples; if vectorized, with an argument ``axis``.
-        seed: Of the resampling.
+        statistic: Function of the samples; if vectorized, with an argument ``axis``.
+        seed: Seed of the resampling.
         resamples: How many.
         vectorized: Whether the statistic takes many resamples at once.
     """

@@ -1,6 +1,5 @@
 """The paper's trials (Sec. III): what is commanded when, on which floor, and runs of them."""
 
-import functools
 import itertools
 import math
 import operator
@@ -201,15 +200,14 @@ def run_trials(
     runs: list[Run] = []
     for batch in batches:
         share = len(batch) * batch[0].seconds / total
-        tick = functools.partial(_report, on_progress, done, share)
-        runs += _run_batch(label, controller, setup, batch, repeats, seed, tick)
+
+        def on_tick(tick: int, ticks: int, done: float = done, share: float = share) -> None:
+            on_progress(done + share * tick / ticks)
+
+        runs += _run_batch(label, controller, setup, batch, repeats, seed, on_tick)
         done += share
     order = {trial.name: i for i, trial in enumerate(trials)}
     return sorted(runs, key=lambda run: (order[run.trial.name], run.repeat))
-
-
-def _report(on_progress: Progress, done: float, share: float, tick: int, ticks: int) -> None:
-    on_progress(done + share * tick / ticks)
 
 
 def _run_batch(

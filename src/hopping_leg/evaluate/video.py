@@ -64,7 +64,7 @@ def render_video(robot: Robot, traces: Mapping[float, Trace], kind: Animation = 
     Args:
         robot: The leg.
         traces: Command in m to a run at it.
-        kind: Of the file.
+        kind: Kind of file.
     """
     commands = list(traces)
     poses = np.stack([clip(trace) for trace in traces.values()])

@@ -87,7 +87,7 @@ def draw_phase_space(trace: Trace, title: str = "") -> Figure:
     Args:
         trace: A run at a constant command; 10 s after the start are drawn, or what there is of
             a shorter one.
-        title: Of the figure.
+        title: Title of the figure.
     """
     time = trace.column("time_s")
     chosen = (time >= START_SECONDS) & (time < START_SECONDS + SECONDS)
@@ -152,7 +152,7 @@ def draw_estimate(trace: Trace, title: str = "") -> Figure:
 
     Args:
         trace: A run whose controller records ``estimated_height_m``.
-        title: Of the figure.
+        title: Title of the figure.
     """
     time, height, estimate = (trace.column(n) for n in ("time_s", "height_m", ESTIMATED_HEIGHT))
     figure = Figure(figsize=(WIDTH, 3.2), layout="constrained")

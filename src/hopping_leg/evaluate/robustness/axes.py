@@ -82,7 +82,7 @@ class Axis:
     """Range in which the axis ``joint`` draws it."""
     alter: Alter
     leaderboard: str = ""
-    """Its name on RealAIGym's robustness leaderboard, if it is there."""
+    """Name on RealAIGym's robustness leaderboard, if it is there."""
 
 
 def _payload(case: Case, share: float) -> Case:

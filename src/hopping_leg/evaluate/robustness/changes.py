@@ -1,6 +1,6 @@
-"""What follows a change in the middle of a run that the controller is not told of.
+"""What follows a change in the middle of a run that the controller does not know of.
 
-Also the answer to a step of the command, of which it is told.
+Also the answer to a step of the command.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,14 +19,14 @@ from hopping_leg.sim.perturbation import Perturbation
 from hopping_leg.trace import Trace
 
 SECONDS, AT = 12.0, 5.0
-"""Of each run, and when it changes, s."""
+"""Duration of each run, and when it changes, s."""
 
 RUNS = 7
 """Runs of a change and command per seed of the suite: with few of them, noise decides on which side
 of the bound a median falls."""
 
 HOPS = 5
-"""Hops that are told one by one."""
+"""Hops after a change that have a row of their own."""
 
 BACK = 0.01
 """Distance from command or steady state at which a controller is back, m."""
@@ -107,10 +107,10 @@ def study_changes(
     )
     traces = [record.trace(leg) for leg in range(len(legs))]
     groups = [traces[k * repeats : (k + 1) * repeats] for k in range(len(runs))]
-    told = list(zip(runs, groups, strict=True))
+    pairs = list(zip(runs, groups, strict=True))
     return {
-        "recovery": [_recovery(run, group, change) for run, group in told if run.change],
-        "steps": [_step(run, group, change) for run, group in told if not run.change],
+        "recovery": [_recovery(run, group, change) for run, group in pairs if run.change],
+        "steps": [_step(run, group, change) for run, group in pairs if not run.change],
     }
 
 

@@ -97,7 +97,7 @@ def share(axes: Sequence[Sequence[Array]], seed: int) -> tuple[float, float, flo
 
     Args:
         axes: Per axis and level: 1 for every successful trial, 0 for the others, (trials,).
-        seed: Of the bootstrap.
+        seed: Seed of the bootstrap.
 
     Returns:
         The share, and its 95 % bootstrap interval, in which trials are resampled within their
@@ -124,7 +124,7 @@ def by_level(outcomes: Sequence[Outcome]) -> dict[float, list[Outcome]]:
 
 
 def level_rows(controller: str, axis: str, outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
-    """Return what is told of each level of an axis, by rising level."""
+    """Return the results of each level of an axis, by rising level."""
     return [
         {
             "controller": controller,
@@ -148,7 +148,7 @@ def score_rows(
     Args:
         controller: As named on the command line.
         outcomes: Trials by axis.
-        seed: Of the bootstrap.
+        seed: Seed of the bootstrap.
     """
     levels = {
         axis: [

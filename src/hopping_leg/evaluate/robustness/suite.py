@@ -54,7 +54,7 @@ class Suite:
     recovery: bool = True
     """Whether changes in the middle of a run are studied, too."""
     seconds: float = SECONDS
-    """Of each trial."""
+    """Duration of each trial, s."""
 
     @property
     def conditions(self) -> dict[str, Any]:
@@ -96,7 +96,7 @@ def make_suite(
         commands: Desired heights, m; the paper's by default, scaled to the leg.
         repeats: Realisations per level and command.
         seed: All randomness follows from it.
-        seconds: Of each trial.
+        seconds: Duration of each trial, s.
 
     Raises:
         UsageError: There is no such axis, or a command is out of reach.

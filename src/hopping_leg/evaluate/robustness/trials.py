@@ -20,16 +20,16 @@ from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.perturbation import Perturbation
 
 SECONDS = 10.0
-"""Of each trial."""
+"""Duration of each trial, s."""
 
 JOINT_POINTS = 4
 """Points of the hypercube per command and seed."""
 
 PUSH_SECONDS = 0.02
-"""Of each push."""
+"""Duration of each push, s."""
 
 GROUND_SECONDS, SWITCH_SECONDS = 1.0, 2.5
-"""Between two steps of the ground, and of the command."""
+"""Time between two steps of the ground, and of the command, s."""
 
 
 @dataclass(frozen=True)
@@ -56,11 +56,11 @@ class AxisTrials:
     """All trials of an axis, run as one batch.
 
     Attributes:
-        axis: Its name.
+        axis: Name of the axis.
         trials: n of them.
         commands: Desired heights, m, (ticks, n).
-        perturbation: What befalls the legs.
-        seed: Of noise and delay.
+        perturbation: What changes and pushes the legs.
+        seed: Seed of noise and delay.
     """
 
     axis: str
@@ -84,14 +84,14 @@ def make_trials(
     """Lay down all trials of an axis.
 
     Args:
-        axis: Its name.
+        axis: Name of the axis.
         robot: What controllers believe.
         commands: Desired apex heights, m.
         repeats: Realisations of each level and command.
         seed: All randomness follows from it.
         rate: Control rate, Hz.
         levels: Instead of the axis' own.
-        seconds: Of each trial.
+        seconds: Duration of each trial, s.
 
     Raises:
         UsageError: There is no such axis.
@@ -175,7 +175,7 @@ class _Events:
 
     Args:
         trial: Whose.
-        seed: Of the suite.
+        seed: Seed of the suite.
         ticks: Control periods of the trial.
         rate: Control rate, Hz.
         within: Lowest and highest command of the suite, m.

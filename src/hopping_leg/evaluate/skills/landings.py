@@ -44,7 +44,7 @@ def rebound(trace: Trace, touchdown: int) -> tuple[float, float]:
     """Return how far a landing bounced.
 
     Args:
-        trace: Of a run that ends at rest.
+        trace: A run that ends at rest.
         touchdown: Tick of the landing.
 
     Returns:
@@ -78,9 +78,9 @@ class Landed:
     drop_m: float
     """Clearance of the foot at the beginning."""
     peak_force: float
-    """Of the ground, weights of the leg."""
+    """Peak force of the ground, weights of the leg."""
     worst_force: float
-    """Its largest value of any run."""
+    """Largest peak force of any run."""
     peak_hip_torque_nm: float
     """Magnitude that the motors gave from touchdown on."""
     peak_knee_torque_nm: float

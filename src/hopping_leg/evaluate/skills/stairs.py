@@ -1,4 +1,4 @@
-"""Hopping on a ground that rises and falls in steps of which no one is told."""
+"""Hopping on a ground that rises and falls in steps that the controller does not know of."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class Stair:
     """Apex minus command of the first hop on it, median over runs; after the start's own settling
     on the first step."""
     median_error_m: float
-    """Of all later hops on it."""
+    """Median apex minus command of all later hops on it."""
     hops: int
     runs: int
 
@@ -44,9 +44,9 @@ class Stairs:
 
     command_m: float
     worst_first_error_m: float
-    """Of all steps, the largest ``first_error_m`` by magnitude."""
+    """Largest ``first_error_m`` of all steps by magnitude."""
     worst_error_m: float
-    """Of all steps, the largest ``median_error_m`` by magnitude."""
+    """Largest ``median_error_m`` of all steps by magnitude."""
     skipped_hops: int
     body_contacts: int
     runs: int
@@ -135,7 +135,7 @@ def _errors(trace: Trace, steps: range, rise: float) -> Array:
     Args:
         trace: Whose ground moves in flight, once the foot is clear.
         steps: Ticks in which the ground is asked to be that of the step.
-        rise: Of the ground at the beginning of the step, m.
+        rise: Rise of the ground at the beginning of the step, m.
     """
     height, rate = trace.column("height_m"), trace.column("height_rate_m_s")
     hops = trace_hops(trace)
