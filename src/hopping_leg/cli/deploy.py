@@ -20,7 +20,6 @@ import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import tyro
 from rich.console import Console
@@ -39,6 +38,7 @@ from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.hardware_trials import Performance, header_of, new_path, perform
 from hopping_leg.deploy.height_page import HeightPage
 from hopping_leg.deploy.keyboard import LiveHeight, keys
+from hopping_leg.deploy.loop import ControlLoop
 from hopping_leg.deploy.motion_sequence import MotionSequence, SequenceTiming, hopping_poses
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.stop_reasons import Reason
@@ -48,9 +48,6 @@ from hopping_leg.robot import load_robot
 from hopping_leg.robot.limits import SoftLimiter, SoftLimits
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import CONTROL_RATE
-
-if TYPE_CHECKING:
-    from hopping_leg.deploy.loop import ControlLoop
 
 _WILLED = (Reason.FINISHED, Reason.OPERATOR_STOP)
 _SECONDS = 10.0
@@ -161,7 +158,7 @@ def _perform(args: Deploy, robot: Robot, plan: Plan) -> Performance:
     limits, console = hopping_limits(robot, plan.rate), Console()
 
     @contextlib.contextmanager
-    def beside(loop: "ControlLoop") -> Iterator[None]:
+    def beside(loop: ControlLoop) -> Iterator[None]:
         with contextlib.ExitStack() as operator:
             operator.enter_context(keys(height, loop.stop, console.print))
             if page is not None:

@@ -8,8 +8,6 @@ from hopping_leg.deploy.drive_link import Reply
 REMEMBERED = 16
 """Ticks; older samples are forgotten."""
 
-_Sample = list[Reply | None]
-
 
 class SampleBuffer:
     """The recent past of both joints.
@@ -24,17 +22,12 @@ class SampleBuffer:
 
     def __init__(self, period: float) -> None:
         self._period = period
-        self._ticks: dict[int, _Sample] = {}
+        self._ticks: dict[int, list[Reply | None]] = {}
         self._commands: dict[int, float] = {}
 
     def put(self, tick: int, joint: int, reply: Reply) -> None:
-        """Take in a reply to a tick's question."""
-        if tick in self._ticks:
-            self._ticks[tick][joint] = reply
-            return
-        sample: _Sample = [None, None]
-        sample[joint] = reply
-        self._ticks[tick] = sample
+        """Record a reply to a tick's question."""
+        self._ticks.setdefault(tick, [None, None])[joint] = reply
         for old in [t for t in self._ticks if t <= tick - REMEMBERED]:
             del self._ticks[old]
             self._commands.pop(old, None)
