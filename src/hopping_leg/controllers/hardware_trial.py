@@ -1,6 +1,6 @@
-"""How a robot is reached that nothing is known of but what it measures: one outing at a time.
+"""Trials of a robot of which nothing is known but what it measures.
 
-On an outing a controller hops for a limited time through a schedule of heights, and what comes back
+In a trial a controller hops for a limited time through a schedule of heights, and what comes back
 is a trace. The simulated twin and the drives behind a wire are both reached like this.
 """
 
@@ -36,20 +36,20 @@ class HardwareTrial:
 
 
 class TrialRobot(Protocol):
-    """A robot that can be sent on outings."""
+    """A robot on which controllers can be tried."""
 
     @property
     def name(self) -> str:
-        """Of the robot."""
+        """Name of the robot."""
         ...
 
     def hop(self, controller: Controller, schedule: CommandSchedule, seed: int) -> HardwareTrial:
         """Let a controller hop from standing.
 
         Args:
-            controller: Has the leg.
+            controller: Drives the leg.
             schedule: Heights in order.
-            seed: Of the outing's own randomness, where there is any to choose.
+            seed: Seed of the trial's own randomness, where there is any to choose.
         """
         ...
 
@@ -60,11 +60,11 @@ MEASURED = {
     "torque": ("hip_torque_nm", "knee_torque_nm"),
     "asked": ("hip_command_nm", "knee_command_nm"),
 }
-"""What a trace of an outing holds of both joints, to its columns."""
+"""Quantities of both joints to their columns in the trace of a trial."""
 
 
 def measured_table(time: Array, command: Array, joints: dict[str, Array]) -> pl.DataFrame:
-    """Return an outing's table.
+    """Return the table of a trial.
 
     Args:
         time: s, (ticks,).

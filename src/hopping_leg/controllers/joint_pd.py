@@ -29,9 +29,9 @@ class JointGains:
     """
 
     stiffness: tuple[float, float] = (20.0, 12.0)
-    """N m/rad."""
+    """Torque per position error, N m/rad."""
     damping: tuple[float, float] = (0.3, 0.15)
-    """N m s/rad."""
+    """Torque per velocity error, N m s/rad."""
 
     def __post_init__(self) -> None:
         for name in ("stiffness", "damping"):
@@ -46,7 +46,7 @@ class JointPD:
     Args:
         position: Joint positions at each control period, rad, (ticks, 2).
         velocity: Joint velocities there, rad/s, (ticks, 2); None sets them to zero, as the paper.
-        gains: Of the PD.
+        gains: Stiffness and damping.
 
     Raises:
         UsageError: The trajectory is empty or of another shape.

@@ -4,7 +4,8 @@ A policy's metadata names its layout; the arrays are raw, in SI units. Normalisa
 policy's graph, so that a policy file needs nothing but encoders and a command.
 """
 
-from typing import Any, ClassVar, Protocol
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -18,10 +19,13 @@ Inputs = dict[str, npt.NDArray[np.float32]]
 """Graph input to its array, (n, ...)."""
 
 
-class ObservationHistory(Protocol):
+class ObservationHistory(ABC):
     """Turns measurements into a policy's inputs; may remember past ticks.
 
     One of your own needs a class and an entry in ``OBSERVATION_HISTORIES``.
+
+    Args:
+        period: Control period, s.
     """
 
     name: ClassVar[str]
@@ -30,40 +34,37 @@ class ObservationHistory(Protocol):
     """Graph inputs, in the order in which the network sees them, without the leading n."""
 
     def __init__(self, period: float) -> None:
-        """Take the control period, s."""
-        ...
+        self.period = period
 
-    def reset(self, count: int) -> None:
+    def reset(self, count: int) -> None:  # noqa: B027
         """Forget the past of all legs; the next measurement has ``count`` rows."""
-        ...
 
+    @abstractmethod
     def restart(self, rows: IntArray, measurement: Measurement) -> None:
         """Forget the past of some legs within a tick: they begin with this measurement."""
-        ...
 
+    @abstractmethod
     def update(self, measurement: Measurement, last_torque: Array) -> None:
-        """Take in what a tick brings.
+        """Update with the measurement of a tick.
 
         Args:
-            measurement: Of this tick.
+            measurement: Measurement of this tick.
             last_torque: What the policy asked for one tick ago, N m, (n, 2); zero after a reset.
         """
-        ...
 
+    @abstractmethod
     def inputs(self) -> Inputs:
         """Return the graph's inputs at this tick."""
-        ...
 
     def state(self) -> dict[str, Any]:
         """Return what is remembered from tick to tick, as arrays."""
-        ...
+        return {}
 
-    def restore(self, state: dict[str, Any]) -> None:
+    def restore(self, state: dict[str, Any]) -> None:  # noqa: B027
         """Go on from a ``state``."""
-        ...
 
 
-class ThreeSamples:
+class ThreeSamples(ObservationHistory):
     """The paper's observation: position, velocity and command at three ticks, newest first.
 
     q and qd are (n, 3, 2) in rad and rad/s, command is (n, 3) in m.
@@ -75,12 +76,6 @@ class ThreeSamples:
         "qd": (SAMPLES, 2),
         "command": (SAMPLES,),
     }
-
-    def __init__(self, period: float) -> None:
-        pass
-
-    def reset(self, count: int) -> None:
-        """Do nothing: the measurement holds all three samples."""
 
     def restart(self, rows: IntArray, measurement: Measurement) -> None:
         """Take this tick's measurement."""
@@ -99,13 +94,6 @@ class ThreeSamples:
             "command": m.command.astype(np.float32),
         }
 
-    def state(self) -> dict[str, Any]:
-        """Return nothing: the measurement holds all."""
-        return {}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Do nothing."""
-
 
 def _dated_shapes(
     lags: tuple[int, ...], torque_lags: tuple[int, ...]
@@ -119,7 +107,7 @@ def _dated_shapes(
     }
 
 
-class Dated:
+class Dated(ObservationHistory):
     """Samples at fixed times before now, however late they came, and the policy's own torques.
 
     A late sample is put where it belongs; a tick whose sample has not arrived shows the one before.
@@ -136,6 +124,7 @@ class Dated:
     shapes: ClassVar[dict[str, tuple[int, ...]]] = _dated_shapes(LAGS, TORQUE_LAGS)
 
     def __init__(self, period: float) -> None:
+        super().__init__(period)
         self._track = SampleHistory(max(*self.LAGS, DELAY_DEPTH) + 1, period)
         self._lags, self._torque_lags = list(self.LAGS), list(self.TORQUE_LAGS)
         self.reset(0)

@@ -62,7 +62,7 @@ class Card:
     steps: int = 0
     """Control steps of experience."""
     versions: dict[str, str] = field(default_factory=dict)
-    """Of the libraries that trained it."""
+    """Versions of the libraries that trained it."""
 
     def to_json(self) -> str:
         """Return the card as stored in the file."""
@@ -179,7 +179,7 @@ class Policy:
 
         Args:
             robot: The leg it shall drive.
-            name: Of the policy, in the sentence.
+            name: Name of the policy in the sentence.
         """
         card = self.card
         if robot.digest == card.robot_digest:

@@ -144,10 +144,10 @@ def rollout(
         controller: Controls all legs at once; a ``PrivilegedController`` is shown them.
         setup: The world it meets.
         commands: Desired height for every tick and leg, m, (ticks, n).
-        seed: Of noise and delay.
+        seed: Seed of noise and delay.
         on_tick: Called with (ticks done, ticks in all), for progress bars.
         on_legs: Called once with the legs, which it may place where they shall start instead.
-        perturbation: What befalls the legs that ``setup`` does not know; recorded heights are above
+        perturbation: Changes of the legs that ``setup`` does not know; recorded heights are above
             the ground of the moment, recorded commands are the controller's.
 
     Raises:
@@ -211,7 +211,7 @@ def _make_legs(setup: RolloutConfig, count: int) -> Simulator:
 
 
 def _perturb(setup: RolloutConfig, perturbation: Perturbation) -> Perturber:
-    """Return what befalls newly made legs, which only MuJoCo's legs can suffer."""
+    """Return newly made legs that are perturbed, which needs MuJoCo."""
     if setup.engine != "mujoco":
         raise UsageError(f"Perturbations need the engine mujoco, not {setup.engine}.")
     legs = MujocoSimulator(
@@ -227,7 +227,7 @@ def _perturb(setup: RolloutConfig, perturbation: Perturbation) -> Perturber:
 
 
 def _check_stable(data: Array, setup: RolloutConfig) -> None:
-    """MuJoCo resets an unstable simulation and goes on, so that only its speed tells."""
+    """MuJoCo resets an unstable simulation and goes on, so that only its speed shows it."""
     speed = np.abs(data[4:6]).max()
     if not speed < _IMPOSSIBLE:
         raise PhysicsError(

@@ -1,6 +1,6 @@
 """Stand, let a hopping controller hop so many times, catch the leg in the air, land, stand again.
 
-A thin layer around any controller, since none was made to stand; it feels the joints alone.
+A thin layer around any controller, since none was made to stand; it measures the joints alone.
 """
 
 from dataclasses import dataclass, fields
@@ -32,7 +32,7 @@ from hopping_leg.sim import CONTROL_RATE
 
 @dataclass(frozen=True)
 class LandingGains:
-    """Of the landing, in units of the leg's weight, length and time (length / gravity)^(1/2).
+    """Gains of the landing, in units of the leg's weight, length and time (length / gravity)^(1/2).
 
     Raises:
         UsageError: A value has no meaning.
@@ -41,9 +41,9 @@ class LandingGains:
     length: float = 0.85
     """Leg length at which the foot waits for the ground; a longer leg has more way to brake."""
     stiffness: float = 3.0
-    """Of the spring."""
+    """Stiffness of the spring."""
     damping: float = 1.5
-    """Of the damper."""
+    """Damping of the damper."""
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -63,7 +63,7 @@ class Landing:
         robot: The leg.
         count: Number of legs n.
         standing: Leg length to end at, m.
-        gains: Of the landing.
+        gains: Gains of the landing.
     """
 
     def __init__(
@@ -142,7 +142,7 @@ _BLIND = 0.9
 
 
 class LiftoffDetector:
-    """Tells when n legs leave the ground.
+    """Detects when n legs leave the ground.
 
     Args:
         robot: The leg.
@@ -214,7 +214,7 @@ class StandHopLand:
         hops: To make, before the leg is caught.
         rate: Control rate, Hz.
         dropped: The legs begin in the air, in ``landing_posture``, and do not hop.
-        landing: Of the landing.
+        landing: Gains of the landing.
 
     Raises:
         UsageError: The number of hops has no meaning.

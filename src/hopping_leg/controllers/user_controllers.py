@@ -95,7 +95,7 @@ class SingleLeg:
 
 
 def _takes_state(leg: object, name: str) -> bool:
-    """Tell which of the two signatures a controller has."""
+    """Return whether a controller takes (x, t) rather than the four measured values."""
     given = list(inspect.signature(getattr(leg, METHOD)).parameters.values())
     needed = [p.name for p in given if p.default is p.empty and p.kind is p.POSITIONAL_OR_KEYWORD]
     names = [p.name for p in given]
@@ -132,7 +132,7 @@ def _torques(answer: Any, name: str) -> Array:  # noqa: ANN401
 T = TypeVar("T")
 
 
-class PlugIn:
+class UserController:
     """Guards a controller of someone else; implements ``Controller``.
 
     Args:
@@ -213,13 +213,13 @@ class PlugIn:
 
 
 def is_user_controller(name: str) -> bool:
-    """Tell whether a name means a Python class (or a Python file whose class was forgotten)."""
+    """Return whether a name means a Python class (or a Python file whose class was forgotten)."""
     source, _, wanted = name.rpartition(":")
     dotted = all(part.isidentifier() for part in source.split("."))
     return name.endswith(".py") or (wanted.isidentifier() and (source.endswith(".py") or dotted))
 
 
-def load_user_controller(name: str, robot: Robot, rate: float) -> PlugIn:
+def load_user_controller(name: str, robot: Robot, rate: float) -> UserController:
     """Make a controller from a Python class.
 
     Args:
@@ -245,8 +245,8 @@ def load_user_controller(name: str, robot: Robot, rate: float) -> PlugIn:
         )
     # Kept results tell controllers apart by class: with the digest in its name, an edited file is
     # judged anew.
-    guard = type(f"{PlugIn.__name__}_{_digest(module)}", (PlugIn,), {})
-    made: PlugIn = guard(controller, name)
+    guard = type(f"{UserController.__name__}_{_digest(module)}", (UserController,), {})
+    made: UserController = guard(controller, name)
     return made
 
 
@@ -305,7 +305,7 @@ def _load_file(path: Path) -> ModuleType:
     except OSError as error:
         raise ControllerError(f"Cannot read {path}: {error.strerror}.") from error
     # A name of its own keeps files of equal names apart; dataclasses look their module up by it.
-    name = f"hopping_leg_plug_in_{hashlib.sha256(content).hexdigest()[:16]}"
+    name = f"hopping_leg_user_file_{hashlib.sha256(content).hexdigest()[:16]}"
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None

@@ -37,8 +37,8 @@ class Camera:
 
     Args:
         legs: The simulations.
-        width: Of the picture, pixels.
-        height: Of the picture, pixels.
+        width: Width of the picture, pixels.
+        height: Height of the picture, pixels.
     """
 
     def __init__(self, legs: MujocoSimulator, width: int = 640, height: int = 480) -> None:

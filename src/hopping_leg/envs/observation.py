@@ -6,8 +6,9 @@ positions run from -1 at the lower to 1 at the upper soft limit, velocities are 
 scale, the command runs from -1 to 1 over its range.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -57,46 +58,43 @@ class Scaling:
     gain: Array
 
 
-class Observation(Protocol):
+class Observation(ABC):
     """Makes the observations of n legs."""
 
     layout: str
-    """Name of the policy layout that gives a trained policy the same inputs."""
+    """Name of the observation history that gives a trained policy the same inputs."""
     size: int
     """Entries of an observation."""
     order: IntArray
-    """Where each of the layout's joined inputs stands in an observation, (size,)."""
+    """Where each of the history's joined inputs stands in an observation, (size,)."""
     scaling: Scaling
-    """Of the layout's joined inputs."""
+    """Scaling of the history's joined inputs."""
 
-    def advance(self, samples: Array, channel: Channel, last_action: Array) -> None:
-        """Take in a new tick.
+    def advance(self, samples: Array, channel: Channel, last_action: Array) -> None:  # noqa: B027
+        """Update with the samples of a new tick.
 
         Args:
             samples: (q1, q2, qd1, qd2, command), newest first, (n, 3, 5).
-            channel: That delivered them in this tick.
+            channel: Channel that delivered them in this tick.
             last_action: Taken one tick ago, zero at the start of an episode, (n, 2).
         """
-        ...
 
-    def restart(self, rows: IntArray, samples: Array, channel: Channel) -> None:
+    def restart(self, rows: IntArray, samples: Array, channel: Channel) -> None:  # noqa: B027
         """Forget the past of some legs, which begin anew within this tick."""
-        ...
 
+    @abstractmethod
     def view(self, samples: Array) -> Array32:
         """Return what is seen in this tick, (n, size)."""
-        ...
 
     def state(self) -> dict[str, Any]:
         """Return what is remembered from tick to tick."""
-        ...
+        return {}
 
-    def restore(self, state: dict[str, Any]) -> None:
+    def restore(self, state: dict[str, Any]) -> None:  # noqa: B027
         """Go on from a ``state``."""
-        ...
 
 
-class PaperObservation:
+class PaperObservation(Observation):
     """The paper's three samples; made straight from the channel's, because it is the fast path."""
 
     layout = ThreeSamples.name
@@ -110,27 +108,14 @@ class PaperObservation:
         shape = (count, SAMPLES, 1)
         self._offset, self._gain = np.tile(sample.offset, shape), np.tile(sample.gain, shape)
 
-    def advance(self, samples: Array, channel: Channel, last_action: Array) -> None:
-        """Do nothing: the samples are all there is."""
-
-    def restart(self, rows: IntArray, samples: Array, channel: Channel) -> None:
-        """Do nothing."""
-
     def view(self, samples: Array) -> Array32:
         """Return the normalised samples, (n, 15)."""
         centred = samples - self._offset
         centred *= self._gain
         return centred.reshape(-1, SIZE).astype(np.float32)
 
-    def state(self) -> dict[str, Any]:
-        """Return nothing."""
-        return {}
 
-    def restore(self, state: dict[str, Any]) -> None:
-        """Do nothing."""
-
-
-class LayoutObservation:
+class HistoryObservation(Observation):
     """The inputs of any policy layout, made by the very code that makes them on the robot."""
 
     def __init__(
@@ -143,7 +128,7 @@ class LayoutObservation:
         layout.reset(count)
 
     def advance(self, samples: Array, channel: Channel, last_action: Array) -> None:
-        """Let the layout take in a new tick."""
+        """Update the layout with a new tick."""
         self._layout.update(channel.measurement(samples), last_action * self._torque)
 
     def restart(self, rows: IntArray, samples: Array, channel: Channel) -> None:
@@ -195,7 +180,7 @@ def make_observation(robot: Robot, options: TaskConfig, count: int) -> Observati
         for name, shape in layout.shapes.items()
     ]
     offset, gain = (np.concatenate(column) for column in zip(*columns, strict=True))
-    return LayoutObservation(layout, Scaling(offset, gain), torque, count)
+    return HistoryObservation(layout, Scaling(offset, gain), torque, count)
 
 
 def privileged_observation(legs: Simulator, command: Array, sample: Scaling, out: Array32) -> None:

@@ -62,7 +62,7 @@ class TaskConfig:
     randomised: tuple[Range, ...] = ()
     """Where each leg draws its own numbers instead of the robot's; none by default."""
     randomize_probability: float = 1.0
-    """That a leg draws one of those numbers rather than has the robot's."""
+    """Probability with which a leg draws each of those numbers rather than has the robot's."""
     randomize_from_start: bool = True
     """Let every leg be the robot itself until ``HoppingTask.randomize``."""
     nominal_fraction: float = 0.0

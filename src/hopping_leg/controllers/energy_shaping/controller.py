@@ -60,7 +60,7 @@ class EnergyShaping:
 
     Attributes:
         truth: What ``watch`` was shown, where an option reads ``"true"``; None for a controller
-            that feels nothing but its joints.
+            that measures nothing but its joints.
     """
 
     def __init__(

@@ -31,9 +31,9 @@ class ShapingGains:
     k0: Gain = 1.0
     """First value of the gain k."""
     k0_slope: Gain = 0.0
-    """1/m."""
+    """Slope of k0, 1/m."""
     exponent: Gain = 2.0
-    """Of the update k_j = k_{j-1} (E_d / E_{j-1})^exponent."""
+    """Exponent of the update k_j = k_{j-1} (E_d / E_{j-1})^exponent."""
     kp_y: Gain = 10.0
     """Sideways stiffness of the foot on the ground, N/m."""
     kd_y: Gain = 3.0
@@ -43,37 +43,37 @@ class ShapingGains:
     push_rate: Gain = 0.83
     """Intended leg rate at lift-off, m/s."""
     push_rate_slope: Gain = 5.2
-    """m/s per m."""
+    """Slope of ``push_rate``, m/s per m."""
     liftoff_length: Gain = 0.245
     """Leg length at which the push ends, m."""
     liftoff_slope: Gain = 0.4
-    """m/m."""
+    """Slope of ``liftoff_length``, m/m."""
     landing_length: Gain = 0.2
     """Leg length in which the foot meets the ground, m."""
     landing_slope: Gain = 0.0
-    """m/m."""
+    """Slope of ``landing_length``, m/m."""
     retract_time: Gain = 0.08
-    """From lift-off to the landing posture, s."""
+    """Time from lift-off to the landing posture, s."""
     hip_stiffness: Gain = 8.8
-    """In flight, N m/rad."""
+    """Stiffness of the hip in flight, N m/rad."""
     hip_damping: Gain = 0.3
-    """In flight, N m s/rad."""
+    """Damping of the hip in flight, N m s/rad."""
     knee_stiffness: Gain = 2.3
-    """In flight, N m/rad."""
+    """Stiffness of the knee in flight, N m/rad."""
     knee_damping: Gain = 0.074
-    """In flight, N m s/rad."""
+    """Damping of the knee in flight, N m s/rad."""
     touchdown_stiffness: Gain = 300.0
-    """Along the leg, N/m."""
+    """Stiffness along the leg, N/m."""
     touchdown_damping: Gain = 60.0
-    """Along the leg, N s/m."""
+    """Damping along the leg, N s/m."""
     touchdown_rate: Gain = -0.39
     """Leg rate, less that of the retraction, that gives the ground away, m/s."""
     touchdown_force: Gain = 1000.0
-    """Or so much force along the leg that the flight PD needs to keep it extended, N."""
+    """Force along the leg that does so too: what the flight PD needs to keep it extended, N."""
     flight_min: Gain = 0.05
     """Contact is not believed earlier than this after lift-off, s."""
     flight_min_slope: Gain = 0.0
-    """s/m."""
+    """Slope of ``flight_min``, s/m."""
     height_offset: Gain = 0.0
     """Added to the estimated apex, m."""
     height_scale: Gain = 1.0

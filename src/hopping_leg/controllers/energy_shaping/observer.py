@@ -48,7 +48,7 @@ class DatedObserver:
         self._past: list[Array] = []
 
     def update(self, measurement: Measurement) -> JointState:
-        """Take in the measurement of this tick and return the state now."""
+        """Update with the measurement of this tick; return the state now."""
         if self._anchor is None:
             self._anchor = measurement.q[:, 0].copy()
         else:

@@ -48,7 +48,7 @@ class Phases:
         self.clock = self.clock + period
 
     def are(self, phase: Phase) -> BoolArray:
-        """Tell which legs are in a phase, (n,)."""
+        """Return which legs are in a phase, (n,)."""
         answer: BoolArray = self.phase == phase
         return answer
 
@@ -80,7 +80,7 @@ class TouchdownDetector:
     ) -> BoolArray:
         """Return which legs meet the ground, (n,).
 
-        A soft leg gives way, a stiff one resists: either tells.
+        A soft leg gives way, a stiff one resists: either shows it.
 
         Args:
             excess: Leg rate less the planned one, m/s, (n,).

@@ -49,8 +49,8 @@ class CommandScore:
 
     Attributes:
         command: Desired apex, m.
-        median: Of all apexes, m; NaN without hops.
-        std: Of all apexes, m.
+        median: Median of all apexes, m; NaN without hops.
+        std: Standard deviation of all apexes, m.
         rate: Hops per second.
         flight: Share of the time with the foot off the ground.
         knee_clearance: Least gap between knee and ground, m.
@@ -247,7 +247,7 @@ def search(
         start: Where to begin.
         setup: The world to hop in.
         options: How long.
-        seed: Of the search; noise and delay take seeds 0 to 8 in turn.
+        seed: Seed of the search; noise and delay take seeds 0 to 8 in turn.
         log: One JSON line per generation; an interrupted search goes on from it.
         report: Called with (generations done, lowest cost so far).
     """
@@ -289,7 +289,7 @@ class Tuned:
         after: Scores of the find.
         generations: How long the search was.
         flight: Share of the time in the air that was asked for.
-        seed: Of the search.
+        seed: Seed of the search.
     """
 
     gains: ShapingGains
@@ -329,7 +329,7 @@ def tune(
         robot_name: As the gain file shall name it.
         start: Shipped name or path of the gains to begin from.
         options: How long.
-        seed: Of the search.
+        seed: Seed of the search.
         out: Folder for the log and the gains.
         report: Called with (generations done, lowest cost so far).
     """

@@ -102,7 +102,7 @@ def retraction(start: Array, end: Array, elapsed: Array, duration: Gain) -> tupl
         start: Joint positions at lift-off, rad, (n, 2).
         end: Landing posture, rad, (n, 2).
         elapsed: Time since lift-off, s, (n,).
-        duration: Of the movement, s.
+        duration: Duration of the movement, s.
     """
     lasts = np.broadcast_to(duration, elapsed.shape)[:, None]
     share = elapsed[:, None] / lasts
