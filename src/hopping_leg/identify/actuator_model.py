@@ -93,7 +93,7 @@ def model_field(model: mujoco.MjModel, name: str) -> np.ndarray:
 
 def drive_values(hypotheses: Sequence[LegHypothesis], name: str) -> Array:
     """Return an attribute of both drives, (hypotheses, 2)."""
-    return np.array([[getattr(c.drive.hip, name), getattr(c.drive.knee, name)] for c in hypotheses])
+    return np.array([[getattr(h.drive.hip, name), getattr(h.drive.knee, name)] for h in hypotheses])
 
 
 def recorded_gains(recording: Recording, name: str) -> Array:
@@ -122,7 +122,7 @@ class MotorBounds:
     def __init__(
         self, hypotheses: Sequence[LegHypothesis], recordings: Sequence[Recording]
     ) -> None:
-        robots = [c.robot for c in hypotheses]
+        robots = [h.robot for h in hypotheses]
         belt = np.array([r.of_joints("belt_ratio") for r in robots])
         peak = np.array([[j.motor.peak_torque for j in (r.hip, r.knee)] for r in robots]) * belt
         speed = np.array([r.of_joints("no_load_speed") for r in robots])

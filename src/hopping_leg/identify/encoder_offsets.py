@@ -113,5 +113,5 @@ def find_offsets(
         hypotheses: Each finds its own offsets.
     """
     return np.array(
-        [[np.zeros(2) if f is None else f.find(c) for f in finders] for c in hypotheses]
+        [[np.zeros(2) if f is None else f.find(h) for f in finders] for h in hypotheses]
     ).reshape(len(hypotheses), len(finders), 2)

@@ -145,8 +145,8 @@ class WindowGroup:
         """Return the batch with each simulation's model and initial state set."""
         metadata, windows = self._metadata, len(self._begin)
         models = [
-            build_rig_model(c.robot, metadata.rig, self._timestep, metadata.effective_gravity)
-            for c in hypotheses
+            build_rig_model(h.robot, metadata.rig, self._timestep, metadata.effective_gravity)
+            for h in hypotheses
         ]
         count = len(hypotheses) * windows
         if count not in self._batches:
@@ -160,10 +160,10 @@ class WindowGroup:
         q[:, -2:] = (self._q0 - offsets).reshape(-1, 2)
         qd[:, -2:] = np.tile(self._qd0, (len(hypotheses), 1))
         if metadata.rig != "fixed-base":
-            standing = [kinematics.stance_height(c.robot, self._q0) for c in hypotheses]
+            standing = [kinematics.stance_height(h.robot, self._q0) for h in hypotheses]
             height = np.where(np.isnan(self._height0), np.stack(standing), self._height0)
             q[:, 0] = height.ravel()
-            qd[:, 0] = np.concatenate([self._base_rate(c.robot) for c in hypotheses])
+            qd[:, 0] = np.concatenate([self._base_rate(h.robot) for h in hypotheses])
         return simulation
 
     def _base_rate(self, robot: Robot) -> Array:
@@ -197,11 +197,11 @@ class WindowGroup:
         friction = simulation.expand("dof_frictionloss")[:, -2:]
         still = friction.copy()
         bounds = MotorBounds(hypotheses, self._recordings)
-        gain = np.repeat([c.robot.of_joints("torque_gain") for c in hypotheses], windows, axis=0)
-        load = np.repeat([c.robot.of_joints("load_friction") for c in hypotheses], windows, axis=0)
-        delay = np.repeat([c.drive.delay for c in hypotheses], windows)
+        gain = np.repeat([h.robot.of_joints("torque_gain") for h in hypotheses], windows, axis=0)
+        load = np.repeat([h.robot.of_joints("load_friction") for h in hypotheses], windows, axis=0)
+        delay = np.repeat([h.drive.delay for h in hypotheses], windows)
         line = DelayLine(delay / self._tick)
-        window = np.repeat([c.drive.velocity_window for c in hypotheses], windows)
+        window = np.repeat([h.drive.velocity_window for h in hypotheses], windows)
         lagging = (window > 0)[:, None]
         windowed = bool(lagging.any()) and not self._zoh
         seen = VelocityWindow(window, self._tick, q, qd)
@@ -251,7 +251,7 @@ class WindowGroup:
         ticks = np.arange(tick, min(tick + _BLOCK, self._rows.ticks))[:, None, None] * self._tick
         late = np.zeros(number) if self._zoh else delay[::windows]
         late = late[:1] if (late == late[0]).all() else late
-        ramp = np.array([[c.drive.ramp] for c in hypotheses])
+        ramp = np.array([[h.drive.ramp] for h in hypotheses])
         commands = np.empty((len(ticks), number, windows, 6))
         gains = np.empty((len(ticks), 3, number, windows, 2))
         fitted = np.array(
