@@ -23,7 +23,7 @@ def test_every_result_is_made_by_a_command_of_the_study(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_commands_are_verbs_or_studies_and_figures_are_theirs(name):
+def test_commands_are_verbs_or_studies_and_a_page_tells_what_came_out(name):
     for command in results(name):
         words = shlex.split(command)
         if words[0] == "hop":
@@ -33,6 +33,7 @@ def test_commands_are_verbs_or_studies_and_figures_are_theirs(name):
             assert words[2].removeprefix("studies.") in NAMES
         else:
             assert words[0] == "cp"
+    assert (ROOT / "studies" / name / "README.md").is_file()
 
 
 def test_results_are_small():
