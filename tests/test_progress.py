@@ -5,7 +5,7 @@ import pytest
 
 from hopping_leg.progress import LiveProgress, minutes
 from hopping_leg.rl.train import TrainingProgress
-from hopping_leg.sim_to_real.board import Board
+from hopping_leg.sim_to_real.jobs import Board
 
 
 def test_without_a_terminal_there_is_a_line_at_most_once_a_minute(capsys, monkeypatch):

@@ -16,7 +16,7 @@ from hopping_leg.robot.model_mismatch import (
     ModelMismatch,
 )
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim_to_real.hopping import Hop
+from hopping_leg.sim_to_real.stages import HopOnTwin
 
 Without = Callable[[ModelMismatch], ModelMismatch]
 
@@ -52,7 +52,7 @@ EFFECTS: dict[str, Without] = {
 
 
 @dataclass(frozen=True)
-class HopWithout(Hop):
+class HopWithout(HopOnTwin):
     """A policy tried on a twin that lacks one effect."""
 
     effect: str
@@ -74,7 +74,7 @@ class HopWithout(Hop):
         return f"-without-{self.effect}"
 
 
-def effect_rows(hops: Sequence[Hop], without: Sequence[HopWithout]) -> list[dict[str, Any]]:
+def effect_rows(hops: Sequence[HopOnTwin], without: Sequence[HopWithout]) -> list[dict[str, Any]]:
     """Return the errors with every effect and with each taken away, one row each.
 
     Args:
@@ -87,7 +87,7 @@ def effect_rows(hops: Sequence[Hop], without: Sequence[HopWithout]) -> list[dict
     return [_row(kind, jobs) for kind, jobs in kinds.items()]
 
 
-def _row(kind: str, jobs: Sequence[Hop]) -> dict[str, Any]:
+def _row(kind: str, jobs: Sequence[HopOnTwin]) -> dict[str, Any]:
     rows = [row for job in jobs for row in job.rows()]
     twins = dict.fromkeys(row["twin"] for row in rows)
     errors = [np.array([r["median_abs_error_m"] for r in rows if r["twin"] == t]) for t in twins]

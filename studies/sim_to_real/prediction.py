@@ -14,8 +14,8 @@ import numpy as np
 from hopping_leg.controllers.registry import load_policy
 from hopping_leg.evaluate.statistics import median_interval
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim_to_real.hopping import Tried
 from hopping_leg.sim_to_real.methods import Method
+from hopping_leg.sim_to_real.stages import HopTrial
 
 POLICY = "fast"
 """It corrects itself least, so that its apexes tell most of the leg, and hops on all of them."""
@@ -25,7 +25,7 @@ _SEED = 0
 
 
 @dataclass(frozen=True)
-class Meet(Tried):
+class Meet(HopTrial):
     """The shipped policy on a twin."""
 
     @property

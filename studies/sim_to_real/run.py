@@ -4,9 +4,16 @@ from typing import Any
 
 from hopping_leg.errors import UsageError
 from hopping_leg.sim_to_real.methods import FORETOLD
-from hopping_leg.sim_to_real.run import fits, hops, records, transfer, work_through
 from hopping_leg.sim_to_real.study import Study
-from hopping_leg.sim_to_real.tables import about, fit_row
+from hopping_leg.sim_to_real.transfer import (
+    about,
+    fit_row,
+    fits,
+    hops,
+    records,
+    transfer,
+    work_through,
+)
 from studies.sim_to_real.effects import EFFECTS, HopWithout, effect_rows
 from studies.sim_to_real.prediction import POLICY, Foretell, Meet, prediction_rows
 

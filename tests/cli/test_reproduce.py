@@ -11,7 +11,7 @@ from hopping_leg.cli.reproduce import NOTHING_MEANT
 
 pytest.importorskip("torch")
 from hopping_leg.rl.recipes.fast import FAST
-from hopping_leg.sim_to_real import run as transfer_run
+from hopping_leg.sim_to_real import transfer as transfer_run
 
 NUMBERS = {"rows": [], "methods": [], "comparison": []}
 

@@ -86,7 +86,7 @@ def run(args: Reproduce) -> None:
     """Record, identify, train, evaluate, transfer, report."""
     start = time.monotonic()
     _check(args)
-    from hopping_leg.sim_to_real.run import transfer
+    from hopping_leg.sim_to_real.transfer import transfer
 
     study = make_study(args)
     write_atomically(args.folder / _MARK, f"{args.size}\n".encode())

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from hopping_leg.sim_to_real import tables
+from hopping_leg.sim_to_real import transfer
 from hopping_leg.sim_to_real.methods import METHODS
-from hopping_leg.sim_to_real.ratio import compare
+from hopping_leg.sim_to_real.transfer import compare
 from tests.sim_to_real.studies import study
 
 
@@ -33,7 +33,7 @@ ERRORS = {
 
 def test_rows_are_medians_over_twins_with_intervals_around_them():
     rows = [r for r in trials(ERRORS) if r["method"] == "identified" and r["command_m"] == 0.35]
-    row = tables._pooled(METHODS["identified"], rows)
+    row = transfer._pooled(METHODS["identified"], rows)
     assert row["median_abs_error_m"] == pytest.approx(0.03)
     assert row["median_error_m"] == pytest.approx(0.03)
     assert row["worst_abs_error_m"] == pytest.approx(0.04)
@@ -53,10 +53,10 @@ def test_order_is_of_the_apexes_and_a_leg_that_stands_has_none(tmp_path):
     one = study(tmp_path, ("identified",), commands=(0.25, 0.35))
     method = one.methods[0]
     rows = trials({"identified": {"a": (0.0, -0.099), "b": (0.06, -0.05), "c": (0.0, 0.0)}})
-    assert tables._whole(method, rows, one)["ordered"] == 2
+    assert transfer._whole(method, rows, one)["ordered"] == 2
     for row in rows[-2:]:
         row["motionless"] = True
-    assert tables._whole(method, rows, one)["ordered"] == 1
+    assert transfer._whole(method, rows, one)["ordered"] == 1
 
 
 def test_of_several_trainings_the_better_one_is_chosen_in_its_own_simulation_alone(tmp_path):
@@ -73,8 +73,8 @@ def test_of_several_trainings_the_better_one_is_chosen_in_its_own_simulation_alo
                 (folder / "result.json").write_text(json.dumps(selected))
                 errors = {method.name: {twin.name: bad if seed == best else good}}
                 rows += [{**row, "seed": seed} for row in trials(errors)]
-    (found,) = tables._best_in_own_simulation(rows, one).values()
+    (found,) = transfer._best_in_own_simulation(rows, one).values()
     assert [row["policies"] for row in found["methods"]] == [2, 2]
     assert [row["worst_abs_error_m"] for row in found["methods"]] == [0.1, 0.1]
     assert found["comparison"][0]["ratio"] == pytest.approx(1.0)
-    assert tables._best_in_own_simulation(rows, study(tmp_path)) == {}
+    assert transfer._best_in_own_simulation(rows, study(tmp_path)) == {}

@@ -4,20 +4,20 @@ import dataclasses
 import os
 import time
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 
-from hopping_leg.sim_to_real.board import Board
-from hopping_leg.sim_to_real.work import work
+from hopping_leg.sim_to_real.jobs import Board, Job, work
 
 
 @dataclasses.dataclass(frozen=True)
-class Note:
+class Note(Job):
     """A job that writes down which process did it."""
 
     file: Path
     seconds: float = 0.0
-    weight = 1.0
+    weight: ClassVar[float] = 1.0
 
     @property
     def name(self):
@@ -30,9 +30,6 @@ class Note:
     def run(self, *, quiet):
         time.sleep(self.seconds)
         self.file.write_text(str(os.getpid()))
-
-    def progress(self):
-        return 0.5, ""
 
 
 @pytest.mark.parametrize("at_once", [1, 2])

@@ -1,25 +1,80 @@
-"""A study's numbers: per method over twins and seeds, with intervals; nothing is left out.
-
-Twins are drawn from a population and seeds of one twin share it, so that the bootstrap resamples
-whole twins. The paper reports its offset with the other sign, command minus actual.
-"""
+"""A sim-to-real study and its numbers: per method over twins and seeds, with intervals."""
 
 import itertools
 import json
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 
-from hopping_leg.arrays import Array
+from hopping_leg.arrays import Array, IntArray
 from hopping_leg.evaluate.runner import software_versions
-from hopping_leg.evaluate.statistics import median_interval
-from hopping_leg.sim_to_real.fitting import Identify
-from hopping_leg.sim_to_real.hopping import FIRST_SEED, Hop, disturbance_of
+from hopping_leg.evaluate.statistics import bootstrap, median_interval
+from hopping_leg.sim_to_real.jobs import Board, Job, work
 from hopping_leg.sim_to_real.methods import Method
-from hopping_leg.sim_to_real.ratio import compare
-from hopping_leg.sim_to_real.study import Study
-from hopping_leg.sim_to_real.training import Train
+from hopping_leg.sim_to_real.stages import (
+    FIRST_SEED,
+    HopOnTwin,
+    IdentifyTwin,
+    RecordTwin,
+    TrainPolicy,
+    disturbance_of,
+)
+from hopping_leg.sim_to_real.study import Study, TwinFile
+
+J = TypeVar("J", bound=Job)
+
+
+def transfer(study: Study, at_once: int = 1) -> dict[str, Any]:
+    """Run a study, or what is left of it, and return its numbers.
+
+    Args:
+        study: What is compared on which twins.
+        at_once: Jobs that run at the same time, each in a process of its own.
+
+    Raises:
+        UsageError: The folder holds results of other options, or there is no such recipe.
+    """
+    for training in trainings(study):
+        training.recipe()
+    work_through((records(study), fits(study), trainings(study), hops(study)), at_once)
+    return tabulate(study, fits(study), trainings(study), hops(study))
+
+
+def work_through(stages: Sequence[Sequence[Job]], at_once: int) -> None:
+    """Do what is not done of some stages, one stage after the other."""
+    total = sum(job.weight for stage in stages for job in stage)
+    with Board(total, own_bars=at_once == 1) as board:
+        for stage in stages:
+            work(stage, at_once, board)
+
+
+def records(study: Study) -> list[RecordTwin]:
+    """Return the recordings that the methods need."""
+    rigs = {rig for method in study.methods if method.fit for rig in method.fit.rigs}
+    return [RecordTwin(study, twin, rig) for twin in study.twins for rig in sorted(rigs)]
+
+
+def fits(study: Study) -> list[IdentifyTwin]:
+    """Return all identifications, those of the first method first; several may share one."""
+    every = (IdentifyTwin(study, t, m) for m in study.methods if m.fit for t in study.twins)
+    return list({study.fitted(fit.twin, fit.method): fit for fit in every}.values())
+
+
+def trainings(study: Study) -> list[TrainPolicy]:
+    """Return all trainings; several twins may share one."""
+    every = (TrainPolicy(study, t, m, s) for s, m, t in _all(study))
+    return list({train.path: train for train in every}.values())
+
+
+def hops(study: Study) -> list[HopOnTwin]:
+    """Return all trials."""
+    return [HopOnTwin(study, t, m, s) for s, m, t in _all(study)]
+
+
+def _all(study: Study) -> Iterable[tuple[int, Method, TwinFile]]:
+    return ((s, m, t) for s in study.seeds for m in study.methods for t in study.twins)
+
 
 Row = dict[str, Any]
 
@@ -28,7 +83,10 @@ _SEED = 0
 
 
 def tabulate(
-    study: Study, fits: Sequence[Identify], trainings: Sequence[Train], hops: Sequence[Hop]
+    study: Study,
+    fits: Sequence[IdentifyTwin],
+    trainings: Sequence[TrainPolicy],
+    hops: Sequence[HopOnTwin],
 ) -> dict[str, Any]:
     """Return everything that was measured, as JSON values.
 
@@ -79,7 +137,7 @@ def _best_in_own_simulation(trials: Sequence[Row], study: Study) -> Row:
         return {}
     best = {}
     for method, twin in itertools.product(study.methods, study.twins):
-        runs = [Train(study, twin, method, seed) for seed in study.seeds]
+        runs = [TrainPolicy(study, twin, method, seed) for seed in study.seeds]
         best[method.name, twin.name] = min(runs, key=lambda run: run.own_score).seed
     chosen = [row for row in trials if row["seed"] == best[row["method"], row["twin"]]]
     return {"best_in_own_simulation": _overall(chosen, study)}
@@ -171,7 +229,7 @@ def _ordered(run: Sequence[Row]) -> bool:
     return moves and all(low < high for low, high in itertools.pairwise(apexes))
 
 
-def fit_row(fit: Identify) -> Row:
+def fit_row(fit: IdentifyTwin) -> Row:
     """Return how well a fit went: errors on data it has not seen, and its parameters."""
     file = fit.study.fitted(fit.twin, fit.method).with_suffix(".json")
     found = json.loads(file.read_text(encoding="utf-8"))
@@ -191,7 +249,7 @@ def fit_row(fit: Identify) -> Row:
     }  # fmt: skip
 
 
-def _training(training: Train) -> Row:
+def _training(training: TrainPolicy) -> Row:
     """Return how a policy hops in the simulation that it was trained in."""
     result = training.result
     errors = [trial["median_error_m"] for trial in result["selected"]["trials"]]
@@ -205,3 +263,58 @@ def _training(training: Train) -> Row:
         else None,
         "own_simulation_score_m": training.own_score,
     }
+
+
+def compare(first: str, other: str, trials: Sequence[dict[str, Any]], seed: int) -> dict[str, Any]:
+    """Return the ratio of two methods' errors, overall and at the command where it is smallest.
+
+    Args:
+        first: Name of the method that the other is compared with.
+        other: Its name.
+        trials: One row per method, twin, seed and command.
+        seed: Of the bootstrap.
+
+    Returns:
+        Medians over all twins, seeds and commands; the interval resamples whole twins, so that both
+        methods keep meeting the same ones.
+    """
+    twins = list(dict.fromkeys(row["twin"] for row in trials))
+    errors = {
+        method: [
+            np.array([
+                row["median_abs_error_m"]
+                for row in trials
+                if row["method"] == method and row["twin"] == twin
+            ])
+            for twin in twins
+        ]
+        for method in (first, other)
+    }  # fmt: skip
+
+    def ratio(index: IntArray) -> float:
+        above, below = (
+            np.median(np.concatenate([errors[method][int(i)] for i in index]))
+            for method in (other, first)
+        )
+        return float(above / below)
+
+    low = high = whole = ratio(np.arange(len(twins)))
+    if len(twins) > 1:
+        low, high = bootstrap((np.arange(len(twins)),), ratio, seed)
+    return {
+        "method": other,
+        "over": first,
+        "ratio": whole,
+        "ratio_low": low,
+        "ratio_high": high,
+        "least_ratio_of_a_command": min(
+            _at(trials, other, c) / _at(trials, first, c)
+            for c in dict.fromkeys(row["command_m"] for row in trials)
+        ),
+    }
+
+
+def _at(trials: Sequence[dict[str, Any]], method: str, command: float) -> float:
+    """Return the median error of a method at a command, m."""
+    rows = [row for row in trials if (row["method"], row["command_m"]) == (method, command)]
+    return float(np.median([row["median_abs_error_m"] for row in rows]))

@@ -1,0 +1,467 @@
+"""Stages of a sim-to-real study: record the twin, identify it, train on that, hop on it.
+
+A twin brings latency, noise and losses of its own; the paper's disturbance stays off there, as it
+would come on top. A twin without [reality] is met with the paper's disturbance.
+"""
+
+import dataclasses
+import hashlib
+import json
+from abc import abstractmethod
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from hopping_leg.controllers import RolloutConfig
+from hopping_leg.controllers.policy import Policy
+from hopping_leg.errors import UsageError
+from hopping_leg.evaluate.entries import Entry
+from hopping_leg.evaluate.result import Evaluation
+from hopping_leg.evaluate.runner import evaluate
+from hopping_leg.identify.cost import Scoring
+from hopping_leg.identify.excitation import make_excitation
+from hopping_leg.identify.optimizers import CmaOptions
+from hopping_leg.identify.paper_excitation import Strokes, adapt, fixed_base, moving_base
+from hopping_leg.identify.parameters import LegHypothesis
+from hopping_leg.identify.pipeline import IdentifyOptions, identify
+from hopping_leg.identify.plan import make_plan
+from hopping_leg.identify.play_excitation import play
+from hopping_leg.identify.recording import load_recording
+from hopping_leg.identify.recording_format import Rig
+from hopping_leg.identify.result import Identified, as_json, save_robot
+from hopping_leg.identify.search import SearchOptions
+from hopping_leg.io import write_json
+from hopping_leg.robot import load_robot
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim import NO_NOISE, NoiseAndDelay
+from hopping_leg.sim_to_real.jobs import Job
+from hopping_leg.sim_to_real.methods import Fit, Method
+from hopping_leg.sim_to_real.study import USUAL_FIT, Study, TwinFile
+from hopping_leg.trace import Trace
+
+if TYPE_CHECKING:
+    from hopping_leg.rl.recipe import Recipe
+    from hopping_leg.rl.run_folder import RunFolder
+
+
+_BOTH_SWINGS = 120.0
+"""Recordings of so many seconds have room for both swing periods of the paper."""
+
+
+@dataclass(frozen=True)
+class RecordTwin(Job):
+    """A twin recorded on a rig."""
+
+    study: Study
+    twin: TwinFile
+    rig: Rig
+
+    weight: ClassVar[float] = 0.1
+
+    @property
+    def name(self) -> str:
+        """What is done."""
+        return f"record {self.twin.name}, {self.rig}"
+
+    @property
+    def done(self) -> bool:
+        """Whether the file is there.
+
+        Raises:
+            UsageError: It is there, but of another twin or length.
+        """
+        if not self._file.exists():
+            return False
+        header = Trace.load(self._file).header
+        asked = self._template().duration
+        if header["robot_digest"] != self.twin.robot.digest or header["seconds"] != asked:
+            raise UsageError(
+                f"{self._file} was recorded from another twin or for another time; give another"
+                " --folder, or delete it to record again."
+            )
+        return True
+
+    def run(self, *, quiet: bool) -> None:
+        """Play the paper's trajectory and write the recording."""
+        believed = load_robot(self.twin.believed)
+        template = adapt(self._template(), believed)
+        recording = play(
+            make_excitation(template, believed),
+            self.twin.robot,
+            believed=self.twin.believed,
+            seed=0 if self.rig == "fixed-base" else 1,
+        )
+        recording.trace.header["seconds"] = template.duration
+        recording.save(self._file)
+
+    @property
+    def _file(self) -> Path:
+        return self.study.recording(self.twin, self.rig)
+
+    def _template(self) -> Strokes:
+        seconds = self.study.seconds
+        if self.rig != "fixed-base":
+            return moving_base(duration=seconds)
+        swings = (10.0, 20.0) if seconds >= _BOTH_SWINGS else (10.0,)
+        return fixed_base(swings=swings, duration=seconds)
+
+
+_INERTIA_FACTOR = 10.0
+"""How far off the CAD's link inertias may be: the paper's Table I has nine times the shank's."""
+
+
+@dataclass(frozen=True)
+class IdentifyTwin(Job):
+    """A twin identified by a method."""
+
+    study: Study
+    twin: TwinFile
+    method: Method
+
+    @property
+    def weight(self) -> float:
+        """Rough time, min."""
+        return 10.0 if self.study.least_squares == USUAL_FIT else 1.0
+
+    @property
+    def name(self) -> str:
+        """What is done."""
+        return f"identify {self.twin.name}, {self.fit.name}"
+
+    @property
+    def fit(self) -> Fit:
+        """How."""
+        assert self.method.fit is not None
+        return self.method.fit
+
+    @property
+    def done(self) -> bool:
+        """Whether the robot file is there.
+
+        Raises:
+            UsageError: It is there, but from other recordings.
+        """
+        file = self.study.fitted(self.twin, self.method)
+        if not file.exists():
+            return False
+        asked = json.loads(file.with_suffix(".json").read_text(encoding="utf-8"))["asked"]
+        if asked != self._asked():
+            raise UsageError(
+                f"{file} was identified from other recordings or with other options; give another"
+                " --folder, or delete it to identify again."
+            )
+        return True
+
+    def run(self, *, quiet: bool) -> None:
+        """Identify and write the robot file; a fit that was killed goes on."""
+        study, search = self.study, self.fit.search
+        file = study.fitted(self.twin, self.method)
+        believed = load_robot(self.twin.believed)
+        effort = SearchOptions(
+            cma=CmaOptions(generations=study.generations),
+            least_squares=study.least_squares,
+        )
+        recordings = [load_recording(path) for path in self._recordings]
+        options = IdentifyOptions(search=search, bounds=_bounds(believed), effort=effort)
+        if search == "one-pass":
+            names = make_plan(recordings, believed, search="two-pass").parameters.names
+            options = dataclasses.replace(
+                options, search="cma", parameters=tuple(names), scoring=Scoring()
+            )
+        identified = identify(
+            recordings,
+            believed,
+            options=options,
+            folder=file.with_suffix(""),
+            resume=True,
+        )
+        content = {"asked": self._asked(), **as_json(identified), "truth": self._truth(identified)}
+        write_json(file.with_suffix(".json"), content)
+        save_robot(identified, file, self.twin.believed)
+
+    @property
+    def _recordings(self) -> list[Path]:
+        return [self.study.recording(self.twin, rig) for rig in self.fit.rigs]
+
+    def _asked(self) -> dict[str, Any]:
+        search = self.fit.search
+        effort = self.study.least_squares
+        return {
+            "recordings": [load_recording(path).digest for path in self._recordings],
+            "search": search,
+            "generations": None if search == "least-squares" else self.study.generations,
+            **({} if effort == USUAL_FIT else {"least_squares": dataclasses.asdict(effort)}),
+        }
+
+    def _truth(self, identified: Identified) -> dict[str, float]:
+        """Return the twin's own values of what was fitted, where it has them."""
+        truth = LegHypothesis(self.twin.without_surprises)
+        names = identified.parameters.names
+        values = {name: truth.get(name) for name in names if not name.startswith("drive.")}
+        if "drive.delay" in names:
+            values["drive.delay"] = self.twin.robot.reality.latency.command
+        return values
+
+
+def _bounds(believed: Robot) -> dict[str, tuple[float, float]]:
+    links = {"thigh.inertia": believed.thigh.inertia, "shank.inertia": believed.shank.inertia}
+    return {name: (v / _INERTIA_FACTOR, v * _INERTIA_FACTOR) for name, v in links.items()}
+
+
+@dataclass(frozen=True)
+class TrainPolicy(Job):
+    """Training of a policy in the simulation of a method."""
+
+    study: Study
+    twin: TwinFile
+    method: Method
+    seed: int
+
+    @property
+    def weight(self) -> float:
+        """Rough time, min."""
+        return self.study.steps / 600_000
+
+    @property
+    def name(self) -> str:
+        """What is done."""
+        return f"train {self.study.training(self.twin, self.method, self.seed).name}"
+
+    @property
+    def done(self) -> bool:
+        """Whether the policy is there.
+
+        Raises:
+            UsageError: The folder holds another training.
+        """
+        folder = self._folder()
+        if not (folder.path / "config.json").exists():
+            return False
+        folder.check_same()
+        return folder.policy.exists()
+
+    def run(self, *, quiet: bool) -> None:
+        """Train; a training that was killed goes on."""
+        from hopping_leg.rl.train import train
+
+        folder = self._folder()
+        train(
+            self.recipe(),
+            self.robot,
+            self.seed,
+            folder.path,
+            resume=True,
+            threads=self.study.threads,
+            quiet=quiet,
+        )
+
+    def progress(self) -> tuple[float, str]:
+        """Return the share done and what to show while it runs."""
+        snapshots = sorted((self._folder().path / "snapshots").glob("*.onnx"))
+        steps = int(snapshots[-1].stem) if snapshots else 0
+        share = min(steps / self.study.steps, 1.0)
+        return share, f"{steps / 1e6:.1f}M steps" if steps else "begun"
+
+    def recipe(self) -> "Recipe":
+        """Return how it is trained.
+
+        Raises:
+            UsageError: There is no such recipe, or it has no such number.
+        """
+        from hopping_leg.rl.recipes import change, get_recipe, randomise
+
+        study = self.study
+        recipe = change(get_recipe(study.recipe), [*study.changes, f"steps={study.steps}"])
+        return randomise(recipe, self.method.ranges)
+
+    @property
+    def robot(self) -> Robot:
+        """What is trained on."""
+        return self.study.simulated(self.twin, self.method)
+
+    @property
+    def path(self) -> Path:
+        """The training's folder."""
+        return self.study.training(self.twin, self.method, self.seed)
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """What the finished training left: how long it took, how the policy hops where it learnt.
+
+        Raises:
+            UsageError: It is not finished.
+        """
+        from hopping_leg.rl.run_folder import read_result
+
+        return read_result(self.path)
+
+    @property
+    def own_score(self) -> float:
+        """How bad the policy is in the simulation that it was trained in, m."""
+        return float(self.result["selected"]["score_m"])
+
+    def _folder(self) -> "RunFolder":
+        from hopping_leg.rl.run_folder import RunFolder
+
+        robot = self.robot
+        recipe = self.recipe().fit(robot)
+        return RunFolder(self.path, recipe, robot, self.seed, None)
+
+
+FIRST_SEED = 1000
+"""Of the trials; no seed from here on has chosen anything."""
+
+_KEPT = ("command_m", "median_error_m", "std_m", "hops", "skipped_hops", "hop_rate_hz",
+         "flight_fraction", "body_contacts")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class HopTrial(Job):
+    """A policy that hops at the study's commands on some leg."""
+
+    study: Study
+    twin: TwinFile
+
+    weight: ClassVar[float] = 0.3
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """What is done."""
+
+    @property
+    @abstractmethod
+    def leg(self) -> Robot:
+        """What the policy hops on."""
+
+    @property
+    @abstractmethod
+    def file(self) -> Path:
+        """Of the result."""
+
+    @property
+    @abstractmethod
+    def policy(self) -> bytes:
+        """The policy's file."""
+
+    @property
+    def done(self) -> bool:
+        """Whether the result is there.
+
+        Raises:
+            UsageError: It is there, but of other trials.
+        """
+        if not self.file.exists():
+            return False
+        if json.loads(self.file.read_text(encoding="utf-8"))["asked"] != self._asked():
+            raise UsageError(
+                f"{self.file} holds trials of another policy, twin or length; give another"
+                " --folder, or delete it to try again."
+            )
+        return True
+
+    def run(self, *, quiet: bool) -> None:
+        """Try the policy at every command and write what was measured."""
+        content = {"asked": self._asked(), "rows": hop(self.policy, self.leg, self.study)}
+        write_json(self.file, content)
+
+    def measured(self) -> list[dict[str, Any]]:
+        """Return what was measured, one row per command."""
+        rows: list[dict[str, Any]] = json.loads(self.file.read_text(encoding="utf-8"))["rows"]
+        return rows
+
+    def _asked(self) -> dict[str, Any]:
+        return {
+            "policy": hashlib.sha256(self.policy).hexdigest()[:16],
+            "twin": self.leg.digest,
+            "commands": list(self.study.commands),
+            "repeats": self.study.repeats,
+        }
+
+
+@dataclass(frozen=True)
+class HopOnTwin(HopTrial):
+    """A trained policy tried on a twin."""
+
+    method: Method
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """What is done."""
+        return f"hop on {self.twin.name}, {self.method.name}, seed {self.seed}"
+
+    @property
+    def leg(self) -> Robot:
+        """The twin."""
+        return self.twin.robot
+
+    @property
+    def suffix(self) -> str:
+        """Of the file with the result."""
+        return ""
+
+    @property
+    def file(self) -> Path:
+        """Of the result."""
+        path = self.study.trial(self.twin, self.method, self.seed)
+        return path.with_name(f"{path.stem}{self.suffix}.json")
+
+    @property
+    def policy(self) -> bytes:
+        """The selected policy of the training."""
+        folder = self.study.training(self.twin, self.method, self.seed)
+        return (folder / "policy.onnx").read_bytes()
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return what was measured, one row per command."""
+        where = {"method": self.method.name, "twin": self.twin.name, "seed": self.seed}
+        return [{**where, **row} for row in self.measured()]
+
+
+def disturbance_of(robot: Robot) -> NoiseAndDelay:
+    """Return what a leg is tried with on top of what it brings: nothing, if it brings anything."""
+    return NoiseAndDelay() if robot.reality.neutral else NO_NOISE
+
+
+def hop(content: bytes, robot: Robot, study: Study) -> list[dict[str, Any]]:
+    """Let a policy hop and return a row per command.
+
+    Errors are apex minus command. A leg that never leaves the ground at a command counts as
+    ``motionless`` with an error as large as the command.
+
+    Args:
+        content: The policy file.
+        robot: The twin.
+        study: Says at which commands and how often.
+    """
+    policy = Policy(content, "the trained policy", "policy")
+    bounds = (policy.card.command_low, policy.card.command_high)
+    setup = RolloutConfig(robot, disturbance_of(robot), threads=study.threads)
+    judged = evaluate(
+        [Entry("policy", policy, bounds)],
+        setup,
+        commands=study.commands,
+        repeats=study.repeats,
+        seed=FIRST_SEED,
+        kinds=("fixed",),
+    )
+    return _rows(judged.evaluation)
+
+
+def _rows(evaluation: Evaluation) -> list[dict[str, Any]]:
+    summary = evaluation.to_json()["summary"]
+    apexes = {d["command_m"]: np.array(d["apexes_m"]) for d in evaluation.distributions}
+    rows = []
+    for full in summary:
+        row = {name: full[name] for name in _KEPT}
+        command = row["command_m"]
+        errors = apexes[command] - command
+        row["motionless"] = not len(errors)
+        row["median_abs_error_m"] = float(np.median(np.abs(errors))) if len(errors) else command
+        if row["motionless"]:
+            row["median_error_m"] = -command
+        rows.append(row)
+    return rows

@@ -1,0 +1,164 @@
+"""Recordings and fits belong to their twin, trainings to what is believed of it."""
+
+import dataclasses
+import json
+
+import numpy as np
+import polars as pl
+import pytest
+from studies.sim_to_real.effects import EFFECTS, HopWithout
+
+from hopping_leg.errors import UsageError
+from hopping_leg.identify.parameters import LegHypothesis
+from hopping_leg.identify.pipeline import IdentifyOptions, identify
+from hopping_leg.identify.recording import load_recording
+from hopping_leg.robot import load_robot
+from hopping_leg.sim import NO_NOISE
+from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES
+from hopping_leg.sim_to_real import stages
+from hopping_leg.sim_to_real.stages import HopOnTwin, IdentifyTwin, RecordTwin, TrainPolicy
+from hopping_leg.sim_to_real.transfer import fit_row, fits
+from hopping_leg.trace import Trace
+from tests.identify.twin import record, swing
+from tests.sim_to_real.studies import study
+
+
+def test_a_recording_belongs_to_its_twin_and_time(tmp_path):
+    one = study(tmp_path)
+    job = RecordTwin(one, one.twins[0], "rail")
+    header = {"robot_digest": one.twins[0].robot.digest, "seconds": 60.0}
+    Trace(pl.DataFrame({"time_s": [0.0]}), header).save(job._file)
+    assert job.done
+    longer = dataclasses.replace(job, study=dataclasses.replace(one, seconds=90.0))
+    stranger = dataclasses.replace(job, twin=one.twins[1])
+    stranger._file.write_bytes(job._file.read_bytes())
+    for other in (longer, stranger):
+        with pytest.raises(UsageError, match="another twin or for another time"):
+            assert other.done
+
+
+LEG = LegHypothesis(load_robot("legv2"))
+
+
+@pytest.fixture(scope="module")
+def identified():
+    run = record(LEG.replace({"hip.friction": 0.12}).robot, swing(8.0))
+    options = IdentifyOptions(parameters=("hip.friction", "knee.friction"), threads=1)
+    return identify([run], LEG.robot, options=options)
+
+
+def test_a_fit_belongs_to_its_recordings(identified, tmp_path, monkeypatch):
+    asked = []
+
+    def fake(recordings, robot, **options):
+        asked.append((recordings, robot.name))
+        return identified
+
+    monkeypatch.setattr(stages, "identify", fake)
+    one = study(tmp_path, ("fixed-base-only",))
+    job = IdentifyTwin(one, one.twins[0], one.methods[0])
+    assert not job.done
+    file = one.recording(one.twins[0], "fixed-base")
+    record(LEG.robot, swing(2.0)).save(file)
+    job.run(quiet=True)
+    [(recordings, believed)] = asked
+    assert believed == "legv2"
+    assert [r.digest for r in recordings] == [load_recording(file).digest]
+    assert job.done
+    row = fit_row(job)
+    truth = {p["name"]: p["truth"] for p in row["parameters"]}
+    assert truth["hip.friction"] == one.twins[0].robot.hip.friction
+    record(LEG.robot, swing(3.0)).save(file)
+    with pytest.raises(UsageError, match="other recordings"):
+        assert job.done
+
+
+def test_no_method_trains_on_what_the_twin_alone_knows(tmp_path):
+    one = study(tmp_path, ("cad", "table-1", "randomised", "truth"))
+    twin = one.twins[0]
+    cad, paper, mixed, truth = (TrainPolicy(one, twin, method, 0) for method in one.methods)
+    assert cad.robot == mixed.robot == load_robot("legv2")
+    assert paper.robot == load_robot("legv2-paper")
+    assert mixed.recipe().task.randomised == IDENTIFIABLE_RANGES
+    assert truth.robot.reality.only_delays
+    assert truth.robot.rail == twin.robot.rail
+    assert truth.robot.reality.latency.command == twin.robot.reality.latency.command
+
+
+def test_legs_may_surprise_around_whatever_is_believed(tmp_path):
+    one = study(tmp_path, ("cad", "cad-surprises", "identified", "identified-surprises"))
+    twin = one.twins[0]
+    cad, surprising, *_ = trains = [TrainPolicy(one, twin, method, 0) for method in one.methods]
+    assert cad.robot == surprising.robot
+    assert cad.recipe().task.randomised == ()
+    assert surprising.recipe().task.randomised == WIDE_RANGES
+    assert len({one.training(twin, train.method, 0) for train in trains}) == 4
+    fit, shared = (one.fitted(twin, method) for method in one.methods[2:])
+    assert fit == shared
+    assert [job.name for job in fits(one)] == [f"identify {t.name}, identified" for t in one.twins]
+
+
+def test_a_study_can_change_the_recipe_but_for_its_steps(tmp_path):
+    one = study(
+        tmp_path, ["cad"], recipe="adaptive", changes=("task.fall_penalty=0.7", "steps=3"), steps=5
+    )
+    recipe = TrainPolicy(one, one.twins[0], one.methods[0], 0).recipe()
+    assert recipe.task.fall_penalty == 0.7
+    assert recipe.schedule.steps == 5
+
+
+def test_a_training_that_goes_beyond_its_steps_is_done_once(tmp_path):
+    one = study(tmp_path, ["cad"], steps=1)
+    train = TrainPolicy(one, one.twins[0], one.methods[0], 0)
+    assert train.progress() == (0.0, "begun")
+    snapshots = one.training(one.twins[0], one.methods[0], 0) / "snapshots"
+    snapshots.mkdir(parents=True)
+    (snapshots / "000000032768.onnx").touch()
+    assert train.progress()[0] == 1.0
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_one_effect_is_taken_away_and_the_rest_stays(tmp_path, effect):
+    one = study(tmp_path, ("identified",))
+    twin, method = one.twins[0], one.methods[0]
+    whole, less = HopOnTwin(one, twin, method, 0), HopWithout(one, twin, method, 0, effect)
+    assert less.leg != whole.leg == twin.robot
+    assert not less.leg.reality.only_delays
+    assert less.file != whole.file
+    for other in set(EFFECTS) - {effect}:
+        assert EFFECTS[other](less.leg.reality) != less.leg.reality
+    assert EFFECTS[effect](less.leg.reality) == less.leg.reality
+
+
+def test_without_all_effects_nothing_is_left(tmp_path):
+    reality = study(tmp_path).twins[0].robot.reality
+    for take_away in EFFECTS.values():
+        reality = take_away(reality)
+    periods = reality.hip.ripple_periods, reality.knee.ripple_periods
+    assert dataclasses.replace(
+        reality,
+        hip=dataclasses.replace(reality.hip, ripple_periods=1.0),
+        knee=dataclasses.replace(reality.knee, ripple_periods=1.0),
+    ).neutral
+    assert periods != (1.0, 1.0)
+
+
+def test_a_twin_is_met_with_its_own_effects_alone():
+    assert stages.disturbance_of(load_robot("twin")) == NO_NOISE
+    assert stages.disturbance_of(load_robot("legv2")).torque_noise > 0
+
+
+def test_a_leg_that_never_hops_errs_by_the_command(tmp_path, monkeypatch):
+    rows = [dict.fromkeys(stages._KEPT, 0.0) | {"command_m": 0.3, "median_error_m": None}]
+
+    class Judged:
+        distributions = ({"command_m": 0.3, "apexes_m": []},)
+
+        def to_json(self):
+            return {"summary": rows}
+
+    (row,) = stages._rows(Judged())
+    assert row["motionless"]
+    assert (row["median_error_m"], row["median_abs_error_m"]) == (-0.3, 0.3)
+    assert json.dumps(row)
+    assert np.isfinite(row["median_abs_error_m"])
