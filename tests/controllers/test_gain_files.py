@@ -29,11 +29,6 @@ def test_shipped_gains_name_their_leg_and_source(name):
     assert found.source
 
 
-def test_paper_gains_are_the_defaults():
-    gains = ShapingGains()
-    assert (gains.k0, gains.kp_y, gains.kd_y, gains.exponent) == (1.0, 10.0, 3.0, 2.0)
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -4,11 +4,19 @@ import numpy as np
 import pytest
 
 from hopping_leg.controllers import RolloutConfig, rollout
+from hopping_leg.controllers.energy_shaping.virtual_leg import LegView
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.controllers.stand_hop_land import STAND_SECONDS, LandingGains, Mode, StandHopLand
+from hopping_leg.controllers.stand_hop_land import (
+    STAND_SECONDS,
+    LandingGains,
+    LiftoffDetector,
+    Mode,
+    StandHopLand,
+)
 from hopping_leg.errors import UsageError
 from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import load_robot
+from hopping_leg.robot.model import GRAVITY
 from tests.evaluate.conftest import Spring
 
 ROBOT = load_robot("legv2-paper")
@@ -52,7 +60,7 @@ def test_same_seed_same_run(hopped):
 
 
 @pytest.mark.parametrize("hops", [1, 3])
-def test_it_feels_nothing_but_joints(hops):
+def test_it_measures_nothing_but_joints(hops):
     """The same joint samples give the same torques, whatever the height was."""
     supervised = StandHopLand(Spring(ROBOT), ROBOT, hops)
     seen = []
@@ -89,7 +97,7 @@ def test_what_makes_no_sense_is_refused():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["fast", "energy-shaping"])
-def test_liftoffs_are_counted_under_noise_and_delay(name):
+def test_hops_are_counted_under_noise_and_delay(name):
     hopper = load_controller(name, ROBOT)
     supervised = StandHopLand(hopper, ROBOT, 1000)
     run = rollout(
@@ -101,3 +109,42 @@ def test_liftoffs_are_counted_under_noise_and_delay(name):
     counted = run.data["counted_hops"][-1]
     assert min(made) > 10
     assert np.abs(counted - made).max() <= 2
+
+
+def liftoffs(rates):
+    """Return when a leg lifts off that presses with its weight and lengthens like this, ticks."""
+    detector, found = LiftoffDetector(ROBOT, 0.005, 1), []
+    force, nothing = np.array([ROBOT.mass * GRAVITY]), np.zeros(1)
+    for tick, rate in enumerate(rates):
+        leg = LegView(
+            np.zeros((1, 2)), np.zeros((1, 2)), nothing, np.array([rate]), nothing, nothing, nothing
+        )
+        if detector.update(leg, force)[0]:
+            found.append(tick)
+    return found
+
+
+def push(top, rise, fall):
+    """Return leg rates that rise to a top and fall to nothing in so many ticks, m/s."""
+    return np.concatenate([np.linspace(0, top, rise), np.linspace(top, 0, fall), np.zeros(4)])
+
+
+HOP, RISE, CREEP = push(1.0, 15, 6), push(0.55, 15, 40), push(0.3, 10, 5)
+
+
+def test_a_push_that_ends_at_once_is_a_lift_off():
+    (tick,) = liftoffs(HOP)
+    assert 15 < tick <= 21
+
+
+@pytest.mark.parametrize(
+    ("rates", "expected"),
+    [
+        pytest.param(RISE, 0, id="slows down gently and stays on the ground"),
+        pytest.param(np.concatenate([RISE, HOP]), 1, id="a rise before does not hide the push"),
+        pytest.param(CREEP, 0, id="creeps up"),
+        pytest.param(np.tile(push(1.0, 8, 5), 2), 1, id="no second lift-off within the flight"),
+    ],
+)
+def test_lift_offs_are_counted(rates, expected):
+    assert len(liftoffs(rates)) == expected

@@ -119,37 +119,26 @@ def test_single_legs_share_no_state_and_are_made_anew_by_reset(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("answer", "says"),
-    [
-        ("np.zeros((self.count, 3))", r"shape \(3, 3\)"),
-        ("np.zeros(2)", r"shape \(2,\)"),
-        ("np.full((self.count, 2), np.nan)", "must be finite"),
-        ("'much'", "no numbers"),
-        ("None", "must be finite|shape"),
-        ("1 / 0", r"ZeroDivisionError: division by zero \(mine.py, line 9\)"),
-    ],
-)
-def test_wrong_answers_are_stopped_by_name(tmp_path, answer, says):
-    path = written(tmp_path / "mine.py", BATCHED, answer=answer)
-    with pytest.raises(ControllerError, match=says) as caught:
-        acted(path, "Held")
-    assert "mine.py:Held" in str(caught.value)
-
-
-@pytest.mark.parametrize(
     ("arguments", "answer", "says"),
     [
+        (None, "np.zeros((self.count, 3))", r"shape \(3, 3\)"),
+        (None, "np.zeros(2)", r"shape \(2,\)"),
+        (None, "np.full((self.count, 2), np.nan)", "must be finite"),
+        (None, "'much'", "no numbers"),
+        (None, "None", "must be finite|shape"),
+        (None, "1 / 0", r"ZeroDivisionError: division by zero \(mine.py, line 9\)"),
         ("x, t", "[1.0]", "must return the torques"),
         ("x, t", "([0, 0], None, [0, 0])", "asks for positions"),
         ("x, t", "[float('inf'), 0.0]", "must be finite"),
         ("a, b, c, d, e", "[0, 0]", "must take"),
     ],
 )
-def test_wrong_single_legs_are_stopped_by_name(tmp_path, arguments, answer, says):
-    path = written(tmp_path / "mine.py", SINGLE, arguments=arguments, answer=answer)
+def test_wrong_answers_are_stopped_by_name(tmp_path, arguments, answer, says):
+    text, name = (SINGLE, "Leg") if arguments else (BATCHED, "Held")
+    path = written(tmp_path / "mine.py", text, arguments=arguments or "", answer=answer)
     with pytest.raises(ControllerError, match=says) as caught:
-        acted(path, "Leg")
-    assert "mine.py:Leg" in str(caught.value)
+        acted(path, name)
+    assert f"mine.py:{name}" in str(caught.value)
 
 
 @pytest.mark.parametrize(
