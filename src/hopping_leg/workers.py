@@ -82,12 +82,7 @@ class ProcessWorkers:
         return self._pool.submit(function, *args, **kwargs)
 
     def map(self, function: Callable[..., R], arguments: Iterable[tuple[Any, ...]]) -> list[R]:
-        """Call a function once per tuple of arguments; return what it returns, in their order.
-
-        Raises:
-            HoppingLegError: A task raised it.
-            UsageError: A process died.
-        """
+        """See ``Workers``."""
         if self.count == 1:
             return [function(*values) for values in arguments]
         futures = [self.submit(function, *values) for values in arguments]
@@ -155,15 +150,7 @@ class RayWorkers:
         return sorted(names - {socket.gethostname()})
 
     def map(self, function: Callable[..., R], arguments: Iterable[tuple[Any, ...]]) -> list[R]:
-        """Call a function once per tuple of arguments; return what it returns, in their order.
-
-        A task takes one CPU; one whose process or machine dies is begun again a few times. The
-        same function, called again, is sent once.
-
-        Raises:
-            HoppingLegError: A task raised it.
-            UsageError: Workers died again and again.
-        """
+        """See ``Workers``; a task that dies begins again, and a function is sent once."""
         exceptions = self._ray.exceptions
         if self._sent[0] is not function:
             self._sent = function, self._ray.put(function)

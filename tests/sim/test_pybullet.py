@@ -8,7 +8,7 @@ from hopping_leg.robot import dynamics, load_robot
 from hopping_leg.robot.kinematics import joint_angles
 from hopping_leg.robot.limits import SoftLimits
 from hopping_leg.sim import MujocoSimulator, NoiseAndDelay, Plant
-from hopping_leg.sim.pybullet.simulator import PyBulletSimulator
+from hopping_leg.sim.pybullet import PyBulletSimulator
 from tests.robot.legs import random_state
 from tests.sim.legs import POSTURE, without_friction
 

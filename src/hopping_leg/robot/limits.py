@@ -67,12 +67,7 @@ class MotorLimit:
         return within if self._gain is None else self._gain * within
 
     def clip(self, torque: Array, qd: Array) -> Array:
-        """Return ``torque`` within what the motors can do at speed ``qd``.
-
-        Args:
-            torque: At the joints, N m, (..., 2).
-            qd: Joint velocity, rad/s, (..., 2).
-        """
+        """Return ``torque`` within what the motors can do at speed ``qd``, see ``give``."""
         drop = self._slope * qd
         upper = self.peak - drop
         np.maximum(upper, self._zero, out=upper)

@@ -35,7 +35,7 @@ def make_simulator(
     if engine == "mujoco":
         return MujocoSimulator(robot, count, rate=rate, timestep=timestep, threads=threads)
     # What runs on the robot shall not import what only PyBullet needs.
-    from hopping_leg.sim.pybullet.simulator import PyBulletSimulator
+    from hopping_leg.sim.pybullet import PyBulletSimulator
 
     return PyBulletSimulator(robot, count, rate=rate, timestep=timestep, ground=ground)
 

@@ -176,13 +176,7 @@ class MujocoSimulator(Simulator):
         self.height -= rise
 
     def place(self, ids: IntArray | slice, height: Array | float, q: Array) -> None:
-        """Put legs at rest at a height and posture.
-
-        Args:
-            ids: Which legs.
-            height: Height of the base above the ground, m, (k,).
-            q: Joint angles, rad, (k, 2) or (2,).
-        """
+        """Put legs at rest at a height, m, and posture, rad."""
         rows = np.arange(self.count)[ids]
         if self.mismatch is not None:
             self.mismatch.place(rows, height, q)
@@ -195,9 +189,6 @@ class MujocoSimulator(Simulator):
 
     def step(self, torque: Array) -> Array:
         """Hold joint torques for one control period; return what the motors gave, N m, (n, 2).
-
-        Args:
-            torque: Asked for at the joints, N m, (n, 2).
 
         Raises:
             mujoco.batch.SimulationError: Physics failed in some simulations.
