@@ -35,7 +35,7 @@ class Probe:
         """Run it, print a table, return every number."""
         from hopping_leg.controllers import RolloutConfig
         from hopping_leg.controllers.registry import load_policy
-        from hopping_leg.evaluate.figures import to_svg
+        from hopping_leg.figure_style import to_svg
         from hopping_leg.io import write_atomically
         from hopping_leg.rl.onnx_export import expose_hidden
         from studies.probing.figure import draw_probe

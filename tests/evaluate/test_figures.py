@@ -6,14 +6,8 @@ import polars as pl
 import pytest
 from matplotlib.figure import Figure
 
-from hopping_leg.evaluate.figures import (
-    draw_distributions,
-    draw_estimate,
-    draw_heights,
-    draw_phase_space,
-    to_png,
-    to_svg,
-)
+from hopping_leg.evaluate.figures.results import draw_distributions
+from hopping_leg.evaluate.figures.runs import draw_estimate, draw_heights, draw_phase_space
 from hopping_leg.evaluate.metrics import (
     ESTIMATED_APEX,
     ESTIMATED_HEIGHT,
@@ -21,7 +15,7 @@ from hopping_leg.evaluate.metrics import (
     judge_estimator,
 )
 from hopping_leg.evaluate.report_figures import draw_report_figures, run_of
-from hopping_leg.figure_style import INCHES, encode, fit_width
+from hopping_leg.figure_style import INCHES, encode, fit_width, to_png, to_svg
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE, find_hops
 from hopping_leg.trace import Trace
 

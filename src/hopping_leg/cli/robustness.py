@@ -16,10 +16,11 @@ from rich.console import Console
 
 from hopping_leg.cli.command_line import command_line
 from hopping_leg.cli.evaluate import Conditions, say_written
-from hopping_leg.evaluate.figures import draw_robustness, to_svg
+from hopping_leg.evaluate.figures.results import draw_robustness
 from hopping_leg.evaluate.result_cache import ResultCache
 from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
 from hopping_leg.evaluate.tables import print_robustness
+from hopping_leg.figure_style import to_svg
 from hopping_leg.io import write_atomically, write_json
 from hopping_leg.progress import ShareProgress
 

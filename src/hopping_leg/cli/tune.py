@@ -101,8 +101,8 @@ class _Recipe:
 
     def search_all(self) -> None:
         """Search, print the best, write all trials and the figures."""
-        from hopping_leg.evaluate.figures import to_svg
         from hopping_leg.evaluate.figures.tuning import FIGURES
+        from hopping_leg.figure_style import to_svg
         from hopping_leg.rl.tuning import Tuning
         from hopping_leg.rl.tuning import tune as tune_recipe
 

@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import tables
-from hopping_leg.evaluate.figures import draw_learning
+from hopping_leg.evaluate.figures.results import draw_learning
 from hopping_leg.evaluate.report_figures import Picture, draw_report_figures, run_of
 from hopping_leg.evaluate.result import Evaluation, flat_conditions
 from hopping_leg.evaluate.result_files import StoredRun

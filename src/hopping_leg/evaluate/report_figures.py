@@ -7,13 +7,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from hopping_leg.evaluate.figures import (
-    draw_distributions,
-    draw_estimate,
-    draw_heights,
-    draw_ladder,
-    draw_phase_space,
-)
+from hopping_leg.evaluate.figures.results import draw_distributions, draw_ladder
+from hopping_leg.evaluate.figures.runs import draw_estimate, draw_heights, draw_phase_space
 from hopping_leg.evaluate.metrics import has_estimate, stretches
 from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.evaluate.trials import Run, Trial
