@@ -6,7 +6,7 @@ import pytest
 from studies.sim_to_real.prediction import Foretell, Meet, prediction_rows
 from studies.sim_to_real.run import foretold, met
 
-from hopping_leg.sim_to_real import hopping
+from hopping_leg.sim_to_real import stages
 from tests.sim_to_real.studies import study
 
 
@@ -36,7 +36,7 @@ def test_errors_are_predicted_minus_measured_apexes_of_the_same_twin(tmp_path):
 def test_the_policy_hops_in_the_methods_simulation(tmp_path, monkeypatch):
     one = study(tmp_path, ("truth",))
     legs = []
-    monkeypatch.setattr(hopping, "hop", lambda content, leg, study: legs.append(leg) or [])
+    monkeypatch.setattr(stages, "hop", lambda content, leg, study: legs.append(leg) or [])
     jobs = [*foretold(one), *met(one)]
     for job in jobs:
         assert not job.done
