@@ -17,10 +17,10 @@ from hopping_leg.controllers.policy import Policy
 from hopping_leg.io import write_json
 from hopping_leg.rl.finetune.config import FinetuneConfig, Method
 from hopping_leg.rl.finetune.finetuning import Row
-from hopping_leg.rl.finetune.hops import score
 from hopping_leg.rl.finetune.pretraining import Task
 from hopping_leg.rl.finetune.running import POLICY, RESULT, finetune
 from hopping_leg.rl.finetune.simulated import Guard, SimulatedTrials
+from hopping_leg.rl.finetune.trial_data import score
 from hopping_leg.robot.parameters import Robot
 
 FIRST_JUDGE = 1000

@@ -60,7 +60,7 @@ class Finetune:
     tolerance: float = 0.004
     """Error that is good enough, on two checks in a row, m."""
     seed: int = 0
-    """Of exploration, commands, batches and a twin's noise."""
+    """Seed of exploration, commands, batches and a twin's noise."""
     out: Path = Path("runs/finetune")
     """The run's folder."""
     resume: bool = False

@@ -34,7 +34,7 @@ class Options:
     robot: str = "legv2-paper"
     """A shipped robot or the path of a .toml file."""
     seed: int = 0
-    """Of weights, exploration, starts, noise and delay."""
+    """Seed of weights, exploration, starts, noise and delay."""
     out: Path | None = None
     """The run's folder; default: runs/RECIPE-seedSEED."""
     resume: bool = False

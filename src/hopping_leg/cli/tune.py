@@ -43,7 +43,7 @@ class EnergyShaping:
     """Gains to begin from: by-hand, energy-shaping (the shipped result) or a gain file's path."""
     search: Annotated[Search, tyro.conf.arg(name="")] = field(default_factory=Search)
     seed: int = 0
-    """Of the search; noise and delay take seeds 0 to 9."""
+    """Seed of the search; noise and delay take seeds 0 to 9."""
     out: Path = Path("runs/tune")
     """Folder for the log and the gains."""
     json: Path | None = None
@@ -91,7 +91,7 @@ class _Recipe:
     startup: int = 10
     """Finished trials before any is given up, and before the search learns from them."""
     seed: int = 0
-    """Of the trainings, and of the search."""
+    """Seed of the trainings, and of the search."""
     set: tuple[str, ...] = ()
     """Numbers of the recipe that every trial takes, e.g. `--set num_envs=256`."""
     out: Path | None = None

@@ -30,7 +30,8 @@ class PPOConfig:
     """Proximal policy optimisation with generalised state-dependent exploration (gSDE)."""
 
     learning_rate: float = 1e-3
-    """At the start; falls along a cosine to a fiftieth, so that late snapshots do not drift."""
+    """Learning rate at the start; falls along a cosine to a fiftieth, so that late snapshots do not
+    drift."""
     n_steps: int = 64
     """Control steps between updates, each environment."""
     batch_size: int = 4096
@@ -102,7 +103,7 @@ class SACConfig:
     """Soft actor-critic with generalised state-dependent exploration (gSDE)."""
 
     learning_rate: float = 5e-4
-    """Of all networks at the start; falls linearly to a tenth."""
+    """Learning rate of all networks at the start; falls linearly to a tenth."""
     buffer_size: int = 300_000
     """Transitions in the replay buffer."""
     learning_starts: int = 2_000

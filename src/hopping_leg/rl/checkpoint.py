@@ -32,7 +32,7 @@ def write_checkpoint(folder: Path, steps: int, tree: Tree) -> Path:
     """Write ``folder/checkpoint-<steps>`` and delete all but the newest ``KEPT``.
 
     Args:
-        folder: Of the run's checkpoints.
+        folder: Folder of the run's checkpoints.
         steps: Control steps so far; orders the checkpoints.
         tree: Everything to keep.
     """

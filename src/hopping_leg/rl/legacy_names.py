@@ -27,8 +27,9 @@ _NAMES = {
     for part, entries in _PARTS.items()
     for old, _, new in (entry.partition("=") for entry in entries.split())
 }
-_IDLE = {"exam_at": [1.0], "task.idle": 0.0, "task.barrier": None}
+_GONE = {"exam_at": [1.0], "task.idle": 0.0}
 """Options that are gone, with the only values that can still be had."""
+_MEMORY = {"recurrent": "gru", "adaptive": "integrator"}
 
 
 def upgrade_config(stored: dict[str, Any]) -> dict[str, Any]:
@@ -37,30 +38,28 @@ def upgrade_config(stored: dict[str, Any]) -> dict[str, Any]:
     Raises:
         UsageError: The run was asked for something that can no longer be had.
     """
-    old = stored.get("options", {})
+    old, recipe = stored.get("options", {}), stored.get("recipe")
     if not old or "schedule" in old:
         return stored
-    flat = {k: v for k, v in old.items() if not isinstance(v, dict) or k == "reward"}
-    flat |= {f"{k}.{i}": w for k, v in old.items() if isinstance(v, dict) for i, w in v.items()}
-    names = _NAMES | ({"rollout": "algorithm.train_freq"} if "tau" in flat else {})
-    new: dict[str, Any] = {"distillation": None} if "teaching" not in flat else {}
+    parts = {k: v for k, v in old.items() if isinstance(v, dict) and k != "reward"}
+    flat = {k: v for k, v in old.items() if k not in parts}
+    flat |= {f"{part}.{name}": value for part, v in parts.items() for name, value in v.items()}
+    names = _NAMES | ({"rollout": "algorithm.train_freq"} if recipe == "paper" else {})
+    new: dict[str, Any] = {} if "teaching" in flat else {"distillation": None}
     for name, value in flat.items():
-        if name in _IDLE and value != _IDLE[name]:
-            raise UsageError(f"The run has {name} = {value}, which can no longer be trained.")
-        if name in _IDLE or (name.startswith("reward.") and "reward" in flat):
-            continue
-        if name == "hidden":
+        if name in _GONE:
+            if value != _GONE[name]:
+                raise UsageError(f"The run has {name} = {value}, which can no longer be trained.")
+        elif name == "hidden":
             new["network"] = {**new.get("network", {}), "actor": value, "critic": value}
         elif name == "task.alike_at_first":
             new = replace_at(new, "task.randomize_from_start", not value)
         else:
             path = names.get(name, name.replace("aiming.", "distillation.integrator.", 1))
             new = replace_at(new, path, value)
-    recipe = stored["recipe"]
-    if recipe == "recurrent":
-        recipe, new = "precise", replace_at(new, "distillation.student.memory", "gru")
-    elif recipe == "adaptive":
-        new = replace_at(new, "distillation.student.memory", "integrator")
+    if recipe in _MEMORY:
+        new = replace_at(new, "distillation.student.memory", _MEMORY[recipe])
+    recipe = "precise" if recipe == "recurrent" else recipe
     seeds = stored.get("number_of_starts", 1)
     return {**stored, "recipe": recipe, "options": new, "parallel_seeds": seeds}
 

@@ -38,6 +38,7 @@ One network from joint measurements to joint torques, for robot `{result["robot"
 - Training: {result["steps"]} control steps, {result["minutes"]:.1f} min of wall-clock time, physics
   step {1000 * task["timestep"]:g} ms.
 {parallel_seeds(result)}\
+{curriculum(result.get("curriculum", []))}\
 {teacher_scores(result.get("teacher_scores_m", []))}\
 - Selection: the policy after {selected["steps"]} steps ({selected["minutes"]:.1f} min), the best of
   {len(selected["finalists"])} finalists out of {len(result["history"])} snapshots.
@@ -66,6 +67,16 @@ def parallel_seeds(result: dict[str, Any]) -> str:
         f"- Parallel seeds: the training with seed {chosen}, the best of {len(rows)} when they"
         f" could be compared, less being better:\n  {scores}.\n"
     )
+
+
+def curriculum(stages: list[dict[str, Any]]) -> str:
+    """Return a line on who learnt until when, if there was more than one.
+
+    Args:
+        stages: In order, see ``Stage``.
+    """
+    shown = ", ".join(f"{s['name']} until {100 * s['until']:.0f} %" for s in stages)
+    return f"- Curriculum, at the latest: {shown} of the training.\n" if stages else ""
 
 
 def teacher_scores(scores: list[float]) -> str:

@@ -31,7 +31,7 @@ class Graph:
     """Nodes and weights in the order in which they are made.
 
     Attributes:
-        nodes: Of the graph.
+        nodes: Nodes of the graph.
         weights: Its initializers.
     """
 
@@ -66,9 +66,9 @@ class Graph:
 
         Args:
             x: Values, (n, in).
-            layers: Of which all but the last have the activation.
+            layers: Layers of which all but the last have the activation.
             activation: One of ``ACTIVATIONS``.
-            prefix: Of all names.
+            prefix: Beginning of all names.
         """
         for index, (weight, bias) in enumerate(layers):
             names = [
@@ -173,8 +173,8 @@ class CommandIntegrator:
     command is normalised, which must be the last input.
 
     Attributes:
-        layers: Of the network that feels from inputs and command of late, (n, inputs + 1), how far
-            the last hop was off; tanh.
+        layers: Layers, tanh, of the network that tells how far the last hop was off from inputs and
+            late command, (n, inputs + 1).
         rate: Share of that by which the aim moves in a tick.
         most: Largest error that is felt, in the network's scale.
         farthest: Largest aim.
@@ -241,8 +241,8 @@ class Network:
         offset: Subtracted from the joined inputs, (size,).
         gain: Multiplied with the rest, (size,).
         layers: Weight (out, in) and bias (out,) of every dense layer.
-        activation: Of the hidden layers, one of ``ACTIVATIONS``.
-        squash: Of the output, one of ``SQUASHES``.
+        activation: Activation of the hidden layers, one of ``ACTIVATIONS``.
+        squash: Squash of the output, one of ``SQUASHES``.
         bound: The last layer's output is clipped to +-bound before the squash.
         memory: What remembers, in front of the dense layers.
     """

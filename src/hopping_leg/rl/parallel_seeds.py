@@ -44,13 +44,13 @@ class ParallelSeeds:
     Attributes:
         recipe: What to train; scaled to the robot's size.
         robot: The leg.
-        seed: Of all of them together; the k-th of n has seed ``n * seed + k``, so that no two
+        seed: Seed of all of them together; the k-th of n has seed ``n * seed + k``, so that no two
             seeds share a start.
         out: Folder in which each has its own, and in which the policy is left; of a single one it
             is its own.
         count: How many.
         minutes: Wall-clock time after which learning stops; None for the recipe's steps.
-        threads: Of each.
+        threads: Threads of each.
         quiet: Show no progress.
         log: Who gets the curves besides TensorBoard.
         source: Folder of another run, from whose checkpoint a single one begins.

@@ -83,7 +83,7 @@ def evaluate_policy(
         controller: To be judged.
         robot: The leg.
         commands: Desired heights, rising, m.
-        seeds: Of noise and delay; each adds four legs per command.
+        seeds: Seeds of noise and delay; each adds four legs per command.
         rate: Control rate, Hz.
         threads: Worker threads, 0 for one per core.
     """

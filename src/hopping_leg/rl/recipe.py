@@ -146,7 +146,7 @@ class Recipe:
 
         Args:
             env: From ``make_env``.
-            seed: Of weights and exploration.
+            seed: Seed of weights and exploration.
         """
         if self.distillation is None:
             return self.algorithm.make_model(env, self.network, seed)

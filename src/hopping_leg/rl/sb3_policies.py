@@ -137,7 +137,7 @@ def network_of(model: BaseAlgorithm, observation: Observation) -> Network:
 
     Args:
         model: SAC, or PPO with separate networks of plain layers.
-        observation: Of the task it learns.
+        observation: Observation of the task it learns.
 
     Raises:
         UsageError: The actor is no stack of dense layers.
@@ -153,7 +153,7 @@ def dense_network(parts: Sequence[nn.Module], observation: Observation, squash: 
 
     Args:
         parts: Layers and activations in order, or modules of such.
-        observation: Of the task.
+        observation: Observation of the task.
         squash: How the output is brought to -1..1.
 
     Raises:

@@ -43,7 +43,7 @@ class TrainingProgress(LiveProgress):
         """Show the state of the training.
 
         Args:
-            share: Of the budget that is used, 0 to 1.
+            share: Share of the budget that is used, 0 to 1.
             steps: Control steps so far.
             hops: Hops so far.
             error: Mean |apex - command| of the latest hops, m; NaN before the first.
@@ -107,13 +107,13 @@ def train(
     Args:
         recipe: What to train; scaled to the robot's size.
         robot: The leg.
-        seed: Of weights, exploration, task, noise and delay.
+        seed: Seed of weights, exploration, task, noise and delay.
         out: The run's folder.
         resume: Go on with the run in ``out``; without one, begin.
         source: Folder of another run of this recipe and robot; its newest checkpoint is the start,
             its steps and time count, its snapshots do not.
         minutes: Stop after so much wall-clock time, pauses excluded, or at the recipe's steps.
-        threads: Of torch and physics; torch's is set for the whole process.
+        threads: Threads of torch and physics; torch's is set for the whole process.
         quiet: Show no progress.
         log: Who gets the curves besides TensorBoard.
         on_snapshot: Called with the steps and the score, m, of every snapshot that was tried; what
@@ -147,7 +147,7 @@ def check(robot: Robot, minutes: float | None, log: Log) -> None:
 
     Args:
         robot: The leg; one that plays the real one leaves nothing to transfer.
-        minutes: Of the training, None for no limit.
+        minutes: Time of the training, None for no limit.
         log: Who gets the curves.
 
     Raises:

@@ -100,7 +100,7 @@ class Tuning:
     startup: int = 10
     """Finished trials before any is given up, and before the search learns from them."""
     seed: int = 0
-    """Of the trainings, and of the search."""
+    """Seed of the trainings, and of the search."""
     fixed: tuple[str, ...] = ()
     """Numbers of the recipe that every trial takes, each ``name=number``."""
     heartbeat: int = 15

@@ -110,7 +110,7 @@ def test_the_teacher_with_the_best_score_teaches():
     with torch.no_grad():
         chooser.policy.action_net.bias -= 1.0
     assert chooser.teacher_scores == [0.03, 0.01, 0.02]
-    assert TINY_PRECISE.extra_results(chooser) == {"teacher_scores_m": [0.03, 0.01, 0.02]}
+    assert TINY_PRECISE.extra_results(chooser)["teacher_scores_m"] == [0.03, 0.01, 0.02]
     weights = [one["mlp_extractor.policy_net.0.weight"] for one in evaluated]
     assert not torch.equal(weights[0], weights[1])
     assert not torch.equal(weights[1], weights[2])
@@ -158,7 +158,7 @@ def test_a_single_teacher_takes_no_exam():
     for share in (0.0, alone.distillation.teacher_share, 1.0):
         alone.anneal(model, model.env, share)
     assert model.teacher_scores == []
-    assert alone.extra_results(model) == {}
+    assert "teacher_scores_m" not in alone.extra_results(model)
 
 
 def test_an_exam_tells_a_teacher_that_does_not_hop():
@@ -273,3 +273,13 @@ def test_the_teacher_is_asked_where_a_late_legs_action_arrives():
     np.testing.assert_array_equal(known[:, 1], [1, 1, 1, 1, 0, 0])
     np.testing.assert_array_equal(known[:, 2], [1, 0, 0, 1, 0, 0])
     np.testing.assert_array_equal(shown[:, 1, 1][known[:, 1]], [2, 3, 4, 5])
+
+
+def test_the_curriculum_names_who_learns_until_when():
+    stages = DISTILLATION.stages
+    assert [(s.name, s.until) for s in stages] == [
+        ("teacher 1", 0.25), ("teacher 2", 0.5), ("student", 1.0),
+    ]  # fmt: skip
+    assert stages[0].must_score == DISTILLATION.teacher_accept_score
+    for stage in stages[:2]:
+        assert rate(1 - stage.until + 1e-6) < 0.03 * RATE

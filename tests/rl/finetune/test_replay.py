@@ -8,11 +8,10 @@ import pytest
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.envs import HoppingTask, TaskConfig, apex_reward
 from hopping_leg.hop_detection import find_hops
-from hopping_leg.rl.finetune.apex_estimate import ApexEstimate
 from hopping_leg.rl.finetune.config import FinetuneConfig
 from hopping_leg.rl.finetune.replay import CRITIC_SIZE, TransitionWriter
 from hopping_leg.rl.finetune.simulated import Witness, traces_of
-from hopping_leg.rl.finetune.trial_data import TrialData
+from hopping_leg.rl.finetune.trial_data import ApexEstimate, TrialData
 from hopping_leg.rl.onnx_export import read_network
 from hopping_leg.sim import NO_NOISE
 

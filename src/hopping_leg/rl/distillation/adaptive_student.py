@@ -58,7 +58,7 @@ class HopErrors:
         """Take in a tick; return what is told of the last hop in it.
 
         Args:
-            height: Of the bases, any unit.
+            height: Heights of the bases, any unit.
             clearance: Under the feet, m.
             command: In the heights' unit.
             begun: Whose episode began with this tick.
@@ -100,7 +100,7 @@ class CommandIntegratorConfig:
     """Numbers of the memory; heights are in half the range of commands."""
 
     share: float = 0.35
-    """Of a hop's error that is corrected."""
+    """Share of a hop's error that is corrected."""
     farthest: float = 1.0
     """Largest aim."""
     beyond: float = 0.3
@@ -146,7 +146,7 @@ class AdaptiveStudent(nn.Module):
         feeling: Layers of the one that feels.
         room: Ticks from which it learns, the newest.
         legs: How many legs act at once.
-        period: Of a tick, s.
+        period: Control period, s.
         command_integrator: Numbers of the memory.
     """
 

@@ -124,7 +124,7 @@ class Distillation:
             ppo: The teacher's algorithm.
             network: The teacher's.
             commands: Heights between which teachers are evaluated, m.
-            seed: Of weights and exploration.
+            seed: Seed of weights and exploration.
         """
         task = env.task
         measured = task.observation.size
@@ -265,8 +265,10 @@ class Distillation:
         return float(model.teacher_scores[0]) if model.teacher_scores else None
 
     def extra_results(self, model: Any) -> dict[str, Any]:  # noqa: ANN401
-        """Return how the teachers scored."""
-        return {"teacher_scores_m": list(model.teacher_scores)} if model.teacher_scores else {}
+        """Return the curriculum and how the teachers scored."""
+        scores = list(model.teacher_scores)
+        curriculum = {"curriculum": [stage._asdict() for stage in self.stages]}
+        return curriculum | ({"teacher_scores_m": scores} if scores else {})
 
     def network(self, model: Any, env: TaskVecEnv) -> Network:  # noqa: ANN401
         """Return the student as it stands."""

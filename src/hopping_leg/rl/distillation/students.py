@@ -183,7 +183,7 @@ class WindowStudent(nn.Module):
         size: Entries of an observation.
         hidden: Its layers.
         room: Ticks from which it learns, the newest.
-        activation: Of the hidden layers.
+        activation: Activation of the hidden layers.
     """
 
     def __init__(

@@ -67,7 +67,7 @@ class CommandCorrection:
         """Aim lower where hops were too high.
 
         Args:
-            commands: Of recent hops, m.
+            commands: Commands of recent hops, m.
             errors: Apex minus command, m.
             rate: Share of the mean error that is corrected.
         """
@@ -287,7 +287,7 @@ def shift_to_arrival(
     Seen in hindsight: what it would do there is what the student has to ask for before.
 
     Args:
-        observations: Of a rollout, (ticks, n, size).
+        observations: Those of a rollout, (ticks, n, size).
         begun: Whose episode began with a tick, (ticks, n).
         late: Ticks until an action arrives, (n,).
         first: Entry with which the true state begins.

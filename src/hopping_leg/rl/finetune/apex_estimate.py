@@ -25,7 +25,7 @@ from hopping_leg.hop_detection import find_hops
 from hopping_leg.rl.checkpoint import Tree
 from hopping_leg.rl.finetune.command_correction import robust_line
 from hopping_leg.rl.finetune.simulated import hop_many, traces_of
-from hopping_leg.rl.finetune.trial_data import TrialData
+from hopping_leg.rl.finetune.trial_data import ApexEstimate, TrialData
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import JOINTS, Robot
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, Range, sample
@@ -69,7 +69,7 @@ class ContactConfig:
     learning_rate: float = 2e-3
     """Falls along a cosine."""
     seed: int = 5
-    """Of legs, commands and weights: runs of one policy and robot share what is learnt."""
+    """Seed of legs, commands and weights: runs of one policy and robot share what is learnt."""
 
 
 class ContactEstimator:
@@ -101,7 +101,7 @@ class ContactEstimator:
         Args:
             data: What they measured.
             flying: Whether the foot was in the air, (ticks, n).
-            seed: Of weights, noise and batches.
+            seed: Seed of weights, noise and batches.
         """
         o, rng = self._options, np.random.default_rng(seed)
         noise = rng.standard_normal((*data.q.shape[:2], 6)) * _sensor_noise()
@@ -157,7 +157,7 @@ def doubtful_legs(
         controller: Has the legs.
         robot: The believed one.
         commands: Lowest and highest, m.
-        seed: Of legs, commands and simulation.
+        seed: Seed of legs, commands and simulation.
         o: How many and how long.
     """
     rng = np.random.default_rng(seed)
@@ -196,23 +196,6 @@ _BOUNCE = 0.02
 
 _NEAR = 0.06
 """Largest distance of an estimated apex from the true one that is taken for the same, s."""
-
-
-@dataclass(frozen=True)
-class ApexEstimate:
-    """What is reckoned of n outings.
-
-    Attributes:
-        height: Of the base, m, (ticks, n).
-        rate: Its derivative, m/s, (ticks, n).
-        flying: Whether the foot was in the air, (ticks, n).
-        apexes: Per outing tick and height of every apex, m, (hops, 2).
-    """
-
-    height: Array
-    rate: Array
-    flying: BoolArray
-    apexes: list[Array]
 
 
 class ApexEstimator:

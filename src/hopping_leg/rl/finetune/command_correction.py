@@ -77,7 +77,7 @@ class LinearCommandCorrection:
         """Return the aim after hops.
 
         Args:
-            command: Of every hop, m, (hops,).
+            command: Command of every hop, m, (hops,).
             error: Apex minus command, m, (hops,).
             options: How fast.
         """

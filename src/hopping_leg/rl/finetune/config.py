@@ -13,7 +13,7 @@ from hopping_leg.rl.finetune.learner import SacConfig
 
 @dataclass(frozen=True)
 class StoppingRules:
-    """Of stopping and throwing back; errors are those estimated on checks."""
+    """When to stop and when to roll back; errors are those estimated on checks."""
 
     minutes: float = 10.0
     """Robot time at most."""
@@ -32,7 +32,7 @@ class StoppingRules:
         """Tell whether the last checks are too bad beside the best.
 
         Args:
-            errors: Of all checks since the last policy was rolled back, and of the best, m.
+            errors: Errors of all checks since the last policy was rolled back, and of the best, m.
         """
         latest = errors[-self.confirm :]
         return len(latest) == self.confirm and min(latest) > min(errors) + self.margin
@@ -41,7 +41,7 @@ class StoppingRules:
         """Return why to stop, a sentence; empty to go on.
 
         Args:
-            errors: Of all checks in order, m.
+            errors: Errors of all checks in order, m.
             minutes: Robot time so far.
             following: Robot time of the next outing.
         """
@@ -103,7 +103,7 @@ class FinetuneConfig:
     reward: ApexRewardConfig = field(
         default_factory=lambda: ApexRewardConfig(width=(0.03, 0.015), sharp_from=1e-6, tail=0.5)
     )
-    """Of the estimated apexes."""
+    """Reward of the estimated apexes."""
 
     def __post_init__(self) -> None:
         if self.method not in get_args(Method):

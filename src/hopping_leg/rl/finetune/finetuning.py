@@ -26,11 +26,10 @@ from hopping_leg.rl.checkpoint import (
 )
 from hopping_leg.rl.finetune.command_correction import LinearCommandCorrection
 from hopping_leg.rl.finetune.config import FinetuneConfig
-from hopping_leg.rl.finetune.hops import Score, estimated, score, settled
 from hopping_leg.rl.finetune.learner import Learner
 from hopping_leg.rl.finetune.pretraining import Task, believed_rows, prepare
 from hopping_leg.rl.finetune.replay import ExploringPolicy, TransitionWriter
-from hopping_leg.rl.finetune.trial_data import TrialData
+from hopping_leg.rl.finetune.trial_data import Score, TrialData, estimated, score, settled
 from hopping_leg.rl.onnx_export import Network, build_policy, read_network
 from hopping_leg.trace import Trace
 

@@ -41,7 +41,7 @@ class SacConfig:
     critic: tuple[int, ...] = (128, 128)
     """Hidden layers of the critics."""
     learning_rate: float = 5e-4
-    """Of the critics."""
+    """Learning rate of the critics."""
     actor_share: float = 0.1
     """The actor's learning rate over the critics'."""
     last_layer: bool = False
@@ -58,7 +58,7 @@ class SacConfig:
     entropy: float = 1e-4
     """Worth of the actor's entropy, hardly any."""
     log_std: float = -3.8
-    """Of gSDE's weights: as quiet as the recipe `fast` ends."""
+    """Log standard deviation of gSDE's weights: as quiet as the recipe `fast` ends."""
     believed_share: float = 0.25
     """Share of a batch from the believed robot, once the real one has been heard of."""
     buffer_size: int = 150_000
@@ -72,7 +72,7 @@ class Learner:
         network: The policy to go on from.
         believed: Transitions of the believed robot, which stay in the replay.
         options: Numbers.
-        seed: Of the critics' weights.
+        seed: Seed of the critics' weights.
     """
 
     def __init__(
@@ -126,7 +126,7 @@ class Learner:
 
         Args:
             steps: How many.
-            seed: Of the batches; stable-baselines3 draws them from numpy's global generator.
+            seed: Seed of the batches; stable-baselines3 draws them from numpy's global generator.
             critics_only: Leave the actor as it is.
         """
         if steps < 1:

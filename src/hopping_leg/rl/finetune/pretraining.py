@@ -31,7 +31,7 @@ class Task:
         policy: The one to go on from.
         robot: The believed leg.
         commands: Lowest and highest, m.
-        seed: Of everything.
+        seed: Seed of everything.
     """
 
     policy: Policy
@@ -88,8 +88,8 @@ def believed_rows(
     Args:
         task: Robot, commands and seed.
         controller: Explores.
-        estimator: Of heights.
-        writer: Of transitions.
+        estimator: Estimates heights.
+        writer: Writes transitions.
         seconds: In all, over ``BELIEVED_LEGS`` legs.
     """
     rng = np.random.default_rng((task.seed, 1))

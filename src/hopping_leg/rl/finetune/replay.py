@@ -18,8 +18,7 @@ from hopping_leg.controllers.protocol import Measurement
 from hopping_leg.envs import Reward
 from hopping_leg.envs.observation import Array32
 from hopping_leg.envs.rewards import Transition
-from hopping_leg.rl.finetune.apex_estimate import ApexEstimate
-from hopping_leg.rl.finetune.trial_data import TrialData
+from hopping_leg.rl.finetune.trial_data import ApexEstimate, TrialData
 from hopping_leg.rl.onnx_export import PREFIX, Network, expose_hidden
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
@@ -117,7 +116,7 @@ class TransitionWriter:
     """Writes transitions.
 
     Args:
-        card: Of the policy.
+        card: Card of the policy.
         network: With the scaling of its inputs.
         robot: The believed leg.
         reward: Judges every tick.

@@ -54,7 +54,7 @@ class SimulatedTrials:
     Args:
         robot: The leg that plays the real one.
         guard: When to stop; None never does.
-        threads: Of the physics.
+        threads: Threads of the physics.
     """
 
     def __init__(self, robot: Robot, guard: Guard | None, threads: int = 1) -> None:
@@ -92,7 +92,7 @@ def hop_many(
         robot: That the controller believes to have.
         robots: What each leg is, n of them.
         commands: Desired heights, m, (ticks, n).
-        seed: Of the simulation.
+        seed: Seed of the simulation.
         timestep: Physics step, s.
     """
     ticks, count = commands.shape

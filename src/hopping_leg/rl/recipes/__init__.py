@@ -53,7 +53,7 @@ def get_recipe(name: str) -> Recipe:
     """Return a shipped recipe, or one of the user's own.
 
     Args:
-        name: Of a shipped one, or ``path/to/file.py:NAME``, a ``Recipe`` or what makes one.
+        name: Name of a shipped one, or ``path/to/file.py:NAME``, a ``Recipe`` or what makes one.
 
     Raises:
         UsageError: There is no such recipe.
@@ -166,7 +166,7 @@ def recipe_of(name: str, options: dict[str, Any]) -> Recipe:
     """Return the recipe that a run was asked for, the inverse of ``words_of``.
 
     Args:
-        name: Of the recipe.
+        name: Name of the recipe.
         options: As in the run's ``config.json``.
 
     Raises:
