@@ -3,9 +3,10 @@ import json
 import numpy as np
 import polars as pl
 import pytest
+from studies.shared import main
+from studies.speed.deploy_options import Deploy
 from studies.speed.emulated_truth import Truth, apexes_of
 
-from hopping_leg.cli import main
 from hopping_leg.deploy.motion_sequence import Part
 from hopping_leg.trace import Trace
 
@@ -30,8 +31,8 @@ def test_apexes_are_matched_with_what_was_commanded():
 @pytest.mark.slow
 def test_the_benchmark_hops_through_the_wire_as_in_process(tmp_path):
     file = tmp_path / "deploy.json"
-    words = ["bench", "deploy", "--controller", "energy-shaping", "--minutes", "0.05"]
-    assert main([*words, "--seconds", "4", "--json", str(file)]) == 0
+    words = ["--controller", "energy-shaping", "--minutes", "0.05", "--seconds", "4"]
+    assert main("speed", Deploy, [*words, "--json", str(file)]) == 0
     result = json.loads(file.read_text())
     assert 0 <= result["share_on_time"] <= 1
     for name in ("tick_us", "wake_late_us"):
