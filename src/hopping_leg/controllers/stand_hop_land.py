@@ -14,9 +14,9 @@ from hopping_leg.controllers.energy_shaping.observer import DatedObserver
 from hopping_leg.controllers.energy_shaping.phases import FLIGHT_LIMIT, TouchdownDetector
 from hopping_leg.controllers.energy_shaping.virtual_leg import (
     LegView,
+    flight_torque,
     foot_force_torque,
     leg_force,
-    per_joint,
     retraction,
     view_leg,
 )
@@ -78,7 +78,7 @@ class Landing:
         self._stiffness = gains.stiffness * self._weight / reach
         self._damping = gains.damping * self._weight / np.sqrt(reach * GRAVITY)
         self._waiting = landing_posture(robot, gains)
-        self._detector = TouchdownDetector(count, debounced=True)
+        self._detector = TouchdownDetector(robot, count, debounced=True)
         self._from = np.tile(self._waiting, (count, 1))
 
     def begin(self, who: BoolArray, q: Array) -> None:
@@ -94,15 +94,8 @@ class Landing:
         """
         gains = self._shared
         target, rate = retraction(self._from, self._waiting, clock, gains.retract_time)
-        torque = per_joint(gains.hip_stiffness, gains.knee_stiffness) * (target - leg.q)
-        torque += per_joint(gains.hip_damping, gains.knee_damping) * (rate - leg.qd)
-        along = kinematics.jacobian(self.robot, leg.q)[:, 0]
-        met = self._detector.update(
-            leg.rate - np.einsum("ni,ni->n", along, rate),
-            leg_force(self.robot, leg.q, torque),
-            gains.touchdown_rate,
-            gains.touchdown_force,
-        )
+        torque = flight_torque(gains, leg, target, rate)
+        met = self._detector.update(leg, rate, torque, gains)
         return torque, (met & (clock >= gains.flight_min)) | (clock > FLIGHT_LIMIT)
 
     def brake(self, leg: LegView) -> Array:

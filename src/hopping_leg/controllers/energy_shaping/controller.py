@@ -21,9 +21,8 @@ from hopping_leg.controllers.energy_shaping.phases import (
 )
 from hopping_leg.controllers.energy_shaping.virtual_leg import (
     LegView,
+    flight_torque,
     foot_force_torque,
-    leg_force,
-    per_joint,
     retraction,
     view_leg,
 )
@@ -93,7 +92,9 @@ class EnergyShaping:
         else:
             self._observer = LatestObserver()
         self._observer.reset(count)
-        self._detector = TouchdownDetector(count, debounced=options.contact == "debounced")
+        self._detector = TouchdownDetector(
+            self.robot, count, debounced=options.contact == "debounced"
+        )
         self._phases = Phases(count)
         self._k_ratio = np.ones(count)
         self._length_0 = np.full(count, np.nan)
@@ -119,8 +120,7 @@ class EnergyShaping:
         self._end_touchdown(leg, command)
         self._end_push(leg, liftoff)
         posture, posture_rate = self._posture(landing)
-        flying = per_joint(gains.hip_stiffness, gains.knee_stiffness) * (posture - leg.q)
-        flying += per_joint(gains.hip_damping, gains.knee_damping) * (posture_rate - leg.qd)
+        flying = flight_torque(gains, leg, posture, posture_rate)
         self._end_flight(leg, posture_rate, flying, command)
         self._estimate_height(leg)
         pressing = foot_force_torque(
@@ -193,14 +193,7 @@ class EnergyShaping:
 
     def _end_flight(self, leg: LegView, posture_rate: Array, flying: Array, command: Array) -> None:
         gains, clock = self.gains, self._phases.clock
-        along = kinematics.jacobian(self.robot, leg.q)[:, 0]
-        planned = np.einsum("ni,ni->n", along, posture_rate)
-        pushed = self._detector.update(
-            leg.rate - planned,
-            leg_force(self.robot, leg.q, flying),
-            gains.touchdown_rate,
-            gains.touchdown_force,
-        )
+        pushed = self._detector.update(leg, posture_rate, flying, gains)
         shortest = gains.flight_min + gains.flight_min_slope * (command - gains.reference)
         touched = pushed & (clock > shortest)
         if self.options.contact == "true":

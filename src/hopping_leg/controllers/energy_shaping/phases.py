@@ -8,7 +8,10 @@ from enum import IntEnum
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.controllers.energy_shaping.gains import Gain
+from hopping_leg.controllers.energy_shaping.gains import ShapingGains
+from hopping_leg.controllers.energy_shaping.virtual_leg import LegView, leg_force
+from hopping_leg.robot import kinematics
+from hopping_leg.robot.parameters import Robot
 
 PUSH_LIMIT = 0.4
 """Longest push, s: a leg that has not reached lift-off by then gives up and tries afresh."""
@@ -65,32 +68,34 @@ class TouchdownDetector:
     """Watches how the leg deviates from the planned retraction.
 
     Args:
+        robot: The leg.
         count: Number of legs n.
         debounced: Judge the median of the last three ticks, so that one noisy sample cannot fake
             a touchdown.
     """
 
-    def __init__(self, count: int, *, debounced: bool) -> None:
-        depth = _MEMORY if debounced else 1
+    def __init__(self, robot: Robot, count: int, *, debounced: bool) -> None:
+        self._robot, depth = robot, _MEMORY if debounced else 1
         self._excess = np.zeros((depth, count))
         self._resisting = np.zeros((depth, count))
 
-    def update(
-        self, excess: Array, force: Array, least_excess: Gain, least_force: Gain
-    ) -> BoolArray:
+    def update(self, leg: LegView, planned: Array, torque: Array, gains: ShapingGains) -> BoolArray:
         """Return which legs meet the ground, (n,).
 
         A soft leg gives way, a stiff one resists: either shows it.
 
         Args:
-            excess: Leg rate less the planned one, m/s, (n,).
-            force: With which the flight PD extends the leg, N, (n,).
-            least_excess: Threshold, negative, m/s.
-            least_force: Threshold, N.
+            leg: State of the legs.
+            planned: Joint velocities of the retraction, rad/s, (n, 2).
+            torque: Joint torques of the flight PD, N m, (n, 2).
+            gains: Thresholds of leg rate and force.
         """
+        along = kinematics.jacobian(self._robot, leg.q)[:, 0]
+        excess = leg.rate - np.einsum("ni,ni->n", along, planned)
+        force = leg_force(self._robot, leg.q, torque)
         for history, newest in ((self._excess, excess), (self._resisting, force)):
             history[1:] = history[:-1].copy()
             history[0] = newest
-        yields: BoolArray = np.median(self._excess, axis=0) < least_excess
-        resists: BoolArray = np.median(self._resisting, axis=0) > least_force
+        yields: BoolArray = np.median(self._excess, axis=0) < gains.touchdown_rate
+        resists: BoolArray = np.median(self._resisting, axis=0) > gains.touchdown_force
         return yields | resists

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.energy_shaping.gains import Gain
+from hopping_leg.controllers.energy_shaping.gains import Gain, ShapingGains
 from hopping_leg.controllers.energy_shaping.observer import JointState
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
@@ -109,6 +109,13 @@ def retraction(start: Array, end: Array, elapsed: Array, duration: Gain) -> tupl
     return start + (end - start) * smooth_step(share), (end - start) * smooth_step_rate(
         share
     ) / lasts
+
+
+def flight_torque(gains: ShapingGains, leg: LegView, target: Array, rate: Array) -> Array:
+    """Return the torques of the flight PD towards a posture that moves, N m, (n, 2)."""
+    torque = per_joint(gains.hip_stiffness, gains.knee_stiffness) * (target - leg.q)
+    torque += per_joint(gains.hip_damping, gains.knee_damping) * (rate - leg.qd)
+    return torque
 
 
 def per_joint(hip: Gain, knee: Gain) -> Array:
