@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hopping_leg.errors import UsageError
+from hopping_leg.rl.parallel_seeds import ParallelSeeds
 from hopping_leg.rl.recipes import (
     RECIPES,
     VARIANTS,
@@ -33,7 +34,7 @@ from hopping_leg.sim.randomization import Range
 def test_a_cards_changes_give_the_recipe_again(name, steps, rate, privileged):
     recipe = get_recipe(name).replace(steps=steps, learning_rate=rate, privileged_critic=privileged)
     stored = dataclasses.asdict(recipe)
-    assert change(get_recipe(name), changes_of(name, stored)) == recipe
+    assert change(get_recipe(name), changes_of(get_recipe(name), stored)) == recipe
 
 
 def test_numbers_of_a_part_are_changed_by_its_name():
@@ -43,9 +44,9 @@ def test_numbers_of_a_part_are_changed_by_its_name():
     assert changed.reward.width == usual.reward.width
     assert (changed.value("dagger.batch_size"), changed.schedule) == (7, usual.schedule)
     stored = dataclasses.asdict(changed)
-    assert change(usual, changes_of("precise", stored)) == changed
+    assert change(usual, changes_of(usual, stored)) == changed
     del stored["reward"]["energy_beyond"]
-    assert "reward.energy_beyond=0.03" not in changes_of("precise", stored)
+    assert "reward.energy_beyond=0.03" not in changes_of(usual, stored)
 
 
 @pytest.mark.parametrize(
@@ -141,7 +142,7 @@ def test_the_recipe_comes_first_and_every_variant_differs(recipe):
 def test_a_memory_is_chosen_by_its_name():
     gru = change(get_recipe("precise"), ["student.memory=gru"])
     assert gru.distillation.student.memory == "gru"
-    assert changes_of("precise", dataclasses.asdict(gru)) == ["student.memory=gru"]
+    assert changes_of(get_recipe("precise"), dataclasses.asdict(gru)) == ["student.memory=gru"]
     with pytest.raises(UsageError, match="window"):
         change(gru, ["student.memory=lstm"])
 
@@ -153,6 +154,10 @@ def test_a_recipe_of_ones_own_is_named_by_its_file(tmp_path):
     assert quiet.make_reward(robot).names[-1] == "torque"
     folder = RunFolder(tmp_path, quiet, robot, 0, None)
     assert f"--recipe {file}:QUIET" in folder.command
+    slow = RunFolder(tmp_path, quiet.replace(n_epochs=2), robot, 0, None)
+    assert slow.command.endswith("--set n_epochs=2")
+    with pytest.raises(UsageError, match="one --seed after the other"):
+        ParallelSeeds(quiet, robot, 0, tmp_path, 2).train()
     folder.write("config.json", folder.config)
     RunFolder(tmp_path, get_recipe(f"{file}:QUIET"), robot, 0, None).check_same()
     with pytest.raises(UsageError, match="is no recipe"):

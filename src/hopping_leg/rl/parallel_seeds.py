@@ -86,6 +86,11 @@ class ParallelSeeds:
             raise UsageError(
                 "--source begins from one run's checkpoint; leave --parallel-seeds out."
             )
+        if self.recipe.source is not None:
+            raise UsageError(
+                f"Recipe {self.recipe.source} is known to this process alone; leave"
+                " --parallel-seeds out and train one --seed after the other."
+            )
         check(self.robot, self.minutes, self.log)
         recipe = self.recipe.fit(self.robot)
         folder = RunFolder(

@@ -75,13 +75,8 @@ class RunFolder:
     def command(self) -> str:
         """The command that makes such a run."""
         config = self.config
-        words = [
-            "hop train",
-            "--recipe",
-            config["options"]["source"] or config["recipe"],
-            "--robot",
-            config["robot"],
-        ]
+        recipe = config["options"]["source"] or config["recipe"]
+        words = ["hop train", "--recipe", recipe, "--robot", config["robot"]]
         words += ["--seed", str(config["seed"])]
         if config["source"] is not None:
             words += ["--source", config["source"]]

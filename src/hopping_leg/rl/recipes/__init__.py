@@ -126,31 +126,29 @@ def settings_of(recipe: Recipe) -> dict[str, int | float | str]:
     }
 
 
-def changes_of(recipe: str, options: dict[str, Any]) -> list[str]:
+def changes_of(usual: Recipe, options: dict[str, Any]) -> list[str]:
     """Return the ``name=value`` entries in which stored options differ from a recipe's defaults.
 
     Args:
-        recipe: Name of the recipe; one that is not shipped has no defaults.
+        usual: The recipe as it is given by its name.
         options: As in a run's ``config.json``.
     """
-    if recipe not in RECIPES:
-        return []
-    usual = RECIPES[recipe]
     paths = dict(usual.paths())
     stored = {name: _at(options, paths[name], v) for name, v in settings_of(usual).items()}
     return [f"{name}={v}" for name, v in stored.items() if v != usual.value(name)]
 
 
-def words_of(recipe: str, options: dict[str, Any]) -> list[str]:
-    """Return the options of ``hop train`` that make a recipe of its defaults.
+def words_of(name: str, options: dict[str, Any]) -> list[str]:
+    """Return the options of ``hop train`` beside ``--recipe`` that make a recipe.
 
     Args:
-        recipe: Name of the recipe; one that is not shipped has no defaults.
+        name: Name of the recipe; one that is neither shipped nor a file's has no defaults.
         options: As in a run's ``config.json``.
     """
-    if recipe not in RECIPES:
+    given = options.get("source") or name
+    if name not in RECIPES and given == name:
         return []
-    usual, words = RECIPES[recipe], list[str]()
+    usual, words = get_recipe(given), list[str]()
     ranges, seen = _ranges_of(options["task"]["randomised"]), options["task"]["observation"]
     if ranges not in (None, _ranges_of([asdict(r) for r in usual.task.randomised])):
         words += ["--randomise", ranges]
@@ -158,7 +156,7 @@ def words_of(recipe: str, options: dict[str, Any]) -> list[str]:
         words += ["--observation", seen]
     if options.get("heights"):
         words += ["--heights", *map(str, options["heights"])]
-    changes = changes_of(recipe, options)
+    changes = changes_of(usual, options)
     return [*words, "--set", *changes] if changes else words
 
 
@@ -172,7 +170,8 @@ def recipe_of(name: str, options: dict[str, Any]) -> Recipe:
     Raises:
         UsageError: There is no such recipe.
     """
-    recipe = change(get_recipe(name), changes_of(name, options))
+    usual = get_recipe(options.get("source") or name)
+    recipe = change(usual, changes_of(usual, options))
     ranges = _ranges_of(options["task"]["randomised"])
     if ranges is not None:
         recipe = randomise(recipe, ranges)
