@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from hopping_leg.cli import guard, read_options
-from hopping_leg.cli.command_line import KEPT, command_line, verb_of
+from hopping_leg.cli.options import KEPT, command_line, verb_of
 from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically, write_json
 

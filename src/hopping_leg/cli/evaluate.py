@@ -21,8 +21,7 @@ from typing import Literal
 import tyro
 from rich.console import Console
 
-from hopping_leg.cli.command_line import command_line
-from hopping_leg.cli.options import Heights
+from hopping_leg.cli.options import Heights, check_file, command_line, say_written
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Entry, EvaluationRun, evaluate
@@ -132,25 +131,7 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
     if args.report:
         videos = render_videos(judged, setup.robot) if args.video else None
         write_atomically(args.report, write_report(judged, videos))
-    say_written(console, args.json, args.report, args.traces)
-
-
-def check_file(path: Path | None) -> None:
-    """Make the folder of a file that will be written.
-
-    Raises:
-        UsageError: It is a folder itself.
-    """
-    if path and path.is_dir():
-        raise UsageError(f"{path} is a folder; name a file.")
-    if path:
-        path.parent.mkdir(parents=True, exist_ok=True)
-
-
-def say_written(console: Console, *paths: Path | None) -> None:
-    """Say where files were written."""
-    for path in filter(None, paths):
-        console.print(f"Wrote {path}", highlight=False, soft_wrap=True)
+    say_written(args.json, args.report, args.traces)
 
 
 def _judge(entries: list[Entry], setup: RolloutConfig, args: Evaluate) -> EvaluationRun:

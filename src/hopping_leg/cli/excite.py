@@ -12,25 +12,15 @@ Examples:
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
+import tyro
 
-from hopping_leg.identify import excitation as excitations
-from hopping_leg.identify.excitation import RATE, Excitation, make_excitation
+from hopping_leg.cli.options import JsonFile, RobotFile, say, show_table
+from hopping_leg.identify import paper_excitation as paper
+from hopping_leg.identify.excitation import RATE, Excitation, Multisine, Template, make_excitation
 from hopping_leg.identify.feasibility import HardwareRange, demand
-from hopping_leg.identify.paper_excitation import (
-    AMPLITUDES,
-    DURATION,
-    PERIODS,
-    SWINGS,
-    Bend,
-    adapt,
-    fixed_base,
-    moving_base,
-)
 from hopping_leg.identify.recording_format import Pair
 from hopping_leg.io import write_json
 from hopping_leg.robot import Robot, load_robot
@@ -40,12 +30,10 @@ from hopping_leg.robot import Robot, load_robot
 class Common:
     """What every excitation needs."""
 
-    robot: str = "legv2"
-    """A shipped name or the path of a .toml file."""
+    robot: RobotFile = "legv2"
     out: Path = Path("excitation.parquet")
     """Parquet file to write."""
-    json: Path | None = None
-    """Write what it asks of the joints to this file as JSON."""
+    json: JsonFile = None
     rate: float = RATE
     """Targets per second, Hz."""
     track_velocity: bool = False
@@ -58,18 +46,18 @@ class Common:
 
 
 @dataclass(frozen=True)
-class Grid:
-    """The paper's template."""
+class MovingBase(Common):
+    """The paper's moving-base trajectory: vertical strokes on the ground."""
 
-    amplitudes: tuple[float, ...] = AMPLITUDES
-    """A of the paper, m."""
-    periods: tuple[float, ...] = PERIODS
-    """T1 of the paper, s."""
-    duration: float = DURATION
-    """All in all, s."""
+    amplitudes: tuple[float, ...] = paper.AMPLITUDES
+    """Amplitudes of the strokes, the paper's A, m."""
+    periods: tuple[float, ...] = paper.PERIODS
+    """Periods of the strokes, the paper's T1, s."""
+    duration: float = paper.DURATION
+    """Duration of all strokes together, s."""
     margin: float = 0.0
     """How far the leg stays from straight, m; 0 is the paper's text, 0.005 the lab's recordings."""
-    bend: Bend = "backward"
+    bend: paper.Bend = "backward"
     """Side of the knee; the lab's fixed-base recordings bend forward."""
     every_pair: bool = False
     """Combine every amplitude with every period instead of the first with the first and so on."""
@@ -78,20 +66,15 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class FixedBase(Common, Grid):
+class FixedBase(MovingBase):
     """The paper's fixed-base trajectory: the foot strokes while the leg swings."""
 
-    swings: tuple[float, ...] = SWINGS
-    """T2 of the paper, s."""
+    swings: tuple[float, ...] = paper.SWINGS
+    """Periods of the swinging leg, the paper's T2, s."""
 
 
 @dataclass(frozen=True)
-class MovingBase(Common, Grid):
-    """The paper's moving-base trajectory: vertical strokes on the ground."""
-
-
-@dataclass(frozen=True)
-class Multisine(Common):
+class MultisineCommand(Common):
     """Harmonics of hip and knee around a posture, base clamped."""
 
     centre: Pair = (0.7, -1.4)
@@ -103,51 +86,55 @@ class Multisine(Common):
     highest: float = 4.0
     """Highest frequency, Hz."""
     duration: float = 60.0
-    """All in all, s."""
+    """Duration of the trajectory, s."""
 
 
-def run(args: FixedBase | MovingBase | Multisine) -> None:
+def run(
+    args: FixedBase
+    | MovingBase
+    | Annotated[MultisineCommand, tyro.conf.subcommand(name="multisine")],
+) -> None:
     """Write an excitation."""
     robot = load_robot(args.robot)
     limits = HardwareRange(args.hip_range, args.knee_range)
-    template: excitations.Template
-    if isinstance(args, Multisine):
-        sines = (args.centre, args.amplitude, args.lowest, args.highest, args.duration)
-        template = excitations.Multisine(*sines)
-    else:
-        strokes = moving_base
-        if isinstance(args, FixedBase):
-            strokes = partial(fixed_base, swings=args.swings)
-        template = strokes(
-            args.amplitudes,
-            args.periods,
-            duration=args.duration,
-            margin=args.margin,
-            bend=args.bend,
-            every_pair=args.every_pair,
-        )
-        if args.adapt:
-            template = adapt(template, robot, rate=args.rate, limits=limits)
     excitation = make_excitation(
-        template, robot, rate=args.rate, limits=limits, track_velocity=args.track_velocity
+        _template(args, robot, limits),
+        robot,
+        rate=args.rate,
+        limits=limits,
+        track_velocity=args.track_velocity,
     )
     excitation.save(args.out)
     facts = _facts(excitation, robot)
     if args.json:
         write_json(args.json, facts)
-    table = Table(
-        "", "hip", "knee", title=f"{args.out}: {len(excitation)} targets for {robot.name}"
+    show_table(
+        ("", "hip", "knee"),
+        [(name, *(f"{x:.3g}" for x in pair)) for name, pair in facts["largest"].items()],
+        f"{args.out}: {len(excitation)} targets for {robot.name}",
     )
-    for name, (hip, knee) in facts["largest"].items():
-        table.add_row(name, f"{hip:.3g}", f"{knee:.3g}")
-    console = Console()
-    console.print(table)
-    console.print(excitation.description.replace("; ", "\n"), highlight=False)
+    say(*excitation.description.split("; "))
+
+
+def _template(args: MovingBase | MultisineCommand, robot: Robot, limits: HardwareRange) -> Template:
+    if isinstance(args, MultisineCommand):
+        return Multisine(args.centre, args.amplitude, args.lowest, args.highest, args.duration)
+    make = paper.moving_base
+    if isinstance(args, FixedBase):
+        make = partial(paper.fixed_base, swings=args.swings)
+    strokes = make(
+        args.amplitudes,
+        args.periods,
+        duration=args.duration,
+        margin=args.margin,
+        bend=args.bend,
+        every_pair=args.every_pair,
+    )
+    return paper.adapt(strokes, robot, rate=args.rate, limits=limits) if args.adapt else strokes
 
 
 def _facts(excitation: Excitation, robot: Robot) -> dict[str, Any]:
     asked = demand(robot, excitation.rig, excitation.position, excitation.rate)
-    largest = {"speed_rad_s": asked.velocity, "torque_nm": asked.torque}
     return {
         "robot": robot.name,
         "rig": excitation.rig,
@@ -158,6 +145,7 @@ def _facts(excitation: Excitation, robot: Robot) -> dict[str, Any]:
         "largest": {
             "lower_rad": asked.position.min(axis=0).tolist(),
             "upper_rad": asked.position.max(axis=0).tolist(),
-            **{name: np.abs(values).max(axis=0).tolist() for name, values in largest.items()},
+            "speed_rad_s": np.abs(asked.velocity).max(axis=0).tolist(),
+            "torque_nm": np.abs(asked.torque).max(axis=0).tolist(),
         },
     }

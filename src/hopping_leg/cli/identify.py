@@ -23,7 +23,7 @@ import tyro
 from rich.console import Console
 from rich.table import Column, Table
 
-from hopping_leg.cli.command_line import command_line
+from hopping_leg.cli.options import command_line
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.optimizers import CmaOptions
 from hopping_leg.identify.pipeline import IdentifyOptions, identify

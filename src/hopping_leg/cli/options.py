@@ -1,8 +1,16 @@
-"""Option types that several verbs share."""
+"""What verbs share: types and checks of options, the command behind a result, printed tables."""
 
-from typing import Annotated
+import dataclasses
+import re
+import shlex
+from collections.abc import Collection, Iterable, Iterator
+from pathlib import Path
+from typing import Annotated, Any, get_args, get_type_hints
 
 import tyro
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Column, Table
 
 from hopping_leg.errors import UsageError
 
@@ -33,14 +41,112 @@ Heights = Annotated[
 ]
 """Heights in metres, given as ``0.25,0.30``."""
 
+RobotFile = Annotated[str, tyro.conf.arg(help="A shipped robot or the path of a .toml file.")]
+JsonFile = Annotated[
+    Path | None, tyro.conf.arg(help="JSON file for every number, besides what is printed.")
+]
 
-def at_least(least: int, **values: int) -> None:
-    """Refuse options below their least sensible value."""
+
+def at_least(least: int, **values: int | None) -> None:
+    """Refuse options below their least sensible value; None is an option that was not given."""
     for name, value in values.items():
-        if value < least:
-            raise UsageError(f"--{name} is {value} but must be {least} or more.")
+        if value is not None and value < least:
+            flag = name.replace("_", "-")
+            raise UsageError(f"--{flag} is {value} but must be {least} or more.")
+
+
+def check_file(path: Path | None) -> None:
+    """Make the folder of a file that will be written.
+
+    Raises:
+        UsageError: It is a folder itself.
+    """
+    if path and path.is_dir():
+        raise UsageError(f"{path} is a folder; name a file.")
+    if path:
+        path.parent.mkdir(parents=True, exist_ok=True)
 
 
 def mm(metres: float | None) -> str:
     """Return a length in mm as a table shows it."""
     return "no hops" if metres is None else f"{metres * 1e3:.2f}"
+
+
+def say(*lines: object) -> None:
+    """Print lines as they are, unwrapped and without markup."""
+    for line in lines:
+        Console().print(str(line), soft_wrap=True, highlight=False, markup=False)
+
+
+def say_written(*paths: Path | None) -> None:
+    """Say where files were written."""
+    say(*(f"Wrote {path}" for path in paths if path))
+
+
+def show_table(
+    columns: Iterable[Column | str], rows: Iterable[Iterable[object]], title: str | None = None
+) -> None:
+    """Print a table of cells as they are, without markup."""
+    table = Table(*columns, title=title and escape(title))
+    for row in rows:
+        table.add_row(*(escape(str(cell)) for cell in row))
+    Console().print(table)
+
+
+KEPT = frozenset({"out", "folder", "figure", "resume", "jobs", "ray"})
+"""Options that only say where results are kept and who computes them."""
+
+
+def command_line(verb: str, args: Any, leave_out: Collection[str] = KEPT) -> str:  # noqa: ANN401
+    """Return a command whose options have the values of a dataclass, as the shell reads it.
+
+    Options with their default values are left out; those of dataclasses among the fields stand
+    beside the others.
+
+    Args:
+        verb: What comes before the options, e.g. ``python -m studies.speed env``.
+        args: The dataclass that tyro reads the options into.
+        leave_out: Names of further fields to leave out.
+    """
+    before, behind = verb.split(), []
+    for name, value, hint in _given(args, leave_out):
+        marks = list(_marks(hint))
+        flag = f"--{name.replace('_', '-')}"
+        if isinstance(value, bool):
+            behind.append(flag if value else f"--no-{flag[2:]}")
+        elif any(mark is tyro.conf.Positional for mark in marks):
+            before += _words(value, marks)
+        else:
+            behind += [flag, *_words(value, marks)]
+    return shlex.join([*before, *behind])
+
+
+def verb_of(args: object) -> str:
+    """Return the name that tyro gives to a dataclass as a subcommand, e.g. ``energy-shaping``."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "-", type(args).__name__).lower()
+
+
+def _given(args: Any, leave_out: Collection[str]) -> Iterator[tuple[str, Any, Any]]:  # noqa: ANN401
+    """Yield name, value and annotation of every field that differs from its default."""
+    hints = get_type_hints(type(args), include_extras=True)
+    for field in dataclasses.fields(args):
+        value = getattr(args, field.name)
+        if dataclasses.is_dataclass(value):
+            yield from _given(value, leave_out)
+        elif field.name not in leave_out and value != field.default:
+            yield field.name, value, hints[field.name]
+
+
+def _marks(hint: object) -> Iterator[object]:
+    """Yield what an annotation says beside the type, of every type in it."""
+    yield from getattr(hint, "__metadata__", ())
+    for part in get_args(hint):
+        yield from _marks(part)
+
+
+def _words(value: object, marks: Collection[object]) -> list[str]:
+    """Return a value as tyro reads it; the option's own reader says how, if it has one."""
+    for mark in marks:
+        if isinstance(mark, tyro.constructors.PrimitiveConstructorSpec):
+            return mark.str_from_instance(value)
+    return [str(entry) for entry in (value if isinstance(value, tuple | list) else [value])]

@@ -21,7 +21,7 @@ from pathlib import Path
 import tyro
 from rich.console import Console
 
-from hopping_leg.cli.evaluate import check_file, say_written
+from hopping_leg.cli.options import check_file, say_written
 from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import EvaluationRun
@@ -94,7 +94,7 @@ def _write(args: Page) -> None:
     write_atomically(args.out, page)
     if args.json:
         write_json(args.json, numbers)
-    say_written(console, args.out, args.json)
+    say_written(args.out, args.json)
 
 
 def _draw(args: Figures) -> None:

@@ -14,8 +14,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hopping_leg.cli.command_line import command_line
-from hopping_leg.cli.evaluate import Conditions, say_written
+from hopping_leg.cli.evaluate import Conditions
+from hopping_leg.cli.options import command_line, say_written
 from hopping_leg.evaluate.figures.results import draw_robustness
 from hopping_leg.evaluate.result_cache import ResultCache
 from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
@@ -49,4 +49,4 @@ def run(args: Robustness) -> None:
     write_atomically(figure, to_svg(draw_robustness(result)))
     console = Console()
     print_robustness(console, result)
-    say_written(console, file, figure)
+    say_written(file, figure)

@@ -10,8 +10,8 @@ from typing import Literal
 
 from rich.console import Console
 
-from hopping_leg.cli.command_line import command_line
-from hopping_leg.cli.evaluate import Conditions, say_written
+from hopping_leg.cli.evaluate import Conditions
+from hopping_leg.cli.options import command_line, say_written
 from hopping_leg.evaluate.skills.suite import run_skills
 from hopping_leg.evaluate.tables import print_skills
 from hopping_leg.io import write_json
@@ -44,4 +44,4 @@ def run(args: Skills) -> None:
     print_skills(console, result)
     if args.json:
         write_json(args.json, result)
-        say_written(console, args.json)
+        say_written(args.json)
