@@ -6,8 +6,6 @@ from hopping_leg.controllers.energy_shaping.virtual_leg import (
     foot_force_torque,
     leg_force,
     retraction,
-    smooth_step,
-    smooth_step_rate,
 )
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.model import GRAVITY
@@ -81,9 +79,3 @@ def test_retraction_starts_and_ends_at_rest_at_its_ends():
         q, qd = retraction(start, end, np.array([elapsed]), 0.1)
         np.testing.assert_allclose(q, where)
         np.testing.assert_allclose(qd, 0, atol=1e-12)
-
-
-def test_smooth_step_rate_is_its_derivative():
-    s, h = np.linspace(0.05, 0.95, 19), 1e-6
-    slope = (smooth_step(s + h) - smooth_step(s - h)) / (2 * h)
-    np.testing.assert_allclose(smooth_step_rate(s), slope, rtol=1e-6)

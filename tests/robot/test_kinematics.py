@@ -73,3 +73,9 @@ def test_foot_and_clearances_agree_with_mujoco(seed):
     velocity = jacobian @ data.qvel
     rates = kinematics.foot_velocity(robot, q, qd)[0]
     np.testing.assert_allclose([rate[0] - rates[0], rates[1]], velocity[[2, 0]], atol=1e-9)
+
+
+def test_smooth_step_rate_is_its_derivative():
+    s, h = np.linspace(0.05, 0.95, 19), 1e-6
+    slope = (kinematics.smooth_step(s + h) - kinematics.smooth_step(s - h)) / (2 * h)
+    np.testing.assert_allclose(kinematics.smooth_step_rate(s), slope, rtol=1e-6)

@@ -13,6 +13,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.errors import TraceError, UsageError
 from hopping_leg.identify.feasibility import HardwareRange, check_demand, demand
 from hopping_leg.identify.recording_format import PAIRS, Pair, Rig
+from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import Trace
 
@@ -85,7 +86,7 @@ class Multisine:
             waves = [_wave(t, mine * self.lowest, phases) for t in (time, one)]
             scale = self.amplitude[joint] / max(np.abs(waves[1]).max(), 1e-12)
             fade = np.clip(np.minimum(time, self.duration - time) * self.lowest * 4, 0, 1)
-            smooth = fade**3 * (10 - 15 * fade + 6 * fade**2)
+            smooth = kinematics.smooth_step(fade)
             angles[:, joint] = self.centre[joint] + smooth * scale * waves[0]
         return angles
 

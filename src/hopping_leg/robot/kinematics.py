@@ -88,3 +88,17 @@ def knee_clearance(robot: Robot, height: Array, q: Array) -> Array:
 def base_clearance(robot: Robot, height: Array) -> Array:
     """Return the gap between the base and the ground, m, (...)."""
     return height - robot.base.radius
+
+
+def smooth_step(share: Array) -> Array:
+    """Return the path of least jerk from 0 to 1, at rest at both ends, (...)."""
+    s = np.clip(share, 0.0, 1.0)
+    path: Array = s**3 * (10 - 15 * s + 6 * s**2)
+    return path
+
+
+def smooth_step_rate(share: Array) -> Array:
+    """Return the derivative of ``smooth_step``, (...)."""
+    s = np.clip(share, 0.0, 1.0)
+    rate: Array = 30 * s**2 * (1 - s) ** 2
+    return rate

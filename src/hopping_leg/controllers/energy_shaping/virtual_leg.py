@@ -81,20 +81,6 @@ def leg_force(robot: Robot, q: Array, torque: Array) -> Array:
     return force
 
 
-def smooth_step(share: Array) -> Array:
-    """Return the path of least jerk from 0 to 1, at rest at both ends, (...)."""
-    s = np.clip(share, 0.0, 1.0)
-    path: Array = s**3 * (10 - 15 * s + 6 * s**2)
-    return path
-
-
-def smooth_step_rate(share: Array) -> Array:
-    """Return the derivative of ``smooth_step``, (...)."""
-    s = np.clip(share, 0.0, 1.0)
-    rate: Array = 30 * s**2 * (1 - s) ** 2
-    return rate
-
-
 def retraction(start: Array, end: Array, elapsed: Array, duration: Gain) -> tuple[Array, Array]:
     """Return where the joints should be and how fast, rad and rad/s, (n, 2).
 
@@ -106,9 +92,8 @@ def retraction(start: Array, end: Array, elapsed: Array, duration: Gain) -> tupl
     """
     lasts = np.broadcast_to(duration, elapsed.shape)[:, None]
     share = elapsed[:, None] / lasts
-    return start + (end - start) * smooth_step(share), (end - start) * smooth_step_rate(
-        share
-    ) / lasts
+    rate = (end - start) * kinematics.smooth_step_rate(share) / lasts
+    return start + (end - start) * kinematics.smooth_step(share), rate
 
 
 def flight_torque(gains: ShapingGains, leg: LegView, target: Array, rate: Array) -> Array:
