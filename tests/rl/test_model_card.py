@@ -1,6 +1,7 @@
 import pytest
 
-from hopping_leg.rl.model_card import MISSED, doubt, teacher_scores
+from hopping_leg.rl.model_card import MISSED, curriculum, doubt, teacher_scores
+from hopping_leg.rl.recipes.precise import PRECISE
 
 
 def trials(**errors):
@@ -28,3 +29,11 @@ def test_a_command_between_centimetres_is_not_rounded_to_another():
 def test_a_card_tells_how_teachers_did():
     assert teacher_scores([]) == ""
     assert "Evaluations of the teachers in order: 21.0, 4.1 mm" in teacher_scores([0.021, 0.0041])
+
+
+def test_a_card_tells_who_learnt_until_when():
+    stages = PRECISE.distillation.stages
+    said = curriculum([stage._asdict() for stage in stages])
+    assert "teacher 1 until 25 % (accepted from 7 mm)" in said
+    assert "student until 100 %" in said
+    assert curriculum([]) == ""

@@ -75,7 +75,11 @@ def curriculum(stages: list[dict[str, Any]]) -> str:
     Args:
         stages: In order, see ``Stage``.
     """
-    shown = ", ".join(f"{s['name']} until {100 * s['until']:.0f} %" for s in stages)
+    shown = ", ".join(
+        f"{s['name']} until {100 * s['until']:.0f} %"
+        + (f" (accepted from {1000 * s['must_score']:g} mm)" if s["must_score"] else "")
+        for s in stages
+    )
     return f"- Curriculum, at the latest: {shown} of the training.\n" if stages else ""
 
 
