@@ -2,7 +2,7 @@
 
 import sys
 
-from studies.ablations.options import Ablation
+from studies.ablations.run import Ablation
 from studies.shared import main
 
 if __name__ == "__main__":

@@ -2,8 +2,8 @@
 
 import sys
 
-from studies.energy_shaping.options import EnergyShaping
+from studies.energy_shaping.run import Baseline
 from studies.shared import main
 
 if __name__ == "__main__":
-    sys.exit(main("energy_shaping", EnergyShaping))
+    sys.exit(main("energy_shaping", Baseline))

@@ -2,7 +2,7 @@
 
 import sys
 
-from studies.engines.options import Engines
+from studies.engines.run import Engines
 from studies.shared import main
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 import sys
 
-from studies.fault_campaign.options import Faults
+from studies.fault_campaign.campaign import Faults
 from studies.shared import main
 
 if __name__ == "__main__":

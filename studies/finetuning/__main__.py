@@ -2,7 +2,7 @@
 
 import sys
 
-from studies.finetuning.options import Finetune
+from studies.finetuning.run import Finetune
 from studies.shared import main
 
 if __name__ == "__main__":

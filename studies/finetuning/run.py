@@ -8,20 +8,31 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from rich.console import Console
+from rich.table import Table
 
+from hopping_leg.cli.finetune import guard_of
+from hopping_leg.cli.options import at_least, mm
 from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.policy import Policy
-from hopping_leg.io import write_json
+from hopping_leg.controllers.registry import load_policy
+from hopping_leg.errors import UsageError
+from hopping_leg.figure_style import WIDTH, colour, styled
+from hopping_leg.io import write_atomically, write_json
 from hopping_leg.rl.finetune.config import FinetuneConfig, Method
 from hopping_leg.rl.finetune.finetuning import Row
 from hopping_leg.rl.finetune.pretraining import Task
 from hopping_leg.rl.finetune.running import POLICY, RESULT, finetune
 from hopping_leg.rl.finetune.simulated import Guard, SimulatedTrials
 from hopping_leg.rl.finetune.trial_data import score
+from hopping_leg.robot import load_robot
 from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim.twins import draw_twin
 
 FIRST_JUDGE = 1000
 """Of the seeds that judge; none of them has chosen anything."""
@@ -178,3 +189,128 @@ def _ending(result: dict[str, Any]) -> Row:
         "first_estimated_error_m": result["first_check"]["error_m"],
         "best_estimated_error_m": result["best_check"]["error_m"],
     }
+
+
+@dataclass(frozen=True)
+class Finetune:
+    """Continue a policy's training on drawn twins by every method; judge it on other seeds."""
+
+    policy: str = "fast"
+    """A shipped policy or an .onnx file."""
+    robot: str = "legv2-paper"
+    """What is believed of the leg; the twins are drawn around it."""
+    twins: tuple[int, ...] = (0, 1)
+    """Seeds of the twins."""
+    methods: tuple[Literal["aim", "sac", "both"], ...] = ("aim", "sac", "both")
+    """What is learnt."""
+    seeds: tuple[int, ...] = (0, 1, 2)
+    """Of the runs, one of each method and twin each."""
+    minutes: float = 10.0
+    """Robot time of a run at most."""
+    judges: int = 3
+    """Judging outings of each policy."""
+    folder: Path = Path("runs/bench-finetune")
+    """Where the runs are kept; finished ones are not repeated, killed ones go on."""
+    figure: Path | None = None
+    """Draw the errors over robot time to this file, .svg."""
+    json: Path | None = None
+    """Write every number to this file."""
+
+    def measure(self) -> dict[str, Any]:
+        """Run it, print a table, return every number."""
+        from hopping_leg.figure_style import to_svg
+        from hopping_leg.rl.finetune.config import FinetuneConfig, StoppingRules
+
+        at_least(1, judges=self.judges)
+        at_least(0, **{f"seeds {seed}": seed for seed in (*self.seeds, *self.twins)})
+        if not (self.twins and self.methods and self.seeds):
+            raise UsageError("--twins, --methods and --seeds each need at least one entry.")
+        policy, robot = load_policy(self.policy), load_robot(self.robot)
+        console = Console()
+        result = measure(
+            Study(
+                policy,
+                robot,
+                tuple(draw_twin(seed, self.robot).robot for seed in self.twins),
+                self.methods,
+                self.seeds,
+                FinetuneConfig(stopping_rules=StoppingRules(minutes=self.minutes)),
+                guard_of(robot, policy.card.rate),
+                self.folder,
+                judges=self.judges,
+            ),
+            lambda text: console.print(text, highlight=False),
+        )
+        if self.figure is not None:
+            write_atomically(self.figure, to_svg(draw_finetuning(result)))
+        _print(console, result)
+        return result
+
+
+def _print(console: Console, result: dict[str, Any]) -> None:
+    table = Table("twin", "method", "|error|, mm", "best seed", "worst seed", "ended early")
+    for row in result["rows"]:
+        numbers = [mm(row[key]) for key in ("median_abs_error_m", "best_m", "worst_m")]
+        table.add_row(row["twin"], row["method"], *numbers, str(row["ended_early"]))
+    console.print(table)
+
+
+_TOP = 0.97
+"""Where crosses are drawn, of the panel's height; those of later methods a little lower."""
+
+
+@styled
+def draw_finetuning(result: dict[str, Any]) -> Figure:
+    """Draw the true error of every check, one panel per twin, one colour per method.
+
+    Args:
+        result: JSON values of ``hop bench finetune``; estimated errors are drawn as dots, checks
+            that were ended early, which have no error, as crosses at the top.
+    """
+    curves = [row for row in result["curves"] if row["kind"] == "check"]
+    twins = list(dict.fromkeys(row["twin"] for row in curves))
+    methods = list(dict.fromkeys(row["method"] for row in curves))
+    figure = Figure(figsize=(WIDTH, 3.2), layout="constrained")
+    panels = figure.subplots(1, len(twins), sharey=True, squeeze=False)[0]
+    for panel, twin in zip(panels, twins, strict=True):
+        for index, method in enumerate(methods):
+            mine = [r for r in curves if (r["twin"], r["method"]) == (twin, method)]
+            _draw(panel, mine, method, index)
+        panel.set_title(twin)
+        panel.set_xlabel("robot time / min")
+        panel.margins(y=0.12)
+    panels[0].set_ylim(bottom=0)
+    panels[0].set_ylabel("median |apex − command| / mm")
+    panels[0].legend()
+    return figure
+
+
+def _draw(panel: Axes, rows: list[dict[str, Any]], method: str, index: int) -> None:
+    """Draw a line per seed, a dot per estimate and a cross per check that was ended early."""
+    for number, seed in enumerate(dict.fromkeys(row["seed"] for row in rows)):
+        mine = [row for row in rows if row["seed"] == seed]
+        whole = [row for row in mine if not row["ended_early"]]
+        minutes = [row["minutes"] for row in whole]
+        panel.plot(
+            minutes,
+            [1e3 * row["true_error_m"] for row in whole],
+            color=colour(index),
+            linewidth=1.2,
+            label=method if number == 0 else None,
+        )
+        panel.plot(
+            minutes,
+            [1e3 * row["error_m"] for row in whole],
+            ".",
+            color=colour(index),
+            markersize=4,
+        )
+        ended = [row["minutes"] for row in mine if row["ended_early"]]
+        panel.plot(
+            ended,
+            [_TOP - 0.03 * index] * len(ended),
+            "x",
+            color=colour(index),
+            markersize=4,
+            transform=panel.get_xaxis_transform(),
+        )

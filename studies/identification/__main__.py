@@ -2,7 +2,7 @@
 
 import sys
 
-from studies.identification.options import Identify
+from studies.identification.run import Identify
 from studies.shared import main
 
 if __name__ == "__main__":

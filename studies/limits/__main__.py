@@ -2,7 +2,7 @@
 
 import sys
 
-from studies.limits.options import Limits
+from studies.limits.run import Limits
 from studies.shared import main
 
 if __name__ == "__main__":

@@ -6,19 +6,33 @@ with a single disturbance on says which of them costs how much.
 
 import functools
 import itertools
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
 
+from hopping_leg.cli.options import Heights, at_least, mm
 from hopping_leg.controllers import RolloutConfig
+from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.entries import Entry, check_labels, check_range, fingerprint
 from hopping_leg.evaluate.result import Summary
 from hopping_leg.evaluate.result_cache import ResultCache
 from hopping_leg.evaluate.robustness.axes import times
 from hopping_leg.evaluate.runner import evaluate, software_versions
 from hopping_leg.io import safe_file_name
+from hopping_leg.rl.checkpoint import list_checkpoints, read_checkpoint
+from hopping_leg.rl.distillation.distillation import make_teacher
+from hopping_leg.rl.distillation.teacher import Teacher
+from hopping_leg.rl.legacy_names import upgrade_config
+from hopping_leg.rl.recipes import recipe_of
+from hopping_leg.rl.resumable import restore_learner
+from hopping_leg.robot import load_robot
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 
@@ -169,3 +183,92 @@ def condense(summary: Sequence[Summary]) -> dict[str, Any]:
         "skipped_hops": sum(row.skipped_hops for row in summary),
         "body_contacts": sum(row.body_contacts for row in summary),
     }
+
+
+_SHOWN = ("worst_abs_median_error_m", "mean_std_m", "worst_std_m")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Take noise, delay and soft ground away in turn, and give a controller the true state."""
+
+    controllers: tuple[str, ...] = ("precise", "adaptive", "recurrent", "energy-shaping")
+    """Names or .onnx files."""
+    teacher: Path | None = None
+    """Folder of a run of `precise`: its teacher, which is shown the true state, joins them."""
+    robot: str = "legv2-paper"
+    """A shipped name or the path of a .toml file."""
+    commands: Heights = (0.22, 0.25, 0.28, 0.31, 0.34, 0.37, 0.40)
+    """Apex heights, m."""
+    seeds: int = 5
+    """Realisations of noise and delay per command."""
+    seed: int = 1000
+    """All of them follow from it; choose one that selected nothing."""
+    threads: int = 0
+    """Threads of the physics, 0 for all cores; results do not depend on it."""
+    folder: Path = Path("runs/bench-limits")
+    """Where each result is kept; what is there is not done again."""
+    json: Path | None = None
+    """Write every number to this file."""
+
+    def measure(self) -> dict[str, Any]:
+        """Run it, print a table, return every number."""
+        from hopping_leg.evaluate.entries import Entry, load_entries
+        from hopping_leg.evaluate.result_cache import ResultCache
+        from hopping_leg.sim import CONTROL_RATE
+
+        at_least(1, seeds=self.seeds)
+        at_least(0, threads=self.threads, seed=self.seed)
+        robot = load_robot(self.robot)
+        entries = load_entries(self.controllers, robot, CONTROL_RATE)
+        if self.teacher is not None:
+            teacher = teacher_of_run(self.teacher, robot)
+            entries.append(Entry(teacher.name, teacher, teacher.command_range))
+        study = LimitsStudy(
+            robot, self.commands, seeds=self.seeds, seed=self.seed, threads=self.threads
+        )
+        with Progress(transient=True) as bar:
+            task = bar.add_task("hopping", total=None)
+            result = measure_limits(
+                entries,
+                study,
+                ResultCache(self.folder, lambda words: bar.update(task, description=words)),
+                lambda done, total: bar.update(task, completed=done, total=total),
+            )
+        table = Table("controller", "with", "worst |error|, mm", "mean std, mm", "worst", "skipped")
+        for row in result["rows"]:
+            numbers = [mm(row[name]) for name in _SHOWN]
+            table.add_row(row["controller"], row["condition"], *numbers, str(row["skipped_hops"]))
+        Console().print(table)
+        return result
+
+
+def teacher_of_run(run: Path, robot: Robot) -> Teacher:
+    """Return the teacher as the newest checkpoint of a run has it.
+
+    Args:
+        run: Folder of a run of ``precise`` or of a recipe made of it.
+        robot: The leg that it was trained on.
+
+    Raises:
+        UsageError: The run has no teacher, no checkpoint, or another robot.
+    """
+    file = run / "config.json"
+    found = list_checkpoints(run / "checkpoints")
+    if not file.exists() or not found:
+        raise UsageError(f"{run} holds no run with a checkpoint; train one with `hop train`.")
+    config = upgrade_config(json.loads(file.read_text(encoding="utf-8")))
+    recipe = recipe_of(config["recipe"], config["options"]).fit(robot)
+    if recipe.distillation is None:
+        raise UsageError(
+            f"The run in {run} is of recipe '{recipe.name}', which has no teacher; take one of"
+            " 'precise' or 'adaptive'."
+        )
+    if config["robot_digest"] != robot.digest:
+        raise UsageError(
+            f"The run in {run} was trained on {config['robot']}, not on this {robot.name}; give the"
+            " robot that it was trained on."
+        )
+    model = recipe.make_model(recipe.make_env(robot, config["seed"]), config["seed"])
+    restore_learner(model, read_checkpoint(found[-1])["model"])
+    return make_teacher(model.policy, robot, recipe.task)

@@ -2,7 +2,7 @@
 
 import sys
 
-from studies.max_height.options import Reach
+from studies.max_height.run import Reach
 from studies.shared import main
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 import sys
 
-from studies.physics_step.options import Convergence
+from studies.physics_step.run import Convergence
 from studies.shared import main
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 import sys
 
-from studies.probing.options import Probe
+from studies.probing.run import Probe
 from studies.shared import main
 
 if __name__ == "__main__":

@@ -3,10 +3,10 @@
 import sys
 
 from studies.shared import main
-from studies.speed.deploy_options import Deploy
-from studies.speed.env_options import Env
-from studies.speed.inference_options import Inference
-from studies.speed.view_options import View
+from studies.speed.deploy import Deploy
+from studies.speed.env import Env
+from studies.speed.inference import Inference
+from studies.speed.view import View
 
 if __name__ == "__main__":
     sys.exit(main("speed", Env | Inference | View | Deploy))

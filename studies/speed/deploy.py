@@ -6,15 +6,20 @@ other load on the computer cannot touch.
 """
 
 import tempfile
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.console import Console
+from rich.table import Table
+from scipy.signal import find_peaks
 
 from hopping_leg.arrays import Array
+from hopping_leg.cli.options import mm
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.policy import Policy
@@ -27,16 +32,72 @@ from hopping_leg.deploy.transport import opener
 from hopping_leg.emulator.process import EmulatorProcess
 from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.emulator.virtual_time import Lockstep
+from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.metrics import START_SECONDS
-from hopping_leg.hop_detection import find_hops
-from hopping_leg.robot import load_robot
+from hopping_leg.hop_detection import BOUNCE, FLIGHT_CLEARANCE, find_hops
+from hopping_leg.robot import kinematics, load_robot
 from hopping_leg.robot.limits import SoftLimiter, SoftLimits
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE
 from hopping_leg.trace import Trace
-from studies.speed.emulated_truth import Truth, apexes_of, watched
 from studies.speed.inference import bench_inference
 from studies.timing import host
+
+_SAMPLE_SECONDS = 0.01
+
+
+@dataclass
+class Truth:
+    """What the emulated leg did; times are since the emulator's start, s."""
+
+    time: list[float] = field(default_factory=list)
+    height: list[float] = field(default_factory=list)
+    clearance: list[float] = field(default_factory=list)
+
+
+@contextmanager
+def watched(emulator: EmulatorProcess, robot: Robot, truth: Truth) -> Iterator[None]:
+    """Write down what the emulated leg does while a run lasts."""
+    over = threading.Event()
+
+    def watch() -> None:
+        while not over.wait(_SAMPLE_SECONDS):
+            state = emulator.state()
+            truth.time.append(state.time)
+            truth.height.append(state.height)
+            standing = float(kinematics.stance_height(robot, np.array(state.q)))
+            truth.clearance.append(state.height - standing)
+
+    thread = threading.Thread(target=watch, name="truth", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+def apexes_of(trace: Trace, truth: Truth) -> list[tuple[float, float]]:
+    """Return command and height of every settled apex of a run.
+
+    The two clocks are matched at the end: the truth is watched until the run is over.
+    """
+    if not truth.time:
+        return []
+    height, clearance = np.array(truth.height), np.array(truth.clearance)
+    peaks, _ = find_peaks(height, prominence=BOUNCE)
+    peaks = peaks[clearance[peaks] >= FLIGHT_CLEARANCE]
+    time, part, command = (trace.column(name) for name in ("time_s", "part", "command_m"))
+    at = np.array(truth.time)[peaks] - truth.time[-1] + time[-1]
+    tick = np.clip(np.searchsorted(time, at), 0, len(time) - 1)
+    switches = time[np.flatnonzero(np.diff(np.where(part == Part.HOP, command, 0.0)))]
+    found = []
+    for peak, index in zip(peaks, tick, strict=True):
+        since = time[index] - switches[switches <= time[index]]
+        if part[index] == Part.HOP and len(since) and since.min() >= START_SECONDS:
+            found.append((float(command[index]), float(height[peak])))
+    return found
+
 
 HEIGHTS = (0.25, 0.30, 0.35)
 """Commands that are compared, m."""
@@ -245,3 +306,51 @@ def _median(values: list[float] | Array) -> float | None:
 def _folder() -> Iterator[Path]:
     with tempfile.TemporaryDirectory() as folder:
         yield Path(folder)
+
+
+@dataclass(frozen=True)
+class Deploy:
+    """Run a controller against emulated drives: ticks and wake-ups in real time, hop heights."""
+
+    controller: str = "fast"
+    """A name, an .onnx file or a gain file."""
+    robot: str = "legv2-paper"
+    """A shipped name or the path of a .toml file."""
+    minutes: float = 10.0
+    """Of hopping in real time, through all heights in turn."""
+    seconds: float = 15.0
+    """Of hopping at each height where heights are compared."""
+    json: Path | None = None
+    """Write every number to this file."""
+
+    def measure(self) -> dict[str, Any]:
+        """Run it, print a table, return every number."""
+        for name, value, least in (("minutes", self.minutes, 0.05), ("seconds", self.seconds, 3.0)):
+            if not least <= value <= 600:
+                raise UsageError(f"--{name} is {value:g} but must lie between {least:g} and 600.")
+        console = Console()
+        study = Study(self.controller, self.robot, self.minutes, self.seconds)
+        result = bench_deploy(study, lambda words: console.print(f"{words} ..."))
+        _print(console, result)
+        return result
+
+
+def _print(console: Console, result: dict[str, Any]) -> None:
+    names = ("wake_late_us", "exchange_us", "control_us", "tick_us")
+    table = Table("us", *result["tick_us"])
+    for name in names:
+        cells = [f"{value:.0f}" for value in result[name].values()]
+        table.add_row(name.removesuffix("_us").replace("_", " "), *cells)
+    console.print(table)
+    console.print(
+        f"{100 * result['share_on_time']:.3f} % of {result['ticks'] + result['skipped']} ticks on"
+        f" time in {result['minutes']:.1f} minutes; stops: {len(result['stops'])}."
+    )
+    for sentence in (*result["stops"], *result["notices"]):
+        console.print(f"- {sentence}", soft_wrap=True)
+    heights = Table("command, mm", "in process", "through the wire", "in real time")
+    rows = zip(result["heights"], result["real_time_heights"], strict=True)
+    for row, live in rows:
+        values = (row["in_process_m"], row["through_the_wire_m"], live["apex_m"])
+        heights.add_row(mm(row["command_m"]), *map(mm, values))
+    console.print(heights)

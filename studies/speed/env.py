@@ -1,4 +1,4 @@
-"""Speed of the environment against the bare physics inside it and against Gymnasium's LiveLeg-v5.
+"""Speed of the environment against the bare physics inside it and against Gymnasium's Hopper-v5.
 
 The environment first runs once while its motor torques are recorded. Then it runs again from the
 same state, in turn with bare physics that gets the recorded torques: both simulate the very same
@@ -7,16 +7,22 @@ motion, so their difference is what noise, delay, limits, reward, observation an
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import gymnasium
 import mujoco
 import numpy as np
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
 
 from hopping_leg.arrays import Array
+from hopping_leg.cli.options import at_least
 from hopping_leg.envs import HoppingEnv, HoppingTask, TaskConfig, paper_reward
-from hopping_leg.robot import Robot, build_model
+from hopping_leg.robot import Robot, build_model, load_robot
 from hopping_leg.robot.kinematics import joint_angles
+from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.sim import MujocoSimulator
 from studies.timing import Timed, host, interleave, median_ratio
 
@@ -72,7 +78,7 @@ def bench_env(
 
     Returns:
         ``batched_env_steps_per_s``, ``batched_env_over_bare_physics`` (throughput, 1 is free),
-        ``single_env_cost_over_bare_physics`` (time, 1 is free), ratios to LiveLeg-v5, and more.
+        ``single_env_cost_over_bare_physics`` (time, 1 is free), ratios to Hopper-v5, and more.
     """
     functions, steps = _functions(benchmark)
     taken = interleave(functions, benchmark.repeats, on_repeat)
@@ -139,7 +145,7 @@ def _functions(benchmark: EnvBenchmark) -> tuple[Mapping[str, Timed], Mapping[st
     )
     lone = MujocoSimulator(robot, 1, timestep=benchmark.timestep, threads=1)
     leg = gymnasium.make(
-        "LiveLeg-v5", frame_skip=bare.substeps, terminate_when_unhealthy=False
+        "Hopper-v5", frame_skip=bare.substeps, terminate_when_unhealthy=False
     ).unwrapped
     leg.reset(seed=benchmark.seed)
     functions = {
@@ -211,7 +217,53 @@ def _mj_step(legs: MujocoSimulator, motion: Motion) -> Timed:
 
 
 def _run_hopper(leg: Any, ticks: int) -> None:  # noqa: ANN401
-    """Step LiveLeg-v5 with random actions, as a policy at the start of training would."""
+    """Step Hopper-v5 with random actions, as a policy at the start of training would."""
     leg.reset()
     for action in leg.np_random.uniform(-1, 1, (ticks, 3)):
         leg.step(action)
+
+
+@dataclass(frozen=True)
+class Env:
+    """Time the environment against bare physics and Gymnasium's Hopper-v5."""
+
+    robot: str = "legv2-paper"
+    """A shipped name or the path of a .toml file."""
+    count: int = 512
+    """Legs of the batched environment."""
+    repeats: int = 15
+    """Rounds; medians over them are reported."""
+    threads: int = 0
+    """Of the batched environment and the batched physics alike, 0 for one per core."""
+    timestep: float = TIMESTEP
+    """Physics step, s."""
+    seed: int = 0
+    """Of noise and delay."""
+    json: Path | None = None
+    """Write every number to this file."""
+
+    def measure(self) -> dict[str, Any]:
+        """Run it, print a table, return every number."""
+        at_least(1, count=self.count, repeats=self.repeats)
+        at_least(0, threads=self.threads, seed=self.seed)
+        benchmark = EnvBenchmark(
+            load_robot(self.robot),
+            count=self.count,
+            repeats=self.repeats,
+            threads=self.threads,
+            timestep=self.timestep,
+            seed=self.seed,
+        )
+        with Progress(transient=True) as bar:
+            task = bar.add_task("timing", total=self.repeats)
+            result = bench_env(benchmark, lambda done, _: bar.update(task, completed=done))
+        _print("Environment with noise and delay", result)
+        return result
+
+
+def _print(title: str, result: dict[str, Any]) -> None:
+    table = Table("number", "value", title=title)
+    for name, value in result.items():
+        if isinstance(value, int | float):
+            table.add_row(name, f"{value:,.4g}" if value < 100 else f"{value:,.0f}")
+    Console().print(table)

@@ -3,7 +3,7 @@
 import sys
 
 from studies.shared import main
-from studies.training_time.options import Training
+from studies.training_time.run import Training
 
 if __name__ == "__main__":
     sys.exit(main("training_time", Training))

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import polars as pl
 import pytest
-from studies.sim_to_real.effects import EFFECTS, HopWithout
+from studies.sim_to_real.run import EFFECTS, HopWithout
 
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.parameters import LegHypothesis

@@ -5,8 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from studies.finetuning import run as module
-from studies.finetuning.figure import draw_finetuning
-from studies.finetuning.run import FIRST_JUDGE, Study, measure
+from studies.finetuning.run import FIRST_JUDGE, Study, draw_finetuning, measure
 
 from hopping_leg.rl.finetune.simulated import Guard
 from hopping_leg.robot import load_robot

@@ -3,8 +3,7 @@
 import json
 
 import pytest
-from studies.sim_to_real.prediction import Foretell, Meet, prediction_rows
-from studies.sim_to_real.run import foretold, met
+from studies.sim_to_real.run import Foretell, Meet, foretold, met, prediction_rows
 
 from hopping_leg.sim_to_real import stages
 from tests.sim_to_real.studies import study

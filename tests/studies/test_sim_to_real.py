@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from studies.sim_to_real.options import Experiment
+from studies.sim_to_real.run import Experiment
 
 from studies import shared
 

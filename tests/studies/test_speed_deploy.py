@@ -4,8 +4,7 @@ import numpy as np
 import polars as pl
 import pytest
 from studies.shared import main
-from studies.speed.deploy_options import Deploy
-from studies.speed.emulated_truth import Truth, apexes_of
+from studies.speed.deploy import Deploy, Truth, apexes_of
 
 from hopping_leg.deploy.motion_sequence import Part
 from hopping_leg.trace import Trace

@@ -7,8 +7,7 @@ pytest.importorskip("playwright", reason="playwright is not installed")
 from PIL import Image
 from studies.shared import main
 from studies.speed import browser
-from studies.speed.view import ViewBenchmark, bench_view
-from studies.speed.view_options import View
+from studies.speed.view import View, ViewBenchmark, bench_view
 
 
 @pytest.mark.slow

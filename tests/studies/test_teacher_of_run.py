@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import torch
-from studies.limits.teacher_of_run import teacher_of_run
+from studies.limits.run import teacher_of_run
 
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.errors import UsageError

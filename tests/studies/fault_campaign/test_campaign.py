@@ -2,11 +2,10 @@ import dataclasses
 import json
 
 import pytest
-from studies.fault_campaign.campaign import Campaign, play_case, run_campaign
+from studies.fault_campaign.campaign import Campaign, Faults, play_case, run_campaign
 from studies.fault_campaign.case import Case
 from studies.fault_campaign.families import FAMILIES
 from studies.fault_campaign.live import LIVE
-from studies.fault_campaign.options import Faults
 from studies.shared import main
 
 from hopping_leg.deploy import loop
