@@ -19,18 +19,12 @@ from hopping_leg.trace import Trace
 
 
 class Template(Protocol):
-    """A trajectory of the joints."""
+    """A trajectory of the joints on a rig, its duration in s."""
 
     @property
-    def rig(self) -> Rig:
-        """What the base is on."""
-        ...
-
+    def rig(self) -> Rig: ...  # noqa: D102
     @property
-    def duration(self) -> float:
-        """How long it lasts, s."""
-        ...
-
+    def duration(self) -> float: ...  # noqa: D102
     def joints(self, robot: Robot, time: Array) -> Array:
         """Return joint angles at times, rad, (ticks, 2); NaN where the foot is out of reach."""
         ...
@@ -83,23 +77,23 @@ class Multisine:
             index = np.arange(len(mine))
             phases = -np.pi * index * (index + 1) / max(1, len(mine))
             one = np.arange(2048) / (2048 * self.lowest)
-            waves = [_wave(t, mine * self.lowest, phases) for t in (time, one)]
-            scale = self.amplitude[joint] / max(np.abs(waves[1]).max(), 1e-12)
+            wave, whole = (
+                np.cos(2 * np.pi * np.multiply.outer(t, mine * self.lowest) + phases).sum(axis=-1)
+                for t in (time, one)
+            )
+            scale = self.amplitude[joint] / max(np.abs(whole).max(), 1e-12)
             fade = np.clip(np.minimum(time, self.duration - time) * self.lowest * 4, 0, 1)
-            smooth = kinematics.smooth_step(fade)
-            angles[:, joint] = self.centre[joint] + smooth * scale * waves[0]
+            fade = kinematics.smooth_step(fade)
+            angles[:, joint] = self.centre[joint] + fade * scale * wave
         return angles
-
-
-def _wave(time: Array, frequencies: Array, phases: Array) -> Array:
-    wave: Array = np.cos(2 * np.pi * np.multiply.outer(time, frequencies) + phases).sum(axis=-1)
-    return wave
 
 
 RATE = 200.0
 """Rate of the paper's recordings, Hz."""
 
 _KEY = "excitation"
+_FACTS = {"rig": "rig", "rate_hz": "rate", "robot": "robot", "description": "description"}
+"""Attributes in the file's header."""
 
 
 @dataclass(frozen=True)
@@ -142,12 +136,7 @@ class Excitation:
         names = (*PAIRS["position_command"], *PAIRS["velocity_command"])
         targets = (*self.position.T, *self.velocity.T)
         columns = {"time_s": self.time} | dict(zip(names, targets, strict=True))
-        facts = {
-            "rig": self.rig,
-            "rate_hz": self.rate,
-            "robot": self.robot,
-            "description": self.description,
-        }
+        facts = {name: getattr(self, field) for name, field in _FACTS.items()}
         Trace(pl.DataFrame(columns), {_KEY: facts}).save(path)
 
 
@@ -163,15 +152,7 @@ def load_excitation(path: Path) -> Excitation:
         raise TraceError(f"{path} is no excitation; write one with `hop excite`.")
     pairs = (PAIRS[f"{quantity}_command"] for quantity in ("position", "velocity"))
     position, velocity = (np.column_stack([trace.column(c) for c in pair]) for pair in pairs)
-    return Excitation(
-        trace.column("time_s"),
-        position,
-        velocity,
-        facts["rig"],
-        facts["rate_hz"],
-        facts["robot"],
-        facts["description"],
-    )
+    return Excitation(trace.column("time_s"), position, velocity, *(facts[n] for n in _FACTS))
 
 
 def make_excitation(
@@ -182,15 +163,10 @@ def make_excitation(
     limits: HardwareRange | None = None,
     track_velocity: bool = False,
 ) -> Excitation:
-    """Sample a template and check that the leg can follow it.
+    """Sample a template at a rate, Hz, and check that the leg can follow it.
 
-    Args:
-        template: The trajectory.
-        robot: The leg.
-        rate: Samples per second, Hz.
-        limits: How far the real joints turn.
-        track_velocity: Let the velocity targets be the positions' derivative, as in the lab's
-            recordings; otherwise they are zero, as the paper says.
+    With ``track_velocity`` the velocity targets are the positions' derivative, as in the lab's
+    recordings; otherwise they are zero, as the paper says.
 
     Raises:
         UsageError: The leg cannot follow; names joint, time and limit.

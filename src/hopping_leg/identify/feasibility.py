@@ -1,12 +1,11 @@
 """Whether a leg can follow a trajectory: reach, joint range, speed, torque; before it is played."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.recording_format import Pair, Rig
 from hopping_leg.robot import dynamics, kinematics
@@ -29,23 +28,17 @@ class HardwareRange:
     knee: Pair = (-2.7, 2.7)
     """rad"""
 
-    @property
-    def bounds(self) -> tuple[Array, Array]:
-        """Lower and upper limits of hip and knee, rad, (2,) each."""
-        lower, upper = np.array([self.hip, self.knee]).T
-        return lower, upper
-
 
 @dataclass(frozen=True)
 class Demand:
-    """What a trajectory asks of the joints.
+    """What a trajectory asks of the joints, (ticks, 2) each.
 
     Attributes:
-        position: rad, (ticks, 2).
-        velocity: rad/s, (ticks, 2).
-        torque: N m, (ticks, 2).
-        clearance: Height of base and knee above the ground on which the foot stands, m, (ticks, 2);
-            infinite where the base is clamped.
+        position: rad.
+        velocity: rad/s.
+        torque: N m.
+        clearance: Height of base and knee above the ground on which the foot stands, m; infinite
+            where the base is clamped.
     """
 
     position: Array
@@ -55,18 +48,11 @@ class Demand:
 
 
 def inverse_dynamics(robot: Robot, rig: Rig, q: Array, qd: Array, qdd: Array) -> Array:
-    """Return the joint torques of a motion, N m, (..., 2).
+    """Return the joint torques, N m, of joint angles, velocities and accelerations, (..., 2) each.
 
     With a moving base the foot presses on flat, hard ground with the force F that the motion
     takes, without horizontal force; where F would pull, the leg flies. Landing impacts are not
     part of this.
-
-    Args:
-        robot: The leg.
-        rig: Whether the base is clamped.
-        q: Joint angles, rad, (..., 2).
-        qd: Joint velocities, rad/s, (..., 2).
-        qdd: Joint accelerations, rad/s2, (..., 2).
     """
     mass, bias = dynamics.mass_matrix(robot, q), dynamics.bias_force(robot, q, qd)
     torque: Array = np.einsum("...ij,...j->...i", mass[..., 1:, 1:], qdd) + bias[..., 1:]
@@ -82,14 +68,7 @@ def inverse_dynamics(robot: Robot, rig: Rig, q: Array, qd: Array, qdd: Array) ->
 
 
 def demand(robot: Robot, rig: Rig, position: Array, rate: float) -> Demand:
-    """Return speeds and torques of a sampled trajectory.
-
-    Args:
-        robot: The leg.
-        rig: Whether the base is clamped.
-        position: rad, (ticks, 2).
-        rate: Samples per second, Hz.
-    """
+    """Return what a trajectory, rad, (ticks, 2), sampled at a rate in Hz, asks of the joints."""
     velocity = np.gradient(position, 1 / rate, axis=0)
     inner = np.diff(position, 2, axis=0) * rate**2
     acceleration = np.pad(inner, ((1, 1), (0, 0)), mode="edge")
@@ -103,50 +82,51 @@ def demand(robot: Robot, rig: Rig, position: Array, rate: float) -> Demand:
 
 
 def check_demand(robot: Robot, wanted: Demand, rate: float, limits: HardwareRange) -> None:
-    """Refuse what the leg cannot do.
-
-    Args:
-        robot: The leg, for its motors' torque-speed lines.
-        wanted: Speeds and torques.
-        rate: Samples per second, Hz.
-        limits: How far the real joints turn.
+    """Refuse what the joints' range, the ground or the motors' torque-speed lines do not allow.
 
     Raises:
         UsageError: Naming joint, time and limit.
     """
-    lower, upper = limits.bounds
-    _refuse(np.isnan(wanted.position), rate, lambda _t, _j: "the foot is out of reach")
-    _refuse(
-        (wanted.position < lower) | (wanted.position > upper),
-        rate,
-        lambda t, j: (
-            f"{wanted.position[t, j]:.2f} rad is outside of the hardware's range"
-            f" {lower[j]:g} to {upper[j]:g} rad"
-        ),
-    )
-    _refuse(
-        wanted.clearance < LEAST_CLEARANCE,
-        rate,
-        lambda t, j: (
-            f"the {('base', 'knee')[j]} is {wanted.clearance[t, j] * 1e3:.0f} mm above the ground,"
-            f" below {LEAST_CLEARANCE * 1e3:g} mm"
-        ),
-    )
+    lower, upper = np.array([limits.hip, limits.knee]).T
     fastest = robot.of_joints("no_load_speed")
-    _refuse(
-        np.abs(wanted.velocity) > fastest,
-        rate,
-        lambda t, j: f"{wanted.velocity[t, j]:.1f} rad/s exceeds {fastest[j]:g} rad/s",
-    )
     possible = MotorLimit(robot).clip(wanted.torque, wanted.velocity)
-    _refuse(
-        np.abs(wanted.torque - possible) > 1e-9,
-        rate,
-        lambda t, j: (
-            f"{wanted.torque[t, j]:.1f} N m at {wanted.velocity[t, j]:.1f} rad/s exceeds the"
-            f" {possible[t, j]:.1f} N m that the motor gives"
+    outside = (wanted.position < lower) | (wanted.position > upper)
+    facts = {
+        "angle": wanted.position,
+        "speed": wanted.velocity,
+        "torque": wanted.torque,
+        "possible": possible,
+        "lower": lower,
+        "upper": upper,
+        "fastest": fastest,
+        "part": np.array(["base", "knee"]),
+        "clearance": wanted.clearance * 1e3,
+        "least": LEAST_CLEARANCE * 1e3,
+    }
+    for bad, reason in (
+        (np.isnan(wanted.position), "the foot is out of reach"),
+        (
+            outside,
+            "{angle:.2f} rad is outside of the hardware's range {lower:g} to {upper:g} rad",
         ),
-    )
+        (
+            wanted.clearance < LEAST_CLEARANCE,
+            "the {part} is {clearance:.0f} mm above the ground, below {least:g} mm",
+        ),
+        (np.abs(wanted.velocity) > fastest, "{speed:.1f} rad/s exceeds {fastest:g} rad/s"),
+        (
+            np.abs(wanted.torque - possible) > 1e-9,
+            "{torque:.1f} N m at {speed:.1f} rad/s exceeds the {possible:.1f} N m that the motor"
+            " gives",
+        ),
+    ):
+        if bad.any():
+            tick, joint = np.argwhere(bad)[0].tolist()
+            at = {k: np.broadcast_to(v, bad.shape)[tick, joint] for k, v in facts.items()}
+            raise UsageError(
+                f"The leg cannot follow the trajectory: at {tick / rate:.3f} s, {JOINTS[joint]}:"
+                f" {reason.format(**at)}; lower the amplitude, slow it down or adapt it."
+            )
 
 
 def _centripetal(robot: Robot, q: Array, qd: Array) -> Array:
@@ -155,13 +135,3 @@ def _centripetal(robot: Robot, q: Array, qd: Array) -> Array:
     lengths = np.array([robot.thigh.length, robot.shank.length])
     downward: Array = -np.vecdot(np.cos(angle) * speed**2, lengths)
     return downward
-
-
-def _refuse(bad: BoolArray, rate: float, reason: Callable[[int, int], str]) -> None:
-    if not bad.any():
-        return
-    tick, joint = (int(index) for index in np.argwhere(bad)[0])
-    raise UsageError(
-        f"The leg cannot follow the trajectory: at {tick / rate:.3f} s, {JOINTS[joint]}:"
-        f" {reason(tick, joint)}; lower the amplitude, slow it down or adapt it."
-    )

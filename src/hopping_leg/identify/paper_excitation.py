@@ -5,7 +5,8 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, Self
+from functools import partial
+from typing import Literal
 
 import numpy as np
 
@@ -56,7 +57,6 @@ class Stroke:
     """From the straight leg, m."""
     bend: Bend = "backward"
     """Side of the knee: negative angles are backward."""
-
     rig: Rig = "fixed-base"
 
     def __post_init__(self) -> None:
@@ -84,10 +84,6 @@ class Stroke:
     def __str__(self) -> str:
         swing = "" if self.swing is None else f", T2 {self.swing:g} s"
         return f"{self.duration:g} s with A {self.amplitude:.4g} m, T1 {self.period:g} s{swing}"
-
-    def smaller(self, amplitude: float, margin: float) -> Self:
-        """Return the stroke with another amplitude and margin."""
-        return dataclasses.replace(self, amplitude=amplitude, margin=margin)
 
     def _phase(self, time: Array, period: float) -> Array:
         periods = math.floor(self.duration / period + 1e-9)
@@ -127,14 +123,15 @@ class Strokes:
 
 
 def fixed_base(
-    amplitudes: tuple[float, ...] = AMPLITUDES,
-    periods: tuple[float, ...] = PERIODS,
-    swings: tuple[float, ...] = SWINGS,
+    amplitudes: Sequence[float] = AMPLITUDES,
+    periods: Sequence[float] = PERIODS,
+    swings: Sequence[float | None] = SWINGS,
     *,
     duration: float = DURATION,
     margin: float = 0.0,
     bend: Bend = "backward",
     every_pair: bool = False,
+    rig: Rig = "fixed-base",
 ) -> Strokes:
     """Return the paper's fixed-base trajectory: the foot strokes while the leg swings.
 
@@ -147,55 +144,23 @@ def fixed_base(
         bend: Side of the knee.
         every_pair: Combine every amplitude with every period; otherwise the first with the first
             and so on, as in the lab's recordings.
+        rig: What the base is on.
     """
-    parts = _strokes(_pairs(amplitudes, periods, every_pair), swings, duration, margin, bend)
-    return Strokes(parts)
-
-
-def moving_base(
-    amplitudes: tuple[float, ...] = AMPLITUDES,
-    periods: tuple[float, ...] = PERIODS,
-    *,
-    duration: float = DURATION,
-    margin: float = 0.0,
-    bend: Bend = "backward",
-    every_pair: bool = False,
-) -> Strokes:
-    """Return the paper's moving-base trajectory: vertical strokes on the ground, some leave it.
-
-    Arguments as for ``fixed_base``.
-    """
-    pairs = _pairs(amplitudes, periods, every_pair)
-    parts = _strokes(pairs, (None,), duration, margin, bend)
-    return Strokes(tuple(dataclasses.replace(part, rig="rail") for part in parts))
-
-
-def _pairs(
-    amplitudes: tuple[float, ...], periods: tuple[float, ...], every_pair: bool
-) -> list[tuple[float, float]]:
-    if every_pair:
-        return list(itertools.product(amplitudes, periods))
-    if len(amplitudes) != len(periods):
+    if not every_pair and len(amplitudes) != len(periods):
         raise UsageError(
             f"{len(amplitudes)} amplitudes and {len(periods)} periods do not pair; give as many of"
             " one as of the other, or combine every pair."
         )
-    return list(zip(amplitudes, periods, strict=True))
-
-
-def _strokes(
-    pairs: list[tuple[float, float]],
-    swings: Sequence[float | None],
-    duration: float,
-    margin: float,
-    bend: Bend,
-) -> tuple[Stroke, ...]:
-    """Return a stroke for every pair of amplitude and period with every swing, of equal length."""
-    grid = [(a, t1, t2) for (a, t1), t2 in itertools.product(pairs, swings)]
+    pairs = (
+        itertools.product(amplitudes, periods)
+        if every_pair
+        else zip(amplitudes, periods, strict=True)
+    )
+    grid = list(itertools.product(pairs, swings))
     if not grid:
         raise UsageError("No stroke is left; give at least one amplitude, period and swing.")
     count, length = len(grid), duration / len(grid)
-    parts = tuple(Stroke(a, t1, t2, length, margin, bend) for a, t1, t2 in grid)
+    parts = tuple(Stroke(a, t1, t2, length, margin, bend, rig) for (a, t1), t2 in grid)
     slowest = max(max(part.period, part.swing or 0.0) for part in parts)
     if count > 1 and sum(part.duration for part in parts) < count * slowest - 1e-9:
         raise UsageError(
@@ -203,46 +168,38 @@ def _strokes(
             f" {slowest:g} s would break off; make them {count * slowest:g} s or longer in all, or"
             " give fewer or shorter periods."
         )
-    return parts
+    return Strokes(parts)
+
+
+moving_base = partial(fixed_base, swings=(None,), rig="rail")
+"""The paper's moving-base trajectory: vertical strokes on the ground, some leave it."""
 
 
 def adapt(
-    strokes: Strokes,
-    robot: Robot,
-    *,
-    rate: float = RATE,
-    limits: HardwareRange | None = None,
+    strokes: Strokes, robot: Robot, *, rate: float = RATE, limits: HardwareRange | None = None
 ) -> Strokes:
     """Return the strokes as large as the leg can follow: the paper's grid does not fit every leg.
 
     Amplitudes shrink in steps of 5 %, and the leg stays ``LAB_MARGIN`` from straight, where the
-    knee would have to jump.
-
-    Args:
-        strokes: The paper's template.
-        robot: The leg.
-        rate: Samples per second, Hz.
-        limits: How far the real joints turn.
+    knee would have to jump. For rate, Hz, and limits see ``make_excitation``.
 
     Raises:
         UsageError: A stroke is beyond the leg at any amplitude.
     """
-    return Strokes(
-        tuple(_adapt_stroke(s, robot, rate, limits or HardwareRange()) for s in strokes.parts)
-    )
+    limits = limits or HardwareRange()
+    return Strokes(tuple(_adapt_stroke(s, robot, rate, limits) for s in strokes.parts))
 
 
 def _adapt_stroke(stroke: Stroke, robot: Robot, rate: float, limits: HardwareRange) -> Stroke:
     time = np.arange(round(stroke.duration * rate)) / rate
-    margin, amplitude = max(stroke.margin, LAB_MARGIN), stroke.amplitude
+    stroke = dataclasses.replace(stroke, margin=max(stroke.margin, LAB_MARGIN))
     while True:
-        smaller = stroke.smaller(amplitude, margin)
         try:
-            wanted = demand(robot, stroke.rig, smaller.joints(robot, time), rate)
+            wanted = demand(robot, stroke.rig, stroke.joints(robot, time), rate)
             check_demand(robot, wanted, rate, limits)
         except UsageError:
-            amplitude *= _SHRINK
-            if amplitude < _SMALLEST:
+            stroke = dataclasses.replace(stroke, amplitude=stroke.amplitude * _SHRINK)
+            if stroke.amplitude < _SMALLEST:
                 raise
         else:
-            return smaller
+            return stroke

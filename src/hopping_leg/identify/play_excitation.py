@@ -15,6 +15,7 @@ from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import NO_NOISE, MujocoSimulator, Plant
 from hopping_leg.trace import Trace
 
+_TARGETS = PAIRS["position_command"] + PAIRS["velocity_command"]
 _IMPOSSIBLE = 1e4
 """Joint speed that no leg reaches, rad/s."""
 
@@ -74,6 +75,8 @@ def play(
             f"The simulation of {robot.name} became unstable at a physics step of {timestep:g} s;"
             " take a smaller one, weaker gains or a gentler excitation."
         )
+    kinds = ("position", "velocity", "torque")
+    steps = (float(robot.reality.of_sensors(f"{kind}_step").max()) for kind in kinds)
     metadata = RecordingMetadata(
         rig=excitation.rig,
         rate_hz=excitation.rate,
@@ -82,7 +85,7 @@ def play(
         onboard="zoh",
         stiffness=gains.stiffness,
         damping=gains.damping,
-        quantisation=_quantisation(robot),
+        quantisation=Quantisation(*steps),
     )
     header = {
         "robot": robot.name,
@@ -92,58 +95,33 @@ def play(
         "excitation": excitation.description,
         "excitation_digest": excitation.digest,
     }
-    return make_recording(_table(excitation, rows), metadata, robot.name, header=header)
-
-
-def _table(excitation: Excitation, rows: np.ndarray) -> pl.DataFrame:
-    columns: dict[str, np.ndarray] = {"time_s": excitation.time}
-    pairs = {
-        "position": rows[:, 0:2],
-        "velocity": rows[:, 2:4],
-        "torque": rows[:, 4:6],
-        "position_command": excitation.position,
-        "velocity_command": excitation.velocity,
-    }
-    for quantity, values in pairs.items():
-        columns |= dict(zip(PAIRS[quantity], values.T, strict=True))
-    if excitation.rig != "fixed-base":
+    values = (*rows[:, :6].T, *excitation.position.T, *excitation.velocity.T)
+    columns = {"time_s": excitation.time} | dict(zip(MEASURED + _TARGETS, values, strict=True))
+    if not fixed:
         columns |= {"height_m": rows[:, 6], "contact": rows[:, 7] <= 0}
-    return pl.DataFrame(columns)
-
-
-def _quantisation(robot: Robot) -> Quantisation:
-    kinds = ("position", "velocity", "torque")
-    return Quantisation(*(float(robot.reality.of_sensors(f"{kind}_step").max()) for kind in kinds))
+    return make_recording(pl.DataFrame(columns), metadata, robot.name, header=header)
 
 
 def recording_of(
     trace: Trace, excitation: Excitation, *, believed: str, gains: JointGains, name: str
 ) -> Recording:
-    """Return the part of a run in which the excitation was played.
+    """Return the part of a run's trace in which the excitation was played.
 
     Each row holds what the drives reported when the command of the row was computed; ticks without
-    a reply have no measurement. The joint PD runs on the host, once per row.
-
-    Args:
-        trace: Trace of the run, with the targets of the PD in its columns.
-        excitation: What was played.
-        believed: Robot file that the recording is filed under, where identification begins.
-        gains: Gains of the PD.
-        name: Name of the recording, for messages.
+    a reply have no measurement. The joint PD runs on the host, once per row; ``believed`` is the
+    robot file that the recording is filed under.
 
     Raises:
         RecordingError: The excitation was not played, or the recording cannot be believed.
     """
-    targets = PAIRS["position_command"] + PAIRS["velocity_command"]
-    lacking = [column for column in (*MEASURED, *targets) if column not in trace.table.columns]
+    lacking = [column for column in MEASURED + _TARGETS if column not in trace.table.columns]
     if lacking:
         raise RecordingError(f"{name} has no column '{lacking[0]}'; no excitation was played.")
-    table = trace.table.filter(pl.col(targets[0]).is_finite())
+    table = trace.table.filter(pl.col(_TARGETS[0]).is_finite())
     if not table.height:
         raise RecordingError(f"{name} ended before the excitation began; see its events.")
     first = float(table["time_s"][0])
     time = np.round(table["time_s"].to_numpy() - first, 9)
-    columns = [table[column] for column in (*MEASURED, *targets)]
     metadata = RecordingMetadata(
         rig=excitation.rig,
         rate_hz=excitation.rate,
@@ -158,6 +136,5 @@ def recording_of(
         "excitation_digest": excitation.digest,
         "run": {k: v for k, v in trace.header.items() if k != "events"},
     }
-    return make_recording(
-        pl.DataFrame([pl.Series("time_s", time), *columns]), metadata, name, header=facts
-    )
+    table = table.select(pl.Series("time_s", time), *MEASURED, *_TARGETS)
+    return make_recording(table, metadata, name, header=facts)
