@@ -53,7 +53,7 @@ def test_kinds_are_listed(capsys):
         (["--robot", "doublependulum"], "cannot hop"),
         (["--start-pose", "1,2,3"], "There is no pose '1,2,3'"),
         (["--faults", "none.toml"], "no fault script none.toml"),
-        (["--seed", "-1"], "A seed of -1"),
+        (["--seed", "-1"], "--seed is -1"),
         (["--channel", "x"], "A channel is for CAN buses"),
     ],
 )

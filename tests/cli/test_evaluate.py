@@ -45,7 +45,7 @@ def test_one_folder_receives_numbers_report_and_traces(spring, tmp_path, capsys)
         (["--commands", "9"], "out of reach"),
         (["--commands", "high"], "not a list of heights"),
         (["--seeds", "0"], "0 seeds are too few"),
-        (["--seed", "-1"], "A seed of -1"),
+        (["--seed", "-1"], "--seed is -1"),
         (["--robot", "legv9"], "There is no robot 'legv9'"),
         (["--threads", "-1"], "'threads' is -1"),
         (["--timestep", "nan"], "'timestep' is nan"),

@@ -58,7 +58,7 @@ def test_wrong_input_is_one_sentence(tmp_path, capsys, excitation):
         ([str(tmp_path / "none.parquet")], "none.parquet"),
         ([str(file), "--robot", "twinn"], "Did you mean 'twin'"),
         ([str(file), "--believed", "legv9"], "There is no robot 'legv9'"),
-        ([str(file), "--seed", "-1"], "A seed of -1"),
+        ([str(file), "--seed", "-1"], "--seed is -1"),
         ([str(file), "--damping", "-1", "0"], "must be zero or more"),
     ):
         assert main(["record", *words, "--out", str(tmp_path / "out")]) == 2

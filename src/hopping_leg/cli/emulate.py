@@ -33,11 +33,11 @@ from typing import TYPE_CHECKING, Literal
 from rich.console import Console
 from rich.table import Table
 
+from hopping_leg.cli.options import at_least
 from hopping_leg.deploy.drive_link import DriveMode, FaultCode
 from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
 from hopping_leg.emulator.faults import KINDS, load_faults
 from hopping_leg.emulator.mode_machine import Notice
-from hopping_leg.errors import UsageError
 from hopping_leg.robot.parameters import JOINTS
 
 if TYPE_CHECKING:
@@ -87,8 +87,7 @@ def run(args: Emulate) -> None:
     if args.kinds:
         _list_kinds(console)
         return
-    if args.seed < 0:
-        raise UsageError(f"A seed of {args.seed} has no meaning; give 0 or more.")
+    at_least(0, seed=args.seed)
     from hopping_leg.emulator.server import EmulatorConfig, Server
 
     start = EmulatorConfig(

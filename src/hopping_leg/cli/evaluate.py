@@ -21,9 +21,8 @@ from typing import Literal
 import tyro
 from rich.console import Console
 
-from hopping_leg.cli.options import Heights, check_file, command_line, say_written
+from hopping_leg.cli.options import Heights, at_least, check_file, command_line, say_written
 from hopping_leg.controllers import RolloutConfig
-from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Entry, EvaluationRun, evaluate
 from hopping_leg.evaluate.entries import load_entries
 from hopping_leg.evaluate.report import render_videos, write_report
@@ -67,8 +66,7 @@ class Conditions:
         Raises:
             UsageError: An option has no meaning, or there is no such robot or controller.
         """
-        if self.seed < 0:
-            raise UsageError(f"A seed of {self.seed} has no meaning; give 0 or more.")
+        at_least(0, seed=self.seed)
         check_file(self.json)
         robot = load_robot(self.robot)
         setup = RolloutConfig(

@@ -11,19 +11,17 @@ Examples:
   hop identify run1.csv.gz --parameters hip.friction,knee.friction --bounds hip.friction=0,0.5
 """
 
-import dataclasses
 import math
 import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
-from rich.console import Console
-from rich.table import Column, Table
+from rich.table import Column
 
-from hopping_leg.cli.options import command_line
+from hopping_leg.cli.options import JsonFile, command_line, say, show_table
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.optimizers import CmaOptions
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
@@ -71,8 +69,7 @@ class Identify:
     """Seed of the split and the search."""
     out: Path = Path("identified.toml")
     """Robot file to write; its name without .toml is the robot's."""
-    json: Path | None = None
-    """Write every number to this file as JSON."""
+    json: JsonFile = None
     report: Path | None = None
     """Write the report to this file as one HTML page."""
     search: str | None = None
@@ -106,31 +103,32 @@ class FitProgress(LiveProgress):
         super().__init__("preparing", first_line=60.0)
 
     def update(self, stage: str, share: float, cost: float) -> None:
-        """Show the state of the fit.
-
-        Args:
-            stage: What is being done.
-            share: Done of all, 0 to 1.
-            cost: Lowest so far.
-        """
-        left = (
-            f" · at most {minutes(self.passed * (1 - share) / share)} left" if 0 < share < 1 else ""
-        )
-        note = f"cost {cost:.5g}{left}"
+        """Show what is being done, the share done of all, 0 to 1, and the lowest cost."""
+        note = f"cost {cost:.5g}"
+        if 0 < share < 1:
+            note += f" · at most {minutes(self.passed * (1 - share) / share)} left"
         self._bar.update(self._task, description=stage, completed=share, note=note)
         self._line_if_due(f"{stage} {100 * share:.0f} % · {note}")
 
 
 def run(args: Identify) -> None:
     """Identify a leg."""
-    console = Console()
-    options = _options(args)
+    cma = CmaOptions(generations=args.generations, population=args.population)
+    options = IdentifyOptions(
+        parameters=args.parameters,
+        bounds=dict(_bounds(text) for text in args.bounds),
+        search=args.search,
+        effort=SearchOptions(starts=args.starts, cma=cma),
+        threads=args.threads,
+        ray=args.ray,
+    )
     recordings = [load_recording(path) for path in args.recordings]
     judges = [load_recording(path) for path in args.validate]
     origin = args.robot or robot_of([*recordings, *judges])
     _check_out(args, origin)
     robot = load_robot(origin)
-    _show_recordings(console, recordings, judges)
+    _show_recordings("fit", recordings)
+    _show_recordings("judge", judges)
     folder = args.folder or Path("runs") / f"identify-{args.out.stem}"
     try:
         with FitProgress() as progress:
@@ -155,29 +153,15 @@ def run(args: Identify) -> None:
     if args.json:
         write_json(args.json, {"command": command, **as_json(identified)})
     if args.report:
-        page = write_fit_report(identified, command, args.threads)
-        write_atomically(args.report, page)
-    _show(console, identified)
-    for name in ("out", "json", "report"):
-        path = getattr(args, name)
-        if path is not None:
-            console.print(f"{_FILES[name]}: {path}", highlight=False, soft_wrap=True)
+        write_atomically(args.report, write_fit_report(identified, command, args.threads))
+    _show(identified)
+    for name, path in _outputs(args):
+        say(f"{_FILES[name]}: {path}")
 
 
-def _options(args: Identify) -> IdentifyOptions:
-    return IdentifyOptions(
-        parameters=args.parameters,
-        bounds=dict(_bounds(text) for text in args.bounds),
-        search=args.search,
-        effort=SearchOptions(
-            starts=args.starts,
-            cma=dataclasses.replace(
-                CmaOptions(), generations=args.generations, population=args.population
-            ),
-        ),
-        threads=args.threads,
-        ray=args.ray,
-    )
+def _outputs(args: Identify) -> list[tuple[str, Path]]:
+    """Return name and path of every file that was asked for."""
+    return [(name, path) for name in _FILES if (path := getattr(args, name)) is not None]
 
 
 def _bounds(text: str) -> tuple[str, tuple[float, float]]:
@@ -198,58 +182,54 @@ def _check_out(args: Identify, origin: str) -> None:
     recordings = (*args.recordings, *args.validate)
     inputs = {Path(origin).resolve(), *(p.resolve() for p in recordings)}
     inputs |= {sidecar_path(p).resolve() for p in recordings}
-    for name in ("out", "json", "report"):
-        path = getattr(args, name)
-        if path is not None and path.resolve() in inputs:
+    for name, path in _outputs(args):
+        if path.resolve() in inputs:
             raise UsageError(f"--{name} {path} would replace an input; give another file.")
-        if path is not None and path.is_dir():
+        if path.is_dir():
             raise UsageError(f"--{name} {path} is a folder; give a file.")
-        if path is not None and not _can_write(path):
+        parent = next(p for p in path.resolve().parents if p.exists())
+        if not (parent.is_dir() and os.access(parent, os.W_OK)):
             raise UsageError(f"--{name} {path} cannot be written there; give another place.")
 
 
-def _can_write(path: Path) -> bool:
-    """Return whether a file can be made, as far as that can be known beforehand."""
-    parent = next(p for p in path.resolve().parents if p.exists())
-    return parent.is_dir() and os.access(parent, os.W_OK)
-
-
-def _show_recordings(
-    console: Console, recordings: list[Recording], judges: list[Recording]
-) -> None:
-    for use, group in (("fit", recordings), ("judge", judges)):
-        for r in group:
-            seconds = r.time[-1] - r.time[0]
-            console.print(
-                f"{use}: {r.name}, {r.metadata.rig}, {seconds:.4g} s at {r.metadata.rate_hz:g} Hz,"
-                f" {r.metadata.source}",
-                highlight=False,
-                markup=False,
-            )
-            for warning in r.warnings:
-                console.print(f"  {warning}", highlight=False, markup=False, soft_wrap=True)
-
-
-def _show(console: Console, identified: Identified) -> None:
-    table = Table(Column("parameter", no_wrap=True), "start", "identified", "95 % interval", "unit")
-    for row in parameters_json(identified):
-        table.add_row(
-            row["name"],
-            f"{row['start']:.4g}",
-            f"{row['value']:.4g}" + (" (at bound)" if row["at_bound"] else ""),
-            f"{row['interval_low']:.4g} .. {row['interval_high']:.4g}"
-            if math.isfinite(row["interval_high"])
-            else "unknown",
-            row["unit"],
+def _show_recordings(use: str, recordings: list[Recording]) -> None:
+    for r in recordings:
+        about, seconds = r.metadata, r.time[-1] - r.time[0]
+        say(
+            f"{use}: {r.name}, {about.rig}, {seconds:.4g} s at {about.rate_hz:g} Hz,"
+            f" {about.source}",
+            *(f"  {warning}" for warning in r.warnings),
         )
-    console.print(table)
-    quality = Table("on held-out data, rms", "before: hip", "knee", "after: hip", "knee", "unit")
-    for row in quality_json(identified):
-        unit, factor = ("mrad", 1e3) if row["unit"] == "rad" else (row["unit"], 1.0)
-        keys = ("hip_before", "knee_before", "hip_after", "knee_after")
-        numbers = (factor * row[key] for key in keys)
-        shown = (f"{n:.3g}" if math.isfinite(n) else "-" for n in numbers)
-        quality.add_row(row["error"], *shown, unit)
-    console.print(quality)
-    for sentence in identified.identifiability.statements:
-        console.print(sentence, highlight=False, markup=False)
+
+
+def _show(identified: Identified) -> None:
+    show_table(
+        (Column("parameter", no_wrap=True), "start", "identified", "95 % interval", "unit"),
+        [
+            (
+                row["name"],
+                f"{row['start']:.4g}",
+                f"{row['value']:.4g}{' (at bound)' if row['at_bound'] else ''}",
+                f"{row['interval_low']:.4g} .. {row['interval_high']:.4g}"
+                if math.isfinite(row["interval_high"])
+                else "unknown",
+                row["unit"],
+            )
+            for row in parameters_json(identified)
+        ],
+    )
+    show_table(
+        ("on held-out data, rms", "before: hip", "knee", "after: hip", "knee", "unit"),
+        [_quality_cells(row) for row in quality_json(identified)],
+    )
+    say(*identified.identifiability.statements)
+
+
+def _quality_cells(row: dict[str, Any]) -> list[str]:
+    unit, factor = ("mrad", 1e3) if row["unit"] == "rad" else (row["unit"], 1.0)
+    values = [row[key] for key in ("hip_before", "knee_before", "hip_after", "knee_after")]
+    return [
+        row["error"],
+        *(f"{factor * value:.3g}" if math.isfinite(value) else "-" for value in values),
+        unit,
+    ]

@@ -15,34 +15,26 @@ Examples:
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import tyro
 from rich.console import Console
+from rich.progress import Progress
 
 from hopping_leg.cli.motors import ask, check, connect
+from hopping_leg.cli.options import at_least, say, say_written
 from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.joint_pd import JointGains, JointPD
-from hopping_leg.deploy.hardware_trials import Performance, header_of, new_path, perform
+from hopping_leg.deploy.hardware_trials import header_of, new_path, perform
 from hopping_leg.deploy.keyboard import keys
 from hopping_leg.deploy.motion_sequence import MotionSequence, Poses, SequenceTiming, hopping_poses
 from hopping_leg.deploy.safety_limits import recording_limits
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.errors import HardwareError, UsageError
-from hopping_leg.identify.excitation import Excitation
-from hopping_leg.identify.play_excitation import recording_of
-from hopping_leg.robot.parameters import Robot
-
-if TYPE_CHECKING:
-    from hopping_leg.deploy.moteus_link import MoteusLink
-
-from rich.progress import Progress
-
-from hopping_leg.identify.excitation import load_excitation
-from hopping_leg.identify.play_excitation import play
+from hopping_leg.identify.excitation import Excitation, load_excitation
+from hopping_leg.identify.play_excitation import play, recording_of
 from hopping_leg.identify.recording_format import Pair
-from hopping_leg.robot import load_robot
+from hopping_leg.robot import Robot, load_robot
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.robot.robot_files import parent_robot
 
@@ -78,28 +70,36 @@ def run(args: Record) -> None:
     """Play every excitation and write its recording."""
     if not args.excitations:
         raise UsageError("No excitation was given; write one with `hop excite`.")
-    if args.seed < 0:
-        raise UsageError(f"A seed of {args.seed} has no meaning; give 0 or more.")
+    at_least(0, seed=args.seed)
     name = args.robot or ("twin" if args.transport is None else "legv2")
     robot = load_robot(name)
     parent = parent_robot(name) if args.transport is None else None
     believed = args.believed or parent or name
     load_robot(believed)
     gains = JointGains(args.stiffness, args.damping)
-    loaded = [(path, load_excitation(path)) for path in args.excitations]
-    names = [path.stem for path, _ in loaded]
+    loaded = [(path.stem, load_excitation(path)) for path in args.excitations]
+    names = [name for name, _ in loaded]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise UsageError(
             f"Two excitations are called '{twice[0]}' and would share a recording; rename one."
         )
-    if args.transport is not None:
-        _record_motors(args, robot, loaded, believed, gains)
-        return
-    console = Console()
+    if args.transport is None:
+        _record_simulated(args, robot, loaded, believed, gains)
+    else:
+        _record_motors(args, args.transport, robot, loaded, believed, gains)
+
+
+def _record_simulated(
+    args: Record,
+    robot: Robot,
+    excitations: Sequence[tuple[str, Excitation]],
+    believed: str,
+    gains: JointGains,
+) -> None:
     with Progress(console=Console(stderr=True)) as bar:
-        for number, (path, excitation) in enumerate(loaded):
-            task = bar.add_task(path.stem, total=len(excitation))
+        for number, (name, excitation) in enumerate(excitations):
+            task = bar.add_task(name, total=len(excitation))
             recording = play(
                 excitation,
                 robot,
@@ -109,36 +109,45 @@ def run(args: Record) -> None:
                 timestep=args.timestep,
                 on_tick=lambda done, _, task=task: bar.update(task, completed=done),  # type: ignore[misc]
             )
-            file = args.out / f"{robot.name}-{path.stem}.parquet"
+            file = args.out / f"{robot.name}-{name}.parquet"
             recording.save(file)
-            console.print(f"Wrote {file}", highlight=False, soft_wrap=True)
-            for warning in recording.warnings:
-                console.print(f"  {warning}", highlight=False)
+            say_written(file)
+            say(*(f"  {warning}" for warning in recording.warnings))
 
 
 def _record_motors(
     args: Record,
+    transport: str,
     robot: Robot,
-    excitations: Sequence[tuple[Path, Excitation]],
+    excitations: Sequence[tuple[str, Excitation]],
     believed: str,
     gains: JointGains,
 ) -> None:
     """Play excitations on motors one after the other and write their recordings and traces."""
-    assert args.transport is not None
     rates = {excitation.rate for _, excitation in excitations}
     if len(rates) > 1:
         raise UsageError("The excitations have different rates; record them one by one.")
-    limits, console = recording_limits(robot, rates.pop()), Console()
-    with connect(robot, args.transport) as link:
-        facts = {"transport": args.transport, "drives": check(link, robot, limits)}
-        for path, excitation in excitations:
-            name = path.stem
+    rate = rates.pop()
+    limits = recording_limits(robot, rate)
+    with connect(robot, transport) as link:
+        drives = check(link, robot, limits)
+        for name, excitation in excitations:
+            seconds = len(excitation) / rate
             ask(
-                f"{robot.name} on the {excitation.rig} will play {name} for"
-                f" {len(excitation) / excitation.rate:.0f} s; keep a hand on the switch.",
+                f"{robot.name} on the {excitation.rig} will play {name} for {seconds:.0f} s; keep a"
+                " hand on the switch.",
                 yes=args.yes,
             )
-            done = _play(link, robot, excitation, gains, args.out / "traces", facts, name)
+            controller = JointPD(excitation.position, excitation.velocity, gains)
+            header = header_of(robot, controller, rate, transport=transport, drives=drives)
+            done = perform(
+                link,
+                _sequence(robot, excitation, controller, gains),
+                limits,
+                new_path(args.out / "traces", name),
+                header,
+                beside=lambda loop: keys(None, loop.stop, Console().print),
+            )
             cause = done.outcome.supervisor.stop_cause
             if cause.reason is not Reason.FINISHED:
                 raise HardwareError(f"{name} was stopped: {cause} Its trace is {done.path}.")
@@ -147,37 +156,20 @@ def _record_motors(
                 done.trace, excitation, believed=believed, gains=gains, name=file.name
             )
             recording.save(file)
-            for notice in (*done.notices, *recording.warnings):
-                console.print(f"  {notice}", highlight=False, soft_wrap=True)
-            console.print(f"Wrote {file}", highlight=False, soft_wrap=True)
+            say(*(f"  {notice}" for notice in (*done.notices, *recording.warnings)))
+            say_written(file)
 
 
-def _play(
-    link: "MoteusLink",
-    robot: Robot,
-    excitation: Excitation,
-    gains: JointGains,
-    folder: Path,
-    facts: dict[str, Any],
-    name: str,
-) -> Performance:
-    controller = JointPD(excitation.position, excitation.velocity, gains)
-    fixed = excitation.rig == "fixed-base"
-    rest = np.zeros(2) if fixed else hopping_poses(robot).rest
-    sequence = MotionSequence(
+def _sequence(
+    robot: Robot, excitation: Excitation, controller: JointPD, gains: JointGains
+) -> MotionSequence:
+    """Return the way to the excitation's first posture, the excitation, and the way to rest."""
+    rest = np.zeros(2) if excitation.rig == "fixed-base" else hopping_poses(robot).rest
+    return MotionSequence(
         controller,
         CommandSchedule(((float("nan"), 1.0),)),
         Poses(excitation.position[0], rest),
         None,
         SequenceTiming(hop=len(excitation) / excitation.rate),
         gains,
-    )
-    header = header_of(robot, controller, excitation.rate, **facts)
-    return perform(
-        link,
-        sequence,
-        recording_limits(robot, excitation.rate),
-        new_path(folder, name),
-        header,
-        beside=lambda loop: keys(None, loop.stop, Console().print),
     )

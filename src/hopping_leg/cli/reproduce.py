@@ -18,10 +18,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.table import Table
-
 from hopping_leg.cli import evaluate
+from hopping_leg.cli.options import at_least, say, show_table
 from hopping_leg.controllers.registry import ENERGY_SHAPING, shipped_policies
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.optimizers import LeastSquaresOptions
@@ -49,7 +47,7 @@ class Reproduce:
     """Folder for report.html, evaluation.json, transfer.json, traces/ and, in transfer/,
     recordings, robots, trainings and trials; default: runs/reproduce, runs/quick or runs/full."""
     seed: int = 0
-    """Of the trainings; the evaluation's seeds follow from another number."""
+    """Seed of the trainings; the evaluation's seeds follow from another number."""
     twin: str | None = None
     """Robot file of the leg that plays the real one; default: one that is drawn."""
     steps: int = 3_000_000
@@ -73,13 +71,7 @@ class Reproduce:
     @property
     def folder(self) -> Path:
         """Where everything is kept."""
-        usual = "reproduce" if self.size == "usual" else self.size
-        return self.out or Path("runs") / usual
-
-    @property
-    def notes(self) -> list[str]:
-        """What has to be said beside every number."""
-        return [NOTHING_MEANT] if self.quick else []
+        return self.out or Path("runs") / self.size.replace("usual", "reproduce")
 
 
 def run(args: Reproduce) -> None:
@@ -88,10 +80,11 @@ def run(args: Reproduce) -> None:
     _check(args)
     from hopping_leg.sim_to_real.transfer import transfer
 
+    folder, notes = args.folder, [NOTHING_MEANT] if args.quick else []
     study = make_study(args)
-    write_atomically(args.folder / _MARK, f"{args.size}\n".encode())
+    write_atomically(folder / _MARK, f"{args.size}\n".encode())
     result = transfer(study, args.jobs)
-    write_json(args.folder / "transfer.json", {**result, "notes": args.notes})
+    write_json(folder / "transfer.json", {**result, "notes": notes})
     twin, method = study.twins[0], study.methods[0]
     policy = study.training(twin, method, args.seed) / "policy.onnx"
     robot = study.fitted(twin, method)
@@ -101,25 +94,21 @@ def run(args: Reproduce) -> None:
             controllers=(f"{method.name}={policy}", *others, ENERGY_SHAPING),
             robot=str(robot),
             seeds=1 if args.quick else 5,
-            out=args.folder,
+            out=folder,
             json=args.json,
             floor="soft" if args.quick else "both",
             video=not args.quick,
         ),
-        args.notes,
+        notes,
     )
     show_transfer(result)
-    print(
-        "\n".join(
-            [
-                *args.notes,
-                f"Done in {(time.monotonic() - start) / 60:.1f} minutes.",
-                f"Report: {(args.folder / 'report.html').resolve()}",
-                f"Transfer: {args.folder / 'transfer.json'}",
-                f"Identified robot: {robot}",
-                f"Policy: {policy} (its model card lies beside it)",
-            ]
-        )
+    say(
+        *notes,
+        f"Done in {(time.monotonic() - start) / 60:.1f} minutes.",
+        f"Report: {(folder / 'report.html').resolve()}",
+        f"Transfer: {folder / 'transfer.json'}",
+        f"Identified robot: {robot}",
+        f"Policy: {policy} (its model card lies beside it)",
     )
 
 
@@ -144,8 +133,8 @@ def make_study(args: Reproduce) -> Study:
 
 
 def _check(args: Reproduce) -> None:
-    if args.seed < 0 or args.jobs < 1 or args.steps < 1:
-        raise UsageError("--seed must not be negative, --jobs and --steps must be at least 1.")
+    at_least(0, seed=args.seed)
+    at_least(1, jobs=args.jobs, steps=args.steps)
     if args.quick and args.full:
         raise UsageError("--quick and --full exclude each other; give one of them.")
     mark = args.folder / _MARK
@@ -161,37 +150,30 @@ def _check(args: Reproduce) -> None:
 
 def show_transfer(result: dict[str, Any]) -> None:
     """Print a study's tables."""
-    table = Table("trained on", "command, mm", "|error|, mm", "95 %", "error, mm", "skipped")
+    rows = []
     for row in result["rows"]:
         low, high = (_mm(row[f"median_abs_error_{end}_m"]) for end in ("low", "high"))
-        table.add_row(
-            row["method"],
-            _mm(row["command_m"]),
-            _mm(row["median_abs_error_m"]),
-            f"{low}-{high}",
-            _mm(row["median_error_m"]),
-            f"{row['skipped_hops']}/{row['hops'] + row['skipped_hops']}",
-        )
-    console = Console()
-    console.print(table)
-    _show_overall(console, result)
+        error, skipped = _mm(row["median_abs_error_m"]), row["skipped_hops"]
+        hops = f"{skipped}/{row['hops'] + skipped}"
+        command, signed = _mm(row["command_m"]), _mm(row["median_error_m"])
+        rows.append((row["method"], command, error, f"{low}-{high}", signed, hops))
+    show_table(("trained on", "command, mm", "|error|, mm", "95 %", "error, mm", "skipped"), rows)
+    _show_overall(result)
     if "best_in_own_simulation" in result:
-        console.print("\nOf several trainings, those alone that hop best in their own simulation:")
-        _show_overall(console, result["best_in_own_simulation"])
+        say("\nOf several trainings, those alone that hop best in their own simulation:")
+        _show_overall(result["best_in_own_simulation"])
 
 
-def _show_overall(console: Console, result: dict[str, Any]) -> None:
+def _show_overall(result: dict[str, Any]) -> None:
     for row in result["methods"]:
-        console.print(
+        say(
             f"{row['method']}: {_mm(row['median_abs_error_m'])} mm over all commands,"
-            f" {row['ordered']} of {row['policies']} policies in order",
-            highlight=False,
+            f" {row['ordered']} of {row['policies']} policies in order"
         )
     for row in result["comparison"]:
-        console.print(
+        say(
             f"{row['method']} errs {row['ratio']:.1f} times as much as {row['over']}"
-            f" ({row['ratio_low']:.1f} to {row['ratio_high']:.1f})",
-            highlight=False,
+            f" ({row['ratio_low']:.1f} to {row['ratio_high']:.1f})"
         )
 
 

@@ -13,10 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import tyro
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
+from hopping_leg.cli.options import show_table
 from hopping_leg.io import Tree, write_json
 from hopping_leg.robot import Robot, build_model, load_robot, shipped_robots
 from hopping_leg.robot.robot_files import load_tree
@@ -74,14 +72,12 @@ def _show(args: Show) -> None:
     robot, tree = load_robot(args.robot), load_tree(args.robot)
     if args.json:
         write_json(args.json, {**asdict(robot), "derived": derived(robot)})
-    table = Table(
-        "number", "value", "unit", "source", title=escape(f"{robot.name}: {robot.description}")
-    )
-    for path, entry in numbers(tree):
-        table.add_row(path, f"{entry['value']:g}", entry["unit"], escape(entry["source"]))
+    rows = [(p, f"{e['value']:g}", e["unit"], e["source"]) for p, e in numbers(tree)]
     for path, value in derived(robot).items():
-        table.add_row(path, f"{value:g}" if isinstance(value, float) else value, "", "computed")
-    Console().print(table)
+        shown = f"{value:g}" if isinstance(value, float) else value
+        rows.append((path, shown, "", "computed"))
+    title = f"{robot.name}: {robot.description}"
+    show_table(("number", "value", "unit", "source"), rows, title)
 
 
 def numbers(tree: Tree, prefix: str = "") -> list[tuple[str, Tree]]:

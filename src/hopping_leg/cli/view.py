@@ -22,8 +22,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
-from rich.console import Console
 
+from hopping_leg.cli.options import say
 from hopping_leg.errors import UsageError
 
 if TYPE_CHECKING:
@@ -80,14 +80,13 @@ def run(args: View) -> None:
         port=args.port,
         detail=scene.pixel_ratio() if args.detail is None else args.detail,
     )
-    console = Console()
-    console.print(f"Open {viewer.address} in a browser; Ctrl-C stops.", highlight=False)
+    say(f"Open {viewer.address} in a browser; Ctrl-C stops.")
     if args.browser and _has_screen():
         webbrowser.open(viewer.address)
     try:
         viewer.run(args.seconds)
     except KeyboardInterrupt:
-        console.print("Stopped.")
+        say("Stopped.")
     finally:
         viewer.close()
 
