@@ -32,7 +32,7 @@ def bash(tmp_path_factory):
 @pytest.mark.parametrize(
     ("words", "found"),
     [
-        (("hop", "rep"), ["reproduce"]),
+        (("hop", "repr"), ["reproduce"]),
         (("hop", "train", "--rec"), ["--recipe"]),
         (("hop", "train", "--log", "tr"), ["trackio"]),
         (("hop", "robots", "sh"), ["show"]),

@@ -68,7 +68,6 @@ raise SystemExit(main({1!r}))
         (["--tyro-print-completion", "bash"], "emulate"),
         (["emulate", "--kinds"], "late_reply"),
     ],
-    ids=" ".join,
 )
 def test_the_core_can_say_what_there_is(words, said):
     code = WITHOUT_EXTRAS.format(OPTIONAL, words)
