@@ -264,7 +264,7 @@ def draw_finetuning(result: dict[str, Any]) -> Figure:
     """Draw the true error of every check, one panel per twin, one colour per method.
 
     Args:
-        result: JSON values of ``hop bench finetune``; estimated errors are drawn as dots, checks
+        result: What the study measured; estimated errors are drawn as dots, checks
             that were ended early, which have no error, as crosses at the top.
     """
     curves = [row for row in result["curves"] if row["kind"] == "check"]

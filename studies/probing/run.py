@@ -245,7 +245,7 @@ def draw_probe(result: dict[str, Any]) -> Figure:
     """Draw the scores of all targets, a panel per policy, two side by side.
 
     Args:
-        result: As ``hop bench probe`` writes it.
+        result: As ``python -m studies.probing`` writes it.
     """
     rows = result["rows"]
     controllers = list(dict.fromkeys(row["controller"] for row in rows))
