@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit code.
 
     Args:
-        arguments: Without the program's name; default: those of the process.
+        arguments: Words behind the program's name; default: those of the process.
     """
     return guard(lambda: _dispatch(list(sys.argv[1:] if arguments is None else arguments)))
 
@@ -65,7 +65,7 @@ def guard(program: Callable[[], int]) -> int:
     try:
         return program()
     except HoppingLegError as error:
-        return _complain(str(error))
+        sentence = str(error)
     except KeyboardInterrupt:
         _complain("Interrupted; finished files are whole and nothing was half-written.")
         return INTERRUPTED
@@ -73,15 +73,24 @@ def guard(program: Callable[[], int]) -> int:
         sys.stderr.close()
         return FAILED
     except OSError as error:
-        return _complain(_system_sentence(error))
+        where = f" {error.filename}" if error.filename else ""
+        sentence = f"Could not use{where or ' a file'}: {error.strerror or error}."
+        if error.errno == errno.ENOSPC:
+            sentence = f"The disk is full; could not write{where}. Free some space and try again."
     except ModuleNotFoundError as error:
         extra = _EXTRAS.get((error.name or "").split(".")[0])
         if extra is None:
             raise
-        return _complain(
+        sentence = (
             f"This needs {error.name}, which comes with the extra '{extra}':"
             f" pip install 'hopping-leg[{extra}]'."
         )
+    return _complain(sentence)
+
+
+def _complain(sentence: str) -> int:
+    print(f"hop: {sentence}", file=sys.stderr)
+    return FAILED
 
 
 _EXTRAS = {
@@ -121,11 +130,17 @@ def read_options(
 
     Args:
         options: The dataclass, or a union of dataclasses, which become subcommands.
-        program: As the shell calls it.
-        description: What its help begins with.
-        arguments: Behind the program.
+        program: Name of the program in its help.
+        description: Beginning of its help.
+        arguments: Words behind the program.
+
+    Raises:
+        UsageError: An option is given twice, which would silently lose its first values.
     """
-    _refuse_repeated(arguments)
+    flags = [word.partition("=")[0] for word in arguments if word.startswith("--")]
+    for flag in flags:
+        if flags.count(flag) > 1:
+            raise UsageError(f"{flag} is given twice; give it once, with all its values behind it.")
     return tyro.cli(options, prog=program, description=description, args=arguments, config=_CONFIG)
 
 
@@ -156,40 +171,17 @@ def _print_completion(shell: str = "") -> int:
     return 0
 
 
-def _refuse_repeated(arguments: Sequence[str]) -> None:
-    """An option given twice would silently lose its first values."""
-    flags = [a.partition("=")[0] for a in arguments if a.startswith("--")]
-    for flag in flags:
-        if flags.count(flag) > 1:
-            raise UsageError(f"{flag} is given twice; give it once, with all its values behind it.")
-
-
 def overview() -> str:
     """Return what ``hop --help`` prints."""
     width = max(map(len, VERBS))
-    lines = [f"  {name:<{width}}  {line}" for name, line in VERBS.items()]
-    return "\n".join(
-        [
-            "usage: hop VERB [options]",
-            "",
-            "A one-legged robot hops to commanded heights: simulate, train, evaluate, compare.",
-            "",
-            *lines,
-            "",
-            "`hop VERB --help` explains a verb; `hop --tyro-print-completion bash` prints a script",
-            "that completes them in the shell (or zsh, fish). Start here:",
-            "  hop evaluate fast energy-shaping --out runs/first",
-        ]
-    )
+    verbs = "\n".join(f"  {name:<{width}}  {line}" for name, line in VERBS.items())
+    return f"""\
+usage: hop VERB [options]
 
+A one-legged robot hops to commanded heights: simulate, train, evaluate, compare.
 
-def _complain(sentence: str) -> int:
-    print(f"hop: {sentence}", file=sys.stderr)
-    return FAILED
+{verbs}
 
-
-def _system_sentence(error: OSError) -> str:
-    where = f" {error.filename}" if error.filename else ""
-    if error.errno == errno.ENOSPC:
-        return f"The disk is full; could not write{where}. Free some space and run it again."
-    return f"Could not use{where or ' a file'}: {error.strerror or error}."
+`hop VERB --help` explains a verb; `hop --tyro-print-completion bash` prints a script
+that completes them in the shell (or zsh, fish). Start here:
+  hop evaluate fast energy-shaping --out runs/first"""

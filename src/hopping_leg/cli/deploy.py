@@ -25,6 +25,7 @@ import tyro
 from rich.console import Console
 
 from hopping_leg.cli.motors import ask, check, connect
+from hopping_leg.cli.options import say, say_written
 from hopping_leg.controllers.command_schedule import (
     CommandSchedule,
     Range,
@@ -49,7 +50,6 @@ from hopping_leg.robot.limits import SoftLimiter, SoftLimits
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import CONTROL_RATE
 
-_WILLED = (Reason.FINISHED, Reason.OPERATOR_STOP)
 _SECONDS = 10.0
 
 
@@ -100,45 +100,41 @@ def run(args: Deploy) -> None:
     robot = load_robot(args.robot)
     robot.require_leg()
     done = _perform(args, robot, _plan(args, robot))
-    console = Console()
-    for notice in done.notices:
-        console.print(notice, soft_wrap=True)
     cause = done.outcome.supervisor.stop_cause
-    console.print(f"{cause} {done.outcome.ticks} ticks, {done.outcome.skipped} left out.")
-    console.print(f"Wrote {done.path}", highlight=False, soft_wrap=True)
-    if cause.reason not in _WILLED:
+    say(*done.notices, f"{cause} {done.outcome.ticks} ticks, {done.outcome.skipped} left out.")
+    say_written(done.path)
+    if cause.reason not in (Reason.FINISHED, Reason.OPERATOR_STOP):
         errors = [event.get("controller_error", "") for event in done.trace.header["events"]]
         raise HardwareError(" ".join([f"The leg was stopped: {cause}", *filter(None, errors)]))
 
 
 def _plan(args: Deploy, robot: Robot) -> Plan:
     """Return what to do; everything that can be wrong with it is found here."""
+    if args.schedule is not None and args.command is not None:
+        raise UsageError("--command and --schedule exclude each other; give one of them.")
+    controller: Controller
     if args.controller.endswith(".parquet"):
         excitation = load_excitation(Path(args.controller))
-        controller: Controller = JointPD(excitation.position, excitation.velocity)
-        rate, usual = excitation.rate, len(excitation) / excitation.rate
+        controller = JointPD(excitation.position, excitation.velocity)
+        rate, seconds = excitation.rate, len(excitation) / excitation.rate
     else:
         controller = load_controller(
             args.controller, robot, other="warn" if args.other_robot else "refuse"
         )
-        rate, usual = CONTROL_RATE, _SECONDS
+        rate, seconds = CONTROL_RATE, _SECONDS
     valid = command_range(controller, robot)
-    schedule = _schedule(args, controller, valid)
+    if args.schedule is not None:
+        schedule = CommandSchedule.parse(args.schedule)
+        seconds = schedule.seconds
+    else:
+        middle = sum(valid) / 2 if isinstance(controller, Policy) else 0.30
+        height = middle if args.command is None else args.command
+        schedule = CommandSchedule(((height, _SECONDS),))
     check_schedule(schedule, valid, controller.name)
-    seconds = args.seconds or (schedule.seconds if args.schedule else usual)
+    seconds = args.seconds or seconds
     if not 0 < seconds <= 3600:
         raise UsageError(f"--seconds is {seconds:g} but must lie between 0 and 3600.")
     return Plan(controller, rate, schedule, seconds, valid)
-
-
-def _schedule(args: Deploy, controller: Controller, valid: Range) -> CommandSchedule:
-    if args.schedule is not None and args.command is not None:
-        raise UsageError("--command and --schedule exclude each other; give one of them.")
-    if args.schedule is not None:
-        return CommandSchedule.parse(args.schedule)
-    middle = sum(valid) / 2 if isinstance(controller, Policy) else 0.30
-    height = middle if args.command is None else args.command
-    return CommandSchedule(((height, _SECONDS),))
 
 
 def _perform(args: Deploy, robot: Robot, plan: Plan) -> Performance:
@@ -155,27 +151,26 @@ def _perform(args: Deploy, robot: Robot, plan: Plan) -> Performance:
         SoftLimiter(robot, SoftLimits()) if args.soft_limits else None,
         SequenceTiming(hop=plan.seconds),
     )
-    limits, console = hopping_limits(robot, plan.rate), Console()
+    limits = hopping_limits(robot, plan.rate)
 
     @contextlib.contextmanager
     def beside(loop: ControlLoop) -> Iterator[None]:
         with contextlib.ExitStack() as operator:
-            operator.enter_context(keys(height, loop.stop, console.print))
+            operator.enter_context(keys(height, loop.stop, Console().print))
             if page is not None:
                 operator.enter_context(page.serve(loop.stop))
             yield
 
     if page is not None:
-        console.print(f"Height and stop: {page.address}", highlight=False)
+        say(f"Height and stop: {page.address}")
     with connect(robot, args.transport) as link:
-        found = check(link, robot, limits)
-        header = header_of(
-            robot, plan.controller, plan.rate, transport=args.transport, drives=found
-        )
+        drives, name = check(link, robot, limits), plan.controller.name
         ask(
-            f"All checks passed. {robot.name} will move and hop for {plan.seconds:g} s with"
-            f" {plan.controller.name}; keep a hand on the switch.",
+            f"All checks passed. {robot.name} will move and hop for {plan.seconds:g} s with {name};"
+            " keep a hand on the switch.",
             yes=args.yes,
         )
-        path = new_path(args.out, plan.controller.name)
-        return perform(link, sequence, limits, path, header, beside=beside)
+        header = header_of(
+            robot, plan.controller, plan.rate, transport=args.transport, drives=drives
+        )
+        return perform(link, sequence, limits, new_path(args.out, name), header, beside=beside)

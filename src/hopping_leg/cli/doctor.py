@@ -15,9 +15,9 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from typing import TYPE_CHECKING
 
 from packaging.requirements import Requirement
-from rich.console import Console
 
 from hopping_leg.cli.motors import ask, connect, find, show
+from hopping_leg.cli.options import say
 from hopping_leg.deploy.preflight import Finding, required_settings
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.errors import HardwareError, UsageError
@@ -27,6 +27,20 @@ from hopping_leg.sim import CONTROL_RATE
 
 if TYPE_CHECKING:
     from hopping_leg.deploy.moteus_link import MoteusLink
+
+PURPOSES = {
+    "train": "train policies (hop train)",
+    "tune": "search a recipe's numbers (hop tune)",
+    "view": "watch the leg in the browser (hop view)",
+    "hardware": "talk to the drives (hop deploy, hop doctor, hop emulate)",
+    "pi3hat": "talk to the drives from a Raspberry Pi with a pi3hat",
+    "bullet": "the leg in PyBullet (hop evaluate --engine pybullet)",
+    "bench": "mujoco.sysid beside our fits (python -m studies.identification)",
+    "cluster": "identify or tune on a Ray cluster (--ray)",
+    "docs": "build the documentation (make docs)",
+    "dev": "test and check a clone (make test, make check)",
+}
+"""Every extra, with what it is for."""
 
 
 @dataclass(frozen=True)
@@ -48,42 +62,39 @@ class Doctor:
 
 def run(args: Doctor) -> None:
     """Check, change what was asked for, check again."""
+    changes = args.write or args.home is not None
     if args.transport is None:
-        if args.write or args.home is not None:
+        if changes:
             raise UsageError("--write and --home need the drives; name their --transport.")
-        show_extras(Console(), survey())
+        show_extras()
         return
-    robot, console = load_robot(args.robot), Console()
+    robot = load_robot(args.robot)
     limits = hopping_limits(robot, CONTROL_RATE)
     with connect(robot, args.transport) as link:
         findings = find(link, robot, limits)
         if args.write:
-            _write(link, robot, findings, console, yes=args.yes)
+            _write(link, robot, findings, yes=args.yes)
         if args.home is not None:
             _home(link, args.home, yes=args.yes)
-        if args.write or args.home is not None:
+        if changes:
             findings = find(link, robot, limits)
-    show(console, findings)
+    show(findings)
     if any(finding.complaint for finding in findings):
         raise HardwareError("The leg may not be armed; the sentences above say why.")
-    console.print("The leg may be armed.")
+    say("The leg may be armed.")
 
 
-def _write(
-    link: "MoteusLink", robot: Robot, findings: list[Finding], console: Console, *, yes: bool
-) -> None:
+def _write(link: "MoteusLink", robot: Robot, findings: list[Finding], *, yes: bool) -> None:
     """Write the settings that were found wrong."""
     from hopping_leg.deploy.drive_info import configure
 
     for joint, name in enumerate(JOINTS):
         wrong = {f.setting for f in findings if f.joint == joint and f.setting}
         settings = [s for s in required_settings(robot, joint) if s.name in wrong]
-        if not settings:
-            continue
-        for setting in settings:
-            console.print(f"{name}: {setting.name} = {setting.text} ({setting.why})")
-        ask(f"These settings of the {name}'s drive will be written for good.", yes=yes)
-        configure(link, joint, settings)
+        if settings:
+            say(*(f"{name}: {s.name} = {s.text} ({s.why})" for s in settings))
+            ask(f"These settings of the {name}'s drive will be written for good.", yes=yes)
+            configure(link, joint, settings)
 
 
 def _home(link: "MoteusLink", angles: tuple[float, float], *, yes: bool) -> None:
@@ -94,78 +105,41 @@ def _home(link: "MoteusLink", angles: tuple[float, float], *, yes: bool) -> None
     home(link, angles)
 
 
-PACKAGE = "hopping-leg"
-
-PURPOSES = {
-    "train": "train policies (hop train)",
-    "tune": "search a recipe's numbers (hop tune)",
-    "view": "watch the leg in the browser (hop view)",
-    "hardware": "talk to the drives (hop deploy, hop doctor, hop emulate)",
-    "pi3hat": "talk to the drives from a Raspberry Pi with a pi3hat",
-    "bullet": "the leg in PyBullet (hop evaluate --engine pybullet)",
-    "bench": "mujoco.sysid beside our fits (python -m studies.identification)",
-    "cluster": "identify or tune on a Ray cluster (--ray)",
-    "docs": "build the documentation (make docs)",
-    "dev": "test and check a clone (make test, make check)",
-}
-"""Every extra, with what it is for."""
+def show_extras() -> None:
+    """Print a line per extra, and the command for those that are missing."""
+    for extra, missing in missing_requirements(requires("hopping-leg") or []).items():
+        if missing:
+            say(f"{extra}: missing {', '.join(missing)}; {PURPOSES[extra]}")
+            say(f"  pip install 'hopping-leg[{extra}]'")
+        else:
+            say(f"{extra}: installed; {PURPOSES[extra]}")
 
 
-@dataclass(frozen=True)
-class Extra:
-    """State of one extra."""
-
-    name: str
-    purpose: str
-    missing: tuple[str, ...]
-    """Requirements that are absent or of a version that does not fit."""
-
-    @property
-    def command(self) -> str:
-        """What installs it."""
-        return f"pip install '{PACKAGE}[{self.name}]'"
-
-
-def survey(requirements: Sequence[str] | None = None) -> list[Extra]:
-    """Look at what is installed.
+def missing_requirements(requirements: Sequence[str]) -> dict[str, list[str]]:
+    """Return what of each extra is absent or of a version that does not fit.
 
     Args:
-        requirements: As a package's metadata states them; default: those of this package.
+        requirements: Requirements as the package's metadata states them.
     """
-    lines = requires(PACKAGE) or [] if requirements is None else requirements
-    wanted = [Requirement(line) for line in lines]
-    return [
-        Extra(name, purpose, tuple(str_of(r) for r in wanted if _of(r, name) and not _met(r)))
-        for name, purpose in PURPOSES.items()
-    ]
+    wanted = [Requirement(line) for line in requirements]
+    return {
+        extra: [_text(r) for r in wanted if _belongs(r, extra) and not _met(r)]
+        for extra in PURPOSES
+    }
 
 
-def show_extras(console: Console, extras: Sequence[Extra]) -> None:
-    """Print a line per extra, and the command for those that are missing."""
-    for extra in extras:
-        if not extra.missing:
-            console.print(f"{extra.name}: installed; {extra.purpose}", highlight=False)
-            continue
-        console.print(
-            f"{extra.name}: missing {', '.join(extra.missing)}; {extra.purpose}\n  {extra.command}",
-            highlight=False,
-            markup=False,
-        )
-
-
-def str_of(requirement: Requirement) -> str:
+def _text(requirement: Requirement) -> str:
     """Return a requirement without its condition."""
     extras = f"[{','.join(sorted(requirement.extras))}]" if requirement.extras else ""
     return f"{requirement.name}{extras}{requirement.specifier}"
 
 
-def _of(requirement: Requirement, extra: str) -> bool:
+def _belongs(requirement: Requirement, extra: str) -> bool:
+    """Tell whether an extra asks for a requirement, which holds on this platform."""
     marker = requirement.marker
-    return (
-        marker is not None
-        and not marker.evaluate({"extra": ""})
-        and marker.evaluate({"extra": extra})
-    )
+    if marker is None:
+        return False
+    return marker.evaluate({"extra": extra}) and not marker.evaluate({"extra": ""})
 
 
 def _met(requirement: Requirement) -> bool:
@@ -176,5 +150,5 @@ def _met(requirement: Requirement) -> bool:
         return False
     brought = [Requirement(line) for line in requires(requirement.name) or []]
     return requirement.specifier.contains(found, prereleases=True) and all(
-        _met(other) for extra in requirement.extras for other in brought if _of(other, extra)
+        _met(other) for extra in requirement.extras for other in brought if _belongs(other, extra)
     )

@@ -30,10 +30,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from rich.console import Console
-from rich.table import Table
-
-from hopping_leg.cli.options import at_least
+from hopping_leg.cli.options import at_least, say, show_table
 from hopping_leg.deploy.drive_link import DriveMode, FaultCode
 from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
 from hopping_leg.emulator.faults import KINDS, load_faults
@@ -42,7 +39,6 @@ from hopping_leg.robot.parameters import JOINTS
 
 if TYPE_CHECKING:
     from hopping_leg.emulator.drive import EmulatedDrive
-    from hopping_leg.emulator.ports import Port
     from hopping_leg.emulator.robot import EmulatedRobot
 
 _RENEWED = 0.2
@@ -83,9 +79,8 @@ class Emulate:
 
 def run(args: Emulate) -> None:
     """Serve the emulated robot until it is over, and tell what happens."""
-    console = Console(highlight=False)
     if args.kinds:
-        _list_kinds(console)
+        show_table(("kind", "what happens", "value", "unit", "lasts"), map(_kind_cells, KINDS))
         return
     at_least(0, seed=args.seed)
     from hopping_leg.emulator.server import EmulatorConfig, Server
@@ -106,9 +101,15 @@ def run(args: Emulate) -> None:
     seconds = math.inf if args.seconds is None else args.seconds
     try:
         with _ending_signals() as over:
-            _greet(console, robot, port)
+            ids = " and ".join(str(drive.id) for drive in robot.drives)
+            where = f"on {port}." if ":" in str(port) else f"behind {port}"
+            say(
+                f"Drives {ids} of {robot.robot.name} {where}",
+                f"  hop deploy fast --transport {port}",
+            )
+            sys.stdout.flush()
             if args.realtime and prefer_this_thread() is not None:
-                console.print("Without real-time priority the drives may answer late under load.")
+                say("Without real-time priority the drives may answer late under load.")
             server, display = Server(robot, port), _Display(robot)
             server.on_turn = lambda: display.renew(server.lost)
             with uninterrupted():
@@ -118,15 +119,12 @@ def run(args: Emulate) -> None:
         port.close()
 
 
-def _list_kinds(console: Console) -> None:
-    table = Table("kind", "what happens", "value", "unit", "lasts")
-    for name, kind in KINDS.items():
-        if math.isnan(kind.duration):
-            lasts = "so many replies"
-        else:
-            lasts = "on" if math.isinf(kind.duration) else f"{kind.duration:g} s"
-        table.add_row(name, kind.text, f"{kind.value:g}" if kind.unit else "", kind.unit, lasts)
-    console.print(table)
+def _kind_cells(name: str) -> tuple[str, ...]:
+    kind = KINDS[name]
+    lasts = "on" if math.isinf(kind.duration) else f"{kind.duration:g} s"
+    if math.isnan(kind.duration):
+        lasts = "so many replies"
+    return name, kind.text, f"{kind.value:g}" if kind.unit else "", kind.unit, lasts
 
 
 @contextlib.contextmanager
@@ -140,14 +138,6 @@ def _ending_signals() -> Iterator[list[int]]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-def _greet(console: Console, robot: "EmulatedRobot", port: "Port") -> None:
-    ids = " and ".join(str(drive.id) for drive in robot.drives)
-    where = f"on {port}." if ":" in str(port) else f"behind {port}"
-    console.print(f"Drives {ids} of {robot.robot.name} {where}", soft_wrap=True)
-    console.print(f"  hop deploy fast --transport {port}", soft_wrap=True)
-    sys.stdout.flush()
 
 
 class _Display:
@@ -175,21 +165,19 @@ class _Display:
             print()
         print(f"The emulator ended after {self._robot.time:.1f} s.", flush=True)
 
-    def _events(self) -> list[str]:
-        """Return a line for each fault that began and each change of mode since the last call."""
-        robot, lines = self._robot, []
-        log = robot.fault_injector.log
+    def _events(self) -> Iterator[str]:
+        """Yield a line for each fault that began and each change of mode since the last call."""
+        robot, log = self._robot, self._robot.fault_injector.log
         for begun, fault in log[self._faults_shown :]:
             who = "" if fault.kind == "unplug" else f" ({fault.drive})"
-            lines.append(f"{begun:7.3f} s  fault: {KINDS[fault.kind].text}{who}")
+            yield f"{begun:7.3f} s  fault: {KINDS[fault.kind].text}{who}"
         self._faults_shown = len(log)
         for joint, drive in enumerate(robot.drives):
             mode = drive.machine.mode
             if mode is not self._modes[joint]:
                 self._modes[joint] = mode
                 why = f": {_code_text(drive.machine.fault)}" if mode is DriveMode.FAULT else ""
-                lines.append(f"{robot.time:7.3f} s  {JOINTS[joint]}: {_mode_text(drive)}{why}")
-        return lines
+                yield f"{robot.time:7.3f} s  {JOINTS[joint]}: {_mode_text(drive)}{why}"
 
     def _status(self, lost: float) -> str:
         """Return the state in one line."""
@@ -215,7 +203,5 @@ def _mode_text(drive: "EmulatedDrive") -> str:
 
 def _code_text(code: int) -> str:
     """Return what a fault code or notice means."""
-    for kind in (FaultCode, Notice):
-        if code in set(kind):
-            return kind(code).name.lower().replace("_", " ")
-    return "unknown"
+    known = [kind(code) for kind in (FaultCode, Notice) if code in set(kind)]
+    return known[0].name.lower().replace("_", " ") if known else "unknown"

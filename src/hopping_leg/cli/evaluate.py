@@ -21,7 +21,15 @@ from typing import Literal
 import tyro
 from rich.console import Console
 
-from hopping_leg.cli.options import Heights, at_least, check_file, command_line, say_written
+from hopping_leg.cli.options import (
+    Heights,
+    JsonFile,
+    RobotFile,
+    at_least,
+    check_file,
+    command_line,
+    say_written,
+)
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.evaluate import Entry, EvaluationRun, evaluate
 from hopping_leg.evaluate.entries import load_entries
@@ -41,16 +49,14 @@ class Conditions:
     controllers: tyro.conf.Positional[tuple[str, ...]]
     """Names (energy-shaping, paper, fast, ...), .onnx files, a quoted pattern of them, or Python
     classes as FILE.py:CLASS; LABEL=FILE chooses the name in all tables."""
-    robot: str = "legv2-paper"
-    """A shipped robot or a .toml file."""
+    robot: RobotFile = "legv2-paper"
     commands: Heights | None = None
     """Apex heights, m; default 0.25,0.30,0.35, scaled to the leg's length."""
     seeds: int = 5
     """Realisations of noise and delay per trial."""
     seed: int = 1000
     """All of them follow from it; choose one that selected nothing."""
-    json: Path | None = None
-    """File for every number."""
+    json: JsonFile = None
     noise: bool = True
     """The paper's sensor noise, torque noise and delay."""
     timestep: float = 5e-4
@@ -122,8 +128,7 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
     judged = replace(judged, evaluation=replace(judged.evaluation, command=command, notes=notes))
     if args.json:
         write_atomically(args.json, judged.evaluation.dumps())
-    console = Console()
-    print_evaluation(console, judged.evaluation)
+    print_evaluation(Console(), judged.evaluation)
     if args.traces:
         save_traces(judged.runs, args.traces)
     if args.report:

@@ -18,10 +18,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
-from rich.console import Console
 
 from hopping_leg.cli.motors import ask, check, connect
-from hopping_leg.cli.options import Heights
+from hopping_leg.cli.options import Heights, JsonFile, at_least, say
 from hopping_leg.controllers.registry import load_policy
 from hopping_leg.deploy.hardware_trials import DeployedRobot
 from hopping_leg.deploy.safety_limits import hopping_limits
@@ -67,8 +66,7 @@ class Finetune:
     """Go on with the run in the folder; without one there, begin."""
     yes: bool = False
     """Arm the drives without asking before every outing."""
-    json: Path | None = None
-    """Write the numbers to this file as well."""
+    json: JsonFile = None
 
 
 def run(args: Finetune) -> None:
@@ -79,39 +77,35 @@ def run(args: Finetune) -> None:
 
     policy, robot = load_policy(args.policy), load_robot(args.robot)
     _refuse(args, policy, robot)
-    stopping_rules = StoppingRules(minutes=args.minutes, tolerance=args.tolerance)
     options = FinetuneConfig(
         method=args.method,
         commands=tuple(sorted(args.commands)),
         outing=args.outing,
-        stopping_rules=stopping_rules,
+        stopping_rules=StoppingRules(minutes=args.minutes, tolerance=args.tolerance),
     )
     span = (min(args.commands), max(args.commands))
-    console = Console()
     result = finetune(
         Task(policy, robot, span, args.seed),
-        _outings(args, robot, policy),
+        _outings(args, robot, policy.card.rate),
         options,
         args.out,
         resume=args.resume,
-        on_outing=lambda row: console.print(line(row), highlight=False, soft_wrap=True),
+        on_outing=lambda row: say(line(row)),
     )
     if args.json is not None:
         write_json(args.json, result)
-    console.print(f"{result['why_it_ended']} Policy: {args.out / POLICY}", soft_wrap=True)
+    say(f"{result['why_it_ended']} Policy: {args.out / POLICY}")
 
 
 def line(row: dict[str, Any]) -> str:
     """Return what to show of an outing."""
     true = f", in truth {1e3 * row['true_error_m']:.1f} mm" if "true_error_m" in row else ""
-    notes = [row["complaint"], "Rolled back to the best." if row["rolled_back"] else ""]
-    return " ".join(
-        [
-            f"{row['minutes']:.2f} min, {row['kind']}: error {1e3 * row['error_m']:.1f} mm{true},"
-            f" {row['hops']} hops.",
-            *filter(None, notes),
-        ]
+    back = "Rolled back to the best." if row["rolled_back"] else ""
+    said = (
+        f"{row['minutes']:.2f} min, {row['kind']}: error {1e3 * row['error_m']:.1f} mm{true},"
+        f" {row['hops']} hops."
     )
+    return " ".join(filter(None, (said, row["complaint"], back)))
 
 
 def guard_of(robot: Robot, rate: float) -> "Guard":
@@ -133,8 +127,7 @@ def _refuse(args: Finetune, policy: "Policy", robot: Robot) -> None:
     """
     if (args.on is None) == (args.transport is None):
         raise UsageError("Give either --on, a twin that plays the leg, or --transport, its drives.")
-    if args.seed < 0:
-        raise UsageError(f"--seed is {args.seed} but must not be negative.")
+    at_least(0, seed=args.seed)
     robot.require_leg()
     if not robot.reality.only_delays:
         raise RobotError(
@@ -156,23 +149,16 @@ def _refuse(args: Finetune, policy: "Policy", robot: Robot) -> None:
             )
 
 
-def _outings(args: Finetune, robot: Robot, policy: "Policy") -> "TrialRobot":
-    if args.on is not None:
+def _outings(args: Finetune, robot: Robot, rate: float) -> "TrialRobot":
+    if args.transport is None:
         from hopping_leg.rl.finetune.simulated import SimulatedTrials
 
-        return SimulatedTrials(load_robot(args.on), guard_of(robot, policy.card.rate))
-    assert args.transport is not None
-    return _deployed(args, robot, policy.card.rate, args.transport)
-
-
-def _deployed(args: Finetune, robot: Robot, rate: float, transport: str) -> "TrialRobot":
-    limits = hopping_limits(robot, rate)
+        return SimulatedTrials(load_robot(str(args.on)), guard_of(robot, rate))
+    limits, transport = hopping_limits(robot, rate), args.transport
 
     def ready(seconds: float) -> None:
-        ask(
-            f"{robot.name} will move and hop for {seconds:g} s; keep a hand on the switch.",
-            yes=args.yes,
-        )
+        what = f"{robot.name} will move and hop for {seconds:g} s; keep a hand on the switch."
+        ask(what, yes=args.yes)
 
     return DeployedRobot(
         robot,

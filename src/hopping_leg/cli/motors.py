@@ -1,13 +1,14 @@
-"""What all verbs share that talk to motors; the client library is imported only here, and late."""
+"""What the verbs that talk to motors share; the client library is imported only here, and late."""
 
 import contextlib
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
 
+from hopping_leg.cli.options import say
 from hopping_leg.deploy.preflight import Finding, check_drives, require_fit
 from hopping_leg.deploy.safety_limits import SafetyLimits
 from hopping_leg.errors import UsageError
@@ -17,13 +18,8 @@ if TYPE_CHECKING:
     from hopping_leg.deploy.moteus_link import MoteusLink
 
 
-@contextlib.contextmanager
-def connect(robot: Robot, transport: str) -> "Iterator[MoteusLink]":
-    """Open the way to a robot's drives.
-
-    Args:
-        robot: Whose drives.
-        transport: As on the command line.
+def connect(robot: Robot, transport: str) -> "contextlib.closing[MoteusLink]":
+    """Open the way to a robot's drives, as a context manager that closes it.
 
     Raises:
         UsageError: There is no such transport.
@@ -32,11 +28,7 @@ def connect(robot: Robot, transport: str) -> "Iterator[MoteusLink]":
     from hopping_leg.deploy.moteus_link import MoteusLink
     from hopping_leg.deploy.transport import opener
 
-    link = MoteusLink(robot, opener(transport))
-    try:
-        yield link
-    finally:
-        link.close()
+    return contextlib.closing(MoteusLink(robot, opener(transport)))
 
 
 def find(link: "MoteusLink", robot: Robot, limits: SafetyLimits) -> list[Finding]:
@@ -61,34 +53,27 @@ def check(link: "MoteusLink", robot: Robot, limits: SafetyLimits) -> dict[str, d
 
 
 def ask(question: str, *, yes: bool) -> None:
-    """Wait for the operator's consent.
-
-    Args:
-        question: What will happen.
-        yes: Whether consent was given on the command line.
+    """Wait for the operator's consent, unless ``yes`` says that the command line gave it.
 
     Raises:
-        UsageError: Nobody can be asked.
+        UsageError: Nobody can be asked, or the answer is no.
     """
     if yes:
         return
     if not sys.stdin.isatty():
         raise UsageError(f"{question} This needs your consent; call it in a terminal or add --yes.")
-    answer = input(f"{question} Type yes: ")
-    if answer.strip().lower() not in ("y", "yes"):
+    if input(f"{question} Type yes: ").strip().lower() not in ("y", "yes"):
         raise UsageError("You did not agree; nothing was done.")
 
 
-def show(console: Console, findings: Sequence[Finding]) -> None:
+def show(findings: Sequence[Finding]) -> None:
     """Print checks as a table and complaints as sentences."""
     table = Table("check", *JOINTS)
     found = {(f.check, f.joint): f for f in findings}
     for name in dict.fromkeys(f.check for f in findings):
-        cells = [found.get((name, joint)) for joint in range(len(JOINTS))]
-        table.add_row(name, *(_cell(finding) for finding in cells))
-    console.print(table)
-    for complaint in (f.complaint for f in findings if f.complaint):
-        console.print(f"- {complaint[0].upper()}{complaint[1:]}", soft_wrap=True, highlight=False)
+        table.add_row(name, *(_cell(found.get((name, joint))) for joint in range(len(JOINTS))))
+    Console().print(table)
+    say(*(f"- {f.complaint[0].upper()}{f.complaint[1:]}" for f in findings if f.complaint))
 
 
 def _cell(finding: Finding | None) -> str:

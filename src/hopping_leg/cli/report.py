@@ -19,9 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
-from rich.console import Console
 
-from hopping_leg.cli.options import check_file, say_written
+from hopping_leg.cli.options import JsonFile, check_file, say, say_written
 from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import EvaluationRun
@@ -64,8 +63,7 @@ class Page:
     the name in all tables."""
     out: Path = Path("report.html")
     """File for the page."""
-    json: Path | None = None
-    """File for every number."""
+    json: JsonFile = None
 
 
 def run(args: Figures | Page) -> None:
@@ -79,7 +77,7 @@ def run(args: Figures | Page) -> None:
 def _write(args: Page) -> None:
     check_file(args.out)
     check_file(args.json)
-    console, runs = Console(), read_runs(args.runs)
+    runs = read_runs(args.runs)
     if len(runs) == 1 and (evaluation := runs[0].evaluation):
         traces = sorted(runs[0].traces.glob("*.parquet")) if runs[0].traces else []
         page = write_report(EvaluationRun(evaluation, [run_of(path) for path in traces]))
@@ -89,8 +87,7 @@ def _write(args: Page) -> None:
         command = shlex.join(["hop", "report", "page", *args.runs, "--out", str(args.out)])
         page = write_comparison(compared, command)
         numbers = {"command": command, **compared.to_json()}
-        for note in compared.notes:
-            console.print(note, highlight=False)
+        say(*compared.notes)
     write_atomically(args.out, page)
     if args.json:
         write_json(args.json, numbers)
@@ -102,16 +99,15 @@ def _draw(args: Figures) -> None:
         raise UsageError("No trace was named; record some with `hop evaluate ... --traces DIR`.")
     runs = [run_of(_trace(path)) for path in args.traces]
     controllers = list(dict.fromkeys(run.controller for run in runs))
-    console = Console()
     for picture in draw_report_figures(tabulate(runs, controllers, seed=0), runs):
         path = args.out / f"{picture.name}.{args.format}"
         write_atomically(path, encode(picture.figure, args.format, args.width))
-        console.print(f"{picture.title}: {path}", highlight=False)
+        say(f"{picture.title}: {path}")
     if args.animation is not None:
         for name in controllers:
             path = args.out / f"hops-{safe_file_name(name)}.{args.animation}"
             write_atomically(path, _animation(runs, name, args.animation))
-            console.print(f"Hops of {name}: {path}", highlight=False)
+            say(f"Hops of {name}: {path}")
 
 
 def _animation(runs: Sequence[Run], controller: str, kind: Animation) -> bytes:

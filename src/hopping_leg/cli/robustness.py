@@ -47,6 +47,5 @@ def run(args: Robustness) -> None:
     file, figure = args.json or args.out / "robustness.json", args.out / "robustness.svg"
     write_json(file, result)
     write_atomically(figure, to_svg(draw_robustness(result)))
-    console = Console()
-    print_robustness(console, result)
+    print_robustness(Console(), result)
     say_written(file, figure)

@@ -40,8 +40,7 @@ def run(args: Skills) -> None:
             on_progress=bar.show,
         )
     result = {"command": command_line("hop skills", args), **found}
-    console = Console()
-    print_skills(console, result)
+    print_skills(Console(), result)
     if args.json:
         write_json(args.json, result)
         say_written(args.json)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from hopping_leg.errors import UsageError
+from hopping_leg.cli.options import JsonFile, RobotFile, at_least
 from hopping_leg.io import write_json
 from hopping_leg.robot import load_robot
 
@@ -31,8 +31,7 @@ class Options:
     """How to train: `fast` for accurate hopping soon, `precise` for more accurate hopping later,
     `adaptive` for one that corrects itself on legs that differ, `paper` for the paper's method; or
     FILE.py:NAME, a recipe of your own."""
-    robot: str = "legv2-paper"
-    """A shipped robot or the path of a .toml file."""
+    robot: RobotFile = "legv2-paper"
     seed: int = 0
     """Seed of weights, exploration, starts, noise and delay."""
     out: Path | None = None
@@ -64,8 +63,7 @@ class Options:
     best goes on alone with the threads of all. A training may fail by bad luck; two hardly do."""
     log: Literal["tensorboard", "wandb", "trackio"] = "tensorboard"
     """Who gets the curves besides TensorBoard; wandb and trackio are packages of their own."""
-    json: Path | None = None
-    """Write the results to this file as JSON."""
+    json: JsonFile = None
 
 
 def run(args: Options) -> None:
@@ -75,11 +73,9 @@ def run(args: Options) -> None:
     from hopping_leg.rl.run_folder import read_result
 
     recipe = get_recipe(args.recipe)
-    if args.seed < 0 or min(args.threads, args.parallel_seeds) < 1:
-        raise UsageError("--seed must be at least 0, --threads and --parallel-seeds at least 1.")
+    at_least(0, seed=args.seed)
+    at_least(1, threads=args.threads, parallel_seeds=args.parallel_seeds, steps=args.steps)
     if args.steps is not None:
-        if args.steps < 1:
-            raise UsageError(f"--steps is {args.steps} but must be at least 1.")
         recipe = recipe.replace(steps=args.steps)
     recipe = change(recipe, args.set)
     if args.randomise is not None:

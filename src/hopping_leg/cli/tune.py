@@ -20,25 +20,22 @@ Examples:
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 import tyro
-from rich.console import Console
 from rich.progress import Progress
-from rich.table import Table
 
-from hopping_leg.cli.options import at_least
-from hopping_leg.controllers.energy_shaping.tuning import Search, Tuned, tune
+from hopping_leg.cli.options import JsonFile, RobotFile, at_least, say, show_table
+from hopping_leg.controllers.energy_shaping.tuning import Search, tune
 from hopping_leg.io import write_atomically, write_json
 from hopping_leg.robot import load_robot
 
 
 @dataclass(frozen=True)
-class EnergyShaping:
+class GainSearch:
     """Search the gains of energy shaping with CMA-ES."""
 
-    robot: str = "legv2-paper"
-    """A shipped name or the path of a .toml file."""
+    robot: RobotFile = "legv2-paper"
     start: str = "by-hand"
     """Gains to begin from: by-hand, energy-shaping (the shipped result) or a gain file's path."""
     search: Annotated[Search, tyro.conf.arg(name="")] = field(default_factory=Search)
@@ -46,33 +43,15 @@ class EnergyShaping:
     """Seed of the search; noise and delay take seeds 0 to 9."""
     out: Path = Path("runs/tune")
     """Folder for the log and the gains."""
-    json: Path | None = None
-    """Write every number to this file."""
-
-    def search_all(self) -> None:
-        """Search, print what came out, write the gains."""
-        robot = load_robot(self.robot)
-        with Progress() as progress:
-            task = progress.add_task("searching", total=self.search.generations)
-
-            def report(done: int, lowest: float) -> None:
-                progress.update(task, completed=done, description=f"lowest cost {lowest:.2f} mm")
-
-            tuned = tune(robot, self.robot, self.start, self.search, self.seed, self.out, report)
-        Console().print(_table(tuned))
-        Console().print(
-            f"Gains: {self.out / 'gains.toml'}; use: hop evaluate {self.out / 'gains.toml'}"
-        )
-        if self.json is not None:
-            write_json(self.json, tuned.record())
+    json: JsonFile = None
 
 
 @dataclass(frozen=True)
-class _Recipe:
-    recipe: ClassVar[str]
+class RecipeSearch:
+    """Search the numbers of a recipe with Optuna."""
 
-    robot: str = "legv2-paper"
-    """A shipped name or the path of a .toml file."""
+    recipe: tyro.conf.Suppress[str]
+    robot: RobotFile = "legv2-paper"
     trials: int = 50
     """Trials in the study when it is over, of all processes together."""
     steps: int = 1_000_000
@@ -96,62 +75,79 @@ class _Recipe:
     """Numbers of the recipe that every trial takes, e.g. `--set num_envs=256`."""
     out: Path | None = None
     """Folder of the trainings, trials.json and the figures; default: runs/tune/RECIPE."""
-    json: Path | None = None
-    """Write all trials to this file, too."""
-
-    def search_all(self) -> None:
-        """Search, print the best, write all trials and the figures."""
-        from hopping_leg.evaluate.figures.tuning import FIGURES
-        from hopping_leg.figure_style import to_svg
-        from hopping_leg.rl.tuning import Tuning
-        from hopping_leg.rl.tuning import tune as tune_recipe
-
-        at_least(1, workers=1 if self.workers is None else self.workers)
-        out = self.out or Path("runs/tune") / self.recipe
-        tuning = Tuning(
-            self.recipe,
-            _storage(self.study or f"runs/tune/{self.recipe}.db"),
-            out,
-            self.robot,
-            self.trials,
-            self.steps,
-            self.snapshots,
-            self.startup,
-            self.seed,
-            self.set,
-        )
-        result = tune_recipe(tuning, self.workers, self.ray)
-        for file in filter(None, (out / "trials.json", self.json)):
-            write_json(file, result)
-        for name, draw in FIGURES.items():
-            write_atomically(out / f"{name}.svg", to_svg(draw(result)))
-        _print(result, out)
+    json: JsonFile = None
 
 
-@dataclass(frozen=True)
-class Fast(_Recipe):
-    """Search the numbers of recipe fast with Optuna."""
-
-    recipe: ClassVar[str] = "fast"
-
-
-@dataclass(frozen=True)
-class Paper(_Recipe):
-    """Search the numbers of recipe paper with Optuna."""
-
-    recipe: ClassVar[str] = "paper"
-
-
-@dataclass(frozen=True)
-class Precise(_Recipe):
-    """Search the numbers of recipe precise with Optuna."""
-
-    recipe: ClassVar[str] = "precise"
-
-
-def run(args: EnergyShaping | Fast | Paper | Precise) -> None:
+def run(
+    args: Annotated[GainSearch, tyro.conf.subcommand(name="energy-shaping")]
+    | Annotated[RecipeSearch, tyro.conf.subcommand(name="fast", default=RecipeSearch("fast"))]
+    | Annotated[RecipeSearch, tyro.conf.subcommand(name="paper", default=RecipeSearch("paper"))]
+    | Annotated[
+        RecipeSearch, tyro.conf.subcommand(name="precise", default=RecipeSearch("precise"))
+    ],
+) -> None:
     """Search."""
-    args.search_all()
+    if isinstance(args, GainSearch):
+        _tune_gains(args)
+    else:
+        _tune_recipe(args)
+
+
+def _tune_gains(args: GainSearch) -> None:
+    """Search, print what came out, write the gains."""
+    robot = load_robot(args.robot)
+    with Progress() as progress:
+        task = progress.add_task("searching", total=args.search.generations)
+
+        def report(done: int, lowest: float) -> None:
+            progress.update(task, completed=done, description=f"lowest cost {lowest:.2f} mm")
+
+        tuned = tune(robot, args.robot, args.start, args.search, args.seed, args.out, report)
+    show_table(
+        ("command, m", "median before", "after", "std before, mm", "after"),
+        [
+            (
+                f"{before.command:.2f}",
+                *(f"{result.median:.4f}" for result in (before, after)),
+                *(f"{1e3 * result.std:.1f}" for result in (before, after)),
+            )
+            for before, after in zip(tuned.before, tuned.after, strict=True)
+        ],
+    )
+    gains = args.out / "gains.toml"
+    say(f"Gains: {gains}; use: hop evaluate {gains}")
+    if args.json is not None:
+        write_json(args.json, tuned.record())
+
+
+def _tune_recipe(args: RecipeSearch) -> None:
+    """Search, print the best, write all trials and the figures."""
+    from hopping_leg.evaluate.figures.tuning import FIGURES
+    from hopping_leg.figure_style import to_svg
+    from hopping_leg.rl.tuning import Tuning
+    from hopping_leg.rl.tuning import tune as tune_recipe
+
+    at_least(1, workers=args.workers)
+    out = args.out or Path("runs/tune") / args.recipe
+    tuning = Tuning(
+        args.recipe,
+        _storage(args.study or f"runs/tune/{args.recipe}.db"),
+        out,
+        args.robot,
+        args.trials,
+        args.steps,
+        args.snapshots,
+        args.startup,
+        args.seed,
+        args.set,
+    )
+    result = tune_recipe(tuning, args.workers, args.ray)
+    for file in filter(None, (out / "trials.json", args.json)):
+        write_json(file, result)
+    for name, draw in FIGURES.items():
+        write_atomically(out / f"{name}.svg", to_svg(draw(result)))
+    _show(result)
+    say(f"Wrote {out}/trials.json and the figures beside it.")
 
 
 def _storage(study: str) -> str:
@@ -163,31 +159,14 @@ def _storage(study: str) -> str:
     return f"sqlite:///{file}"
 
 
-def _print(result: dict[str, Any], out: Path) -> None:
-    best, trials = result["best"], result["trials"]
-    states = [trial["state"] for trial in trials]
+def _show(result: dict[str, Any]) -> None:
+    best, states = result["best"], [trial["state"] for trial in result["trials"]]
     counts = ", ".join(f"{states.count(state)} {state}" for state in dict.fromkeys(states))
-    Console().print(f"{len(trials)} trials: {counts}.")
+    say(f"{len(states)} trials: {counts}.")
     if best is not None:
-        table = Table(
-            "number", "best", title=f"trial {best['number']}: {1e3 * best['score_m']:.1f} mm"
-        )
-        for name, value in best["params"].items():
-            table.add_row(name, f"{value:.4g}" if isinstance(value, float) else str(value))
-        Console().print(table)
-    Console().print(
-        f"Wrote {out}/trials.json and the figures beside it.", highlight=False, soft_wrap=True
-    )
-
-
-def _table(tuned: Tuned) -> Table:
-    table = Table("command, m", "median before", "after", "std before, mm", "after")
-    for before, after in zip(tuned.before, tuned.after, strict=True):
-        numbers: list[Any] = [
-            f"{before.command:.2f}",
-            f"{before.median:.4f}",
-            f"{after.median:.4f}",
+        rows = [
+            (name, f"{value:.4g}" if isinstance(value, float) else value)
+            for name, value in best["params"].items()
         ]
-        numbers += [f"{1e3 * before.std:.1f}", f"{1e3 * after.std:.1f}"]
-        table.add_row(*numbers)
-    return table
+        title = f"trial {best['number']}: {1e3 * best['score_m']:.1f} mm"
+        show_table(("number", "best"), rows, title)
