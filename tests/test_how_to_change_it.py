@@ -1,0 +1,88 @@
+"""Each change on the page is carried out as it stands there, in a copy of the package."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import hopping_leg
+
+pytest.importorskip("torch")
+
+ROOT = Path(__file__).parent.parent
+PAGE = (ROOT / "docs" / "how-to-change-it.md").read_text(encoding="utf-8")
+CHANGES = re.findall(r"^## (.*?)\n(.*?)(?=^## |\Z)", PAGE, re.DOTALL | re.MULTILINE)
+BLOCK = re.compile(r'^```(?:python|toml) title="(.*?)"\n(.*?)^```$', re.DOTALL | re.MULTILINE)
+COMMAND = re.compile(r"^```sh\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+
+SHORT = {
+    "train": "--steps 512 --set num_envs=8 n_steps=32 batch_size=64 log_every=1",
+    "evaluate": "--commands 0.3 --seeds 1 --floor soft --no-video",
+    "robustness": "--commands 0.3 --seeds 1",
+}
+"""What makes a verb's command short."""
+
+SAYS = {
+    "A fault": "slow_warming",
+    "A robot": "my-robot",
+    "A robustness axis": "joint-damping",
+    "A recipe": "long",
+}
+"""What the commands of a change print, where that shows it."""
+
+
+def carry_out(title, text, source):
+    """Write a block to its file, or put it into its place in the package."""
+    file, place, anchor = re.fullmatch(r"(\S+?)(?: (after|before|at) (.*))?", title).groups()
+    path = Path(file) if place is None else source / Path(file).relative_to("src/hopping_leg")
+    if place is None:
+        path.write_text(text)
+        return
+    code = path.read_text(encoding="utf-8")
+    if place == "at":
+        path.write_text(code + text)
+        return
+    assert code.count(f"{anchor}\n") == 1, f"{file} has no single line {anchor!r}"
+    new = f"{anchor}\n{text}" if place == "after" else f"{text}{anchor}\n"
+    path.write_text(code.replace(f"{anchor}\n", new))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "section"), CHANGES, ids=[name for name, _ in CHANGES])
+def test_the_change_works_as_the_page_says(name, section, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    package = tmp_path / "package" / "hopping_leg"
+    shutil.copytree(Path(hopping_leg.__file__).parent, package)
+    blocks = BLOCK.findall(section)
+    assert blocks
+    for title, text in blocks:
+        carry_out(title, text, package)
+    said = ""
+    for command in "".join(COMMAND.findall(section)).splitlines():
+        hop, verb, *words = command.split()
+        assert hop == "hop"
+        done = subprocess.run(
+            [sys.executable, "-m", "hopping_leg.cli", verb, *words, *SHORT.get(verb, "").split()],
+            env={**os.environ, "PYTHONPATH": str(package.parent)},
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, f"{command}\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
+        said += done.stdout + done.stderr
+    assert SAYS.get(name, "") in said
+
+
+def test_every_file_and_test_that_the_page_names_exists():
+    named = set(re.findall(r"`((?:src|tests|studies)/[\w/.]+)`", PAGE))
+    assert len(named) > 10
+    assert {name for name in named if not (ROOT / name).exists()} == set()
+
+
+def test_the_page_has_all_seven_changes():
+    assert [name.split()[-1] for name, _ in CHANGES] == [
+        "term", "robot", "controller", "recipe", "axis", "fault", "history",
+    ]  # fmt: skip
