@@ -36,19 +36,12 @@ SAYS = {
 
 
 def carry_out(title, text, source):
-    """Write a block to its file, or put it into its place in the package."""
-    file, place, anchor = re.fullmatch(r"(\S+?)(?: (after|before|at) (.*))?", title).groups()
-    path = Path(file) if place is None else source / Path(file).relative_to("src/hopping_leg")
-    if place is None:
-        path.write_text(text)
-        return
-    code = path.read_text(encoding="utf-8")
-    if place == "at":
-        path.write_text(code + text)
-        return
-    assert code.count(f"{anchor}\n") == 1, f"{file} has no single line {anchor!r}"
-    new = f"{anchor}\n{text}" if place == "after" else f"{text}{anchor}\n"
-    path.write_text(code.replace(f"{anchor}\n", new))
+    """Write a block to its file, or to the end of a file of the package."""
+    file, _, place = title.partition(" ")
+    assert place in ("", "at the end")
+    path = source / Path(file).relative_to("src/hopping_leg") if place else Path(file)
+    code = path.read_text(encoding="utf-8") + "\n\n" if place else ""
+    path.write_text(code + text, encoding="utf-8")
 
 
 @pytest.mark.slow
