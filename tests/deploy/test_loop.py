@@ -4,8 +4,9 @@ import math
 import numpy as np
 import pytest
 
-from hopping_leg.deploy.drive_link import BRAKE, STOP, Action
+from hopping_leg.deploy.drive_link import BRAKE, STOP, Action, Reply
 from hopping_leg.deploy.flight_recorder import recover
+from hopping_leg.deploy.loop import SampleBuffer
 from hopping_leg.deploy.motion_sequence import Part
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.supervisor import State
@@ -137,3 +138,35 @@ def test_a_crash_of_the_loop_itself_brakes(tmp_path):
         loop.run()
     box.close()
     assert link.told == [BRAKE]
+
+
+def sample(position):
+    return Reply(position, 10 * position, 0.0, 10, 0, 24.0, 30.0, 0.0)
+
+
+def test_a_late_reply_is_put_where_it_belongs():
+    samples = SampleBuffer(0.005)
+    for tick in range(5):
+        samples.put(tick, 0, sample(tick))
+        if tick != 3:
+            samples.put(tick, 1, sample(-tick))
+    seen = samples.measurement(4, 0.3)
+    np.testing.assert_allclose(seen.age[0], [0, 0.010, 0.015])
+    np.testing.assert_allclose(seen.q[0, :, 0], [4, 2, 1])
+    samples.put(3, 1, sample(-3))
+    seen = samples.measurement(5, 0.25)
+    np.testing.assert_allclose(seen.age[0], [0.005, 0.010, 0.015])
+    np.testing.assert_allclose(seen.q[0], [[4, -4], [3, -3], [2, -2]])
+    np.testing.assert_allclose(seen.qd, 10 * seen.q)
+    np.testing.assert_allclose(seen.command[0], [0.3, 0.25, 0.25])
+
+
+def test_one_sample_stands_for_the_past_and_there_is_none_without_both_joints():
+    samples = SampleBuffer(0.005)
+    assert samples.measurement(0, 0.3) is None
+    samples.put(0, 0, sample(1))
+    assert samples.measurement(0, 0.3) is None
+    samples.put(0, 1, sample(2))
+    seen = samples.measurement(0, 0.3)
+    assert seen.q.shape == seen.qd.shape == (1, 3, 2)
+    np.testing.assert_allclose(seen.q[0], [[1, 2]] * 3)

@@ -159,7 +159,7 @@ def test_a_pulled_adapter_is_silence_and_another_may_be_opened(adapter):
     adapter.pull_out()
     for _ in range(3):
         assert exchange(link, wait=0.05).replies == (None, None)
-    assert link.transport.devices()[0].gone
+    assert link.transport.devices()[0]._descriptor is None
     link.close()
     again = Adapter()
     link = MoteusLink(LEG, opener(again.path))

@@ -5,7 +5,7 @@ import pytest
 
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorder, FlightRecorderTail
-from hopping_leg.deploy.telemetry import columns
+from hopping_leg.deploy.loop import columns
 from hopping_leg.errors import RobotError, TraceError, UsageError
 from hopping_leg.robot import kinematics, load_robot
 from hopping_leg.viewer.data_source import RecorderSource

@@ -1,21 +1,21 @@
 """What the drives say about themselves, asked one by one before anything is armed."""
 
 import asyncio
+import contextlib
 import math
-from collections.abc import Awaitable, Callable, Sequence
-from typing import Any, TypeVar
+from collections.abc import Sequence
+from typing import Any
 
 from moteus import CommandError, Stream, multiplex
 from moteus.protocol import Register
 
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.preflight import DriveInfo, Setting, required_settings
-from hopping_leg.robot.parameters import JOINTS
 
 _ANSWER_SECONDS = 1.0
 _TRIES = 3
 _TALK_SECONDS = 5.0
-_ALL_SECONDS = 60.0
+_ALL_SECONDS = 30.0
 
 _IDENTITY = {
     int(Register.MODEL_NUMBER): multiplex.INT32,
@@ -32,8 +32,6 @@ _STATE = {
     int(Register.FAULT): multiplex.INT8,
 }
 
-Result = TypeVar("Result")
-
 
 def inspect(link: MoteusLink) -> tuple[DriveInfo, DriveInfo]:
     """Ask both drives everything that arming depends on.
@@ -41,17 +39,12 @@ def inspect(link: MoteusLink) -> tuple[DriveInfo, DriveInfo]:
     Raises:
         HardwareError: The adapter does not answer.
     """
-    hip, knee = link.call(_inspect_both(link), _ALL_SECONDS)
+    hip, knee = (link.call(_inspect(link, joint), _ALL_SECONDS) for joint in (0, 1))
     return hip, knee
 
 
 def configure(link: MoteusLink, joint: int, settings: Sequence[Setting]) -> None:
-    """Write settings into a drive, and into its permanent memory.
-
-    Args:
-        link: To the drives; they must be stopped.
-        joint: 0 for the hip, 1 for the knee.
-        settings: To be written.
+    """Write settings into a stopped drive (0 hip, 1 knee), and into its permanent memory.
 
     Raises:
         HardwareError: The drive does not answer.
@@ -60,10 +53,10 @@ def configure(link: MoteusLink, joint: int, settings: Sequence[Setting]) -> None
 
 
 def home(link: MoteusLink, angles: Sequence[float]) -> None:
-    """Tell both drives where their joints are; the rotor's own position makes it exact.
+    """Tell both stopped drives where their joints are; the rotor's own position makes it exact.
 
     Args:
-        link: To the drives; they must be stopped.
+        link: To the drives.
         angles: Hip and knee, rad, within a twelfth of a turn of the motors' outputs.
 
     Raises:
@@ -71,47 +64,42 @@ def home(link: MoteusLink, angles: Sequence[float]) -> None:
     """
     for joint, angle in enumerate(angles):
         position = link.transforms[joint].motor_position(angle)
-        controller = link.controllers[joint]
-        work = controller.set_output_nearest(position=position, query=True)
+        work = link.controllers[joint].set_output_nearest(position=position, query=True)
         link.call(asyncio.wait_for(work, _ANSWER_SECONDS), _TALK_SECONDS)
 
 
-async def _inspect_both(link: MoteusLink) -> list[DriveInfo]:
-    return [await _inspect(link, joint) for joint in range(len(JOINTS))]
-
-
 async def _inspect(link: MoteusLink, joint: int) -> DriveInfo:
-    controller = link.controllers[joint]
-    state = await _asked(lambda: controller.custom_query(_STATE))
-    if state is None:
-        return DriveInfo(answers=False)
-    identity = await _asked(lambda: controller.custom_query(_IDENTITY))
-    serial = await _asked(lambda: controller.custom_query(_SERIAL))
-    if identity is None or serial is None:
-        return DriveInfo(answers=False)
-    state, identity = state.values, identity.values
-    words = [int(serial.values.get(register, 0)) & 0xFFFFFFFF for register in _SERIAL]
+    values: dict[int, Any] = {}
+    for registers in (_STATE, _IDENTITY, _SERIAL):
+        answer = await _query(link.controllers[joint], registers)
+        if answer is None:
+            return DriveInfo(answers=False)
+        values |= answer
+    stream = await _console(link, joint)
+    names = [setting.name for setting in required_settings(link.robot, joint)]
     return DriveInfo(
         answers=True,
-        firmware=int(identity.get(Register.FIRMWARE_VERSION, 0)),
-        register_map=int(identity.get(Register.REGISTER_MAP_VERSION, 0)),
-        serial="".join(f"{word:08x}" for word in words),
-        home=int(state.get(Register.HOME_STATE, 0)),
-        position=link.transforms[joint].joint_position(state.get(Register.POSITION, math.nan)),
-        mode=int(state.get(Register.MODE, 0)),
-        fault=int(state.get(Register.FAULT, 0)),
-        voltage=float(state.get(Register.VOLTAGE, math.nan)),
-        temperature=float(state.get(Register.TEMPERATURE, math.nan)),
-        settings=await _settings(link, joint),
+        firmware=int(values.get(Register.FIRMWARE_VERSION, 0)),
+        register_map=int(values.get(Register.REGISTER_MAP_VERSION, 0)),
+        serial="".join(f"{int(values.get(word, 0)) & 0xFFFFFFFF:08x}" for word in _SERIAL),
+        home=int(values.get(Register.HOME_STATE, 0)),
+        position=link.transforms[joint].joint_position(values.get(Register.POSITION, math.nan)),
+        mode=int(values.get(Register.MODE, 0)),
+        fault=int(values.get(Register.FAULT, 0)),
+        voltage=float(values.get(Register.VOLTAGE, math.nan)),
+        temperature=float(values.get(Register.TEMPERATURE, math.nan)),
+        settings={name: await _setting(stream, name) for name in names},
     )
 
 
-async def _settings(link: MoteusLink, joint: int) -> dict[str, float]:
-    stream = await _console(link, joint)
-    return {
-        setting.name: await _setting(stream, setting.name)
-        for setting in required_settings(link.robot, joint)
-    }
+async def _query(controller: Any, registers: dict[int, int]) -> dict[int, Any] | None:  # noqa: ANN401
+    """Ask again where no answer comes; None after the last try."""
+    for _ in range(_TRIES):
+        with contextlib.suppress(TimeoutError, RuntimeError):
+            answer = await asyncio.wait_for(controller.custom_query(registers), _ANSWER_SECONDS)
+            if answer is not None:
+                return dict(answer.values)
+    return None
 
 
 async def _console(link: MoteusLink, joint: int) -> Any:  # noqa: ANN401
@@ -123,9 +111,8 @@ async def _console(link: MoteusLink, joint: int) -> Any:  # noqa: ANN401
 
 
 async def _setting(stream: Any, name: str) -> float:  # noqa: ANN401
-    question = f"conf get {name}".encode()
     try:
-        work = stream.command(question, allow_any_response=True)
+        work = stream.command(f"conf get {name}".encode(), allow_any_response=True)
         return float(await asyncio.wait_for(work, _ANSWER_SECONDS))
     except (ValueError, TimeoutError, CommandError):
         return math.nan
@@ -136,15 +123,3 @@ async def _configure(link: MoteusLink, joint: int, settings: Sequence[Setting]) 
     commands = [f"conf set {setting.name} {setting.text}" for setting in settings]
     for command in (*commands, "conf write"):
         await asyncio.wait_for(stream.command(command.encode()), _TALK_SECONDS)
-
-
-async def _asked(question: Callable[[], Awaitable[Result]]) -> Result | None:
-    """Ask again where no answer comes; None after the last try."""
-    for _ in range(_TRIES):
-        try:
-            answer = await asyncio.wait_for(question(), _ANSWER_SECONDS)
-        except (TimeoutError, RuntimeError):
-            continue
-        if answer is not None:
-            return answer
-    return None

@@ -5,6 +5,7 @@ A file of frames, each ``kind, length, content, CRC-32``: one header (JSON), row
 killed, all but the very last frames are in the file, and a frame that was cut off is left out.
 """
 
+import contextlib
 import json
 import os
 import queue
@@ -12,7 +13,6 @@ import struct
 import threading
 import zlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -106,87 +106,26 @@ class FlightRecorder:
                 return
 
 
-@dataclass(frozen=True)
-class FlightRecording:
-    """What a flight recording holds.
-
-    Attributes:
-        columns: Names of the rows' values.
-        header: Facts about the run.
-        rows: (ticks, columns).
-        events: In order.
-        whole: Whether the file ends with a whole frame.
-    """
-
-    columns: tuple[str, ...]
-    header: dict[str, Any]
-    rows: np.ndarray
-    events: list[dict[str, Any]]
-    whole: bool
-
-    def table(self) -> pl.DataFrame:
-        """Return the rows as a table."""
-        return pl.DataFrame(dict(zip(self.columns, self.rows.T, strict=True)))
-
-
-def read_recording(path: Path) -> FlightRecording:
-    """Read a flight recording, also of a process that was killed.
-
-    Raises:
-        TraceError: The file is missing, or no flight recording.
-    """
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise TraceError(f"Cannot read {path}: {error.strerror}.") from error
-    if not content.startswith(MAGIC):
-        raise TraceError(f"{path} is no flight recording of `hop deploy`.")
-    found = list(_frames(content, len(MAGIC)))
-    if not found or found[0][0] != HEADER:
-        raise TraceError(f"{path} ends before its header; the run had not begun.")
-    first = json.loads(found[0][1])
-    columns = tuple(first["columns"])
-    body = b"".join(data for kind, data, _ in found if kind == ROW)
-    return FlightRecording(
-        columns=columns,
-        header=first["header"],
-        rows=np.frombuffer(body, "<f8").reshape(-1, len(columns)),
-        events=[json.loads(data) for kind, data, _ in found if kind == EVENT],
-        whole=found[-1][2] == len(content),
-    )
-
-
-def recover(path: Path) -> Trace:
-    """Return the common trace of a run from its flight recording.
-
-    Columns of the true height, which hardware does not know, hold NaN.
-
-    Raises:
-        TraceError: The file is missing, no flight recording, or holds no tick.
-    """
-    box = read_recording(path)
-    if not len(box.rows):
-        raise TraceError(f"{path} holds no tick; the run had not begun.")
-    unknown = ("height_m", "height_rate_m_s")
-    clearances = tuple(f"{part}_clearance_m" for part in ("foot", "knee", "base"))
-    missing = [name for name in (*unknown, *clearances) if name not in box.columns]
-    table = box.table().with_columns(pl.lit(float("nan")).alias(name) for name in missing)
-    return Trace(table, {**box.header, "events": box.events})
-
-
 class FlightRecorderTail:
     """Reads what is new in a flight recording.
 
-    Attributes:
+    Args:
         path: The file.
+
+    Attributes:
         columns: Names of the rows' values; empty until the header is there.
         header: Facts about the run; empty until the header is there.
+        events: So far, in order.
+
+    Raises:
+        TraceError: The file cannot be read.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.columns: tuple[str, ...] = ()
         self.header: dict[str, Any] = {}
+        self.events: list[dict[str, Any]] = []
         self._rest = b""
         self._begun = False
         try:
@@ -199,6 +138,11 @@ class FlightRecorderTail:
         """Whether the file is gone: the run has ended and left its trace."""
         return os.fstat(self._file.fileno()).st_nlink == 0
 
+    @property
+    def whole(self) -> bool:
+        """Whether what was read ends with a whole frame."""
+        return not self._rest
+
     def rows(self) -> npt.NDArray[np.float64]:
         """Return the rows that were written since the last call, (ticks, columns).
 
@@ -208,11 +152,11 @@ class FlightRecorderTail:
         content = self._rest + self._file.read()
         at = 0
         if not self._begun:
+            if not content.startswith(MAGIC[: len(content)]):
+                raise TraceError(f"{self.path} is no flight recording of `hop deploy`.")
             if len(content) < len(MAGIC):
                 self._rest = content
                 return np.empty((0, 0))
-            if not content.startswith(MAGIC):
-                raise TraceError(f"{self.path} is no flight recording of `hop deploy`.")
             at, self._begun = len(MAGIC), True
         found = []
         for kind, data, end in _frames(content, at):
@@ -222,12 +166,47 @@ class FlightRecorderTail:
                 self.columns, self.header = tuple(first["columns"]), first["header"]
             elif kind == ROW:
                 found.append(data)
+            else:
+                self.events.append(json.loads(data))
         self._rest = content[at:]
         return np.frombuffer(b"".join(found), "<f8").reshape(len(found), len(self.columns))
 
     def close(self) -> None:
         """Close the file."""
         self._file.close()
+
+
+def read_recording(path: Path) -> tuple[FlightRecorderTail, npt.NDArray[np.float64]]:
+    """Return a flight recording and its rows, (ticks, columns), also of a process that was killed.
+
+    Raises:
+        TraceError: The file is missing, or no flight recording.
+    """
+    with contextlib.closing(FlightRecorderTail(path)) as box:
+        rows = box.rows()
+    if not box.columns:
+        raise TraceError(f"{path} ends before its header; the run had not begun.")
+    return box, rows
+
+
+def recover(path: Path) -> Trace:
+    """Return the common trace of a run from its flight recording.
+
+    Columns of the true height, which hardware does not know, hold NaN.
+
+    Raises:
+        TraceError: The file is missing, no flight recording, or holds no tick.
+    """
+    box, rows = read_recording(path)
+    if not len(rows):
+        raise TraceError(f"{path} holds no tick; the run had not begun.")
+    unknown = ("height_m", "height_rate_m_s")
+    clearances = tuple(f"{part}_clearance_m" for part in ("foot", "knee", "base"))
+    missing = [name for name in (*unknown, *clearances) if name not in box.columns]
+    table = pl.DataFrame(dict(zip(box.columns, rows.T, strict=True))).with_columns(
+        pl.lit(float("nan")).alias(name) for name in missing
+    )
+    return Trace(table, {**box.header, "events": box.events})
 
 
 def _frame(kind: int, content: bytes) -> bytes:

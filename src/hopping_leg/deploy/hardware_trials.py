@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,13 +19,12 @@ from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.deploy.drive_link import Action
 from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorder, recover
-from hopping_leg.deploy.loop import ControlLoop, LoopOutcome
+from hopping_leg.deploy.loop import ControlLoop, LoopOutcome, columns
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
 from hopping_leg.deploy.realtime import Clock, RealClock, keeping_time
 from hopping_leg.deploy.safety_limits import SafetyLimits, hopping_limits
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.supervisor import State
-from hopping_leg.deploy.telemetry import columns
 from hopping_leg.errors import HardwareError
 from hopping_leg.io import safe_file_name, versions
 from hopping_leg.robot.limits import SoftLimiter, SoftLimits
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from hopping_leg.deploy.moteus_link import MoteusLink
 
 _PACKAGES = ("hopping-leg", "numpy", "onnxruntime", "moteus", "python-can")
+_CODES: dict[str, type[Enum]] = {"state": State, "part": Part, "action": Action, "reason": Reason}
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ def perform(
         limits: The supervisor's limits.
         path: File of the trace; the flight recording lies beside it as long as the run lasts.
         header: Header of the trace.
-        clock: The time; none takes the computer's.
+        clock: None takes the computer's.
         realtime: Ask for priority and locked memory.
         beside: Makes what is open while the loop runs, e.g. a keyboard that stops it.
 
@@ -109,10 +110,8 @@ def header_of(robot: Robot, controller: Controller, rate: float, **facts: Any) -
         "started": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "versions": versions(*_PACKAGES),
         "codes": {
-            "state": _names(State),
-            "part": _names(Part),
-            "action": _names(Action),
-            "reason": _names(Reason),
+            name: {str(member.value): member.name.lower() for member in kind}
+            for name, kind in _CODES.items()
         },
         **facts,
     }
@@ -152,10 +151,6 @@ def _stopped_by_signals(loop: ControlLoop) -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-def _names(kind: Any) -> dict[str, str]:  # noqa: ANN401
-    return {str(member.value): member.name.lower() for member in kind}
 
 
 @dataclass(frozen=True)

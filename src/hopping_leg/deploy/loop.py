@@ -11,15 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hopping_leg.deploy import telemetry
-from hopping_leg.deploy.drive_link import BRAKE, STOP, DriveCommand, DriveLink, Exchange
+from hopping_leg.controllers.protocol import SAMPLES, Controller, Measurement
+from hopping_leg.deploy.drive_link import BRAKE, STOP, DriveCommand, DriveLink, Exchange, Reply
 from hopping_leg.deploy.flight_recorder import FlightRecorder
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceStep
 from hopping_leg.deploy.realtime import Clock
 from hopping_leg.deploy.safety_limits import SafetyLimits
-from hopping_leg.deploy.sample_buffer import SampleBuffer
 from hopping_leg.deploy.stop_reasons import Operator, SupervisorInput
 from hopping_leg.deploy.supervisor import State, SupervisorState, supervise
+from hopping_leg.robot.parameters import JOINTS
 
 REPLY_SHARE = 0.7
 """Share of the period after which a tick goes on without the replies that are not in."""
@@ -32,6 +32,73 @@ _WARM_TICKS = 10
 
 _STOP_TICKS = 10
 """Ticks in which the drives are told to stop at the end."""
+
+
+_REMEMBERED = 16
+"""Ticks; older samples are forgotten."""
+
+_LOOP = ("time_s", "command_m", "state", "reason", "part", "action")
+_TIMES = ("wake_late_s", "exchange_s", "control_s", "tick_s", "skipped_ticks")
+_MEASURED = ("position", "velocity", "torque")
+_DRIVE = ("mode", "fault", "voltage", "temperature")
+_DRIVE_COLUMNS = (
+    *("position_rad", "velocity_rad_s", "torque_nm", "mode", "fault", "voltage_v"),
+    *("temperature_c", "fresh", "command_nm", "sent_nm"),
+)
+
+
+def columns(controller: Controller) -> tuple[str, ...]:
+    """Return the columns of a run's recording; the controller's own come last."""
+    drives = tuple(f"{joint}_{name}" for name in _DRIVE_COLUMNS for joint in JOINTS)
+    return (*_LOOP, *_TIMES, *drives, *_internal_names(controller))
+
+
+def _internal_names(controller: Controller) -> list[str]:
+    controller.reset(1)
+    return sorted(controller.internals())
+
+
+class SampleBuffer:
+    """The recent past of both joints, by tick.
+
+    A sample counts once both drives have sent it. Its age is that of the tick that asked for it,
+    so that a sample of this tick has age zero, as in simulation; a reply that arrives late is put
+    where it belongs, and a tick without one shows older samples with their ages.
+
+    Args:
+        period: Control period, s.
+    """
+
+    def __init__(self, period: float) -> None:
+        self._period = period
+        self._ticks: dict[int, list[Reply | None]] = {}
+        self._commands: dict[int, float] = {}
+
+    def put(self, tick: int, joint: int, reply: Reply) -> None:
+        """Record a reply to a tick's question."""
+        self._ticks.setdefault(tick, [None, None])[joint] = reply
+        for old in [t for t in self._ticks if t <= tick - _REMEMBERED]:
+            del self._ticks[old]
+            self._commands.pop(old, None)
+
+    def measurement(self, tick: int, command: float) -> Measurement | None:
+        """Return what a controller sees at a tick, given the height commanded now, m.
+
+        None as long as no tick has samples of both joints.
+        """
+        whole = [t for t, sample in self._ticks.items() if None not in sample and t <= tick]
+        if not whole:
+            return None
+        self._commands[tick] = command
+        newest = sorted(whole, reverse=True)[:SAMPLES]
+        newest += [newest[-1]] * (SAMPLES - len(newest))
+        chosen = [[reply for reply in self._ticks[t] if reply is not None] for t in newest]
+        return Measurement(
+            q=np.array([[[reply.position for reply in pair] for pair in chosen]]),
+            qd=np.array([[[reply.velocity for reply in pair] for pair in chosen]]),
+            command=np.array([[self._commands.get(t, command) for t in newest]]),
+            age=np.array([[(tick - t) * self._period for t in newest]]),
+        )
 
 
 @dataclass(frozen=True)
@@ -71,7 +138,7 @@ class ControlLoop:
         self._link, self._sequence, self._limits = link, sequence, limits
         self._recorder, self._clock = recorder, clock
         self._samples = SampleBuffer(limits.period)
-        self._internals = telemetry.internal_names(sequence.controller)
+        self._internals = _internal_names(sequence.controller)
         self._stop, self._complaint = threading.Event(), ""
 
     def stop(self) -> None:
@@ -123,18 +190,32 @@ class ControlLoop:
         if after.state is not state.state:
             self._note(after, deadline - start)
         timings = (woke - deadline, replied - woke, sent - replied, sent - deadline, skipped)
-        self._recorder.row(
-            telemetry.row(
-                deadline - start,
-                step,
-                after,
-                outgoing,
-                exchange.replies,
-                timings,
-                self._own_columns(step),
-            )
-        )
+        self._record(deadline - start, step, after, outgoing, exchange, timings)
         return after, outgoing
+
+    def _record(
+        self,
+        time: float,
+        step: SequenceStep,
+        after: SupervisorState,
+        outgoing: DriveCommand,
+        exchange: Exchange,
+        timings: tuple[float, ...],
+    ) -> None:
+        """Record the row of a tick; measurements are NaN where no fresh reply came."""
+        fresh, last = exchange.replies, after.counts.last
+        parts = (after.state, after.cause.reason, step.phase, outgoing.action.value)
+        values = [time, step.command, *parts, *timings]
+        for replies, names in ((fresh, _MEASURED), (last, _DRIVE)):
+            values += [getattr(reply, name, math.nan) for name in names for reply in replies]
+        values += [float(reply is not None) for reply in fresh]
+        values += (*step.controller, *outgoing.torque)
+        if step.phase is Part.HOP and not self._complaint:
+            internals = self._sequence.controller.internals()
+            values += [float(internals[name][0]) for name in self._internals]
+        else:
+            values += [math.nan] * len(self._internals)
+        self._recorder.row(values)
 
     def _remember(self, tick: int, deadline: float, exchange: Exchange) -> None:
         for joint, reply in enumerate(exchange.replies):
@@ -151,9 +232,7 @@ class ControlLoop:
         if self._complaint:
             return SequenceStep((0.0, 0.0), sequence.command(time), Part.DONE)
         try:
-            measurement = None
-            if self._samples.complete():
-                measurement = self._samples.measurement(tick, sequence.command(time))
+            measurement = self._samples.measurement(tick, sequence.command(time))
             return sequence.step(time, measurement)
         except Exception as error:
             self._complaint = f"{type(error).__name__}: {error}"
@@ -178,9 +257,3 @@ class ControlLoop:
         if state.state is State.RUNNING:
             posture = np.array([reply.position for reply in state.counts.last if reply])
             self._sequence.begin(state.since, posture)
-
-    def _own_columns(self, step: SequenceStep) -> list[float]:
-        if step.phase is not Part.HOP or self._complaint:
-            return [math.nan] * len(self._internals)
-        internals = self._sequence.controller.internals()
-        return [float(internals[name][0]) for name in self._internals]

@@ -8,6 +8,7 @@ in time counts; and what is not done by its deadline is cancelled.
 
 import asyncio
 import concurrent.futures
+import functools
 import math
 import threading
 from collections.abc import Callable, Coroutine
@@ -24,21 +25,22 @@ from hopping_leg.deploy.transport import Opener
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot.parameters import Robot
 
+_SEND_SECONDS = 0.004
+"""A command that could not leave within this time is dropped: it is outdated."""
+
+_OPENING_SECONDS = 10.0
+
 Result = TypeVar("Result")
 
 
 class Client(Protocol):
-    """Where the asyncio client's work is done."""
+    """Where the asyncio client's work is done; raises ``HardwareError`` where it takes too long."""
 
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Begin work; never waits for the motors."""
 
     def call(self, work: Coroutine[Any, Any, Result], seconds: float) -> Result:
-        """Do work and wait for its result.
-
-        Raises:
-            HardwareError: It took too long.
-        """
+        """Do work and wait for its result."""
 
     def close(self) -> None:
         """End it."""
@@ -56,7 +58,8 @@ class ClientThread:
         self._tasks: set[asyncio.Task[None]] = set()
         self.loop = asyncio.new_event_loop()
         self.loop.set_exception_handler(self._note)
-        self._thread = threading.Thread(target=self._run, name="moteus-client", daemon=True)
+        run = self.loop.run_forever
+        self._thread = threading.Thread(target=run, name="moteus-client", daemon=True)
         self._thread.start()
 
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
@@ -64,11 +67,7 @@ class ClientThread:
         self.loop.call_soon_threadsafe(self._create, work)
 
     def call(self, work: Coroutine[Any, Any, Result], seconds: float) -> Result:
-        """Do work in the loop and wait for its result.
-
-        Raises:
-            HardwareError: It took too long.
-        """
+        """Do work in the loop and wait for its result."""
         future = asyncio.run_coroutine_threadsafe(work, self.loop)
         try:
             return future.result(seconds)
@@ -85,10 +84,6 @@ class ClientThread:
         if not self._thread.is_alive():
             self.loop.close()
 
-    def _run(self) -> None:
-        asyncio.set_event_loop(self.loop)
-        self.loop.run_forever()
-
     def _create(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         task = self.loop.create_task(work())
         self._tasks.add(task)
@@ -97,12 +92,6 @@ class ClientThread:
     def _note(self, _: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         error = context.get("exception")
         self._on_error(str(error or context.get("message", "unknown")))
-
-
-_SEND_SECONDS = 0.004
-"""A command that could not leave within this time is dropped: it is outdated."""
-
-_OPENING_SECONDS = 10.0
 
 
 class MoteusLink:
@@ -131,9 +120,7 @@ class MoteusLink:
         self._clock = clock or RealClock()
         self.robot, self.transforms = robot, joint_transforms(robot)
         self.trouble = ""
-        joints, servos = (robot.hip, robot.knee), robot.hardware.servos
-        self._limits = [joint.motor.torque_limit for joint in joints]
-        self._watchdog = robot.hardware.watchdog
+        self._limits = [joint.motor.torque_limit for joint in (robot.hip, robot.knee)]
         self._clocks = (DriveClock(), DriveClock())
         self._client = client(self._note)
         try:
@@ -142,8 +129,8 @@ class MoteusLink:
             self._client.close()
             raise
         self.controllers = [
-            Controller(int(servo.id), query_resolution=_resolution(), transport=self.transport)
-            for servo in servos
+            Controller(wire.id, query_resolution=_resolution(), transport=self.transport)
+            for wire in self.transforms
         ]
 
     def exchange(self, outgoing: DriveCommand, until: float) -> Exchange:
@@ -151,7 +138,8 @@ class MoteusLink:
         question = Question(self.transforms, self._clocks, self._clock.now())
         commands = self._commands(outgoing, query=True)
         for joint, command in enumerate(commands):
-            self._listen(command, joint, question)
+            command.reply_filter = functools.partial(self._judge, question, joint)
+            command.parse = _as_it_is
         self._client.start_soon(lambda: self._ask(question, commands, until))
         question.done.wait(self._clock.patience(until))
         return question.result()
@@ -163,11 +151,7 @@ class MoteusLink:
         self._client.start_soon(lambda: self._cycle(commands, until))
 
     def call(self, work: Coroutine[Any, Any, Result], seconds: float) -> Result:
-        """Do something slow in the client's thread; not while a leg is armed.
-
-        Raises:
-            HardwareError: It took too long.
-        """
+        """Do something slow in the client's thread; not while a leg is armed."""
         return self._client.call(work, seconds)
 
     def close(self) -> None:
@@ -209,7 +193,7 @@ class MoteusLink:
                         ilimit_scale=0.0,
                         feedforward_torque=transform.motor_torque(torque),
                         maximum_torque=limit,
-                        watchdog_timeout=self._watchdog,
+                        watchdog_timeout=self.robot.hardware.watchdog,
                         query=query,
                     )
                     for controller, transform, torque, limit in pairs
@@ -219,10 +203,8 @@ class MoteusLink:
             case Action.STOP:
                 return [controller.make_stop(query=query) for controller in self.controllers]
 
-    def _listen(self, command: Any, joint: int, question: Question) -> None:  # noqa: ANN401
-        """Let a question judge the frames that may answer a command."""
-        command.reply_filter = lambda frame: question.take(joint, frame, self._clock.now())
-        command.parse = _as_it_is
+    def _judge(self, question: Question, joint: int, frame: Any) -> bool:  # noqa: ANN401
+        return question.take(joint, frame, self._clock.now())
 
     async def _open(self, open_transport: Opener) -> Any:  # noqa: ANN401
         try:

@@ -4,6 +4,7 @@ Rising and sinking are minimum-jerk paths under the joint PD; the rise begins wh
 the gains fade out before its end. The paper's soft limits stay in force throughout.
 """
 
+import math
 from dataclasses import dataclass, field
 from enum import IntEnum
 
@@ -91,7 +92,7 @@ class SequenceStep:
     torque: Pair
     command: float
     phase: Part
-    controller: Pair = (float("nan"), float("nan"))
+    controller: Pair = (math.nan, math.nan)
 
 
 @dataclass
@@ -102,7 +103,7 @@ class MotionSequence:
         controller: Hops.
         commands: What it is told.
         poses: Start and rest.
-        limiter: Soft limits; None goes without.
+        limiter: None goes without soft limits.
         timing: Length of each part.
         gains: Joint PD of rising and sinking.
     """
@@ -118,13 +119,7 @@ class MotionSequence:
         self._began: float | None = None
         self._from = np.zeros(2)
         self._phase = Part.WAIT
-        self._stop_at: float | None = None
         self.controller.reset(1)
-
-    @property
-    def began(self) -> bool:
-        """Whether the leg has begun to rise."""
-        return self._began is not None
 
     @property
     def finished(self) -> bool:
@@ -132,12 +127,7 @@ class MotionSequence:
         return self._phase is Part.DONE
 
     def begin(self, time: float, q: Array) -> None:
-        """Start to rise from a posture.
-
-        Args:
-            time: Now, s.
-            q: Measured joint angles, rad, (2,).
-        """
+        """Start to rise at a time, s, from measured joint angles, rad, (2,)."""
         self._began, self._from = time, q.copy()
 
     def step(self, time: float, measurement: Measurement | None) -> SequenceStep:
@@ -151,21 +141,21 @@ class MotionSequence:
         if phase is Part.HOP and self._phase is not Part.HOP:
             self.controller.reset(1)
         self._phase = phase
-        command = self.commands.at(self._hopped(time))
+        command = self.command(time)
         if phase is Part.HOP:
             asked = self.controller.act(measurement)[0]
-            return SequenceStep(_pair(self._limit(asked, q, qd)), command, phase, _pair(asked))
-        asked = self._hold(phase, lasted, q, qd)
-        return SequenceStep(_pair(self._limit(asked, q, qd)), command, phase)
+        else:
+            asked = self._hold(phase, lasted, q, qd)
+        torque = asked if self.limiter is None else self.limiter.apply(asked, q, qd)
+        own = _pair(asked) if phase is Part.HOP else (math.nan, math.nan)
+        return SequenceStep(_pair(torque), command, phase, own)
 
     def command(self, time: float) -> float:
         """Return the height commanded at a time, m."""
-        return self.commands.at(self._hopped(time))
-
-    def _hopped(self, time: float) -> float:
         if self._began is None:
-            return 0.0
-        return max(time - self._began - self.timing.rise - self.timing.settle, 0.0)
+            return self.commands.at(0.0)
+        hopped = time - self._began - self.timing.rise - self.timing.settle
+        return self.commands.at(max(hopped, 0.0))
 
     def _hold(self, phase: Part, lasted: float, q: Array, qd: Array) -> Array:
         """Return the torque of rising, standing or sinking."""
@@ -182,9 +172,6 @@ class MotionSequence:
             strength = min((timing.sink - lasted) / timing.fade, 1.0)
         torque: Array = strength * np.array(gains.stiffness) * (target - q)
         return torque - np.array(gains.damping) * qd
-
-    def _limit(self, torque: Array, q: Array, qd: Array) -> Array:
-        return torque if self.limiter is None else self.limiter.apply(torque, q, qd)
 
 
 def _between(start: Array, end: Array, share: float) -> Array:

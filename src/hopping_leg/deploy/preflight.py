@@ -16,11 +16,6 @@ from hopping_leg.errors import HardwareError
 from hopping_leg.robot.hardware import REGISTER_MAP
 from hopping_leg.robot.parameters import JOINTS, Robot
 
-BRAKE_MODE = 15
-"""What a drive shall do when its watchdog ends a torque command; the firmware's default is limp."""
-
-_RELATIVE = 1e-3
-
 
 @dataclass(frozen=True)
 class Setting:
@@ -38,7 +33,7 @@ class Setting:
 
     def holds(self, found: float) -> bool:
         """Tell whether a drive's value is the wanted one, within the rounding of its text."""
-        return math.isclose(found, self.value, rel_tol=_RELATIVE, abs_tol=1e-6)
+        return math.isclose(found, self.value, rel_tol=1e-3, abs_tol=1e-6)
 
     @property
     def text(self) -> str:
@@ -56,7 +51,8 @@ def required_settings(robot: Robot, joint: int) -> tuple[Setting, ...]:
         Setting("servopos.position_min", ends[0], "mechanical stop"),
         Setting("servopos.position_max", ends[1], "mechanical stop"),
         Setting("servo.max_current_A", servo.max_current, "motor current"),
-        Setting("servo.timeout_mode", BRAKE_MODE, "brakes when the host is silent"),
+        # The firmware's default is limp.
+        Setting("servo.timeout_mode", int(DriveMode.BRAKE), "brakes when the host is silent"),
         Setting("servo.default_timeout_s", robot.hardware.watchdog, "watchdog"),
     )
 
@@ -116,17 +112,8 @@ class Finding:
 
 
 def check_drives(robot: Robot, limits: SafetyLimits, drives: Sequence[DriveInfo]) -> list[Finding]:
-    """Return all checks of both drives.
-
-    Args:
-        robot: What the drives should belong to.
-        limits: Where the leg may start, and at which voltage and temperature.
-        drives: Hip and knee.
-    """
-    findings: list[Finding] = []
-    for joint, facts in enumerate(drives):
-        findings += _of_drive(robot, limits, joint, facts)
-    return findings
+    """Return all checks of both drives, hip and knee; ``limits`` say where the leg may start."""
+    return [f for joint, facts in enumerate(drives) for f in _check(robot, limits, joint, facts)]
 
 
 def require_fit(findings: Sequence[Finding]) -> None:
@@ -141,95 +128,87 @@ def require_fit(findings: Sequence[Finding]) -> None:
         raise HardwareError(f"Not armed: {complaints[0]}{more}")
 
 
-def _of_drive(robot: Robot, limits: SafetyLimits, joint: int, facts: DriveInfo) -> list[Finding]:
+def _check(robot: Robot, limits: SafetyLimits, joint: int, facts: DriveInfo) -> list[Finding]:
     name, address = JOINTS[joint], joint_transforms(robot)[joint].id
+
+    def finding(check: str, found: str, good: bool, complaint: str, setting: str = "") -> Finding:
+        return Finding(joint, check, found, *(("", "") if good else (complaint, setting)))
+
+    answers = finding(
+        "answers",
+        f"id {address}" if facts.answers else "no",
+        facts.answers,
+        f"the {name}'s drive (id {address}) does not answer; check its power, the CAN cable"
+        " and its termination, and hardware.id in the robot's file.",
+    )
     if not facts.answers:
-        complaint = (
-            f"the {name}'s drive (id {address}) does not answer; check its power, the CAN cable"
-            " and its termination, and hardware.id in the robot's file."
-        )
-        return [Finding(joint, "answers", "no", complaint)]
+        return [answers]
+    serial, fault = robot.hardware.servos[joint].serial, "none"
+    if facts.mode == DriveMode.FAULT:
+        fault = fault_text(facts.fault)
+    voltage_low, voltage_high = limits.voltage_low, limits.voltage_high
+    lower, upper = limits.lower[joint], limits.upper[joint]
     return [
-        Finding(joint, "answers", f"id {address}"),
-        *_of_identity(robot, joint, facts),
-        *_of_power(limits, joint, facts),
-        *_of_configuration(robot, joint, facts),
-        *_of_pose(limits, joint, facts),
+        answers,
+        finding(
+            "serial number",
+            facts.serial,
+            serial in ("", facts.serial),
+            f"the drive with id {address} has serial number {facts.serial} but the robot's file"
+            f" expects {serial} at the {name}; are two drives swapped?",
+        ),
+        finding(
+            "register map",
+            f"{facts.register_map}, firmware {facts.firmware:#06x}",
+            facts.register_map == REGISTER_MAP,
+            f"the {name}'s firmware has register map {facts.register_map} but this version speaks"
+            f" {REGISTER_MAP}; flash another firmware with `moteus_tool --flash`.",
+        ),
+        finding(
+            "fault",
+            fault,
+            fault == "none",
+            f"the {name}'s drive reports {fault}; remove its cause and switch the power off and"
+            " on.",
+        ),
+        finding(
+            "bus voltage",
+            f"{facts.voltage:.1f} V",
+            voltage_low <= facts.voltage <= voltage_high,
+            f"the bus voltage at the {name} is {facts.voltage:.1f} V but must lie between"
+            f" {voltage_low:g} and {voltage_high:g} V; check the supply.",
+        ),
+        finding(
+            "temperature",
+            f"{facts.temperature:.0f} deg C",
+            facts.temperature <= limits.temperature,
+            f"the {name}'s drive has {facts.temperature:.0f} deg C; let it cool below"
+            f" {limits.temperature:g}.",
+        ),
+        *(
+            finding(
+                setting.name,
+                f"{found:.6g}",
+                setting.holds(found),
+                f"the {name}'s {setting.name} is {found:.6g} but must be {setting.value:.6g}"
+                f" ({setting.why}); let `hop doctor --write` set it.",
+                setting.name,
+            )
+            for setting in required_settings(robot, joint)
+            for found in [facts.settings.get(setting.name, math.nan)]
+        ),
+        finding(
+            "homed",
+            "yes" if facts.home == HOMED else "no",
+            facts.home == HOMED,
+            f"the {name} is not homed: after power-up its encoder is absolute only within a turn"
+            " of its rotor; bring the leg into a pose that you know and run `hop doctor --home`.",
+        ),
+        finding(
+            "position",
+            f"{facts.position:.3f} rad",
+            lower <= facts.position <= upper,
+            f"the {name} stands at {facts.position:.2f} rad but may only start between"
+            f" {lower:.2f} and {upper:.2f} rad; move it by hand, or home it.",
+        ),
     ]
-
-
-def _of_identity(robot: Robot, joint: int, facts: DriveInfo) -> list[Finding]:
-    name, servo, address = (
-        JOINTS[joint],
-        robot.hardware.servos[joint],
-        joint_transforms(robot)[joint].id,
-    )
-    serial = (
-        f"the drive with id {address} has serial number {facts.serial} but the robot's file"
-        f" expects {servo.serial} at the {name}; are two drives swapped?"
-    )
-    speaks = (
-        f"the {name}'s firmware has register map {facts.register_map} but this version speaks"
-        f" {REGISTER_MAP}; flash another firmware with `moteus_tool --flash`."
-    )
-    fault = fault_text(facts.fault) if facts.mode == DriveMode.FAULT else "none"
-    broken = (
-        f"the {name}'s drive reports {fault}; remove its cause and switch the power off and on."
-    )
-    version = f"{facts.register_map}, firmware {facts.firmware:#06x}"
-    return [
-        _finding(joint, "serial number", facts.serial, servo.serial in ("", facts.serial), serial),
-        _finding(joint, "register map", version, facts.register_map == REGISTER_MAP, speaks),
-        _finding(joint, "fault", fault, fault == "none", broken),
-    ]
-
-
-def _of_power(limits: SafetyLimits, joint: int, facts: DriveInfo) -> list[Finding]:
-    name, low, high = JOINTS[joint], limits.voltage_low, limits.voltage_high
-    volts, heat = f"{facts.voltage:.1f} V", f"{facts.temperature:.0f} deg C"
-    supply = (
-        f"the bus voltage at the {name} is {volts} but must lie between {low:g} and {high:g} V;"
-        " check the supply."
-    )
-    hot = f"the {name}'s drive has {heat}; let it cool below {limits.temperature:g}."
-    return [
-        _finding(joint, "bus voltage", volts, low <= facts.voltage <= high, supply),
-        _finding(joint, "temperature", heat, facts.temperature <= limits.temperature, hot),
-    ]
-
-
-def _of_pose(limits: SafetyLimits, joint: int, facts: DriveInfo) -> list[Finding]:
-    name, low, high = JOINTS[joint], limits.lower[joint], limits.upper[joint]
-    homed = facts.home == HOMED
-    lost = (
-        f"the {name} is not homed: after power-up its encoder is absolute only within a turn of"
-        " its rotor; bring the leg into a pose that you know and run `hop doctor --home`."
-    )
-    outside = (
-        f"the {name} stands at {facts.position:.2f} rad but may only start between {low:.2f} and"
-        f" {high:.2f} rad; move it by hand, or home it."
-    )
-    found = f"{facts.position:.3f} rad"
-    return [
-        _finding(joint, "homed", "yes" if homed else "no", homed, lost),
-        _finding(joint, "position", found, low <= facts.position <= high, outside),
-    ]
-
-
-def _of_configuration(robot: Robot, joint: int, facts: DriveInfo) -> list[Finding]:
-    findings = []
-    for setting in required_settings(robot, joint):
-        found = facts.settings.get(setting.name, float("nan"))
-        complaint = (
-            ""
-            if setting.holds(found)
-            else f"the {JOINTS[joint]}'s {setting.name} is {found:.6g} but must be"
-            f" {setting.value:.6g} ({setting.why}); let `hop doctor --write` set it."
-        )
-        wrong = setting.name if complaint else ""
-        findings.append(Finding(joint, setting.name, f"{found:.6g}", complaint, wrong))
-    return findings
-
-
-def _finding(joint: int, check: str, found: str, good: bool, complaint: str) -> Finding:
-    return Finding(joint, check, found, "" if good else complaint)

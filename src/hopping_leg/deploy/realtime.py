@@ -24,15 +24,11 @@ class Clock(Protocol):
         """Return how many of the computer's seconds something due at a time is worth waiting."""
 
 
+_SPIN_SECONDS = 2e-4
+
+
 class RealClock:
-    """The computer's clock: sleeps until shortly before a deadline and spins for the rest.
-
-    Args:
-        spin: Time to spin, s.
-    """
-
-    def __init__(self, spin: float = 2e-4) -> None:
-        self._spin = spin
+    """The computer's clock: sleeps until shortly before a deadline and spins for the rest."""
 
     def now(self) -> float:
         """Return the time."""
@@ -40,7 +36,7 @@ class RealClock:
 
     def wait_until(self, deadline: float) -> float:
         """Return at a deadline; returns the time."""
-        pause = deadline - time.monotonic() - self._spin
+        pause = deadline - time.monotonic() - _SPIN_SECONDS
         if pause > 0:
             time.sleep(pause)
         while (now := time.monotonic()) < deadline:
@@ -74,46 +70,32 @@ def prefer_this_process() -> str | None:
     One thread is not enough: whichever holds the interpreter must not be preempted either. New
     threads inherit it.
     """
+    return None if _schedule_all(os.SCHED_FIFO, PRIORITY) else _NOTICE
+
+
+def _schedule_all(policy: int, priority: int) -> bool:
     threads = [int(entry.name) for entry in Path("/proc/self/task").iterdir()]
-    done = [_schedule(thread, os.SCHED_FIFO, PRIORITY) for thread in threads]
-    return None if all(done) else _NOTICE
-
-
-def prefer_nothing() -> None:
-    """Give all threads ordinary priority again."""
-    for entry in Path("/proc/self/task").iterdir():
-        _schedule(int(entry.name), os.SCHED_OTHER, 0)
+    done = [_schedule(thread, policy, priority) for thread in threads]
+    return all(done)
 
 
 def _schedule(thread: int, policy: int, priority: int) -> bool:
     try:
         os.sched_setscheduler(thread, policy, os.sched_param(priority))
-    except ProcessLookupError:
-        return True
-    except OSError:
-        return False
+    except OSError as error:
+        return isinstance(error, ProcessLookupError)
     return True
 
 
 def lock_memory() -> str | None:
     """Keep the process in memory; return a notice where that is not permitted."""
-    try:
-        libc = ctypes.CDLL(None, use_errno=True)
-        locked = libc.mlockall(_MCL_CURRENT | _MCL_FUTURE) == 0
-    except (OSError, AttributeError):
-        locked = False
-    if locked:
-        return None
+    with contextlib.suppress(OSError, AttributeError):
+        if ctypes.CDLL(None).mlockall(_MCL_CURRENT | _MCL_FUTURE) == 0:
+            return None
     return (
         "No permission to lock memory (mlockall): a tick may be late when memory is swapped;"
         " run as root or allow it with `ulimit -l unlimited`."
     )
-
-
-def release_memory() -> None:
-    """Let the process be swapped again; nothing happens where memory was not locked."""
-    with contextlib.suppress(OSError, AttributeError):
-        ctypes.CDLL(None).munlockall()
 
 
 @contextlib.contextmanager
@@ -135,10 +117,9 @@ def uninterrupted() -> Iterator[None]:
 
 @contextlib.contextmanager
 def keeping_time(*, realtime: bool) -> Iterator[tuple[str, ...]]:
-    """Let a loop run undisturbed; yields notices of what the computer does not permit.
+    """Let a loop run undisturbed, if asked for with priority and locked memory.
 
-    Args:
-        realtime: Ask for priority and locked memory, too.
+    Yields notices of what the computer does not permit.
     """
     notices = (lock_memory(), prefer_this_process()) if realtime else ()
     try:
@@ -146,5 +127,6 @@ def keeping_time(*, realtime: bool) -> Iterator[tuple[str, ...]]:
             yield tuple(notice for notice in notices if notice)
     finally:
         if realtime:
-            prefer_nothing()
-            release_memory()
+            _schedule_all(os.SCHED_OTHER, 0)
+            with contextlib.suppress(OSError, AttributeError):
+                ctypes.CDLL(None).munlockall()

@@ -22,7 +22,7 @@ _DRIFT = 2e-4
 _RESTART = -500
 """A counter that falls back further than this, ms, began anew: no reply is held up so long."""
 
-_SLACK = 0.0015
+SLACK = 0.0015
 """A reply may seem this much older than its question, s: the counter's step and drift."""
 
 
@@ -36,20 +36,17 @@ class DriveClock:
         self._updated = 0.0
 
     def date(self, counter: int, arrived: float) -> float | None:
-        """Return when a reply was measured, s on the host's clock.
+        """Return when a reply was measured, None if it was seen before; s on the host's clock.
 
         Args:
             counter: Drive's counter, ms; wraps after 49 days.
             arrived: On the host's clock, s.
-
-        Returns:
-            None for a reply that has been seen before.
         """
-        if self._counter is None:
-            return self._begin(counter, arrived)
-        step = (counter - self._counter + _HALF) % _WRAP - _HALF
-        if step < _RESTART:
-            return self._begin(counter, arrived)
+        step = (counter - (self._counter or 0) + _HALF) % _WRAP - _HALF
+        if self._counter is None or step < _RESTART:
+            self._counter, self._time = counter, counter % _WRAP * 1e-3
+            self._offset, self._updated = arrived - self._time, arrived
+            return arrived
         if step == 0:
             return None
         time = self._time + step * 1e-3
@@ -58,21 +55,6 @@ class DriveClock:
         allowance = _DRIFT * (arrived - self._updated)
         self._offset, self._updated = min(self._offset + allowance, arrived - time), arrived
         return time + self._offset
-
-    def _begin(self, counter: int, arrived: float) -> float:
-        self._counter, self._time = counter, counter % _WRAP * 1e-3
-        self._offset, self._updated = arrived - self._time, arrived
-        return arrived
-
-    @staticmethod
-    def fresh(taken: float, asked: float) -> bool:
-        """Tell whether a reply answers a question rather than an earlier one.
-
-        Args:
-            taken: When it was measured, s.
-            asked: When the question left, s.
-        """
-        return taken >= asked - _SLACK
 
 
 class Question:
@@ -98,19 +80,13 @@ class Question:
         self.done = threading.Event()
 
     def take(self, joint: int, frame: Any, now: float) -> bool:  # noqa: ANN401
-        """Judge a frame; return whether it answers this question.
-
-        Args:
-            joint: 0 for the hip, 1 for the knee.
-            frame: A frame of the client library.
-            now: When it arrived, s.
-        """
+        """Judge a client library's frame that arrived now, s; return whether it answers this."""
         if self._fresh[joint] is not None:
             return False
         reply = read_reply(frame.data, self._transforms[joint], self._clocks[joint], now)
         if reply is None:
             return False
-        if not DriveClock.fresh(reply.taken, self._asked):
+        if reply.taken < self._asked - SLACK:
             self._late.append((joint, reply))
             return False
         self._fresh[joint] = reply
@@ -127,11 +103,7 @@ class Question:
 def read_reply(
     data: bytes, transform: JointTransform, clock: DriveClock, now: float
 ) -> Reply | None:
-    """Return the state that a frame reports.
-
-    Returns:
-        None for a frame that lacks something, makes no sense, or was seen before.
-    """
+    """Return the state that a frame reports; None if it is incomplete, senseless or not new."""
     try:
         values = parse_reply(data)
         counter = values[Register.MILLISECOND_COUNTER]

@@ -29,13 +29,9 @@ class TolerantFdcanusb(FdcanusbDevice):  # type: ignore[misc]
     with the loop, so that the next one with its number never reads.
 
     Must be made inside of a running event loop.
-
-    Attributes:
-        garbage: Lines that were skipped.
     """
 
     def __init__(self, path: str) -> None:
-        self.garbage = 0
         super().__init__(path)
         self._loop = asyncio.get_running_loop()
         self._descriptor: int | None = self._serial.fd
@@ -56,11 +52,10 @@ class TolerantFdcanusb(FdcanusbDevice):  # type: ignore[misc]
         try:
             return await super()._process_one_line()
         except (ValueError, IndexError):
-            self.garbage += 1
             return False
 
     async def _handle_other_response(self, line: bytes) -> None:
-        self.garbage += 1
+        """Skip the line."""
 
     def _abandon(self) -> None:
         if self._descriptor is not None:

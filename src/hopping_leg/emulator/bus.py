@@ -1,5 +1,6 @@
 """The CAN bus: what a drive makes of a frame, and what it answers."""
 
+import contextlib
 from dataclasses import dataclass
 
 from moteus import multiplex
@@ -37,11 +38,8 @@ class Message:
     def read(frame: Frame) -> "Message":
         """Return the message of a frame."""
         subframes: list[multiplex.Subframe] = []
-        try:
+        with contextlib.suppress(Exception):  # the parser raises whatever a short buffer leads to
             subframes.extend(multiplex.parse_frame(frame.data))
-        except Exception:
-            # The parser raises whatever a short buffer leads to.
-            return Message(frame, tuple(subframes))
         return Message(frame, tuple(subframes))
 
     def subframes_for(self, drive: EmulatedDrive) -> tuple[multiplex.Subframe, ...]:
@@ -65,14 +63,7 @@ def act(message: Message, drive: EmulatedDrive, time: float) -> Errors:
 
 
 def answer(message: Message, drive: EmulatedDrive, time: float, errors: Errors) -> Frame | None:
-    """Return a drive's answer to a message; None if it is not meant or none is wanted.
-
-    Args:
-        message: From the host.
-        drive: On the bus.
-        time: Now, s.
-        errors: Its writes that failed.
-    """
+    """Return a drive's answer, which tells its failed writes; None if none is wanted of it."""
     subframes = message.subframes_for(drive)
     if not subframes:
         return None
@@ -86,16 +77,12 @@ def answer(message: Message, drive: EmulatedDrive, time: float, errors: Errors) 
 
 def _addressed(subframes: tuple[multiplex.Subframe, ...], drive: EmulatedDrive) -> bool:
     """Whether a frame that names a UUID, or its beginning, means this drive."""
-    for s in subframes:
-        if (
-            isinstance(s, RegisterSubframe)
-            and s.register in _UUID_MASKS
-            and s.type is SubframeType.WRITE
-        ):
-            own = drive.identity.get(s.register - Register.UUID_MASK1 + Register.UUID1)
-            if own != s.value:
-                return False
-    return True
+    return all(
+        s.value == drive.identity.get(s.register - Register.UUID_MASK1 + Register.UUID1)
+        for s in subframes
+        if isinstance(s, RegisterSubframe) and s.type is SubframeType.WRITE
+        if s.register in _UUID_MASKS
+    )
 
 
 def _stream(

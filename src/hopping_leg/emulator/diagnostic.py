@@ -87,6 +87,6 @@ class Diagnostic:
     def _set_offset(self, where: float) -> None:
         """Change the configured offset so that the output is at a position, revolutions."""
         settings, position = self._settings, self._encoder.position
-        change = (where - position) * float(settings["motor_position.output.sign"])
-        offset = float(settings["motor_position.output.offset"]) + change
+        change = (where - position) * settings["motor_position.output.sign"]
+        offset = settings["motor_position.output.offset"] + change
         settings.set("motor_position.output.offset", repr(offset))

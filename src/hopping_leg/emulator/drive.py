@@ -5,7 +5,7 @@ Time comes as an argument; between two steps nothing changes but the command reg
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from moteus.multiplex import F32
 from moteus.protocol import Register, scale_register
@@ -104,6 +104,11 @@ class EmulatedDrive:
         """Whether the output stage is powered."""
         return self.machine.mode in CONTROLLING
 
+    @property
+    def _amperes(self) -> float:
+        """Phase current, A."""
+        return self._torque / (self.encoder.gear_ratio * TORQUE_CONSTANT)
+
     def boot(self, output: float) -> None:
         """Power up with the output at a true position, revolutions."""
         self.settings.load()
@@ -115,16 +120,13 @@ class EmulatedDrive:
         scaled = value if resolution == F32 else scale_register(register, resolution, value)
         if register == Register.MODE:
             return self._write_mode(int(scaled))
-        name = COMMAND_FIELDS.get(register)
-        if name is not None:
-            setattr(self.command, name, float(scaled))
+        if register in COMMAND_FIELDS:
+            setattr(self.command, COMMAND_FIELDS[register], float(scaled))
         elif register == Register.SET_OUTPUT_NEAREST:
             self.encoder.set_nearest(float(scaled))
         elif register == Register.SET_OUTPUT_EXACT:
             self.encoder.set_exact(float(scaled))
-        elif Register.UUID_MASK1 <= register <= Register.UUID_MASK4:
-            return 0
-        else:
+        elif not Register.UUID_MASK1 <= register <= Register.UUID_MASK4:
             known = register in self.state() or self.stored(register) is not None
             return NOT_WRITABLE if known else UNKNOWN_REGISTER
         return 0
@@ -141,7 +143,7 @@ class EmulatedDrive:
         if self._commanded:
             self._commanded = False
             command = self.command
-            timeout = command.timeout or float(self.settings["servo.default_timeout_s"])
+            timeout = command.timeout or self.settings["servo.default_timeout_s"]
             self.machine.command(command.mode, time, timeout)
 
     def stop(self, time: float) -> None:
@@ -150,39 +152,24 @@ class EmulatedDrive:
         self.commit(time)
 
     def update_sensors(self, output: float, velocity: float, torque: float) -> None:
-        """Set what the sensors see after a step of physics.
-
-        Args:
-            output: Position of the output, revolutions.
-            velocity: Velocity of the output, rev/s.
-            torque: What the motor gave, at the output, N m.
-        """
+        """Set what the sensors see of the output after a step of physics: rev, rev/s, N m."""
         self.encoder.update(output)
         self._velocity = self.encoder.velocity(velocity)
         self._torque = torque if self.active else 0.0
 
     def step(self, time: float, dt: float) -> float:
-        """Let one step of physics begin.
-
-        Args:
-            time: Now, s.
-            dt: Length of the step, s.
-
-        Returns:
-            Torque that the drive asks of its motor, at the output, N m; finite.
-        """
+        """Begin one step of physics; return the torque asked of the motor's output, N m, finite."""
         self.uptime += dt
-        amperes = self._torque / (self.encoder.gear_ratio * TORQUE_CONSTANT)
-        self._warmth += dt / _WARMING_TIME * (_HEATING * amperes**2 - self._warmth)
+        self._warmth += dt / _WARMING_TIME * (_HEATING * self._amperes**2 - self._warmth)
         free = bool(self.command.ignore_bounds)
         if self.machine.advance(time, outside_limits=not free and self._outside_limits()):
             self.law.begin()
         self._check()
         self.law.notice = 0
         wanted = self._control(dt)
+        self._asked = wanted
         if self.active:
             self.machine.fault = self.disturbances.notice or self.law.notice
-        self._asked = wanted
         if math.isnan(wanted):
             self.machine.fault = Notice.MAX_VOLTAGE
             return 0.0
@@ -212,35 +199,32 @@ class EmulatedDrive:
         machine, settings = self.machine, self.settings
         if self.disturbances.fault:
             machine.trip(self.disturbances.fault)
-        if self.voltage > float(settings["servo.max_voltage"]):
+        if self.voltage > settings["servo.max_voltage"]:
             machine.trip(FaultCode.OVER_VOLTAGE)
         if self.voltage < _LOWEST_VOLTAGE:
             machine.trip(FaultCode.UNDER_VOLTAGE)
-        if self.temperature > float(settings["servo.fault_temperature"]):
+        if self.temperature > settings["servo.fault_temperature"]:
             machine.trip(FaultCode.OVER_TEMPERATURE)
 
     def _outside_limits(self) -> bool:
-        low, high = (float(self.settings[f"servopos.position_{end}"]) for end in ("min", "max"))
+        low, high = self.settings.position_bounds
         return self.encoder.position < low or self.encoder.position > high
 
     def stored(self, register: int) -> float | None:
         """Return a command or identity register, None if it is neither."""
-        name = COMMAND_FIELDS.get(register)
-        if name is not None:
-            return float(getattr(self.command, name))
+        if register in COMMAND_FIELDS:
+            return float(getattr(self.command, COMMAND_FIELDS[register]))
         return self.identity.get(register)
 
     def state(self) -> dict[int, float]:
         """Return the registers that tell how the drive is, in its units."""
         position = self.encoder.position
-        torque = self.encoder.torque_as_reported(self._torque)
-        amperes = self._torque / (self.encoder.gear_ratio * TORQUE_CONSTANT)
         return {
             Register.MODE: self.machine.mode,
             Register.POSITION: position,
             Register.VELOCITY: self._velocity,
-            Register.TORQUE: torque,
-            Register.Q_CURRENT: math.nan if math.isnan(self._asked) else amperes,
+            Register.TORQUE: self.encoder.torque_as_reported(self._torque),
+            Register.Q_CURRENT: math.nan if math.isnan(self._asked) else self._amperes,
             Register.D_CURRENT: 0.0,
             Register.ABS_POSITION: position,
             Register.POWER: self._torque * self._velocity * 2 * math.pi,
@@ -256,6 +240,3 @@ class EmulatedDrive:
             Register.MILLISECOND_COUNTER: int(self.uptime * 1000),
             Register.MULTIPLEX_ID: self.id,
         }
-
-
-assert set(COMMAND_FIELDS.values()) <= {f.name for f in fields(Command)}

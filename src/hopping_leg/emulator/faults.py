@@ -70,14 +70,10 @@ class Fault:
     """Setting that is wrong, for ``configuration``."""
 
     def __post_init__(self) -> None:
-        for name, valid in (
-            ("kind", KINDS),
-            ("since", SINCE),
-            ("phase", PHASES),
-            ("drive", DRIVES),
-        ):
-            if getattr(self, name) not in valid:
-                raise UsageError(unknown_name(f"fault {name}", str(getattr(self, name)), valid))
+        valid = {"kind": KINDS, "since": SINCE, "phase": PHASES, "drive": DRIVES}
+        for name, choices in valid.items():
+            if getattr(self, name) not in choices:
+                raise UsageError(unknown_name(f"fault {name}", str(getattr(self, name)), choices))
         for name in ("at", "duration"):
             seconds = getattr(self, name)
             if seconds is not None and not seconds >= 0:
@@ -154,8 +150,9 @@ class FaultKind:
     duration: ClassVar[float] = math.inf
     at_start: ClassVar[bool] = False
 
-    def __init_subclass__(cls, *, kind: str) -> None:
-        KINDS[kind] = cls
+    def __init_subclass__(cls, *, kind: str = "") -> None:
+        if kind:
+            KINDS[kind] = cls
 
     def __init__(self, fault: Fault, robot: FaultyRobot, rng: np.random.Generator) -> None:
         self.fault, self.robot, self.rng = fault, robot, rng
@@ -226,11 +223,9 @@ class _DuplicateReply(FaultKind, kind="duplicate_reply"):
         delivery.copies += 1
 
 
-class _Silence(FaultKind, kind="silence"):
+class _Silence(_DropReply, kind="silence"):
     text = "no reply arrives any more"
-
-    def on_reply(self, delivery: Delivery) -> None:
-        delivery.copies = 0
+    duration = math.inf
 
 
 class _GarbageLine(FaultKind, kind="garbage_line"):
@@ -256,57 +251,53 @@ class _EncoderJump(FaultKind, kind="encoder_jump"):
             drive.encoder.jump = 0.0
 
 
-class _DriveFault(FaultKind, kind="drive_fault"):
-    text, unit, value = "a drive goes to fault with this code", "code", 33.0
+class _Disturbance(FaultKind):
+    field: ClassVar[str]
+    """Of ``Disturbances``."""
 
     def begin(self) -> None:
-        for drive in self.drives:
-            drive.disturbances.fault = int(self.fault.amount)
+        self.disturb(self.fault.amount)
 
     def end(self) -> None:
+        self.disturb(0)
+
+    def disturb(self, amount: float) -> None:
         for drive in self.drives:
-            drive.disturbances.fault = 0
+            kind = type(getattr(drive.disturbances, self.field))
+            setattr(drive.disturbances, self.field, kind(amount))
 
 
-class _OverTemperature(FaultKind, kind="over_temperature"):
+class _DriveFault(_Disturbance, kind="drive_fault"):
+    text, unit, value = "a drive goes to fault with this code", "code", 33.0
+    field = "fault"
+
+
+class _OverTemperature(_Disturbance, kind="over_temperature"):
     text, unit, value = "a drive warms up", "K/s", 40.0
+    field = "temperature"
+
+    def begin(self) -> None:
+        """Begin with no rise."""
 
     def update(self) -> None:
-        for drive in self.drives:
-            passed = self.robot.time - self.begun
-            drive.disturbances.temperature = self.fault.amount * passed
-
-    def end(self) -> None:
-        for drive in self.drives:
-            drive.disturbances.temperature = 0.0
+        self.disturb(self.fault.amount * (self.robot.time - self.begun))
 
 
-class _OverVoltage(FaultKind, kind="over_voltage"):
+class _OverVoltage(_Disturbance, kind="over_voltage"):
     text, unit, value = "the bus voltage rises to", "V", 50.0
+    field = "voltage"
 
     def begin(self) -> None:
-        for drive in self.drives:
-            drive.disturbances.voltage = self.fault.amount - drive.nominal_voltage
-
-    def end(self) -> None:
-        for drive in self.drives:
-            drive.disturbances.voltage = 0.0
+        self.disturb(self.fault.amount - self.drives[0].nominal_voltage)
 
 
 class _UnderVoltage(_OverVoltage, kind="under_voltage"):
     text, value = "the bus voltage sags to", 10.0
 
 
-class _LimitNotice(FaultKind, kind="limit_notice"):
+class _LimitNotice(_Disturbance, kind="limit_notice"):
     text, unit, value = "a drive reports that a limit is at work", "code", 102.0
-
-    def begin(self) -> None:
-        for drive in self.drives:
-            drive.disturbances.notice = int(self.fault.amount)
-
-    def end(self) -> None:
-        for drive in self.drives:
-            drive.disturbances.notice = 0
+    field = "notice"
 
 
 class _Unplug(FaultKind, kind="unplug"):

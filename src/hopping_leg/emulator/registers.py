@@ -6,7 +6,7 @@ Scales, saturation and NaN come from the client's own writer, so both ends agree
 import hashlib
 import io
 import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 
 from moteus import multiplex
 from moteus.protocol import Register, Writer
@@ -22,8 +22,7 @@ REGISTER_MAP = 5
 def identity(seed: str) -> dict[int, int]:
     """Return the registers that tell what a drive was made with: versions, serial number, UUID.
 
-    Args:
-        seed: Makes serial number and UUID; two drives on a bus need different ones.
+    The seed makes serial number and UUID; two drives on a bus need different ones.
     """
     words = struct.unpack("<7I", hashlib.sha256(seed.encode()).digest()[:28])
     registers: dict[int, int] = {
@@ -59,21 +58,21 @@ _TORQUES = (
     Register.TORQUE_ERROR,
 )
 _CURRENTS = (Register.Q_CURRENT, Register.D_CURRENT, Register.COMMAND_FIXED_CURRENT_OVERRIDE)
-_SHARES = (*(Register.COMMAND_KP_SCALE, Register.COMMAND_KD_SCALE, Register.COMMAND_ILIMIT_SCALE),)
+_SHARES = (Register.COMMAND_KP_SCALE, Register.COMMAND_KD_SCALE, Register.COMMAND_ILIMIT_SCALE)
 _VOLTAGES = (Register.VOLTAGE, Register.COMMAND_FIXED_VOLTAGE_OVERRIDE)
 _TEMPERATURES = (Register.TEMPERATURE, Register.MOTOR_TEMPERATURE)
 
 _PACKERS: dict[int, _Pack] = {
-    **dict.fromkeys(map(int, _POSITIONS), Writer.write_position),
-    **dict.fromkeys(map(int, _VELOCITIES), Writer.write_velocity),
-    **dict.fromkeys(map(int, _TORQUES), Writer.write_torque),
-    **dict.fromkeys(map(int, _CURRENTS), Writer.write_current),
-    **dict.fromkeys(map(int, _SHARES), Writer.write_pwm),
-    **dict.fromkeys(map(int, _VOLTAGES), Writer.write_voltage),
-    **dict.fromkeys(map(int, _TEMPERATURES), Writer.write_temperature),
-    int(Register.POWER): Writer.write_power,
-    int(Register.COMMAND_ACCEL_LIMIT): Writer.write_accel,
-    int(Register.COMMAND_TIMEOUT): Writer.write_time,
+    **dict.fromkeys(_POSITIONS, Writer.write_position),
+    **dict.fromkeys(_VELOCITIES, Writer.write_velocity),
+    **dict.fromkeys(_TORQUES, Writer.write_torque),
+    **dict.fromkeys(_CURRENTS, Writer.write_current),
+    **dict.fromkeys(_SHARES, Writer.write_pwm),
+    **dict.fromkeys(_VOLTAGES, Writer.write_voltage),
+    **dict.fromkeys(_TEMPERATURES, Writer.write_temperature),
+    Register.POWER: Writer.write_power,
+    Register.COMMAND_ACCEL_LIMIT: Writer.write_accel,
+    Register.COMMAND_TIMEOUT: Writer.write_time,
 }
 """What packs each scaled register; all others are integers."""
 
@@ -90,29 +89,20 @@ class ReplyWriter:
         """The payload so far."""
         return self._buffer.getvalue()
 
-    def values(self, first: int, resolution: int, values: Iterable[float]) -> None:
-        """Add a run of registers.
-
-        Args:
-            first: Number of the first register.
-            resolution: ``multiplex.INT8``, ``INT16``, ``INT32`` or ``F32``, of all of them.
-            values: One per register.
-        """
-        values = list(values)
+    def values(self, first: int, resolution: int, values: Sequence[float]) -> None:
+        """Add a run of registers, all of one resolution: that of ``multiplex``."""
         head = multiplex.REPLY_BASE | (resolution << 2)
-        if len(values) <= _MAX_RUN:
-            self._buffer.write(bytes([head | len(values)]))
-        else:
-            self._buffer.write(bytes([head, len(values)]))
+        short = len(values) <= _MAX_RUN
+        self._buffer.write(bytes([head | len(values)] if short else [head, len(values)]))
         self._writer.write_varuint(first)
         for register, value in enumerate(values, first):
-            pack = _PACKERS.get(register)
-            if pack is not None:
-                pack(self._writer, value, resolution)
+            if register in _PACKERS:
+                _PACKERS[register](self._writer, value, resolution)
             elif resolution == multiplex.F32:
                 self._writer.write_f32(value)
-            else:
-                self._writer.write(_wrapped(int(value), _INT_BITS[resolution]), resolution)
+            else:  # as the firmware's cast to fewer bits leaves an integer
+                half = 1 << (_INT_BITS[resolution] - 1)
+                self._writer.write((int(value) + half) % (2 * half) - half, resolution)
 
     def error(self, register: int, code: int, *, reading: bool) -> None:
         """Add the report that a register could not be read or written."""
@@ -123,18 +113,11 @@ class ReplyWriter:
 
     def stream(self, channel: int, data: bytes, packet: int | None = None) -> None:
         """Add a piece of the diagnostic stream, numbered where the host asked for that."""
-        kind = multiplex.STREAM_SERVER_DATA
-        if packet is not None:
-            kind = multiplex.STREAM_SERVER_DATA_FLOW
+        flow = packet is not None
+        kind = multiplex.STREAM_SERVER_DATA_FLOW if flow else multiplex.STREAM_SERVER_DATA
         self._buffer.write(bytes([kind]))
         self._writer.write_varuint(channel)
         if packet is not None:
             self._buffer.write(bytes([packet]))
         self._writer.write_varuint(len(data))
         self._buffer.write(data)
-
-
-def _wrapped(value: int, bits: int) -> int:
-    """Return an integer as the firmware's cast to fewer bits leaves it."""
-    half = 1 << (bits - 1)
-    return (value + half) % (2 * half) - half

@@ -31,11 +31,11 @@ class RotorEncoder:
 
     @property
     def _ratio(self) -> float:
-        return float(self._settings["motor_position.rotor_to_output_ratio"])
+        return self._settings["motor_position.rotor_to_output_ratio"]
 
     @property
     def _sign(self) -> float:
-        return float(self._settings["motor_position.output.sign"])
+        return self._settings["motor_position.output.sign"]
 
     def boot(self, output: float) -> None:
         """Begin anew with the true output at a position, revolutions."""
@@ -55,7 +55,7 @@ class RotorEncoder:
     @property
     def position(self) -> float:
         """Output as the firmware reports it, revolutions."""
-        offset = float(self._settings["motor_position.output.offset"])
+        offset = self._settings["motor_position.output.offset"]
         rotor = self._rotor + self._shift + self.jump
         return self._sign * (rotor * self._ratio + offset)
 

@@ -74,15 +74,16 @@ class Settings:
             self.set(name, str(value))
         self.save()
 
-    def __getitem__(self, name: str) -> Value:
-        return self._values[name]
+    def __getitem__(self, name: str) -> float:
+        return float(self._values[name])
+
+    @property
+    def position_bounds(self) -> tuple[float, float]:
+        """Lowest and highest position of the output, revolutions."""
+        return self["servopos.position_min"], self["servopos.position_max"]
 
     def set(self, name: str, text: str) -> None:
-        """Change a value in RAM.
-
-        Raises:
-            UsageError: The name is unknown or the text no number.
-        """
+        """Change a value in RAM; a ``UsageError`` tells of an unknown name or no number."""
         if name not in self._values:
             raise UsageError(unknown_name("drive setting", name, self._values))
         kind = type(DEFAULTS[name])

@@ -12,7 +12,7 @@ from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.emulator.mode_machine import Notice
 from hopping_leg.emulator.settings import Settings
 
-_FIELDS = {
+COMMAND_FIELDS: dict[int, str] = {
     Register.COMMAND_POSITION: "position",
     Register.COMMAND_VELOCITY: "velocity",
     Register.COMMAND_FEEDFORWARD_TORQUE: "feedforward",
@@ -37,12 +37,10 @@ _FIELDS = {
     Register.COMMAND_WITHIN_ILIMIT_SCALE: "ilimit_scale",
     Register.COMMAND_WITHIN_IGNORE_POSITION_BOUNDS: "ignore_bounds",
 }
-
-COMMAND_FIELDS = {int(register): name for register, name in _FIELDS.items()}
 """Register to the field of ``Command`` that it holds."""
 
 
-@dataclass
+@dataclass(slots=True)
 class Command:
     """One command; a mode write starts from these defaults. Units are the drive's: rev, s, N m."""
 
@@ -88,17 +86,20 @@ class TorqueLaw:
     def position(self, command: Command, position: float, velocity: float, dt: float) -> float:
         """Return the torque of position mode, N m; see the firmware's ``ISR_DoPositionCommon``."""
         self._head_for(command, position, dt)
-        kp, kd = (float(self._settings[f"servo.pid_position.{k}"]) for k in ("kp", "kd"))
-        stiff, damp = kp * command.kp_scale, kd * command.kd_scale
+        stiff, damp = self._gains(command)
         torque = command.feedforward + damp * (self.control_velocity - velocity)
         if stiff:
             torque += stiff * (self.control_position - position)
         return self._within(torque, command.max_torque)
 
+    def _gains(self, command: Command) -> tuple[float, float]:
+        kp, kd = (self._settings[f"servo.pid_position.{gain}"] for gain in ("kp", "kd"))
+        return kp * command.kp_scale, kd * command.kd_scale
+
     def zero_velocity(self, kd_scale: float, velocity: float) -> float:
         """Return the torque of zero-velocity mode, N m."""
-        damp = float(self._settings["servo.pid_position.kd"]) * kd_scale
-        return self._within(-damp * velocity, float(self._settings["servo.timeout_max_torque_Nm"]))
+        damp = self._settings["servo.pid_position.kd"] * kd_scale
+        return self._within(-damp * velocity, self._settings["servo.timeout_max_torque_Nm"])
 
     def stay_within(self, command: Command, position: float, velocity: float) -> float:
         """Return the torque of stay-within mode, N m: none but feedforward inside the bounds."""
@@ -107,8 +108,8 @@ class TorqueLaw:
         target = low if low > position else high if high < position else None
         torque = command.feedforward
         if target is not None:
-            kp, kd = (float(self._settings[f"servo.pid_position.{k}"]) for k in ("kp", "kd"))
-            torque += kp * command.kp_scale * (target - position) - kd * command.kd_scale * velocity
+            stiff, damp = self._gains(command)
+            torque += stiff * (target - position) - damp * velocity
         return self._within(torque, command.max_torque)
 
     def limited(
@@ -116,35 +117,31 @@ class TorqueLaw:
     ) -> float:
         """Return the torque that the limits leave, N m; NaN passes, as in the firmware.
 
-        Args:
-            torque: Asked for.
-            position: Position of the output, as reported, revolutions.
-            velocity: Velocity of the output, as reported, rev/s.
-            temperature: Temperature of the output stage, degrees C.
-            bounds: Whether the position limits hold.
+        Position, rev, and velocity, rev/s, are the output's as reported; the temperature, degrees
+        C, is the output stage's; ``bounds`` tells whether the position limits hold.
         """
         if bounds:
             torque = self._in_bounds(torque, position)
-        highest = float(self._settings["servo.max_velocity"])
-        amperes = float(self._settings["servo.max_current_A"])
+        highest = self._settings["servo.max_velocity"]
+        amperes = self._settings["servo.max_current_A"]
         if abs(velocity) > highest and torque * velocity > 0:
-            over = (abs(velocity) - highest) / float(self._settings["servo.max_velocity_derate"])
+            over = (abs(velocity) - highest) / self._settings["servo.max_velocity_derate"]
             torque = self._capped(torque, max(0.0, 1 - over) * amperes, Notice.MAX_VELOCITY)
         return self._cooled(torque, amperes, temperature)
 
     def _cooled(self, torque: float, amperes: float, temperature: float) -> float:
-        margin = float(self._settings["servo.temperature_margin"])
-        begin = float(self._settings["servo.fault_temperature"]) - margin
+        margin = self._settings["servo.temperature_margin"]
+        begin = self._settings["servo.fault_temperature"] - margin
         hot = (temperature - begin) / margin
         if hot <= 0:
             return self._capped(torque, amperes, Notice.MAX_CURRENT)
-        least = float(self._settings["servo.derate_current_A"])
+        least = self._settings["servo.derate_current_A"]
         left = min(amperes, max(0.0, amperes + hot * (least - amperes)))
         return self._capped(torque, left, Notice.FET_TEMPERATURE)
 
     def _in_bounds(self, torque: float, position: float) -> float:
-        derate = float(self._settings["servo.position_derate"])
-        high, low = (float(self._settings[f"servopos.position_{end}"]) for end in ("max", "min"))
+        derate = self._settings["servo.position_derate"]
+        low, high = self._settings.position_bounds
         beyond = max(position - high, 0.0) if torque > 0 else max(low - position, 0.0)
         if not beyond > 0:
             return torque
@@ -152,7 +149,7 @@ class TorqueLaw:
         return torque * max(0.0, 1 - beyond / derate)
 
     def _capped(self, torque: float, amperes: float, notice: Notice) -> float:
-        ratio = float(self._settings["motor_position.rotor_to_output_ratio"])
+        ratio = self._settings["motor_position.rotor_to_output_ratio"]
         most = amperes * TORQUE_CONSTANT / ratio
         if abs(torque) > most:
             self.notice = notice
@@ -184,10 +181,7 @@ class TorqueLaw:
                 command.position = math.nan
             else:
                 self.control_velocity = math.copysign(command.velocity_limit, gap)
-        self._clip_control_position()
-
-    def _clip_control_position(self) -> None:
-        low, high = (float(self._settings[f"servopos.position_{end}"]) for end in ("min", "max"))
+        low, high = self._settings.position_bounds
         if not math.isnan(high):
             self.control_position = min(self.control_position, high)
         if not math.isnan(low):
