@@ -24,9 +24,8 @@ from hopping_leg.controllers.registry import load_policy
 from hopping_leg.errors import UsageError
 from hopping_leg.figure_style import WIDTH, colour, styled
 from hopping_leg.io import write_atomically, write_json
-from hopping_leg.rl.finetune.config import FinetuneConfig, Method
+from hopping_leg.rl.finetune.config import FinetuneConfig, Method, Task
 from hopping_leg.rl.finetune.finetuning import Row
-from hopping_leg.rl.finetune.pretraining import Task
 from hopping_leg.rl.finetune.running import POLICY, RESULT, finetune
 from hopping_leg.rl.finetune.simulated import Guard, SimulatedTrials
 from hopping_leg.rl.finetune.trial_data import score
@@ -38,7 +37,7 @@ FIRST_JUDGE = 1000
 """Of the seeds that judge; none of them has chosen anything."""
 
 _SECONDS = 5.0
-"""At each height in a judging outing."""
+"""At each height in a judging trial."""
 
 START = "start"
 """Stands for the method of the policy before it was continued."""
@@ -58,7 +57,7 @@ class Study:
     folder: Path
     eval_commands: tuple[float, ...] = (0.25, 0.27, 0.29, 0.31, 0.33, 0.35)
     judges: int = 3
-    """Judging outings of each policy."""
+    """Judging trials of each policy."""
 
 
 def measure(study: Study, on_progress: Callable[[str], None]) -> dict[str, Any]:
@@ -114,7 +113,7 @@ def _run(
             folder,
             resume=True,
             pretraining=study.folder / "pretraining",
-            on_outing=lambda row: on_progress(
+            on_trial=lambda row: on_progress(
                 f"{folder.name} {row['minutes']:.2f} min: {1e3 * row['error_m']:.0f} mm"
             ),
         )
@@ -135,9 +134,9 @@ def _judge(study: Study, twin: Robot, policy: Policy, method: str, seed: int | N
     schedule = CommandSchedule(tuple((c, _SECONDS) for c in study.eval_commands))
     rows = []
     for judge in range(FIRST_JUDGE, FIRST_JUDGE + study.judges):
-        outing = SimulatedTrials(twin, study.guard).hop(policy, schedule, judge)
-        assert outing.truth is not None
-        found = score(outing.truth, schedule, outing.complaint)
+        trial = SimulatedTrials(twin, study.guard).hop(policy, schedule, judge)
+        assert trial.truth is not None
+        found = score(trial.truth, schedule, trial.complaint)
         rows += [
             {
                 "twin": twin.name,
@@ -147,7 +146,7 @@ def _judge(study: Study, twin: Robot, policy: Policy, method: str, seed: int | N
                 "command_m": command,
                 "median_abs_error_m": error,
                 "median_error_m": found.offsets[command],
-                "ended_early": bool(outing.complaint),
+                "ended_early": bool(trial.complaint),
             }
             for command, error in found.by_command.items()
         ]
@@ -208,7 +207,7 @@ class Finetune:
     minutes: float = 10.0
     """Robot time of a run at most."""
     judges: int = 3
-    """Judging outings of each policy."""
+    """Judging trials of each policy."""
     folder: Path = Path("runs/bench-finetune")
     """Where the runs are kept; finished ones are not repeated, killed ones go on."""
     figure: Path | None = None

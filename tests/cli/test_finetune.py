@@ -19,7 +19,7 @@ from hopping_leg.robot import load_robot
         (["fast", "--on", "twin", "--commands", "0.3"], "at least two"),
         (["fast", "--on", "twin", "--commands", "0.25,0.9"], "0.9 m"),
         (["fast", "--on", "twin", "--minutes", "0"], "minutes"),
-        (["fast", "--on", "twin", "--outing", "600"], "outing of 600"),
+        (["fast", "--on", "twin", "--trial-seconds", "600"], "trial of 600"),
         (["fast", "--on", "nobody"], "nobody"),
         (["energy-shaping", "--on", "twin"], "energy-shaping"),
         (["adaptive", "--on", "twin"], "without one, e.g. precise"),
@@ -40,7 +40,7 @@ def test_the_guard_is_the_supervisors():
     assert (guard.speed > robot.of_joints("no_load_speed")).all()
 
 
-def test_an_outings_line_says_what_happened():
+def test_a_trials_line_says_what_happened():
     row = {"minutes": 1.0, "kind": "check", "error_m": 0.02, "true_error_m": 0.018, "hops": 9,
            "complaint": "A joint left its range.", "rolled_back": True}  # fmt: skip
     said = line(row)
@@ -52,14 +52,13 @@ def test_an_outings_line_says_what_happened():
 @pytest.mark.slow
 def test_a_run_leaves_policy_card_and_numbers(tmp_path, monkeypatch, capsys):
     from hopping_leg.rl.finetune import finetuning
-    from hopping_leg.rl.finetune.apex_estimate import ContactConfig
-    from hopping_leg.rl.finetune.pretraining import prepare
+    from hopping_leg.rl.finetune.apex_estimate import ContactConfig, prepare
 
     few = ContactConfig(num_envs=4, seconds=3.0, steps=50, hidden=(8,))
-    monkeypatch.setattr(finetuning, "prepare", lambda task, _, folder: prepare(task, few, folder))
+    monkeypatch.setattr(finetuning, "prepare", lambda p, r, _, folder: prepare(p, r, few, folder))
     out, numbers = tmp_path / "run", tmp_path / "finetune.json"
-    words = ["finetune", "fast", "--on", "twin", "--method", "aim", "--minutes", "0.4", "--outing",
-             "10", "--out", str(out), "--json", str(numbers)]  # fmt: skip
+    words = ["finetune", "fast", "--on", "twin", "--method", "aim", "--minutes", "0.4"]
+    words += ["--trial-seconds", "10", "--out", str(out), "--json", str(numbers)]
     assert main(words) == 0
     result = json.loads(numbers.read_text())
     assert result["policy"] == "fast"

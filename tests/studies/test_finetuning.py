@@ -9,7 +9,7 @@ from studies.finetuning.run import FIRST_JUDGE, Study, draw_finetuning, measure
 
 from hopping_leg.rl.finetune.simulated import Guard
 from hopping_leg.robot import load_robot
-from tests.rl.finetune.outings import OPTIONS, POLICY, ROBOT, Imagined
+from tests.rl.finetune.trials import OPTIONS, POLICY, ROBOT, Imagined
 
 WIDE = Guard(np.full(2, -9.0), np.full(2, 9.0), np.full(2, 999.0))
 

@@ -1,6 +1,6 @@
 """Continue a policy's training on the real leg, or on a twin that plays it.
 
-The robot is reached through outings of some seconds alone, and nothing is known of it but what its
+The robot is reached through trials of some seconds alone, and nothing is known of it but what its
 joints measure: heights are reckoned from the time in the air. First a correction of the commanded
 height is learnt, two numbers, then the network's weights go on by soft actor-critic, beside the
 believed robot's experience. A policy that became worse is rolled back to the best; the run stops
@@ -54,8 +54,8 @@ class Finetune:
     """Robot time at most."""
     commands: Heights = (0.25, 0.30, 0.35)
     """Heights of the checks, m; explorations hop between the lowest and the highest."""
-    outing: float = 15.0
-    """Length of an outing, s."""
+    trial_seconds: float = 15.0
+    """Length of a trial, s."""
     tolerance: float = 0.004
     """Error that is good enough, on two checks in a row, m."""
     seed: int = 0
@@ -65,14 +65,13 @@ class Finetune:
     resume: bool = False
     """Go on with the run in the folder; without one there, begin."""
     yes: bool = False
-    """Arm the drives without asking before every outing."""
+    """Arm the drives without asking before every trial."""
     json: JsonFile = None
 
 
 def run(args: Finetune) -> None:
     """Continue the training, say how it went."""
-    from hopping_leg.rl.finetune.config import FinetuneConfig, StoppingRules
-    from hopping_leg.rl.finetune.pretraining import Task
+    from hopping_leg.rl.finetune.config import FinetuneConfig, StoppingRules, Task
     from hopping_leg.rl.finetune.running import POLICY, finetune
 
     policy, robot = load_policy(args.policy), load_robot(args.robot)
@@ -80,17 +79,17 @@ def run(args: Finetune) -> None:
     options = FinetuneConfig(
         method=args.method,
         commands=tuple(sorted(args.commands)),
-        outing=args.outing,
+        trial_seconds=args.trial_seconds,
         stopping_rules=StoppingRules(minutes=args.minutes, tolerance=args.tolerance),
     )
     span = (min(args.commands), max(args.commands))
     result = finetune(
         Task(policy, robot, span, args.seed),
-        _outings(args, robot, policy.card.rate),
+        _trial_robot(args, robot, policy.card.rate),
         options,
         args.out,
         resume=args.resume,
-        on_outing=lambda row: say(line(row)),
+        on_trial=lambda row: say(line(row)),
     )
     if args.json is not None:
         write_json(args.json, result)
@@ -98,7 +97,7 @@ def run(args: Finetune) -> None:
 
 
 def line(row: dict[str, Any]) -> str:
-    """Return what to show of an outing."""
+    """Return what to show of a trial."""
     true = f", in truth {1e3 * row['true_error_m']:.1f} mm" if "true_error_m" in row else ""
     back = "Rolled back to the best." if row["rolled_back"] else ""
     said = (
@@ -149,7 +148,7 @@ def _refuse(args: Finetune, policy: "Policy", robot: Robot) -> None:
             )
 
 
-def _outings(args: Finetune, robot: Robot, rate: float) -> "TrialRobot":
+def _trial_robot(args: Finetune, robot: Robot, rate: float) -> "TrialRobot":
     if args.transport is None:
         from hopping_leg.rl.finetune.simulated import SimulatedTrials
 

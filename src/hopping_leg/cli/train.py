@@ -84,11 +84,10 @@ def run(args: Options) -> None:
         recipe = recipe.replace({"task.observation": args.observation})
     recipe = recipe.replace(heights=args.heights)
     out = args.out or Path("runs") / f"{recipe.name}-seed{args.seed}"
-    robot = load_robot(args.robot)
     try:
         trained = ParallelSeeds(
             recipe,
-            robot,
+            load_robot(args.robot),
             args.seed,
             out,
             args.parallel_seeds,
@@ -101,6 +100,6 @@ def run(args: Options) -> None:
         print(f"Stopped; the same command with --resume goes on in {out}.", file=sys.stderr)
         raise
     if args.json:
-        write_json(args.json, read_result(trained.folder))
-    print((trained.folder / "model_card.md").read_text(encoding="utf-8"))
+        write_json(args.json, read_result(trained.policy.parent))
+    print(trained.policy.with_name("model_card.md").read_text(encoding="utf-8"))
     print(f"Policy: {trained.policy}\nJudge it: hop evaluate {trained.policy}")

@@ -39,30 +39,19 @@ class _ComparableError(Exception):
 
 @dataclass(frozen=True)
 class ParallelSeeds:
-    """Several trainings of a recipe that differ in their seeds.
-
-    Attributes:
-        recipe: What to train; scaled to the robot's size.
-        robot: The leg.
-        seed: Seed of all of them together; the k-th of n has seed ``n * seed + k``, so that no two
-            seeds share a start.
-        out: Folder in which each has its own, and in which the policy is left; of a single one it
-            is its own.
-        count: How many.
-        minutes: Wall-clock time after which learning stops; None for the recipe's steps.
-        threads: Threads of each.
-        quiet: Show no progress.
-        log: Who gets the curves besides TensorBoard.
-        source: Folder of another run, from whose checkpoint a single one begins.
-    """
+    """Several trainings of a recipe that differ in their seeds; options are those of ``train``."""
 
     recipe: Recipe
     robot: Robot
     seed: int
+    """Seed of all together; the k-th of n has ``n * seed + k``, so that none is taken twice."""
     out: Path
+    """Folder in which each has its own, and in which the policy is left; a single one's own."""
     count: int
+    """Trainings side by side."""
     minutes: float | None = None
     threads: int = 1
+    """Threads of each."""
     quiet: bool = False
     log: Log = "tensorboard"
     source: Path | None = None
@@ -103,7 +92,7 @@ class ParallelSeeds:
         return self._finish(folder)
 
     def folder(self, number: int) -> Path:
-        """Return the folder of a start."""
+        """Return the folder of one of them."""
         return self.out if self.count == 1 else self.out / f"start-{number}"
 
     def work(self, number: int) -> None:
@@ -120,10 +109,8 @@ class ParallelSeeds:
                 self._train(number, self.threads, quiet=quiet, on_early_score=_stop)
             decision = self._try(folder)
         except _ComparableError as early_score:
-            score_m, minutes = early_score.args
-            decision = {"score_m": score_m, "minutes": minutes}
-        seed = self._seed(number)
-        write_json(folder / _DECISION, {"seed": seed, **decision})
+            decision = dict(zip(("score_m", "minutes"), early_score.args, strict=True))
+        write_json(folder / _DECISION, {"seed": self._seed(number), **decision})
 
     def _train(
         self,
@@ -162,12 +149,9 @@ class ParallelSeeds:
         return {"score_m": score(results), "minutes": minutes, "trials": as_rows(results)}
 
     def _decision(self, number: int) -> dict[str, Any] | None:
-        """Return what decides about a start: seed, score in m, and minutes until then."""
+        """Return what decides about one of them: seed, score in m, and minutes until then."""
         file = self.folder(number) / _DECISION
-        if not file.exists():
-            return None
-        decision: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-        return decision
+        return json.loads(file.read_text(encoding="utf-8")) if file.exists() else None
 
     def _finish(self, folder: RunFolder) -> Trained:
         """Go on with the best of them where it is not finished, and keep its policy."""
@@ -190,8 +174,7 @@ class ParallelSeeds:
         folder.write("result.json", result)
         write_card(folder.path)
         write_atomically(folder.policy, (best / "policy.onnx").read_bytes())
-        trials = own["selected"]["trials"]
-        return Trained(folder.policy, folder.path, result["minutes"], own["steps"], trials)
+        return Trained(folder.policy, result["minutes"], own["steps"])
 
 
 def _stop(early_score: float, minutes: float) -> None:

@@ -15,25 +15,12 @@ from hopping_leg.robot.parameters import Robot
 
 _LIBRARIES = ("hopping-leg", "mujoco", "numpy", "onnxruntime", "stable-baselines3", "torch")
 
-_ASKED = (
-    "recipe",
-    "robot_digest",
-    "seed",
-    "parallel_seeds",
-    "minutes_budget",
-    "source",
-    "options",
-)
+_ASKED = ["recipe", "robot_digest", "seed", "parallel_seeds", "minutes_budget", "source", "options"]
 """What a run must have been asked for alike to go on."""
 
 
 class RunFolder:
-    """Paths and files of one run.
-
-    Attributes:
-        path: The folder.
-        config: What the run was asked for, as JSON values.
-    """
+    """Paths and files of one run."""
 
     def __init__(
         self,
@@ -46,8 +33,8 @@ class RunFolder:
         parallel_seeds: int = 1,
     ) -> None:
         self.path, self._source = path, source
-        self._defaults = _as_stored(asdict(RECIPES.get(recipe.name, recipe)))
-        self.config = _as_stored(
+        self._defaults = as_stored(asdict(RECIPES.get(recipe.name, recipe)))
+        self.config = as_stored(
             {
                 "recipe": recipe.name,
                 "options": asdict(recipe),
@@ -60,6 +47,7 @@ class RunFolder:
                 "versions": library_versions(),
             }
         )
+        """What the run was asked for, as JSON values."""
 
     @property
     def checkpoints(self) -> Path:
@@ -96,26 +84,19 @@ class RunFolder:
         Raises:
             UsageError: The folder holds a run and ``resume`` is off, or another or finished run.
         """
-        if not self._config_file.exists():
-            if self.path.is_dir() and any(self.path.iterdir()):
-                raise UsageError(f"{self.path} is not empty and holds no run; give another --out.")
-            tree = self._from_source() if self._source else None
+        new = is_new(self.path, resume=resume)
+        found = [] if new else list_checkpoints(self.checkpoints)
+        if not new:
+            self.check_same()
+            refuse_finished(self.policy)
+        tree = upgrade_checkpoint(read_checkpoint(found[-1])) if found else self._from_source()
+        if new:
             self.write("config.json", self.config)
-            return tree
-        if not resume:
-            raise UsageError(
-                f"{self.path} already holds a run; go on with --resume or give another --out."
-            )
-        self.check_same()
-        if self.policy.exists():
-            raise UsageError(f"The run in {self.path} is finished; its policy is {self.policy}.")
-        found = list_checkpoints(self.checkpoints)
-        if found:
-            return upgrade_checkpoint(read_checkpoint(found[-1]))
-        return self._from_source() if self._source else None
+        return tree
 
-    def _from_source(self) -> Tree:
-        assert self._source is not None
+    def _from_source(self) -> Tree | None:
+        if self._source is None:
+            return None
         found = list_checkpoints(self._source / "checkpoints")
         if not found:
             raise UsageError(f"{self._source} holds no checkpoint to begin from.")
@@ -125,27 +106,55 @@ class RunFolder:
         """Write a JSON file of the folder, whole or not at all."""
         write_json(self.path / name, content)
 
-    @property
-    def _config_file(self) -> Path:
-        return self.path / "config.json"
-
     def check_same(self) -> None:
         """Check that the run in the folder was asked for the same as this one.
 
         Raises:
             UsageError: It was not; the message names the first difference.
         """
-        stored = upgrade_config(json.loads(self._config_file.read_text(encoding="utf-8")))
-        # A run from before an option existed was asked for what is now its default.
+        stored = upgrade_config(read_json(self.path / "config.json"))
+        # A run from before an option existed was asked for what is its default.
         _complete(stored.get("options", {}), self._defaults)
         stored.setdefault("parallel_seeds", 1)
-        for key in _ASKED:
-            if stored.get(key) != self.config[key]:
-                raise UsageError(
-                    f"The run in {self.path} has another {key.replace('_', ' ')}"
-                    f" ({_short(stored.get(key))} instead of {_short(self.config[key])});"
-                    " resume it with the options that it began with."
-                )
+        check_same(self.path, stored, {key: self.config[key] for key in _ASKED})
+
+
+def is_new(folder: Path, *, resume: bool) -> bool:
+    """Tell whether a folder holds no run.
+
+    Raises:
+        UsageError: It holds something else, or a run and ``resume`` is off.
+    """
+    if not (folder / "config.json").exists():
+        if folder.is_dir() and any(folder.iterdir()):
+            raise UsageError(f"{folder} is not empty and holds no run; give another --out.")
+        return True
+    if not resume:
+        raise UsageError(
+            f"{folder} already holds a run; go on with --resume or give another --out."
+        )
+    return False
+
+
+def check_same(folder: Path, stored: dict[str, Any], asked: dict[str, Any]) -> None:
+    """Check that a run was asked for the same.
+
+    Raises:
+        UsageError: It was not; the message names the first difference.
+    """
+    for key, value in asked.items():
+        if stored.get(key) != value:
+            raise UsageError(
+                f"The run in {folder} has another {key.replace('_', ' ')}"
+                f" ({_short(stored.get(key))} instead of {_short(value)});"
+                " resume it with the options that it began with."
+            )
+
+
+def refuse_finished(policy: Path) -> None:
+    """Raise ``UsageError`` where a run has left its policy."""
+    if policy.exists():
+        raise UsageError(f"The run in {policy.parent} is finished; its policy is {policy}.")
 
 
 def _complete(options: dict[str, Any], defaults: dict[str, Any]) -> None:
@@ -155,10 +164,16 @@ def _complete(options: dict[str, Any], defaults: dict[str, Any]) -> None:
             _complete(options[name], value)
 
 
-def _as_stored(values: dict[str, Any]) -> dict[str, Any]:
+def as_stored(values: dict[str, Any]) -> dict[str, Any]:
     """Return values as JSON gives them back."""
     stored: dict[str, Any] = json.loads(json.dumps(values, default=_name))
     return stored
+
+
+def read_json(file: Path) -> dict[str, Any]:
+    """Return the object in a JSON file."""
+    content: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    return content
 
 
 def read_result(path: Path) -> dict[str, Any]:
@@ -170,8 +185,7 @@ def read_result(path: Path) -> dict[str, Any]:
     file = path / "result.json"
     if not file.exists():
         raise UsageError(f"{path} holds no finished run; go on with `hop train --resume`.")
-    result: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-    return result
+    return read_json(file)
 
 
 def library_versions() -> dict[str, str]:

@@ -20,15 +20,12 @@ FINALISTS = 4
 
 
 class Selection:
-    """Tries every snapshot on one seed; the best few again on others, and one of those wins.
-
-    Attributes:
-        rows: Every snapshot so far: steps, minutes, score and trials, as JSON values.
-    """
+    """Tries every snapshot on one seed; the best few again on others, and one of those wins."""
 
     def __init__(self, recipe: Recipe, robot: Robot, folder: RunFolder) -> None:
         self._recipe, self._robot, self._folder = recipe, robot, folder
         self.rows: list[dict[str, Any]] = []
+        """Every snapshot so far: steps, minutes, score and trials, as JSON values."""
 
     @property
     def next_at(self) -> int:
@@ -37,13 +34,7 @@ class Selection:
         return every * (self.rows[-1]["steps"] // every + 1) if self.rows else every
 
     def add(self, steps: int, minutes: float, content: bytes) -> dict[str, Any]:
-        """Keep and try a snapshot.
-
-        Args:
-            steps: Control steps so far.
-            minutes: Wall-clock time so far.
-            content: The policy file.
-        """
+        """Keep and try a policy file; return its row."""
         write_atomically(self._folder.snapshot(steps), content)
         row = {"steps": steps, "minutes": minutes, **self._trials(content, (FIRST_SEED,))}
         self.rows.append(row)

@@ -9,7 +9,6 @@ from typing import Any
 
 import torch
 from rich.progress import TextColumn, TimeRemainingColumn
-from stable_baselines3.common.callbacks import BaseCallback
 
 from hopping_leg.controllers.policy import Card
 from hopping_leg.errors import RobotError, UsageError
@@ -27,12 +26,7 @@ from hopping_leg.robot.parameters import Robot
 
 
 class TrainingProgress(LiveProgress):
-    """Live numbers of a training, as a context manager.
-
-    Args:
-        title: What is trained.
-        quiet: Show nothing.
-    """
+    """Live numbers of a training, as a context manager."""
 
     def __init__(self, title: str, *, quiet: bool = False) -> None:
         super().__init__(title, columns=(TextColumn("left"), TimeRemainingColumn()), quiet=quiet)
@@ -67,21 +61,14 @@ SHOWN_EVERY = 0.5
 
 @dataclass(frozen=True)
 class Trained:
-    """A finished training.
-
-    Attributes:
-        policy: The selected policy file.
-        folder: The run's folder.
-        minutes: Wall-clock time of the training, pauses excluded.
-        steps: Control steps of experience.
-        results: Verdicts on the selected policy, on selection seeds, as JSON rows.
-    """
+    """A finished training."""
 
     policy: Path
-    folder: Path
+    """The selected policy file, in the run's folder."""
     minutes: float
+    """Wall-clock time of the training, pauses excluded."""
     steps: int
-    results: list[dict[str, Any]]
+    """Control steps of experience."""
 
 
 def train(
@@ -134,8 +121,7 @@ def train(
     tree = folder.begin(resume=resume)
     trainer = Trainer(recipe, robot, seed, folder, minutes, threads)
     trainer.model.set_logger(make_logger(folder.path, log, folder.config))
-    trainer.on_snapshot = on_snapshot
-    trainer.on_early_score = on_early_score
+    trainer.on_snapshot, trainer.on_early_score = on_snapshot, on_early_score
     if tree is not None:
         trainer.restore(tree)
     with TrainingProgress(f"{recipe.name} seed {seed}", quiet=quiet) as progress:
@@ -143,12 +129,7 @@ def train(
 
 
 def check(robot: Robot, minutes: float | None, log: Log) -> None:
-    """Refuse what cannot be trained before anything is written.
-
-    Args:
-        robot: The leg; one that plays the real one leaves nothing to transfer.
-        minutes: Time of the training, None for no limit.
-        log: Who gets the curves.
+    """Refuse what cannot be trained before anything is written, see ``train``.
 
     Raises:
         UsageError: The time is no time, or what ``log`` needs is not installed.
@@ -178,17 +159,16 @@ class Trainer:
         threads: int,
     ) -> None:
         self.recipe, self.robot, self.seed, self.folder = recipe, robot, seed, folder
-        self._budget = None if minutes is None else 60 * minutes
+        self._seconds = float("inf") if minutes is None else 60 * minutes
         self.env = recipe.make_env(robot, seed, threads)
         self.model = recipe.make_model(self.env, seed)
         self.model.on_boundary = self._at_boundary
-        if self._budget is not None:
+        if minutes is not None:
             self.model.remaining = lambda: max(0.0, 1 - self.elapsed / self._seconds)
         self.selection = Selection(recipe, robot, folder)
         self._restored = False
         self._earlier = 0.0
-        self._began = time.monotonic()
-        self._saved = self._began
+        self._began = self._saved = time.monotonic()
         self._shown = 0.0
         self._progress: TrainingProgress | None = None
         self.on_snapshot: Callable[[int, float], None] = lambda _steps, _score: None
@@ -198,10 +178,6 @@ class Trainer:
     def elapsed(self) -> float:
         """Wall-clock time of the training, pauses excluded, s."""
         return self._earlier + time.monotonic() - self._began
-
-    @property
-    def _seconds(self) -> float:
-        return self._budget or float("inf")
 
     def restore(self, tree: dict[str, Any]) -> None:
         """Go on from a checkpoint, of this run or of the shorter one that it begins with."""
@@ -220,7 +196,7 @@ class Trainer:
         if self.elapsed < self._seconds and model.num_timesteps < recipe.schedule.steps:
             model.learn(
                 recipe.schedule.steps - model.num_timesteps,
-                callback=_Watch(self),
+                callback=lambda *_: self.tick(),
                 log_interval=recipe.schedule.log_every,
                 reset_num_timesteps=not self._restored,
             )
@@ -240,7 +216,7 @@ class Trainer:
         self.folder.write("result.json", {**self.folder.config, **result})
         write_card(self.folder.path)
         write_atomically(self.folder.policy, content)
-        return Trained(self.folder.policy, self.folder.path, minutes, steps, results["trials"])
+        return Trained(self.folder.policy, minutes, steps)
 
     def tick(self) -> bool:
         """Show the progress; return whether there is time left."""
@@ -253,10 +229,8 @@ class Trainer:
             self.model.logger.record_mean(f"reward/{name}", mean)
         self.recipe.anneal(self.model, self.env, share)
         self._tell_early_score()
-        if (
-            share >= self.recipe.selection.eval_start
-            and self.model.num_timesteps >= self.selection.next_at
-        ):
+        due = self.model.num_timesteps >= self.selection.next_at
+        if due and share >= self.recipe.selection.eval_start:
             self._evaluate()
         if time.monotonic() - self._saved >= self.recipe.schedule.checkpoint_seconds:
             self.checkpoint()
@@ -322,14 +296,3 @@ class Trainer:
         self._progress.update(
             min(share, 1.0), steps, self.env.hops, self.env.apex_error, self.selection.describe()
         )
-
-
-class _Watch(BaseCallback):  # type: ignore[misc]
-    """Looks at the clock after every tick."""
-
-    def __init__(self, trainer: Trainer) -> None:
-        super().__init__()
-        self._trainer = trainer
-
-    def _on_step(self) -> bool:
-        return self._trainer.tick()

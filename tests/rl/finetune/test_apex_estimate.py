@@ -4,7 +4,7 @@ import numpy as np
 
 from hopping_leg.rl.finetune.trial_data import TrialData
 
-from .outings import PERIOD, estimator, flying_leg
+from .trials import PERIOD, estimator, flying_leg
 
 
 def estimate(hops):

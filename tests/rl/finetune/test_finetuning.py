@@ -1,4 +1,4 @@
-"""Outings, learning and stopping as a whole, on a robot that is made up or simulated."""
+"""Trials, learning and stopping as a whole, on a robot that is made up or simulated."""
 
 import dataclasses
 import json
@@ -10,16 +10,16 @@ import pytest
 from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import UsageError
-from hopping_leg.rl.finetune import pretraining
-from hopping_leg.rl.finetune.config import StoppingRules
+from hopping_leg.rl.finetune import apex_estimate, replay
+from hopping_leg.rl.finetune.apex_estimate import prepare
+from hopping_leg.rl.finetune.config import StoppingRules, Task
 from hopping_leg.rl.finetune.finetuning import Finetuning
-from hopping_leg.rl.finetune.pretraining import Task, prepare
 from hopping_leg.rl.finetune.running import POLICY as FILE
 from hopping_leg.rl.finetune.running import finetune
 from hopping_leg.rl.finetune.simulated import Guard, SimulatedTrials
 from hopping_leg.robot import load_robot
 
-from .outings import OPTIONS, POLICY, ROBOT, Imagined
+from .trials import OPTIONS, POLICY, ROBOT, Imagined
 
 TASK = Task(POLICY, ROBOT, (0.25, 0.35), 3)
 
@@ -27,13 +27,13 @@ TASK = Task(POLICY, ROBOT, (0.25, 0.35), 3)
 @pytest.fixture(scope="module")
 def ready(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pretraining")
-    prepare(TASK, OPTIONS.contact, folder)
+    prepare(POLICY, ROBOT, OPTIONS.contact, folder)
     return folder
 
 
 @pytest.fixture(autouse=True)
 def few_legs(monkeypatch):
-    monkeypatch.setattr(pretraining, "BELIEVED_LEGS", 2)
+    monkeypatch.setattr(replay, "BELIEVED_LEGS", 2)
 
 
 class KilledError(Exception):
@@ -44,12 +44,12 @@ def test_what_is_learnt_beforehand_is_learnt_once(ready, monkeypatch):
     def never(*_):
         raise AssertionError("simulated again")
 
-    monkeypatch.setattr(pretraining, "doubtful_legs", never)
-    again = prepare(TASK, OPTIONS.contact, ready)
+    monkeypatch.setattr(apex_estimate, "doubtful_legs", never)
+    again = prepare(POLICY, ROBOT, OPTIONS.contact, ready)
     assert again.drag.shape == (2,)
     other = dataclasses.replace(OPTIONS.contact, seed=6)
     with pytest.raises(AssertionError, match="simulated again"):
-        prepare(TASK, other, ready)
+        prepare(POLICY, ROBOT, other, ready)
 
 
 @pytest.mark.slow
@@ -58,15 +58,14 @@ def test_a_killed_run_goes_on_exactly(tmp_path, ready):
     kinds = [row["kind"] for row in whole["outings"]]
     assert {"check", "exploration"} <= set(kinds)
     for number in (1, 3, 4):
-        count = number
 
-        def kill(row, at=count):
+        def kill(row, at=number):
             if row["outing"] == at:
                 raise KilledError
 
         with pytest.raises(KilledError):
             finetune(TASK, Imagined(), OPTIONS, tmp_path / "cut", resume=number > 1,
-                  pretraining=ready, on_outing=kill)  # fmt: skip
+                  pretraining=ready, on_trial=kill)  # fmt: skip
     cut = finetune(TASK, Imagined(), OPTIONS, tmp_path / "cut", resume=True, pretraining=ready)
     assert cut["outings"] == whole["outings"]
     assert (tmp_path / "cut" / FILE).read_bytes() == (tmp_path / "whole" / FILE).read_bytes()
@@ -76,16 +75,15 @@ def test_a_killed_run_goes_on_exactly(tmp_path, ready):
 def test_weights_move_and_the_policy_file_names_its_source(tmp_path, ready):
     options = dataclasses.replace(OPTIONS, method="sac")
     run = Finetuning(TASK, Imagined(), options, tmp_path, ready)
-    finetuned = run.run()
-    last = run._content(run._network, run._aim)
-    assert last != finetuned.content
-    card = Policy(finetuned.content, "finetuned", "finetuned").card
+    content, reason = run.run()
+    assert run._content(run._network, run._correction) != content
+    card = Policy(content, "finetuned", "finetuned").card
     assert POLICY.digest in card.recipe
     assert card.robot_digest == POLICY.card.robot_digest
-    assert "used up" in finetuned.reason
+    assert "used up" in reason
 
 
-def test_outings_that_were_ended_early_never_win_and_are_counted(tmp_path, ready):
+def test_trials_that_were_ended_early_never_win_and_are_counted(tmp_path, ready):
     options = dataclasses.replace(OPTIONS, method="aim")
     robot = Imagined(complain_from=1)
     result = finetune(TASK, robot, options, tmp_path, pretraining=ready)
@@ -120,22 +118,22 @@ def test_a_folder_with_another_run_is_refused(tmp_path, ready):
     assert json.loads((tmp_path / "finetune.json").read_text())["on"] == "imagined"
 
 
-def test_a_simulated_outing_tells_what_was_measured_and_keeps_the_truth_apart():
+def test_a_simulated_trial_tells_what_was_measured_and_keeps_the_truth_apart():
     twin = load_robot("twin")
-    outing = SimulatedTrials(twin, None).hop(POLICY, CommandSchedule(((0.3, 2.0),)), 1)
+    trial = SimulatedTrials(twin, None).hop(POLICY, CommandSchedule(((0.3, 2.0),)), 1)
     again = SimulatedTrials(twin, None).hop(POLICY, CommandSchedule(((0.3, 2.0),)), 1)
-    assert outing.trace.table.equals(again.trace.table)
-    assert not {"height_m", "foot_clearance_m"} & set(outing.trace.table.columns)
-    noise = np.diff(outing.trace.column("hip_velocity_rad_s")[:20])
+    assert trial.trace.table.equals(again.trace.table)
+    assert not {"height_m", "foot_clearance_m"} & set(trial.trace.table.columns)
+    noise = np.diff(trial.trace.column("hip_velocity_rad_s")[:20])
     assert np.abs(noise).max() > 0.01
-    assert outing.seconds == 2.0
-    assert len(outing.truth) >= 3
+    assert trial.seconds == 2.0
+    assert len(trial.truth) >= 3
 
 
-def test_a_guard_takes_the_leg_away_and_ends_the_outing():
+def test_a_guard_takes_the_leg_away_and_ends_the_trial():
     narrow = Guard(np.array([-9.0, -9.0]), np.array([9.0, 9.0]), np.array([9.0, 9.0]))
-    outing = SimulatedTrials(ROBOT, narrow).hop(POLICY, CommandSchedule(((0.3, 2.0),)), 1)
-    assert "faster" in outing.complaint
-    assert 0 < outing.seconds < 2.0
-    speed = outing.trace.column("knee_velocity_rad_s")
+    trial = SimulatedTrials(ROBOT, narrow).hop(POLICY, CommandSchedule(((0.3, 2.0),)), 1)
+    assert "faster" in trial.complaint
+    assert 0 < trial.seconds < 2.0
+    speed = trial.trace.column("knee_velocity_rad_s")
     assert np.abs(speed[:-1]).max() <= 9.0

@@ -1,7 +1,5 @@
 """Transitions from an undisturbed trace are those that the environment would have given."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -15,7 +13,7 @@ from hopping_leg.rl.finetune.trial_data import ApexEstimate, TrialData
 from hopping_leg.rl.onnx_export import read_network
 from hopping_leg.sim import NO_NOISE
 
-from .outings import POLICY, ROBOT
+from .trials import POLICY, ROBOT
 
 TICKS = 300
 COMMAND = 0.3
@@ -87,18 +85,10 @@ def test_observations_and_rewards_are_the_environments(run):
     assert not rows.done.any()
 
 
-def test_an_outing_that_was_ended_costs_and_is_terminal(run):
+def test_a_trial_that_was_ended_costs_and_is_terminal(run):
     write, _ = writer()
     data, estimate = TrialData.of(traces_of(run)), truth(run)
     fine, ended = write(data, estimate), write(data, estimate, ended=True)
     assert ended.done[-1] == 1
     assert not ended.done[:-1].any()
     np.testing.assert_allclose(fine.reward[-1] - ended.reward[-1], 5.0, rtol=1e-5)
-
-
-def test_rows_of_several_join(run):
-    write, _ = writer()
-    rows = write(TrialData.of(traces_of(run)), truth(run))
-    both = type(rows).join([rows, rows])
-    for field in dataclasses.fields(rows):
-        assert len(getattr(both, field.name)) == 2 * (TICKS - 1)

@@ -11,7 +11,7 @@ from hopping_leg.rl.finetune.trial_data import TrialData
 from hopping_leg.sim import NO_NOISE
 from hopping_leg.trace import Trace
 
-from .outings import PERIOD, POLICY, ROBOT
+from .trials import PERIOD, POLICY, ROBOT
 
 
 class Shown:

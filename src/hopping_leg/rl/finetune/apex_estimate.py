@@ -11,7 +11,8 @@ The rail's drag makes true apexes lower; by how much is learnt on the same simul
 """
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
 import numpy as np
 import torch
@@ -19,13 +20,14 @@ from torch import nn
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.controllers.energy_shaping.equations import flight_time_apex
-from hopping_leg.controllers.protocol import Controller
+from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.rollout import Rollout
 from hopping_leg.hop_detection import find_hops
-from hopping_leg.rl.checkpoint import Tree
+from hopping_leg.rl.checkpoint import Tree, list_checkpoints, read_checkpoint, write_checkpoint
 from hopping_leg.rl.finetune.command_correction import robust_line
 from hopping_leg.rl.finetune.simulated import hop_many, traces_of
 from hopping_leg.rl.finetune.trial_data import ApexEstimate, TrialData
+from hopping_leg.rl.run_folder import as_stored
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import JOINTS, Robot
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, Range, sample
@@ -45,7 +47,7 @@ DOUBTS = (
 
 _MIDDLE = np.array([0.6, -1.3, 0.0, 0.0, 0.0, 0.0])
 _SPREAD = np.array([0.4, 0.5, 8.0, 12.0, 3.0, 3.0])
-"""Of positions, velocities and torques: what the network sees is about 1 in size."""
+"""Scale of positions, velocities and torques: the network's inputs are about 1 in size."""
 
 
 @dataclass(frozen=True)
@@ -53,31 +55,27 @@ class ContactConfig:
     """How contact is learnt."""
 
     num_envs: int = 192
-    """That differ."""
+    """Legs that differ."""
     seconds: float = 12.0
-    """For which each of them hops."""
+    """Time that each of them hops, s."""
     hold: float = 1.5
     """Time between new commands, s."""
     reach: int = 16
     """Ticks before and after that the network sees."""
     hidden: tuple[int, ...] = (128, 64)
-    """Its hidden layers."""
+    """Hidden layers of the network."""
     steps: int = 6000
     """Gradient steps."""
     batch_size: int = 1024
     """Ticks per gradient step."""
     learning_rate: float = 2e-3
-    """Falls along a cosine."""
+    """Learning rate at the start; falls along a cosine."""
     seed: int = 5
     """Seed of legs, commands and weights: runs of one policy and robot share what is learnt."""
 
 
 class ContactEstimator:
-    """The network; more than zero is in the air.
-
-    Args:
-        options: Its size.
-    """
+    """A network that tells contact; more than zero is in the air."""
 
     def __init__(self, options: ContactConfig) -> None:
         self._options = options
@@ -96,13 +94,7 @@ class ContactEstimator:
         return torch.stack(legs, dim=1).double().numpy()
 
     def learn(self, data: TrialData, flying: Array, seed: int) -> None:
-        """Learn from legs of which it is known.
-
-        Args:
-            data: What they measured.
-            flying: Whether the foot was in the air, (ticks, n).
-            seed: Seed of weights, noise and batches.
-        """
+        """Learn from legs of which it is known whether the foot was in the air, (ticks, n)."""
         o, rng = self._options, np.random.default_rng(seed)
         noise = rng.standard_normal((*data.q.shape[:2], 6)) * _sensor_noise()
         seen, truth = _normalised(data.filled() + noise), torch.from_numpy(flying).float()
@@ -115,10 +107,8 @@ class ContactEstimator:
             optimizer = torch.optim.Adam(self._net.parameters(), o.learning_rate)
             schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, o.steps)
             for _ in range(o.steps):
-                tick, leg = (
-                    torch.randint(ticks, (o.batch_size,)),
-                    torch.randint(count, (o.batch_size,)),
-                )
+                tick = torch.randint(ticks, (o.batch_size,))
+                leg = torch.randint(count, (o.batch_size,))
                 guess = self._judge(seen, tick, leg)
                 loss = nn.functional.binary_cross_entropy_with_logits(guess, truth[tick, leg])
                 optimizer.zero_grad()
@@ -144,35 +134,40 @@ class ContactEstimator:
         return judged
 
 
-def doubtful_legs(
-    controller: Controller,
-    robot: Robot,
-    commands: tuple[float, float],
-    seed: int,
-    o: ContactConfig,
-) -> Rollout:
-    """Let a controller hop on legs that each differ from the believed one.
+def doubtful_legs(policy: Policy, robot: Robot, o: ContactConfig) -> Rollout:
+    """Let a policy hop on legs that each differ from the believed one."""
+    rng = np.random.default_rng(o.seed)
+    robots = sample(robot, DOUBTS, o.num_envs, rng)
+    span = (policy.card.command_low, policy.card.command_high)
+    steps = rng.uniform(*span, (round(o.seconds / o.hold), o.num_envs))
+    return hop_many(policy, robot, robots, np.repeat(steps, round(o.hold * 200), axis=0), o.seed)
+
+
+def prepare(policy: Policy, robot: Robot, options: ContactConfig, folder: Path) -> "ApexEstimator":
+    """Learn to estimate heights in simulation, or take it from an earlier run's folder.
 
     Args:
-        controller: Has the legs.
-        robot: The believed one.
-        commands: Lowest and highest, m.
-        seed: Seed of legs, commands and simulation.
-        o: How many and how long.
+        policy: The one to go on from.
+        robot: The believed leg.
+        options: How contact is learnt.
+        folder: Where the estimator is kept.
     """
-    rng = np.random.default_rng(seed)
-    robots = sample(robot, DOUBTS, o.num_envs, rng)
-    held = round(o.hold * 200)
-    steps = rng.uniform(*commands, (round(o.seconds / o.hold), o.num_envs))
-    return hop_many(controller, robot, robots, np.repeat(steps, held, axis=0), seed)
-
-
-def learn_contact(run: Rollout, seed: int, options: ContactConfig) -> ContactEstimator:
-    """Return a network that has learnt contact from a run of ``doubtful_legs``."""
     contact = ContactEstimator(options)
-    data = TrialData.of(traces_of(run))
-    contact.learn(data, (run.data["foot_clearance_m"] > 0).astype(np.float64), seed)
-    return contact
+    asked = {"policy": policy.digest, "robot": robot.digest, "options": as_stored(asdict(options))}
+    found = list_checkpoints(folder)
+    for path in found:
+        tree = read_checkpoint(path)
+        if tree["asked"] == asked:
+            contact.restore(tree["contact"])
+            return ApexEstimator(robot, contact, tree["drag"])
+    run = doubtful_legs(policy, robot, options)
+    flying = (run.data["foot_clearance_m"] > 0).astype(np.float64)
+    contact.learn(TrialData.of(traces_of(run)), flying, options.seed)
+    estimator = ApexEstimator(robot, contact)
+    estimator.calibrate(run)
+    tree = {"asked": asked, "contact": contact.state(), "drag": estimator.drag}
+    write_checkpoint(folder, len(found), tree)
+    return estimator
 
 
 def _normalised(values: Array) -> torch.Tensor:
@@ -182,14 +177,14 @@ def _normalised(values: Array) -> torch.Tensor:
 def _sensor_noise() -> Array:
     """Return the standing noise of leg V2's sensors as the twins have it, (6,)."""
     noise = {spread.path: spread.high for spread in TWIN_RANGES}
-    kinds, joints = ("position", "velocity", "torque"), JOINTS
+    kinds = ("position", "velocity", "torque")
     return np.array(
-        [noise[f"reality.{joint}.sensor.{kind}_noise"] for kind in kinds for joint in joints]
+        [noise[f"reality.{joint}.sensor.{kind}_noise"] for kind in kinds for joint in JOINTS]
     )
 
 
 _SHORTEST = 0.08
-"""Of a flight, s: one of 8 mm."""
+"""Shortest flight, s: one of 8 mm."""
 
 _BOUNCE = 0.02
 """Contact shorter than this is a doubt, not a landing, s."""
@@ -199,12 +194,12 @@ _NEAR = 0.06
 
 
 class ApexEstimator:
-    """Reckons heights.
+    """Estimates heights of a leg; ``drag`` is by what flight time overestimates apexes.
 
     Args:
         robot: The believed leg: its lengths.
         contact: Tells what is flight.
-        drag: Constant and slope over height of what flight time overestimates apexes by, m, (2,).
+        drag: Constant and slope over height, m, (2,).
     """
 
     def __init__(self, robot: Robot, contact: ContactEstimator, drag: Array | None = None) -> None:
@@ -212,7 +207,7 @@ class ApexEstimator:
         self.drag = np.zeros(2) if drag is None else drag
 
     def __call__(self, data: TrialData) -> ApexEstimate:
-        """Return the heights of outings."""
+        """Return the heights of trials."""
         air = self.contact.airborne(data)
         filled = data.filled()
         q, qd = filled[..., 0:2], filled[..., 2:4]
@@ -247,7 +242,7 @@ class ApexEstimator:
     def _fly(
         self, height: Array, rate: Array, flying: BoolArray, begin: float, end: float, period: float
     ) -> tuple[float, float]:
-        """Write one flight into an outing's arrays; return tick and height of its apex."""
+        """Write one flight into a trial's arrays; return tick and height of its apex."""
         ticks = np.arange(len(height))
         ends = np.interp([begin, end], ticks, height)
         lasted = np.array([(end - begin) * period])
@@ -264,7 +259,7 @@ class ApexEstimator:
 
 
 def _flights(air: Array, period: float) -> list[tuple[float, float]]:
-    """Return the flights of an outing, ticks with fractions."""
+    """Return the flights of a trial, ticks with fractions."""
     change = np.diff((air > 0).astype(np.int64))
     begins, ends = np.flatnonzero(change == 1), np.flatnonzero(change == -1)
     found: list[tuple[float, float]] = []

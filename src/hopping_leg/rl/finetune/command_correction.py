@@ -1,7 +1,7 @@
-"""Tell a network another command, so that hops come true on average.
+"""Give a network another command, so that hops reach the desired height on average.
 
-What it is told at a command c is c + a + b (c - m) / w, with m the middle and w half of the range
-of commands. After every outing a and b move against the line through the errors of its hops, as an
+At a command c it is given c + a + b (c - m) / w, with m the middle and w half of the range of
+commands. After every trial a and b move against the line through the errors of its hops, as an
 integral controller does. The two numbers vanish in the scaling of the network's inputs: the file
 is an ordinary policy.
 """
@@ -22,7 +22,7 @@ _NEAR = 1e-3
 
 
 def robust_line(x: Array, y: Array, doubt: float = 0.0) -> Array:
-    """Return constant and slope of the line, (2,).
+    """Return constant and slope of the line of least absolute deviations, (2,).
 
     Args:
         x: (n,).
@@ -42,10 +42,10 @@ def robust_line(x: Array, y: Array, doubt: float = 0.0) -> Array:
 
 @dataclass(frozen=True)
 class CommandCorrectionConfig:
-    """How the aim follows the errors."""
+    """How the correction follows the errors."""
 
     rate: float = 0.6
-    """Share of an outing's error that is corrected."""
+    """Share of a trial's error that is corrected."""
     ridge: float = 2.0
     """Hops' worth of doubt that the errors depend on the command at all."""
     farthest: float = 0.1
@@ -54,27 +54,24 @@ class CommandCorrectionConfig:
 
 @dataclass(frozen=True)
 class LinearCommandCorrection:
-    """Where a network is told to hop.
-
-    Attributes:
-        low: Lowest command, m.
-        high: Highest command, m.
-        shift: a and b, m, (2,).
-    """
+    """Commands that a network is given instead of the desired ones."""
 
     low: float
+    """Lowest command, m."""
     high: float
+    """Highest command, m."""
     shift: tuple[float, float] = (0.0, 0.0)
+    """a and b, m."""
 
-    def told(self, command: Array) -> Array:
-        """Return what the network is told at commands, m, (...)."""
-        told: Array = command + self._lean(command) @ np.array(self.shift)
-        return told
+    def corrected(self, command: Array) -> Array:
+        """Return what the network is given at commands, m, (...)."""
+        given: Array = command + self._features(command) @ np.array(self.shift)
+        return given
 
-    def corrected(
+    def updated(
         self, command: Array, error: Array, options: CommandCorrectionConfig
     ) -> "LinearCommandCorrection":
-        """Return the aim after hops.
+        """Return the correction after hops.
 
         Args:
             command: Command of every hop, m, (hops,).
@@ -83,7 +80,7 @@ class LinearCommandCorrection:
         """
         if not len(error):
             return self
-        line = robust_line(self._lean(command)[:, 1], error, options.ridge)
+        line = robust_line(self._features(command)[:, 1], error, options.ridge)
         a, b = np.array(self.shift) - options.rate * line
         most = options.farthest
         a = float(np.clip(a, -most, most))
@@ -91,24 +88,24 @@ class LinearCommandCorrection:
         return dataclasses.replace(self, shift=(a, float(np.clip(b, -room, room))))
 
     def applied(self, network: Network, card: Card) -> Network:
-        """Return a network that is told the aim at every command."""
+        """Return a network that computes with the corrected command."""
         a, b = self.shift
         middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
         slope = 1 + b / half
-        at = command_columns(card)
+        at = _command_columns(card)
         offset, gain = network.offset.copy(), network.gain.copy()
         offset[at] = (offset[at] - a + b / half * middle) / slope
         gain[at] = gain[at] * slope
         return dataclasses.replace(network, offset=offset, gain=gain)
 
-    def _lean(self, command: Array) -> Array:
+    def _features(self, command: Array) -> Array:
         middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
         return np.stack([np.ones_like(command), (command - middle) / half], axis=-1)
 
 
-def command_columns(card: Card) -> list[int]:
+def _command_columns(card: Card) -> slice:
     """Return where commands stand among a policy's joined inputs."""
     shapes = make_observation_history(card.layout, 1 / card.rate).shapes
     sizes = {name: int(np.prod(shape)) for name, shape in shapes.items()}
     first = sum(sizes[name] for name in list(sizes)[: list(sizes).index("command")])
-    return list(range(first, first + sizes["command"]))
+    return slice(first, first + sizes["command"])

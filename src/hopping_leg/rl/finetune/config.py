@@ -4,11 +4,27 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
+from hopping_leg.controllers.policy import Policy
 from hopping_leg.envs import ApexRewardConfig
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.finetune.apex_estimate import ContactConfig
 from hopping_leg.rl.finetune.command_correction import CommandCorrectionConfig
 from hopping_leg.rl.finetune.learner import SacConfig
+from hopping_leg.robot.parameters import Robot
+
+
+@dataclass(frozen=True)
+class Task:
+    """What goes on learning."""
+
+    policy: Policy
+    """The one to go on from."""
+    robot: Robot
+    """The believed leg."""
+    commands: tuple[float, float]
+    """Lowest and highest command, m."""
+    seed: int
+    """Seed of everything."""
 
 
 @dataclass(frozen=True)
@@ -29,35 +45,23 @@ class StoppingRules:
     """Checks without an improvement after which the training ends."""
 
     def rolled_back(self, errors: Sequence[float]) -> bool:
-        """Tell whether the last checks are too bad beside the best.
-
-        Args:
-            errors: Errors of all checks since the last policy was rolled back, and of the best, m.
-        """
+        """Tell whether the last errors of checks, m, are too bad beside the best."""
         latest = errors[-self.confirm :]
         return len(latest) == self.confirm and min(latest) > min(errors) + self.margin
 
     def reason(self, errors: Sequence[float], minutes: float, following: float) -> str:
-        """Return why to stop, a sentence; empty to go on.
+        """Return why to stop after errors of checks, m; empty to go on.
 
-        Args:
-            errors: Errors of all checks in order, m.
-            minutes: Robot time so far.
-            following: Robot time of the next outing.
+        The next trial takes ``following`` minutes of robot time.
         """
         if len(errors) > 1 and max(errors[-2:]) <= self.tolerance:
             return f"The error is within {1e3 * self.tolerance:g} mm."
         if minutes + following > self.minutes + 1e-9:
             return f"The {self.minutes:g} minutes of robot time are used up."
-        if self._stale(errors):
+        before, since = errors[: -self.patience], errors[-self.patience :]
+        if before and min(since) > min(before) - self.gain:
             return f"Nothing improved on the last {self.patience} checks."
         return ""
-
-    def _stale(self, errors: Sequence[float]) -> bool:
-        if len(errors) <= self.patience:
-            return False
-        before, since = errors[: -self.patience], errors[-self.patience :]
-        return min(since) > min(before) - self.gain
 
 
 Method = Literal["aim", "sac", "both"]
@@ -69,17 +73,17 @@ class FinetuneConfig:
     """Continued training on a robot."""
 
     method: Method = "both"
-    """What is learnt: the command that the network is told, its weights, or first the one."""
+    """What is learnt: a correction of the command, the network's weights, or first the one."""
     commands: tuple[float, ...] = (0.25, 0.30, 0.35)
     """Heights of the checks, m; explorations hop between the lowest and the highest."""
-    outing: float = 15.0
-    """Length of an outing, s."""
+    trial_seconds: float = 15.0
+    """Length of a trial, s."""
     hold: float = 2.5
     """Time between new commands on explorations, s."""
     explorations: int = 3
-    """Outings with exploration after each check, where weights are learnt."""
+    """Trials with exploration after each check, where weights are learnt."""
     correction_minutes: float = 2.0
-    """Robot time for the aim before weights are learnt, with the method `both`, min."""
+    """Robot time for the correction before weights are learnt, with the method `both`, min."""
     sde_sample_freq: int = 24
     """Ticks that exploration keeps its noise, 0.12 s: about a push-off."""
     believed_seconds: float = 320.0
@@ -89,13 +93,13 @@ class FinetuneConfig:
     steps_per_tick: float = 0.33
     """Gradient steps for every tick of the real robot."""
     critics_first: int = 2
-    """Outings of exploration from which only the critics learn."""
+    """Trials of exploration from which only the critics learn."""
     penalty: float = 5.0
-    """Reward lost where an outing is ended early."""
+    """Reward lost where a trial is ended early."""
     stopping_rules: StoppingRules = field(default_factory=StoppingRules)
     """When it ends."""
-    aim: CommandCorrectionConfig = field(default_factory=CommandCorrectionConfig)
-    """How the aim follows the errors."""
+    correction: CommandCorrectionConfig = field(default_factory=CommandCorrectionConfig)
+    """How the command's correction follows the errors."""
     learner: SacConfig = field(default_factory=SacConfig)
     """Numbers of SAC."""
     contact: ContactConfig = field(default_factory=ContactConfig)
@@ -110,12 +114,12 @@ class FinetuneConfig:
             raise UsageError(f"'method' is '{self.method}'; valid: {', '.join(get_args(Method))}.")
         if len(set(self.commands)) < 2:
             raise UsageError(
-                f"Commands {self.commands} are too few to aim by; give at least two heights."
+                f"Commands {self.commands} are too few to correct by; give at least two heights."
             )
-        if not 2 * len(self.commands) <= self.outing <= 60:
+        if not 2 * len(self.commands) <= self.trial_seconds <= 60:
             raise UsageError(
-                f"An outing of {self.outing:g} s does not suit {len(self.commands)} commands; give"
-                f" {2 * len(self.commands)} to 60 s."
+                f"A trial of {self.trial_seconds:g} s does not suit {len(self.commands)} commands;"
+                f" give {2 * len(self.commands)} to 60 s."
             )
         if not 0 < self.stopping_rules.minutes <= 600:
             raise UsageError(

@@ -1,13 +1,13 @@
-"""Continue a policy's training on a robot: outings, checks, learning, the best one kept.
+"""Continue a policy's training on a robot: trials, checks, learning, the best one kept.
 
-A check is an outing without exploration at fixed heights; its error, as estimated from the joints,
-decides what is best, what is rolled back and when to stop. Checks take robot time like any outing.
-All randomness follows from seed and number of the outing, so that a run that was killed goes on
-exactly: networks and optimisers from a checkpoint, experience from the outings' traces.
+A check is a trial without exploration at fixed heights; its error, as estimated from the joints,
+decides what is best, what is rolled back and when to stop. Checks take robot time like any trial.
+All randomness follows from seed and number of the trial, so that a run that was killed goes on
+exactly: networks and optimisers from a checkpoint, experience from the trials' traces.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,51 +18,22 @@ from hopping_leg.controllers.hardware_trial import HardwareTrial, TrialRobot
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.envs import apex_reward
-from hopping_leg.rl.checkpoint import (
-    Tree,
-    list_checkpoints,
-    read_checkpoint,
-    write_checkpoint,
-)
+from hopping_leg.rl.checkpoint import Tree, list_checkpoints, read_checkpoint, write_checkpoint
+from hopping_leg.rl.finetune.apex_estimate import prepare
 from hopping_leg.rl.finetune.command_correction import LinearCommandCorrection
-from hopping_leg.rl.finetune.config import FinetuneConfig
+from hopping_leg.rl.finetune.config import FinetuneConfig, Task
 from hopping_leg.rl.finetune.learner import Learner
-from hopping_leg.rl.finetune.pretraining import Task, believed_rows, prepare
-from hopping_leg.rl.finetune.replay import ExploringPolicy, TransitionWriter
+from hopping_leg.rl.finetune.replay import ExploringPolicy, TransitionWriter, believed_rows
 from hopping_leg.rl.finetune.trial_data import Score, TrialData, estimated, score, settled
 from hopping_leg.rl.onnx_export import Network, build_policy, read_network
 from hopping_leg.trace import Trace
 
 Row = dict[str, Any]
-"""Of an outing, as JSON values."""
-
-
-@dataclass(frozen=True)
-class Finetuned:
-    """A finished run.
-
-    Attributes:
-        content: The best policy's file.
-        reason: Why it ended, a sentence.
-        rows: One per outing.
-    """
-
-    content: bytes
-    reason: str
-    rows: list[Row]
+"""Result of a trial, as JSON values."""
 
 
 class Finetuning:
-    """One continued training.
-
-    Args:
-        task: Policy, believed robot, range of commands, seed.
-        robot: The real one, or what plays it.
-        options: What is asked for.
-        folder: For traces, checkpoints and what is learnt beforehand.
-        pretraining: Folder of what is learnt beforehand, if others share it.
-        on_outing: Called with every outing's row.
-    """
+    """One continued training, see ``running.finetune``."""
 
     def __init__(
         self,
@@ -71,32 +42,34 @@ class Finetuning:
         options: FinetuneConfig,
         folder: Path,
         pretraining: Path | None = None,
-        on_outing: Callable[[Row], None] = lambda _: None,
+        on_trial: Callable[[Row], None] = lambda _: None,
     ) -> None:
         self._task, self._robot, self._options, self._folder = task, robot, options, folder
-        self._on_outing = on_outing
-        self._estimator = prepare(task, options.contact, pretraining or folder / "pretraining")
+        self._on_trial = on_trial
+        self._estimator = prepare(
+            task.policy, task.robot, options.contact, pretraining or folder / "pretraining"
+        )
         self._network = read_network(task.policy.content)
-        self._aim = LinearCommandCorrection(*task.commands)
+        self._correction = LinearCommandCorrection(*task.commands)
         self._learner: Learner | None = None
-        self._best = self._origin = (self._network, self._aim)
+        self._best = self._origin = (self._network, self._correction)
         self._explored = 0
         self.rows: list[Row] = []
 
-    def run(self) -> Finetuned:
-        """Go on until a rule ends it."""
+    def run(self) -> tuple[bytes, str]:
+        """Go on until a rule ends it; return the best policy's file and why it ended."""
         self._restore()
         while not (reason := self._reason()):
             check = self._check_is_due()
             number = len(self.rows)
-            schedule = self._check_schedule() if check else self._exploring_schedule(number)
-            controller = self._controller(check=check, number=number)
-            outing = self._robot.hop(controller, schedule, self._seed(number, 0))
-            outing.trace.save(self._trace(number))
-            self._take(outing, schedule, check=check)
+            schedule = self._schedule(number, check=check)
+            controller = self._controller(number, check=check)
+            trial = self._robot.hop(controller, schedule, self._seed(number, 0))
+            trial.trace.save(self._trace(number))
+            self._evaluate(trial, schedule, check=check)
             self._checkpoint()
-            self._on_outing(self.rows[-1])
-        return Finetuned(self._content(*self._best), reason, self.rows)
+            self._on_trial(self.rows[-1])
+        return self._content(*self._best), reason
 
     @property
     def minutes(self) -> float:
@@ -110,36 +83,32 @@ class Finetuning:
     def _errors_since(self) -> list[float]:
         """Return the best error and those of the checks since a policy was rolled back, m."""
         checks = [row for row in self.rows if row["kind"] == "check"]
-        thrown = [index for index, row in enumerate(checks) if row["rolled_back"]]
-        first = thrown[-1] + 1 if thrown else 0
+        rolled_back = [index for index, row in enumerate(checks) if row["rolled_back"]]
+        first = rolled_back[-1] + 1 if rolled_back else 0
         return [min(self._errors), *(row["error_m"] for row in checks[first:])]
 
     def _reason(self) -> str:
-        return self._options.stopping_rules.reason(
-            self._errors, self.minutes, self._options.outing / 60
-        )
+        o = self._options
+        return o.stopping_rules.reason(self._errors, self.minutes, o.trial_seconds / 60)
 
     def _learns_weights(self) -> bool:
-        method = self._options.method
-        return method == "sac" or (
-            method == "both" and self.minutes >= self._options.correction_minutes
-        )
+        method, first = self._options.method, self._options.correction_minutes
+        return method == "sac" or (method == "both" and self.minutes >= first)
 
     def _check_is_due(self) -> bool:
         latest = [row["kind"] for row in self.rows[-self._options.explorations :]]
         return not self._learns_weights() or "check" not in latest
 
-    def _check_schedule(self) -> CommandSchedule:
-        o = self._options
-        return CommandSchedule(tuple((c, o.outing / len(o.commands)) for c in o.commands))
-
-    def _exploring_schedule(self, number: int) -> CommandSchedule:
+    def _schedule(self, number: int, *, check: bool) -> CommandSchedule:
         o, rng = self._options, np.random.default_rng((self._task.seed, number, 1))
-        drawn = rng.uniform(*self._task.commands, round(o.outing / o.hold))
-        return CommandSchedule(tuple((float(command), o.hold) for command in drawn))
+        if check:
+            each = o.trial_seconds / len(o.commands)
+            return CommandSchedule(tuple((command, each) for command in o.commands))
+        sampled = rng.uniform(*self._task.commands, round(o.trial_seconds / o.hold))
+        return CommandSchedule(tuple((float(command), o.hold) for command in sampled))
 
-    def _controller(self, *, check: bool, number: int) -> Controller:
-        content = self._content(self._network, self._aim)
+    def _controller(self, number: int, *, check: bool) -> Controller:
+        content = self._content(self._network, self._correction)
         if check:
             return Policy(content, "the policy in training", self._task.policy.name)
         assert self._learner is not None
@@ -149,50 +118,52 @@ class Finetuning:
             content, card, self._learner.spread, self._options.sde_sample_freq, rng
         )
 
-    def _take(self, outing: HardwareTrial, schedule: CommandSchedule, *, check: bool) -> None:
-        """Judge an outing, learn from it, note it."""
-        data = TrialData.of([outing.trace])
+    def _evaluate(self, trial: HardwareTrial, schedule: CommandSchedule, *, check: bool) -> None:
+        """Score and record a trial, and learn from it."""
+        data = TrialData.of([trial.trace])
         estimate = self._estimator(data)
-        apexes = estimated(outing, estimate)
-        judged = score(apexes, schedule, outing.complaint)
+        apexes = estimated(trial, estimate)
+        judged = score(apexes, schedule, trial.complaint)
         row: Row = {
             "outing": len(self.rows),
             "kind": "check" if check else "exploration",
-            "minutes": self.minutes + outing.seconds / 60,
-            "complaint": outing.complaint,
-            "aim_m": list(self._aim.shift),
+            "minutes": self.minutes + trial.seconds / 60,
+            "complaint": trial.complaint,
+            "aim_m": list(self._correction.shift),
             **_numbers(judged, ""),
         }
-        if outing.truth is not None:
-            row |= _numbers(score(outing.truth, schedule, outing.complaint), "true_")
+        if trial.truth is not None:
+            row |= _numbers(score(trial.truth, schedule, trial.complaint), "true_")
         row["rolled_back"] = False
         self.rows.append(row)
-        if check or outing.complaint:
+        if check or trial.complaint:
             self._keep_best_or_roll_back(row)
         if self._learns_weights():
-            self._learn(outing, len(data.command), explored=not check)
+            self._learn(trial, len(data.command), explored=not check)
         elif not row["rolled_back"]:
             counted = settled(apexes, schedule)
-            errors = counted[:, 2] - counted[:, 1]
-            self._aim = self._aim.corrected(counted[:, 1], errors, self._options.aim)
+            errors, options = counted[:, 2] - counted[:, 1], self._options.correction
+            self._correction = self._correction.updated(counted[:, 1], errors, options)
 
     def _keep_best_or_roll_back(self, row: Row) -> None:
         check = row["kind"] == "check"
         if check and row["error_m"] <= min(self._errors):
-            self._best = (self._network, self._aim)
+            self._best = (self._network, self._correction)
         elif row["complaint"] or self._options.stopping_rules.rolled_back(self._errors_since()):
             row["rolled_back"] = True
-            self._network, self._aim = self._best
+            self._network, self._correction = self._best
             if self._learner is not None:
                 self._learner.set_actor(self._network)
 
-    def _learn(self, outing: HardwareTrial, ticks: int, *, explored: bool) -> None:
+    def _learn(self, trial: HardwareTrial, ticks: int, *, explored: bool) -> None:
         if self._learner is None:
-            self._network, self._aim = self._best
+            self._network, self._correction = self._best
             self._begin_learning()
-            self._pretrain()
+            assert self._learner is not None
+            first_steps = self._options.first_steps
+            self._learner.learn(first_steps, self._seed(0, 5), critics_only=True)
         else:
-            self._keep(outing.trace, bool(outing.complaint))
+            self._keep(trial.trace, bool(trial.complaint))
         assert self._learner is not None
         self._explored += explored
         steps = round(self._options.steps_per_tick * ticks)
@@ -206,33 +177,30 @@ class Finetuning:
         self._learner.keep(self._writer()(data, self._estimator(data), ended=ended))
 
     def _begin_learning(self) -> None:
-        """Make a learner that knows the believed robot and every outing so far."""
+        """Make a learner that knows the believed robot and every trial so far."""
         o, task = self._options, self._task
-        self._origin = (self._network, self._aim)
+        self._origin = (self._network, self._correction)
         hidden = len(self._network.layers[-1][0][0])
         spread = np.full((hidden, 2), np.exp(o.learner.log_std))
         rng = np.random.default_rng((task.seed, 4))
-        content = self._content(self._network, self._aim)
+        content = self._content(self._network, self._correction)
         explorer = ExploringPolicy(content, task.policy.card, spread, o.sde_sample_freq, rng)
-        rows = believed_rows(task, explorer, self._estimator, self._writer(), o.believed_seconds)
+        rows = believed_rows(
+            task.robot, task.commands, task.seed,
+            explorer, self._estimator, self._writer(), o.believed_seconds,
+        )  # fmt: skip
         self._learner = Learner(self._network, rows, o.learner, task.seed)
         for row in self.rows:
             self._keep(Trace.load(self._trace(row["outing"])), bool(row["complaint"]))
-
-    def _pretrain(self) -> None:
-        """Let the critics learn from what is there before the actor does."""
-        assert self._learner is not None
-        steps = self._options.first_steps
-        self._learner.learn(steps, self._seed(0, 5), critics_only=True)
 
     def _writer(self) -> TransitionWriter:
         o, card = self._options, self._task.policy.card
         reward = apex_reward(self._task.robot, o.reward, card.rate)
         reward.anneal(1.0)
-        scaled = self._aim.applied(self._network, card)
+        scaled = self._correction.applied(self._network, card)
         return TransitionWriter(card, scaled, self._task.robot, reward, o.penalty)
 
-    def _content(self, network: Network, aim: LinearCommandCorrection) -> bytes:
+    def _content(self, network: Network, correction: LinearCommandCorrection) -> bytes:
         policy = self._task.policy
         card = replace(
             policy.card,
@@ -240,7 +208,7 @@ class Finetuning:
             seed=self._task.seed,
             steps=policy.card.steps + round(60 * self.minutes * policy.card.rate),
         )
-        return build_policy(aim.applied(network, card), card)
+        return build_policy(correction.applied(network, card), card)
 
     def _seed(self, number: int, purpose: int) -> int:
         sequence = np.random.SeedSequence((self._task.seed, number, purpose))
@@ -253,7 +221,7 @@ class Finetuning:
         tree: Tree = {
             "rows": self.rows,
             "explored": self._explored,
-            "now": _as_tree(self._network, self._aim),
+            "now": _as_tree(self._network, self._correction),
             "best": _as_tree(*self._best),
             "origin": _as_tree(*self._origin),
             "learner": None if self._learner is None else self._learner.state(),
@@ -268,21 +236,21 @@ class Finetuning:
         tree = read_checkpoint(found[-1])
         self.rows, self._explored = tree["rows"], tree["explored"]
         if tree["learner"] is not None:
-            self._network, self._aim = self._from_tree(tree["origin"])
+            self._network, self._correction = self._from_tree(tree["origin"])
             self._begin_learning()
             assert self._learner is not None
             self._learner.restore(tree["learner"])
-        self._network, self._aim = self._from_tree(tree["now"])
+        self._network, self._correction = self._from_tree(tree["now"])
         self._best = self._from_tree(tree["best"])
 
     def _from_tree(self, tree: Tree) -> tuple[Network, LinearCommandCorrection]:
         layers = [(np.array(weight), np.array(bias)) for weight, bias in tree["layers"]]
         a, b = tree["shift"]
-        return replace(self._network, layers=layers), replace(self._aim, shift=(a, b))
+        return replace(self._network, layers=layers), replace(self._correction, shift=(a, b))
 
 
-def _as_tree(network: Network, aim: LinearCommandCorrection) -> Tree:
-    return {"layers": [list(layer) for layer in network.layers], "shift": list(aim.shift)}
+def _as_tree(network: Network, correction: LinearCommandCorrection) -> Tree:
+    return {"layers": [list(layer) for layer in network.layers], "shift": list(correction.shift)}
 
 
 def _numbers(judged: Score, prefix: str) -> Row:

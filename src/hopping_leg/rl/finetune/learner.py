@@ -3,10 +3,10 @@
 The actor is the policy: same layers, same weights. A policy by PPO clips its output, SAC squashes
 by tanh; the mean here is the inverse tanh of the clipped output, so that SAC's squash gives the
 policy's action back. Where the output is clipped, a gradient passes that leads back inside.
-Exploration keeps its size: entropy is not sought, the actor's noise is what the outings can bear.
+Exploration keeps its size: entropy is not sought, the actor's noise is what the trials can bear.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import gymnasium
@@ -29,7 +29,7 @@ _LOOKED_AT = 3000
 """Ticks on which it is told how much actions have changed, the newest, 15 s."""
 
 _HALVINGS = 8
-"""Shares of a step that are tried, each half of the one before, until one is short enough."""
+"""Shares of a step that are tried, each half of the one before."""
 
 _ACTIVATIONS = {"relu": nn.ReLU, "tanh": nn.Tanh, "elu": nn.ELU}
 
@@ -47,7 +47,7 @@ class SacConfig:
     last_layer: bool = False
     """Whether the actor learns in its last layer alone."""
     change: float = 0.02
-    """Root mean square by which learning from an outing may change the actor's actions, of full
+    """Root mean square by which learning from a trial may change the actor's actions, of full
     torque: critics that have heard little of the robot would lead it far astray."""
     batch_size: int = 256
     """Transitions per gradient step."""
@@ -66,13 +66,9 @@ class SacConfig:
 
 
 class Learner:
-    """SAC without an environment.
+    """SAC without an environment, which goes on from a policy's network.
 
-    Args:
-        network: The policy to go on from.
-        believed: Transitions of the believed robot, which stay in the replay.
-        options: Numbers.
-        seed: Seed of the critics' weights.
+    Transitions of the believed robot stay in its replay.
     """
 
     def __init__(
@@ -106,9 +102,13 @@ class Learner:
             _init_setup_model=False,
         )
         self.model.begin(size, options.actor_share)
-        self.model.replay_buffer.believed = _buffer(believed, self.model)
-        self.model.replay_buffer.share = options.believed_share
-        self._take(network)
+        buffer = self.model.replay_buffer
+        buffer.believed = ReplayBuffer(
+            max(len(believed.reward), 1), buffer.observation_space, buffer.action_space, "cpu"
+        )
+        _fill(buffer.believed, believed)
+        buffer.share = options.believed_share
+        self.set_actor(network)
 
     @property
     def spread(self) -> Array:
@@ -145,10 +145,7 @@ class Learner:
         return [weight.detach().clone() for weight in self.model.actor.parameters()]
 
     def _hold_back(self, before: list[torch.Tensor]) -> None:
-        """Take back of what the actor learnt as much as goes beyond the change that it may take.
-
-        The step is halved until the actions on the newest ticks have changed little enough.
-        """
+        """Halve the actor's step until actions on the newest ticks have changed little enough."""
         real, actor = self.model.replay_buffer, self.model.actor
         buffer = real if real.size() else real.believed
         newest = (buffer.pos - 1 - np.arange(min(_LOOKED_AT, buffer.size()))) % buffer.buffer_size
@@ -175,8 +172,7 @@ class Learner:
         with torch.no_grad():
             weights = [(m.weight.double().numpy().copy(), m.bias.double().numpy().copy())
                        for m in layers]  # fmt: skip
-        n = self._network
-        return Network(n.offset, n.gain, weights, n.activation, n.squash, n.bound)
+        return replace(self._network, layers=weights)
 
     def state(self) -> Tree:
         """Return networks and optimisers; transitions are others' to keep."""
@@ -188,9 +184,6 @@ class Learner:
 
     def set_actor(self, network: Network) -> None:
         """Let the actor go on from another network; the critics stay."""
-        self._take(network)
-
-    def _take(self, network: Network) -> None:
         actor = self.model.actor
         linear = actor.mu[0] if isinstance(actor.mu, nn.Sequential) else actor.mu
         layers = [m for m in [*actor.latent_pi, linear] if isinstance(m, nn.Linear)]
@@ -258,18 +251,12 @@ class _Unclip(torch.autograd.Function):
 
 
 class _Unclipped(nn.Module):
+    """What tanh turns into the clipped value."""
+
     def forward(self, value: torch.Tensor) -> torch.Tensor:
-        """Return what tanh turns into the clipped value."""
+        """Return it."""
         unclipped: torch.Tensor = _Unclip.apply(value)  # type: ignore[no-untyped-call]
         return unclipped
-
-
-def _buffer(rows: Transitions, model: SAC) -> ReplayBuffer:
-    buffer = ReplayBuffer(
-        max(len(rows.reward), 1), model.observation_space, model.action_space, "cpu"
-    )
-    _fill(buffer, rows)
-    return buffer
 
 
 def _fill(buffer: ReplayBuffer, rows: Transitions) -> None:

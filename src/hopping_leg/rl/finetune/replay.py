@@ -1,4 +1,4 @@
-"""Transitions from what outings measured: what the environment would have given.
+"""Transitions from what trials measured: what the environment would have given.
 
 The actor's part of an observation is made by the policy's own layout from the samples as they
 arrived. The critics' part and the reward come from estimate: a robot that cannot know its height
@@ -18,6 +18,8 @@ from hopping_leg.controllers.protocol import Measurement
 from hopping_leg.envs import Reward
 from hopping_leg.envs.observation import Array32
 from hopping_leg.envs.rewards import Transition
+from hopping_leg.rl.finetune.apex_estimate import ApexEstimator
+from hopping_leg.rl.finetune.simulated import hop_many, traces_of
 from hopping_leg.rl.finetune.trial_data import ApexEstimate, TrialData
 from hopping_leg.rl.onnx_export import PREFIX, Network, expose_hidden
 from hopping_leg.robot import kinematics
@@ -87,29 +89,18 @@ _HEIGHT, _SPEED = 0.1, 10.0
 
 @dataclass(frozen=True)
 class Transitions:
-    """Transitions, (n, ...).
-
-    Attributes:
-        observation: The actor's inputs, then the critics', (n, size).
-        following: The same one tick later, (n, size).
-        action: Taken in between, -1 to 1, (n, 2).
-        reward: (n,).
-        done: Whether the outing was ended there by whoever watches over the leg, (n,).
-    """
+    """Transitions, (n, ...)."""
 
     observation: Array32
+    """Inputs of the actor, then those of the critics, (n, size)."""
     following: Array32
+    """The same one tick later, (n, size)."""
     action: Array32
+    """Action in between, -1 to 1, (n, 2)."""
     reward: Array32
+    """Reward of the action, (n,)."""
     done: Array32
-
-    @staticmethod
-    def join(parts: "list[Transitions]") -> "Transitions":
-        """Return several as one."""
-        names = ("observation", "following", "action", "reward", "done")
-        return Transitions(
-            *(np.concatenate([getattr(part, name) for part in parts]) for name in names)
-        )
+    """Whether the trial was ended there by whoever watches over the leg, (n,)."""
 
 
 class TransitionWriter:
@@ -120,7 +111,7 @@ class TransitionWriter:
         network: With the scaling of its inputs.
         robot: The believed leg.
         reward: Judges every tick.
-        penalty: Reward lost where an outing is ended early.
+        penalty: Reward lost where a trial is ended early.
     """
 
     def __init__(
@@ -133,16 +124,10 @@ class TransitionWriter:
     def __call__(
         self, data: TrialData, estimate: ApexEstimate, *, ended: bool = False
     ) -> Transitions:
-        """Return the transitions of outings.
-
-        Args:
-            data: What they measured.
-            estimate: What is reckoned of them.
-            ended: Whether they were ended early.
-        """
+        """Return the transitions of trials, which may have ``ended`` early."""
         action = np.clip(data.asked / self._scale, -EDGE, EDGE)
         seen = np.concatenate(
-            [self.actor_inputs(data), self._critic_inputs(data, estimate, action)], axis=-1
+            [self._actor_inputs(data), self._critic_inputs(data, estimate, action)], axis=-1
         ).astype(np.float32)
         reward = self._rewards(data, estimate, action)
         done = np.zeros(reward.shape, np.float32)
@@ -155,7 +140,7 @@ class TransitionWriter:
             before, after, taken.astype(np.float32), reward.ravel().astype(np.float32), done.ravel()
         )
 
-    def actor_inputs(self, data: TrialData) -> Array:
+    def _actor_inputs(self, data: TrialData) -> Array:
         """Return what the network computes with at every tick, normalised, (ticks, n, size)."""
         card, network = self._card, self._network
         layout = make_observation_history(card.layout, 1 / card.rate)
@@ -208,3 +193,29 @@ class TransitionWriter:
             )  # fmt: skip
             last = action[tick - 1]
         return rewards
+
+
+BELIEVED_LEGS = 16
+"""Legs that hop at once for the replay."""
+
+
+def believed_rows(
+    robot: Robot,
+    commands: tuple[float, float],
+    seed: int,
+    controller: ExploringPolicy,
+    estimator: ApexEstimator,
+    writer: TransitionWriter,
+    seconds: float,
+) -> Transitions:
+    """Return transitions of an exploring policy on the believed robot in simulation.
+
+    Heights are estimated there, too, as they will be on the real one. The time is that of all
+    ``BELIEVED_LEGS`` legs together.
+    """
+    rng = np.random.default_rng((seed, 1))
+    holds = max(1, round(seconds / BELIEVED_LEGS / 2.0))
+    steps = np.repeat(rng.uniform(*commands, (holds, BELIEVED_LEGS)), 400, axis=0)
+    run = hop_many(controller, robot, [robot] * BELIEVED_LEGS, steps, seed)
+    data = TrialData.of(traces_of(run))
+    return writer(data, estimator(data))

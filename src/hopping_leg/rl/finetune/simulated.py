@@ -1,4 +1,4 @@
-"""A simulated leg that is reached like a real one: by outings that return what it measured.
+"""A simulated leg that is reached like a real one: by trials that return what it measured.
 
 The leg is stepped by the code that ``hop evaluate`` hops on. What the twin brings of latency and
 noise is all there is; its true state goes nowhere but into ``HardwareTrial.truth``.
@@ -11,11 +11,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.controllers.command_schedule import CommandSchedule
-from hopping_leg.controllers.hardware_trial import (
-    MEASURED,
-    HardwareTrial,
-    measured_table,
-)
+from hopping_leg.controllers.hardware_trial import MEASURED, HardwareTrial, measured_table
 from hopping_leg.controllers.protocol import Controller, Measurement
 from hopping_leg.controllers.rollout import Rollout, RolloutConfig, rollout
 from hopping_leg.hop_detection import find_hops
@@ -25,12 +21,12 @@ from hopping_leg.sim.perturbation import Perturbation
 from hopping_leg.trace import Trace
 
 _BRAKING = 0.15
-"""Of the joints once a leg was stopped, N m s/rad."""
+"""Damping of the joints once a leg was stopped, N m s/rad."""
 
 
 @dataclass(frozen=True)
 class Guard:
-    """Beyond what measured joints end an outing; pairs are hip and knee, (2,) each."""
+    """Beyond what measured joints end a trial; pairs are hip and knee, (2,) each."""
 
     lower: Array
     """rad"""
@@ -40,7 +36,7 @@ class Guard:
     """rad/s"""
 
     def complaint(self, q: Array, qd: Array) -> str:
-        """Return what is wrong with a leg's joints, rad and rad/s, (2,) each; else nothing."""
+        """Return what is wrong with a leg's joints, rad and rad/s, (2,) each; empty if nothing."""
         if (q < self.lower).any() or (q > self.upper).any():
             return "A joint left its range."
         if (np.abs(qd) > self.speed).any():
@@ -83,24 +79,15 @@ def hop_many(
     robots: Sequence[Robot],
     commands: Array,
     seed: int,
-    timestep: float = 1e-3,
 ) -> Rollout:
-    """Let a controller hop on many simulated legs; measured joints are columns, see ``traces_of``.
+    """Let a controller hop on many simulated legs, each a robot of its own, as if on ``robot``.
 
-    Args:
-        controller: Has all legs.
-        robot: That the controller believes to have.
-        robots: What each leg is, n of them.
-        commands: Desired heights, m, (ticks, n).
-        seed: Seed of the simulation.
-        timestep: Physics step, s.
+    Measured joints are columns, see ``traces_of``; commands are desired heights, m, (ticks, n).
     """
-    ticks, count = commands.shape
-    calm = np.zeros((ticks, count))
-    differ = Perturbation(tuple(robots), np.zeros((ticks, count, 2)), calm, calm)
-    witness = Witness(controller, None)
-    setup = RolloutConfig(robot, NO_NOISE, timestep=timestep, threads=1)
-    return rollout(witness, setup, commands, seed, perturbation=differ)
+    calm = np.zeros(commands.shape)
+    differ = Perturbation(tuple(robots), np.zeros((*commands.shape, 2)), calm, calm)
+    setup = RolloutConfig(robot, NO_NOISE, timestep=1e-3, threads=1)
+    return rollout(Witness(controller, None), setup, commands, seed, perturbation=differ)
 
 
 def traces_of(run: Rollout) -> list[Trace]:
@@ -122,11 +109,7 @@ def traces_of(run: Rollout) -> list[Trace]:
 
 
 class Witness:
-    """Writes down what a controller is shown, and takes the leg from it where a guard objects.
-
-    Args:
-        controller: Has the legs.
-        guard: When to stop a leg; None never does.
+    """Records what a controller is shown, and stops a leg where a guard objects.
 
     Attributes:
         ended: Tick at which each leg was stopped, -1 for never, (n,).
@@ -137,7 +120,7 @@ class Witness:
         self.name, self._controller, self._guard = controller.name, controller, guard
 
     def watch(self, legs: Simulator) -> None:
-        """Take the legs whose motors' torque is read."""
+        """Set the legs whose motors' torque is read."""
         self._legs = legs
 
     def reset(self, count: int) -> None:
@@ -154,8 +137,9 @@ class Witness:
         asked = self._controller.act(measurement)
         seen = {"q": q, "qd": qd, "torque": self._legs.measured_torque, "asked": asked}
         self._seen = {name: np.array(values) for name, values in seen.items()}
-        if self._guard is not None:
-            self._judge(self._guard, q, qd)
+        for leg in np.flatnonzero(self.ended < 0):
+            if self._guard and (complaint := self._guard.complaint(q[leg], qd[leg])):
+                self.ended[leg], self.complaints[leg] = self._tick, complaint
         stopped = (self.ended >= 0)[:, None]
         return np.where(stopped, -_BRAKING * qd, asked)
 
@@ -166,12 +150,6 @@ class Witness:
             for name, columns in MEASURED.items()
             for joint, column in enumerate(columns)
         }
-
-    def _judge(self, guard: Guard, q: Array, qd: Array) -> None:
-        for leg in np.flatnonzero(self.ended < 0):
-            complaint = guard.complaint(q[leg], qd[leg])
-            if complaint:
-                self.ended[leg], self.complaints[leg] = self._tick, complaint
 
 
 def _own(column: str) -> str:

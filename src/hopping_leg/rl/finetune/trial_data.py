@@ -1,4 +1,4 @@
-"""What outings measured, what is estimated of their hops, and how well those met the commands."""
+"""What trials measured, what is estimated of their hops, and how well those met the commands."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,27 +15,24 @@ from hopping_leg.trace import Trace
 
 @dataclass(frozen=True)
 class TrialData:
-    """Measured and asked of n outings of the same length; samples that did not arrive are NaN.
-
-    Attributes:
-        q: Joint positions, rad, (ticks, n, 2).
-        qd: Joint velocities, rad/s, (ticks, n, 2).
-        torque: Measured at the joints, N m, (ticks, n, 2).
-        asked: Asked for by the controller, N m, (ticks, n, 2).
-        command: Desired height, m, (ticks, n).
-        period: Control period, s.
-    """
+    """What n trials of the same length measured; samples that did not arrive are NaN."""
 
     q: Array
+    """Joint positions, rad, (ticks, n, 2)."""
     qd: Array
+    """Joint velocities, rad/s, (ticks, n, 2)."""
     torque: Array
+    """Measured joint torques, N m, (ticks, n, 2)."""
     asked: Array
+    """Torques that the controller asked for, N m, (ticks, n, 2)."""
     command: Array
+    """Desired height, m, (ticks, n)."""
     period: float
+    """Control period, s."""
 
     @staticmethod
     def of(traces: Sequence[Trace]) -> "TrialData":
-        """Return equally long traces of outings as arrays.
+        """Return equally long traces of trials as arrays.
 
         Raises:
             TraceError: A trace lacks a column, or has no sample at all.
@@ -48,9 +45,7 @@ class TrialData:
             for name, columns in MEASURED.items()
         }
         if np.isnan(joints["q"]).all(axis=(0, 2)).any():
-            raise TraceError(
-                "A trace of an outing holds no sample of the joints; it tells nothing."
-            )
+            raise TraceError("A trace of a trial holds no sample of the joints; it tells nothing.")
         command = np.stack([trace.column("command_m") for trace in traces], axis=1)
         return TrialData(**joints, command=command, period=1 / traces[0].header["rate_hz"])
 
@@ -72,8 +67,7 @@ class TrialData:
         """Yield what the controller saw at every tick: the newest samples, each with its age."""
         newest = self._newest()
         legs = np.arange(self.command.shape[1])[:, None]
-        for tick in range(self.ticks):
-            chosen = newest[tick]
+        for tick, chosen in enumerate(newest):
             at = (chosen, legs)
             age = np.maximum(tick - chosen, 0) * self.period
             yield Measurement(self.q[at], self.qd[at], self.command[at], age)
@@ -96,68 +90,56 @@ SETTLING = 1.0
 """Time after a new command whose hops do not count, s."""
 
 _FALLEN = 1.0
-"""Error of an outing that was ended early, m."""
+"""Error of a trial that was ended early, m."""
 
 
 @dataclass(frozen=True)
 class ApexEstimate:
-    """What is reckoned of n outings.
-
-    Attributes:
-        height: Height of the base, m, (ticks, n).
-        rate: Its derivative, m/s, (ticks, n).
-        flying: Whether the foot was in the air, (ticks, n).
-        apexes: Per outing tick and height of every apex, m, (hops, 2).
-    """
+    """Estimated motion of the base in n trials."""
 
     height: Array
+    """Height of the base, m, (ticks, n)."""
     rate: Array
+    """Vertical velocity of the base, m/s, (ticks, n)."""
     flying: BoolArray
+    """Whether the foot was in the air, (ticks, n)."""
     apexes: list[Array]
+    """Per trial tick and height of every apex, m, (hops, 2)."""
 
 
 @dataclass(frozen=True)
 class Score:
-    """Score of one outing.
-
-    Attributes:
-        by_command: Command to the median |apex - command|, m; the command itself without hops.
-        offsets: Command to the median of apex - command, m.
-        hops: That counted.
-        error: Mean of ``by_command``, or one metre where the outing was ended early.
-    """
+    """How well one trial met its commands."""
 
     by_command: dict[float, float]
+    """Command to the median |apex - command|, m; the command itself without hops."""
     offsets: dict[float, float]
+    """Command to the median of apex - command, m."""
     hops: int
+    """Hops that counted."""
     error: float
+    """Mean of ``by_command``, or one metre where the trial was ended early."""
 
 
-def estimated(outing: HardwareTrial, estimate: ApexEstimate) -> Array:
-    """Return time, command and estimated height of an outing's apexes, s, m, m, (hops, 3)."""
+def estimated(trial: HardwareTrial, estimate: ApexEstimate) -> Array:
+    """Return time, command and estimated height of a trial's apexes, s, m, m, (hops, 3)."""
     tick, height = estimate.apexes[0].T
     rows = tick.astype(np.int64)
-    columns = (outing.trace.column(name)[rows] for name in ("time_s", "command_m"))
-    begin = outing.trace.column("time_s")[0] if len(outing.trace.table) else 0.0
-    time, command = columns
-    return np.stack([time - begin, command, height], axis=1)
+    time, command = (trial.trace.column(name) for name in ("time_s", "command_m"))
+    return np.stack([time[rows] - time[0], command[rows], height], axis=1)
 
 
 def settled(apexes: Array, schedule: CommandSchedule) -> Array:
     """Return the apexes that no change of the command disturbed, (hops, 3)."""
-    switches = np.cumsum([0.0, *(seconds for _, seconds in schedule.steps)])
-    since = apexes[:, :1] - switches[None, :]
+    since = apexes[:, :1] - np.cumsum([0.0, *(seconds for _, seconds in schedule.steps)])
     calm: Array = apexes[np.where(since >= 0, since, np.inf).min(axis=1) >= SETTLING]
     return calm
 
 
 def score(apexes: Array, schedule: CommandSchedule, complaint: str) -> Score:
-    """Return how well commands were met.
+    """Return how well commands were met by apexes of time, command and height, (hops, 3).
 
-    Args:
-        apexes: Time, command and height of every apex, (hops, 3).
-        schedule: What was commanded.
-        complaint: Why the outing was ended early, if it was.
+    A complaint says why the trial was ended early, if it was.
     """
     counted = settled(apexes, schedule)
     errors, offsets = {}, {}

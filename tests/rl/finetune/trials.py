@@ -1,4 +1,4 @@
-"""Short outings of a small continued training."""
+"""Short trials of a small continued training."""
 
 import dataclasses
 
@@ -20,7 +20,7 @@ CONTACT = ContactConfig(num_envs=4, seconds=3.0, steps=20, batch_size=64, hidden
 OPTIONS = FinetuneConfig(
     method="both",
     commands=(0.25, 0.35),
-    outing=4.0,
+    trial_seconds=4.0,
     hold=2.0,
     explorations=1,
     correction_minutes=0.1,
@@ -40,7 +40,7 @@ class Imagined:
     name = "imagined"
 
     def __init__(self, off=0.02, complain_from=10**9):
-        self.off, self.complain_from, self.outings = off, complain_from, 0
+        self.off, self.complain_from, self.trials = off, complain_from, 0
 
     def hop(self, controller, schedule, seed):
         command = schedule.commands(1 / PERIOD)
@@ -49,8 +49,8 @@ class Imagined:
         joints["q"] += [0.6, -1.3]
         joints["asked"] = rng.uniform(-3, 3, (len(command), 2))
         table = measured_table(np.arange(len(command)) * PERIOD, command, joints)
-        self.outings += 1
-        complaint = "A joint left its range." if self.outings > self.complain_from else ""
+        self.trials += 1
+        complaint = "A joint left its range." if self.trials > self.complain_from else ""
         time = np.arange(1.2, len(command) * PERIOD, 0.4)
         at = command[(time / PERIOD).astype(int)]
         truth = np.stack([time, at, at + self.off], axis=1)
