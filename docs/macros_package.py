@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import operator
 
 from macros_results import grid, number
 from studies.fault_campaign.families import FAMILIES
@@ -34,6 +35,21 @@ def trace_columns() -> str:
         for name, meaning in COLUMNS.items()
     ]
     return grid(["column", "unit", "meaning"], rows)
+
+
+def hyperparameters(recipe: str) -> str:
+    """Return every option of a recipe by its name in `hop train --set` as a table."""
+    from hopping_leg.rl.recipes import get_recipe
+
+    shipped = get_recipe(recipe)
+    found = {name: operator.attrgetter(path)(shipped) for name, path in shipped.paths()}
+    shown = (bool, int, float, str, tuple)
+    rows = [
+        [f"`{name}`", str(value).replace("|", "or")]
+        for name, value in found.items()
+        if isinstance(value, shown) and value != ()
+    ]
+    return grid(["option", "value"], rows)
 
 
 def search_space(recipe: str) -> str:
@@ -102,6 +118,7 @@ def fault_families() -> str:
 MACROS = {
     "fault_families": fault_families,
     "fault_kinds": fault_kinds,
+    "hyperparameters": hyperparameters,
     "robot": robot,
     "robustness_axes": robustness_axes,
     "search_space": search_space,

@@ -11,6 +11,7 @@ from typing import Any
 
 from mkdocs.exceptions import PluginError
 
+from hopping_leg import figure_style
 from hopping_leg.evaluate.acceptance import HIGHEST, LEAST_FLIGHT, LOWER, accuracies
 
 STUDIES = Path(__file__).parent.parent / "studies"
@@ -118,6 +119,34 @@ def _rows(file: str, path: str, where: dict[str, Any]) -> list[dict[str, Any]]:
     if not rows:
         raise PluginError(f"The result {file} has no rows at '{path}' with {where}.")
     return rows
+
+
+def curve(file: str, path: str, key: str, axis: str, by: str, factor: float = 1000.0) -> str:
+    """Return a learning curve as an inline figure: a key over minutes, a line for each group.
+
+    Args:
+        file: Name of the result.
+        path: Dotted path of the records, in order of time.
+        key: What is drawn, times ``factor``, on a logarithmic axis.
+        axis: Label of that axis.
+        by: Key that tells the lines apart.
+        factor: Turns m into mm.
+    """
+    figure, ((axes,),) = figure_style.panels(1, height=3.0)
+    records = _rows(file, path, {})
+    for index, group in enumerate(dict.fromkeys(r[by] for r in records)):
+        mine = [r for r in records if r[by] == group and r[key] is not None]
+        line = [abs(r[key]) * factor for r in mine]
+        axes.plot(
+            [r["minutes"] for r in mine],
+            line,
+            color=figure_style.colour(index),
+            label=f"{by} {group}",
+        )
+    axes.set(yscale="log", xlabel="wall-clock time, min", ylabel=axis)
+    axes.legend()
+    svg = figure_style.to_svg(figure).decode()
+    return svg[svg.index("<svg") :].replace("\n", "") + "\n" + origin(file)
 
 
 def entries(file: str) -> str:
@@ -257,6 +286,7 @@ MACROS = {
     "against": against,
     "bullets": bullets,
     "commands": commands(),
+    "curve": curve,
     "entries": entries,
     "percentiles": percentiles,
     "pictures": pictures,
