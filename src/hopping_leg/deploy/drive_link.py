@@ -95,15 +95,11 @@ class Action(Enum):
 
 @dataclass(frozen=True, slots=True)
 class DriveCommand:
-    """What leaves for the drives.
-
-    Attributes:
-        action: What they do.
-        torque: At the joints, N m; zero unless the action is ``TORQUE``.
-    """
+    """What leaves for the drives."""
 
     action: Action
     torque: Pair = (0.0, 0.0)
+    """At the joints, N m; zero unless the action is ``TORQUE``."""
 
 
 STOP = DriveCommand(Action.STOP)
@@ -114,15 +110,12 @@ LIMP = DriveCommand(Action.TORQUE)
 
 @dataclass(frozen=True, slots=True)
 class Exchange:
-    """What came back in a tick.
-
-    Attributes:
-        replies: Fresh ones: measured after this tick's question was asked.
-        late: Drive (0 hip, 1 knee) and reply to an earlier tick that arrived now.
-    """
+    """What came back in a tick."""
 
     replies: Replies
+    """Fresh ones: measured after this tick's question was asked."""
     late: tuple[tuple[int, Reply], ...] = ()
+    """Drive (0 hip, 1 knee) and reply to an earlier tick that arrived now."""
 
 
 class DriveLink(Protocol):
@@ -131,9 +124,7 @@ class DriveLink(Protocol):
     def exchange(self, outgoing: DriveCommand, until: float) -> Exchange:
         """Tell both drives what to do and ask for their state in the same frames.
 
-        Args:
-            outgoing: What they shall do.
-            until: When to stop waiting, s on the loop's clock.
+        Waits no longer than ``until``, s on the loop's clock.
         """
 
     def send(self, outgoing: DriveCommand) -> None:

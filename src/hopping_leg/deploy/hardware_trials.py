@@ -86,8 +86,14 @@ def perform(
     loop = ControlLoop(link, sequence, limits, recorder, clock or RealClock())
     notices: tuple[str, ...] = ()
     try:
-        with _stopped_by_signals(loop), beside(loop), keeping_time(realtime=realtime) as notices:
-            outcome = _run(loop)
+        with (
+            _stopped_by_signals(loop),
+            beside(loop),
+            keeping_time(realtime=realtime) as notices,
+            concurrent.futures.ThreadPoolExecutor(1, "control-loop") as threads,
+        ):
+            # Signals reach this thread while it waits for the loop's.
+            outcome = threads.submit(loop.run).result()
     finally:
         if link.trouble:
             recorder.event(link_trouble=link.trouble)
@@ -126,15 +132,6 @@ def new_path(folder: Path, name: str) -> Path:
         count += 1
         path = folder / f"{safe}-{stamp}-{count}.parquet"
     return path
-
-
-def _run(loop: ControlLoop) -> LoopOutcome:
-    """Run a loop in a thread of its own; hand its result, or its error, on."""
-    with concurrent.futures.ThreadPoolExecutor(1, "control-loop") as threads:
-        future = threads.submit(loop.run)
-        while not future.done():
-            concurrent.futures.wait([future], 0.1)
-        return future.result()
 
 
 @contextmanager

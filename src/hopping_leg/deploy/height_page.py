@@ -48,11 +48,7 @@ setInterval(() => { if (document.activeElement !== slider) send("/height"); }, 1
 
 
 class HeightPage:
-    """Serves the page on this computer alone, from when it is made; what it changes acts later.
-
-    Args:
-        height: To be changed.
-        port: To listen at; 0 takes a free one.
+    """Serves the page on this computer alone; port 0 takes a free one.
 
     Raises:
         UsageError: The port cannot be had.
@@ -73,11 +69,7 @@ class HeightPage:
 
     @contextlib.contextmanager
     def serve(self, stop: Callable[[], None]) -> Iterator[None]:
-        """Answer in a thread while the leg runs.
-
-        Args:
-            stop: Stops the leg.
-        """
+        """Answer in a thread while the leg runs; ``stop`` stops it."""
         self._stop = stop
         thread = threading.Thread(target=self._server.serve_forever, name="page", daemon=True)
         thread.start()

@@ -15,19 +15,16 @@ from hopping_leg.robot.parameters import Robot
 
 @dataclass(frozen=True)
 class JointTransform:
-    """The way from one drive to its joint and back.
-
-    Attributes:
-        id: CAN id of the drive.
-        sign: 1 or -1.
-        belt_ratio: Turns of the motor's output per turn of the joint.
-        zero_offset: Joint angle at motor position zero, rad.
-    """
+    """The way from one drive to its joint and back."""
 
     id: int
+    """CAN id of the drive."""
     sign: float
+    """1 or -1."""
     belt_ratio: float
+    """Turns of the motor's output per turn of the joint."""
     zero_offset: float
+    """Joint angle at motor position zero, rad."""
 
     def joint_position(self, revolutions: float) -> float:
         """Return the joint angle, rad, of a motor position, rev."""

@@ -22,11 +22,7 @@ _PATIENCE = 0.1
 
 
 class LiveHeight:
-    """A height that the operator changes while the leg hops.
-
-    Attributes:
-        valid: Lowest and highest, m.
-    """
+    """A height that the operator changes while the leg hops; ``valid`` is its range, m."""
 
     def __init__(self, height: float, valid: Range) -> None:
         self._height, self.valid = height, valid
@@ -50,10 +46,7 @@ class LiveHeight:
 def handle_key(key: bytes, height: LiveHeight | None, stop: Callable[[], None]) -> str:
     """Do what a key asks for; return what to show the operator.
 
-    Args:
-        key: As the terminal sends it.
-        height: To be changed; None where a schedule commands.
-        stop: Stops the leg.
+    ``height`` is None where a schedule commands.
     """
     if key in _STOP:
         stop()
@@ -69,10 +62,7 @@ def keys(
 ) -> Iterator[None]:
     """Listen to the keyboard in a thread; do nothing where there is no terminal.
 
-    Args:
-        height: To be changed; None where a schedule commands.
-        stop: Stops the leg.
-        show: Shows the operator a line.
+    ``height`` is None where a schedule commands; ``show`` shows the operator a line.
     """
     if not sys.stdin.isatty():
         yield
@@ -84,10 +74,8 @@ def keys(
     def listen() -> None:
         while not over.is_set():
             ready, _, _ = select.select([descriptor], [], [], _PATIENCE)
-            if ready:
-                words = handle_key(os.read(descriptor, 8), height, stop)
-                if words:
-                    show(words)
+            if ready and (words := handle_key(os.read(descriptor, 8), height, stop)):
+                show(words)
 
     thread = threading.Thread(target=listen, name="keyboard", daemon=True)
     tty.setcbreak(descriptor)

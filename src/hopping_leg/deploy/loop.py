@@ -64,9 +64,6 @@ class SampleBuffer:
     A sample counts once both drives have sent it. Its age is that of the tick that asked for it,
     so that a sample of this tick has age zero, as in simulation; a reply that arrives late is put
     where it belongs, and a tick without one shows older samples with their ages.
-
-    Args:
-        period: Control period, s.
     """
 
     def __init__(self, period: float) -> None:
@@ -103,28 +100,19 @@ class SampleBuffer:
 
 @dataclass(frozen=True)
 class LoopOutcome:
-    """How a run ended.
-
-    Attributes:
-        supervisor: Its last state.
-        ticks: Done.
-        skipped: Left out because the loop was late.
-    """
+    """How a run ended."""
 
     supervisor: SupervisorState
     ticks: int
+    """Done."""
     skipped: int
+    """Left out because the loop was late."""
 
 
 class ControlLoop:
     """Runs one sequence on one link, from arming to the end of stopping.
 
-    Args:
-        link: To the drives.
-        sequence: What the leg does.
-        limits: The supervisor's limits.
-        recorder: Where everything is recorded.
-        clock: The time; shared with the link.
+    The clock is the link's; everything is recorded.
     """
 
     def __init__(

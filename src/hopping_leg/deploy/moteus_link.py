@@ -47,11 +47,7 @@ class Client(Protocol):
 
 
 class ClientThread:
-    """Runs an event loop; work is handed over and never waited for without a deadline.
-
-    Args:
-        on_error: Told what went wrong inside of the loop, in a few words.
-    """
+    """Runs an event loop; work is handed over and never waited for without a deadline."""
 
     def __init__(self, on_error: Callable[[str], None]) -> None:
         self._on_error = on_error
@@ -100,7 +96,7 @@ class MoteusLink:
     Args:
         robot: Whose drives.
         open_transport: Opens the adapter.
-        clock: The time; none takes the computer's.
+        clock: None takes the computer's.
         client: Makes what does the client's work, given who is told of its errors.
 
     Attributes:

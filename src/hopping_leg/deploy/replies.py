@@ -58,14 +58,9 @@ class DriveClock:
 
 
 class Question:
-    """One tick's question to both drives; frames are judged the moment they arrive.
+    """One tick's question to both drives, asked at a time, s; frames are judged as they arrive.
 
     Lives between two threads: the client's puts frames in, the loop's waits for ``done``.
-
-    Args:
-        transforms: Both joints' transforms.
-        clocks: Both drives' clocks; shared from tick to tick.
-        asked: When it leaves, s.
     """
 
     def __init__(

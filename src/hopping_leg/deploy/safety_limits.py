@@ -68,11 +68,10 @@ def recording_limits(robot: Robot, rate: float) -> SafetyLimits:
 
 
 def _limits(robot: Robot, rate: float, ranges: list[Pair]) -> SafetyLimits:
-    (hip_lower, hip_upper), (knee_lower, knee_upper) = ranges
     hip, knee, hardware = robot.hip, robot.knee, robot.hardware
     return SafetyLimits(
-        lower=(hip_lower, knee_lower),
-        upper=(hip_upper, knee_upper),
+        lower=(ranges[0][0], ranges[1][0]),
+        upper=(ranges[0][1], ranges[1][1]),
         torque=(hip.torque_limit, knee.torque_limit),
         speed=(1.3 * hip.no_load_speed, 1.3 * knee.no_load_speed),
         voltage_low=hardware.voltage_low,

@@ -56,15 +56,11 @@ def fault_text(code: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """A reason with what was seen.
-
-    Attributes:
-        reason: Which.
-        detail: Joint and number, or nothing.
-    """
+    """A reason with what was seen."""
 
     reason: Reason
     detail: str = ""
+    """Joint and number, or nothing."""
 
     def __str__(self) -> str:
         return f"{self.reason.sentence} ({self.detail})" if self.detail else self.reason.sentence
@@ -117,22 +113,15 @@ class Counts:
 
     def after(self, limits: SafetyLimits, seen: SupervisorInput) -> "Counts":
         """Return the counts after a tick."""
-        hip, knee = (
-            self._of_drive(i, limits, reply, self.last[i]) for i, reply in enumerate(seen.replies)
-        )
-        late = seen.late > limits.period
-        return Counts(
-            (hip[0], knee[0]),
-            (hip[1], knee[1]),
-            (hip[2], knee[2]),
-            self.overruns + 1 if late else 0,
-        )
+        hip, knee = (self._of_drive(i, limits, reply) for i, reply in enumerate(seen.replies))
+        overruns = self.overruns + 1 if seen.late > limits.period else 0
+        return Counts((hip[0], knee[0]), (hip[1], knee[1]), (hip[2], knee[2]), overruns)
 
     def _of_drive(
-        self, index: int, limits: SafetyLimits, reply: Reply | None, last: Reply | None
+        self, index: int, limits: SafetyLimits, reply: Reply | None
     ) -> tuple[Reply | None, int, int]:
         if reply is None:
-            return last, self.missing[index] + 1, self.excess[index]
+            return self.last[index], self.missing[index] + 1, self.excess[index]
         much = abs(reply.torque) > limits.excess_torque * limits.torque[index]
         return reply, 0, self.excess[index] + 1 if much else 0
 
@@ -142,12 +131,8 @@ def find_cause(
 ) -> Cause | None:
     """Return the gravest thing that is wrong at a tick, or None.
 
-    Args:
-        limits: The limits.
-        before: Counts before the tick.
-        now: Counts after it.
-        seen: At the tick.
-        arming: Whether the drives are still on their way into torque control.
+    The counts are those before and after the tick; ``arming`` tells whether the drives are still
+    on their way into torque control.
     """
     for index, reply in enumerate(seen.replies):
         if reply is not None:

@@ -115,17 +115,13 @@ class FaultyRobot(Protocol):
 
 @dataclass
 class Delivery:
-    """How a drive's reply reaches the host.
-
-    Attributes:
-        due: When, s.
-        copies: How often.
-        flip: Which bits flip, see ``QueuedReply``.
-    """
+    """How a drive's reply reaches the host."""
 
     due: float
+    """s"""
     copies: int = 1
     flip: int = -1
+    """Which bits flip, see ``QueuedReply``."""
 
 
 class FaultKind:
@@ -137,11 +133,6 @@ class FaultKind:
         value: Default value.
         duration: Default duration, s; NaN where a number of replies is meant.
         at_start: Whether the robot starts with it, whatever the script says of its time.
-
-    Args:
-        fault: Entry of the script.
-        robot: That has it.
-        rng: Chooses the bits that flip.
     """
 
     text: ClassVar[str]

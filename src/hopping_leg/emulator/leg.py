@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.deploy.joint_transform import JointTransform, joint_transforms
+from hopping_leg.deploy.joint_transform import joint_transforms
 from hopping_leg.robot.parameters import Joint, Robot
 from hopping_leg.sim import MujocoSimulator
 
@@ -40,7 +40,6 @@ class EmulatedLeg:
         if self._legs.mismatch is not None:
             self._legs.mismatch.reseed(np.random.default_rng(seed))
         self._legs.stand(slice(None), np.asarray(q, np.float64))
-        self._torque = np.zeros((1, 2))
         self._links = (robot.thigh.length, robot.shank.length)
         self._foot = robot.foot.radius
 
@@ -74,8 +73,7 @@ class EmulatedLeg:
 
     def sensed(self, joint: int) -> tuple[float, float, float]:
         """Return what one motor's sensors see: position, rev, velocity, rev/s, torque, N m."""
-        transform: JointTransform = self.transforms[joint]
-        legs = self._legs
+        transform, legs = self.transforms[joint], self._legs
         return (
             transform.motor_position(float(legs.measured_q[0, joint])),
             transform.motor_velocity(float(legs.measured_qd[0, joint])),
@@ -83,19 +81,9 @@ class EmulatedLeg:
         )
 
     def step(self, motor_torque: tuple[float, float]) -> None:
-        """Go on by one physics step.
-
-        Args:
-            motor_torque: At the motors' outputs, N m.
-
-        Raises:
-            mujoco.batch.SimulationError: Physics failed.
-        """
-        for joint, (transform, torque) in enumerate(
-            zip(self.transforms, motor_torque, strict=True)
-        ):
-            self._torque[0, joint] = transform.joint_torque(torque)
-        self._legs.step(self._torque)
+        """Go on by one physics step with torques at the motors' outputs, N m."""
+        wires = zip(self.transforms, motor_torque, strict=True)
+        self._legs.step(np.array([[wire.joint_torque(torque) for wire, torque in wires]]))
 
 
 def _unlimited(joint: Joint) -> Joint:

@@ -59,13 +59,7 @@ class ModeMachine:
         self._deadline = math.inf
 
     def command(self, mode: DriveMode, time: float, timeout: float) -> None:
-        """Take a command.
-
-        Args:
-            mode: What is asked for.
-            time: Now, s.
-            timeout: Silence after which the drive leaves position mode, s; NaN for never.
-        """
+        """Take a command; after a silence of ``timeout``, s, position mode ends; NaN for never."""
         if mode in BETWEEN:
             return
         self.wanted = mode
@@ -77,14 +71,9 @@ class ModeMachine:
             self.mode, self.fault = DriveMode.FAULT, int(fault)
 
     def advance(self, time: float, *, outside_limits: bool = False) -> bool:
-        """Let time pass.
+        """Let time pass; return whether the drive has just begun to control in another mode.
 
-        Args:
-            time: Now, s.
-            outside_limits: Whether position mode may not begin where the drive stands.
-
-        Returns:
-            Whether the drive has just begun to control in another mode.
+        ``outside_limits`` tells that position mode may not begin where the drive stands.
         """
         before = self.mode
         if self.wanted != self.mode:

@@ -24,9 +24,7 @@ DEFAULT_CHANNELS = {UDP_MULTICAST: "239.74.163.2", "socketcan": "vcan0"}
 class PtyPort:
     """The adapter's end of a serial line.
 
-    Args:
-        link: Also offer the terminal under this path, which stays the same when it is plugged in
-            again.
+    The terminal is also offered under the path ``link``, which outlives a pulled plug.
     """
 
     def __init__(self, link: Path | None = None) -> None:
@@ -112,11 +110,7 @@ def _flipped(line: bytes, digits: int, flip: int) -> bytes:
 
 
 class CanPort:
-    """One node on a CAN-FD bus that speaks for both drives.
-
-    Args:
-        interface: One of ``DEFAULT_CHANNELS``.
-        channel: Channel of the interface; none takes the default.
+    """One node on a CAN-FD bus that speaks for both drives; see ``DEFAULT_CHANNELS``.
 
     Raises:
         UsageError: The bus cannot be opened.
@@ -137,11 +131,7 @@ class CanPort:
         return self._bus is not None
 
     def plug_in(self) -> None:
-        """Join the bus.
-
-        Raises:
-            UsageError: The bus cannot be opened.
-        """
+        """Join the bus; a ``UsageError`` tells why it cannot be opened."""
         try:
             self._bus = can.Bus(interface=self.interface, channel=self.channel, fd=True)
         except (can.CanError, OSError, ImportError) as error:

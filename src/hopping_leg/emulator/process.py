@@ -49,15 +49,12 @@ class EmulatorState:
 
 @dataclass(frozen=True)
 class EmulatorRecord:
-    """What happened since the start.
-
-    Attributes:
-        log: Commands and answers on the wire.
-        faults: Those that began, with when, s.
-    """
+    """What happened since the start."""
 
     log: WireLog
+    """Commands and answers on the wire."""
     faults: tuple[tuple[float, Fault], ...]
+    """Those that began, with when, s."""
 
 
 class EmulatorProcess:
@@ -78,30 +75,21 @@ class EmulatorProcess:
             raise UsageError(f"The emulator did not start: {answer}")
         self.path = answer
 
-    @property
-    def pid(self) -> int:
-        """Number of the process."""
-        assert self._process.pid is not None
-        return self._process.pid
-
     def state(self) -> EmulatorState:
         """Return the truth about the robot now."""
-        self._pipe.send("state")
-        state = self._answer()
+        state = self._ask("state")
         assert isinstance(state, EmulatorState)
         return state
 
     def record(self) -> EmulatorRecord:
         """Return what went over the wire and which faults began."""
-        self._pipe.send("record")
-        record = self._answer()
+        record = self._ask("record")
         assert isinstance(record, EmulatorRecord)
         return record
 
     def inject(self, fault: Fault) -> None:
         """Let a fault happen; its time counts from now."""
-        self._pipe.send(fault)
-        self._answer()
+        self._ask(fault)
 
     def close(self) -> None:
         """End the process."""
@@ -115,6 +103,10 @@ class EmulatorProcess:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def _ask(self, request: str | Fault) -> object:
+        self._pipe.send(request)
+        return self._answer()
 
     def _answer(self) -> object:
         if not self._pipe.poll(_PATIENCE):

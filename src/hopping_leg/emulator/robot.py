@@ -5,7 +5,9 @@ Time comes as an argument. Nothing here knows of sockets, terminals or the clock
 
 import heapq
 import itertools
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,9 +15,8 @@ from hopping_leg.arrays import Array
 from hopping_leg.deploy.preflight import required_settings
 from hopping_leg.emulator import bus
 from hopping_leg.emulator.drive import EmulatedDrive
-from hopping_leg.emulator.fault_injection import FaultInjector
-from hopping_leg.emulator.faults import Fault
-from hopping_leg.emulator.frames import Frame, ReplyQueue
+from hopping_leg.emulator.faults import KINDS, Delivery, Fault, FaultKind
+from hopping_leg.emulator.frames import Frame, QueuedReply, ReplyQueue
 from hopping_leg.emulator.leg import TIMESTEP, EmulatedLeg
 from hopping_leg.emulator.registers import identity
 from hopping_leg.emulator.settings import Settings
@@ -24,6 +25,10 @@ from hopping_leg.robot.parameters import JOINTS, Robot
 
 NOMINAL_VOLTAGE = 26.0
 """Bus voltage at which the qdd100 has the speed limit of the robot files, V."""
+
+
+_AIRBORNE = 0.01
+"""Height of the foot in a flight that counts as the first, m: no bounce."""
 
 
 class EmulatedRobot:
@@ -101,7 +106,7 @@ class EmulatedRobot:
             self.log.record_command(self.time, joint, message, drive)
             if answer is not None:
                 self.log.record_reply(self.time, joint, answer)
-                self.fault_injector.send(answer, joint, self.wire_time)
+                self.fault_injector.send(answer, joint)
 
     def _step(self) -> None:
         self.fault_injector.step()
@@ -136,3 +141,79 @@ def _drive(robot: Robot, joint: int, configured: bool) -> EmulatedDrive:
         brake=motor.peak_torque / motor.no_load_speed,
         voltage=NOMINAL_VOLTAGE * robot.reality.voltage,
     )
+
+
+class FaultInjector:
+    """When the faults of one robot begin and end, and what becomes of replies meanwhile.
+
+    Attributes:
+        log: Which fault began when, s.
+        flown: When the foot left the ground for the first time, s.
+    """
+
+    def __init__(
+        self, robot: "EmulatedRobot", faults: Sequence[Fault], rng: np.random.Generator
+    ) -> None:
+        self._robot, self._rng = robot, rng
+        self._pending = [fault for fault in faults if not KINDS[fault.kind].at_start]
+        self._running: list[FaultKind] = []
+        self.log: list[tuple[float, Fault]] = []
+        self._powered = self.flown = math.inf
+        self._contact, self._rate = True, 0.0
+        for fault in faults:
+            if KINDS[fault.kind].at_start:
+                self._begin(fault)
+
+    def add(self, fault: Fault) -> None:
+        """Add a fault whose time counts from now, whatever its ``since`` says."""
+        self._pending.append(replace(fault, since="start", at=fault.at + self._robot.time))
+
+    def step(self) -> None:
+        """Begin, update and end what is due before a step of physics."""
+        phases, time = self._phases(), self._robot.time
+        since = {"start": 0.0, "powered": self._powered, "flight": self.flown}
+        for fault in list(self._pending):
+            if time >= since[fault.since] + fault.at and fault.phase in phases:
+                self._pending.remove(fault)
+                self._running.append(self._begin(fault))
+        for running in list(self._running):
+            if running.over:
+                self._running.remove(running)
+                running.end()
+            else:
+                running.update()
+
+    def send(self, frame: Frame, joint: int) -> None:
+        """Queue a drive's reply (0 hip, 1 knee), or what becomes of it."""
+        delivery = Delivery(self._robot.time + self._robot.wire_time)
+        for running in self._running:
+            if joint in running.fault.joints:
+                running.replies_left -= 1
+                running.on_reply(delivery)
+        for _ in range(delivery.copies):
+            self._robot.reply_queue.put(delivery.due, QueuedReply(frame, flip=delivery.flip))
+
+    def _phases(self) -> set[str]:
+        """Return the phases of this moment; record power and the first lift-off."""
+        robot = self._robot
+        if math.isinf(self._powered) and all(drive.active for drive in robot.drives):
+            self._powered = robot.time
+        contact, rate = robot.leg.foot_clearance <= 0, robot.leg.height_rate
+        phases = {"any", "stance" if contact else "flight"}
+        if not contact:
+            phases.add("rising" if rate > 0 else "falling")
+            if self._rate > 0 >= rate:
+                phases.add("apex")
+            airborne = robot.leg.foot_clearance > _AIRBORNE
+            if airborne and math.isinf(self.flown) and math.isfinite(self._powered):
+                self.flown = robot.time
+        elif not self._contact:
+            phases.add("touchdown")
+        self._contact, self._rate = contact, rate
+        return phases
+
+    def _begin(self, fault: Fault) -> FaultKind:
+        running = KINDS[fault.kind](fault, self._robot, self._rng)
+        self.log.append((self._robot.time, fault))
+        running.begin()
+        return running

@@ -16,9 +16,7 @@ HOMED_OUTPUT = 2
 class RotorEncoder:
     """Position of one drive's output as its firmware knows it.
 
-    Args:
-        settings: Configuration of the drive.
-        gear_ratio: Turns of the rotor per turn of the output: the truth, whatever is configured.
+    The gear ratio, turns of the rotor per turn of the output, is the truth, whatever is configured.
     """
 
     def __init__(self, settings: Settings, gear_ratio: float) -> None:

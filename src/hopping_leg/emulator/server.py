@@ -158,13 +158,7 @@ class Server:
 def serve(robot: EmulatedRobot, port: Port, *, ready: bool) -> bool:
     """Hand over what is due between host and robot, and pull or push the plug.
 
-    Args:
-        robot: Behind the wire.
-        port: Towards the host.
-        ready: Whether the host may have sent something.
-
-    Returns:
-        Whether there is anything new for the host.
+    ``ready`` tells that the host may have sent something; returns whether the host has something.
     """
     if ready and port.plugged:
         for frame in port.receive():
@@ -173,10 +167,9 @@ def serve(robot: EmulatedRobot, port: Port, *, ready: bool) -> bool:
     for item in items:
         if port.plugged:
             port.send(item)
-    plugged = robot.plugged
-    if plugged == port.plugged:
+    if robot.plugged == port.plugged:
         return bool(items)
-    if plugged:
+    if robot.plugged:
         port.plug_in()
     else:
         port.unplug()

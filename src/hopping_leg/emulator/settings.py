@@ -6,11 +6,9 @@ only values that the emulator obeys or a host may want to check are here.
 
 from hopping_leg.errors import UsageError, unknown_name
 
-Value = int | float
-
 NAN = float("nan")
 
-DEFAULTS: dict[str, Value] = {
+DEFAULTS: dict[str, int | float] = {
     "id.id": 1,
     "can.prefix": 0,
     "motor.poles": 42,
@@ -61,14 +59,13 @@ DEFAULTS: dict[str, Value] = {
 class Settings:
     """One drive's configuration; changes are lost with power unless saved.
 
-    Args:
-        changes: Values that differ from the defaults, already in flash.
+    What is given differs from the defaults, already in flash.
 
     Raises:
         UsageError: A name is unknown or a value has no meaning.
     """
 
-    def __init__(self, **changes: Value) -> None:
+    def __init__(self, **changes: float) -> None:
         self._values = dict(DEFAULTS)
         for name, value in changes.items():
             self.set(name, str(value))

@@ -71,11 +71,8 @@ class _Waiting(selectors.SelectSelector):
 class Lockstep:
     """The clock that moves an emulated robot, the link to it, and the client behind the link.
 
-    Whoever asks the client does its work, in the place of a thread.
-
-    Args:
-        robot: Behind the wire.
-        checksums: Whether the lines have checksums; a plain fdcanusb's have none.
+    Whoever asks the client does its work, in the place of a thread. The lines have checksums, or
+    none as a plain fdcanusb's.
 
     Attributes:
         truth: Time and base height at every tick, s and m, and the foot's clearance, m.
