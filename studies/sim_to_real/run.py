@@ -87,9 +87,10 @@ class HopWithout(HopOnTwin):
         return dataclasses.replace(robot, reality=EFFECTS[self.effect](robot.reality))
 
     @property
-    def suffix(self) -> str:
-        """Of the file."""
-        return f"-without-{self.effect}"
+    def file(self) -> Path:
+        """File of the result."""
+        path = super().file
+        return path.with_name(f"{path.stem}-without-{self.effect}.json")
 
 
 def effect_rows(hops: Sequence[HopOnTwin], without: Sequence[HopWithout]) -> list[dict[str, Any]]:
@@ -136,13 +137,8 @@ class Meet(HopTrial):
         return f"hop on {self.twin.name}, shipped {POLICY}"
 
     @property
-    def leg(self) -> Robot:
-        """The twin."""
-        return self.twin.robot
-
-    @property
     def file(self) -> Path:
-        """Of the result."""
+        """File of the result."""
         return self.study.folder / "predictions" / f"{self.twin.name}.json"
 
     @property
@@ -169,7 +165,7 @@ class Foretell(Meet):
 
     @property
     def file(self) -> Path:
-        """Of the result."""
+        """File of the result."""
         return self.study.folder / "predictions" / f"{self.twin.name}-{self.method.name}.json"
 
 
@@ -284,18 +280,18 @@ class Experiment:
     not to foretell), rail-only, fixed-base-only, two-pass, one-pass, truth. Default: the first
     four; or all that can foretell."""
     seeds: tuple[int, ...] = (0,)
-    """Of the trainings, one of each method and twin each."""
+    """Seeds of the trainings, one of each method and twin each."""
     recipe: str = "adaptive"
-    """By which policies are trained, as in `hop train`; `fast` is the quicker one, but
+    """Recipe by which policies are trained, as in `hop train`; `fast` is the quicker one, but
     corrects nothing of what no fit can find."""
     set: tuple[str, ...] = ()
     """Numbers of the recipe to change, as in `hop train`; not its steps."""
     steps: int = Study.steps
     """Control steps of experience of a training."""
     seconds: float = 60.0
-    """Of each recording; the paper's are 240 s."""
+    """Duration of each recording, s; the paper's are 240 s."""
     generations: int = 100
-    """Of CMA-ES in each pass, for the methods two-pass and one-pass."""
+    """Generations of CMA-ES in each pass, for the methods two-pass and one-pass."""
     commands: Heights = Study.commands
     """Apex heights at which the twins are tried, m."""
     repeats: int = 3
@@ -306,9 +302,9 @@ class Experiment:
     jobs: int = 1
     """Recordings, fits, trainings or trials at the same time, each in its own process."""
     threads: int = 1
-    """Of each job."""
+    """Threads of each job."""
     folder: Path = Path("runs/transfer")
-    """For recordings, robots, trainings and trials; what is there is not done again."""
+    """Folder for recordings, robots, trainings and trials; what is there is not done again."""
     json: Path | None = None
     """Write every number to this file."""
 

@@ -27,13 +27,13 @@ def test_a_recording_belongs_to_its_twin_and_time(tmp_path):
     one = study(tmp_path)
     job = RecordTwin(one, one.twins[0], "rail")
     header = {"robot_digest": one.twins[0].robot.digest, "seconds": 60.0}
-    Trace(pl.DataFrame({"time_s": [0.0]}), header).save(job._file)
+    Trace(pl.DataFrame({"time_s": [0.0]}), header).save(job.file)
     assert job.done
     longer = dataclasses.replace(job, study=dataclasses.replace(one, seconds=90.0))
     stranger = dataclasses.replace(job, twin=one.twins[1])
-    stranger._file.write_bytes(job._file.read_bytes())
-    for other in (longer, stranger):
-        with pytest.raises(UsageError, match="another twin or for another time"):
+    stranger.file.write_bytes(job.file.read_bytes())
+    for other, option in ((longer, "seconds"), (stranger, "robot_digest")):
+        with pytest.raises(UsageError, match=rf"other options \({option}\)"):
             assert other.done
 
 
@@ -69,7 +69,7 @@ def test_a_fit_belongs_to_its_recordings(identified, tmp_path, monkeypatch):
     truth = {p["name"]: p["truth"] for p in row["parameters"]}
     assert truth["hip.friction"] == one.twins[0].robot.hip.friction
     record(LEG.robot, swing(3.0)).save(file)
-    with pytest.raises(UsageError, match="other recordings"):
+    with pytest.raises(UsageError, match=r"other options \(recordings\)"):
         assert job.done
 
 

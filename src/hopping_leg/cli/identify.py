@@ -16,12 +16,11 @@ import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
 
 import tyro
 from rich.table import Column
 
-from hopping_leg.cli.options import JsonFile, command_line, say, show_table
+from hopping_leg.cli.options import JsonFile, Names, command_line, say, show_table
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.optimizers import CmaOptions
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
@@ -39,20 +38,9 @@ from hopping_leg.identify.search import SearchOptions
 from hopping_leg.io import write_atomically, write_json
 from hopping_leg.progress import LiveProgress, minutes
 from hopping_leg.robot import load_robot
+from hopping_leg.robot.parameters import JOINTS
 
 _FILES = {"out": "Robot", "json": "Numbers", "report": "Report"}
-
-Names = Annotated[
-    tuple[str, ...],
-    tyro.constructors.PrimitiveConstructorSpec(
-        nargs=1,
-        metavar="NAME,NAME,...",
-        instance_from_str=lambda words: tuple(n.strip() for n in words[0].split(",")),
-        is_instance=lambda value: isinstance(value, tuple),
-        str_from_instance=lambda names: [",".join(names)],
-    ),
-]
-"""Parameters given as ``hip.friction,knee.damping``."""
 
 
 @dataclass(frozen=True)
@@ -167,7 +155,7 @@ def _outputs(args: Identify) -> list[tuple[str, Path]]:
 def _bounds(text: str) -> tuple[str, tuple[float, float]]:
     name, _, pair = text.partition("=")
     try:
-        low, high = (float(part) for part in pair.split(","))
+        low, high = map(float, pair.split(","))
     except ValueError as error:
         raise UsageError(
             f"'{text}' gives no bounds; write e.g. hip.friction=0,0.5 in SI units."
@@ -180,8 +168,7 @@ def _check_out(args: Identify, origin: str) -> None:
     if args.out.suffix != ".toml":
         raise UsageError(f"--out {args.out} must end in .toml, as robot files do.")
     recordings = (*args.recordings, *args.validate)
-    inputs = {Path(origin).resolve(), *(p.resolve() for p in recordings)}
-    inputs |= {sidecar_path(p).resolve() for p in recordings}
+    inputs = {p.resolve() for p in (Path(origin), *recordings, *map(sidecar_path, recordings))}
     for name, path in _outputs(args):
         if path.resolve() in inputs:
             raise UsageError(f"--{name} {path} would replace an input; give another file.")
@@ -203,33 +190,20 @@ def _show_recordings(use: str, recordings: list[Recording]) -> None:
 
 
 def _show(identified: Identified) -> None:
-    show_table(
-        (Column("parameter", no_wrap=True), "start", "identified", "95 % interval", "unit"),
-        [
-            (
-                row["name"],
-                f"{row['start']:.4g}",
-                f"{row['value']:.4g}{' (at bound)' if row['at_bound'] else ''}",
-                f"{row['interval_low']:.4g} .. {row['interval_high']:.4g}"
-                if math.isfinite(row["interval_high"])
-                else "unknown",
-                row["unit"],
-            )
-            for row in parameters_json(identified)
-        ],
-    )
-    show_table(
-        ("on held-out data, rms", "before: hip", "knee", "after: hip", "knee", "unit"),
-        [_quality_cells(row) for row in quality_json(identified)],
-    )
+    rows = []
+    for row in parameters_json(identified):
+        value = f"{row['value']:.4g}{' (at bound)' if row['at_bound'] else ''}"
+        interval = f"{row['interval_low']:.4g} .. {row['interval_high']:.4g}"
+        known = math.isfinite(row["interval_high"])
+        name, start, unit = row["name"], f"{row['start']:.4g}", row["unit"]
+        rows.append((name, start, value, interval if known else "unknown", unit))
+    first = Column("parameter", no_wrap=True)
+    show_table((first, "start", "identified", "95 % interval", "unit"), rows)
+    rows = []
+    for row in quality_json(identified):
+        unit, factor = ("mrad", 1e3) if row["unit"] == "rad" else (row["unit"], 1.0)
+        values = [row[f"{joint}_{when}"] for when in ("before", "after") for joint in JOINTS]
+        shown = (f"{factor * value:.3g}" if math.isfinite(value) else "-" for value in values)
+        rows.append((row["error"], *shown, unit))
+    show_table(("on held-out data, rms", "before: hip", "knee", "after: hip", "knee", "unit"), rows)
     say(*identified.identifiability.statements)
-
-
-def _quality_cells(row: dict[str, Any]) -> list[str]:
-    unit, factor = ("mrad", 1e3) if row["unit"] == "rad" else (row["unit"], 1.0)
-    values = [row[key] for key in ("hip_before", "knee_before", "hip_after", "knee_after")]
-    return [
-        row["error"],
-        *(f"{factor * value:.3g}" if math.isfinite(value) else "-" for value in values),
-        unit,
-    ]

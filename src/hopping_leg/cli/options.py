@@ -3,7 +3,7 @@
 import dataclasses
 import re
 import shlex
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_type_hints
 
@@ -29,18 +29,26 @@ def parse_heights(text: str) -> tuple[float, ...]:
         ) from error
 
 
-Heights = Annotated[
-    tuple[float, ...],
-    tyro.constructors.PrimitiveConstructorSpec(
+def _one_word(
+    metavar: str, read: Callable[[str], tuple[Any, ...]], form: str
+) -> tyro.constructors.PrimitiveConstructorSpec[Any]:
+    """Return how a tuple is read from one word with commas, and written."""
+    return tyro.constructors.PrimitiveConstructorSpec(
         nargs=1,
-        metavar="M,M,...",
-        instance_from_str=lambda words: parse_heights(words[0]),
+        metavar=metavar,
+        instance_from_str=lambda words: read(words[0]),
         is_instance=lambda value: isinstance(value, tuple),
-        str_from_instance=lambda heights: [",".join(f"{h:g}" for h in heights)],
-    ),
-]
-"""Heights in metres, given as ``0.25,0.30``."""
+        str_from_instance=lambda values: [",".join(format(value, form) for value in values)],
+    )
 
+
+Heights = Annotated[tuple[float, ...], _one_word("M,M,...", parse_heights, "g")]
+"""Heights in metres, given as ``0.25,0.30``."""
+Names = Annotated[
+    tuple[str, ...],
+    _one_word("NAME,NAME,...", lambda text: tuple(n.strip() for n in text.split(",")), ""),
+]
+"""Names given as ``hip.friction,knee.damping``."""
 RobotFile = Annotated[str, tyro.conf.arg(help="A shipped robot or the path of a .toml file.")]
 JsonFile = Annotated[
     Path | None, tyro.conf.arg(help="JSON file for every number, besides what is printed.")

@@ -117,15 +117,12 @@ def make_study(args: Reproduce) -> Study:
     from hopping_leg.rl.recipes.fast import FAST
 
     folder = args.folder / "transfer"
-    count = "5" if args.full else "1"
-    twins = find_twins([args.twin or count], folder / "twins")
-    steps = 1 if args.quick else args.steps
     return Study(
         folder,
-        twins,
+        find_twins([args.twin or ("5" if args.full else "1")], folder / "twins"),
         tuple(choose_methods(_PAPER if args.full else _MINIATURE)),
         seeds=(args.seed,),
-        steps=FAST.schedule.steps if args.full else steps,
+        steps=FAST.schedule.steps if args.full else 1 if args.quick else args.steps,
         seconds=240.0 if args.full else SHORTEST,
         least_squares=_GLANCE if args.quick else USUAL_FIT,
         repeats=1 if args.quick else 3,
@@ -138,10 +135,8 @@ def _check(args: Reproduce) -> None:
     if args.quick and args.full:
         raise UsageError("--quick and --full exclude each other; give one of them.")
     mark = args.folder / _MARK
-    size = (
-        mark.read_text(encoding="utf-8", errors="replace").strip() if mark.exists() else args.size
-    )
-    if size != args.size:
+    size = mark.read_text(encoding="utf-8", errors="replace").strip() if mark.exists() else ""
+    if size not in ("", args.size):
         raise UsageError(
             f"{args.folder} holds a run of the {size} size, not of the {args.size} one; give"
             " another --out."

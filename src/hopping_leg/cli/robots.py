@@ -51,7 +51,11 @@ class Check:
 def run(args: List | Show | Check) -> None:
     """List, show or check robots."""
     if isinstance(args, List):
-        _list(args)
+        robots = [load_robot(name) for name in shipped_robots()]
+        if args.json:
+            write_json(args.json, [{"name": r.name, **derived(r)} for r in robots])
+        for robot in robots:
+            print(f"{robot.name:<12}  {robot.description}\n{'':<12}  {_summary(robot)}")
     elif isinstance(args, Show):
         _show(args)
     else:
@@ -60,22 +64,13 @@ def run(args: List | Show | Check) -> None:
         print(f"{args.robot} is a valid robot: {robot.name} ({_summary(robot)}).")
 
 
-def _list(args: List) -> None:
-    robots = [load_robot(name) for name in shipped_robots()]
-    if args.json:
-        write_json(args.json, [{"name": r.name, **derived(r)} for r in robots])
-    for robot in robots:
-        print(f"{robot.name:<12}  {robot.description}\n{'':<12}  {_summary(robot)}")
-
-
 def _show(args: Show) -> None:
     robot, tree = load_robot(args.robot), load_tree(args.robot)
     if args.json:
         write_json(args.json, {**asdict(robot), "derived": derived(robot)})
     rows = [(p, f"{e['value']:g}", e["unit"], e["source"]) for p, e in numbers(tree)]
     for path, value in derived(robot).items():
-        shown = f"{value:g}" if isinstance(value, float) else value
-        rows.append((path, shown, "", "computed"))
+        rows.append((path, f"{value:g}" if isinstance(value, float) else value, "", "computed"))
     title = f"{robot.name}: {robot.description}"
     show_table(("number", "value", "unit", "source"), rows, title)
 

@@ -50,8 +50,47 @@ _BOTH_SWINGS = 120.0
 """Recordings of so many seconds have room for both swing periods of the paper."""
 
 
+class StoredJob(Job):
+    """A job whose result is a file, stored with the options that it depends on."""
+
+    @property
+    @abstractmethod
+    def file(self) -> Path:
+        """File of the result."""
+
+    @property
+    @abstractmethod
+    def asked(self) -> dict[str, Any]:
+        """Options that the result depends on, as JSON values."""
+
+    @property
+    def stored(self) -> dict[str, Any]:
+        """Options that the stored result was made with; others may stand beside them."""
+        text = self.file.with_suffix(".json").read_text(encoding="utf-8")
+        asked: dict[str, Any] = json.loads(text)["asked"]
+        return asked
+
+    @property
+    def done(self) -> bool:
+        """Whether the result is stored.
+
+        Raises:
+            UsageError: It is stored, but of other options.
+        """
+        if not self.file.exists():
+            return False
+        stored, asked = self.stored, self.asked
+        other = [name for name in {**asked, **stored} if asked.get(name) != stored.get(name)]
+        if other:
+            raise UsageError(
+                f"{self.file} was made with other options ({', '.join(other)}); give another"
+                " --folder, or delete it to make it again."
+            )
+        return True
+
+
 @dataclass(frozen=True)
-class RecordTwin(Job):
+class RecordTwin(StoredJob):
     """A twin recorded on a rig."""
 
     study: Study
@@ -66,22 +105,20 @@ class RecordTwin(Job):
         return f"record {self.twin.name}, {self.rig}"
 
     @property
-    def done(self) -> bool:
-        """Whether the file is there.
+    def file(self) -> Path:
+        """The recording."""
+        return self.study.recording(self.twin, self.rig)
 
-        Raises:
-            UsageError: It is there, but of another twin or length.
-        """
-        if not self._file.exists():
-            return False
-        header = Trace.load(self._file).header
-        asked = self._template().duration
-        if header["robot_digest"] != self.twin.robot.digest or header["seconds"] != asked:
-            raise UsageError(
-                f"{self._file} was recorded from another twin or for another time; give another"
-                " --folder, or delete it to record again."
-            )
-        return True
+    @property
+    def asked(self) -> dict[str, Any]:
+        """Twin and duration, s."""
+        return {"robot_digest": self.twin.robot.digest, "seconds": self._template().duration}
+
+    @property
+    def stored(self) -> dict[str, Any]:
+        """The same entries of the recording's header."""
+        header = Trace.load(self.file).header
+        return {name: header[name] for name in ("robot_digest", "seconds")}
 
     def run(self, *, quiet: bool) -> None:
         """Play the paper's trajectory and write the recording."""
@@ -94,11 +131,7 @@ class RecordTwin(Job):
             seed=0 if self.rig == "fixed-base" else 1,
         )
         recording.trace.header["seconds"] = template.duration
-        recording.save(self._file)
-
-    @property
-    def _file(self) -> Path:
-        return self.study.recording(self.twin, self.rig)
+        recording.save(self.file)
 
     def _template(self) -> Strokes:
         seconds = self.study.seconds
@@ -113,7 +146,7 @@ _INERTIA_FACTOR = 10.0
 
 
 @dataclass(frozen=True)
-class IdentifyTwin(Job):
+class IdentifyTwin(StoredJob):
     """A twin identified by a method."""
 
     study: Study
@@ -132,36 +165,32 @@ class IdentifyTwin(Job):
 
     @property
     def fit(self) -> Fit:
-        """How."""
+        """How the method identifies."""
         assert self.method.fit is not None
         return self.method.fit
 
     @property
-    def done(self) -> bool:
-        """Whether the robot file is there.
+    def file(self) -> Path:
+        """The robot file; beside it, as .json, stands the fit."""
+        return self.study.fitted(self.twin, self.method)
 
-        Raises:
-            UsageError: It is there, but from other recordings.
-        """
-        file = self.study.fitted(self.twin, self.method)
-        if not file.exists():
-            return False
-        asked = json.loads(file.with_suffix(".json").read_text(encoding="utf-8"))["asked"]
-        if asked != self._asked():
-            raise UsageError(
-                f"{file} was identified from other recordings or with other options; give another"
-                " --folder, or delete it to identify again."
-            )
-        return True
+    @property
+    def asked(self) -> dict[str, Any]:
+        """Recordings and search."""
+        search, effort = self.fit.search, self.study.least_squares
+        return {
+            "recordings": [load_recording(path).digest for path in self._recordings],
+            "search": search,
+            "generations": None if search == "least-squares" else self.study.generations,
+            **({} if effort == USUAL_FIT else {"least_squares": dataclasses.asdict(effort)}),
+        }
 
     def run(self, *, quiet: bool) -> None:
         """Identify and write the robot file; a fit that was killed goes on."""
         study, search = self.study, self.fit.search
-        file = study.fitted(self.twin, self.method)
         believed = load_robot(self.twin.believed)
         effort = SearchOptions(
-            cma=CmaOptions(generations=study.generations),
-            least_squares=study.least_squares,
+            cma=CmaOptions(generations=study.generations), least_squares=study.least_squares
         )
         recordings = [load_recording(path) for path in self._recordings]
         options = IdentifyOptions(search=search, bounds=_bounds(believed), effort=effort)
@@ -170,30 +199,15 @@ class IdentifyTwin(Job):
             options = dataclasses.replace(
                 options, search="cma", parameters=tuple(names), scoring=Scoring()
             )
-        identified = identify(
-            recordings,
-            believed,
-            options=options,
-            folder=file.with_suffix(""),
-            resume=True,
-        )
-        content = {"asked": self._asked(), **as_json(identified), "truth": self._truth(identified)}
-        write_json(file.with_suffix(".json"), content)
-        save_robot(identified, file, self.twin.believed)
+        folder = self.file.with_suffix("")
+        identified = identify(recordings, believed, options=options, folder=folder, resume=True)
+        content = {"asked": self.asked, **as_json(identified), "truth": self._truth(identified)}
+        write_json(self.file.with_suffix(".json"), content)
+        save_robot(identified, self.file, self.twin.believed)
 
     @property
     def _recordings(self) -> list[Path]:
         return [self.study.recording(self.twin, rig) for rig in self.fit.rigs]
-
-    def _asked(self) -> dict[str, Any]:
-        search = self.fit.search
-        effort = self.study.least_squares
-        return {
-            "recordings": [load_recording(path).digest for path in self._recordings],
-            "search": search,
-            "generations": None if search == "least-squares" else self.study.generations,
-            **({} if effort == USUAL_FIT else {"least_squares": dataclasses.asdict(effort)}),
-        }
 
     def _truth(self, identified: Identified) -> dict[str, float]:
         """Return the twin's own values of what was fitted, where it has them."""
@@ -227,7 +241,7 @@ class TrainPolicy(Job):
     @property
     def name(self) -> str:
         """What is done."""
-        return f"train {self.study.training(self.twin, self.method, self.seed).name}"
+        return f"train {self.path.name}"
 
     @property
     def done(self) -> bool:
@@ -246,12 +260,11 @@ class TrainPolicy(Job):
         """Train; a training that was killed goes on."""
         from hopping_leg.rl.train import train
 
-        folder = self._folder()
         train(
             self.recipe(),
             self.robot,
             self.seed,
-            folder.path,
+            self.path,
             resume=True,
             threads=self.study.threads,
             quiet=quiet,
@@ -259,7 +272,7 @@ class TrainPolicy(Job):
 
     def progress(self) -> tuple[float, str]:
         """Return the share done and what to show while it runs."""
-        snapshots = sorted((self._folder().path / "snapshots").glob("*.onnx"))
+        snapshots = sorted((self.path / "snapshots").glob("*.onnx"))
         steps = int(snapshots[-1].stem) if snapshots else 0
         share = min(steps / self.study.steps, 1.0)
         return share, f"{steps / 1e6:.1f}M steps" if steps else "begun"
@@ -278,12 +291,12 @@ class TrainPolicy(Job):
 
     @property
     def robot(self) -> Robot:
-        """What is trained on."""
+        """Robot that is trained on."""
         return self.study.simulated(self.twin, self.method)
 
     @property
     def path(self) -> Path:
-        """The training's folder."""
+        """Folder of the training."""
         return self.study.training(self.twin, self.method, self.seed)
 
     @property
@@ -299,26 +312,25 @@ class TrainPolicy(Job):
 
     @property
     def own_score(self) -> float:
-        """How bad the policy is in the simulation that it was trained in, m."""
+        """Score of the policy in the simulation that it was trained in, m; less is better."""
         return float(self.result["selected"]["score_m"])
 
     def _folder(self) -> "RunFolder":
         from hopping_leg.rl.run_folder import RunFolder
 
         robot = self.robot
-        recipe = self.recipe().fit(robot)
-        return RunFolder(self.path, recipe, robot, self.seed, None)
+        return RunFolder(self.path, self.recipe().fit(robot), robot, self.seed, None)
 
 
 FIRST_SEED = 1000
-"""Of the trials; no seed from here on has chosen anything."""
+"""First seed of the trials; no seed from here on has chosen anything."""
 
 _KEPT = ("command_m", "median_error_m", "std_m", "hops", "skipped_hops", "hop_rate_hz",
          "flight_fraction", "body_contacts")  # fmt: skip
 
 
 @dataclass(frozen=True)
-class HopTrial(Job):
+class HopTrial(StoredJob):
     """A policy that hops at the study's commands on some leg."""
 
     study: Study
@@ -327,19 +339,9 @@ class HopTrial(Job):
     weight: ClassVar[float] = 0.3
 
     @property
-    @abstractmethod
-    def name(self) -> str:
-        """What is done."""
-
-    @property
-    @abstractmethod
     def leg(self) -> Robot:
-        """What the policy hops on."""
-
-    @property
-    @abstractmethod
-    def file(self) -> Path:
-        """Of the result."""
+        """Leg that the policy hops on: the twin."""
+        return self.twin.robot
 
     @property
     @abstractmethod
@@ -347,38 +349,24 @@ class HopTrial(Job):
         """The policy's file."""
 
     @property
-    def done(self) -> bool:
-        """Whether the result is there.
-
-        Raises:
-            UsageError: It is there, but of other trials.
-        """
-        if not self.file.exists():
-            return False
-        if json.loads(self.file.read_text(encoding="utf-8"))["asked"] != self._asked():
-            raise UsageError(
-                f"{self.file} holds trials of another policy, twin or length; give another"
-                " --folder, or delete it to try again."
-            )
-        return True
-
-    def run(self, *, quiet: bool) -> None:
-        """Try the policy at every command and write what was measured."""
-        content = {"asked": self._asked(), "rows": hop(self.policy, self.leg, self.study)}
-        write_json(self.file, content)
-
-    def measured(self) -> list[dict[str, Any]]:
-        """Return what was measured, one row per command."""
-        rows: list[dict[str, Any]] = json.loads(self.file.read_text(encoding="utf-8"))["rows"]
-        return rows
-
-    def _asked(self) -> dict[str, Any]:
+    def asked(self) -> dict[str, Any]:
+        """Policy, leg and trials."""
         return {
             "policy": hashlib.sha256(self.policy).hexdigest()[:16],
             "twin": self.leg.digest,
             "commands": list(self.study.commands),
             "repeats": self.study.repeats,
         }
+
+    def run(self, *, quiet: bool) -> None:
+        """Try the policy at every command and write what was measured."""
+        rows = hop(self.policy, self.leg, self.study)
+        write_json(self.file, {"asked": self.asked, "rows": rows})
+
+    def measured(self) -> list[dict[str, Any]]:
+        """Return what was measured, one row per command."""
+        rows: list[dict[str, Any]] = json.loads(self.file.read_text(encoding="utf-8"))["rows"]
+        return rows
 
 
 @dataclass(frozen=True)
@@ -394,20 +382,9 @@ class HopOnTwin(HopTrial):
         return f"hop on {self.twin.name}, {self.method.name}, seed {self.seed}"
 
     @property
-    def leg(self) -> Robot:
-        """The twin."""
-        return self.twin.robot
-
-    @property
-    def suffix(self) -> str:
-        """Of the file with the result."""
-        return ""
-
-    @property
     def file(self) -> Path:
-        """Of the result."""
-        path = self.study.trial(self.twin, self.method, self.seed)
-        return path.with_name(f"{path.stem}{self.suffix}.json")
+        """File of the result."""
+        return self.study.trial(self.twin, self.method, self.seed)
 
     @property
     def policy(self) -> bytes:
@@ -435,7 +412,7 @@ def hop(content: bytes, robot: Robot, study: Study) -> list[dict[str, Any]]:
     Args:
         content: The policy file.
         robot: The twin.
-        study: Says at which commands and how often.
+        study: Commands and how often each is tried.
     """
     policy = Policy(content, "the trained policy", "policy")
     bounds = (policy.card.command_low, policy.card.command_high)

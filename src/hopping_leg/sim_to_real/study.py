@@ -14,7 +14,7 @@ from hopping_leg.sim.twins import draw_twin
 from hopping_leg.sim_to_real.methods import Method
 
 SHORTEST = 30.0
-"""Of a recording, s: one swing of the leg per amplitude."""
+"""Shortest recording, s: one swing of the leg per amplitude."""
 
 USUAL_FIT = LeastSquaresOptions(tolerance=1e-3)
 """A round that lowers the cost by a smaller share ends the search."""
@@ -56,17 +56,17 @@ class Study:
     twins: tuple[TwinFile, ...]
     methods: tuple[Method, ...]
     seeds: tuple[int, ...] = (0,)
-    """Of the trainings, one each."""
+    """Seeds of the trainings, one each."""
     recipe: str = "fast"
-    """By which policies are trained."""
+    """Recipe by which policies are trained."""
     changes: tuple[str, ...] = ()
     """Numbers of the recipe that differ from its defaults, each ``name=number``."""
     steps: int = 6_000_000
     """Control steps of experience of a training."""
     seconds: float = 60.0
-    """Of each recording."""
+    """Duration of each recording, s."""
     generations: int = 100
-    """Of CMA-ES in each pass, for the methods that use it."""
+    """Generations of CMA-ES in each pass, for the methods that use it."""
     least_squares: LeastSquaresOptions = USUAL_FIT
     """How far the methods that use it search."""
     commands: tuple[float, ...] = (0.25, 0.27, 0.29, 0.31, 0.33, 0.35)
@@ -76,7 +76,7 @@ class Study:
     effects: bool = False
     """Whether the first method's policies also meet the twins with one effect less at a time."""
     threads: int = 1
-    """Of a training or trial; a fit takes every core."""
+    """Threads of a training or trial; a fit takes every core."""
 
     def __post_init__(self) -> None:
         for name in ("steps", "generations", "repeats", "threads"):

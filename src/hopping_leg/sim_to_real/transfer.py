@@ -79,7 +79,7 @@ def _all(study: Study) -> Iterable[tuple[int, Method, TwinFile]]:
 Row = dict[str, Any]
 
 _SEED = 0
-"""Of the bootstrap."""
+"""Seed of the bootstrap."""
 
 
 def tabulate(
@@ -88,14 +88,7 @@ def tabulate(
     trainings: Sequence[TrainPolicy],
     hops: Sequence[HopOnTwin],
 ) -> dict[str, Any]:
-    """Return everything that was measured, as JSON values.
-
-    Args:
-        study: What was asked for.
-        fits: All done.
-        trainings: All done.
-        hops: All done.
-    """
+    """Return everything that was measured, as JSON values; all jobs must be done."""
     trials = [row for hop in hops for row in hop.rows()]
     rows = [
         _pooled(method, [r for r in trials if (r["method"], r["command_m"]) == (method.name, c)])
@@ -164,27 +157,31 @@ def about(study: Study) -> Row:
 
 def _pooled(method: Method, trials: Sequence[Row]) -> Row:
     """Return one row over the twins and seeds of a method and command."""
-    absolute, signed = (_by_twin(trials, name) for name in ("median_abs_error_m", "median_error_m"))
-    low, high = median_interval(absolute, _SEED)
-    signed_low, signed_high = median_interval(signed, _SEED)
     return {
         "method": method.name,
         "meaning": method.meaning,
         "command_m": trials[0]["command_m"],
         "policies": len(trials),
-        "median_abs_error_m": float(np.median(np.concatenate(absolute))),
-        "median_abs_error_low_m": low,
-        "median_abs_error_high_m": high,
-        "worst_abs_error_m": float(np.max(np.concatenate(absolute))),
-        "median_error_m": float(np.median(np.concatenate(signed))),
-        "median_error_low_m": signed_low,
-        "median_error_high_m": signed_high,
+        **_median(trials, "median_abs_error_m"),
+        **_median(trials, "median_error_m"),
+        "worst_abs_error_m": max(r["median_abs_error_m"] for r in trials),
         "median_std_m": float(np.median([r["std_m"] for r in trials if r["hops"]] or [np.nan])),
-        "hops": sum(r["hops"] for r in trials),
-        "skipped_hops": sum(r["skipped_hops"] for r in trials),
-        "body_contacts": sum(r["body_contacts"] for r in trials),
-        "motionless": sum(r["motionless"] for r in trials),
+        **_sums(trials),
     }
+
+
+def _median(trials: Sequence[Row], name: str) -> Row:
+    """Return the median of a number and its interval over the twins."""
+    numbers = _by_twin(trials, name)
+    low, high = median_interval(numbers, _SEED)
+    start = name.removesuffix("_m")
+    median = float(np.median(np.concatenate(numbers)))
+    return {name: median, f"{start}_low_m": low, f"{start}_high_m": high}
+
+
+def _sums(trials: Sequence[Row]) -> Row:
+    names = ("hops", "skipped_hops", "body_contacts", "motionless")
+    return {name: sum(r[name] for r in trials) for name in names}
 
 
 def _by_twin(trials: Sequence[Row], name: str) -> list[Array]:
@@ -196,28 +193,20 @@ def _by_twin(trials: Sequence[Row], name: str) -> list[Array]:
 def _whole(method: Method, trials: Sequence[Row], study: Study) -> Row:
     """Return one row over all commands of a method."""
     mine = [r for r in trials if r["method"] == method.name]
-    errors = _by_twin(mine, "median_abs_error_m")
-    low, high = median_interval(errors, _SEED)
-    runs = [
-        [r for r in mine if (r["twin"], r["seed"]) == run]
-        for run in dict.fromkeys((r["twin"], r["seed"]) for r in mine)
-    ]
-    by_command = [[r["median_abs_error_m"] for r in mine if r["command_m"] == c]
-                  for c in study.commands]  # fmt: skip
+    runs: dict[tuple[str, int], list[Row]] = {}
+    for row in mine:
+        runs.setdefault((row["twin"], row["seed"]), []).append(row)
     return {
         "method": method.name,
         "meaning": method.meaning,
         "policies": len(runs),
-        "median_abs_error_m": float(np.median(np.concatenate(errors))),
-        "median_abs_error_low_m": low,
-        "median_abs_error_high_m": high,
-        "worst_command_median_abs_error_m": max(float(np.median(e)) for e in by_command),
-        "worst_abs_error_m": float(np.max(np.concatenate(errors))),
-        "ordered": sum(_ordered(run) for run in runs),
-        "hops": sum(r["hops"] for r in mine),
-        "skipped_hops": sum(r["skipped_hops"] for r in mine),
-        "body_contacts": sum(r["body_contacts"] for r in mine),
-        "motionless": sum(r["motionless"] for r in mine),
+        **_median(mine, "median_abs_error_m"),
+        "worst_command_median_abs_error_m": max(
+            _at(mine, method.name, command) for command in study.commands
+        ),
+        "worst_abs_error_m": max(r["median_abs_error_m"] for r in mine),
+        "ordered": sum(map(_ordered, runs.values())),
+        **_sums(mine),
     }
 
 
@@ -270,26 +259,19 @@ def compare(first: str, other: str, trials: Sequence[dict[str, Any]], seed: int)
 
     Args:
         first: Name of the method that the other is compared with.
-        other: Its name.
+        other: Name of the other.
         trials: One row per method, twin, seed and command.
-        seed: Of the bootstrap.
+        seed: Seed of the bootstrap.
 
     Returns:
         Medians over all twins, seeds and commands; the interval resamples whole twins, so that both
         methods keep meeting the same ones.
     """
-    twins = list(dict.fromkeys(row["twin"] for row in trials))
+    count = len({row["twin"] for row in trials})
     errors = {
-        method: [
-            np.array([
-                row["median_abs_error_m"]
-                for row in trials
-                if row["method"] == method and row["twin"] == twin
-            ])
-            for twin in twins
-        ]
-        for method in (first, other)
-    }  # fmt: skip
+        name: _by_twin([row for row in trials if row["method"] == name], "median_abs_error_m")
+        for name in (first, other)
+    }
 
     def ratio(index: IntArray) -> float:
         above, below = (
@@ -298,9 +280,9 @@ def compare(first: str, other: str, trials: Sequence[dict[str, Any]], seed: int)
         )
         return float(above / below)
 
-    low = high = whole = ratio(np.arange(len(twins)))
-    if len(twins) > 1:
-        low, high = bootstrap((np.arange(len(twins)),), ratio, seed)
+    low = high = whole = ratio(np.arange(count))
+    if count > 1:
+        low, high = bootstrap((np.arange(count),), ratio, seed)
     return {
         "method": other,
         "over": first,
