@@ -52,11 +52,7 @@ INTERRUPTED = 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; return the exit code.
-
-    Args:
-        arguments: Words behind the program's name; default: those of the process.
-    """
+    """Run the command line, by default the process's own; return the exit code."""
     return guard(lambda: _dispatch(list(sys.argv[1:] if arguments is None else arguments)))
 
 

@@ -72,8 +72,7 @@ class Deploy:
     live: bool = False
     """Change the height while the leg hops: + and -, or the arrows."""
     web: int | None = None
-    """Serve a page with a slider for the height and a stop button at this port of this computer, 0
-    for any free one; implies --live."""
+    """Port of a page with a slider for the height and a stop button, 0 for any; implies --live."""
     soft_limits: bool = True
     """The paper's PD that pulls joints back into bounds."""
     other_robot: bool = False

@@ -48,8 +48,8 @@ class Doctor:
     """Which drives, and what may be changed."""
 
     transport: str | None = None
-    """Path of an fdcanusb, interface:channel of python-can, or pi3hat; without one only the
-    installation is looked at."""
+    """Path of an fdcanusb, interface:channel of python-can, or pi3hat; without one the
+    installation is checked."""
     robot: str = "legv2-paper"
     """A shipped robot or a .toml file; its table [hardware] says how the drives are wired."""
     write: bool = False
@@ -116,11 +116,7 @@ def show_extras() -> None:
 
 
 def missing_requirements(requirements: Sequence[str]) -> dict[str, list[str]]:
-    """Return what of each extra is absent or of a version that does not fit.
-
-    Args:
-        requirements: Requirements as the package's metadata states them.
-    """
+    """Return what of each extra's requirements is absent or of a version that does not fit."""
     wanted = [Requirement(line) for line in requirements]
     return {
         extra: [_text(r) for r in wanted if _belongs(r, extra) and not _met(r)]

@@ -105,12 +105,7 @@ class Evaluate(Conditions):
 
 
 def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
-    """Evaluate controllers, print the table, write what was asked for.
-
-    Args:
-        args: Options.
-        notes: Sentences for table and report, before those that arise.
-    """
+    """Evaluate controllers, print the table, write what was asked for; notes come first there."""
     command = command_line("hop evaluate", args)
     if args.out is not None:
         args = replace(

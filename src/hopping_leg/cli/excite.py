@@ -9,7 +9,7 @@ Examples:
   hop excite multisine --centre 0.7 -1.4 --amplitude 0.3 0.4 --out multisine.parquet
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -37,8 +37,7 @@ class Common:
     rate: float = RATE
     """Targets per second, Hz."""
     track_velocity: bool = False
-    """Let the velocity targets be the positions' derivative, as in the lab's recordings; the paper
-    sets them to zero."""
+    """Velocity targets are the positions' derivative, as in the lab's recordings, not zero."""
     hip_range: Pair = HardwareRange().hip
     """How far the real hip turns, rad."""
     knee_range: Pair = HardwareRange().knee
@@ -77,16 +76,7 @@ class FixedBase(MovingBase):
 class MultisineCommand(Common):
     """Harmonics of hip and knee around a posture, base clamped."""
 
-    centre: Pair = (0.7, -1.4)
-    """Posture of hip and knee, rad."""
-    amplitude: Pair = (0.3, 0.4)
-    """Largest excursion of hip and knee, rad."""
-    lowest: float = 0.1
-    """Lowest frequency and spacing of the others, Hz."""
-    highest: float = 4.0
-    """Highest frequency, Hz."""
-    duration: float = 60.0
-    """Duration of the trajectory, s."""
+    signal: Annotated[Multisine, tyro.conf.arg(name="")] = field(default_factory=Multisine)
 
 
 def run(
@@ -118,7 +108,7 @@ def run(
 
 def _template(args: MovingBase | MultisineCommand, robot: Robot, limits: HardwareRange) -> Template:
     if isinstance(args, MultisineCommand):
-        return Multisine(args.centre, args.amplitude, args.lowest, args.highest, args.duration)
+        return args.signal
     make = paper.moving_base
     if isinstance(args, FixedBase):
         make = partial(paper.fixed_base, swings=args.swings)

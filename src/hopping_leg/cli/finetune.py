@@ -48,8 +48,7 @@ class Finetune:
     robot: str = "legv2-paper"
     """What is believed of the leg: the robot that the policy was trained on."""
     method: Literal["aim", "sac", "both"] = "both"
-    """What is learnt: the command that the network is told, its weights, or the one, then the
-    other."""
+    """What is learnt: the command that the network is told, its weights, or one after the other."""
     minutes: float = 10.0
     """Robot time at most."""
     commands: Heights = (0.25, 0.30, 0.35)

@@ -55,11 +55,10 @@ class Reproduce:
     jobs: int = 2
     """Recordings, trainings or trials at the same time; take the number of cores."""
     quick: bool = False
-    """The shortest run that takes every step, to see that all of it works here; its numbers mean
-    nothing."""
+    """Take every step as shortly as can be, to see that it works; the numbers mean nothing."""
     full: bool = False
-    """The paper's sizes instead: 240 s per recording, five twins, all alternatives and ablations,
-    trainings of the recipe's full length. Takes hours."""
+    """Take the paper's sizes: 240 s per recording, five twins, all ablations, trainings of the
+    recipe's full length. Takes hours."""
     json: Path | None = None
     """File for every number of the evaluation, besides evaluation.json."""
 

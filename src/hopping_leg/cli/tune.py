@@ -57,8 +57,7 @@ class RecipeSearch:
     steps: int = 1_000_000
     """Control steps of each training, all legs together."""
     study: str | None = None
-    """SQLite file, or URL of another database, e.g. postgresql://...; default:
-    runs/tune/RECIPE.db."""
+    """SQLite file, or URL of another database; default: runs/tune/RECIPE.db."""
     workers: int | None = None
     """Processes on this machine, one by default; more machines: the same command with the same
     --study, or --ray, where it counts the cluster's workers, by default one per CPU."""

@@ -2,7 +2,7 @@
 
 import hashlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
@@ -48,17 +48,17 @@ class Multisine:
         UsageError: A number has no meaning.
     """
 
-    centre: Pair
-    """Posture, rad."""
-    amplitude: Pair
-    """Largest excursion, rad."""
+    centre: Pair = (0.7, -1.4)
+    """Posture of hip and knee, rad."""
+    amplitude: Pair = (0.3, 0.4)
+    """Largest excursion of hip and knee, rad."""
     lowest: float = 0.1
-    """Hz; also the spacing of the harmonics."""
+    """Lowest frequency and spacing of the others, Hz."""
     highest: float = 4.0
-    """Hz."""
+    """Highest frequency, Hz."""
     duration: float = 60.0
-    """s."""
-    rig: Rig = "fixed-base"
+    """Duration of the trajectory, s."""
+    rig: Rig = field(default="fixed-base", init=False)
 
     def __post_init__(self) -> None:
         for name in ("lowest", "duration"):
