@@ -7,6 +7,7 @@ import time
 
 from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.emulator.drive import EmulatedDrive
+from hopping_leg.emulator.leg import TIMESTEP
 from hopping_leg.emulator.mode_machine import CONTROLLING
 from hopping_leg.emulator.virtual_time import Lockstep
 
@@ -82,7 +83,7 @@ class StruckClock:
         while robot.time < begin + _WATCHED:
             if braked is None and all(_braking(drive) for drive in robot.drives):
                 braked = robot.time - begin
-            robot.advance(robot.time + robot.timestep)
+            robot.advance(robot.time + TIMESTEP)
         return braked
 
 

@@ -27,28 +27,31 @@ while True:
 """
 
 
-def write(path, rows=5):
+def write(path):
     box = FlightRecorder(path, COLUMNS, {"robot": "legv2"})
-    for tick in range(rows):
+    for tick in range(5):
         box.row([tick * 0.005, 0.3, 1.0 + tick])
     box.event(time_s=0.01, state="damping", reason="operator_stop")
     box.close()
-    return box
 
 
-def test_what_was_recorded_comes_back_as_a_trace(tmp_path):
+@pytest.fixture
+def path(tmp_path):
+    """A recording of five ticks."""
     write(tmp_path / "a.blackbox")
-    trace = recover(tmp_path / "a.blackbox")
+    return tmp_path / "a.blackbox"
+
+
+def test_what_was_recorded_comes_back_as_a_trace(path):
+    trace = recover(path)
     np.testing.assert_allclose(trace.column("hip_position_rad"), [1, 2, 3, 4, 5])
     assert np.isnan(trace.column("height_m")).all()
     assert trace.header["events"][0]["reason"] == "operator_stop"
-    trace.save(tmp_path / "a.parquet")
-    assert Trace.load(tmp_path / "a.parquet").header["robot"] == "legv2"
+    trace.save(path.with_suffix(".parquet"))
+    assert Trace.load(path.with_suffix(".parquet")).header["robot"] == "legv2"
 
 
-def test_cut_anywhere_it_gives_all_whole_rows_before_the_cut(tmp_path):
-    path = tmp_path / "a.blackbox"
-    write(path)
+def test_cut_anywhere_it_gives_all_whole_rows_before_the_cut(path):
     content = path.read_bytes()
     first = content.index(b"}}") + 2 + 4
     size = 5 + 8 * len(COLUMNS) + 4
@@ -59,9 +62,7 @@ def test_cut_anywhere_it_gives_all_whole_rows_before_the_cut(tmp_path):
         assert box.whole is (cut in {first + n * size for n in range(6)})
 
 
-def test_damage_ends_the_record_and_is_never_data(tmp_path):
-    path = tmp_path / "a.blackbox"
-    write(path)
+def test_damage_ends_the_record_and_is_never_data(path):
     content = bytearray(path.read_bytes())
     content[content.index(b"}}") + 6 + 20] ^= 1
     path.write_bytes(content)
@@ -100,11 +101,12 @@ def test_a_full_disk_never_stops_the_loop(tmp_path):
     assert "No space" in box.error
 
 
-def test_foreign_and_missing_files_get_a_sentence(tmp_path):
-    (tmp_path / "b.blackbox").write_text("hello")
-    for name, sentence in (("b", "is no flight recording"), ("c", "Cannot read")):
-        with pytest.raises(TraceError, match=sentence):
-            read_recording(tmp_path / f"{name}.blackbox")
-    write(tmp_path / "d.blackbox")
+def test_foreign_and_missing_files_get_a_sentence(path):
     with pytest.raises(TraceError, match="Cannot create"):
-        write(tmp_path / "d.blackbox")
+        write(path)
+    path.write_text("hello")
+    with pytest.raises(TraceError, match="is no flight recording"):
+        read_recording(path)
+    path.unlink()
+    with pytest.raises(TraceError, match="Cannot read"):
+        read_recording(path)

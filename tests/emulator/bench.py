@@ -79,6 +79,11 @@ class Bench:
     def wait(self, seconds):
         self.robot.advance(self.robot.time + seconds)
 
+    def push(self, hip, knee=0.0, seconds=0.001, **more):
+        """Command pure torques and wait."""
+        self.torque(hip, knee, **more)
+        self.wait(seconds)
+
     def cycle(self, *commands):
         return asyncio.run(self.transport.cycle(list(commands)))
 
@@ -95,8 +100,7 @@ class Bench:
 
     def power(self, **more):
         """Bring both drives into torque mode at zero torque."""
-        self.torque(0.0, 0.0, **more)
-        self.wait(0.02)
+        self.push(0.0, seconds=0.02, **more)
         assert self.modes() == [10, 10]
 
     def stop(self):
@@ -104,9 +108,8 @@ class Bench:
         self.wait(0.001)
 
     def read(self, *registers, drive=0, resolution=moteus.F32):
-        (result,) = self.cycle(
-            self.drives[drive].make_custom_query(dict.fromkeys(registers, resolution))
-        )
+        query = self.drives[drive].make_custom_query(dict.fromkeys(registers, resolution))
+        (result,) = self.cycle(query)
         values = [result.values.get(int(register)) for register in registers]
         return values[0] if len(values) == 1 else values
 

@@ -15,20 +15,16 @@ def bench():
 
 
 @given(
-    st.sampled_from(
-        [R.POSITION, R.VELOCITY, R.TORQUE, R.VOLTAGE, R.TEMPERATURE, R.COMMAND_TIMEOUT]
-    ),
-    st.sampled_from([moteus.INT8, moteus.INT16, moteus.INT32, moteus.F32]),
+    st.sampled_from((R.POSITION, R.VELOCITY, R.TORQUE, R.VOLTAGE, R.COMMAND_TIMEOUT)),
+    st.sampled_from((moteus.INT8, moteus.INT16, moteus.INT32, moteus.F32)),
     st.floats(-1.2, 1.2),
 )
 def test_the_client_reads_what_was_written(register, resolution, value):
-    reply = ReplyWriter()
-    reply.values(register, resolution, [value])
-    read = moteus.protocol.parse_reply(reply.data)[register]
-    assert read == pytest.approx(value, abs=1.0)
-    reply = ReplyWriter()
-    reply.values(register, resolution, [float("nan")])
-    assert np.isnan(moteus.protocol.parse_reply(reply.data)[register])
+    for written in (value, float("nan")):
+        reply = ReplyWriter()
+        reply.values(register, resolution, [written])
+        read = moteus.protocol.parse_reply(reply.data)[register]
+        assert read == pytest.approx(written, abs=1.0, nan_ok=True)
 
 
 def test_a_query_of_everything_is_answered_in_full(bench):
@@ -80,3 +76,14 @@ def test_no_payload_breaks_a_drive(bench, data):
     bench.wait(5e-4)
     assert len(bench.robot.reply_queue.take(bench.robot.time)) <= 2
     assert np.isfinite(bench.robot.leg.q).all()
+
+
+@pytest.mark.parametrize(("resolution", "told"), [(moteus.INT16, 65.0), (moteus.F32, 65.04)])
+def test_an_answer_is_logged_as_it_travels_if_it_tells_the_state(resolution, told):
+    bench = Bench()
+    bench.robot.drives[0].disturbances.temperature = 35.04
+    bench.read(R.POSITION, R.TEMPERATURE)
+    assert not bench.robot.log.answers
+    bench.read(R.MODE, R.FAULT, R.VOLTAGE, R.TEMPERATURE, resolution=resolution)
+    (answer,) = bench.robot.log.answers
+    assert answer.temperature == pytest.approx(told, abs=1e-5)

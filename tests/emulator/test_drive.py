@@ -9,28 +9,40 @@ from hopping_leg.emulator.mode_machine import Notice
 from tests.emulator.bench import Bench, R
 
 
+@pytest.fixture
+def bench():
+    """A leg that nobody holds, its drives not yet powered."""
+    return Bench(held=False)
+
+
+@pytest.fixture
+def powered(bench):
+    bench.power()
+    return bench
+
+
 def spin(bench, torque, seconds=0.04):
     """Spin the hip in the air; return its speed, rev/s."""
     bench.robot.leg._legs.place(slice(None), 1.0, np.array([0.0, -1.5]))
-    bench.torque(torque, 0.0)
-    bench.wait(seconds)
+    bench.push(torque, seconds=seconds)
     return bench.read(R.VELOCITY)
 
 
-def limits(bench, low, high):
+def configure(bench, **settings):
     for drive in bench.robot.drives:
-        drive.settings.set("servopos.position_min", str(low))
-        drive.settings.set("servopos.position_max", str(high))
+        for name, value in settings.items():
+            drive.settings.set(name.replace("__", "."), str(value))
 
 
-def test_torque_appears_at_the_joint_behind_the_belt():
-    bench = Bench(held=False)
-    bench.power()
-    bench.torque(0.4, -0.2)
-    bench.wait(5e-4)
-    legs = bench.robot.leg._legs
+def limits(bench, low, high):
+    configure(bench, servopos__position_min=low, servopos__position_max=high)
+
+
+def test_torque_appears_at_the_joint_behind_the_belt(powered):
+    powered.push(0.4, -0.2, seconds=5e-4)
+    legs = powered.robot.leg._legs
     np.testing.assert_allclose(legs.measured_torque[0], [0.4, -0.4], atol=1e-6)
-    hip, knee = bench.torque(0.4, -0.2)
+    hip, knee = powered.torque(0.4, -0.2)
     assert hip.values[R.TORQUE] == pytest.approx(0.4)
     assert knee.values[R.TORQUE] == pytest.approx(-0.2)
 
@@ -46,35 +58,30 @@ def test_a_person_holds_the_leg_until_both_drives_are_powered():
 
 
 @pytest.mark.parametrize(("mode", "least", "most"), [(12, 0.9, 1.01), (15, 0.0, 0.5)])
-def test_after_silence_a_drive_in_torque_mode_is_limp_unless_it_shall_brake(mode, least, most):
-    bench = Bench(held=False)
+def test_after_silence_a_drive_in_torque_mode_is_limp_unless_it_shall_brake(
+    bench, mode, least, most
+):
     limits(bench, math.nan, math.nan)
-    for drive in bench.robot.drives:
-        drive.settings.set("servo.timeout_mode", str(mode))
+    configure(bench, servo__timeout_mode=mode)
     bench.power()
     spin(bench, 0.6)
-    bench.torque(0.0, 0.0, watchdog=0.02)
-    bench.wait(0.0205)
+    bench.push(0.0, seconds=0.0205, watchdog=0.02)
     assert bench.modes() == [11, 11]
     begin = bench.read(R.VELOCITY)
     bench.wait(0.02)
     assert least <= bench.read(R.VELOCITY) / begin <= most
 
 
-def test_nan_torque_keeps_the_drive_active_with_a_notice():
-    bench = Bench(held=False)
-    bench.power()
+def test_nan_torque_keeps_the_drive_active_with_a_notice(powered):
     for _ in range(5):
-        bench.torque(math.nan, 0.0)
-        bench.wait(0.005)
-    assert bench.modes() == [10, 10]
-    assert bench.faults()[0] == Notice.MAX_VOLTAGE
-    assert math.isnan(bench.read(R.Q_CURRENT))
-    assert np.isfinite(bench.robot.leg.q).all()
+        powered.push(math.nan, seconds=0.005)
+    assert powered.modes() == [10, 10]
+    assert powered.faults()[0] == Notice.MAX_VOLTAGE
+    assert math.isnan(powered.read(R.Q_CURRENT))
+    assert np.isfinite(powered.robot.leg.q).all()
 
 
-def test_position_limits_take_outward_torque_only_and_the_joint_coasts_on():
-    bench = Bench(held=False)
+def test_position_limits_take_outward_torque_only_and_the_joint_coasts_on(bench):
     limits(bench, -1.0, 0.2)
     bench.power()
     spin(bench, 3.0, 0.1)
@@ -83,74 +90,61 @@ def test_position_limits_take_outward_torque_only_and_the_joint_coasts_on():
     assert speed > 0.5
     assert bench.faults()[0] == Notice.POSITION_BOUNDS
     assert bench.read(R.TORQUE) == pytest.approx(0.0)
-    bench.torque(-1.0, 0.0)
-    bench.wait(0.001)
+    bench.push(-1.0)
     assert bench.read(R.TORQUE) == pytest.approx(-1.0)
 
 
 def test_a_drive_outside_its_limits_refuses_to_start():
     bench = Bench()
     limits(bench, 0.3, 0.4)
-    bench.torque(0.0, 0.0)
-    bench.wait(0.01)
+    bench.push(0.0, seconds=0.01)
     assert bench.modes() == [1, 1]
     assert bench.faults() == [FaultCode.START_OUTSIDE_LIMIT] * 2
 
 
-def test_torque_is_limited_by_the_frame_and_by_the_current():
-    bench = Bench(held=False)
-    bench.power()
-    bench.torque(5.0, 0.0, maximum=2.0)
-    bench.wait(0.001)
-    assert bench.read(R.CONTROL_TORQUE) == pytest.approx(2.0)
-    assert bench.faults()[0] == Notice.MAX_TORQUE
-    bench.robot.drives[0].settings.set("servo.max_current_A", "10")
-    bench.torque(5.0, 0.0)
-    bench.wait(0.001)
-    assert bench.read(R.CONTROL_TORQUE) == pytest.approx(10 * 0.0275 * 6)
-    assert bench.faults()[0] == Notice.MAX_CURRENT
+def test_torque_is_limited_by_the_frame_and_by_the_current(powered):
+    powered.push(5.0, maximum=2.0)
+    assert powered.read(R.CONTROL_TORQUE) == pytest.approx(2.0)
+    assert powered.faults()[0] == Notice.MAX_TORQUE
+    powered.robot.drives[0].settings.set("servo.max_current_A", "10")
+    powered.push(5.0)
+    assert powered.read(R.CONTROL_TORQUE) == pytest.approx(10 * 0.0275 * 6)
+    assert powered.faults()[0] == Notice.MAX_CURRENT
 
 
-def test_heat_derates_then_faults():
-    bench = Bench(held=False)
-    bench.power()
-    drive = bench.robot.drives[0]
+def test_heat_derates_then_faults(powered):
+    drive = powered.robot.drives[0]
     torques = []
     for heat in (10.0, 30.0, 40.0):
         drive.disturbances.temperature = heat
-        bench.torque(15.0, 0.0)
-        bench.wait(0.001)
-        torques.append(bench.read(R.CONTROL_TORQUE))
+        powered.push(15.0)
+        torques.append(powered.read(R.CONTROL_TORQUE))
     assert torques[0] == pytest.approx(15.0)
     assert torques[0] > torques[1] > torques[2] >= 0.0
     drive.disturbances.temperature = 50.0
-    bench.wait(0.001)
-    assert (bench.modes()[0], bench.faults()[0]) == (1, FaultCode.OVER_TEMPERATURE)
+    powered.wait(0.001)
+    assert (powered.modes()[0], powered.faults()[0]) == (1, FaultCode.OVER_TEMPERATURE)
 
 
 @pytest.mark.parametrize(
     ("volts", "fault"), [(47, FaultCode.OVER_VOLTAGE), (3, FaultCode.UNDER_VOLTAGE)]
 )
-def test_voltage_faults_only_where_power_is_on(volts, fault):
-    bench = Bench(held=False)
+def test_voltage_faults_only_where_power_is_on(bench, volts, fault):
     for drive in bench.robot.drives:
         drive.disturbances.voltage = volts - drive.nominal_voltage
     bench.wait(0.01)
     assert bench.modes() == [0, 0]
-    bench.torque(0.0, 0.0)
-    bench.wait(0.01)
+    bench.push(0.0, seconds=0.01)
     assert bench.modes() == [1, 1]
     assert bench.faults() == [fault, fault]
     assert bench.read(R.VOLTAGE) == pytest.approx(volts)
 
 
-def test_a_mode_write_resets_the_command():
-    bench = Bench(held=False)
-    bench.power()
-    bench.torque(0.5, 0.0)
-    bench.cycle(bench.drives[0].make_position(position=math.nan, query=True))
-    assert bench.read(R.COMMAND_FEEDFORWARD_TORQUE) == 0.0
-    assert bench.read(R.COMMAND_KD_SCALE) == 1.0
+def test_a_mode_write_resets_the_command(powered):
+    powered.torque(0.5, 0.0)
+    powered.cycle(powered.drives[0].make_position(position=math.nan, query=True))
+    assert powered.read(R.COMMAND_FEEDFORWARD_TORQUE) == 0.0
+    assert powered.read(R.COMMAND_KD_SCALE) == 1.0
 
 
 def test_power_up_finds_the_output_within_a_turn_of_the_rotor_only():
@@ -166,28 +160,23 @@ def test_power_up_finds_the_output_within_a_turn_of_the_rotor_only():
         assert bench.read(R.HOME_STATE) == 2
 
 
-def test_a_wrong_gear_ratio_falsifies_position_and_torque():
-    bench = Bench((0.6, -1.3), held=False)
+def test_a_wrong_gear_ratio_falsifies_position_and_torque(bench):
     truth = bench.read(R.POSITION)
     bench.robot.drives[0].settings.set("motor_position.rotor_to_output_ratio", "1.0")
     assert bench.read(R.POSITION) == pytest.approx(6 * truth)
     limits(bench, math.nan, math.nan)
     bench.power()
-    bench.torque(0.1, 0.0)
-    bench.wait(0.001)
+    bench.push(0.1)
     assert bench.robot.leg._legs.measured_torque[0, 0] == pytest.approx(0.6)
     assert bench.read(R.TORQUE) == pytest.approx(0.1)
 
 
-def test_the_joint_pd_of_the_firmware_holds_a_position():
-    bench = Bench((0.6, -1.3), held=False)
+def test_the_joint_pd_of_the_firmware_holds_a_position(bench):
     target = [bench.read(R.POSITION, drive=n) for n in (0, 1)]
     for _ in range(100):
-        commands = [
-            d.make_position(position=p, watchdog_timeout=1.0, maximum_torque=10.0, query=True)
-            for d, p in zip(bench.drives, target, strict=True)
-        ]
-        bench.cycle(*commands)
+        frame = {"watchdog_timeout": 1.0, "maximum_torque": 10.0, "query": True}
+        pairs = zip(bench.drives, target, strict=True)
+        bench.cycle(*(drive.make_position(position=p, **frame) for drive, p in pairs))
         bench.wait(0.005)
     held = [bench.read(R.POSITION, drive=n) for n in (0, 1)]
     np.testing.assert_allclose(held, target, atol=0.02)
@@ -207,8 +196,7 @@ def test_the_same_commands_give_the_same_run():
         bench = Bench(robot="twin", held=False, seed=4)
         bench.power()
         for n in range(60):
-            bench.torque(math.sin(n / 5), -math.cos(n / 7))
-            bench.wait(0.005)
+            bench.push(math.sin(n / 5), -math.cos(n / 7), seconds=0.005)
         return bench.robot.leg.q.tobytes()
 
     assert run() == run()

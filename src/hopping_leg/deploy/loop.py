@@ -33,7 +33,6 @@ _WARM_TICKS = 10
 _STOP_TICKS = 10
 """Ticks in which the drives are told to stop at the end."""
 
-
 _REMEMBERED = 16
 """Ticks; older samples are forgotten."""
 
@@ -163,12 +162,14 @@ class ControlLoop:
         replied = clock.now()
         self._remember(tick, deadline, exchange)
         step = self._step(tick, deadline)
+        arms = state.state is State.DISARMED and tick >= _WARM_TICKS
+        operator = Operator.ARM if arms else Operator.NOTHING
         seen = SupervisorInput(
             deadline,
             woke - deadline + skipped * period,
             exchange.replies,
             None if self._complaint else step.torque,
-            self._operator(tick, state),
+            Operator.STOP if self._stop.is_set() else operator,
             self._sequence.finished,
         )
         after, outgoing = supervise(self._limits, state, seen)
@@ -216,23 +217,14 @@ class ControlLoop:
 
     def _step(self, tick: int, time: float) -> SequenceStep:
         """Ask the sequence; an error of the controller becomes a complaint, never a crash."""
-        sequence = self._sequence
-        if self._complaint:
-            return SequenceStep((0.0, 0.0), sequence.command(time), Part.DONE)
-        try:
-            measurement = self._samples.measurement(tick, sequence.command(time))
-            return sequence.step(time, measurement)
-        except Exception as error:
-            self._complaint = f"{type(error).__name__}: {error}"
-            self._recorder.event(time_s=time, controller_error=self._complaint)
-            return SequenceStep((0.0, 0.0), sequence.command(time), Part.DONE)
-
-    def _operator(self, tick: int, state: SupervisorState) -> Operator:
-        if self._stop.is_set():
-            return Operator.STOP
-        if state.state is State.DISARMED and tick >= _WARM_TICKS:
-            return Operator.ARM
-        return Operator.NOTHING
+        command = self._sequence.command(time)
+        if not self._complaint:
+            try:
+                return self._sequence.step(time, self._samples.measurement(tick, command))
+            except Exception as error:
+                self._complaint = f"{type(error).__name__}: {error}"
+                self._recorder.event(time_s=time, controller_error=self._complaint)
+        return SequenceStep((0.0, 0.0), command, Part.DONE)
 
     def _note(self, state: SupervisorState, time: float) -> None:
         """Record a transition; begin the sequence with it."""

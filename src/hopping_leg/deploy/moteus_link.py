@@ -30,6 +30,10 @@ _SEND_SECONDS = 0.004
 
 _OPENING_SECONDS = 10.0
 
+_NO_POSITION_CONTROL = {"position": math.nan, "velocity": 0.0} | dict.fromkeys(
+    ("kp_scale", "kd_scale", "ilimit_scale"), 0.0
+)
+
 Result = TypeVar("Result")
 
 
@@ -182,11 +186,7 @@ class MoteusLink:
             case Action.TORQUE:
                 return [
                     controller.make_position(
-                        position=math.nan,
-                        velocity=0.0,
-                        kp_scale=0.0,
-                        kd_scale=0.0,
-                        ilimit_scale=0.0,
+                        **_NO_POSITION_CONTROL,
                         feedforward_torque=transform.motor_torque(torque),
                         maximum_torque=limit,
                         watchdog_timeout=self.robot.hardware.watchdog,

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
-from hopping_leg.emulator.frames import QueuedReply, ReplyQueue
+from hopping_leg.emulator.frames import QueuedReply, TimedQueue
 from hopping_leg.emulator.settings import DEFAULTS
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.io import read_dataclass
@@ -106,7 +106,7 @@ class FaultyRobot(Protocol):
     plugged: bool
     """Whether the adapter is plugged in."""
     leg: "EmulatedLeg"
-    reply_queue: ReplyQueue
+    reply_queue: TimedQueue[QueuedReply]
 
     @property
     def drives(self) -> "tuple[EmulatedDrive, ...]":

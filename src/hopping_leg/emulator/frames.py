@@ -7,14 +7,15 @@ An fdcanusb speaks ``can send``, ``OK``, ``rcv``, ``ERR``. A line may end in `` 
 import heapq
 import itertools
 from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+Item = TypeVar("Item")
 
 BROADCAST = 0x7F
 """Destination that every drive listens to."""
 
 _REPLY_WANTED = 0x8000
-_STANDARD = 0x7FF
 _SIZES = (*range(9), 12, 16, 20, 24, 32, 48, 64)
-_PADDING = b"\x50"
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class Frame:
     @property
     def extended(self) -> bool:
         """Whether the id needs 29 bits."""
-        return self.arbitration_id > _STANDARD
+        return self.arbitration_id > 0x7FF
 
     def reply(self, drive: int, data: bytes) -> "Frame":
         """Return the frame in which a drive answers this one."""
@@ -58,37 +59,34 @@ class Frame:
 def padded(data: bytes) -> bytes:
     """Return the payload in the next size that CAN-FD knows, filled with NOPs."""
     size = next((s for s in _SIZES if s >= len(data)), len(data))
-    return data + _PADDING * (size - len(data))
+    return data + b"\x50" * (size - len(data))
 
 
 @dataclass(frozen=True)
 class QueuedReply:
-    """One thing that arrives at the host.
-
-    Attributes:
-        frame: From a drive; None for noise.
-        noise: A line that is no frame.
-        flip: Which bits flip on a serial line, any number from 0; negative for none. A CAN
-            controller discards such a frame.
-    """
+    """One thing that arrives at the host."""
 
     frame: Frame | None = None
+    """From a drive; None for noise."""
     noise: bytes = b""
+    """A line that is no frame."""
     flip: int = -1
+    """Which bits flip on a serial line, any number from 0; negative for none. A CAN controller
+    discards such a frame."""
 
 
-class ReplyQueue:
+class TimedQueue(Generic[Item]):
     """Things in the order in which they are due; equal times keep their order."""
 
     def __init__(self) -> None:
-        self._heap: list[tuple[float, int, QueuedReply]] = []
+        self._heap: list[tuple[float, int, Item]] = []
         self._numbers = itertools.count()
 
-    def put(self, due: float, item: QueuedReply) -> None:
+    def put(self, due: float, item: Item) -> None:
         """Add something that is due at a time, s."""
         heapq.heappush(self._heap, (due, next(self._numbers), item))
 
-    def take(self, time: float) -> list[QueuedReply]:
+    def take(self, time: float) -> list[Item]:
         """Remove and return what is due at a time, s."""
         items = []
         while self._heap and self._heap[0][0] <= time:
@@ -145,17 +143,12 @@ class LineProtocol:
         *lines, self._buffer = self._buffer.replace(b"\r", b"\n").split(b"\n")
         if len(self._buffer) > _LONGEST:
             self._buffer = b""
-        out: list[Frame | bytes] = []
-        for line in lines:
-            if line.strip():
-                out += self._take(line)
-        return out
+        return [item for line in lines if line.strip() for item in self._take(line)]
 
     def line(self, text: bytes) -> bytes:
         """Return a line as sent to the host."""
         if self.checksums:
-            text += b" "
-            text += b"*%02X" % crc8(text)
+            text += b" *%02X" % crc8(text + b" ")
         return text + b"\r\n"
 
     def _take(self, line: bytes) -> list[Frame | bytes]:

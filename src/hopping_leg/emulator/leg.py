@@ -26,17 +26,14 @@ class EmulatedLeg:
         robot: What is simulated; its ``reality`` holds.
         q: Joint angles at the start, rad, (2,); the foot stands on the ground.
         seed: Seed of sensor noise.
-        timestep: Physics step, s.
     """
 
-    def __init__(
-        self, robot: Robot, q: Array, *, seed: int = 0, timestep: float = TIMESTEP
-    ) -> None:
+    def __init__(self, robot: Robot, q: Array, seed: int) -> None:
         self.transforms = joint_transforms(robot)
         free = replace(robot, hip=_unlimited(robot.hip), knee=_unlimited(robot.knee))
         immediate = replace(robot.reality.latency, command=0.0, jitter=0.0)
         free = replace(free, reality=replace(robot.reality, latency=immediate))
-        self._legs = MujocoSimulator(free, 1, rate=1 / timestep, timestep=timestep, threads=1)
+        self._legs = MujocoSimulator(free, 1, rate=1 / TIMESTEP, timestep=TIMESTEP, threads=1)
         if self._legs.mismatch is not None:
             self._legs.mismatch.reseed(np.random.default_rng(seed))
         self._legs.stand(slice(None), np.asarray(q, np.float64))
@@ -65,11 +62,6 @@ class EmulatedLeg:
     def q(self) -> Array:
         """True joint angles, rad, (2,)."""
         return np.array(self._legs.q[0])
-
-    @property
-    def qd(self) -> Array:
-        """True joint velocities, rad/s, (2,)."""
-        return np.array(self._legs.qd[0])
 
     def sensed(self, joint: int) -> tuple[float, float, float]:
         """Return what one motor's sensors see: position, rev, velocity, rev/s, torque, N m."""

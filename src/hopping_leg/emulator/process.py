@@ -29,21 +29,15 @@ class EmulatorState:
     Attributes:
         time: Since the start, s.
         modes: Modes of the drives.
-        faults: Codes or notices of the drives.
         q: Joint angles, rad.
-        qd: Joint velocities, rad/s.
         height: Height of the base, m.
-        lost: Time that was not simulated for want of the processor, s.
         flown: When the foot left the ground for the first time, s; infinite if it did not yet.
     """
 
     time: float
-    modes: tuple[int, int]
-    faults: tuple[int, int]
-    q: tuple[float, float]
-    qd: tuple[float, float]
+    modes: tuple[int, ...]
+    q: tuple[float, ...]
     height: float
-    lost: float
     flown: float
 
 
@@ -127,15 +121,12 @@ def _serve(start: EmulatorConfig, pipe: Connection) -> None:
     server = Server(robot, port)
     pipe.send(port.path if isinstance(port, PtyPort) else Path())
     prefer_this_thread()
-    running = True
     with uninterrupted():
-        while running:
-            server.turn()
-            running = _answer_parent(pipe, robot, server)
+        server.run(lambda: not _answer_parent(pipe, robot))
     port.close()
 
 
-def _answer_parent(pipe: Connection, robot: EmulatedRobot, server: Server) -> bool:
+def _answer_parent(pipe: Connection, robot: EmulatedRobot) -> bool:
     """Answer what the parent asked; return whether it is still there."""
     try:
         while pipe.poll():
@@ -145,22 +136,10 @@ def _answer_parent(pipe: Connection, robot: EmulatedRobot, server: Server) -> bo
             if request == "record":
                 pipe.send(EmulatorRecord(robot.log, tuple(robot.fault_injector.log)))
             else:
-                pipe.send(_state(robot, server))
+                modes = tuple(int(drive.machine.mode) for drive in robot.drives)
+                q, height = tuple(robot.leg.q.tolist()), robot.leg.height
+                flown = robot.fault_injector.flown
+                pipe.send(EmulatorState(robot.time, modes, q, height, flown))
     except (EOFError, OSError):
         return False
     return True
-
-
-def _state(robot: EmulatedRobot, server: Server) -> EmulatorState:
-    hip, knee = robot.drives
-    q, qd = robot.leg.q, robot.leg.qd
-    return EmulatorState(
-        time=robot.time,
-        modes=(int(hip.machine.mode), int(knee.machine.mode)),
-        faults=(int(hip.machine.fault), int(knee.machine.fault)),
-        q=(float(q[0]), float(q[1])),
-        qd=(float(qd[0]), float(qd[1])),
-        height=robot.leg.height,
-        lost=server.lost,
-        flown=robot.fault_injector.flown,
-    )

@@ -3,8 +3,6 @@
 Time comes as an argument. Nothing here knows of sockets, terminals or the clock on the wall.
 """
 
-import heapq
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,7 +14,7 @@ from hopping_leg.deploy.preflight import required_settings
 from hopping_leg.emulator import bus
 from hopping_leg.emulator.drive import EmulatedDrive
 from hopping_leg.emulator.faults import KINDS, Delivery, Fault, FaultKind
-from hopping_leg.emulator.frames import Frame, QueuedReply, ReplyQueue
+from hopping_leg.emulator.frames import Frame, QueuedReply, TimedQueue
 from hopping_leg.emulator.leg import TIMESTEP, EmulatedLeg
 from hopping_leg.emulator.registers import identity
 from hopping_leg.emulator.settings import Settings
@@ -26,7 +24,6 @@ from hopping_leg.robot.parameters import JOINTS, Robot
 NOMINAL_VOLTAGE = 26.0
 """Bus voltage at which the qdd100 has the speed limit of the robot files, V."""
 
-
 _AIRBORNE = 0.01
 """Height of the foot in a flight that counts as the first, m: no bounce."""
 
@@ -34,18 +31,15 @@ _AIRBORNE = 0.01
 class EmulatedRobot:
     """Leg and drives, moved by ``advance`` and ``receive``.
 
-    A person holds the leg where it stands until both drives are powered.
-
     Args:
         robot: What stands behind the wire; its ``reality`` holds.
         q: Joint angles at the start, rad, (2,).
         configured: Whether the drives are configured as the robot's file asks; else as the
             firmware is delivered, but for their ids.
         homed: Whether somebody homed the drives already.
-        held: Whether the leg is held until the drives are powered.
+        held: Whether a person holds the leg where it stands until both drives are powered.
         seed: Seed of sensor noise and jitter.
         faults: What goes wrong, and when.
-        timestep: Physics step, s.
     """
 
     def __init__(
@@ -58,21 +52,19 @@ class EmulatedRobot:
         held: bool = True,
         seed: int = 0,
         faults: Sequence[Fault] = (),
-        timestep: float = TIMESTEP,
     ) -> None:
-        self.robot, self.time, self.timestep, self.held = robot, 0.0, timestep, held
-        self.leg = EmulatedLeg(robot, q, seed=seed, timestep=timestep)
+        self.robot, self.time, self.held = robot, 0.0, held
+        self.leg = EmulatedLeg(robot, q, seed)
         self.drives = tuple(_drive(robot, joint, configured) for joint in range(len(JOINTS)))
         self._latency, self._rng = robot.reality.latency, np.random.default_rng(seed)
-        self._due: list[tuple[float, int, bus.Message]] = []
-        self._numbers = itertools.count()
+        self._late_messages = TimedQueue[bus.Message]()
         self._last_delivery = 0.0
         for joint, drive in enumerate(self.drives):
             position, *_ = self.leg.sensed(joint)
             drive.boot(position)
             if homed:
                 drive.encoder.set_nearest(position)
-        self.reply_queue = ReplyQueue()
+        self.reply_queue = TimedQueue[QueuedReply]()
         """What is on its way to the host."""
         self.wire_time = 0.0
         """What a reply takes at least, s."""
@@ -85,7 +77,7 @@ class EmulatedRobot:
 
     def advance(self, until: float) -> None:
         """Simulate whole steps up to a time, s."""
-        while self.time + self.timestep <= until + 1e-9:
+        while self.time + TIMESTEP <= until + 1e-9:
             self._step()
 
     def receive(self, frame: Frame) -> None:
@@ -99,7 +91,7 @@ class EmulatedRobot:
         if late:
             due = max(self.time + late, self._last_delivery)
             self._last_delivery = due
-            heapq.heappush(self._due, (due, next(self._numbers), message))
+            self._late_messages.put(due, message)
         for joint, drive in enumerate(self.drives):
             errors = [] if late else bus.act(message, drive, self.time)
             answer = bus.answer(message, drive, self.time, errors)
@@ -110,16 +102,15 @@ class EmulatedRobot:
 
     def _step(self) -> None:
         self.fault_injector.step()
-        while self._due and self._due[0][0] <= self.time:
-            message = heapq.heappop(self._due)[2]
+        for message in self._late_messages.take(self.time):
             for drive in self.drives:
                 bus.act(message, drive, self.time)
-        hip, knee = (drive.step(self.time, self.timestep) for drive in self.drives)
+        hip, knee = (drive.step(self.time, TIMESTEP) for drive in self.drives)
         if self.held and all(drive.active for drive in self.drives):
             self.held = False
         if not self.held:
             self.leg.step((hip, knee))
-        self.time += self.timestep
+        self.time += TIMESTEP
         self._sense()
 
     def _sense(self) -> None:

@@ -14,6 +14,7 @@ from moteus import Transport
 
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.transport import TolerantFdcanusb
+from hopping_leg.emulator.leg import TIMESTEP
 from hopping_leg.emulator.ports import Port, PtyPort
 from hopping_leg.emulator.robot import EmulatedRobot
 from hopping_leg.emulator.server import serve
@@ -62,7 +63,7 @@ class _Waiting(selectors.SelectSelector):
         serve(robot, self._port, ready=True)
         ready = super().select(0)
         while not ready and robot.time < until - 1e-9:
-            robot.advance(robot.time + robot.timestep)
+            robot.advance(robot.time + TIMESTEP)
             if serve(robot, self._port, ready=False):
                 ready = super().select(0)
         return ready
