@@ -1,5 +1,6 @@
 import pytest
 
+from hopping_leg.cli import FAILED, main
 from hopping_leg.cli import evaluate as verb
 from hopping_leg.evaluate import Entry
 from tests.evaluate.conftest import Spring
@@ -13,3 +14,16 @@ def spring(monkeypatch):
         return [Entry(name, Spring(robot), (0.29, 0.31)) for name in names]
 
     monkeypatch.setattr(verb, "load_entries", load)
+
+
+@pytest.fixture
+def refused(capsys):
+    """Return a function that calls `hop` and expects exit code 2 and a sentence on stderr."""
+
+    def call(words, sentence):
+        assert main([str(word) for word in words]) == FAILED
+        error = " ".join(capsys.readouterr().err.split())
+        assert "hop: " in error
+        assert sentence in error
+
+    return call

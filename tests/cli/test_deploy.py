@@ -9,7 +9,6 @@ from hopping_leg.cli import main
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.recording import load_recording
-from hopping_leg.robot import load_robot
 from hopping_leg.trace import Trace
 from tests.cli.emulated import put_behind
 
@@ -51,18 +50,15 @@ def test_a_python_class_is_deployed_and_stopped_by_name(emulate, tmp_path, capsy
     )
     words = [RUN[0], f"{file}:Mine", *RUN[2:], "--yes", "--out", str(tmp_path / "run")]
     assert main(words) == (2 if says else 0)
-    error = capsys.readouterr().err
-    assert says is None or says in error
-    assert "Traceback" not in error
+    assert says is None or says in capsys.readouterr().err
     (trace,) = (tmp_path / "run").glob("*.parquet")
     assert Trace.load(trace).header["controller"] == "Mine"
 
 
 @pytest.mark.slow
-def test_a_fault_is_a_sentence_and_an_exit_code(emulate, tmp_path, capsys):
+def test_a_fault_is_a_sentence_and_an_exit_code(emulate, tmp_path, refused):
     emulate(faults=(Fault("drive_fault", at=0.6, drive="hip", value=33),))
-    assert main([*RUN, "--yes", "--out", str(tmp_path)]) == 2
-    assert "hip: fault 33 (motor driver)" in capsys.readouterr().err
+    refused([*RUN, "--yes", "--out", tmp_path], "hip: fault 33 (motor driver)")
     assert len(list(tmp_path.glob("*.parquet"))) == 1
 
 
@@ -81,13 +77,10 @@ def test_a_fault_is_a_sentence_and_an_exit_code(emulate, tmp_path, capsys):
         (["energy-shaping"], "add --yes"),
     ],
 )
-def test_bad_input_is_refused_before_anything_is_armed(emulate, tmp_path, capsys, words, sentence):
+def test_bad_input_is_refused_before_anything_is_armed(emulate, tmp_path, refused, words, sentence):
     lockstep = emulate()
     out = tmp_path / "out"
-    assert main(["deploy", *words, "--transport", "/dev/leg", "--out", str(out)]) == 2
-    error = capsys.readouterr().err
-    assert sentence in error
-    assert "Traceback" not in error
+    refused(["deploy", *words, "--transport", "/dev/leg", "--out", out], sentence)
     assert lockstep.robot.held
     assert not out.exists()
 
@@ -102,11 +95,8 @@ def test_bad_input_is_refused_before_anything_is_armed(emulate, tmp_path, capsys
         ("/dev/null", "Cannot open the adapter"),
     ],
 )
-def test_a_transport_that_is_none_is_a_sentence(capsys, transport, sentence):
-    assert main(["doctor", "--transport", transport]) == 2
-    error = capsys.readouterr().err
-    assert sentence in error
-    assert "Traceback" not in error
+def test_a_transport_that_is_none_is_a_sentence(refused, transport, sentence):
+    refused(["doctor", "--transport", transport], sentence)
 
 
 def test_doctor_says_what_is_wrong_and_puts_it_right(emulate, capsys):
@@ -143,9 +133,6 @@ def test_a_recording_from_motors_is_one_that_identification_takes(emulate, tmp_p
     assert np.nanmax(np.abs(measured - position)) < 0.4
     torque = recording.array("torque")
     assert np.nanstd(torque) > 0.1
-    stiffness, damping = recording.metadata.stiffness, recording.metadata.damping
-    assert load_robot(recording.metadata.robot).name == "legv2"
-    asked = np.array(stiffness) * (position - measured) - np.array(damping) * recording.array(
-        "velocity"
-    )
+    stiffness, damping = map(np.array, (recording.metadata.stiffness, recording.metadata.damping))
+    asked = stiffness * (position - measured) - damping * recording.array("velocity")
     assert np.nanmedian(np.abs(torque[1:] - asked[:-1])) < 0.05

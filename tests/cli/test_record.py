@@ -32,11 +32,8 @@ def test_a_recording_holds_what_was_played_and_measured(excitation, tmp_path):
     assert content != (tmp_path / "other" / name).read_bytes()
     recording = load_recording(out / name)
     metadata = recording.metadata
-    assert (metadata.rig, metadata.onboard, metadata.sample) == (
-        played.rig,
-        "zoh",
-        "before-command",
-    )
+    assert metadata.rig == played.rig
+    assert (metadata.onboard, metadata.sample) == ("zoh", "before-command")
     assert metadata.stiffness == (25.0, 15.0)
     assert metadata.damping == JointGains().damping
     assert metadata.robot == "legv2-paper"
@@ -51,7 +48,7 @@ def test_a_recording_holds_what_was_played_and_measured(excitation, tmp_path):
     assert recording.has_column("height_m") == (played.rig == "rail")
 
 
-def test_wrong_input_is_one_sentence(tmp_path, capsys, excitation):
+def test_wrong_input_is_one_sentence(tmp_path, refused, excitation):
     file, _ = excitation
     for words, sentence in (
         ([], "No excitation"),
@@ -61,8 +58,5 @@ def test_wrong_input_is_one_sentence(tmp_path, capsys, excitation):
         ([str(file), "--seed", "-1"], "--seed is -1"),
         ([str(file), "--damping", "-1", "0"], "must be zero or more"),
     ):
-        assert main(["record", *words, "--out", str(tmp_path / "out")]) == 2
-        error = capsys.readouterr().err
-        assert sentence in error
-        assert "Traceback" not in error
+        refused(["record", *words, "--out", tmp_path / "out"], sentence)
     assert not (tmp_path / "out").exists()

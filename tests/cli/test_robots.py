@@ -29,12 +29,9 @@ def test_show_gives_every_number_with_unit_and_source(capsys, monkeypatch, name)
         assert entry["source"] in line
 
 
-def test_check_accepts_the_example(capsys):
+def test_check_accepts_the_example_and_show_writes_the_digest(tmp_path, capsys):
     assert main(["robots", "check", "examples/my_leg.toml"]) == 0
     assert "valid robot: my-leg" in capsys.readouterr().out
-
-
-def test_show_writes_the_digest(tmp_path):
     file = tmp_path / "robot.json"
     assert main(["robots", "show", "legv2", "--json", str(file)]) == 0
     assert json.loads(file.read_text())["derived"]["digest"] == load_robot("legv2").digest

@@ -2,9 +2,9 @@
 
 import hashlib
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 import polars as pl
@@ -58,7 +58,8 @@ class Multisine:
     """Highest frequency, Hz."""
     duration: float = 60.0
     """Duration of the trajectory, s."""
-    rig: Rig = field(default="fixed-base", init=False)
+
+    rig: ClassVar[Rig] = "fixed-base"
 
     def __post_init__(self) -> None:
         for name in ("lowest", "duration"):
