@@ -6,15 +6,20 @@ import polars as pl
 import pytest
 from matplotlib.figure import Figure
 
-from hopping_leg.evaluate.figures.results import draw_distributions
-from hopping_leg.evaluate.figures.runs import draw_estimate, draw_heights, draw_phase_space
+from hopping_leg.evaluate.figures import (
+    draw_distributions,
+    draw_estimate,
+    draw_heights,
+    draw_phase_space,
+)
 from hopping_leg.evaluate.metrics import (
     ESTIMATED_APEX,
     ESTIMATED_HEIGHT,
     START_SECONDS,
     judge_estimator,
 )
-from hopping_leg.evaluate.report_figures import draw_report_figures, run_of
+from hopping_leg.evaluate.report import draw_report_figures
+from hopping_leg.evaluate.trials import load_run
 from hopping_leg.figure_style import INCHES, encode, fit_width, to_png, to_svg
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE, find_hops
 from hopping_leg.trace import Trace
@@ -66,7 +71,7 @@ def test_phase_space_shows_flight_and_stance_of_ten_seconds(fixed):
 def test_the_gallery_from_stored_traces_is_the_reports(judged, tmp_path):
     for run in judged.runs:
         run.trace.save(tmp_path / run.file_name)
-    again = [run_of(tmp_path / run.file_name) for run in judged.runs]
+    again = [load_run(tmp_path / run.file_name) for run in judged.runs]
     assert [(r.controller, r.trial.kind, r.repeat) for r in again] == [
         (r.controller, r.trial.kind, r.repeat) for r in judged.runs
     ]
@@ -84,7 +89,7 @@ def test_the_gallery_from_stored_traces_is_the_reports(judged, tmp_path):
 def test_a_trace_from_elsewhere_can_be_drawn(fixed, tmp_path):
     path = tmp_path / "robot.parquet"
     Trace(fixed.table).save(path)
-    run = run_of(path)
+    run = load_run(path)
     assert (run.controller, run.trial.kind) == ("robot", "fixed")
     assert run.trial.seconds == pytest.approx(15.0)
 

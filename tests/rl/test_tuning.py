@@ -12,12 +12,12 @@ import pytest
 
 from hopping_leg.cli import main
 from hopping_leg.errors import PhysicsError, UsageError
-from hopping_leg.evaluate.figures.tuning import FIGURES
 from hopping_leg.figure_style import to_svg
 from hopping_leg.rl import policy_evaluation, tuning
 from hopping_leg.rl.recipes import RECIPES, SPACES
 from hopping_leg.rl.search_space import defaults
 from hopping_leg.rl.tuning import Tuning, open_study, tune
+from hopping_leg.rl.tuning_figures import FIGURES
 from tests.clusters import local
 
 

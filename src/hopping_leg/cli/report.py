@@ -26,10 +26,9 @@ from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import EvaluationRun
 from hopping_leg.evaluate.aggregation import tabulate
 from hopping_leg.evaluate.comparison import set_beside, write_comparison
-from hopping_leg.evaluate.report import write_report
-from hopping_leg.evaluate.report_figures import draw_report_figures, run_of
+from hopping_leg.evaluate.report import draw_report_figures, write_report
 from hopping_leg.evaluate.result_files import read_runs
-from hopping_leg.evaluate.trials import Run
+from hopping_leg.evaluate.trials import Run, load_run
 from hopping_leg.evaluate.video import Animation, fixed_traces, render_video
 from hopping_leg.figure_style import Format, Width, encode
 from hopping_leg.io import safe_file_name, write_atomically, write_json
@@ -80,7 +79,7 @@ def _write(args: Page) -> None:
     runs = read_runs(args.runs)
     if len(runs) == 1 and (evaluation := runs[0].evaluation):
         traces = sorted(runs[0].traces.glob("*.parquet")) if runs[0].traces else []
-        page = write_report(EvaluationRun(evaluation, [run_of(path) for path in traces]))
+        page = write_report(EvaluationRun(evaluation, [load_run(path) for path in traces]))
         numbers = evaluation.to_json()
     else:
         compared = set_beside(runs)
@@ -97,7 +96,7 @@ def _write(args: Page) -> None:
 def _draw(args: Figures) -> None:
     if not args.traces:
         raise UsageError("No trace was named; record some with `hop evaluate ... --traces DIR`.")
-    runs = [run_of(_trace(path)) for path in args.traces]
+    runs = [load_run(_trace(path)) for path in args.traces]
     controllers = list(dict.fromkeys(run.controller for run in runs))
     for picture in draw_report_figures(tabulate(runs, controllers, seed=0), runs):
         path = args.out / f"{picture.name}.{args.format}"

@@ -16,7 +16,7 @@ from rich.console import Console
 
 from hopping_leg.cli.evaluate import Conditions
 from hopping_leg.cli.options import command_line, say_written
-from hopping_leg.evaluate.figures.results import draw_robustness
+from hopping_leg.evaluate.figures import draw_robustness
 from hopping_leg.evaluate.result_cache import ResultCache
 from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
 from hopping_leg.evaluate.tables import print_robustness

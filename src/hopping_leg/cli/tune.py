@@ -121,10 +121,10 @@ def _tune_gains(args: GainSearch) -> None:
 
 def _tune_recipe(args: RecipeSearch) -> None:
     """Search, print the best, write all trials and the figures."""
-    from hopping_leg.evaluate.figures.tuning import FIGURES
     from hopping_leg.figure_style import to_svg
     from hopping_leg.rl.tuning import Tuning
     from hopping_leg.rl.tuning import tune as tune_recipe
+    from hopping_leg.rl.tuning_figures import FIGURES
 
     at_least(1, workers=args.workers)
     out = args.out or Path("runs/tune") / args.recipe

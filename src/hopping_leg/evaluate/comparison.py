@@ -9,13 +9,12 @@ from typing import Any
 from markupsafe import Markup
 
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate import tables
-from hopping_leg.evaluate.figures.results import draw_learning
-from hopping_leg.evaluate.report_figures import Picture, draw_report_figures, run_of
+from hopping_leg.evaluate.figures import draw_learning
+from hopping_leg.evaluate.report import pictures_of
 from hopping_leg.evaluate.result import Evaluation, flat_conditions
 from hopping_leg.evaluate.result_files import StoredRun
-from hopping_leg.evaluate.tables import column, millimetres
-from hopping_leg.evaluate.trials import Run
+from hopping_leg.evaluate.tables import SUMMARY, column, millimetres
+from hopping_leg.evaluate.trials import Run, load_run
 from hopping_leg.html_page import Column, page_template, svg_uri, table
 
 _DRAWN = ("sequence", "staircase")
@@ -89,7 +88,7 @@ def traces_of(compared: Compared) -> list[Run]:
         others = {r.label: r.evaluation for r in compared.runs if r.evaluation}
         name = _name(others, stored.label)
         for kind in _DRAWN:
-            runs = [run_of(path) for path in sorted(stored.traces.glob(f"*-{kind}-0.parquet"))]
+            runs = [load_run(path) for path in sorted(stored.traces.glob(f"*-{kind}-0.parquet"))]
             known = [run for run in runs if run.controller in evaluation.controllers]
             found += [dataclasses.replace(r, controller=name(r.controller)) for r in known]
     return found
@@ -218,14 +217,14 @@ def write_comparison(compared: Compared, command: str = "") -> bytes:
     evaluation = compared.evaluation
     rows = [training_row(label, training) for label, training in compared.trainings.items()]
     histories = {label: training["history"] for label, training in compared.trainings.items()}
-    pictures = draw_report_figures(evaluation, traces_of(compared)) if evaluation.summary else []
+    pictures = pictures_of(evaluation, traces_of(compared)) if evaluation.summary else []
     page = page_template("hopping_leg.evaluate", "compare.html.j2").render(
         title=f"Compared: {', '.join(run.label for run in compared.runs)}",
         command=command,
         compared=compared,
         beside=beside_table(evaluation),
-        summary=tables.summary_table(evaluation.summary),
-        pictures=[_picture(picture, evaluation) for picture in pictures],
+        summary=table(SUMMARY, evaluation.summary),
+        pictures=pictures,
         learning=svg_uri(draw_learning(histories)) if histories else "",
         trainings=table(_TRAINING, rows),
         differences=difference_table(compared),
@@ -269,16 +268,3 @@ def difference_table(compared: Compared) -> Markup:
     rows = compared.differences
     names = list(rows[0]) if rows else []
     return table([column(name.removeprefix("in "), name) for name in names], rows)
-
-
-def _picture(picture: Picture, evaluation: Evaluation) -> dict[str, Any]:
-    beside = {
-        "staircase": lambda: tables.staircase_table(evaluation.staircase),
-        "ladder": lambda: tables.ladder_table(evaluation.ladder),
-    }
-    return {
-        "title": picture.title,
-        "caption": picture.caption,
-        "source": svg_uri(picture.figure),
-        "table": beside.get(picture.name, lambda: Markup(""))(),
-    }

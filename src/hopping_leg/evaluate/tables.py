@@ -1,6 +1,7 @@
 """Results as tables, in HTML for pages and in text for the terminal; lengths in mm."""
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -26,6 +27,7 @@ def column(
     name: str,
     form: str = "",
     scale: float = 1.0,
+    unit: str = "",
     bad: Callable[[Any], bool] = lambda _value: False,
 ) -> Column:
     """Return the column of an entry of rows, be they dataclasses or JSON values."""
@@ -37,14 +39,13 @@ def column(
         value = entry(row)
         if value is None or value != value:
             return "-"
-        return format(value * scale if scale != 1 else value, form)
+        return format(value * scale if scale != 1 else value, form) + unit
 
     return Column(heading, text, lambda row: bad(entry(row)))
 
 
 def _percent(heading: str, name: str) -> Column:
-    share = column(heading, name, ".0f", 100)
-    return Column(heading, lambda row: f"{share.text(row)} %")
+    return column(heading, name, ".0f", 100, " %")
 
 
 def _interval(row: Summary | Group) -> str:
@@ -66,7 +67,7 @@ _HOPS = column("hops", "hops")
 _SKIPPED = column("skipped", "skipped_hops", bad=_positive)
 _CONTACTS = column("body contacts", "body_contacts", bad=_positive)
 
-_SUMMARY = (
+SUMMARY = (
     _CONTROLLER,
     _COMMAND,
     _ERROR,
@@ -87,9 +88,9 @@ _SUMMARY = (
     Column("RMS", lambda r: f"{r.rms_hip_torque_nm:.1f}, {r.rms_knee_torque_nm:.1f}"),
 )
 
-_LADDER = (_CONTROLLER, _COMMAND, _ERROR, _STD, _HOPS, _SKIPPED, _CONTACTS)
+LADDER = (_CONTROLLER, _COMMAND, _ERROR, _STD, _HOPS, _SKIPPED, _CONTACTS)
 
-_GROUPS = (
+GROUPS = (
     column("group", "group"),
     _COMMAND,
     column("policies", "policies"),
@@ -102,7 +103,7 @@ _GROUPS = (
     _CONTACTS,
 )
 
-_SHORT_SUMMARY = (
+_SHORT = (
     _CONTROLLER,
     column("cmd", "command_m", ".0f", 1e3),
     column("error", "median_error_m", "+.1f", 1e3),
@@ -145,40 +146,24 @@ _LANDINGS = (
 )
 
 
-def summary_table(rows: Sequence[Summary]) -> Markup:
-    """Return the main table."""
-    return table(_SUMMARY, rows)
-
-
-def ladder_table(rows: Sequence[Summary]) -> Markup:
-    """Return the ladder in short form."""
-    return table(_LADDER, rows)
-
-
-def group_table(groups: Sequence[Group]) -> Markup:
-    """Return the aggregate over training seeds."""
-    return table(_GROUPS, groups)
-
-
 def neighbour_table(comparisons: Sequence[Comparison]) -> Markup:
     """Return the tests between neighbouring commands."""
+    p = column("", "p", ".3f")
     columns = (
-        Column("controller", lambda r: r[0]),
-        Column("commands / m", lambda r: f"{r[1].lower_m:.2f} and {r[1].upper_m:.2f}"),
-        Column("p, rank sum", lambda r: _p_value(r[1].p), lambda r: not r[1].p < 1e-3),
-        Column("Cliff's delta", lambda r: f"{r[1].cliffs_delta:+.3f}" if r[1].p == r[1].p else "-"),
+        _CONTROLLER,
+        Column("commands / m", lambda r: f"{r['lower_m']:.2f} and {r['upper_m']:.2f}"),
         Column(
-            "hops in the overlap",
-            lambda r: f"{100 * r[1].overlap:.1f} %" if r[1].p == r[1].p else "-",
+            "p, rank sum",
+            lambda r: "< 0.001" if r["p"] < 1e-3 else p.text(r),
+            lambda r: not r["p"] < 1e-3,
         ),
+        column("Cliff's delta", "cliffs_delta", "+.3f"),
+        column("hops in the overlap", "overlap", ".1f", 100, " %"),
     )
-    return table(columns, [(c.controller, pair) for c in comparisons for pair in c.neighbours])
-
-
-def _p_value(p: float) -> str:
-    if p != p:
-        return "-"
-    return "< 0.001" if p < 1e-3 else f"{p:.3f}"
+    return table(
+        columns,
+        [{"controller": c.controller, **vars(n)} for c in comparisons for n in c.neighbours],
+    )
 
 
 def staircase_table(stairs: Sequence[Staircase]) -> Markup:
@@ -186,22 +171,23 @@ def staircase_table(stairs: Sequence[Staircase]) -> Markup:
     sets: dict[tuple[float, ...], list[Staircase]] = {}
     for one in stairs:
         sets.setdefault(tuple(one.commands_m), []).append(one)
-    caption = "median apex at each step / mm"
-    tables = [table(_staircase_columns(steps), rows, caption) for steps, rows in sets.items()]
-    return Markup("").join(tables)
 
+    def step(index: int, command: float) -> Column:
+        return Column(f"{command:.2f} m", lambda row: millimetres(row.median_apexes_m[index]))
 
-def _staircase_columns(steps: Sequence[float]) -> list[Column]:
-    def median(index: int) -> Callable[[Staircase], str]:
-        return lambda staircase: millimetres(staircase.median_apexes_m[index])
-
-    return [
-        _CONTROLLER,
-        *(Column(f"{command:.2f} m", median(index)) for index, command in enumerate(steps)),
+    last = (
         Column("monotone", lambda r: "yes" if r.monotone else "no", lambda r: not r.monotone),
         Column("runs monotone", lambda r: f"{r.monotone_runs} of {r.runs}"),
         _SKIPPED,
-    ]
+    )
+    return Markup("").join(
+        table(
+            (_CONTROLLER, *itertools.starmap(step, enumerate(steps)), *last),
+            rows,
+            "median apex at each step / mm",
+        )
+        for steps, rows in sets.items()
+    )
 
 
 def estimator_table(estimators: Sequence[Estimator]) -> Markup:
@@ -234,7 +220,7 @@ def print_evaluation(console: Console, evaluation: Evaluation) -> None:
             "error: median of apex - command; skip: skipped hops; 1/s: hop rate;\n"
             "base: lowest height over whole runs; contacts: of base or knee with the ground"
         )
-        console.print(_text_table(_SHORT_SUMMARY, one.summary, title, caption))
+        console.print(_text_table(_SHORT, one.summary, title, caption))
     lines = [
         f"Staircase, {step.controller}: {'rises' if step.monotone else 'does not rise'} at every"
         f" step ({step.monotone_runs} of {step.runs} runs on their own), {step.skipped_hops}"

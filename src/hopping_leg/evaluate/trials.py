@@ -12,6 +12,7 @@ import numpy as np
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.errors import UsageError, unknown_name
+from hopping_leg.evaluate.metrics import stretches
 from hopping_leg.io import safe_file_name
 from hopping_leg.robot.limits import command_limits
 from hopping_leg.robot.model_mismatch import GroundMismatch
@@ -242,3 +243,19 @@ def save_traces(runs: Sequence[Run], directory: Path) -> list[Path]:
     for run, path in zip(runs, paths, strict=True):
         run.trace.save(path)
     return paths
+
+
+def load_run(path: Path) -> Run:
+    """Load a trace as a run; traces from elsewhere count as fixed trials of their own."""
+    trace = Trace.load(path)
+    command, time = trace.column("command_m"), trace.column("time_s")
+    period = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    steps = tuple((float(command[a]), (b - a) * period) for a, b in stretches(command))
+    header = trace.header
+    default = "fixed" if len(steps) == 1 else "sequence"
+    return Run(
+        controller=str(header.get("controller", path.stem)),
+        trial=Trial(steps, str(header.get("kind", default))),
+        repeat=int(header.get("repeat", 0)),
+        trace=trace,
+    )

@@ -1,6 +1,8 @@
 """A short video of a hop at every command, rendered off screen in a process of its own.
 
-OpenGL drivers crash, hang or are missing; none of that may take an evaluation down.
+OpenGL drivers crash, hang or are missing; none of that may take an evaluation down. That process is
+``python -m hopping_leg.evaluate.video XML NPY OUT M...``, as MuJoCo chooses the OpenGL backend when
+it is imported.
 """
 
 import os
@@ -10,9 +12,11 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
+import mujoco
 import numpy as np
+from PIL import Image, ImageDraw
 
 from hopping_leg.arrays import Array
 from hopping_leg.evaluate.metrics import START_SECONDS
@@ -32,21 +36,27 @@ FRAME_RATE = 33.3
 """Frames per second of simulated time."""
 
 SLOWDOWN = 2.0
+SIZE = (220, 300)
+"""Width and height of one command's picture, pixels."""
+
 TIMEOUT = 120.0
 """Given to one backend, s."""
+
+_ENCODING: dict[str, dict[str, Any]] = {
+    ".webp": {"quality": 60, "method": 4},
+    ".gif": {"optimize": True},
+}
+"""By the file's ending."""
 
 
 @dataclass(frozen=True)
 class Video:
-    """An animation, or the reason why there is none.
-
-    Attributes:
-        content: The file, or None.
-        reason: What stood in the way, empty if nothing did.
-    """
+    """An animation, or the reason why there is none."""
 
     content: bytes | None
+    """The file."""
     reason: str = ""
+    """What stood in the way, empty if nothing did."""
 
 
 def fixed_traces(runs: Sequence[Run], controller: str) -> dict[float, Trace]:
@@ -75,17 +85,13 @@ def render_video(robot: Robot, traces: Mapping[float, Trace], kind: Animation = 
         model.write_text(spec.to_xml(), encoding="utf-8")
         np.save(motion, poses)
         reasons = []
-        for backend in _backends():
+        chosen = os.environ.get("MUJOCO_GL", "").lower()
+        for backend in (chosen,) if chosen else BACKENDS:
             reason = _render(backend, model, motion, out, commands)
             if reason is None:
                 return Video(out.read_bytes())
             reasons.append(f"{backend}: {reason}")
     return Video(None, f"{'; '.join(reasons)} (Mesa's libegl1 or libosmesa6 would do)")
-
-
-def _backends() -> tuple[str, ...]:
-    chosen = os.environ.get("MUJOCO_GL", "").lower()
-    return (chosen,) if chosen else BACKENDS
 
 
 def clip(trace: Trace) -> Array:
@@ -108,7 +114,7 @@ def _render(
     backend: str, model: Path, motion: Path, out: Path, commands: list[float]
 ) -> str | None:
     """Render in another process; return what went wrong or None."""
-    command = [sys.executable, "-m", "hopping_leg.evaluate.render"]
+    command = [sys.executable, "-m", "hopping_leg.evaluate.video"]
     command += [str(model), str(motion), str(out), *(f"{c:.6f}" for c in commands)]
     environment = {**os.environ, "MUJOCO_GL": backend}
     if backend == "osmesa":
@@ -123,3 +129,63 @@ def _render(
         return None
     lines = [line for line in done.stderr.splitlines() if line.strip() and line[0] != " "]
     return lines[-1] if lines else f"the renderer ended with code {done.returncode}"
+
+
+def _main(arguments: list[str]) -> None:
+    """Render poses to a file; arguments as in the module's docstring."""
+    model = mujoco.MjModel.from_xml_path(arguments[0])
+    poses = np.load(arguments[1], allow_pickle=False)
+    frames = _draw_frames(model, poses, [float(text) for text in arguments[3:]])
+    out = Path(arguments[2])
+    frames[0].save(
+        out,
+        save_all=True,
+        append_images=frames[1:],
+        duration=round(1000 * SLOWDOWN / FRAME_RATE),
+        loop=0,
+        **_ENCODING[out.suffix],
+    )
+
+
+def _draw_frames(model: mujoco.MjModel, poses: Array, commands: list[float]) -> list[Image.Image]:
+    """Return one picture per frame with all commands side by side; poses (commands, frames, 3)."""
+    data = mujoco.MjData(model)
+    highest = float(poses[..., 0].max())
+    camera = mujoco.MjvCamera()
+    camera.lookat[:] = [0.02, 0.0, 0.5 * highest]
+    camera.azimuth, camera.elevation = 90.0, -4.0
+    camera.distance = 0.35 + 1.25 * highest
+    width, height = SIZE
+    pictures = []
+    with mujoco.Renderer(model, height, width) as renderer:
+        renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False
+        for frame in range(poses.shape[1]):
+            picture = Image.new("RGB", (width * len(commands), height))
+            draw = ImageDraw.Draw(picture)
+            for column, command in enumerate(commands):
+                data.qpos[:] = poses[column, frame]
+                mujoco.mj_forward(model, data)
+                renderer.update_scene(data, camera)
+                _mark(renderer.scene, command)
+                picture.paste(Image.fromarray(renderer.render()), (column * width, 0))
+                text = f"command {command:.2f} m   hip axis {poses[column, frame, 0]:.2f} m"
+                draw.text((column * width + 8, 6), text, fill=(40, 40, 40))
+            pictures.append(picture)
+    return pictures
+
+
+def _mark(scene: mujoco.MjvScene, command: float) -> None:
+    """Draw the commanded height of the hip axis as a thin line behind the leg."""
+    mujoco.mjv_initGeom(
+        scene.geoms[scene.ngeom],
+        mujoco.mjtGeom.mjGEOM_BOX,
+        np.array([0.25, 0.001, 0.0012]),
+        np.array([0.0, 0.06, command]),
+        np.eye(3).ravel(),
+        np.array([0.84, 0.37, 0.0, 0.8], dtype=np.float32),
+    )
+    scene.ngeom += 1
+
+
+if __name__ == "__main__":
+    _main(sys.argv[1:])

@@ -14,11 +14,7 @@ _COLUMNS = 3
 
 @styled
 def draw_history(study: dict[str, Any]) -> Figure:
-    """Draw the score of every trial, the best so far, and trials that were given up.
-
-    Args:
-        study: As ``hop tune --json`` writes it.
-    """
+    """Draw the score of every trial, the best so far, and trials that were given up."""
     figure = Figure(figsize=(WIDTH, 3.0), layout="constrained")
     axes = figure.subplots()
     done, given_up = _done(study), [t for t in study["trials"] if t["state"] == "pruned"]
@@ -30,35 +26,25 @@ def draw_history(study: dict[str, Any]) -> Figure:
     last = [(t["number"], 1e3 * t["snapshots_m"][-1]) for t in given_up if t["snapshots_m"]]
     if last:
         axes.plot(*zip(*last, strict=True), "x", color="0.6", markersize=4, label="given up")
-    axes.set_yscale("log")
-    axes.set_xlabel("trial")
-    axes.set_ylabel("score / mm")
+    axes.set(yscale="log", xlabel="trial", ylabel="score / mm")
     axes.legend()
     return figure
 
 
 @styled
 def draw_importance(study: dict[str, Any]) -> Figure:
-    """Draw how much each number matters for the score.
-
-    Args:
-        study: As ``hop tune --json`` writes it.
-    """
-    shares = sorted(study["importance"].items(), key=lambda entry: entry[1])
+    """Draw how much each number matters for the score."""
+    shares = dict(sorted(study["importance"].items(), key=lambda entry: entry[1]))
     figure = Figure(figsize=(WIDTH, 0.8 + 0.28 * max(len(shares), 1)), layout="constrained")
     axes = figure.subplots()
-    axes.barh([name for name, _ in shares], [share for _, share in shares], color=COLOURS[0])
+    axes.barh(list(shares), list(shares.values()), color=COLOURS[0])
     axes.set_xlabel("share of importance (PED-ANOVA)")
     return figure
 
 
 @styled
 def draw_slices(study: dict[str, Any]) -> Figure:
-    """Draw the score of every finished trial over each number.
-
-    Args:
-        study: As ``hop tune --json`` writes it.
-    """
+    """Draw the score of every finished trial over each number."""
     names, done = list(study["space"]), _done(study)
     rows = math.ceil(len(names) / _COLUMNS)
     figure = Figure(figsize=(WIDTH, 2.0 * rows + 0.3), layout="constrained")
@@ -72,8 +58,7 @@ def draw_slices(study: dict[str, Any]) -> Figure:
         elif study["space"][name].get("log"):
             axes.set_xscale("log")
             axes.xaxis.set_minor_formatter(NullFormatter())
-        axes.set_xlabel(name)
-        axes.set_yscale("log")
+        axes.set(xlabel=name, yscale="log")
     for axes in panels[len(names) :]:
         axes.set_visible(False)
     for axes in panels[::_COLUMNS]:
@@ -83,25 +68,20 @@ def draw_slices(study: dict[str, Any]) -> Figure:
 
 @styled
 def draw_parallel(study: dict[str, Any]) -> Figure:
-    """Draw every finished trial as a line over all numbers, the best quarter in colour.
-
-    Args:
-        study: As ``hop tune --json`` writes it.
-    """
+    """Draw every finished trial as a line over all numbers, the best quarter in colour."""
     names, done = list(study["space"]), _done(study)
     figure = Figure(figsize=(WIDTH, 3.4), layout="constrained")
     axes = figure.subplots()
     columns = []
     for name in names:
         places, labels = _places(study, name, done)
-        low, high, logarithmic = _range(study["space"][name], labels)
-        values = np.asarray(places, float)
-        if logarithmic:
+        dimension, values = study["space"][name], np.asarray(places, float)
+        low, high = (0.0, len(labels) - 1.0) if labels else (dimension["low"], dimension["high"])
+        if not labels and dimension["log"]:
             values, low, high = np.log(values), math.log(low), math.log(high)
         columns.append((values - low) / max(high - low, 1e-12))
-    order = np.argsort([-t["score_m"] for t in done])
     good = len(done) - max(len(done) // 4, 1)
-    for rank, index in enumerate(order):
+    for rank, index in enumerate(np.argsort([-t["score_m"] for t in done])):
         look = {"color": COLOURS[1], "linewidth": 1.3} if rank >= good else {"color": "0.8"}
         axes.plot(range(len(names)), [column[index] for column in columns], **look)
     axes.set_xticks(range(len(names)), names, rotation=30, ha="right")
@@ -115,7 +95,7 @@ FIGURES = {
     "slices": draw_slices,
     "parallel": draw_parallel,
 }
-"""All of them, by name."""
+"""All of them, by name; each takes what ``hop tune --json`` writes."""
 
 
 def _done(study: dict[str, Any]) -> list[dict[str, Any]]:
@@ -132,9 +112,3 @@ def _places(
         return values, []
     labels = ["x".join(map(str, c)) if isinstance(c, list | tuple) else str(c) for c in choices]
     return [labels.index(str(value)) for value in values], labels
-
-
-def _range(dimension: dict[str, Any], labels: list[str]) -> tuple[float, float, bool]:
-    if labels:
-        return 0.0, len(labels) - 1.0, False
-    return dimension["low"], dimension["high"], dimension["log"]

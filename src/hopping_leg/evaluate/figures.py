@@ -1,0 +1,259 @@
+"""Figures: heights over time, phase space, distributions, ladder, robustness, learning curves."""
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+
+from hopping_leg import figure_style
+from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.evaluate.metrics import ESTIMATED_HEIGHT, START_SECONDS, SWITCH_SECONDS, stretches
+from hopping_leg.evaluate.result import Evaluation
+from hopping_leg.figure_style import COLOURS, COMMAND_COLOUR, WIDTH, colour, styled
+from hopping_leg.hop_detection import FLIGHT_CLEARANCE, trace_hops
+from hopping_leg.trace import Trace
+
+_PHASE_SPACE_SECONDS = 10.0
+"""Length of the paper's trial, s."""
+
+_ESTIMATE_SECONDS = 3.0
+"""Time in which estimate and truth are drawn, s."""
+
+_ENOUGH = 5
+"""Hops from which on a shape is drawn around the dots."""
+
+_COLUMNS = 4
+"""Panels of robustness beside each other."""
+
+
+@styled
+def draw_heights(traces: Mapping[str, Trace]) -> Figure:
+    """Draw base height, command and apexes over time, a panel per run under its title."""
+    figure, axes = figure_style.panels(len(traces))
+    for index, (title, trace) in enumerate(traces.items()):
+        _draw_heights(axes[index][0], trace, colour(index), with_labels=index == 0)
+        axes[index][0].set_title(title)
+        axes[index][0].set_ylabel("base height / m")
+    axes[-1][0].set_xlabel("time / s")
+    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside upper right", ncols=4)
+    return figure
+
+
+def _draw_heights(axes: Axes, trace: Trace, paint: str, *, with_labels: bool) -> None:
+    time, command = trace.column("time_s"), trace.column("command_m")
+    height, hops = trace.column("height_m"), trace_hops(trace)
+    names = ("base height", "command", "apex in flight", "median apex")
+    line, ask, dots, median = names if with_labels else ("_",) * 4
+    axes.plot(time, height, color=paint, linewidth=0.8, alpha=0.8, label=line)
+    axes.step(time, command, where="post", color=COMMAND_COLOUR, linewidth=1.4, label=ask)
+    axes.plot(time[hops.tick], hops.apex, ".", color="black", markersize=3.5, label=dots)
+    contrast = COLOURS[0] if paint == COLOURS[1] else COLOURS[1]
+    for start, end in stretches(command):
+        begin = time[start] + (SWITCH_SECONDS if start else START_SECONDS)
+        apex = hops.apex[(hops.tick < end) & (time[hops.tick] >= begin)]
+        if len(apex):
+            look: dict[str, Any] = {"color": contrast, "linewidth": 1.8, "zorder": 4}
+            axes.hlines(np.median(apex), begin, time[end - 1], label=median, **look)
+            median = "_"
+    axes.margins(x=0.01)
+
+
+@styled
+def draw_phase_space(trace: Trace, title: str = "") -> Figure:
+    """Draw the torque the controller asked of the knee at every configuration it met.
+
+    Line: one example phase; circle: its start; diamond: its end.
+
+    Args:
+        trace: A run at a constant command; 10 s after the start are drawn, or what there is of
+            a shorter one.
+        title: Title of the figure.
+    """
+    time = trace.column("time_s")
+    chosen = (time >= START_SECONDS) & (time < START_SECONDS + _PHASE_SPACE_SECONDS)
+    if not chosen.any():
+        chosen = time < _PHASE_SPACE_SECONDS
+    names = ("knee_position_rad", "knee_velocity_rad_s", "knee_command_nm")
+    angle, speed, torque = (trace.column(name)[chosen] for name in names)
+    flight = trace.column("foot_clearance_m")[chosen] >= FLIGHT_CLEARANCE
+    figure = Figure(figsize=(WIDTH, 3.6), layout="constrained")
+    panels = figure.subplots(1, 2, sharex=True, sharey=True)
+    limit = float(np.nanmax(np.abs(torque), initial=0.0)) or 1.0
+    look: dict[str, Any] = {"cmap": figure_style.TORQUE_MAP, "vmin": -limit, "vmax": limit, "s": 9}
+    look |= {"edgecolors": "0.6", "linewidths": 0.2, "rasterized": True}
+    for axes, name, phase in ((panels[0], "flight", flight), (panels[1], "stance", ~flight)):
+        dots = axes.scatter(angle[phase], speed[phase], c=torque[phase], **look)
+        _draw_example_phase(axes, angle, speed, phase)
+        axes.set_title(name)
+        axes.set_xlabel("knee angle / rad")
+    panels[0].set_ylabel("knee velocity / (rad/s)")
+    figure.colorbar(dots, ax=panels, label="knee torque asked for / N m")
+    if title:
+        figure.suptitle(title, x=0.01, ha="left", fontsize=10)
+    return figure
+
+
+def _draw_example_phase(axes: Axes, angle: Array, speed: Array, phase: BoolArray) -> None:
+    """Draw the complete phase of median length."""
+    edges = np.flatnonzero(np.diff(phase)) + 1
+    spans = [(a, b) for a, b in itertools.pairwise(edges) if phase[a]]
+    if not spans:
+        return
+    start, end = sorted(spans, key=lambda span: span[1] - span[0])[len(spans) // 2]
+    axes.plot(angle[start:end], speed[start:end], color="black", linewidth=1.3)
+    look: dict[str, Any] = {"color": "white", "markeredgecolor": "black", "linestyle": "none"}
+    for tick, marker, label in ((start, "o", "start"), (end - 1, "D", "end")):
+        axes.plot(angle[tick], speed[tick], marker=marker, markersize=7, label=label, **look)
+    axes.legend(loc="lower right")
+
+
+@styled
+def draw_estimate(trace: Trace, title: str = "") -> Figure:
+    """Draw estimated and true height over a few hops, and the error over the whole run."""
+    time, height, estimate = (trace.column(n) for n in ("time_s", "height_m", ESTIMATED_HEIGHT))
+    figure = Figure(figsize=(WIDTH, 3.2), layout="constrained")
+    over_time, spread = figure.subplots(1, 2, width_ratios=(2, 1))
+    shown = (time >= START_SECONDS) & (time < START_SECONDS + _ESTIMATE_SECONDS)
+    over_time.plot(time[shown], height[shown], color=COLOURS[0], label="true")
+    over_time.plot(time[shown], estimate[shown], "--", color=COLOURS[1], label="estimated")
+    over_time.set(xlabel="time / s", ylabel="base height / m")
+    over_time.margins(y=0.15)
+    over_time.legend(loc="upper right", ncols=2)
+    flight, error = trace.column("foot_clearance_m") > 0, 1e3 * (estimate - height)
+    known = (time >= START_SECONDS) & np.isfinite(error)
+    bins = np.linspace(error[known].min() - 1, error[known].max() + 1, 50)
+    for name, phase, paint in (("flight", flight, COLOURS[0]), ("stance", ~flight, COLOURS[1])):
+        look: dict[str, Any] = {"histtype": "step", "density": True, "color": paint, "label": name}
+        spread.hist(error[known & phase], bins=bins, **look)
+    spread.set(xlabel="estimated - true / mm", ylabel="density / (1/mm)")
+    spread.legend()
+    over_time.set_title(title)
+    return figure
+
+
+@styled
+def draw_distributions(evaluation: Evaluation) -> Figure:
+    """Draw every hop as a dot, the distribution around it, its median and the command."""
+    controllers = evaluation.controllers
+    commands = sorted({row.command_m for row in evaluation.summary})
+    apexes = {
+        (e["controller"], e["command_m"]): np.array(e["apexes_m"]) for e in evaluation.distributions
+    }
+    figure = Figure(figsize=(WIDTH, 4.2), layout="constrained")
+    axes = figure.subplots()
+    slot = 0.8 / len(controllers)
+    rng = np.random.default_rng(0)
+    for place, command in enumerate(commands):
+        axes.hlines(command, place - 0.45, place + 0.45, color=COMMAND_COLOUR, linewidth=1.2)
+    for index, controller in enumerate(controllers):
+        for place, command in enumerate(commands):
+            apex = apexes.get((controller, command), np.empty(0))
+            if len(apex):
+                centre = place - 0.4 + slot * (index + 0.5)
+                _draw_apexes(axes, apex, centre, slot, colour(index), rng)
+        axes.plot([], [], color=colour(index), linewidth=3, label=controller)
+    axes.plot([], [], color=COMMAND_COLOUR, linewidth=1.2, label="command")
+    axes.set_xticks(range(len(commands)), [f"{c:.2f}" for c in commands])
+    axes.grid(visible=False, axis="x")
+    axes.set(xlabel="commanded apex height / m", ylabel="apex height / m")
+    figure.legend(loc="outside upper right", ncols=min(len(controllers) + 1, 4))
+    return figure
+
+
+def _draw_apexes(
+    axes: Axes, apex: Array, centre: float, slot: float, paint: str, rng: np.random.Generator
+) -> None:
+    if len(apex) >= _ENOUGH and np.ptp(apex) > 0:
+        parts = axes.violinplot([apex], [centre], widths=0.9 * slot, showextrema=False, points=200)
+        for body in cast("list[PolyCollection]", parts["bodies"]):
+            body.set(facecolor=paint, alpha=0.25, edgecolor="none")
+    at = centre + rng.uniform(-0.18, 0.18, len(apex)) * slot
+    look: dict[str, Any] = {"markersize": 2.5, "alpha": 0.6, "markeredgecolor": "none"}
+    dots, *_ = axes.plot(at, apex, ".", color=paint, **look)
+    dots.set_rasterized(True)  # thousands of them; as shapes they make a file of megabytes
+    axes.hlines(np.median(apex), centre - 0.42 * slot, centre + 0.42 * slot, color=paint, lw=2.2)
+
+
+@styled
+def draw_ladder(evaluation: Evaluation) -> Figure:
+    """Draw median apex and error over the command; bars are one standard deviation over hops."""
+    figure = Figure(figsize=(WIDTH, 3.6), layout="constrained")
+    apex, error = figure.subplots(1, 2)
+    controllers = list(dict.fromkeys(row.controller for row in evaluation.ladder))
+    commands = sorted({row.command_m for row in evaluation.ladder})
+    apex.plot(commands, commands, color=COMMAND_COLOUR, linewidth=1.2, label="command")
+    error.axhline(0, color=COMMAND_COLOUR, linewidth=1.2)
+    for index, name in enumerate(controllers):
+        rows = [row for row in evaluation.ladder if row.controller == name]
+        at, median, spread = np.array([(r.command_m, r.median_error_m, r.std_m) for r in rows]).T
+        look = {"color": colour(index), "marker": "o", "markersize": 3.5, "linewidth": 1.2}
+        apex.plot(at, at + median, label=name, **look)
+        aside = at + 0.0012 * (index - (len(controllers) - 1) / 2)
+        error.errorbar(aside, 1e3 * median, 1e3 * spread, capsize=2, elinewidth=0.9, **look)
+    for axes in (apex, error):
+        axes.set_xticks(commands[::2], [f"{c:.2f}" for c in commands[::2]])
+        axes.set_xlabel("commanded apex height / m")
+    apex.set_ylabel("median apex height / m")
+    error.set_ylabel("apex - command / mm, median and std")
+    apex.legend()
+    return figure
+
+
+@styled
+def draw_robustness(result: dict[str, Any]) -> Figure:
+    """Draw the share of successful trials of a benchmark's JSON over the level, a panel an axis."""
+    axes, levels = result["axes"], result["levels"]
+    controllers = list(dict.fromkeys(row["controller"] for row in levels))
+    rows, columns = math.ceil(len(axes) / _COLUMNS), min(_COLUMNS, len(axes))
+    figure = Figure(figsize=(WIDTH, 1.7 * rows + 0.6), layout="constrained")
+    panels = figure.subplots(rows, columns, sharey=True, squeeze=False)
+    for panel, axis in zip(panels.flat, axes, strict=False):
+        for index, controller in enumerate(controllers):
+            points = [  # the curve passes through the neutral level, where nothing is changed
+                (axis["neutral"] if row["axis"] == "nominal" else row["level"], row["success"])
+                for row in levels
+                if row["controller"] == controller and row["axis"] in (axis["name"], "nominal")
+            ]
+            at, shares = np.array(sorted(points)).T
+            look = {"color": colour(index), "marker": "o", "markersize": 3, "linewidth": 1.2}
+            panel.plot(at, 100 * shares, label=controller, **look)
+        panel.set_ylim(-5, 105)
+        panel.set_title(axis["name"], fontsize=9)
+        panel.set_xlabel("level" if axis["unit"] == "1" else f"level / {axis['unit']}")
+    for panel in panels.flat[len(axes) :]:
+        panel.set_visible(False)
+    for line in panels:
+        line[0].set_ylabel("successful / %")
+    handles, labels = panels.flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper right", ncols=min(len(controllers), 4))
+    return figure
+
+
+@styled
+def draw_learning(histories: Mapping[str, Sequence[Mapping[str, Any]]]) -> Figure:
+    """Draw the snapshots of each training as a line, the best one as a dot.
+
+    Args:
+        histories: Label to the snapshots of a training: ``steps``, ``minutes``, ``score_m``.
+    """
+    figure = Figure(figsize=(WIDTH, 3.2), layout="constrained")
+    panels = figure.subplots(1, 2, sharey=True)
+    shown = (("steps", 1e-6, "experience / million steps"), ("minutes", 1.0, "time / min"))
+    for axes, (key, factor, label) in zip(panels, shown, strict=True):
+        for index, (name, rows) in enumerate(histories.items()):
+            if not rows:
+                continue
+            at, score = np.array([(factor * row[key], 1e3 * row["score_m"]) for row in rows]).T
+            best = int(np.argmin(score))
+            axes.plot(at, score, color=colour(index), linewidth=1.2, label=name)
+            axes.plot(at[best], score[best], "o", color=colour(index), markersize=5)
+        axes.set_xlabel(label)
+        axes.set_yscale("log")
+    panels[0].set_ylabel("score of the snapshot / mm")
+    panels[0].legend()
+    return figure

@@ -1,1 +1,0 @@
-"""The paper's figures, each drawn from traces or an evaluation alone."""
