@@ -28,31 +28,20 @@ from hopping_leg.identify.recording_format import (
     COLUMNS,
     PAIRS,
     RecordingMetadata,
-    metadata_from_tree,
-    metadata_to_tree,
 )
 from hopping_leg.identify.unit_checks import STALL, Inspection, row_period
+from hopping_leg.io import read_dataclass
 from hopping_leg.trace import Trace
 
-_TEXT_COLUMNS = {"phase"}
-"""Columns that hold words."""
-
+_KEY = "recording"
 _FLAGS = {"true": 1.0, "false": 0.0}
 _PARQUET = b"PAR1"
 _GZIP = b"\x1f\x8b"
 
 
-def read_csv(content: bytes, origin: str) -> pl.DataFrame:
-    """Return a CSV's table, numbers as floats, empty fields and NaN as null.
-
-    Args:
-        content: The file's bytes, gzip or plain, UTF-8.
-        origin: The file, for messages.
-
-    Raises:
-        RecordingError: Naming file, column and row of what is wrong.
-    """
-    rows = _rows(_text(content, origin), origin)
+def _read_csv(content: bytes, origin: str) -> pl.DataFrame:
+    """Return a CSV's table, plain or gzip, numbers as floats, empty fields and NaN as null."""
+    rows = _rows(content, origin)
     header = [name.strip() for name in next(rows, [])]
     if not header:
         raise RecordingError(f"{origin} is empty; record again.")
@@ -71,34 +60,22 @@ def read_csv(content: bytes, origin: str) -> pl.DataFrame:
                 " a logger that was killed leaves such a row, delete it."
             )
         body.append(row)
-    columns = zip(*body, strict=True) if body else ([] for _ in header)
-    return pl.DataFrame([_parse(n, list(c), origin) for n, c in zip(header, columns, strict=True)])
+    texts = pl.DataFrame(body, schema=dict.fromkeys(header, pl.String), orient="row")
+    return pl.DataFrame([_parse(column, origin) for column in texts])
 
 
-def _cast(column: pl.Series, kind: type[pl.DataType], origin: str) -> pl.Series:
-    try:
-        return column.cast(kind)
-    except pl.exceptions.PolarsError as error:
-        raise RecordingError(
-            f"{origin}: column '{column.name}' holds {column.dtype} but must hold {kind}."
-        ) from error
-
-
-def _text(content: bytes, origin: str) -> str:
+def _rows(content: bytes, origin: str) -> Iterator[list[str]]:
     if content.startswith(_GZIP):
         try:
             content = gzip.decompress(content)
         except (OSError, EOFError, zlib.error) as error:
             raise RecordingError(f"{origin} is not a whole gzip file: {error}.") from error
     try:
-        return content.decode("utf-8-sig")
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise RecordingError(
             f"{origin} is neither Parquet nor a CSV in UTF-8: byte {error.start} is no text."
         ) from error
-
-
-def _rows(text: str, origin: str) -> Iterator[list[str]]:
     reader = csv.reader(io.StringIO(text, newline=""))
     try:
         yield from (row for row in reader if row)
@@ -106,10 +83,10 @@ def _rows(text: str, origin: str) -> Iterator[list[str]]:
         raise RecordingError(f"{origin}: line {reader.line_num} is not CSV: {error}.") from error
 
 
-def _parse(name: str, texts: list[str], origin: str) -> pl.Series:
-    words = pl.Series(name, texts, dtype=pl.String).str.strip_chars()
+def _parse(texts: pl.Series, origin: str) -> pl.Series:
+    words = texts.str.strip_chars()
     words = words.set(words == "", None)
-    if name in _TEXT_COLUMNS:
+    if COLUMNS.get(words.name) is pl.String:
         return words
     numbers = words.cast(pl.Float64, strict=False)
     strange = (words.is_not_null() & numbers.is_null()).arg_true()
@@ -120,11 +97,10 @@ def _parse(name: str, texts: list[str], origin: str) -> pl.Series:
     for row in strange:
         if numbers[row] is None:
             text = words[row] if len(words[row]) <= 20 else f"{words[row][:20]}..."
-            raise RecordingError(f"{origin}: column '{name}', row {row}: {text!r} is no number.")
+            raise RecordingError(
+                f"{origin}: column '{words.name}', row {row}: {text!r} is no number."
+            )
     return numbers.fill_nan(None)
-
-
-_KEY = "recording"
 
 
 @dataclass(frozen=True)
@@ -169,19 +145,19 @@ class Recording:
         return bool(np.isfinite(self.array(quantity)).any())
 
     def array(self, quantity: str) -> Array:
-        """Return a quantity of hip and knee, (ticks, 2), NaN where it was not recorded.
-
-        Args:
-            quantity: ``position``, ``velocity``, ``torque``, ``position_command``,
-                ``velocity_command``, ``torque_command``, ``stiffness``, ``damping``, or one of
-                the guesses ``position_estimate`` and ``velocity_estimate``.
+        """Return a quantity of ``PAIRS``, (ticks, 2), NaN where it was not recorded.
 
         Raises:
             UsageError: There is no such quantity.
         """
         if quantity not in PAIRS:
             raise UsageError(unknown_name("quantity of a recording", quantity, PAIRS))
-        return np.stack([self._floats(column) for column in PAIRS[quantity]], axis=-1)
+        columns = []
+        for name in PAIRS[quantity]:
+            known = self.has_column(name)
+            values = self.trace.table[name].cast(pl.Float64).to_numpy() if known else None
+            columns.append(np.full(len(self), np.nan) if values is None else values)
+        return np.stack(columns, axis=-1)
 
     def segments(self) -> list[slice]:
         """Return the stretches of rows without a stall, in order."""
@@ -200,14 +176,9 @@ class Recording:
         Raises:
             TraceError: The file cannot be written.
         """
-        header = {**self.trace.header, _KEY: metadata_to_tree(self.metadata)}
+        tree = dataclasses.asdict(self.metadata).items()
+        header = {**self.trace.header, _KEY: {k: v for k, v in tree if v is not None}}
         Trace(self.trace.table, header).save(path)
-
-    def _floats(self, column: str) -> Array:
-        if not self.has_column(column):
-            return np.full(len(self), np.nan)
-        values: Array = self.trace.table[column].cast(pl.Float64).to_numpy()
-        return values
 
 
 def make_recording(
@@ -219,10 +190,10 @@ def make_recording(
     header: dict[str, Any] | None = None,
     digest: str = "",
 ) -> Recording:
-    """Check a table and return it as a recording.
+    """Check a table in the columns of ``COLUMNS`` and return it as a recording.
 
     Args:
-        table: Columns as in ``COLUMNS``.
+        table: What was recorded.
         metadata: How it was recorded.
         name: The file, for messages.
         names: The file's own column for a recording's column, where they differ.
@@ -232,9 +203,11 @@ def make_recording(
     Raises:
         RecordingError: The table cannot be believed; names file, column and row.
     """
-    inspection = Inspection(_typed(table, name), metadata, name, names or {})
-    table, warnings = check_table(inspection)
-    return Recording(Trace(table, header or {}), metadata, Path(name).name, digest, tuple(warnings))
+    table = _cast(table, COLUMNS, name).with_columns(pl.selectors.float().fill_nan(None))
+    inspection = Inspection(table, metadata, name, names or {})
+    check_table(inspection)
+    trace, warnings = Trace(inspection.table, header or {}), tuple(inspection.warnings)
+    return Recording(trace, metadata, Path(name).name, digest, warnings)
 
 
 def load_recording(path: str | Path) -> Recording:
@@ -257,14 +230,14 @@ def load_recording(path: str | Path) -> Recording:
         raise RecordingError(f"{path} is empty; record again.")
     digest = hashlib.sha256(content).hexdigest()
     table, header = (
-        _native(path) if content.startswith(_PARQUET) else (read_csv(content, origin), {})
+        _native(path) if content.startswith(_PARQUET) else (_read_csv(content, origin), {})
     )
     sidecar = _sidecar(path)
     names: dict[str, str] = {}
     if sidecar is not None:
         table, metadata, names = _apply(sidecar, table, origin)
     elif _KEY in header:
-        metadata = metadata_from_tree(header.pop(_KEY), origin)
+        metadata = _read_metadata(header.pop(_KEY), origin)
     else:
         importer = recognise(table.columns)
         if importer is None:
@@ -291,11 +264,11 @@ def _native(path: Path) -> tuple[pl.DataFrame, dict[str, Any]]:
         if text is not None:
             trace = Trace.load(path)
             return trace.table, dict(trace.header)
-        columns = pl.read_parquet(path).get_columns()
+        table = pl.read_parquet(path)
     except (pl.exceptions.PolarsError, OSError) as error:
         raise RecordingError(f"{path} is not a readable Parquet file: {error}.") from error
-    kinds = (pl.String if c.name in _TEXT_COLUMNS else pl.Float64 for c in columns)
-    return pl.DataFrame([_cast(c, k, str(path)) for c, k in zip(columns, kinds, strict=False)]), {}
+    kinds = {c: pl.String if COLUMNS.get(c) is pl.String else pl.Float64 for c in table.columns}
+    return _cast(table, kinds, str(path)), {}
 
 
 def _sidecar(path: Path) -> tuple[str, dict[str, Any]] | None:
@@ -326,11 +299,21 @@ def _apply(
     table = table.with_columns(pl.col(old).alias(new) for new, old in names.items())
     if "row" not in table.columns:
         table = table.with_columns(pl.int_range(pl.len()).alias("row"))
-    return table, metadata_from_tree(tree, file), names
+    return table, _read_metadata(tree, file), names
 
 
-def _typed(table: pl.DataFrame, origin: str) -> pl.DataFrame:
-    """Return the columns of a recording in their types; others are left out."""
-    known = [(name, kind) for name, (kind, _) in COLUMNS.items() if name in table.columns]
-    series = [_cast(table[name], kind, origin) for name, kind in known]
-    return pl.DataFrame(series).with_columns(pl.selectors.float().fill_nan(None))
+def _read_metadata(tree: object, origin: str) -> RecordingMetadata:
+    return read_dataclass(RecordingMetadata, tree, origin, error=RecordingError)
+
+
+def _cast(table: pl.DataFrame, kinds: Mapping[str, type[pl.DataType]], origin: str) -> pl.DataFrame:
+    """Return the columns that have a type, in it; others are left out."""
+    series = []
+    for name, kind in ((n, k) for n, k in kinds.items() if n in table.columns):
+        try:
+            series.append(table[name].cast(kind))
+        except pl.exceptions.PolarsError as error:
+            raise RecordingError(
+                f"{origin}: column '{name}' holds {table[name].dtype} but must hold {kind}."
+            ) from error
+    return pl.DataFrame(series)

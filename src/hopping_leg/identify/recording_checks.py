@@ -9,7 +9,7 @@ import polars as pl
 
 from hopping_leg.arrays import BoolArray
 from hopping_leg.errors import RecordingError
-from hopping_leg.identify.recording_format import COLUMNS, MEASURED, PAIRS
+from hopping_leg.identify.recording_format import MEASURED, PAIRS
 from hopping_leg.identify.unit_checks import (
     STALL,
     Inspection,
@@ -31,7 +31,6 @@ _STARTUP = 10
 _JUMP = 0.05
 """Step out of rows of zeros, rad, that only a sensor that woke up makes."""
 
-
 _LEAST_ROWS = 20
 """Rows with a position that a recording needs."""
 
@@ -42,13 +41,18 @@ _SMALL_MOTION = 0.5
 """Below it, rad, positions may be revolutions."""
 
 
-def check_table(inspection: Inspection) -> tuple[pl.DataFrame, list[str]]:
-    """Return a table that can be believed, and a sentence for each thing that was strange.
+def check_table(inspection: Inspection) -> None:
+    """Leave in the inspection's table what can be believed, and warn of what was strange.
 
     Raises:
         RecordingError: Naming file, column and row.
     """
-    _check_columns(inspection)
+    if inspection.table.height == 0:
+        raise RecordingError(f"{inspection.origin} has no rows below its header; record again.")
+    if "time_s" not in inspection.table.columns:
+        raise RecordingError(
+            f"{inspection.origin} has no column 'time_s'; a recording needs time and position."
+        )
     check_clock(inspection)
     _drop_garbage(inspection)
     _drop_zeros(inspection)
@@ -57,14 +61,11 @@ def check_table(inspection: Inspection) -> tuple[pl.DataFrame, list[str]]:
     check_velocity(inspection)
     _check_motion(inspection)
     _warn_of_stalls(inspection)
-    return inspection.table, inspection.warnings
 
 
 def _drop_garbage(inspection: Inspection) -> None:
     """Leave out denormal, infinite and huge values."""
-    for column, (dtype, _) in COLUMNS.items():
-        if dtype != pl.Float64 or column not in inspection.table.columns:
-            continue
+    for column in inspection.table.select(pl.selectors.float()).columns:
         size = np.abs(inspection.floats(column))
         garbage = ((size > 0) & (size < TINY)) | (size > HUGE)
         if not garbage.any():
@@ -112,17 +113,14 @@ def _drop_startup(inspection: Inspection) -> None:
     if known and already:
         return  # saved again after they were left out
     if rows:
-        columns = ", ".join(inspection.named(c) for c in _startup_columns(inspection))
+        pairs = PAIRS["torque_command"] + PAIRS["position"]
+        present = [c for c in pairs if c in inspection.table.columns]
+        columns = ", ".join(map(inspection.named, present[:2]))
         inspection.warn(
             f"rows {already} to {inspection.row(rows - 1)} are start-up rows ({reason};"
             f" {columns}); left out"
         )
     inspection.table = inspection.table.slice(rows)
-
-
-def _startup_columns(inspection: Inspection) -> list[str]:
-    pairs = (*PAIRS["torque_command"], *PAIRS["position"])
-    return [column for column in pairs if column in inspection.table.columns][:2]
 
 
 def _asleep(inspection: Inspection) -> int:
@@ -147,22 +145,11 @@ def _unapplied(inspection: Inspection) -> int:
         if len(command) <= 2 * _STARTUP or np.isnan(torque[_STARTUP:]).all():
             continue
         flagged: BoolArray = command[:_STARTUP] > 1.2 * command[_STARTUP:].max()
-        answer = np.fmax(torque[: _STARTUP + 2][:-2], torque[1 : _STARTUP + 1])
-        answer = np.fmax(answer, torque[2 : _STARTUP + 2])
+        answer = np.fmax.reduce([torque[late : _STARTUP + late] for late in range(3)])
         ignored = np.flatnonzero(flagged & (np.nan_to_num(answer) < 0.3 * command[:_STARTUP]))
         if len(ignored) and command[_STARTUP:].max() > 0:
             last = max(last, int(ignored[-1]) + 3)
     return last
-
-
-def _check_columns(inspection: Inspection) -> None:
-    table = inspection.table
-    if table.height == 0:
-        raise RecordingError(f"{inspection.origin} has no rows below its header; record again.")
-    if "time_s" not in table.columns:
-        raise RecordingError(
-            f"{inspection.origin} has no column 'time_s'; a recording needs time and position."
-        )
 
 
 def _check_motion(inspection: Inspection) -> None:

@@ -1,16 +1,13 @@
 """What a recording holds: its columns, and the metadata that its rows do not say."""
 
-import dataclasses
 import math
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 import polars as pl
 
 from hopping_leg.errors import RecordingError
-from hopping_leg.io import read_dataclass
 from hopping_leg.robot.model import GRAVITY
-from hopping_leg.robot.parameters import JOINTS
 
 PAIRS = {
     "position": ("hip_position_rad", "knee_position_rad"),
@@ -24,39 +21,31 @@ PAIRS = {
     "position_estimate": ("hip_position_estimate_rad", "knee_position_estimate_rad"),
     "velocity_estimate": ("hip_velocity_estimate_rad_s", "knee_velocity_estimate_rad_s"),
 }
-"""Quantities that hip and knee both have, each with its two columns."""
+"""Quantities that hip and knee both have, each with its two columns.
 
-_MEANINGS = {
-    "position": "joint position, measured",
-    "velocity": "joint velocity, measured",
-    "torque": "joint torque, measured",
-    "position_command": "target position of the on-board PD",
-    "velocity_command": "target velocity of the on-board PD",
-    "torque_command": "commanded torque; feed-forward where there is an on-board PD",
-    "stiffness": "gain of the on-board PD at this row, where it changes",
-    "damping": "gain of the on-board PD at this row, where it changes",
-    "position_estimate": "guess at the position where it was not measured; never scored",
-    "velocity_estimate": "guess at the velocity where it was not measured; never scored",
-}
+The first three are measured. Commanded position and velocity are targets of the on-board PD, the
+commanded torque is its feed-forward, or all there is; gains stand where they change from row to
+row. Estimates are guesses where nothing was measured and never scored.
+"""
 
-COLUMNS: dict[str, tuple[type[pl.DataType], str]] = {
-    "time_s": (pl.Float64, "when the row was sampled"),
-    "row": (pl.Int64, "row of the source file, the first below the header is 0"),
-    "exact_time": (pl.Boolean, "false where the time stamp is a guess"),
-    "height_m": (pl.Float64, "hip axis above the ground"),
-    "base_rise_m": (pl.Float64, "base height above an unknown zero"),
-    "contact": (pl.Boolean, "the foot touches the ground"),
-    "phase": (pl.String, "what the rig's controller was doing"),
-} | {
-    column: (pl.Float64, f"{joint}: {_MEANINGS[quantity]}")
-    for quantity, columns in PAIRS.items()
-    for joint, column in zip(JOINTS, columns, strict=True)
-}
-"""Every column of a recording: type and meaning. Only time and one position are required."""
+COLUMNS: dict[str, type[pl.DataType]] = {
+    "time_s": pl.Float64,
+    "row": pl.Int64,
+    "exact_time": pl.Boolean,
+    "height_m": pl.Float64,
+    "base_rise_m": pl.Float64,
+    "contact": pl.Boolean,
+    "phase": pl.String,
+} | {column: pl.Float64 for columns in PAIRS.values() for column in columns}
+"""Every column of a recording; only time and one position are required.
 
-MEASURED = tuple(c for q in ("position", "velocity", "torque") for c in PAIRS[q])
+``row`` is that of the source file, the first below the header being 0; ``exact_time`` is false
+where the time stamp is a guess; ``height_m`` is the hip axis above the ground, ``base_rise_m`` the
+base above an unknown zero, ``contact`` the foot's, ``phase`` what the rig's controller did.
+"""
+
+MEASURED = PAIRS["position"] + PAIRS["velocity"] + PAIRS["torque"]
 """Columns that sensors filled."""
-
 
 Rig = Literal["fixed-base", "rail", "boom"]
 Sample = Literal["before-command", "after-command"]
@@ -119,8 +108,8 @@ class RecordingMetadata:
 
     def __post_init__(self) -> None:
         for name in ("rate_hz", "effective_gravity"):
-            if not 0 < getattr(self, name) < math.inf:
-                value = getattr(self, name)
+            value = getattr(self, name)
+            if not 0 < value < math.inf:
                 raise RecordingError(f"'{name}' is {value} but must be positive and finite.")
         if self.startup_rows < 0:
             raise RecordingError(f"'startup_rows' is {self.startup_rows} but must be 0 or more.")
@@ -133,21 +122,3 @@ class RecordingMetadata:
     def period(self) -> float:
         """Nominal time from row to row, s."""
         return 1 / self.rate_hz
-
-
-def metadata_to_tree(metadata: RecordingMetadata) -> dict[str, Any]:
-    """Return a metadata as nested tables for TOML or JSON; what is none is left out."""
-    return {k: v for k, v in dataclasses.asdict(metadata).items() if v is not None}
-
-
-def metadata_from_tree(tree: object, origin: str) -> RecordingMetadata:
-    """Read a metadata from the tables of a sidecar or a header.
-
-    Args:
-        tree: Field names to values as in ``RecordingMetadata``; pairs are lists of two numbers.
-        origin: The file, for messages.
-
-    Raises:
-        RecordingError: Naming file and field.
-    """
-    return read_dataclass(RecordingMetadata, tree, origin, error=RecordingError)

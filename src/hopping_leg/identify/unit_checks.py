@@ -5,6 +5,7 @@ Rows in messages are those of the file, the first below the header being 0.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NoReturn
 
 import numpy as np
 import polars as pl
@@ -17,21 +18,17 @@ from hopping_leg.robot import load_robot
 
 @dataclass
 class Inspection:
-    """What the checks know.
-
-    Attributes:
-        table: In a recording's columns and types; null where nothing was recorded.
-        metadata: How it was recorded.
-        origin: The file, for messages.
-        names: The file's own column for a recording's column, where they differ.
-        warnings: What was strange so far, a sentence each.
-    """
+    """What the checks know."""
 
     table: pl.DataFrame
+    """In a recording's columns and types; null where nothing was recorded."""
     metadata: RecordingMetadata
     origin: str
-    names: Mapping[str, str] = field(default_factory=dict)
+    """The file, for messages."""
+    names: Mapping[str, str]
+    """The file's own column for a recording's column, where they differ."""
     warnings: list[str] = field(default_factory=list)
+    """What was strange so far, a sentence each."""
 
     def named(self, column: str) -> str:
         """Return a column as the file calls it, in quotes."""
@@ -50,12 +47,11 @@ class Inspection:
 
     def floats(self, column: str) -> Array:
         """Return a column as floats, (ticks,), NaN where null."""
-        values: Array = self.values(column).cast(pl.Float64).to_numpy()
-        return np.asarray(values, dtype=np.float64)
+        return np.asarray(self.values(column).cast(pl.Float64).to_numpy(), dtype=np.float64)
 
-    def refusal(self, sentence: str) -> RecordingError:
-        """Return the error that refuses the file; the sentence has its full stop."""
-        return RecordingError(f"{self.origin}: {sentence}")
+    def refuse(self, sentence: str) -> NoReturn:
+        """Refuse the file; the sentence has its full stop."""
+        raise RecordingError(f"{self.origin}: {sentence}")
 
     def warn(self, sentence: str) -> None:
         """Note something strange; the sentence gets the file and a full stop."""
@@ -63,8 +59,7 @@ class Inspection:
 
     def drop(self, column: str) -> None:
         """Make a column as if it had not been recorded."""
-        empty = pl.lit(None, dtype=self.table[column].dtype).alias(column)
-        self.table = self.table.with_columns(empty)
+        self.table = self.table.with_columns(pl.lit(None, self.table[column].dtype).alias(column))
 
 
 STALL = 2.0
@@ -118,22 +113,18 @@ def row_period(time: np.ndarray, period: float) -> float:
 
 
 def check_clock(inspection: Inspection) -> None:
-    """Refuse time that is missing, not finite, not increasing or in another unit.
-
-    Raises:
-        RecordingError: Naming file, column and row.
-    """
+    """Refuse time that is missing, not finite, not increasing or in another unit."""
     time, where = inspection.floats("time_s"), inspection.named("time_s")
     bad = np.flatnonzero(~np.isfinite(time))
     if len(bad):
-        raise inspection.refusal(
+        inspection.refuse(
             f"{where} has no time in row {inspection.row(bad[0])}; every row needs one."
         )
     steps = np.diff(time)
     back = np.flatnonzero(steps <= 0)
     if len(back):
         index = back[0] + 1
-        raise inspection.refusal(
+        inspection.refuse(
             f"{where} does not increase in row {inspection.row(index)}:"
             f" {time[index]:.9g} s comes after {time[index - 1]:.9g} s; remove the row."
         )
@@ -144,61 +135,48 @@ def check_clock(inspection: Inspection) -> None:
     if not 0.5 <= periods <= _SPARSEST:
         unit = next((u for u, f in _TIME_UNITS.items() if 0.8 < periods / f < 1.25), None)
         guess = f"the time seems to be in {unit}" if unit else "one of the two is wrong"
-        raise inspection.refusal(
+        inspection.refuse(
             f"{where} steps by {step:.3g} from row to row but the metadata's rate_hz ="
             f" {metadata.rate_hz:g} means {metadata.period:.3g} s; {guess}."
         )
 
 
 def check_units(inspection: Inspection) -> None:
-    """Refuse positions, speeds, torques and heights that cannot be rad, rad/s, N m and m.
-
-    Raises:
-        RecordingError: Naming file, column and row.
-    """
+    """Refuse positions, speeds, torques and heights that cannot be rad, rad/s, N m and m."""
+    try:
+        robot = load_robot(inspection.metadata.robot)
+        strongest = [j.motor.peak_torque * j.belt_ratio for j in (robot.hip, robot.knee)]
+    except (RobotError, OSError):
+        strongest = [_COMMON_PEAK] * 2
     joints = (
-        ("position", (_HALF_TURNS, _HALF_TURNS), "rad", "degrees"),
-        ("velocity", (_FASTEST, _FASTEST), "rad/s", "degrees/s"),
-        ("torque", _strongest(inspection.metadata.robot), "N m", "mN m"),
+        ("position", [_HALF_TURNS] * 2, "rad", "degrees"),
+        ("velocity", [_FASTEST] * 2, "rad/s", "degrees/s"),
+        ("torque", [_STRONGEST * peak for peak in strongest], "N m", "mN m"),
     )
     for quantity, limits, unit, guess in joints:
         for columns in (PAIRS[quantity], PAIRS[f"{quantity}_command"]):
             for column, limit in zip(columns, limits, strict=True):
-                middle = _middle(inspection.floats(column)) if quantity == "position" else 0.0
-                _at_most(inspection, column, middle, limit, unit, guess)
+                _check_size(inspection, column, limit, unit, guess, quantity == "position")
     for column in ("height_m", "base_rise_m"):
-        _at_most(inspection, column, 0.0, _HIGHEST, "m", "mm")
+        _check_size(inspection, column, _HIGHEST, "m", "mm")
     for measured, commanded in zip(PAIRS["position"], PAIRS["position_command"], strict=True):
         _check_command(inspection, measured, commanded)
 
 
-def _middle(values: Array) -> float:
-    known = values[~np.isnan(values)]
-    return float(known.max() + known.min()) / 2 if len(known) else 0.0
-
-
-def _at_most(
-    inspection: Inspection, column: str, middle: float, limit: float, unit: str, guess: str
+def _check_size(
+    inspection: Inspection, column: str, limit: float, unit: str, guess: str, centred: bool = False
 ) -> None:
+    """Refuse values beyond a limit to either side of zero, or of their middle."""
     values = inspection.floats(column)
-    size = np.abs(values - middle)
-    if np.isnan(size).all() or np.nanmax(size) <= limit:
+    if np.isnan(values).all():
         return
-    worst = int(np.nanargmax(size))
-    raise inspection.refusal(
-        f"{inspection.named(column)} cannot be in {unit}: row {inspection.row(worst)} holds"
-        f" {values[worst]:.4g}; is it in {guess}? Convert it."
-    )
-
-
-def _strongest(name: str) -> tuple[float, float]:
-    """Return the torques that hip and knee of a robot cannot give by far, N m."""
-    try:
-        robot = load_robot(name)
-    except (RobotError, OSError):
-        return _STRONGEST * _COMMON_PEAK, _STRONGEST * _COMMON_PEAK
-    hip, knee = (_STRONGEST * (j.motor.peak_torque * j.belt_ratio) for j in (robot.hip, robot.knee))
-    return hip, knee
+    middle = float(np.nanmax(values) + np.nanmin(values)) / 2 if centred else 0.0
+    worst = int(np.nanargmax(np.abs(values - middle)))
+    if abs(values[worst] - middle) > limit:
+        inspection.refuse(
+            f"{inspection.named(column)} cannot be in {unit}: row {inspection.row(worst)} holds"
+            f" {values[worst]:.4g}; is it in {guess}? Convert it."
+        )
 
 
 def _check_command(inspection: Inspection, measured: str, commanded: str) -> None:
@@ -214,7 +192,7 @@ def _check_command(inspection: Inspection, measured: str, commanded: str) -> Non
     for column, ratio in ((measured, factor), (commanded, 1 / factor)):
         unit = _unit_of(ratio, _POSITION_UNITS)
         if unit:
-            raise inspection.refusal(
+            inspection.refuse(
                 f"{inspection.named(column)} seems to be in {unit} from row"
                 f" {inspection.row(int(np.argmax(known)))} on: position over command is"
                 f" {factor:.3g}; convert it to rad."
@@ -234,23 +212,18 @@ def _proportion(x: Array, y: Array) -> tuple[float, float] | None:
 
 
 def check_velocity(inspection: Inspection) -> None:
-    """Leave out a velocity that is not the derivative of its position.
-
-    Raises:
-        RecordingError: Position or velocity is in another unit; names file, column and row.
-    """
+    """Leave out a velocity that is not the derivative of its position; refuse other units."""
     time = inspection.floats("time_s")
     for placed, moving in zip(PAIRS["position"], PAIRS["velocity"], strict=True):
         velocity = inspection.floats(moving)
         compared = _compare(time, inspection.floats(placed), velocity)
         if compared is None:
             continue
-        factor, correlation, worst = compared
-        worst = inspection.row(worst)
+        factor, correlation, worst = compared[0], compared[1], inspection.row(compared[2])
         for column, units in ((placed, _POSITION_UNITS), (moving, _VELOCITY_UNITS)):
             unit = _unit_of(factor, units)
             if unit and correlation >= _ALIKE:
-                raise inspection.refusal(
+                inspection.refuse(
                     f"{inspection.named(column)} seems to be in {unit}: in {_BLOCK * 1e3:g} ms,"
                     f" position moves {factor:.3g} times the integral of velocity, most in row"
                     f" {worst}; convert to rad and rad/s."
@@ -267,16 +240,10 @@ def check_velocity(inspection: Inspection) -> None:
 
 
 def _compare(time: Array, position: Array, velocity: Array) -> tuple[float, float, int] | None:
-    """Compare the way with the integral of velocity, or return none where they cannot tell.
+    """Compare the way with the integral of velocity, (ticks,) each, NaN where not measured.
 
-    Args:
-        time: (ticks,), s.
-        position: (ticks,), rad; NaN where not measured.
-        velocity: (ticks,), rad/s; NaN where not measured.
-
-    Returns:
-        Way over integral, their correlation, and the row that ends the block where they differ
-        most.
+    Return way over integral, their correlation, and the row that ends the block where they differ
+    most; None where the data cannot tell.
     """
     moving = np.flatnonzero(~np.isnan(velocity))
     placed = np.flatnonzero(~np.isnan(position))
