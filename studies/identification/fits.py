@@ -76,7 +76,7 @@ def fit(
         )
     )
     rows = compare(values, truth, told)
-    for row, searched in zip(rows, identified.parameters.parameters, strict=True):
+    for row, searched in zip(rows, identified.passes[-1].parameters.parameters, strict=True):
         row |= {"low": searched.low, "high": searched.high}
     return {
         "method": METHODS[method],

@@ -34,7 +34,7 @@ def throughput(
     """
     recordings = record_paper(study.throughput_seconds)
     plan = make_plan(recordings, believed(), search="two-pass")
-    windows = cut(recordings, plan.window, stride=plan.stride, unscored=plan.unscored)
+    windows = cut(recordings, plan.window, unscored=plan.unscored)
     rng = np.random.default_rng(study.seed)
     low, high = (np.clip(bound, -1, 1) for bound in plan.parameters.bounds)
     vectors = rng.uniform(low, high, (study.population, len(low)))

@@ -57,14 +57,14 @@ def test_the_fit_lies_on_what_was_measured():
     (overlay,) = drawn([run(1.0)])
     before, after = np.nanmax(np.abs(overlay.errors("position")), axis=(1, 2))
     assert after < 0.05 * before
-    assert np.isnan(overlay.position[:100]).all()
-    assert not np.isnan(overlay.position[100:]).any()
+    assert np.isnan(overlay.measured["position"][:100]).all()
+    assert not np.isnan(overlay.measured["position"][100:]).any()
 
 
 def test_torque_driven_recordings_are_started_anew():
     (overlay,) = drawn([record(LEG, swing(2.0), onboard="torque")])
     assert overlay.restarted
-    starts = overlay.simulated_position[:, ::100]
+    starts = overlay.simulated["position"][:, ::100]
     np.testing.assert_array_equal(starts[0], starts[1])
 
 
@@ -82,10 +82,10 @@ def test_a_long_recording_is_drawn_where_it_fits_worst():
 def test_a_spectrum_shows_amplitude_where_the_error_is():
     (overlay,) = drawn([run(1.0)])
     wave = 0.02 * np.sin(2 * np.pi * 5.0 * overlay.recording.time)
-    position = overlay.simulated_position[-1] + wave[:, None]
+    position = overlay.simulated["position"][-1] + wave[:, None]
     scattered = np.where(np.random.default_rng(0).random(position.shape) < 0.4, position, np.nan)
     frequency, amplitude = residual_spectrum(
-        [dataclasses.replace(overlay, position=scattered)], "position", 0, -1
+        [dataclasses.replace(overlay, measured={"position": scattered})], "position", 0, -1
     )
     peak = amplitude.argmax()
     assert frequency[peak] == pytest.approx(5.0, rel=0.05)

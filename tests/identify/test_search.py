@@ -59,7 +59,7 @@ def test_the_second_pass_stays_near_the_first():
     first = choose(CAD, pass_names(rigs)[0])
     assert "thigh.inertia" not in first.names
     vector = np.clip(np.ones(len(first.names)), *first.bounds)
-    second = second_pass(first, Found(vector, 1.0, 1, []), rigs)
+    second = second_pass(first, Found(vector, 1.0, 1, []), rigs, {}, {})
     assert {"thigh.inertia", "contact.time_constant", "rail.damping"} <= set(second.names)
     found = dict(zip(first.names, first.values(vector), strict=True))
     for p in second.parameters:

@@ -13,44 +13,26 @@ from hopping_leg.identify.recording_format import Rig
 from hopping_leg.robot.model import GRAVITY, get_spec
 from hopping_leg.robot.parameters import Robot
 
-FIELDS = (
-    "actuator_biasprm",
-    "actuator_forcerange",
-    "body_inertia",
-    "body_invweight0",
-    "body_ipos",
-    "body_mass",
-    "body_pos",
-    "body_subtreemass",
-    "dof_M0",
-    "dof_armature",
-    "dof_damping",
-    "dof_frictionloss",
-    "dof_invweight0",
-    "geom_friction",
-    "geom_pos",
-    "geom_rbound",
-    "geom_size",
-    "geom_solref",
-    "opt.gravity",
-)
-"""Fields of a model in which hypotheses may differ."""
+_PARTS = {
+    "actuator": ("biasprm", "forcerange"),
+    "body": ("inertia", "invweight0", "ipos", "mass", "pos", "subtreemass"),
+    "dof": ("M0", "armature", "damping", "frictionloss", "invweight0"),
+    "geom": ("friction", "pos", "rbound", "size", "solref"),
+}
+FIELDS = [f"{part}_{name}" for part, names in _PARTS.items() for name in names] + ["opt.gravity"]
+"""Fields of a model in which hypotheses may differ, as ``Batch.expand`` knows them."""
 
 
 def build_rig_model(
     robot: Robot, rig: Rig, timestep: float, gravity: float = GRAVITY
 ) -> mujoco.MjModel:
-    """Compile a robot on its rig.
+    """Compile a robot on its rig; a fixed base has no rail joint and touches nothing.
 
     An actuator's force is ``ctrl - kp q - kd qd`` at the joint, bounded by its force range; the
     gains stand in ``biasprm`` and are zero here. So a drive's own loop acts at every physics step
     if ``ctrl = kp q* + kd qd* + feed-forward``.
 
-    Args:
-        robot: Parameters of the leg.
-        rig: A fixed base has no rail joint and touches nothing.
-        timestep: Physics step, s.
-        gravity: Acceleration of the base in free flight, m/s2.
+    The timestep is in s, gravity is the acceleration of the base in free flight, m/s2.
 
     Raises:
         RobotError: MuJoCo refuses the parameters.
@@ -77,18 +59,10 @@ def build_rig_model(
         actuator.forcelimited = True
         actuator.forcerange = [-1e9, 1e9]
     try:
-        model = spec.compile()
+        return spec.compile()
     except ValueError as error:
         reason = " ".join(str(error).split()).removeprefix("Error: ")
         raise RobotError(f"MuJoCo cannot build robot '{robot.name}': {reason}.") from error
-    return model
-
-
-def model_field(model: mujoco.MjModel, name: str) -> np.ndarray:
-    """Return a model's field by the name that ``Batch.expand`` knows it by."""
-    owner = model.opt if name.startswith("opt.") else model
-    value: np.ndarray = getattr(owner, name.removeprefix("opt."))
-    return value
 
 
 def drive_values(hypotheses: Sequence[LegHypothesis], name: str) -> Array:
@@ -97,26 +71,18 @@ def drive_values(hypotheses: Sequence[LegHypothesis], name: str) -> Array:
 
 
 def recorded_gains(recording: Recording, name: str) -> Array:
-    """Return what a recording says about a gain of its on-board PD, (rows, 2), NaN if unknown.
-
-    Args:
-        recording: Rows win over the metadata.
-        name: ``stiffness``, ``damping`` or ``integral``.
-    """
+    """Return a gain of the on-board PD, (rows, 2), NaN if unknown; rows win over the metadata."""
     pair = getattr(recording.metadata, name)
-    values: Array = np.tile((np.nan, np.nan) if pair is None else pair, (len(recording), 1))
     if name == "integral":
-        return np.nan_to_num(values)
-    rows: Array = recording.array(name)
-    return np.where(np.isnan(rows), values, rows)
+        return np.tile(pair or (0.0, 0.0), (len(recording), 1))
+    rows = recording.array(name)
+    return np.where(np.isnan(rows), pair or (np.nan, np.nan), rows)
 
 
 class MotorBounds:
     """Smallest and largest torque of each joint at its speed, as ``robot.limits.MotorLimit``.
 
-    Args:
-        hypotheses: Legs with the motors and their limits.
-        recordings: One per window; a limit in the metadata replaces the robot's software limit.
+    There is a recording per window; a limit in its metadata replaces the robot's software limit.
     """
 
     def __init__(
@@ -128,11 +94,8 @@ class MotorBounds:
         speed = np.array([r.of_joints("no_load_speed") for r in robots])
         own = np.array([r.of_joints("torque_limit") for r in robots])
         fitted = drive_values(hypotheses, "torque_limit")
-        limits = []
-        for recording in recordings:
-            pair = recording.metadata.torque_limit
-            known = own if pair is None else np.broadcast_to(np.array(pair), own.shape)
-            limits.append(np.where(np.isnan(fitted), known, fitted))
+        pairs = (recording.metadata.torque_limit for recording in recordings)
+        limits = [np.where(np.isnan(fitted), pair or own, fitted) for pair in pairs]
         self._limit = np.stack(limits, axis=1).reshape(-1, 2)
         self._peak = np.repeat(peak, len(recordings), axis=0)
         self._slope = np.repeat(peak / speed, len(recordings), axis=0)
@@ -146,58 +109,42 @@ class MotorBounds:
 
 
 class DelayLine:
-    """Torques that arrive a fraction of ticks late; before the first comes the first.
-
-    Args:
-        delay: In ticks, (n,).
-    """
+    """Values so many ticks, (n,), late; before the first comes the first, or a given ``past``."""
 
     def __init__(self, delay: Array) -> None:
         self._whole = np.floor(delay).astype(int)
         self._part = (delay - self._whole)[:, None]
-        self._depth = int(self._whole.max(initial=0)) + 2
-        self._past: list[Array] = []
-        self._rows = np.arange(len(delay))
+        depth = int(self._whole.max(initial=0)) + 2
+        self.back = np.arange(1, depth + 1)[:, None, None]
+        self.past: Array | None = None
+        self._rows, self._slot = np.arange(len(delay)), 0
 
-    def push(self, torque: Array) -> Array:
-        """Return what arrives in the tick in which ``torque`` was computed, (n, 2)."""
-        self._past = [torque, *self._past][: self._depth]
-        stack = np.stack(self._past)
-        newest = np.minimum(self._whole, len(stack) - 1)
-        older = np.minimum(self._whole + 1, len(stack) - 1)
+    def push(self, value: Array) -> tuple[Array, Array]:
+        """Take the values of this tick, (n, 2); return what arrives: two shares, to be added."""
+        depth = len(self.back)
+        if self.past is None:
+            self.past = np.repeat(value[None], depth, axis=0)
+        self._slot = (self._slot - 1) % depth
+        self.past[self._slot] = value
+        near, far = (self._slot + self._whole) % depth, (self._slot + self._whole + 1) % depth
         part = self._part
-        due: Array = (1 - part) * stack[newest, self._rows] + part * stack[older, self._rows]
-        return due
+        return (1 - part) * self.past[near, self._rows], part * self.past[far, self._rows]
 
 
 class VelocityWindow:
-    """Mean velocities over the last stretch of time, from positions at ticks.
+    """Mean velocities over the last stretch of time, s, (n,), from positions at ticks, s.
 
-    Args:
-        window: s, (n,); zero passes the velocity of the moment.
-        tick: From one position to the next, s.
-        position: At the first tick, rad, (n, 2).
-        velocity: At the first tick and, so assumed, before, rad/s, (n, 2).
+    A stretch of zero passes the velocity of the moment. That of the first tick, rad/s, (n, 2), is
+    taken for the one before it.
     """
 
     def __init__(self, window: Array, tick: float, position: Array, velocity: Array) -> None:
-        self._ticks = np.maximum(window / tick, 1e-9)
-        self._instant = (window <= 0)[:, None]
-        self._whole = np.floor(self._ticks).astype(int)
-        self._part = (self._ticks - self._whole)[:, None]
-        depth = int(self._whole.max(initial=0)) + 2
-        back = np.arange(1, depth + 1)[:, None, None]
-        self._ring = position - tick * back * velocity
-        self._window = (self._ticks * tick)[:, None]
-        self._rows, self._newest = np.arange(len(window)), depth - 1
+        ticks = np.maximum(window / tick, 1e-9)
+        self._window, self._instant = (ticks * tick)[:, None], (window <= 0)[:, None]
+        self._line = DelayLine(ticks)
+        self._line.past = position - tick * self._line.back * velocity
 
     def push(self, position: Array, velocity: Array) -> Array:
         """Return the velocity that the drive sees at this tick, rad/s, (n, 2)."""
-        depth = len(self._ring)
-        self._newest = (self._newest + 1) % depth
-        slot = (depth - 1 - self._newest) % depth
-        self._ring[slot] = position
-        near = self._ring[(slot + self._whole) % depth, self._rows]
-        far = self._ring[(slot + self._whole + 1) % depth, self._rows]
-        mean = (position - (1 - self._part) * near - self._part * far) / self._window
-        return np.where(self._instant, velocity, mean)
+        near, far = self._line.push(position)
+        return np.where(self._instant, velocity, (position - near - far) / self._window)

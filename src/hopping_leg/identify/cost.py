@@ -26,14 +26,12 @@ class RobustLoss:
 
     Gauss-Newton steps on such a cost are those on residuals that are weighted by the levels of the
     moment; the rest of the cost beside their squares is residuals that no parameter moves.
-
-    Attributes:
-        groups: Number of each residual's group, (size,).
-        level: Mean squared residual beyond which a group counts ever less.
     """
 
     groups: IntArray
+    """Number of each residual's group, (size,)."""
     level: float
+    """Mean squared residual beyond which a group counts ever less."""
 
     @cached_property
     def sizes(self) -> IntArray:
@@ -42,8 +40,7 @@ class RobustLoss:
 
     def weights(self, residuals: Array) -> Array:
         """Return factors of one hypothesis's residuals at its own levels, (size,)."""
-        share: Array = ((1 + self._squares(residuals)) ** -0.75)[self.groups]
-        return share
+        return np.asarray(((1 + self._squares(residuals)) ** -0.75)[self.groups])
 
     def rest(self, residuals: Array) -> Array:
         """Return the root of what each group costs beside its weighted residuals, (groups,)."""
@@ -51,8 +48,7 @@ class RobustLoss:
         root = np.sqrt(1 + squares)
         # 2 (1 - 1 / root) - squares / root**3 without the cancellation of small squares
         share = (squares / (root + 1)) ** 2 * (2 * root + 1) / root**3
-        rest: Array = np.sqrt(self.sizes * self.level * share)
-        return rest
+        return np.asarray(np.sqrt(self.sizes * self.level * share))
 
     def cost(self, residuals: Array) -> float:
         """Return the cost of one hypothesis's residuals, (size,)."""
@@ -62,20 +58,13 @@ class RobustLoss:
     def _squares(self, residuals: Array) -> Array:
         """Return groups' mean squared residuals in units of the level, (groups,)."""
         total = np.bincount(self.groups, np.square(residuals), len(self.sizes))
-        mean: Array = total / np.maximum(self.sizes, 1) / self.level
-        return mean
+        return np.asarray(total / np.maximum(self.sizes, 1) / self.level)
 
 
 def total_costs(residuals: Array, loss: RobustLoss | None) -> Array:
-    """Return the costs of hypotheses' residuals (n, size), (n,).
-
-    Args:
-        residuals: Residuals of every vector.
-        loss: None counts every residual in full.
-    """
+    """Return the costs (n,) of hypotheses' residuals (n, size); no loss counts all in full."""
     if loss is None:
-        total: Array = np.square(residuals).sum(axis=1)
-        return total
+        return np.asarray(np.square(residuals).sum(axis=1))
     return np.array([loss.cost(r) for r in residuals])
 
 
@@ -123,14 +112,6 @@ class Objective:
 
     Only measured samples with an exact time stamp count, after each window's unscored rows. An
     objective can be sent to other machines, where it builds its simulations anew.
-
-    Attributes:
-        recordings: What was recorded.
-        windows: Which stretches count.
-        parameters: What vectors mean.
-        scoring: What errors count.
-        timestep: Physics step, s.
-        threads: Worker threads, 0 for one per core.
     """
 
     recordings: tuple[Recording, ...]
@@ -138,7 +119,9 @@ class Objective:
     parameters: ParameterSet
     scoring: Scoring
     timestep: float = TIMESTEP
+    """Physics step, s."""
     threads: int = 0
+    """Worker threads, 0 for one per core."""
 
     @cached_property
     def simulator(self) -> WindowSimulator:
@@ -149,14 +132,10 @@ class Objective:
 
     @cached_property
     def _scored(self) -> dict[str, tuple[float, Array, BoolArray]]:
-        """Scale, measured values and which of them count, by quantity.
-
-        Raises:
-            RecordingError: The windows hold no sample that counts.
-        """
+        """Scale, measured values and which of them count, by quantity."""
+        scales = {name: getattr(self.scoring, name) for name in _QUANTITIES}
         scored = {}
-        for name in _QUANTITIES:
-            scale = getattr(self.scoring, name)
+        for name, scale in scales.items():
             if scale is not None:
                 values = measured(self.simulator, name)
                 scored[name] = (scale, values, ~np.isnan(values))
@@ -204,8 +183,7 @@ class Objective:
         if bound is None:
             return raw
         squares = 2 * bound**2 * (np.sqrt(1 + np.square(raw / bound)) - 1)
-        robust: Array = np.copysign(np.sqrt(squares), raw)
-        return robust
+        return np.asarray(np.copysign(np.sqrt(squares), raw))
 
     def __call__(self, vectors: Array) -> Array:
         """Return the costs of search vectors (n, k), by default the paper's J, (n,)."""
@@ -231,12 +209,12 @@ def measured(simulator: WindowSimulator, quantity: str) -> Array:
 
     Of shape (windows, rows, 2), or (windows, rows) if the quantity is the base's ``height``.
     """
-    of_joints = (2,) if quantity != "height" else ()
+    of_joints = () if quantity == "height" else (2,)
     values = np.full((len(simulator.windows), simulator.rows, *of_joints), np.nan)
     for i, w in enumerate(simulator.windows):
         recording = simulator.recordings[w.recording]
         rows = slice(w.start + w.unscored, w.start + w.length)
-        if quantity != "height":
+        if of_joints:
             sampled = recording.array(quantity)[rows]
         elif recording.metadata.rig != "fixed-base" and recording.has_column("height_m"):
             sampled = recording.trace.column("height_m")[rows].copy()

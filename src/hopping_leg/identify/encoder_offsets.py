@@ -9,8 +9,6 @@ which needs velocities but no accelerations. Wrong offsets tilt gravity and bend
 two numbers of each recording, found by Gauss-Newton steps from its first second.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from hopping_leg.arrays import Array
@@ -23,7 +21,6 @@ from hopping_leg.robot.model import GRAVITY
 
 SETTLING = 1.0
 """Beginning of a recording from which its offsets are found, s."""
-
 _SPAN = 0.2
 """Over which momentum is balanced, s."""
 _GRID = 2e-3
@@ -44,11 +41,7 @@ def has_encoder_offsets(metadata: RecordingMetadata) -> bool:
 
 
 class OffsetFinder:
-    """What the encoders of one recording show when the leg hangs straight down.
-
-    Args:
-        recording: Run of a clamped base, with velocities and torques that command the motors.
-    """
+    """What the encoders of one recording of torque commands show when the leg hangs straight."""
 
     def __init__(self, recording: Recording) -> None:
         position, velocity = start_states(recording)
@@ -85,8 +78,7 @@ class OffsetFinder:
         """Return what the joints felt on the grid, N m, (n, 2)."""
         late = self._grid - hypothesis.drive.delay
         row = np.searchsorted(self._time, late, side="right") - 1
-        felt: Array = hypothesis.robot.of_joints("torque_gain") * self._command[np.maximum(row, 0)]
-        return felt
+        return hypothesis.robot.of_joints("torque_gain") * self._command[np.maximum(row, 0)]
 
     def _imbalance(self, hypothesis: LegHypothesis, offsets: Array, torque: Array) -> Array:
         """Return the mean torque over each span that momentum misses, N m, (n, 2)."""
@@ -101,17 +93,3 @@ class OffsetFinder:
         impulse = np.cumsum(force, axis=0) * _GRID
         excess: Array = (momentum - impulse) / _SPAN
         return excess[_ROWS:] - excess[:-_ROWS]
-
-
-def find_offsets(
-    finders: Sequence[OffsetFinder | None], hypotheses: Sequence[LegHypothesis]
-) -> Array:
-    """Return the offsets of every hypothesis in every recording, rad, (hypotheses, recordings, 2).
-
-    Args:
-        finders: One per recording; None where the encoders' offsets are the leg's.
-        hypotheses: Each finds its own offsets.
-    """
-    return np.array(
-        [[np.zeros(2) if f is None else f.find(h) for f in finders] for h in hypotheses]
-    ).reshape(len(hypotheses), len(finders), 2)

@@ -30,14 +30,11 @@ class Template(Protocol):
         ...
 
 
-def require_positive(name: str, value: float) -> None:
-    """Refuse a number that is not positive and finite.
-
-    Raises:
-        UsageError: Naming it.
-    """
-    if not 0 < value < math.inf:
-        raise UsageError(f"'{name}' is {value:g} but must be positive and finite.")
+def require_positive(**numbers: float | None) -> None:
+    """Refuse numbers that are not positive and finite, by name; None passes."""
+    for name, value in numbers.items():
+        if value is not None and not 0 < value < math.inf:
+            raise UsageError(f"'{name}' is {value:g} but must be positive and finite.")
 
 
 @dataclass(frozen=True)
@@ -62,8 +59,7 @@ class Multisine:
     rig: ClassVar[Rig] = "fixed-base"
 
     def __post_init__(self) -> None:
-        for name in ("lowest", "duration"):
-            require_positive(name, getattr(self, name))
+        require_positive(lowest=self.lowest, duration=self.duration)
         if not self.lowest < self.highest < math.inf:
             raise UsageError(f"'highest' is {self.highest:g} Hz but must exceed 'lowest'.")
 
@@ -91,7 +87,6 @@ class Multisine:
 
 RATE = 200.0
 """Rate of the paper's recordings, Hz."""
-
 _KEY = "excitation"
 _FACTS = {"rig": "rig", "rate_hz": "rate", "robot": "robot", "description": "description"}
 """Attributes in the file's header."""
@@ -99,24 +94,19 @@ _FACTS = {"rig": "rig", "rate_hz": "rate", "robot": "robot", "description": "des
 
 @dataclass(frozen=True)
 class Excitation:
-    """Targets of the joints' PD over time.
-
-    Attributes:
-        time: From 0 on, s, (ticks,).
-        position: rad, (ticks, 2).
-        velocity: rad/s, (ticks, 2); zero where only positions are tracked, as the paper says.
-        rig: What the base is on.
-        rate: Hz.
-        robot: Name of the robot that it was checked for.
-        description: How it was made.
-    """
+    """Targets of the joints' PD over time."""
 
     time: Array
+    """From 0 on, s, (ticks,)."""
     position: Array
+    """rad, (ticks, 2)"""
     velocity: Array
+    """rad/s, (ticks, 2); zero where only positions are tracked, as the paper says."""
     rig: Rig
     rate: float
+    """Hz"""
     robot: str
+    """Name of the robot that it was checked for."""
     description: str
 
     def __len__(self) -> int:

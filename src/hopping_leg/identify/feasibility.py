@@ -31,20 +31,14 @@ class HardwareRange:
 
 @dataclass(frozen=True)
 class Demand:
-    """What a trajectory asks of the joints, (ticks, 2) each.
-
-    Attributes:
-        position: rad.
-        velocity: rad/s.
-        torque: N m.
-        clearance: Height of base and knee above the ground on which the foot stands, m; infinite
-            where the base is clamped.
-    """
+    """What a trajectory asks of the joints, rad, rad/s and N m, (ticks, 2) each."""
 
     position: Array
     velocity: Array
     torque: Array
     clearance: Array
+    """Height of base and knee above the ground on which the foot stands, m; infinite where the base
+    is clamped."""
 
 
 def inverse_dynamics(robot: Robot, rig: Rig, q: Array, qd: Array, qdd: Array) -> Array:

@@ -23,37 +23,28 @@ _SINGULAR = 1e-10
 
 @dataclass(frozen=True)
 class Identifiability:
-    """How well values are known.
-
-    Attributes:
-        names: Parameters in order.
-        values: Best values, SI, (k,).
-        half_width: Half widths of the 95 % intervals, (k,); infinite where the data say nothing.
-        correlation: (k, k).
-        at_bound: Whether a value stands at a bound of its search, (k,).
-        statements: What these data cannot tell, a sentence each.
-    """
+    """How well values are known."""
 
     names: list[str]
     values: Array
+    """Best values, SI, (k,)."""
     half_width: Array
+    """Half widths of the 95 % intervals, (k,); infinite where the data say nothing."""
     correlation: Array
+    """(k, k)"""
     at_bound: list[bool]
+    """Whether a value stands at a bound of its search."""
     statements: list[str]
+    """What these data cannot tell, a sentence each."""
 
 
 def identifiability(
     parameters: ParameterSet, vector: Array, residuals: Array, jacobian: Array
 ) -> Identifiability:
-    """Judge a fit.
-
-    Args:
-        parameters: What was fitted.
-        vector: Best search vector, (k,).
-        residuals: There, (m,), in the order of time.
-        jacobian: Slopes of the residuals, (m, k).
-    """
-    covariance, blind = _covariance(jacobian, _variance(residuals, len(vector)))
+    """Judge a fit by its best search vector (k,), residuals there (m,) and their slopes (m, k)."""
+    freedom = max(len(residuals) / correlation_time(residuals) - len(vector), 1.0)
+    variance = float(np.sum(np.square(residuals))) / freedom
+    covariance, blind = _covariance(jacobian, variance)
     deviation = np.sqrt(np.diag(covariance))
     scale = np.where(deviation > 0, deviation, 1.0)
     correlation = covariance / np.outer(scale, scale)
@@ -80,12 +71,6 @@ def correlation_time(residuals: Array) -> float:
             break
         total += 2 * share
     return total
-
-
-def _variance(residuals: Array, unknowns: int) -> float:
-    """Return the residuals' variance, as many times larger as fewer of them are independent."""
-    freedom = max(len(residuals) / correlation_time(residuals) - unknowns, 1.0)
-    return float(np.sum(np.square(residuals))) / freedom
 
 
 def _covariance(jacobian: Array, variance: float) -> tuple[Array, Array]:

@@ -14,13 +14,7 @@ BOOM_RADIUS = 1.146
 
 
 def _joint_columns(patterns: Mapping[str, str], hip: str, knee: str) -> dict[str, str]:
-    """Return a recording's column for each column of a rig.
-
-    Args:
-        patterns: Quantity of ``PAIRS`` to the rig's name for it, with ``{}`` for the joint.
-        hip: What the rig calls the hip.
-        knee: What the rig calls the knee.
-    """
+    """Return a recording's column for each of a rig's, from its pattern for each quantity."""
     return {
         pattern.format(joint): column
         for quantity, pattern in patterns.items()
@@ -28,20 +22,13 @@ def _joint_columns(patterns: Mapping[str, str], hip: str, knee: str) -> dict[str
     }
 
 
-def _unchanged(recording: pl.DataFrame, table: pl.DataFrame) -> pl.DataFrame:
-    del table
-    return recording
+def _base_rise(table: pl.DataFrame) -> list[pl.Series]:
+    present = "boom_pitch" in table.columns
+    return [(BOOM_RADIUS * table["boom_pitch"].sin()).alias("base_rise_m")] if present else []
 
 
-def _add_base_rise(recording: pl.DataFrame, table: pl.DataFrame) -> pl.DataFrame:
-    if "boom_pitch" not in table.columns:
-        return recording
-    rise = BOOM_RADIUS * table["boom_pitch"].sin()
-    return recording.with_columns(rise.alias("base_rise_m"))
-
-
-def _correct_hip_velocity(recording: pl.DataFrame, table: pl.DataFrame) -> pl.DataFrame:
-    """Replace the hip's velocity command by the one that its drive got.
+def _hip_velocity(table: pl.DataFrame) -> list[pl.Series]:
+    """Return the hip's velocity command that its drive got.
 
     The foot moved along q = (theta - k/2, k): the leg swung by theta and stretched by k, with equal
     links. The file's velocity commands are those of both motions, yet the drives got the
@@ -51,31 +38,25 @@ def _correct_hip_velocity(recording: pl.DataFrame, table: pl.DataFrame) -> pl.Da
     With it, a hip gain of 13 N m/rad and no integral explain the mean, the slow and the fast errors
     alike.
     """
-    del table
-    hip, knee = PAIRS["velocity_command"]
-    recording = recording.with_columns(pl.col("exact_time") > 0)
-    if knee in recording.columns:
-        recording = recording.with_columns((-0.5 * pl.col(knee)).alias(hip))
-    return recording
+    columns = [(table["t_exact"] > 0).alias("exact_time")]
+    if "knee_vel_cmd" in table.columns:
+        columns.append((-0.5 * table["knee_vel_cmd"]).alias(PAIRS["velocity_command"][0]))
+    return columns
 
 
 @dataclass(frozen=True)
 class LogFormat:
-    """Tables of one rig's logger.
-
-    Attributes:
-        columns: Columns by which the rig is recognised.
-        names: A recording's column for each of the rig's.
-        metadata: How the rig records.
-        complete: From the renamed and the rig's own table to the recording's.
-        own_rate: Whether the rate is that of the clock, which was never stated.
-    """
+    """Tables of one rig's logger."""
 
     columns: frozenset[str]
+    """Columns by which the rig is recognised."""
     names: dict[str, str]
+    """A recording's column for each of the rig's."""
     metadata: RecordingMetadata
-    complete: Callable[[pl.DataFrame, pl.DataFrame], pl.DataFrame] = _unchanged
+    derived: Callable[[pl.DataFrame], list[pl.Series]] = lambda _table: []
+    """From the rig's table to columns of the recording beside those that are renamed."""
     own_rate: bool = False
+    """Whether the rate is that of the clock, which was never stated."""
 
     def read(self, table: pl.DataFrame) -> tuple[pl.DataFrame, RecordingMetadata]:
         """Return a recording's table and metadata from the rig's own table."""
@@ -84,7 +65,7 @@ class LogFormat:
         metadata = self.metadata
         if self.own_rate:
             metadata = dataclasses.replace(metadata, rate_hz=_median_rate(table["t"]))
-        return self.complete(renamed, table), metadata
+        return renamed.with_columns(self.derived(table)), metadata
 
 
 def _median_rate(time: pl.Series) -> float:
@@ -119,7 +100,7 @@ IMPORTERS = {
             damping=(0.8, 4.0),
             gains_exact=False,
         ),
-        _correct_hip_velocity,
+        _hip_velocity,
     ),
     # Leg V1 hopping on the vertical rail under energy shaping.
     "legv1_rail": LogFormat(
@@ -156,7 +137,7 @@ IMPORTERS = {
             effective_gravity=4.5,
             startup_rows=3,
         ),
-        _add_base_rise,
+        _base_rise,
     ),
     # The two-link pendulum of the same lab: base clamped, torque commands. Joint 1 is the hip,
     # joint 2 the knee; steps of the sensors as seen in the recordings, which all begin at zero to

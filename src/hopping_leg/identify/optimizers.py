@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +24,9 @@ Progress = Callable[[float, float], None]
 
 _NOTHING = 1e-3
 """A cost that is nothing, as residuals are in units of errors that matter."""
-
 _MARGIN = 1.0
-"""Distance from its bounds at which a parameter starts, in units of its scale."""
+"""Distance from its bounds, near which the trust region would barely move it, at which a parameter
+starts, in units of its scale."""
 
 
 @dataclass(frozen=True)
@@ -45,19 +45,16 @@ class LeastSquaresOptions:
 
 @dataclass(frozen=True)
 class Found:
-    """Where a search ended.
-
-    Attributes:
-        vector: In search coordinates, (k,).
-        cost: Sum of squared residuals, as the levels of unexplained ones weigh it.
-        evaluations: Candidates simulated.
-        history: Best cost after each round or generation.
-    """
+    """Where a search ended."""
 
     vector: Array
+    """In search coordinates, (k,)."""
     cost: float
+    """Sum of squared residuals, as the levels of unexplained ones weigh it."""
     evaluations: int
+    """Candidates simulated."""
     history: list[float]
+    """Best cost after each round or generation."""
 
 
 def jacobian(
@@ -97,8 +94,9 @@ def jacobian(
     slopes = sides / np.stack(steps)[..., None]
     if groups is None:
         return np.asarray(slopes[0].T)
-    columns = [_calmer(first, second, groups) for first, second in zip(*slopes, strict=True)]
-    return np.stack(columns, axis=1)
+    squares = np.apply_along_axis(lambda s: np.bincount(groups, np.square(s)), -1, slopes)
+    calm = (squares[0] <= squares[1])[:, groups]
+    return np.ascontiguousarray(np.where(calm, *slopes).T)
 
 
 def least_squares(
@@ -131,21 +129,19 @@ def least_squares(
     """
     options = options or LeastSquaresOptions()
     low, high = parameters.bounds
-    vector = _inside(np.zeros(len(low)) if start is None else start, low, high)
-    identity = {
-        "parameters": repr(parameters.parameters),
-        "start": vector.tolist(),
-        "options": repr(options),
-        "about": dict(about or {}),
-    }
+    margin = np.minimum(_MARGIN, 0.25 * (high - low))
+    vector = np.clip(np.zeros(len(low)) if start is None else start, low + margin, high - margin)
+    identity = _identity(parameters, vector, options, about)
     history: list[float] = []
     evaluations = 0
-    saved = _load_state(checkpoint, identity)
-    if saved is not None:
+    if saved := _load_state(checkpoint, identity):
         vector, evaluations = np.array(saved["vector"]), int(saved["evaluations"])
         history = list(saved["history"])
     while len(history) < options.rounds and not _settled(history, options.tolerance):
-        problem = _Problem(residuals, (low, high), options, loss, groups, history, report)
+        least = history[-1] if history else np.inf
+        problem = _Problem(
+            residuals, (low, high), options, loss, groups, report, len(history), least
+        )
         result = optimize.least_squares(
             problem.values,
             vector,
@@ -168,11 +164,8 @@ def multi_start(
 ) -> list[Found]:
     """Search from the parameters' start and from random others; best first.
 
-    Args:
-        search: From the start's number and vector to where it ended.
-        parameters: Starts are drawn within the bounds, up to three scales from the start.
-        starts: How many.
-        seed: Seed of the draws.
+    The others are drawn within the bounds, up to three scales from the start; ``search`` goes from
+    a start's number and vector to where it ended.
     """
     low, high = parameters.bounds
     rng = np.random.default_rng(seed)
@@ -181,71 +174,54 @@ def multi_start(
     return sorted((search(i, x) for i, x in enumerate(draws)), key=lambda found: found.cost)
 
 
-def _calmer(first: Array, second: Array, groups: IntArray) -> Array:
-    """Return two columns of slopes joined, (m,): of each group whichever is smaller."""
-    squares = [np.bincount(groups, np.square(column)) for column in (first, second)]
-    chosen: Array = np.where((squares[0] <= squares[1])[groups], first, second)
-    return chosen
-
-
-def _inside(vector: Array, low: Array, high: Array) -> Array:
-    """Return the vector off its bounds, near which the trust region would barely move it."""
-    margin = np.minimum(_MARGIN, 0.25 * (high - low))
-    return np.clip(vector, low + margin, high - margin)
-
-
 def _settled(history: list[float], tolerance: float) -> bool:
-    if history and history[-1] < _NOTHING:
-        return True
-    return len(history) > 1 and history[-2] - history[-1] <= tolerance * history[-2]
+    settled = len(history) > 1 and history[-2] - history[-1] <= tolerance * history[-2]
+    return settled or bool(history and history[-1] < _NOTHING)
 
 
+@dataclass
 class _Problem:
     """Residuals whose squares add up to the cost, and their slopes; reports every step tried.
 
     The slopes are those at the levels of the moment, which make the cost's own slope exact.
     """
 
-    def __init__(
-        self,
-        residuals: Evaluate,
-        bounds: tuple[Array, Array],
-        options: LeastSquaresOptions,
-        loss: RobustLoss | None,
-        groups: IntArray | None,
-        history: list[float],
-        report: Progress,
-    ) -> None:
-        self._residuals, self._bounds, self._options = residuals, bounds, options
-        self._loss, self._groups, self._report = loss, groups, report
-        self._round, self._least = len(history), history[-1] if history else np.inf
-        self._at: Array = np.empty(0)
-        self.count, self._tried = 0, 0
+    residuals: Evaluate
+    bounds: tuple[Array, Array]
+    options: LeastSquaresOptions
+    loss: RobustLoss | None
+    groups: IntArray | None
+    report: Progress
+    rounds: int
+    least: float
+    at: Array = field(default_factory=lambda: np.empty(0))
+    count: int = 0
+    tried: int = 0
 
     def values(self, vector: Array) -> Array:
         """Return residuals, (m,), and with a robust loss what each group costs beside them."""
         residuals: Array = self._counted(vector[None])[0]
-        if self._loss is None:
+        if self.loss is None:
             return residuals
-        weights, rest = self._loss.weights(residuals), self._loss.rest(residuals)
+        weights, rest = self.loss.weights(residuals), self.loss.rest(residuals)
         return np.concatenate([weights * residuals, rest])
 
     def slopes(self, vector: Array) -> Array:
         """Return the slopes of what ``values`` returns, (m, k)."""
-        slopes = jacobian(self._counted, vector, self._bounds, self._options.step, self._groups)
-        if self._loss is None:
+        slopes = jacobian(self._counted, vector, self.bounds, self.options.step, self.groups)
+        if self.loss is None:
             return slopes
-        still = np.zeros((len(self._loss.sizes), len(vector)))
-        return np.concatenate([self._loss.weights(self._at)[:, None] * slopes, still])
+        still = np.zeros((len(self.loss.sizes), len(vector)))
+        return np.concatenate([self.loss.weights(self.at)[:, None] * slopes, still])
 
     def _counted(self, vectors: Array) -> Array:
         self.count += len(vectors)
-        self._tried += len(vectors) == 1
-        values = self._residuals(vectors)
-        self._at = values[0]
-        self._least = min(self._least, float(total_costs(values, self._loss).min()))
-        within = min(self._tried / self._options.evaluations, 1.0)
-        self._report(min((self._round + within) / self._options.rounds, 1.0), self._least)
+        self.tried += len(vectors) == 1
+        values = self.residuals(vectors)
+        self.at = values[0]
+        self.least = min(self.least, float(total_costs(values, self.loss).min()))
+        within = min(self.tried / self.options.evaluations, 1.0)
+        self.report(min((self.rounds + within) / self.options.rounds, 1.0), self.least)
         return values
 
 
@@ -267,7 +243,6 @@ class CmaOptions:
 
 _RECENT = 4
 """Generations whose best stand for election at the end of a search that is judged by shares."""
-
 _COLLAPSED = 1e-3
 """Standard deviation, in units of the parameters' scales, below which such a search has ended."""
 
@@ -288,20 +263,19 @@ def cma_es(
 
     Costs only rank the candidates of a generation, so a share of the data is enough to judge it
     by. As shares take turns, the distribution's mean wanders about where all of them agree; its
-    averages and the last generations' best are judged by everything, and the best one counts.
-
-    The checkpoint holds every generation's costs. A resumed run draws the same generations from
-    the same seed and takes their costs from there, so it ends bit for bit as if never killed.
+    averages and the last generations' best are judged by everything, and the best one counts. A
+    resumed run draws the same generations from the same seed and takes their costs from the
+    checkpoint, so it ends bit for bit as if never killed.
 
     Args:
-        values: Function of search vectors.
+        values: Function of search vectors; judges everything if there are no ``shares``.
         parameters: Bounds and scales.
         options: How.
         seed: Seed of all randomness.
         start: Search vector to start from, (k,); None takes the parameters' start.
         shares: Functions whose sum is ``values``; each generation is judged by the next one in
-            turn, and what comes out by ``values``, which judges everything if there are none.
-        about: What else tells this search from others, e.g. the recordings' hashes.
+            turn, and what comes out by ``values``.
+        about: What else tells this search from others.
         checkpoint: File for the state after each generation.
         report: Called after each generation with the best cost, or what its share makes of it.
 
@@ -311,13 +285,7 @@ def cma_es(
     options = options or CmaOptions()
     low, high = parameters.bounds
     first = np.clip(np.zeros(len(low)) if start is None else start, low, high)
-    identity = {
-        "parameters": repr(parameters.parameters),
-        "start": first.tolist(),
-        "options": repr(options),
-        "seed": seed,
-        "about": dict(about or {}),
-    }
+    identity = {**_identity(parameters, first, options, about), "seed": seed}
     saved = _load_state(checkpoint, identity) or {"costs": []}
     costs: list[list[float]] = saved["costs"]
     bounds = [low.tolist(), high.tolist()]
@@ -341,9 +309,8 @@ def cma_es(
             bests.append(vectors[found.argmin()])
         history.append(least if counts else history[-1])
         report((generation + 1) / options.generations, history[-1])
-        if np.ptp(found) <= options.tolerance * abs(found.min()):
-            break
-        if shares and np.max(strategy.result.stds) < _COLLAPSED:
+        converged = np.ptp(found) <= options.tolerance * abs(found.min())
+        if converged or (shares and np.max(strategy.result.stds) < _COLLAPSED):
             break
     count = len(history) * options.population
     if not shares:
@@ -355,32 +322,37 @@ def cma_es(
     return Found(elected[final.argmin()], least, count + len(elected), [*history, least])
 
 
+def _identity(
+    parameters: ParameterSet, start: Array, options: object, about: Mapping[str, object] | None
+) -> dict[str, Any]:
+    """Return what tells a search from others."""
+    return {
+        "parameters": repr(parameters.parameters),
+        "start": start.tolist(),
+        "options": repr(options),
+        "about": dict(about or {}),
+    }
+
+
 def _save_state(path: Path | None, identity: dict[str, Any], state: dict[str, Any]) -> None:
     """Write what a search needs to go on, floats with every bit; nothing without a path."""
     if path is not None:
-        text = json.dumps({"identity": identity, "state": state})
-        write_atomically(path, text.encode())
+        write_atomically(path, json.dumps({"identity": identity, "state": state}).encode())
 
 
 def _load_state(path: Path | None, identity: dict[str, Any]) -> dict[str, Any] | None:
-    """Return the saved state, or None if there is none.
-
-    Raises:
-        UsageError: The file is no checkpoint, or one of another search.
-    """
+    """Return the saved state of this very search, or None if there is none."""
     if path is None or not path.exists():
         return None
     try:
         saved = json.loads(path.read_bytes())
         known, state = saved["identity"], saved["state"]
     except (ValueError, KeyError, TypeError, OSError) as error:
-        raise UsageError(
-            f"{path} is no checkpoint of a search; remove it to start anew."
-        ) from error
+        sentence = f"{path} is no checkpoint of a search; remove it to start anew."
+        raise UsageError(sentence) from error
     if known != json.loads(json.dumps(identity)):
         raise UsageError(
             f"{path} belongs to a search with other parameters, data or options;"
             " repeat those, or remove it to start anew."
         )
-    assert isinstance(state, dict)
-    return state
+    return dict(state)

@@ -26,7 +26,6 @@ AMPLITUDES, PERIODS, SWINGS = (0.15, 0.1, 0.05), (0.75, 0.5, 0.25), (10.0, 20.0)
 
 LAB_MARGIN = 0.005
 """How far from straight the lab kept the leg in its recordings, m; the paper says nothing."""
-
 _SHRINK = 0.95
 _SMALLEST = 0.005
 
@@ -60,10 +59,8 @@ class Stroke:
     rig: Rig = "fixed-base"
 
     def __post_init__(self) -> None:
-        for name in ("amplitude", "period", "duration"):
-            require_positive(name, getattr(self, name))
-        if self.swing is not None:
-            require_positive("swing", self.swing)
+        require_positive(amplitude=self.amplitude, period=self.period)
+        require_positive(duration=self.duration, swing=self.swing)
         if not 0 <= self.margin < math.inf:
             raise UsageError(f"'margin' is {self.margin:g} m but must be zero or more.")
 
@@ -88,8 +85,7 @@ class Stroke:
     def _phase(self, time: Array, period: float) -> Array:
         periods = math.floor(self.duration / period + 1e-9)
         whole = periods * period if periods else self.duration
-        phase: Array = 2 * np.pi * np.minimum(time, whole) / period
-        return phase
+        return np.asarray(2 * np.pi * np.minimum(time, whole) / period)
 
 
 @dataclass(frozen=True)
@@ -115,10 +111,8 @@ class Strokes:
         """Return joint angles at times, rad, (ticks, 2)."""
         starts = np.cumsum([0.0, *(part.duration for part in self.parts[:-1])])
         which = np.searchsorted(starts, time + 1e-9, side="right") - 1
-        angles = [
-            part.joints(robot, time[which == index] - start)
-            for index, (part, start) in enumerate(zip(self.parts, starts, strict=True))
-        ]
+        pairs = enumerate(zip(self.parts, starts, strict=True))
+        angles = [part.joints(robot, time[which == i] - start) for i, (part, start) in pairs]
         return np.unwrap(np.concatenate(angles), axis=0)
 
 
@@ -135,16 +129,9 @@ def fixed_base(
 ) -> Strokes:
     """Return the paper's fixed-base trajectory: the foot strokes while the leg swings.
 
-    Args:
-        amplitudes: A, m.
-        periods: T1, s.
-        swings: T2, s.
-        duration: Duration of all strokes, s, divided evenly.
-        margin: From the straight leg, m.
-        bend: Side of the knee.
-        every_pair: Combine every amplitude with every period; otherwise the first with the first
-            and so on, as in the lab's recordings.
-        rig: What the base is on.
+    See ``Stroke``; the duration of all strokes, s, is divided evenly. ``every_pair`` combines every
+    amplitude with every period; otherwise the first goes with the first and so on, as in the lab's
+    recordings.
     """
     if not every_pair and len(amplitudes) != len(periods):
         raise UsageError(

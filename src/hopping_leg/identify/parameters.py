@@ -12,24 +12,22 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError, unknown_name
-from hopping_leg.io import replace_at
+from hopping_leg.io import quantity, replace_at
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.robot.parameters import Robot
-
-_DRIVE = "drive"
 
 
 @dataclass(frozen=True)
 class ActuatorParameters:
     """One joint's drive at the joint's side; NaN takes what the recording says."""
 
-    stiffness: float = field(default=float("nan"), metadata={"unit": "N m/rad"})
-    damping: float = field(default=float("nan"), metadata={"unit": "N m s/rad"})
-    integral: float = field(default=float("nan"), metadata={"unit": "N m/(rad s)"})
-    torque_limit: float = field(default=float("nan"), metadata={"unit": "N m"})
-    torque_offset: float = field(default=0.0, metadata={"unit": "N m"})
+    stiffness: float = quantity("N m/rad", math.nan)
+    damping: float = quantity("N m s/rad", math.nan)
+    integral: float = quantity("N m/(rad s)", math.nan)
+    torque_limit: float = quantity("N m", math.nan)
+    torque_offset: float = quantity("N m", 0.0)
     """Measured torque without any true torque."""
-    sensor_gain: float = field(default=1.0, metadata={"unit": "1"})
+    sensor_gain: float = quantity("1", 1.0)
     """Measured torque per true torque."""
 
 
@@ -39,12 +37,12 @@ class Actuators:
 
     hip: ActuatorParameters = field(default_factory=ActuatorParameters)
     knee: ActuatorParameters = field(default_factory=ActuatorParameters)
-    delay: float = field(default=0.0, metadata={"unit": "s"})
+    delay: float = quantity("s", 0.0)
     """From a command's time stamp to its effect."""
-    velocity_window: float = field(default=0.0, metadata={"unit": "s"})
+    velocity_window: float = quantity("s", 0.0)
     """Over which a drive that closes its own loop averages the velocity that it damps; its delay
     makes stiff loops ring."""
-    ramp: float = field(default=0.0, metadata={"unit": "1"})
+    ramp: float = quantity("1", 0.0)
     """Share of the commanded velocity by which a drive moves its position target on until the
     next command: 0 holds the target, 1 ramps it as mjbots' moteus does."""
 
@@ -66,8 +64,7 @@ class LegHypothesis:
         Raises:
             UsageError: There is no such parameter.
         """
-        _check(self, name)
-        return float(attrgetter(_path(name))(self))
+        return float(attrgetter(_path(self, name))(self))
 
     def replace(self, values: dict[str, float]) -> "LegHypothesis":
         """Return the hypothesis with some parameters' values changed.
@@ -77,36 +74,32 @@ class LegHypothesis:
         """
         hypothesis = self
         for name, value in values.items():
-            _check(self, name)
-            hypothesis = replace_at(hypothesis, _path(name), float(value))
+            hypothesis = replace_at(hypothesis, _path(self, name), float(value))
         return hypothesis
 
 
 def parameter_units(hypothesis: LegHypothesis) -> dict[str, str]:
     """Return every parameter's name and unit."""
-    names = {f"{_DRIVE}.{name}": unit for name, unit in _leaves(hypothesis.drive)}
-    return dict(_leaves(hypothesis.robot)) | names
+    return _units(hypothesis.robot) | _units(hypothesis.drive, "drive.")
 
 
-def _path(name: str) -> str:
-    return name if name.startswith(f"{_DRIVE}.") else f"robot.{name}"
-
-
-def _leaves(owner: Any, prefix: str = "") -> list[tuple[str, str]]:  # noqa: ANN401
-    found: list[tuple[str, str]] = []
+def _units(owner: Any, prefix: str = "") -> dict[str, str]:  # noqa: ANN401
+    found: dict[str, str] = {}
     for spec in dataclasses.fields(owner):
         value = getattr(owner, spec.name)
         if dataclasses.is_dataclass(value):
-            found += _leaves(value, f"{prefix}{spec.name}.")
+            found |= _units(value, f"{prefix}{spec.name}.")
         elif "unit" in spec.metadata:
-            found.append((prefix + spec.name, spec.metadata["unit"]))
+            found[prefix + spec.name] = spec.metadata["unit"]
     return found
 
 
-def _check(hypothesis: LegHypothesis, name: str) -> None:
+def _path(hypothesis: LegHypothesis, name: str) -> str:
+    """Return where a parameter stands in a hypothesis."""
     units = parameter_units(hypothesis)
     if name not in units:
         raise UsageError(unknown_name("parameter", name, units))
+    return name if name.startswith("drive.") else f"robot.{name}"
 
 
 _RANGES = {
@@ -138,15 +131,7 @@ _FACTOR = 4.0
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number to find.
-
-    Attributes:
-        name: Path, e.g. ``"hip.friction"`` or ``"drive.knee.stiffness"``.
-        unit: SI.
-        start: Where a search begins.
-        low: Lower bound.
-        high: Upper bound.
-        scale: A change that matters; searches work in units of it.
+    """One number to find, named as ``LegHypothesis`` says.
 
     Raises:
         UsageError: The bounds exclude the start.
@@ -158,6 +143,7 @@ class Parameter:
     low: float
     high: float
     scale: float
+    """A change that matters; searches work in units of it."""
 
     def __post_init__(self) -> None:
         if not self.low <= self.start <= self.high or not self.low < self.high:
@@ -205,9 +191,8 @@ class ParameterSet:
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
         """Lower and upper bounds in search coordinates, (k,) each."""
-        low = np.array([p.low for p in self.parameters])
-        high = np.array([p.high for p in self.parameters])
-        return (low - self.start) / self.scale, (high - self.start) / self.scale
+        low, high = np.array([(p.low, p.high) for p in self.parameters]).T
+        return self.vector(low), self.vector(high)
 
     def values(self, vector: Array) -> Array:
         """Return physical values of search vectors, (..., k)."""
@@ -233,12 +218,8 @@ def choose(
 ) -> ParameterSet:
     """Return a set of parameters with sensible bounds and scales.
 
-    Args:
-        base: LegHypothesis with the starting values; a drive's gain that it leaves to the recording
-            needs a ``start``.
-        names: What to fit.
-        bounds: Bounds that differ from the widest ones.
-        start: Starting values that differ from the hypothesis's.
+    ``bounds`` are those that differ from the widest ones; ``start`` has values that differ from the
+    base's, or are of drives' gains that it leaves to the recording.
 
     Raises:
         UsageError: A name does not exist, or bounds exclude the start.
@@ -249,7 +230,7 @@ def choose(
         value = (start or {}).get(name, base.get(name))
         if math.isnan(value):
             raise UsageError(f"'{name}' has no value to start from; give one.")
-        low, high = (bounds or {}).get(name) or _range(name, value)
+        low, high = (bounds or {}).get(name) or _widest_bounds(name, value)
         if value == low == 0.0 or math.isclose(value, low, rel_tol=1e-12):
             scale = 0.02 * (high - low)
         else:
@@ -258,11 +239,9 @@ def choose(
     return ParameterSet(base, tuple(parameters))
 
 
-def _range(name: str, value: float) -> tuple[float, float]:
+def _widest_bounds(name: str, value: float) -> tuple[float, float]:
     last = name.rsplit(".", 1)[-1]
     short = f"drive.{last}" if name.startswith("drive.") else last
     known = _RANGES.get(name) or _RANGES.get(short)
-    if known is None:
-        ends = sorted((value / _FACTOR, value * _FACTOR))
-        return ends[0], ends[1]
-    return min(known[0], value), max(known[1], value)
+    low, high = known or sorted((value / _FACTOR, value * _FACTOR))
+    return min(low, value), max(high, value)

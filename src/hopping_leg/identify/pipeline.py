@@ -9,13 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.errors import (
-    PhysicsError,
-    RecordingError,
-    RobotError,
-    UsageError,
-    unknown_name,
-)
+from hopping_leg.errors import PhysicsError, RecordingError, RobotError, UsageError, unknown_name
 from hopping_leg.identify import validation
 from hopping_leg.identify.cost import Objective, Scoring
 from hopping_leg.identify.identifiability import Identifiability, identifiability
@@ -90,11 +84,12 @@ def identify(
         raise UsageError("The seed and the number of threads must not be negative.")
     robot = dataclasses.replace(robot, reality=NO_MISMATCH)
     check_recordings([*recordings, *validate], robot)
+    bounds = {**_file_bounds(robot), **options.bounds}
     plan = make_plan(
         recordings,
         robot,
         parameters=options.parameters,
-        bounds={**_file_bounds(robot), **options.bounds},
+        bounds=bounds,
         search=options.search,
         scoring=options.scoring,
     )
@@ -105,62 +100,52 @@ def identify(
                 f" {unknown_name('fitted parameter', name, plan.parameters.names)}"
             )
     fit, held, split = _split(recordings, validate, plan, seed)
-    windows = cut(fit, plan.window, stride=plan.stride, unscored=plan.unscored)
+    windows = cut(fit, plan.window, unscored=plan.unscored)
     objective = Objective(
         tuple(fit), tuple(windows), plan.parameters, plan.scoring, plan.timestep, options.threads
     )
     about = {"fitted": [r.name for r in fit], "starts": options.effort.starts}
-    run = _RunFolder(folder, _config(objective, options, held, seed))
-    run.begin(resume=resume)
+    if folder is not None:
+        _prepare(folder, _config(objective, options, held, seed), resume=resume)
     searcher = Searcher(plan, objective, options.effort, seed, folder, report, options.ray, about)
     passes = searcher.run([r.metadata.rig for r in recordings])
     report("finding intervals", 1.0, passes[-1].found.cost)
     try:
         hypothesis, known = _conclude(objective, passes[-1], options)
     except PhysicsError as error:
-        run.finish({"failed": str(error)})
+        _finish(folder, {"failed": str(error)})
         raise
     report("judging", 1.0, passes[-1].found.cost)
     effort = (plan.timestep, options.threads)
     before, after = (validation.validate(held, h, *effort) for h in (plan.start, hypothesis))
-    rigs = list(dict.fromkeys(r.metadata.rig for r in held))
-    groups = {rig: [r for r in held if r.metadata.rig == rig] for rig in rigs}
     by_rig = {}
-    if len(rigs) > 1:
-        by_rig = {rig: validation.validate(g, hypothesis, *effort) for rig, g in groups.items()}
-    identified = Identified(
-        hypothesis=hypothesis,
-        start=plan.start,
-        plan=plan,
-        passes=tuple(passes),
-        identifiability=known,
-        fit=tuple(fit),
-        held=tuple(held),
-        split=split,
-        validation=after,
-        start_validation=before,
-        by_rig=by_rig,
-        seed=seed,
-    )
-    run.finish(as_json(identified))
+    for rig in dict.fromkeys(r.metadata.rig for r in held):
+        group = [r for r in held if r.metadata.rig == rig]
+        if len(group) < len(held):
+            by_rig[rig] = validation.validate(group, hypothesis, *effort)
+    parts = (tuple(passes), known, tuple(fit), tuple(held), split, after, before, by_rig, seed)
+    identified = Identified(hypothesis, plan.start, plan, *parts)
+    _finish(folder, as_json(identified))
     return identified
+
+
+def _finish(folder: Path | None, result: dict[str, Any]) -> None:
+    """Write the result, or why there is none; either marks the run as finished."""
+    if folder is not None:
+        write_json(folder / _RESULT, result)
 
 
 def _file_bounds(robot: Robot) -> dict[str, tuple[float, float]]:
     """Return bounds that robot files demand: centres of mass on links, peaks above limits."""
-    links = {"thigh": robot.thigh, "shank": robot.shank}
-    motors = {"hip": robot.hip.motor, "knee": robot.knee.motor}
-    return {
-        f"{name}.com": (0.25 * link.com, min(4 * link.com, (1 - 1e-9) * link.length))
-        for name, link in links.items()
-        if link.com < (1 - 1e-9) * link.length
-    } | {
-        f"{name}.motor.peak_torque": (
-            max(motor.torque_limit, motor.rated_torque),
-            4 * motor.peak_torque,
-        )
-        for name, motor in motors.items()
-    }
+    bounds = {}
+    for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
+        whole = (1 - 1e-9) * link.length
+        if link.com < whole:
+            bounds[f"{name}.com"] = (0.25 * link.com, min(4 * link.com, whole))
+    for name, motor in (("hip", robot.hip.motor), ("knee", robot.knee.motor)):
+        least = max(motor.torque_limit, motor.rated_torque)
+        bounds[f"{name}.motor.peak_torque"] = (least, 4 * motor.peak_torque)
+    return bounds
 
 
 def _split(
@@ -168,8 +153,7 @@ def _split(
 ) -> tuple[list[Recording], list[Recording], str]:
     if not validation:
         rng = np.random.default_rng(seed)
-        fit, held = hold_out(recordings, plan.window, rng)
-        return fit, held, "held-out stretches"
+        return *hold_out(recordings, plan.window, rng), "held-out stretches"
     for recording in validation:
         if recording.digest and any(recording.digest == r.digest for r in recordings):
             raise UsageError(
@@ -187,11 +171,7 @@ def _split(
 def _conclude(
     objective: Objective, last: Pass, options: IdentifyOptions
 ) -> tuple[LegHypothesis, Identifiability]:
-    """Return the best hypothesis and what is known of it.
-
-    Raises:
-        PhysicsError: It breaks down in simulation, so that nothing was identified.
-    """
+    """Return the best hypothesis and what is known of it, unless it breaks down in simulation."""
     objective = dataclasses.replace(objective, parameters=last.parameters)
     vector = last.found.vector
     (hypothesis,) = last.parameters.hypotheses(vector[None])
@@ -210,10 +190,9 @@ def _conclude(
             f"The fit failed: its best candidate breaks down in {broken} of {len(lengths)} windows;"
             " narrow the bounds, fit fewer parameters, or check the recording's gains and units."
         )
-    step = options.effort.least_squares.step
+    step, bounds = options.effort.least_squares.step, last.parameters.bounds
     residuals = objective.residuals(vector[None])[0]
-    bounds, jumping = last.parameters.bounds, objective.jumping
-    slopes = jacobian(objective.residuals, vector, bounds, step, jumping)
+    slopes = jacobian(objective.residuals, vector, bounds, step, objective.jumping)
     if objective.loss is not None:
         weights = objective.loss.weights(residuals)
         residuals, slopes = weights * residuals, weights[:, None] * slopes
@@ -223,8 +202,8 @@ def _conclude(
 def _config(
     objective: Objective, options: IdentifyOptions, held: Sequence[Recording], seed: int
 ) -> dict[str, Any]:
-    """Return what makes a run this run; threads and cluster change nothing."""
-    return {
+    """Return what makes a run this run, as JSON values; threads and cluster change nothing."""
+    config = {
         "recordings": [[r.name, r.digest] for r in objective.recordings],
         "recordings_to_judge_by": [[r.name, r.digest] for r in held],
         "robot": objective.parameters.base.robot.digest,
@@ -235,58 +214,31 @@ def _config(
         "seed": seed,
         "software": software_versions(),
     }
+    return dict(json.loads(json.dumps(config)))
 
 
-class _RunFolder:
-    """Files of one run: what was asked for, checkpoints of its searches, result.
+def _prepare(folder: Path, config: dict[str, Any], *, resume: bool) -> None:
+    """Prepare a run's folder; the run in it goes on if it is the same one and unfinished.
 
-    Args:
-        path: The folder; None keeps nothing.
-        config: What makes this run this run, as JSON values.
+    With ``resume`` a finished run goes on, too, instead of being replaced.
     """
-
-    def __init__(self, path: Path | None, config: dict[str, Any]) -> None:
-        self._path, self._config = path, json.loads(json.dumps(config))
-
-    def begin(self, *, resume: bool) -> None:
-        """Prepare the folder; the run in it goes on if it is the same one and unfinished.
-
-        Args:
-            resume: Go on with a finished run, too, instead of replacing it.
-
-        Raises:
-            UsageError: It holds another run that is unfinished, or to be resumed, or something
-                else than a run.
-        """
-        path = self._path
-        if path is None:
-            return
-        config, result = path / _CONFIG, path / _RESULT
-        checkpoints = list(path.glob("search-*.json"))
-        if not config.exists():
-            if path.exists() and (not path.is_dir() or any(path.iterdir())):
-                raise UsageError(f"{path} is not empty and holds no run; give another folder.")
-        elif checkpoints and (resume or not result.exists()):
-            self._check_same(config)
-            return
-        for file in (*checkpoints, result):
-            file.unlink(missing_ok=True)
-        write_json(config, self._config)
-
-    def finish(self, result: dict[str, Any]) -> None:
-        """Write the result, or why there is none; either marks the run as finished."""
-        if self._path is not None:
-            write_json(self._path / _RESULT, result)
-
-    def _check_same(self, config: Path) -> None:
+    file, result = folder / _CONFIG, folder / _RESULT
+    checkpoints = list(folder.glob("search-*.json"))
+    if not file.exists():
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise UsageError(f"{folder} is not empty and holds no run; give another folder.")
+    elif checkpoints and (resume or not result.exists()):
         try:
-            stored = json.loads(config.read_bytes())
-            differences = [k for k, v in self._config.items() if stored.get(k) != v]
+            stored = json.loads(file.read_bytes())
+            differences = [k for k, v in config.items() if stored.get(k) != v]
         except (ValueError, AttributeError) as error:
-            raise UsageError(f"{config} is no run's; give another folder.") from error
+            raise UsageError(f"{file} is no run's; give another folder.") from error
         if differences:
             raise UsageError(
-                f"The run in {config.parent} began with another"
-                f" {differences[0].replace('_', ' ')}; go on with what it began with, or give"
-                " another --folder."
+                f"The run in {folder} began with another {differences[0].replace('_', ' ')}; go on"
+                " with what it began with, or give another --folder."
             )
+        return
+    for path in (*checkpoints, result):
+        path.unlink(missing_ok=True)
+    write_json(file, config)

@@ -72,18 +72,11 @@ def check_recordings(recordings: Sequence[Recording], robot: Robot) -> None:
 
 SEARCHES = ("least-squares", "cma", "two-pass")
 """What a plan may search with."""
-
-JOINT_PARAMETERS = tuple(
-    f"{joint}.{name}" for joint in JOINTS for name in ("friction", "damping", "armature")
-)
-"""Table I, hip and knee."""
-RAIL_PARAMETERS = ("rail.friction", "rail.damping")
-"""Table I, rail."""
-INERTIAS = ("thigh.inertia", "shank.inertia")
-"""Table I, link inertias, fixed in the first pass."""
-SOLVER_PARAMETERS = ("contact.time_constant", "contact.damping_ratio")
-"""Table I, the contact's, fixed in the first pass."""
-
+_JOINT_PARAMETERS = [f"{j}.{name}" for j in JOINTS for name in ("friction", "damping", "armature")]
+_RAIL_PARAMETERS = ["rail.friction", "rail.damping"]
+_INERTIAS = ["thigh.inertia", "shank.inertia"]
+_SOLVER_PARAMETERS = ["contact.time_constant", "contact.damping_ratio"]
+"""Table I; inertias and the contact's are fixed in the first pass."""
 _COARSE = 1e-3
 """Physics step for a clamped leg whose drives' own loop the model only approximates, s; half of
 it would cost twice as much and change less than the model errs by."""
@@ -97,27 +90,20 @@ _FASTEST, _REACHED = 0.999, 0.8
 
 @dataclass(frozen=True)
 class FitPlan:
-    """All decisions of an identification.
-
-    Attributes:
-        start: Robot and drives before the fit.
-        parameters: What to fit, from where, within which bounds.
-        scoring: What errors count.
-        window: Duration that is simulated from one measured state, s.
-        stride: From one window's start to the next, s.
-        unscored: Beginning of each window that does not count, s.
-        timestep: Physics step, s.
-        search: One of ``SEARCHES``.
-    """
+    """All decisions of an identification."""
 
     start: LegHypothesis
+    """Robot and drives before the fit."""
     parameters: ParameterSet
     scoring: Scoring
     window: float
-    stride: float
+    """Duration that is simulated from one measured state, s."""
     unscored: float
+    """Beginning of each window that does not count, s."""
     timestep: float
+    """Physics step, s."""
     search: str
+    """One of ``SEARCHES``."""
 
 
 def make_plan(
@@ -129,16 +115,10 @@ def make_plan(
     search: str | None = None,
     scoring: Scoring | None = None,
 ) -> FitPlan:
-    """Decide how to identify a robot.
+    """Decide how to identify a robot from recordings, on whatever rigs, as far as it is not said.
 
-    Args:
-        recordings: Recordings of one robot; rigs may differ.
-        robot: Its values before the fit.
-        parameters: What to fit; None decides by what the recordings can tell.
-        bounds: Bounds that differ from the widest ones.
-        search: One of ``SEARCHES``; ``two-pass`` is the paper's: CMA-ES on positions only. None
-            takes least squares.
-        scoring: What errors count; None decides by the recordings and the search.
+    Bounds are those that differ from the widest ones. ``search`` is one of ``SEARCHES``;
+    ``two-pass`` is the paper's: CMA-ES on positions only.
 
     Raises:
         UsageError: There is no recording, a parameter or search does not exist, or bounds
@@ -152,45 +132,40 @@ def make_plan(
     start = _start(recordings, robot)
     paper = search == "two-pass"
     names = parameters or _names(recordings, paper=paper)
-    window, unscored = _window(recordings)
+    limits = {**_speed_bounds(recordings, robot), **(bounds or {})}
     return FitPlan(
-        start=start,
-        parameters=choose(
-            start, names, bounds={**_speed_bounds(recordings, robot), **(bounds or {})}
-        ),
-        scoring=scoring or (Scoring() if paper else _scoring(recordings)),
-        window=window,
-        stride=window,
-        unscored=unscored,
-        timestep=_timestep(recordings),
-        search=search,
+        start,
+        choose(start, names, bounds=limits),
+        scoring or (Scoring() if paper else _scoring(recordings)),
+        *_window(recordings),
+        _timestep(recordings),
+        search,
     )
 
 
 def pass_names(rigs: Sequence[Rig]) -> tuple[list[str], list[str]]:
     """Return the parameters of the paper's first pass and those that the second one adds.
 
-    Args:
-        rigs: Rigs of the recordings; without a moving base nothing is known of rail and contact.
+    Without a moving base among the rigs nothing is known of rail and contact.
     """
     moving = any(rig != "fixed-base" for rig in rigs)
-    first = [*JOINT_PARAMETERS, *(RAIL_PARAMETERS if moving else ())]
-    return first, [*INERTIAS, *(SOLVER_PARAMETERS if moving else ())]
+    if moving:
+        return _JOINT_PARAMETERS + _RAIL_PARAMETERS, _INERTIAS + _SOLVER_PARAMETERS
+    return _JOINT_PARAMETERS, _INERTIAS
 
 
 def _names(recordings: Sequence[Recording], *, paper: bool) -> list[str]:
     """Return what these recordings can tell, or Table I; and drives' gains nobody knows."""
     first, second = pass_names([r.metadata.rig for r in recordings])
-    names = [*first, *second] if paper else [*first, *(n for n in second if n not in INERTIAS)]
-    if not paper:
-        names += ["thigh.com", "shank.com", *INERTIAS, "drive.delay"]
-        names.remove("hip.armature")
-        if _tell_load(recordings):
-            names += [f"{joint}.load_friction" for joint in JOINTS]
-        if all(_tells_gain(r) for r in recordings):
-            names += [f"{joint}.torque_gain" for joint in JOINTS]
-        names += _limits(recordings)
-    return [*names, *_open_gains(recordings)]
+    if paper:
+        return [*first, *second, *_open_gains(recordings)]
+    names = [n for n in first + second if n not in (*_INERTIAS, "hip.armature")]
+    names += ["thigh.com", "shank.com", *_INERTIAS, "drive.delay"]
+    if _tell_load(recordings):
+        names += [f"{joint}.load_friction" for joint in JOINTS]
+    if all(map(_tells_gain, recordings)):
+        names += [f"{joint}.torque_gain" for joint in JOINTS]
+    return [*names, *_limits(recordings), *_open_gains(recordings)]
 
 
 def _tell_load(recordings: Sequence[Recording]) -> bool:
@@ -200,10 +175,10 @@ def _tell_load(recordings: Sequence[Recording]) -> bool:
     the air such a loop asks for torque where it meets damping, and the two cannot be told apart;
     on the ground the leg's weight asks for it.
     """
-    if all(r.metadata.onboard == "torque" for r in recordings):
-        return True
+    commanded = [r.metadata.onboard == "torque" for r in recordings]
     grounded = any(r.metadata.rig != "fixed-base" for r in recordings)
-    return grounded and all(_tells_gain(r) or r.metadata.onboard == "torque" for r in recordings)
+    known = (c or _tells_gain(r) for c, r in zip(commanded, recordings, strict=True))
+    return all(commanded) or (grounded and all(known))
 
 
 def _tells_gain(recording: Recording) -> bool:
@@ -214,19 +189,20 @@ def _tells_gain(recording: Recording) -> bool:
 def _open_gains(recordings: Sequence[Recording]) -> list[str]:
     """Return gains of the on-board loop that a recording leaves open."""
     found = []
-    for gain in ("stiffness", "damping", "integral"):
-        if any(r.metadata.onboard != "torque" and _is_open(r, gain) for r in recordings):
+    for gain in _GAINS:
+        if any(_is_open(r, gain) for r in recordings):
             found += [f"drive.{joint}.{gain}" for joint in JOINTS]
     return found
 
 
 def _is_open(recording: Recording, gain: str) -> bool:
     """Return whether a recording leaves a gain to the fit; an unnamed integral is none."""
+    if recording.metadata.onboard == "torque":
+        return False
     stated = getattr(recording.metadata, gain) is not None
     if gain == "integral":
         return stated and not recording.metadata.gains_exact
-    rows = bool(np.isfinite(recording.array(gain)).any())
-    return not rows and not (stated and recording.metadata.gains_exact)
+    return not recording.has(gain) and not (stated and recording.metadata.gains_exact)
 
 
 def _limits(recordings: Sequence[Recording]) -> list[str]:
@@ -246,9 +222,7 @@ def _limits(recordings: Sequence[Recording]) -> list[str]:
         spring = np.array(metadata.stiffness) * (recording.array("position_command") - q)
         damper = np.array(metadata.damping) * (recording.array("velocity_command") - qd)
         wanted = np.minimum(np.abs(spring), np.abs(spring + damper))
-        asked, given = (
-            np.nanquantile(values, _OFTEN, axis=0) for values in (wanted, np.abs(torque))
-        )
+        asked, given = (np.nanquantile(v, _OFTEN, axis=0) for v in (wanted, np.abs(torque)))
         beyond |= asked > _BEYOND * given
     lines = ("peak_torque", "no_load_speed")
     return [f"{j}.motor.{n}" for j, far in zip(JOINTS, beyond, strict=True) if far for n in lines]
@@ -258,9 +232,8 @@ def _speed_bounds(recordings: Sequence[Recording], robot: Robot) -> dict[str, tu
     """Return bounds of the motors' no-load speeds: what a joint was seen to reach, it can."""
     speeds = np.abs(np.concatenate([r.array("velocity") for r in recordings]))
     found = {}
-    for index, name in enumerate(JOINTS):
-        joint = getattr(robot, name)
-        seen = speeds[np.isfinite(speeds[:, index]), index]
+    for name, joint, speed in zip(JOINTS, (robot.hip, robot.knee), speeds.T, strict=True):
+        seen = speed[np.isfinite(speed)]
         least = _REACHED * joint.belt_ratio * float(np.quantile(seen, _FASTEST)) if len(seen) else 0
         known = joint.motor.no_load_speed
         found[f"{name}.motor.no_load_speed"] = (max(0.25 * known, min(least, known)), 4 * known)

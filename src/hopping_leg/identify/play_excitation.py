@@ -77,16 +77,8 @@ def play(
         )
     kinds = ("position", "velocity", "torque")
     steps = (float(robot.reality.of_sensors(f"{kind}_step").max()) for kind in kinds)
-    metadata = RecordingMetadata(
-        rig=excitation.rig,
-        rate_hz=excitation.rate,
-        robot=believed,
-        source=f"simulated: {robot.name} ({robot.digest}), seed {seed}",
-        onboard="zoh",
-        stiffness=gains.stiffness,
-        damping=gains.damping,
-        quantisation=Quantisation(*steps),
-    )
+    source = f"simulated: {robot.name} ({robot.digest}), seed {seed}"
+    metadata = _metadata(excitation, believed, gains, source, Quantisation(*steps))
     header = {
         "robot": robot.name,
         "robot_digest": robot.digest,
@@ -100,6 +92,22 @@ def play(
     if not fixed:
         columns |= {"height_m": rows[:, 6], "contact": rows[:, 7] <= 0}
     return make_recording(pl.DataFrame(columns), metadata, robot.name, header=header)
+
+
+def _metadata(
+    excitation: Excitation, robot: str, gains: JointGains, source: str, steps: Quantisation
+) -> RecordingMetadata:
+    """Return how a leg on the paper's joint PD is recorded."""
+    return RecordingMetadata(
+        excitation.rig,
+        excitation.rate,
+        robot,
+        source,
+        onboard="zoh",
+        stiffness=gains.stiffness,
+        damping=gains.damping,
+        quantisation=steps,
+    )
 
 
 def recording_of(
@@ -122,15 +130,8 @@ def recording_of(
         raise RecordingError(f"{name} ended before the excitation began; see its events.")
     first = float(table["time_s"][0])
     time = np.round(table["time_s"].to_numpy() - first, 9)
-    metadata = RecordingMetadata(
-        rig=excitation.rig,
-        rate_hz=excitation.rate,
-        robot=believed,
-        source=f"motors on {trace.header.get('transport')}, {trace.header.get('started')}",
-        onboard="zoh",
-        stiffness=gains.stiffness,
-        damping=gains.damping,
-    )
+    source = f"motors on {trace.header.get('transport')}, {trace.header.get('started')}"
+    metadata = _metadata(excitation, believed, gains, source, Quantisation())
     facts = {
         "excitation": excitation.description,
         "excitation_digest": excitation.digest,

@@ -1,4 +1,4 @@
-"""A recording: measured joints and commands over time, and how they were recorded.
+"""Recordings: measured joints and commands over time, and how they were recorded.
 
 Native files are traces (Parquet) whose header holds the metadata; CSV and foreign Parquet files
 need a sidecar, or come from one of the known rigs.
@@ -24,11 +24,7 @@ from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.errors import RecordingError, UsageError, unknown_name
 from hopping_leg.identify.importers import IMPORTERS, recognise
 from hopping_leg.identify.recording_checks import check_table
-from hopping_leg.identify.recording_format import (
-    COLUMNS,
-    PAIRS,
-    RecordingMetadata,
-)
+from hopping_leg.identify.recording_format import COLUMNS, PAIRS, RecordingMetadata, float_column
 from hopping_leg.identify.unit_checks import STALL, Inspection, row_period
 from hopping_leg.io import read_dataclass
 from hopping_leg.trace import Trace
@@ -105,21 +101,16 @@ def _parse(texts: pl.Series, origin: str) -> pl.Series:
 
 @dataclass(frozen=True)
 class Recording:
-    """One run of a rig.
-
-    Attributes:
-        trace: Table in the columns of ``COLUMNS`` and the header.
-        metadata: How it was recorded.
-        name: The file's name.
-        digest: SHA-256 of the file's bytes, hex.
-        warnings: What the loader found strange but could live with, a sentence each.
-    """
+    """One run of a rig."""
 
     trace: Trace
+    """Table in the columns of ``COLUMNS`` and the header."""
     metadata: RecordingMetadata
     name: str
     digest: str = ""
+    """SHA-256 of the file's bytes, hex."""
     warnings: tuple[str, ...] = ()
+    """What the loader found strange but could live with, a sentence each."""
 
     def __len__(self) -> int:
         return self.trace.table.height
@@ -152,12 +143,7 @@ class Recording:
         """
         if quantity not in PAIRS:
             raise UsageError(unknown_name("quantity of a recording", quantity, PAIRS))
-        columns = []
-        for name in PAIRS[quantity]:
-            known = self.has_column(name)
-            values = self.trace.table[name].cast(pl.Float64).to_numpy() if known else None
-            columns.append(np.full(len(self), np.nan) if values is None else values)
-        return np.stack(columns, axis=-1)
+        return np.stack([float_column(self.trace.table, c) for c in PAIRS[quantity]], axis=-1)
 
     def segments(self) -> list[slice]:
         """Return the stretches of rows without a stall, in order."""
@@ -192,13 +178,8 @@ def make_recording(
 ) -> Recording:
     """Check a table in the columns of ``COLUMNS`` and return it as a recording.
 
-    Args:
-        table: What was recorded.
-        metadata: How it was recorded.
-        name: The file, for messages.
-        names: The file's own column for a recording's column, where they differ.
-        header: Further entries for the file's header.
-        digest: Hash of the file.
+    Messages name the file, and its own columns by ``names`` where they differ from a recording's;
+    ``header`` is further entries for the file's header, ``digest`` the hash of the file.
 
     Raises:
         RecordingError: The table cannot be believed; names file, column and row.

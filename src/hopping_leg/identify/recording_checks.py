@@ -9,34 +9,22 @@ import polars as pl
 
 from hopping_leg.arrays import BoolArray
 from hopping_leg.errors import RecordingError
+from hopping_leg.identify import unit_checks
 from hopping_leg.identify.recording_format import MEASURED, PAIRS
-from hopping_leg.identify.unit_checks import (
-    STALL,
-    Inspection,
-    check_clock,
-    check_units,
-    check_velocity,
-    row_period,
-)
+from hopping_leg.identify.unit_checks import STALL, Inspection, row_period
 
 TINY, HUGE = 1e-30, 1e30
 """No sensor gives a magnitude beyond these; uninitialised memory read as a float does."""
-
 _MOSTLY = 0.1
 """Share of garbage above which nothing in a column is believed."""
-
 _STARTUP = 10
 """Rows at the beginning that are searched for commands that were not applied."""
-
 _JUMP = 0.05
 """Step out of rows of zeros, rad, that only a sensor that woke up makes."""
-
 _LEAST_ROWS = 20
 """Rows with a position that a recording needs."""
-
 _LEAST_MOTION = 0.02
 """Motion of the joint that moves more, rad; below it nothing can be identified."""
-
 _SMALL_MOTION = 0.5
 """Below it, rad, positions may be revolutions."""
 
@@ -53,12 +41,12 @@ def check_table(inspection: Inspection) -> None:
         raise RecordingError(
             f"{inspection.origin} has no column 'time_s'; a recording needs time and position."
         )
-    check_clock(inspection)
+    unit_checks.check_clock(inspection)
     _drop_garbage(inspection)
     _drop_zeros(inspection)
     _drop_startup(inspection)
-    check_units(inspection)
-    check_velocity(inspection)
+    unit_checks.check_units(inspection)
+    unit_checks.check_velocity(inspection)
     _check_motion(inspection)
     _warn_of_stalls(inspection)
 
@@ -66,14 +54,15 @@ def check_table(inspection: Inspection) -> None:
 def _drop_garbage(inspection: Inspection) -> None:
     """Leave out denormal, infinite and huge values."""
     for column in inspection.table.select(pl.selectors.float()).columns:
-        size = np.abs(inspection.floats(column))
+        values = inspection.floats(column)
+        size = np.abs(values)
         garbage = ((size > 0) & (size < TINY)) | (size > HUGE)
         if not garbage.any():
             continue
         first = int(np.argmax(garbage))
         found = (
             f"{inspection.named(column)}, row {inspection.row(first)}:"
-            f" {inspection.values(column)[first]:.3g} is no measurement but uninitialised memory"
+            f" {values[first]:.3g} is no measurement but uninitialised memory"
             f" ({int(garbage.sum())} such values)"
         )
         if garbage.mean() > _MOSTLY:
@@ -157,17 +146,18 @@ def _check_motion(inspection: Inspection) -> None:
     table, origin = inspection.table, inspection.origin
     spans = {}
     for column in PAIRS["position"]:
-        values = inspection.values(column).drop_nulls()
-        if values.len() >= _LEAST_ROWS:
-            spans[column] = float(values.max()) - float(values.min())  # type: ignore[arg-type]
-        elif column not in table.columns or values.len() == 0:
+        values = inspection.floats(column)
+        known = np.count_nonzero(~np.isnan(values))
+        if known >= _LEAST_ROWS:
+            spans[column] = float(np.nanmax(values) - np.nanmin(values))
+        elif not known:
             inspection.warn(f"{inspection.named(column)} was not recorded")
     if not spans:
         raise RecordingError(
             f"{origin} is too short: {table.height} rows, and no joint has {_LEAST_ROWS} positions"
             f" ({' or '.join(map(inspection.named, PAIRS['position']))})."
         )
-    widest = max(spans, key=lambda column: spans[column])
+    widest = max(spans, key=spans.__getitem__)
     if spans[widest] < _LEAST_MOTION:
         raise RecordingError(
             f"{origin} is at rest: {inspection.named(widest)} spans {spans[widest]:.2g} rad;"

@@ -4,8 +4,10 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
 import polars as pl
 
+from hopping_leg.arrays import Array
 from hopping_leg.errors import RecordingError
 from hopping_leg.robot.model import GRAVITY
 
@@ -46,6 +48,14 @@ base above an unknown zero, ``contact`` the foot's, ``phase`` what the rig's con
 
 MEASURED = PAIRS["position"] + PAIRS["velocity"] + PAIRS["torque"]
 """Columns that sensors filled."""
+
+
+def float_column(table: pl.DataFrame, column: str) -> Array:
+    """Return a table's column as floats, (rows,), NaN where it is null or missing."""
+    if column not in table.columns:
+        return np.full(table.height, np.nan)
+    return np.array(table[column].cast(pl.Float64).to_numpy())
+
 
 Rig = Literal["fixed-base", "rail", "boom"]
 Sample = Literal["before-command", "after-command"]

@@ -1,20 +1,17 @@
 """The report of an identification: one HTML page that holds everything and needs nothing."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
 from hopping_leg.html_page import Column, page_template, svg_uri, table
-from hopping_leg.identify.report_figures import (
-    draw_correlations,
-    draw_course,
-    draw_overlay,
-    draw_spectra,
-)
+from hopping_leg.identify import report_figures as figures
+from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.result import Identified, as_json, parameters_json, quality_json
-from hopping_leg.identify.validation import RESTART, Overlay, overlays
+from hopping_leg.identify.validation import RESTART, Overlay, overlays, rms
 from hopping_leg.io import Tree
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.parameters import JOINTS
@@ -28,13 +25,7 @@ _MOST = 12
 
 
 def write_fit_report(identified: Identified, command: str = "", threads: int = 0) -> bytes:
-    """Return the report as HTML.
-
-    Args:
-        identified: What was found.
-        command: Command that made it.
-        threads: Worker threads of the simulations to draw, 0 for one per core.
-    """
+    """Return the report as HTML, with the command that made it; threads simulate what is drawn."""
     candidates = (identified.start, identified.hypothesis)
     drawn = overlays(identified.held, candidates, identified.plan.timestep, threads)
     known = identified.identifiability
@@ -46,12 +37,12 @@ def write_fit_report(identified: Identified, command: str = "", threads: int = 0
         quality=quality_table(identified),
         parameters=parameter_table(identified),
         statements=known.statements,
-        correlations=svg_uri(draw_correlations(known.names, known.correlation)),
+        correlations=svg_uri(figures.draw_correlations(known.names, known.correlation)),
         recordings=recording_table(drawn),
         fits=[_fit(overlay) for overlay in _worst(drawn)],
         left_out=max(0, len(drawn) - _MOST),
-        spectra=svg_uri(draw_spectra(drawn)),
-        course=svg_uri(draw_course(identified.passes)),
+        spectra=svg_uri(figures.draw_spectra(drawn)),
+        course=svg_uri(figures.draw_course(identified.passes)),
         provenance=_provenance(as_json(identified)),
     )
     return page.encode()
@@ -61,7 +52,7 @@ def quality_table(identified: Identified) -> Markup:
     """Return errors on held-out data before and after the fit."""
     columns = [Column("rms error", lambda row: f"{row['error']} / {_UNITS[row['unit']][0]}")]
     for when in ("before", "after"):
-        columns += [Column(f"{when}: {j}", _scaled(f"{j}_{when}")) for j in JOINTS]
+        columns += [Column(f"{when}: {j}", partial(_scaled, f"{j}_{when}")) for j in JOINTS]
     return table(columns, quality_json(identified))
 
 
@@ -75,7 +66,7 @@ def parameter_table(identified: Identified) -> Markup:
         Column("95 % interval", _interval, _untold),
         Column(f"start: {identified.start.robot.name}", lambda r: f"{r['start']:.4g}"),
     ]
-    columns += [Column(name, _looked_up(values)) for name, values in references.items()]
+    columns += [Column(name, partial(_looked_up, values)) for name, values in references.items()]
     columns.append(
         Column("bounds", lambda r: f"{_number(r['bound_low'])} .. {_number(r['bound_high'])}")
     )
@@ -88,27 +79,24 @@ def recording_table(drawn: list[Overlay]) -> Markup:
         Column("recording", lambda o: o.recording.name),
         Column("rig", lambda o: o.recording.metadata.rig),
     ]
-    for quantity, unit, factor in (("position", "mrad", 1e3), ("torque", "N m", 1.0)):
+    for quantity, si in (("position", "rad"), ("torque", "N m")):
+        unit, factor = _UNITS[si]
         for index, when in enumerate(("before", "after")):
             heading = f"{quantity} {when} / {unit}: hip, knee"
-            columns.append(Column(heading, _rms_text(quantity, index, factor)))
+            columns.append(Column(heading, partial(_rms_text, quantity, index, factor)))
     return table(columns, drawn)
 
 
 def _references(identified: Identified) -> dict[str, Mapping[str, float]]:
     """Return what other files say of the same leg, by heading; none for another leg."""
     cad, robot = load_robot(_CAD), identified.start.robot
-    same = all(
-        getattr(cad, link).length == getattr(robot, link).length for link in ("thigh", "shank")
-    )
-    if not same:
+    links = ("thigh", "shank")
+    if any(getattr(cad, link).length != getattr(robot, link).length for link in links):
         return {}
     found: dict[str, Mapping[str, float]] = {}
     if robot.digest != cad.digest:
-        start = identified.start
         names = [n for n in identified.identifiability.names if not n.startswith("drive.")]
-        own = type(start)(cad)
-        found[f"CAD ({_CAD})"] = {name: own.get(name) for name in names}
+        found[f"CAD ({_CAD})"] = {name: LegHypothesis(cad).get(name) for name in names}
     return found | {f"paper's Table I ({_PAPER})": _table_one(load_tree(_PAPER))}
 
 
@@ -123,34 +111,31 @@ def _table_one(tree: Tree, prefix: str = "") -> dict[str, float]:
 
 
 def _worst(drawn: list[Overlay]) -> list[Overlay]:
-    def error(overlay: Overlay) -> float:
-        values = overlay.errors("position")[-1]
-        return float(np.nansum(np.square(values)) / max(1, np.isfinite(values).sum()))
-
-    chosen = sorted(drawn, key=error, reverse=True)[:_MOST]
-    return [overlay for overlay in drawn if any(overlay is c for c in chosen)]
+    """Return the overlays that fit worst, in their order."""
+    squares = (np.square(overlay.errors("position")[-1]) for overlay in drawn)
+    errors = [float(np.nansum(s) / max(1, np.isfinite(s).sum())) for s in squares]
+    ranked = sorted(range(len(drawn)), key=lambda index: errors[index], reverse=True)
+    return [drawn[index] for index in sorted(ranked[:_MOST])]
 
 
 def _fit(overlay: Overlay) -> dict[str, str]:
-    how = (
-        f"driven by the recorded torques, started anew every {RESTART:g} s"
-        if overlay.restarted
-        else "under its own joint controller, started once"
-    )
+    how = "under its own joint controller, started once"
+    if overlay.restarted:
+        how = f"driven by the recorded torques, started anew every {RESTART:g} s"
     return {
         "title": overlay.recording.name,
         "caption": f"{overlay.recording.metadata.source}; simulated {how}.",
-        "source": svg_uri(draw_overlay(overlay)),
+        "source": svg_uri(figures.draw_overlay(overlay)),
     }
 
 
 def _subtitle(identified: Identified) -> str:
     rigs = ", ".join(dict.fromkeys(r.metadata.rig for r in (*identified.fit, *identified.held)))
-    seconds = [
+    fit, held = (
         sum(float(r.time[-1] - r.time[0]) for r in p) for p in (identified.fit, identified.held)
-    ]
+    )
     return (
-        f"{identified.start.robot.name} on {rigs}; {seconds[0]:.0f} s fitted, {seconds[1]:.0f} s"
+        f"{identified.start.robot.name} on {rigs}; {fit:.0f} s fitted, {held:.0f} s"
         f" held out to judge ({identified.split}); search: {identified.plan.search}"
     )
 
@@ -169,12 +154,12 @@ def _provenance(tree: dict[str, Any]) -> dict[str, str]:
     return rows
 
 
-def _scaled(key: str) -> Callable[[Any], str]:
-    return lambda row: _number(_UNITS[row["unit"]][1] * row[key])
+def _scaled(key: str, row: dict[str, Any]) -> str:
+    return _number(_UNITS[row["unit"]][1] * row[key])
 
 
-def _number(value: float) -> str:
-    return f"{value:.3g}" if np.isfinite(value) else "-"
+def _number(value: float, digits: int = 3) -> str:
+    return f"{value:.{digits}g}" if np.isfinite(value) else "-"
 
 
 def _interval(row: dict[str, Any]) -> str:
@@ -187,16 +172,9 @@ def _untold(row: dict[str, Any]) -> bool:
     return not row["interval_high"] - row["interval_low"] <= abs(row["value"])
 
 
-def _looked_up(values: Mapping[str, float]) -> Callable[[Any], str]:
-    return lambda row: f"{values[row['name']]:.4g}" if row["name"] in values else "-"
+def _looked_up(values: Mapping[str, float], row: dict[str, Any]) -> str:
+    return _number(values.get(row["name"], np.nan), 4)
 
 
-def _rms_text(quantity: str, index: int, factor: float) -> Callable[[Any], str]:
-    def text(overlay: Overlay) -> str:
-        errors = overlay.errors(quantity)[index]
-        counts = np.maximum(np.isfinite(errors).sum(axis=0), 1)
-        rms = factor * np.sqrt(np.nansum(np.square(errors), axis=0) / counts)
-        known = np.isfinite(errors).any(axis=0)
-        return ", ".join(_number(v) if k else "-" for v, k in zip(rms, known, strict=True))
-
-    return text
+def _rms_text(quantity: str, index: int, factor: float, overlay: Overlay) -> str:
+    return ", ".join(_number(factor * value) for value in rms(overlay.errors(quantity)[index]))

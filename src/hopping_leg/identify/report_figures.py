@@ -13,14 +13,11 @@ from hopping_leg.identify.search import Pass
 from hopping_leg.identify.validation import Overlay
 from hopping_leg.robot.parameters import JOINTS
 
-LABELS = {"position": "position / rad", "torque": "torque / N m"}
-
+_LABELS = {"position": "position / rad", "torque": "torque / N m"}
 _SHOWN = 6.0
 """Longest stretch that is drawn, s."""
-
 _SAMPLES = 4000
 """Residuals that a spectrum takes at most; more change nothing that can be seen."""
-
 _FREQUENCIES = 500
 """Frequencies of a spectrum, from slow to half the rate."""
 
@@ -30,16 +27,35 @@ def draw_overlay(overlay: Overlay) -> Figure:
     """Draw measured and simulated positions and torques of the stretch that fits worst."""
     rows = worst_stretch(overlay)
     time = overlay.recording.time[rows]
-    figure = Figure(figsize=(WIDTH, 4.4), layout="constrained")
-    panels = figure.subplots(2, 2, sharex=True, squeeze=False)
-    for line, (quantity, label) in zip(panels, LABELS.items(), strict=True):
-        for joint, axes in enumerate(line):
-            _draw_joint(axes, overlay, quantity, joint, rows, time)
-            axes.set_ylabel(f"{JOINTS[joint]} {label}")
-    for axes in panels[-1]:
-        axes.set_xlabel("time / s")
-    panels[0][0].legend(loc="upper right", ncols=3)
+    figure, panels = _panels("time / s")
+    for (quantity, joint), axes in panels.items():
+        measured = overlay.measured[quantity][rows, joint]
+        before, after = overlay.simulated[quantity][:, rows, joint]
+        known = ~np.isnan(measured)
+        axes.plot(time[known], measured[known], ".", color="0.55", markersize=3.0, label="measured")
+        axes.plot(time, before, color=colour(4), linewidth=0.9, label="before")
+        axes.plot(time, after, color=colour(0), linewidth=1.1, label="after")
+        if known.any():  # what runs away before the fit is outside the picture
+            shown = np.concatenate([measured[known], after[np.isfinite(after)]])
+            low, high = shown.min(), shown.max()
+            room = 0.15 * (high - low) + 1e-6
+            axes.set_ylim(low - room, high + 1.6 * room)
+        axes.margins(x=0.01)
+    panels["position", 0].legend(loc="upper right", ncols=3)
     return figure
+
+
+def _panels(x_label: str) -> tuple[Figure, dict[tuple[str, int], Axes]]:
+    """Return a figure with a panel for each quantity of each joint."""
+    figure = Figure(figsize=(WIDTH, 4.4), layout="constrained")
+    grid, panels = figure.subplots(2, 2, sharex=True, squeeze=False), {}
+    for line, (quantity, label) in zip(grid, _LABELS.items(), strict=True):
+        for joint, axes in enumerate(line):
+            axes.set_ylabel(f"{JOINTS[joint]} {label}")
+            panels[quantity, joint] = axes
+    for axes in grid[-1]:
+        axes.set_xlabel(x_label)
+    return figure, panels
 
 
 def worst_stretch(overlay: Overlay) -> slice:
@@ -55,43 +71,15 @@ def worst_stretch(overlay: Overlay) -> slice:
     return slice(first, int(stops[first]))
 
 
-def _draw_joint(
-    axes: Axes, overlay: Overlay, quantity: str, joint: int, rows: slice, time: Array
-) -> None:
-    measured = getattr(overlay, quantity)[rows, joint]
-    before, after = getattr(overlay, f"simulated_{quantity}")[:, rows, joint]
-    known = ~np.isnan(measured)
-    axes.plot(time[known], measured[known], ".", color="0.55", markersize=3.0, label="measured")
-    axes.plot(time, before, color=colour(4), linewidth=0.9, label="before")
-    axes.plot(time, after, color=colour(0), linewidth=1.1, label="after")
-    if known.any():
-        _zoom(axes, measured[known], after)
-    axes.margins(x=0.01)
-
-
-def _zoom(axes: Axes, measured: Array, after: Array) -> None:
-    """Leave what runs away before the fit outside the picture."""
-    shown = np.concatenate([measured, after[np.isfinite(after)]])
-    low, high = shown.min(), shown.max()
-    room = 0.15 * (high - low) + 1e-6
-    axes.set_ylim(low - room, high + 1.6 * room)
-
-
 @styled
 def draw_spectra(overlays: Sequence[Overlay]) -> Figure:
     """Draw the residuals' amplitude over frequency, before and after the fit."""
-    figure = Figure(figsize=(WIDTH, 4.4), layout="constrained")
-    panels = figure.subplots(2, 2, sharex=True, squeeze=False)
-    for line, (quantity, label) in zip(panels, LABELS.items(), strict=True):
-        for joint, axes in enumerate(line):
-            for index, (name, shade) in enumerate((("before", colour(4)), ("after", colour(0)))):
-                frequency, amplitude = residual_spectrum(overlays, quantity, joint, index)
-                axes.loglog(frequency, amplitude, color=shade, linewidth=1.0, label=name)
-            axes.set_ylabel(f"{JOINTS[joint]} {label}")
-    for axes in panels[-1]:
-        axes.set_xlabel("frequency / Hz")
-    if panels[0][0].lines:
-        panels[0][0].legend()
+    figure, panels = _panels("frequency / Hz")
+    for (quantity, joint), axes in panels.items():
+        for index, (name, shade) in enumerate((("before", colour(4)), ("after", colour(0)))):
+            frequency, amplitude = residual_spectrum(overlays, quantity, joint, index)
+            axes.loglog(frequency, amplitude, color=shade, linewidth=1.0, label=name)
+    panels["position", 0].legend()
     return figure
 
 

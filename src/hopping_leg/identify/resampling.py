@@ -10,13 +10,9 @@ from hopping_leg.arrays import Array
 class HeldSignal:
     """Values that hold or ramp from their row to the next, averaged over any interval.
 
-    The average is exact for jittered time stamps and differentiable in the interval's position,
-    and so in a delay.
-
-    Args:
-        time: Time stamps, s, (rows,).
-        values: At the rows, (rows, k); before the first row and after the last they hold.
-        slopes: Rates of change from each row on, (rows, k); zero if None.
+    The average is exact for jittered time stamps, s, (rows,), and differentiable in the interval's
+    position, and so in a delay. Values and slopes, their rates of change from each row on, are
+    (rows, k); before the first row and after the last the values hold.
     """
 
     def __init__(self, time: Array, values: Array, slopes: Array | None = None) -> None:
@@ -28,12 +24,7 @@ class HeldSignal:
         self._integral = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(area, axis=0)])
 
     def average(self, start: Array, duration: float) -> Array:
-        """Return the mean over ``start`` to ``start + duration``, (..., k).
-
-        Args:
-            start: Absolute times, s, (...).
-            duration: s.
-        """
+        """Return the mean from absolute times ``start``, s, (...), on, (..., k)."""
         return (self._until(start + duration) - self._until(start)) / duration
 
     def at(self, time: Array) -> Array:
@@ -46,23 +37,19 @@ class HeldSignal:
         row = np.clip(np.searchsorted(self._time, time, side="right") - 1, 0, len(self._time) - 1)
         since = (time - self._time[row])[..., None]
         slope = np.where(since < 0, 0.0, self._slopes[row])
-        area: Array = self._integral[row] + since * (self._values[row] + 0.5 * since * slope)
-        return area
+        return self._integral[row] + since * (self._values[row] + 0.5 * since * slope)
 
 
 class RowResampling:
     """Where the rows of every window lie among the ticks.
 
     Values at the ticks have shape (ticks, hypotheses, windows, k), those at the rows
-    (hypotheses, windows, rows, k). Windows with fewer rows than the longest repeat their last.
+    (hypotheses, windows, rows, k). Windows with fewer rows than the longest repeat their last;
+    ``padding``, (windows, rows), says where.
 
     Args:
         times: Times of each window's rows since its first, s, (rows of that window,).
         tick: Time between two ticks, s.
-
-    Attributes:
-        ticks: How many ticks reach past the last row.
-        padding: Which rows a window does not have, (windows, rows).
     """
 
     def __init__(self, times: Sequence[Array], tick: float) -> None:
@@ -79,12 +66,7 @@ class RowResampling:
         self._share = np.clip(place - self._before, 0.0, 1.0)[..., None]
 
     def cubic(self, q: Array, qd: Array) -> tuple[Array, Array]:
-        """Return position and velocity at the rows by the cubic through both at the ticks.
-
-        Args:
-            q: Joint positions at the ticks, rad.
-            qd: Joint velocities, rad/s, likewise.
-        """
+        """Return position, rad, and velocity, rad/s, by the cubic through both at the ticks."""
         q0, q1 = self._ends(q)
         v0, v1 = (self._tick * v for v in self._ends(qd))
         s, jump = self._share, q1 - q0
@@ -96,8 +78,7 @@ class RowResampling:
     def linear(self, values: Array) -> Array:
         """Return values at the rows, on the straight line between the ticks around each."""
         before, after = self._ends(values)
-        between: Array = before + self._share * (after - before)
-        return between
+        return np.asarray(before + self._share * (after - before))
 
     def _ends(self, values: Array) -> tuple[Array, Array]:
         """Return what stands at the ticks around each row, (hypotheses, windows, rows, k)."""

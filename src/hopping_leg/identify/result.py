@@ -1,21 +1,20 @@
 """What an identification found: as JSON, and as a robot file."""
 
-import copy
 import dataclasses
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from hopping_leg.identify.identifiability import Identifiability
-from hopping_leg.identify.parameters import LegHypothesis, ParameterSet
+from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import FitPlan
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.recording_format import Rig
 from hopping_leg.identify.search import Pass
 from hopping_leg.identify.validation import Validation
-from hopping_leg.io import Tree, plain, versions, write_atomically
+from hopping_leg.io import plain, replace_at, versions, write_atomically
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.robot.robot_files import load_tree, robot_from_tree, robot_text
 
@@ -24,45 +23,33 @@ _LIBRARIES = ("hopping-leg", "mujoco", "numpy", "scipy", "cma", "polars")
 
 @dataclass(frozen=True)
 class Identified:
-    """What came out.
-
-    Attributes:
-        hypothesis: Robot and drives with the identified values.
-        start: Robot and drives before the fit.
-        plan: All decisions.
-        passes: Searches in order; the last one's end is the result.
-        identifiability: Values, intervals, correlations, and what the data cannot tell.
-        fit: Recordings, or parts of them, that were fitted.
-        held: Recordings, or parts of them, that judge; the fit has not seen them.
-        split: ``held-out stretches`` or ``validation recordings``.
-        validation: Errors of the result on what was held.
-        start_validation: Errors of the start, likewise.
-        by_rig: Errors of the result on each rig, if there are several.
-        seed: Seed of all randomness.
-    """
+    """What came out."""
 
     hypothesis: LegHypothesis
+    """Robot and drives with the identified values."""
     start: LegHypothesis
+    """Robot and drives before the fit."""
     plan: FitPlan
     passes: tuple[Pass, ...]
+    """Searches in order; the last one's end is the result."""
     identifiability: Identifiability
     fit: tuple[Recording, ...]
+    """Recordings, or parts of them, that were fitted."""
     held: tuple[Recording, ...]
+    """Recordings, or parts of them, that judge; the fit has not seen them."""
     split: str
+    """``held-out stretches`` or ``validation recordings``."""
     validation: Validation
+    """Errors of the result on what was held."""
     start_validation: Validation
     by_rig: Mapping[Rig, Validation]
+    """Errors of the result on each rig, if there are several."""
     seed: int
 
     @property
     def robot(self) -> Robot:
         """The robot with the identified values."""
         return self.hypothesis.robot
-
-    @property
-    def parameters(self) -> ParameterSet:
-        """What the last pass fitted, with its bounds."""
-        return self.passes[-1].parameters
 
 
 def as_json(identified: Identified) -> dict[str, Any]:
@@ -83,21 +70,31 @@ def as_json(identified: Identified) -> dict[str, Any]:
             "method": plan.search,
             "scoring": dataclasses.asdict(plan.scoring),
             "window_s": plan.window,
-            "stride_s": plan.stride,
+            "stride_s": plan.window,
             "unscored_s": plan.unscored,
             "timestep_s": plan.timestep,
-            "passes": [_pass_json(p) for p in identified.passes],
+            "passes": [
+                {
+                    "name": one.name,
+                    "parameters": one.parameters.names,
+                    "cost": one.found.cost,
+                    "candidates": one.found.evaluations,
+                    "history": one.found.history,
+                    "other_starts": list(one.others),
+                }
+                for one in identified.passes
+            ],
         },
         "recordings": [
-            *_recordings_json(identified.fit, "fit"),
-            *_recordings_json(identified.held, "judge"),
+            _recording_json(recording, use)
+            for use, recordings in (("fit", identified.fit), ("judge", identified.held))
+            for recording in recordings
         ],
         "split": identified.split,
         "seed": identified.seed,
         "versions": software_versions(),
     }
-    described: dict[str, Any] = plain(tree)
-    return described
+    return dict(plain(tree))
 
 
 def validation_json(validation: Validation) -> dict[str, Any]:
@@ -124,15 +121,9 @@ def quality_json(identified: Identified) -> list[dict[str, Any]]:
     for horizon, pair in before.open_loop_position.items():
         name = f"position, predicted {horizon:g} s ahead"
         rows.append((name, "rad", pair, after.open_loop_position[horizon]))
+    keys = ("hip_before", "knee_before", "hip_after", "knee_after")
     return [
-        {
-            "error": name,
-            "unit": unit,
-            "hip_before": first[0],
-            "knee_before": first[1],
-            "hip_after": second[0],
-            "knee_after": second[1],
-        }
+        {"error": name, "unit": unit, **dict(zip(keys, (*first, *second), strict=True))}
         for name, unit, first, second in rows
         if any(map(math.isfinite, (*first, *second)))
     ]
@@ -141,25 +132,23 @@ def quality_json(identified: Identified) -> list[dict[str, Any]]:
 def parameters_json(identified: Identified) -> list[dict[str, Any]]:
     """Return a record per parameter: value, 95 % interval, start and bounds, SI."""
     known = identified.identifiability
-    bounds = {p.name: p for p in identified.parameters.parameters}
     first = {p.name: p.start for p in identified.plan.parameters.parameters}
-    rows = []
-    for index, name in enumerate(known.names):
-        value, half = float(known.values[index]), float(known.half_width[index])
-        rows.append(
-            {
-                "name": name,
-                "unit": bounds[name].unit,
-                "value": value,
-                "interval_low": value - half,
-                "interval_high": value + half,
-                "start": first.get(name, identified.start.get(name)),
-                "bound_low": bounds[name].low,
-                "bound_high": bounds[name].high,
-                "at_bound": bool(known.at_bound[index]),
-            }
-        )
-    return rows
+    values, halves = known.values.tolist(), known.half_width.tolist()
+    parameters = identified.passes[-1].parameters.parameters
+    return [
+        {
+            "name": p.name,
+            "unit": p.unit,
+            "value": value,
+            "interval_low": value - half,
+            "interval_high": value + half,
+            "start": first.get(p.name, identified.start.get(p.name)),
+            "bound_low": p.low,
+            "bound_high": p.high,
+            "at_bound": bool(stuck),
+        }
+        for p, value, half, stuck in zip(parameters, values, halves, known.at_bound, strict=True)
+    ]
 
 
 def software_versions() -> dict[str, str]:
@@ -167,33 +156,19 @@ def software_versions() -> dict[str, str]:
     return versions(*_LIBRARIES)
 
 
-def _pass_json(one: Pass) -> dict[str, Any]:
+def _recording_json(recording: Recording, use: str) -> dict[str, Any]:
     return {
-        "name": one.name,
-        "parameters": one.parameters.names,
-        "cost": one.found.cost,
-        "candidates": one.found.evaluations,
-        "history": one.found.history,
-        "other_starts": list(one.others),
+        "name": recording.name,
+        "use": use,
+        "sha256": recording.digest,
+        "rows": len(recording),
+        "first_s": float(recording.time[0]),
+        "last_s": float(recording.time[-1]),
+        "rig": recording.metadata.rig,
+        "rate_hz": recording.metadata.rate_hz,
+        "source": recording.metadata.source,
+        "warnings": list(recording.warnings),
     }
-
-
-def _recordings_json(recordings: Iterable[Recording], use: str) -> Sequence[dict[str, Any]]:
-    return [
-        {
-            "name": r.name,
-            "use": use,
-            "sha256": r.digest,
-            "rows": len(r),
-            "first_s": float(r.time[0]),
-            "last_s": float(r.time[-1]),
-            "rig": r.metadata.rig,
-            "rate_hz": r.metadata.rate_hz,
-            "source": r.metadata.source,
-            "warnings": list(r.warnings),
-        }
-        for r in recordings
-    ]
 
 
 _LATENCY = "reality.latency.command"
@@ -202,47 +177,30 @@ _LATENCY = "reality.latency.command"
 def save_robot(identified: Identified, path: Path, origin: str | Path) -> None:
     """Write the robot file; it stands alone, and an existing file is replaced as a whole.
 
-    Args:
-        identified: What was found.
-        path: A ``.toml`` file; its stem is the robot's name.
-        origin: Name or path of the robot that the fit began with, for all other numbers.
+    The delay of the recordings' loop becomes the robot's latency, with which training simulates it.
+    The stem of the ``.toml`` file is the robot's name; ``origin``, name or path of the robot that
+    the fit began with, gives all other numbers.
 
     Raises:
         RobotError: The identified values make no valid robot; nothing is written.
         TraceError: The file cannot be written.
     """
-    tree = _identified_tree(identified, load_tree(origin), path.stem)
+    tree = {key: value for key, value in load_tree(origin).items() if key != "reality"}
+    tree["name"] = path.stem
+    tree["description"] = f"{identified.start.robot.name}, identified from recordings"
+    for row in parameters_json(identified):
+        place = _place(row["name"])
+        if place.startswith("drive.") or (place == _LATENCY and not row["value"] > 0):
+            continue
+        entry = {"value": row["value"], "unit": row["unit"], "source": _source(row)}
+        tree = replace_at(tree, place, entry)
     robot_from_tree(tree, str(path))
     write_atomically(path, robot_text(tree, _comment(identified, str(origin))).encode())
 
 
-def _identified_tree(identified: Identified, tree: Tree, name: str) -> Tree:
-    """Return a robot's tables with the identified values in place.
-
-    The delay of the recordings' loop becomes the robot's latency, with which training simulates it.
-
-    Args:
-        identified: What was found.
-        tree: Tables of the robot that the fit began with, ``extends`` resolved.
-        name: Name of the new robot.
-    """
-    tree = {key: copy.deepcopy(value) for key, value in tree.items() if key != "reality"}
-    tree["name"] = name
-    tree["description"] = f"{identified.start.robot.name}, identified from recordings"
-    for row in parameters_json(identified):
-        *path, last = _place(row["name"])
-        if path[0] == "drive" or (path[0] == "reality" and not row["value"] > 0):
-            continue
-        table = tree
-        for part in path:
-            table = table.setdefault(part, {})
-        table[last] = {"value": row["value"], "unit": row["unit"], "source": _source(row)}
-    return tree
-
-
-def _place(name: str) -> list[str]:
-    """Return where a fit's parameter stands in a robot file, table by table."""
-    return (_LATENCY if name == "drive.delay" else name).split(".")
+def _place(name: str) -> str:
+    """Return where a fit's parameter stands in a robot file."""
+    return _LATENCY if name == "drive.delay" else name
 
 
 def _comment(identified: Identified, origin: str) -> str:
@@ -253,9 +211,14 @@ def _comment(identified: Identified, origin: str) -> str:
     lines.append(f"Split: {identified.split}; seed {identified.seed}; {identified.plan.search}.")
     versions = software_versions().items()
     lines.append("Versions: " + ", ".join(f"{name} {value}" for name, value in versions) + ".")
-    lines += _quality(identified)
+    lines.append("Error on what judged (rms; hip, knee), before and after the fit:")
+    for row in quality_json(identified):
+        before, after = (
+            f"{row[f'hip_{when}']:.3g}, {row[f'knee_{when}']:.3g}" for when in ("before", "after")
+        )
+        lines.append(f"  {row['error']}: {before} and {after} {row['unit']}")
     rows = parameters_json(identified)
-    drives = [row for row in rows if _place(row["name"])[0] == "drive"]
+    drives = [row for row in rows if _place(row["name"]).startswith("drive.")]
     if drives:
         lines.append("Of the recordings' drives, which are no part of the robot:")
         lines += [f"  {r['name']} = {r['value']:.6g} {r['unit']} ({_source(r)})" for r in drives]
@@ -263,16 +226,6 @@ def _comment(identified: Identified, origin: str) -> str:
         lines.append("What these data cannot tell:")
         lines += [f"  {sentence}" for sentence in identified.identifiability.statements]
     return "\n".join(lines)
-
-
-def _quality(identified: Identified) -> list[str]:
-    lines = ["Error on what judged (rms; hip, knee), before and after the fit:"]
-    for row in quality_json(identified):
-        before, after = (
-            f"{row[f'hip_{when}']:.3g}, {row[f'knee_{when}']:.3g}" for when in ("before", "after")
-        )
-        lines.append(f"  {row['error']}: {before} and {after} {row['unit']}")
-    return lines
 
 
 def _source(row: dict[str, Any]) -> str:

@@ -8,7 +8,6 @@ armature parameters derived from the first pass."
 """
 
 import dataclasses
-import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -18,16 +17,9 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
+from hopping_leg.identify import optimizers
 from hopping_leg.identify.cost import Objective
-from hopping_leg.identify.optimizers import (
-    CmaOptions,
-    Evaluate,
-    Found,
-    LeastSquaresOptions,
-    cma_es,
-    least_squares,
-    multi_start,
-)
+from hopping_leg.identify.optimizers import CmaOptions, Evaluate, Found, LeastSquaresOptions
 from hopping_leg.identify.parameters import ParameterSet, choose
 from hopping_leg.identify.plan import FitPlan, pass_names
 from hopping_leg.identify.recording_format import Rig
@@ -65,52 +57,36 @@ class SearchOptions:
 
 @dataclass(frozen=True)
 class Pass:
-    """One search: the paper's method has two, others one.
-
-    Attributes:
-        name: Name of the pass.
-        parameters: What it searched.
-        found: Where it ended, from the best of its starts.
-        others: Costs where the other starts ended, best first.
-    """
+    """One search: the paper's method has two, others one."""
 
     name: str
     parameters: ParameterSet
     found: Found
+    """Where it ended, from the best of its starts."""
     others: tuple[float, ...] = ()
+    """Costs where the other starts ended, best first."""
 
 
 @dataclass(frozen=True)
 class Searcher:
-    """Searches as a plan says.
-
-    Attributes:
-        plan: What to search, how.
-        objective: Cost of the plan's parameters; a pass with others gets its own.
-        options: How hard.
-        seed: Seed of all randomness.
-        folder: Folder for checkpoints; None keeps none.
-        report: Called with the progress.
-        ray: Address of a Ray cluster that simulates, ``local`` for one on this machine; None
-            simulates here.
-        about: What else makes this run this run.
-    """
+    """Searches as a plan says."""
 
     plan: FitPlan
     objective: Objective
+    """Cost of the plan's parameters; a pass with others gets its own."""
     options: SearchOptions
     seed: int = 0
     folder: Path | None = None
+    """Folder for checkpoints; None keeps none."""
     report: Report = lambda stage, share, cost: None
     ray: str | None = None
+    """Address of a Ray cluster that simulates, ``local`` for one on this machine; None simulates
+    here."""
     about: Mapping[str, object] = field(default_factory=dict)
+    """What else makes this run this run."""
 
     def run(self, rigs: Sequence[Rig]) -> list[Pass]:
-        """Return the passes in order; the last one's end is the result.
-
-        Args:
-            rigs: Rigs of the recordings.
-        """
+        """Return the passes for recordings on rigs, in order; the last one's end is the result."""
         plan = self.plan
         if plan.search != "two-pass":
             return [self._pass(plan.search, plan.parameters, 0.0, 1.0)]
@@ -121,7 +97,7 @@ class Searcher:
         further = [name for name in own if name not in (*names, *added)]
         parameters = choose(plan.start, [*names, *further], bounds=bounds, start=start)
         first = self._pass("two-pass, first", parameters, 0.0, 0.5)
-        parameters = second_pass(parameters, first.found, rigs, bounds=bounds, start=start)
+        parameters = second_pass(parameters, first.found, rigs, bounds, start)
         return [first, self._pass("two-pass, second", parameters, 0.5, 0.5)]
 
     def _pass(self, name: str, parameters: ParameterSet, begin: float, share: float) -> Pass:
@@ -141,14 +117,14 @@ class Searcher:
             checkpoint = None if self.folder is None else self.folder / file
             return searched(start=start, checkpoint=checkpoint, report=progress)
 
-        ends = multi_start(search, parameters, starts, self.seed)
+        ends = optimizers.multi_start(search, parameters, starts, self.seed)
         return Pass(name, parameters, ends[0], tuple(end.cost for end in ends[1:]))
 
     def _search_of(self, objective: Objective, about: Mapping[str, object]) -> Callable[..., Found]:
         """Return the plan's search, which still takes start, checkpoint and report."""
         if self.plan.search == "least-squares":
             return partial(
-                least_squares,
+                optimizers.least_squares,
                 self._spread(objective.residuals),
                 objective.parameters,
                 self.options.least_squares,
@@ -156,52 +132,39 @@ class Searcher:
                 groups=objective.jumping,
                 about=about,
             )
-        return partial(
-            cma_es,
-            self._spread(objective),
-            objective.parameters,
-            self.options.cma,
-            seed=self.seed,
-            shares=[self._spread(share) for share in self._shares(objective)],
-            about=about,
-        )
-
-    def _shares(self, objective: Objective) -> list[Objective]:
-        """Return what judges generations in turn; nothing if all windows can judge each."""
         rates = [r.metadata.rate_hz for r in objective.recordings]
         simulated = sum(w.length / rates[w.recording] for w in objective.windows)
         count = max(1, round(simulated / self.options.cma.seconds))
         hands = deal(objective.windows, count, np.random.default_rng(self.seed))
-        if len(hands) < 2:
-            return []
-        return [dataclasses.replace(objective, windows=hand) for hand in hands]
+        hands = hands if len(hands) > 1 else []  # all windows can judge each generation
+        return partial(
+            optimizers.cma_es,
+            self._spread(objective),
+            objective.parameters,
+            self.options.cma,
+            seed=self.seed,
+            shares=[self._spread(dataclasses.replace(objective, windows=hand)) for hand in hands],
+            about=about,
+        )
 
     def _spread(self, evaluate: Evaluate) -> Evaluate:
         """Return a function of a population, on the cluster if there is one."""
-        if self.ray is None:
-            return evaluate
-        return functools.partial(map_rows, RayWorkers(self.ray), evaluate)
+        return evaluate if self.ray is None else partial(map_rows, RayWorkers(self.ray), evaluate)
 
 
 def second_pass(
     first: ParameterSet,
     found: Found,
     rigs: Sequence[Rig],
-    *,
-    bounds: Mapping[str, tuple[float, float]] | None = None,
-    start: Mapping[str, float] | None = None,
+    bounds: Mapping[str, tuple[float, float]],
+    start: Mapping[str, float],
 ) -> ParameterSet:
-    """Return the parameters of the paper's second pass.
+    """Return the parameters of the paper's second pass from those and the end of the first.
 
-    Args:
-        first: Parameters of the first pass.
-        found: Where that ended.
-        rigs: Rigs of the recordings.
-        bounds: Bounds of the added parameters that differ from the widest ones.
-        start: Starting values of those that differ from the robot's.
+    Bounds and starting values, where they differ from usual, are those of the added parameters.
     """
     names, added = pass_names(rigs)
-    starts, every = {**(start or {})}, {**(bounds or {})}
+    starts, every = {**start}, {**bounds}
     for p, value in zip(first.parameters, first.values(found.vector).tolist(), strict=True):
         low, high = p.low, p.high
         if p.name in names:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 from mujoco import batch
@@ -15,10 +16,9 @@ from hopping_leg.identify.actuator_model import (
     VelocityWindow,
     build_rig_model,
     drive_values,
-    model_field,
     recorded_gains,
 )
-from hopping_leg.identify.encoder_offsets import OffsetFinder, find_offsets, has_encoder_offsets
+from hopping_leg.identify.encoder_offsets import OffsetFinder, has_encoder_offsets
 from hopping_leg.identify.initial_states import base_rate, start_states
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
@@ -28,12 +28,11 @@ from hopping_leg.robot import kinematics
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.robot.parameters import Robot
 
+_GAINS = ("stiffness", "damping", "integral")
 _BLOCK = 256
 """Ticks whose commands are prepared at once."""
-
 _TICKS_PER_PERIOD = 5
 """Ticks per period at which a drive that closes its own loop renews target, integral and limits."""
-
 _WILD = 1e4
 """Joint velocity beyond which a simulation has broken down, rad/s."""
 
@@ -45,13 +44,7 @@ class WindowGroup:
     rows may lie anywhere between ticks. Row n holds state and torque before command n acts. A
     ``zoh`` PD is computed once per tick from the simulated state; a ``continuous`` one is the
     actuators' own and acts at every physics step, its target, integral and limits renewed at
-    several ticks a period.
-
-    Args:
-        recordings: All recordings.
-        windows: This group's.
-        timestep: Physics step, s.
-        threads: Worker threads, 0 for one per core.
+    several ticks a period. Arguments are those of ``WindowSimulator``.
 
     Raises:
         UsageError: The physics step is longer than the recording's period.
@@ -79,9 +72,9 @@ class WindowGroup:
         self._zoh = self._metadata.onboard == "zoh"
         self._numbers = sorted({w.recording for w in windows})
         self._of_window = np.array([self._numbers.index(w.recording) for w in windows])
-        self._prepare_rows(recordings, windows)
         self._distinct = [recordings[n] for n in self._numbers]
         self._start_rows = np.array([w.start for w in windows])
+        self._prepare_rows(recordings, windows)
         self._prepare_commands()
         self._offsets = [
             OffsetFinder(r) if has_encoder_offsets(r.metadata) else None for r in self._distinct
@@ -90,12 +83,11 @@ class WindowGroup:
         self._batches: dict[int, batch.Batch] = {}
 
     def run(self, hypotheses: Sequence[LegHypothesis]) -> tuple[Array, Array, Array, Array]:
-        """Return position, velocity and measured torque of the joints, and the base's height.
-
-        Of shape (hypotheses, windows, rows, 2) the first three, (hypotheses, windows, rows) the
-        last, which is NaN where the base is fixed.
-        """
-        offsets = find_offsets(self._offsets, hypotheses)[:, self._of_window]
+        """Return the arrays of ``SimulatedWindows``."""
+        found = [
+            [np.zeros(2) if f is None else f.find(h) for f in self._offsets] for h in hypotheses
+        ]
+        offsets = np.array(found)[:, self._of_window]
         simulation = self._start(hypotheses, offsets)
         *history, heights = self._advance(simulation, hypotheses)
         shape = (self._rows.ticks, len(hypotheses), -1, 2)
@@ -131,14 +123,11 @@ class WindowGroup:
     def _prepare_commands(self) -> None:
         self._held, self._ramps, self._gains = [], [], []
         for recording in self._distinct:
-            columns = [
-                np.nan_to_num(recording.array(f"{name}_command"))
-                for name in ("position", "velocity", "torque")
-            ]
-            time = recording.time
+            time, names = recording.time, ("position", "velocity", "torque")
+            columns = [np.nan_to_num(recording.array(f"{name}_command")) for name in names]
             self._held.append(HeldSignal(time, np.concatenate(columns, axis=1)))
             self._ramps.append(HeldSignal(time, np.zeros_like(columns[1]), columns[1]))
-            rows = [recorded_gains(recording, n) for n in ("stiffness", "damping", "integral")]
+            rows = [recorded_gains(recording, name) for name in _GAINS]
             self._gains.append(HeldSignal(time, np.concatenate(rows, axis=1)))
 
     def _start(self, hypotheses: Sequence[LegHypothesis], offsets: Array) -> batch.Batch:
@@ -153,7 +142,7 @@ class WindowGroup:
             self._batches[count] = batch.Batch(models[0], count, self._threads)
         simulation = self._batches[count]
         for name in FIELDS:
-            values = np.stack([model_field(m, name) for m in models])
+            values = np.stack([attrgetter(name)(m) for m in models])
             simulation.expand(name)[...] = np.repeat(values, windows, axis=0)
         simulation.reset(stage=0)
         q, qd = simulation.bind("qpos"), simulation.bind("qvel")
@@ -170,25 +159,21 @@ class WindowGroup:
         """Return the base's first speed in each window, m/s; zero if no height was measured."""
         lengths = (robot.thigh.length, robot.shank.length, robot.foot.radius)
         if lengths not in self._base_rates:
-            rates = np.zeros(len(self._begin))
+            rates = self._base_rates[lengths] = np.zeros(len(self._begin))
             for n, recording in enumerate(self._distinct):
                 if recording.has_column("height_m"):
                     mine = self._of_window == n
                     rates[mine] = base_rate(recording, robot)[self._start_rows[mine]]
-            self._base_rates[lengths] = rates
         return self._base_rates[lengths]
 
     def _advance(
         self, simulation: batch.Batch, hypotheses: Sequence[LegHypothesis]
     ) -> tuple[Array, Array, Array, Array]:
-        """Run all ticks; return joint position, velocity and torque, base height at each.
-
-        Of shape (ticks, n, 2) the first three, (ticks, n) the last.
-        """
+        """Run all ticks; return q, qd and torque, (ticks, n, 2), and base height, (ticks, n)."""
         windows, count = len(self._begin), simulation.nsim
-        history = tuple(np.full((self._rows.ticks, count, 2), np.nan) for _ in range(3))
-        positions, velocities, torques = history
-        heights = np.full((self._rows.ticks, count), np.nan)
+        shape = (self._rows.ticks, count, 2)
+        positions, velocities, torques = (np.full(shape, np.nan) for _ in range(3))
+        heights = np.full(shape[:2], np.nan)
         q, qd = simulation.bind("qpos")[:, -2:], simulation.bind("qvel")[:, -2:]
         base = simulation.bind("qpos")[:, 0] if self._metadata.rig != "fixed-base" else np.nan
         ctrl = simulation.bind("ctrl")
@@ -197,8 +182,10 @@ class WindowGroup:
         friction = simulation.expand("dof_frictionloss")[:, -2:]
         still = friction.copy()
         bounds = MotorBounds(hypotheses, self._recordings)
-        gain = np.repeat([h.robot.of_joints("torque_gain") for h in hypotheses], windows, axis=0)
-        load = np.repeat([h.robot.of_joints("load_friction") for h in hypotheses], windows, axis=0)
+        gain, load = (
+            np.repeat([h.robot.of_joints(name) for h in hypotheses], windows, axis=0)
+            for name in ("torque_gain", "load_friction")
+        )
         delay = np.repeat([h.drive.delay for h in hypotheses], windows)
         line = DelayLine(delay / self._tick)
         window = np.repeat([h.drive.velocity_window for h in hypotheses], windows)
@@ -219,7 +206,7 @@ class WindowGroup:
             if self._zoh:
                 asked = push + kp * (target - q) + kd * (rate - qd)
                 torque = ctrl.copy()
-                ctrl[...] = gain * np.clip(line.push(asked), lower, upper)
+                ctrl[...] = gain * np.clip(np.add(*line.push(asked)), lower, upper)
                 torque = torque if tick else ctrl.copy()
             else:
                 asked = push + kp * target + kd * rate
@@ -254,9 +241,7 @@ class WindowGroup:
         ramp = np.array([[h.drive.ramp] for h in hypotheses])
         commands = np.empty((len(ticks), number, windows, 6))
         gains = np.empty((len(ticks), 3, number, windows, 2))
-        fitted = np.array(
-            [drive_values(hypotheses, n) for n in ("stiffness", "damping", "integral")]
-        )[:, :, None]
+        fitted = np.array([drive_values(hypotheses, name) for name in _GAINS])[:, :, None]
         for n in range(len(self._numbers)):
             mine = self._of_window == n
             start = self._begin[mine] + ticks - late[:, None]
@@ -270,7 +255,7 @@ class WindowGroup:
             gains[:, :, :, mine] = np.where(np.isnan(fitted), rows, fitted)
         if self._metadata.onboard == "torque":
             gains[...] = 0.0
-        for index, name in enumerate(("stiffness", "damping")):
+        for index, name in enumerate(_GAINS[:2]):
             if np.isnan(gains[:, index]).any():
                 raise RecordingError(
                     f"{self._recordings[0].name} does not say the {name} of its on-board PD; state"
@@ -281,19 +266,16 @@ class WindowGroup:
 
 @dataclass(frozen=True)
 class SimulatedWindows:
-    """What recordings would have been, row by row; NaN beyond a window's end or a failure.
-
-    Attributes:
-        position: rad, (hypotheses, windows, rows, 2).
-        velocity: rad/s, (hypotheses, windows, rows, 2).
-        torque: As the rig would have measured it, N m, (hypotheses, windows, rows, 2).
-        height: Height of the base, m, (hypotheses, windows, rows); NaN where it is fixed.
-    """
+    """What recordings would have been, row by row; NaN beyond a window's end or a failure."""
 
     position: Array
+    """rad, (hypotheses, windows, rows, 2)"""
     velocity: Array
+    """rad/s, likewise."""
     torque: Array
+    """As the rig would have measured it, N m, likewise."""
     height: Array
+    """Height of the base, m, (hypotheses, windows, rows); NaN where it is fixed."""
 
 
 class WindowSimulator:
@@ -302,11 +284,7 @@ class WindowSimulator:
     Windows of the same rig, rate and on-board controller share one ``mujoco.batch.Batch``; results
     do not depend on the number of threads, nor on what else is simulated beside a hypothesis.
 
-    Args:
-        recordings: What was recorded.
-        windows: Which stretches to simulate.
-        timestep: Physics step, s; the training's own by default.
-        threads: Worker threads, 0 for one per core.
+    The physics step, s, is the training's own by default; 0 threads are one per core.
 
     Raises:
         UsageError: There is no window.

@@ -12,7 +12,7 @@ import polars as pl
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RecordingError, RobotError
-from hopping_leg.identify.recording_format import PAIRS, RecordingMetadata
+from hopping_leg.identify.recording_format import PAIRS, RecordingMetadata, float_column
 from hopping_leg.robot import load_robot
 
 
@@ -39,15 +39,9 @@ class Inspection:
         """Return the file's row of a row of the table."""
         return int(self.table["row"][int(index)]) if "row" in self.table.columns else index
 
-    def values(self, column: str) -> pl.Series:
-        """Return a column, all null if there is none."""
-        if column in self.table.columns:
-            return self.table[column]
-        return pl.Series(column, [None] * self.table.height, dtype=pl.Float64)
-
     def floats(self, column: str) -> Array:
         """Return a column as floats, (ticks,), NaN where null."""
-        return np.asarray(self.values(column).cast(pl.Float64).to_numpy(), dtype=np.float64)
+        return float_column(self.table, column)
 
     def refuse(self, sentence: str) -> NoReturn:
         """Refuse the file; the sentence has its full stop."""
@@ -64,31 +58,23 @@ class Inspection:
 
 STALL = 2.0
 """A gap between rows of more than this many periods is a stall."""
-
 _TIME_UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1 / 60}
 _SPARSEST = 20.0
 """Periods per row beyond which the rate or the time's unit must be wrong."""
-
 _DEGREE, _TURN = 180 / np.pi, 1 / (2 * np.pi)
 _POSITION_UNITS = {"degrees": _DEGREE, "revolutions": _TURN}
 _VELOCITY_UNITS = {"degrees/s": 1 / _DEGREE, "revolutions/s": 1 / _TURN, "rpm": 1 / _TURN / 60}
 """What a unit of these is in SI."""
-
 _HALF_TURNS = 12.5
 """Largest distance of a joint from its middle, rad, two turns; degrees exceed it."""
-
 _FASTEST = 150.0
 """Speed of a joint, rad/s, far beyond any leg's motor; degrees per second exceed it."""
-
 _HIGHEST = 5.0
 """Base height, m; millimetres exceed it."""
-
 _STRONGEST = 5.0
 """Torque in units of the motor's peak; mN m exceed it."""
-
 _COMMON_PEAK = 60.0
 """Peak torque where the robot is unknown, N m."""
-
 _BLOCK = 0.05
 """Time over which velocity is integrated and compared with the way, s; shorter blocks would
 compare the position's quantisation."""
@@ -96,13 +82,10 @@ compare the position's quantisation."""
 _LEAST_BLOCKS = 20
 _LEAST_WAY = 5e-3
 """Root mean square way within a block below which nothing can be said, rad."""
-
 _GAP = 0.2
 """Longest time between two velocities that is integrated across, s."""
-
 _DENSE = 0.9
 """Share of rows with a velocity above which interpolation plays no role."""
-
 _ALIKE = 0.9
 """Correlation above which two columns are one quantity, maybe in two units."""
 

@@ -1,6 +1,7 @@
 """Judging a hypothesis on recordings: in closed loop, and predicting open-loop from torques."""
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,35 +12,28 @@ from hopping_leg.identify.cost import measured
 from hopping_leg.identify.encoder_offsets import SETTLING, has_encoder_offsets
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.recording_format import Pair
+from hopping_leg.identify.recording_format import PAIRS, Pair
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import Window, cut, duration
 from hopping_leg.robot.model import TIMESTEP
 
 HORIZONS = (0.2, 0.5, 1.0)
 """How far to predict without looking at the recording again, s."""
-
 _UNSCORED = 1.0
 """Beginning of a recording that does not count in closed loop, s, or a quarter of a short one."""
-
-_NOTHING: Pair = (float("nan"), float("nan"))
-"""Where nothing counts."""
 
 
 @dataclass(frozen=True)
 class Validation:
-    """Root mean square errors, (hip, knee), on exact samples only; NaN where nothing counts.
-
-    Attributes:
-        closed_loop_position: Under the recording's own controller from its first row on, rad;
-            recordings that command torques have none and do not count.
-        closed_loop_torque: Likewise, N m.
-        open_loop_position: By horizon in s: driven by the recorded torques alone, rad.
-    """
+    """Root mean square errors, (hip, knee), on exact samples only; NaN where nothing counts."""
 
     closed_loop_position: Pair
+    """Under the recording's own controller from its first row on, rad; recordings that command
+    torques have none and do not count."""
     closed_loop_torque: Pair
+    """Likewise, N m."""
     open_loop_position: dict[float, Pair]
+    """By horizon in s: driven by the recorded torques alone, rad."""
 
 
 def validate(
@@ -48,43 +42,26 @@ def validate(
     timestep: float = TIMESTEP,
     threads: int = 0,
 ) -> Validation:
-    """Judge a hypothesis; a recording that is shorter than a horizon is left out there.
+    """Judge a hypothesis on recordings, best those that no fit has seen.
 
-    Args:
-        recordings: Best those that no fit has seen.
-        hypothesis: What to judge.
-        timestep: Physics step, s.
-        threads: Worker threads, 0 for one per core.
+    A recording that is shorter than a horizon is left out there. The timestep is in s; 0 threads
+    are one per core.
 
     Raises:
         RecordingError: A recording is too short to judge anything.
     """
-    closed = _closed_loop(recordings, hypothesis, timestep, threads)
-    predicted = {}
-    for horizon in HORIZONS:
-        long_enough = [r for r in recordings if _reaches(r, horizon)]
-        predicted[horizon] = open_loop(long_enough, hypothesis, horizon, timestep, threads)
-    return Validation(*closed, predicted)
-
-
-def _closed_loop(
-    recordings: Sequence[Recording],
-    hypothesis: LegHypothesis,
-    timestep: float,
-    threads: int,
-) -> tuple[Pair, Pair]:
-    """Return the rms errors of position, rad, and torque, N m."""
     controlled = [r for r in recordings if r.metadata.onboard != "torque"]
-    if not controlled:
-        return _NOTHING, _NOTHING
     windows = cut(controlled, None, unscored=_unscored(recordings))
-    simulator = WindowSimulator(controlled, windows, timestep=timestep, threads=threads)
-    simulated = simulator.run([hypothesis])
-    position, torque = (
-        _rms(getattr(simulated, name)[0] - measured(simulator, name))
-        for name in ("position", "torque")
+    position, torque = _errors(
+        controlled, windows, hypothesis, timestep, threads, "position", "torque"
     )
-    return position, torque
+    predicted = {}
+    rows = [max(s.stop - s.start for s in r.segments()) for r in recordings]
+    for horizon in HORIZONS:
+        pairs = zip(recordings, rows, strict=True)
+        long_enough = [r for r, n in pairs if n >= max(3, round(horizon * r.metadata.rate_hz))]
+        predicted[horizon] = open_loop(long_enough, hypothesis, horizon, timestep, threads)
+    return Validation(position, torque, predicted)
 
 
 def open_loop(
@@ -101,13 +78,24 @@ def open_loop(
     are found predicts nothing.
     """
     driven = [d for d in map(as_torque_driven, recordings) if d.has("torque_command")]
-    if not driven:
-        return _NOTHING
     windows = [w for w in cut(driven, horizon, stride=horizon / 2) if _starts_known(driven, w)]
+    return _errors(driven, windows, hypothesis, timestep, threads, "position")[0]
+
+
+def _errors(
+    recordings: Sequence[Recording],
+    windows: Sequence[Window],
+    hypothesis: LegHypothesis,
+    timestep: float,
+    threads: int,
+    *quantities: str,
+) -> list[Pair]:
+    """Return the rms errors of simulated windows."""
     if not windows:
-        return _NOTHING
-    simulator = WindowSimulator(driven, windows, timestep=timestep, threads=threads)
-    return _rms(simulator.run([hypothesis]).position[0] - measured(simulator, "position"))
+        return [(math.nan, math.nan)] * len(quantities)
+    simulator = WindowSimulator(recordings, windows, timestep=timestep, threads=threads)
+    simulated = simulator.run([hypothesis])
+    return [rms(getattr(simulated, q)[0] - measured(simulator, q)) for q in quantities]
 
 
 def as_torque_driven(recording: Recording) -> Recording:
@@ -119,27 +107,18 @@ def as_torque_driven(recording: Recording) -> Recording:
     if recording.metadata.onboard == "torque":
         return recording
     table = recording.trace.table
-    columns = {"hip_command_nm": "hip_torque_nm", "knee_command_nm": "knee_torque_nm"}
-    acted = {
-        command: table[measured_].interpolate().fill_null(strategy="backward")
-        for command, measured_ in columns.items()
-        if measured_ in table.columns
-    }
     share = 1.0 if recording.metadata.onboard == "zoh" else 0.5
-    table = table.with_columns(
-        ((1 - share) * now + share * now.shift(-1).fill_null(strategy="forward")).alias(command)
-        for command, now in acted.items()
-    )
+    for command, torque in zip(PAIRS["torque_command"], PAIRS["torque"], strict=True):
+        if torque in table.columns:
+            now = table[torque].interpolate().fill_null(strategy="backward")
+            later = now.shift(-1).fill_null(strategy="forward")
+            table = table.with_columns(((1 - share) * now + share * later).alias(command))
     trace = dataclasses.replace(recording.trace, table=table)
     return dataclasses.replace(recording, trace=trace).with_metadata(onboard="torque")
 
 
 def _starts_known(recordings: Sequence[Recording], window: Window) -> bool:
-    """Return whether a window starts where the state is known.
-
-    That is in a row that was measured or is at least next to measured ones, and where offsets have
-    to be found, after the rows that tell them.
-    """
+    """Return whether a window starts in or next to measured rows, after those that tell offsets."""
     recording = recordings[window.recording]
     since = recording.time[window.start] - recording.time[0]
     if has_encoder_offsets(recording.metadata) and since < SETTLING:
@@ -148,8 +127,8 @@ def _starts_known(recordings: Sequence[Recording], window: Window) -> bool:
     return bool(np.isfinite(state).all()) or recording.has("position_estimate")
 
 
-def _rms(errors: Array) -> Pair:
-    """Return the root mean square over everything but the joint, ignoring NaN."""
+def rms(errors: Array) -> Pair:
+    """Return the root mean square over everything but the joint, the last axis, ignoring NaN."""
     flat = errors.reshape(-1, 2)
     counts = np.count_nonzero(~np.isnan(flat), axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -162,11 +141,6 @@ def _unscored(recordings: Sequence[Recording]) -> float:
     return min(_UNSCORED, 0.25 * min(map(duration, recordings)))
 
 
-def _reaches(recording: Recording, horizon: float) -> bool:
-    rows = max(s.stop - s.start for s in recording.segments())
-    return bool(rows >= max(3, round(horizon * recording.metadata.rate_hz)))
-
-
 RESTART = 0.5
 """Where a recording's torques are commanded there is no loop that holds the simulation to it; it
 is started anew so often, s."""
@@ -174,32 +148,19 @@ is started anew so often, s."""
 
 @dataclass(frozen=True)
 class Overlay:
-    """One recording; NaN where nothing was measured or simulated.
-
-    Attributes:
-        recording: The recording or part of one.
-        restarted: Whether the simulation was started anew every ``RESTART``.
-        position: Measured, and counted, rad, (rows, 2).
-        torque: Likewise, N m, (rows, 2).
-        simulated_position: By each hypothesis, rad, (hypotheses, rows, 2).
-        simulated_torque: Likewise, N m, (hypotheses, rows, 2).
-    """
+    """One recording or part of one: its ``position``, rad, and ``torque``, N m."""
 
     recording: Recording
     restarted: bool
-    position: Array
-    torque: Array
-    simulated_position: Array
-    simulated_torque: Array
+    """Whether the simulation was started anew every ``RESTART``."""
+    measured: dict[str, Array]
+    """What was measured and counts, (rows, 2), else NaN."""
+    simulated: dict[str, Array]
+    """By each hypothesis, (hypotheses, rows, 2)."""
 
     def errors(self, quantity: str) -> Array:
-        """Return simulated minus measured, (hypotheses, rows, 2).
-
-        Args:
-            quantity: ``position`` or ``torque``.
-        """
-        difference: Array = getattr(self, f"simulated_{quantity}") - getattr(self, quantity)
-        return difference
+        """Return simulated minus measured, (hypotheses, rows, 2)."""
+        return self.simulated[quantity] - self.measured[quantity]
 
 
 def overlays(
@@ -208,27 +169,19 @@ def overlays(
     timestep: float,
     threads: int = 0,
 ) -> list[Overlay]:
-    """Simulate recordings with hypotheses.
-
-    Args:
-        recordings: Best those that no fit has seen.
-        hypotheses: To compare.
-        timestep: Physics step, s.
-        threads: Worker threads, 0 for one per core.
-    """
+    """Simulate recordings, best those that no fit has seen, with hypotheses to compare."""
     skip, drawn = _unscored(recordings), []
     for recording in recordings:
         restarted = recording.metadata.onboard == "torque"
         length, unscored = (RESTART, 0.0) if restarted else (None, skip)
         windows = cut([recording], length, unscored=unscored)
         simulator = WindowSimulator([recording], windows, timestep=timestep, threads=threads)
-        simulated, filled = simulator.run(hypotheses), {}
+        found, known, simulated = simulator.run(hypotheses), {}, {}
         for name in ("position", "torque"):
             values = measured(simulator, name)[None]
-            filled[name] = _in_rows(values, windows, len(recording))[0]
-            values = getattr(simulated, name)
-            filled[f"simulated_{name}"] = _in_rows(values, windows, len(recording))
-        drawn.append(Overlay(recording, restarted, **filled))
+            known[name] = _in_rows(values, windows, len(recording))[0]
+            simulated[name] = _in_rows(getattr(found, name), windows, len(recording))
+        drawn.append(Overlay(recording, restarted, known, simulated))
     return drawn
 
 

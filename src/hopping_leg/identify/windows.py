@@ -12,19 +12,15 @@ from hopping_leg.identify.recording import Recording
 
 @dataclass(frozen=True)
 class Window:
-    """Rows ``start`` to ``start + length`` of a recording.
-
-    Attributes:
-        recording: Index of the recording.
-        start: First row, whose state starts the simulation.
-        length: Number of rows.
-        unscored: Rows at the beginning that no residual counts, while the start's error decays.
-    """
+    """Rows ``start`` to ``start + length`` of a recording."""
 
     recording: int
+    """Index of the recording."""
     start: int
+    """First row, whose state starts the simulation."""
     length: int
     unscored: int = 1
+    """Rows at the beginning that no residual counts, while the start's error decays."""
 
 
 def cut(
@@ -34,13 +30,10 @@ def cut(
     stride: float | None = None,
     unscored: float = 0.0,
 ) -> list[Window]:
-    """Cut recordings into windows of one duration.
+    """Cut recordings into windows of one duration, s, whose first ``unscored`` s do not count.
 
-    Args:
-        recordings: What to cut.
-        duration: Duration of a window, s; None makes one of each recording, as the paper does.
-        stride: From one window's start to the next, s; None leaves no gap and no overlap.
-        unscored: Beginning of each window that does not count, s.
+    Without a duration each recording is one window, as in the paper. The stride, s, is from one
+    window's start to the next; without it there is no gap and no overlap.
 
     Raises:
         UsageError: A duration has no meaning.
@@ -53,7 +46,7 @@ def cut(
     for index, recording in enumerate(recordings):
         rate = recording.metadata.rate_hz
         skip = max(1, round(unscored * rate))
-        found = False
+        before = len(windows)
         for segment in recording.segments():
             rows = segment.stop - segment.start
             length = rows if duration is None else round(duration * rate)
@@ -62,8 +55,7 @@ def cut(
             step = length if stride is None else max(1, round(stride * rate))
             starts = range(segment.start, segment.stop - length + 1, step)
             windows += [Window(index, start, length, skip) for start in starts]
-            found = found or bool(starts)
-        if not found:
+        if len(windows) == before:
             wanted = f"windows of {duration:g} s" if duration else "one window"
             raise RecordingError(
                 f"{recording.name} has {len(recording)} rows, {len(recording) / rate:.3g} s, too"
@@ -78,27 +70,19 @@ def deal(
     """Deal windows to shares of nearly equal size, each of which is spread over all of them.
 
     Of so many windows in a row every share gets one, at random, lest a motion's period favour one.
-
-    Args:
-        windows: To deal, in order.
-        shares: How many; no share stays empty, so that there may be fewer.
-        rng: Source of randomness.
+    No share stays empty, so that there may be fewer.
     """
     count = min(shares, len(windows))
     rows = -(-len(windows) // count)
     owners = np.concatenate([rng.permutation(count) for _ in range(rows)])
-    return [
-        tuple(w for w, owner in zip(windows, owners, strict=False) if owner == share)
-        for share in range(count)
-    ]
+    pairs = list(zip(windows, owners, strict=False))
+    return [tuple(w for w, owner in pairs if owner == share) for share in range(count)]
 
 
-SHARE = 4
+_SHARE = 4
 """One stretch in so many is held out."""
-
-STRETCH = 5.0
+_STRETCH = 5.0
 """Usual length of a stretch, s."""
-
 SHORTEST = 1.0
 """A stretch below this, s, judges nothing."""
 
@@ -114,12 +98,8 @@ def hold_out(
     """Split recordings into what is fitted and what judges the fit.
 
     Each is cut into stretches of equal length, of which every fourth is held out, so that each
-    part of an excitation stands on both sides. A short recording gives its last quarter.
-
-    Args:
-        recordings: To split.
-        window: Shortest stretch that can be fitted, s.
-        rng: Decides where the counting begins.
+    part of an excitation stands on both sides; ``rng`` decides where the counting begins. A short
+    recording gives its last quarter. No stretch to fit is shorter than a window, s.
 
     Raises:
         RecordingError: A recording is too short to be split.
@@ -128,17 +108,19 @@ def hold_out(
     held: list[Recording] = []
     for recording in recordings:
         whole = duration(recording)
-        least = max(SHARE * SHORTEST, window * SHARE / (SHARE - 1) + 2 * recording.metadata.period)
+        least = max(
+            _SHARE * SHORTEST, window * _SHARE / (_SHARE - 1) + 2 * recording.metadata.period
+        )
         if whole < least:
             raise RecordingError(
                 f"{recording.name} is too short: {whole:.3g} s, but {least:.3g} s are needed to"
                 " fit to one part and to judge by another; record longer, or name recordings to"
                 " judge by with --validate."
             )
-        count = max(SHARE, int(whole / max(STRETCH, 1.25 * window)))
-        begin = int(rng.integers(SHARE)) if count >= 2 * SHARE else SHARE - 1
+        count = max(_SHARE, int(whole / max(_STRETCH, 1.25 * window)))
+        begin = int(rng.integers(_SHARE)) if count >= 2 * _SHARE else _SHARE - 1
         edges = np.linspace(0, len(recording), count + 1).round().astype(int)
-        chosen = [i for i in range(count) if i % SHARE == begin]
+        chosen = [i for i in range(count) if i % _SHARE == begin]
         held += [part(recording, edges[i], edges[i + 1]) for i in chosen]
         for first, last in zip([-1, *chosen], [*chosen, count], strict=True):
             if edges[last] - edges[first + 1] >= round(window * recording.metadata.rate_hz) + 2:
@@ -150,8 +132,6 @@ def part(recording: Recording, start: int, stop: int) -> Recording:
     """Return rows of a recording as a recording whose name says which seconds they are."""
     table = recording.trace.table[int(start) : int(stop)]
     first, last = (float(recording.time[row]) - recording.time[0] for row in (start, stop - 1))
-    return dataclasses.replace(
-        recording,
-        trace=dataclasses.replace(recording.trace, table=table),
-        name=f"{recording.name}, {first:.1f}-{last:.1f} s",
-    )
+    name = f"{recording.name}, {first:.1f}-{last:.1f} s"
+    trace = dataclasses.replace(recording.trace, table=table)
+    return dataclasses.replace(recording, trace=trace, name=name)

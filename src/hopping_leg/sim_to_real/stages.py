@@ -212,7 +212,7 @@ class IdentifyTwin(StoredJob):
     def _truth(self, identified: Identified) -> dict[str, float]:
         """Return the twin's own values of what was fitted, where it has them."""
         truth = LegHypothesis(self.twin.without_surprises)
-        names = identified.parameters.names
+        names = identified.passes[-1].parameters.names
         values = {name: truth.get(name) for name in names if not name.startswith("drive.")}
         if "drive.delay" in names:
             values["drive.delay"] = self.twin.robot.reality.latency.command
