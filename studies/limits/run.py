@@ -27,7 +27,6 @@ from hopping_leg.evaluate.robustness.axes import times
 from hopping_leg.evaluate.runner import evaluate, software_versions
 from hopping_leg.io import safe_file_name
 from hopping_leg.rl.checkpoint import list_checkpoints, read_checkpoint
-from hopping_leg.rl.distillation.distillation import make_teacher
 from hopping_leg.rl.distillation.teacher import Teacher
 from hopping_leg.rl.legacy_names import upgrade_config
 from hopping_leg.rl.recipes import recipe_of
@@ -271,4 +270,4 @@ def teacher_of_run(run: Path, robot: Robot) -> Teacher:
         )
     model = recipe.make_model(recipe.make_env(robot, config["seed"]), config["seed"])
     restore_learner(model, read_checkpoint(found[-1])["model"])
-    return make_teacher(model.policy, robot, recipe.task)
+    return Teacher(model.policy, robot, recipe.task)

@@ -149,8 +149,8 @@ RECIPES = {
         "batch_size=64",
         "teacher_share=0.5",
         "dagger.gradient_steps=4",
-        "alike=0.5",
-        "draws=2",
+        "nominal_share=0.5",
+        "randomizations=2",
     ],
     "recurrent": [
         "batch_size=64", "teacher_share=0.5", "teachers=1", "n_epochs=4", "task.command_skew=1",

@@ -1,6 +1,6 @@
 import pytest
 
-from hopping_leg.rl.model_card import MISSED, curriculum, doubt, teacher_scores
+from hopping_leg.rl.model_card import MISSED, curriculum, missed_commands, teacher_scores
 from hopping_leg.rl.recipes.precise import PRECISE
 
 
@@ -12,18 +12,18 @@ def trials(**errors):
 
 
 @pytest.mark.parametrize("error", [0.0, MISSED, -MISSED])
-def test_a_policy_that_does_what_it_is_told_is_not_doubted(error):
-    assert doubt(trials(_22=error, _30=0.001)) == ""
+def test_a_policy_that_meets_its_commands_is_not_doubted(error):
+    assert missed_commands(trials(_22=error, _30=0.001)) == ""
 
 
 def test_a_card_names_every_command_that_its_own_simulation_misses():
-    said = doubt(trials(_22=0.235, _25=0.004, _30=-0.021, _35=None))
+    said = missed_commands(trials(_22=0.235, _25=0.004, _30=-0.021, _35=None))
     assert "0.22 m (+235 mm), 0.30 m (-21 mm), 0.35 m (no hops)" in said
     assert "0.25" not in said
 
 
 def test_a_command_between_centimetres_is_not_rounded_to_another():
-    assert "0.225 m (+30 mm)" in doubt([{"command_m": 0.225, "median_error_m": 0.03}])
+    assert "0.225 m (+30 mm)" in missed_commands([{"command_m": 0.225, "median_error_m": 0.03}])
 
 
 def test_a_card_tells_how_teachers_did():

@@ -8,7 +8,7 @@ from studies.limits.run import teacher_of_run
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.checkpoint import write_checkpoint
-from hopping_leg.rl.distillation.distillation import make_teacher
+from hopping_leg.rl.distillation.teacher import Teacher
 from hopping_leg.rl.recipes import change, get_recipe
 from hopping_leg.rl.resumable import learner_state
 from hopping_leg.rl.run_folder import RunFolder
@@ -76,7 +76,7 @@ def test_its_torques_can_err_as_an_imitators_do(tmp_path):
     model = stop_early(tmp_path)
     task, recipe = model.env.task, get_recipe("precise")
     right, wrong = (
-        make_teacher(model.policy, ROBOT, recipe.task, teacher_action_noise)
+        Teacher(model.policy, ROBOT, recipe.task, teacher_action_noise)
         for teacher_action_noise in (0.0, 0.05)
     )
 

@@ -14,7 +14,8 @@ _PARTS = {
     " warmup=learning_starts returns=n_steps tau gradient_steps target_entropy",
     "network": "actor critic privileged_critic",
     "distillation": "teaching=teacher_share teachers passing=teacher_accept_score"
-    " erring=teacher_action_noise guided=dagger_mixing_share alike draws trusting",
+    " erring=teacher_action_noise guided=dagger_mixing_share alike=nominal_share"
+    " draws=randomizations trusting=estimate_ramp",
     "distillation.student": "student=hidden memory=size feeling=error_hidden",
     "task": "task.start=reset_distribution task.stagger=random_episode_start"
     " task.command_hold=command_resampling_time task.chance=randomize_probability"
@@ -71,7 +72,6 @@ def upgrade_checkpoint(tree: Tree) -> Tree:
         own["teacher_scores"] = own.pop("exams")
     task = tree["model"].get("env", {}).get("task", {})
     task.pop("hopped", None)
-    reward = task.get("reward", {})
-    if set(reward) == {"air", "since"}:
-        task["reward"] = {"apex": reward}
+    if set(task.get("reward", {})) == {"air", "since"}:
+        task["reward"] = {"apex": task["reward"]}
     return tree

@@ -15,7 +15,7 @@ from hopping_leg.io import write_atomically
 Log = Literal["tensorboard", "wandb", "trackio"]
 
 PROJECT = "hopping-leg"
-"""Under which runs are filed there."""
+"""Project under which runs are filed there."""
 
 
 def check_log(log: Log) -> None:
@@ -24,19 +24,20 @@ def check_log(log: Log) -> None:
     Raises:
         UsageError: It is not; the message names the command.
     """
-    if log != "tensorboard" and not _installed(log):
+    if log == "tensorboard":
+        return
+    try:
+        importlib.import_module(log)
+    except ImportError as error:
         raise UsageError(
             f"--log {log} needs the package {log}, which is not installed: pip install {log}."
-        )
+        ) from error
 
 
 def make_logger(folder: Path, log: Log, config: Mapping[str, Any]) -> Logger:
-    """Return the logger of a training.
+    """Return the logger of the training in a folder, whose name is the run's.
 
-    Args:
-        folder: The run's; its name is the run's name.
-        log: Who gets the curves besides TensorBoard.
-        config: What the run was asked for, shown beside its curves.
+    The configuration is shown beside the curves.
 
     Raises:
         UsageError: The package is missing or does not start.
@@ -76,24 +77,13 @@ class Dashboard(KVWriter):  # type: ignore[misc]
         step: int = 0,
     ) -> None:
         """Send the numbers of one step; texts and pictures are TensorBoard's alone."""
-        numbers = {
-            key: float(value)
-            for key, value in key_values.items()
-            if isinstance(value, int | float | np.number)
-        }
+        numeric = (int, float, np.number)
+        numbers = {k: float(v) for k, v in key_values.items() if isinstance(v, numeric)}
         self._module.log(numbers, step=step)
 
     def close(self) -> None:
         """Finish the run."""
         self._module.finish()
-
-
-def _installed(package: str) -> bool:
-    try:
-        importlib.import_module(package)
-    except ImportError:
-        return False
-    return True
 
 
 def _identity(folder: Path) -> str:

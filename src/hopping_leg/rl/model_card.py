@@ -1,29 +1,24 @@
 """Write a policy's model card from the results of its training."""
 
-import json
 from pathlib import Path
 from typing import Any
 
 from hopping_leg.io import write_atomically
+from hopping_leg.rl.run_folder import read_result
 
 MISSED = 0.02
-"""Median error beyond which a policy does not do what it is told, m; the robustness suite's."""
+"""Median error beyond which a policy misses its command, m; the robustness suite's."""
 
 
 def write_card(folder: Path) -> Path:
     """Write ``model_card.md`` into a run's folder from its ``result.json``."""
-    result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
     path = folder / "model_card.md"
-    write_atomically(path, render(result).encode())
+    write_atomically(path, render(read_result(folder)).encode())
     return path
 
 
 def render(result: dict[str, Any]) -> str:
-    """Return the card of a finished training as Markdown.
-
-    Args:
-        result: Content of ``result.json``.
-    """
+    """Return the card of a finished training, as Markdown, from its ``result.json``."""
     selected, task = result["selected"], result["options"]["task"]
     commands = task["command_range"] or (min(task["commands"]), max(task["commands"]))
     versions = ", ".join(f"{name} {number}" for name, number in result["versions"].items())
@@ -49,15 +44,11 @@ step 0.5 ms, the first 2 s of each trial dropped. These seeds chose the policy; 
 {result["recipe"]}` judges it on others.
 
 {table(selected["trials"])}
-{doubt(selected["trials"])}"""
+{missed_commands(selected["trials"])}"""
 
 
 def parallel_seeds(result: dict[str, Any]) -> str:
-    """Return a line on the trainings of which this was the best, if there were several.
-
-    Args:
-        result: Content of ``result.json``.
-    """
+    """Return a line on the trainings of which this was the best, if there were several."""
     if "seed_scores" not in result:
         return ""
     rows = result["seed_scores"]
@@ -70,11 +61,7 @@ def parallel_seeds(result: dict[str, Any]) -> str:
 
 
 def curriculum(stages: list[dict[str, Any]]) -> str:
-    """Return a line on who learnt until when, if there was more than one.
-
-    Args:
-        stages: In order, see ``Stage``.
-    """
+    """Return a line on who learnt until when, if there was more than one."""
     shown = ", ".join(
         f"{s['name']} until {100 * s['until']:.0f} %"
         + (f" (accepted from {1000 * s['must_score']:g} mm)" if s["must_score"] else "")
@@ -84,26 +71,18 @@ def curriculum(stages: list[dict[str, Any]]) -> str:
 
 
 def teacher_scores(scores: list[float]) -> str:
-    """Return a line on the teachers' scores, if there were any.
-
-    Args:
-        scores: In the order in which they were taken, m.
-    """
-    if not scores:
-        return ""
+    """Return a line on the teachers' scores, m, if there were any."""
     numbers = ", ".join(f"{1000 * score:.1f}" for score in scores)
     return (
         f"- Evaluations of the teachers in order: {numbers} mm where they"
         " did worst (less is better); who did best taught.\n"
+        if scores
+        else ""
     )
 
 
-def doubt(trials: list[dict[str, Any]]) -> str:
-    """Return a paragraph on the commands that a policy misses in its own simulation, if any.
-
-    Args:
-        trials: Rows of ``evaluate_policy``.
-    """
+def missed_commands(trials: list[dict[str, Any]]) -> str:
+    """Return a paragraph on the commands that a policy misses in its own simulation, if any."""
     errors = {t["command_m"]: t["median_error_m"] for t in trials}
     missed = [
         f"{_height(command)} m ({'no hops' if error is None else f'{1000 * error:+.0f} mm'})"
@@ -119,11 +98,7 @@ before this policy goes to any other leg.
 
 
 def table(trials: list[dict[str, Any]]) -> str:
-    """Return trials as a Markdown table.
-
-    Args:
-        trials: Rows of ``evaluate_policy``.
-    """
+    """Return trials as a Markdown table."""
     head = (
         "| command m | median error mm | std mm | hops/s | flight % | skipped | body contact ticks"
         " | lowest base m |\n|---|---|---|---|---|---|---|---|"

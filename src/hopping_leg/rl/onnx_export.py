@@ -28,12 +28,7 @@ Layers = Sequence[tuple[Array, Array]]
 
 
 class Graph:
-    """Nodes and weights in the order in which they are made.
-
-    Attributes:
-        nodes: Nodes of the graph.
-        weights: Its initializers.
-    """
+    """Nodes and weights, the graph's initializers, in the order in which they are made."""
 
     def __init__(self) -> None:
         self.nodes: list[Any] = []
@@ -62,13 +57,10 @@ class Graph:
         self.nodes.append(helper.make_node(operator, inputs, outputs, **attributes))
 
     def dense(self, x: str, layers: Layers, activation: str, prefix: str = "") -> str:
-        """Put dense layers behind values; return what the last one gives.
+        """Put dense layers behind values, (n, in); return what the last one gives.
 
-        Args:
-            x: Values, (n, in).
-            layers: Layers of which all but the last have the activation.
-            activation: One of ``ACTIVATIONS``.
-            prefix: Beginning of all names.
+        All but the last have the activation, one of ``ACTIVATIONS``; all names begin with the
+        prefix.
         """
         for index, (weight, bias) in enumerate(layers):
             names = [
@@ -101,12 +93,9 @@ class Memory(Protocol):
         ...
 
     def build(self, graph: Graph, x: str, inputs: int) -> str:
-        """Put it behind the normalised inputs; return what the dense layers see.
+        """Put it behind the normalised inputs, (n, inputs); return what the dense layers see.
 
-        Args:
-            graph: Under construction; gets the values ``NEXT_MEMORY``.
-            x: The normalised inputs, (n, inputs).
-            inputs: How many.
+        The graph gets the values ``NEXT_MEMORY``.
         """
         ...
 
@@ -115,11 +104,7 @@ class Memory(Protocol):
 class RecurrentUnit:
     """A gated recurrent unit with its gates reset, update and candidate in this order, as torch's.
 
-    Attributes:
-        of_input: (3 k, size).
-        of_memory: (3 k, k).
-        bias_of_input: (3 k,).
-        bias_of_memory: (3 k,).
+    Weights are (3 k, size) and (3 k, k), biases (3 k,).
     """
 
     of_input: Array
@@ -167,31 +152,29 @@ class RecurrentUnit:
 
 @dataclass(frozen=True)
 class CommandIntegrator:
-    """Where a policy aims so that its hops come true, see ``rl.distillation.adaptive_student``.
+    """Memory that corrects a policy's command, see ``rl.distillation.adaptive_student``.
 
-    Remembers the aim at both ends of the range of commands and the command of late, all as the
-    command is normalised, which must be the last input.
-
-    Attributes:
-        layers: Layers, tanh, of the network that tells how far the last hop was off from inputs and
-            late command, (n, inputs + 1).
-        rate: Share of that by which the aim moves in a tick.
-        most: Largest error that is felt, in the network's scale.
-        farthest: Largest aim.
-        beyond: How far outside of the commands' range, -1 to 1, the dense layers may be told.
-        follow: Share of its distance by which the command of late follows in a tick.
+    Remembers the correction at both ends of the range of commands and the delayed command, all as
+    the command is normalised, which must be the last input.
     """
 
     layers: Layers
+    """Layers, tanh, of the network that estimates the last hop's error from inputs and delayed
+    command, (n, inputs + 1)."""
     rate: float
+    """Share of the error by which a tick changes the correction."""
     most: float
+    """Largest estimated error, in the network's scale."""
     farthest: float
+    """Largest correction."""
     beyond: float
+    """Largest distance of the corrected command from the range of commands, -1 to 1."""
     follow: float
+    """Share of its distance by which the delayed command follows in a tick."""
     size: ClassVar[int] = 3
 
     def build(self, graph: Graph, x: str, inputs: int) -> str:
-        """Tell the dense layers the aim instead of the command."""
+        """Show the dense layers the corrected command; names of nodes are those of policy files."""
         apply, constant = graph.apply, graph.constant
         sizes = constant("input_sizes", np.array([inputs - 1, 1], np.int64))
         graph.add("Split", [x, sizes], ["samples", "asked"], axis=1)
@@ -235,25 +218,22 @@ _IR_VERSION = 8
 
 @dataclass(frozen=True)
 class Network:
-    """A deterministic actor in numpy.
-
-    Attributes:
-        offset: Subtracted from the joined inputs, (size,).
-        gain: Multiplied with the rest, (size,).
-        layers: Weight (out, in) and bias (out,) of every dense layer.
-        activation: Activation of the hidden layers, one of ``ACTIVATIONS``.
-        squash: Squash of the output, one of ``SQUASHES``.
-        bound: The last layer's output is clipped to +-bound before the squash.
-        memory: What remembers, in front of the dense layers.
-    """
+    """A deterministic actor in numpy."""
 
     offset: Array
+    """Offset that is subtracted from the joined inputs, (size,)."""
     gain: Array
+    """Factor of the rest, (size,)."""
     layers: Layers
+    """Weight (out, in) and bias (out,) of every dense layer."""
     activation: str
+    """Activation of the hidden layers, one of ``ACTIVATIONS``."""
     squash: str
+    """Squash of the output, one of ``SQUASHES``."""
     bound: float = float("inf")
+    """Bound of the last layer's output before the squash."""
     memory: Memory | None = None
+    """Memory in front of the dense layers."""
 
     def __post_init__(self) -> None:
         if self.activation not in ACTIVATIONS or self.squash not in SQUASHES:
@@ -264,11 +244,9 @@ class Network:
 
 
 def build_policy(network: Network, card: Card) -> bytes:
-    """Return a policy file's content.
+    """Return a policy file's content, with the card in its metadata.
 
-    Args:
-        network: The actor; its input is the layout's arrays, flattened row by row and joined.
-        card: Stored in the metadata.
+    The actor's input is the layout's arrays, flattened row by row and joined.
     """
     shapes = make_observation_history(card.layout, 1 / card.rate).shapes
     graph = Graph()
@@ -313,9 +291,6 @@ def save_policy(path: Path, network: Network, card: Card) -> None:
 def read_network(content: bytes) -> Network:
     """Return the actor in a policy file.
 
-    Args:
-        content: As ``export`` wrote it.
-
     Raises:
         PolicyError: The graph was made elsewhere, or remembers.
     """
@@ -337,10 +312,10 @@ def read_network(content: bytes) -> Network:
 
 
 PREFIX = "hidden_"
-"""Of the names that ``export`` gives to hidden layers."""
+"""Beginning of the names of hidden layers."""
 
 _LEARNT = ("weight_", "bias_", "gru_", "felt_weight_", "felt_bias_")
-"""Beginnings of the names that ``export`` and ``memories`` give to what is learnt."""
+"""Beginnings of the names of what is learnt."""
 
 
 def expose_hidden(content: bytes, shuffle: int | None = None) -> bytes:
@@ -363,7 +338,8 @@ def expose_hidden(content: bytes, shuffle: int | None = None) -> bytes:
         raise PolicyError("The policy's graph names no hidden layer; export it with `hop train`.")
     if shuffle is not None:
         rng = np.random.default_rng(shuffle)
-        hidden = {i for node in graph.node[: _last(graph, inside)] for i in node.input}
+        last = max(i for i, node in enumerate(graph.node) if set(inside) & set(node.output))
+        hidden = {i for node in graph.node[: last + 1] for i in node.input}
         for stored in graph.initializer:
             if stored.name in hidden and stored.name.startswith(_LEARNT):
                 values = numpy_helper.to_array(stored)
@@ -373,8 +349,3 @@ def expose_hidden(content: bytes, shuffle: int | None = None) -> bytes:
         graph.output.append(helper.make_tensor_value_info(name, TensorProto.FLOAT, ["n", None]))
     extended: bytes = model.SerializeToString(deterministic=True)
     return extended
-
-
-def _last(graph: onnx.GraphProto, names: list[str]) -> int:
-    """Return the number of nodes up to the last that gives one of these values."""
-    return max(i for i, node in enumerate(graph.node) if set(names) & set(node.output)) + 1

@@ -25,7 +25,7 @@ DECIDING_SEEDS = (505, 506, 507, 508)
 """Judge the policies of several seeds, each the best of its own training."""
 
 _SPACING = 0.01
-"""Of the heights at which nothing between two others should be missed, m."""
+"""Spacing of heights at which nothing between two others should be missed, m."""
 
 SETTLE = 0.2
 """Share of a trial at its start that does not count."""
@@ -44,29 +44,23 @@ _PENALTY = 0.1
 
 @dataclass(frozen=True)
 class CommandResult:
-    """Hops at one command, pooled over legs and seeds.
-
-    Attributes:
-        command_m: Desired apex height, m.
-        median_error_m: Median of apex - command, m; NaN without hops.
-        std_m: Standard deviation of the apexes, m; NaN without hops.
-        hops: In-flight apexes.
-        hops_per_s: Their rate, 1/s.
-        flight_fraction: Share of the time with the foot off the ground.
-        skipped_hops: Hops that should have happened and did not.
-        body_contact_ticks: Ticks with base or knee on the ground.
-        min_height_m: Lowest base height, m.
-    """
+    """Hops at one command, pooled over legs and seeds."""
 
     command_m: float
     median_error_m: float
+    """Median of apex - command, NaN without hops."""
     std_m: float
+    """Standard deviation of the apexes, NaN without hops."""
     hops: int
     hops_per_s: float
     flight_fraction: float
+    """Share of the time with the foot off the ground."""
     skipped_hops: int
+    """Hops that should have happened and did not."""
     body_contact_ticks: int
+    """Control steps with base or knee on the ground."""
     min_height_m: float
+    """Lowest base height."""
 
 
 def evaluate_policy(
@@ -80,7 +74,7 @@ def evaluate_policy(
     """Let a controller hop at fixed commands with noise and delay on, physics at 0.5 ms.
 
     Args:
-        controller: To be judged.
+        controller: The controller.
         robot: The leg.
         commands: Desired heights, rising, m.
         seeds: Seeds of noise and delay; each adds four legs per command.
@@ -110,9 +104,8 @@ def score(results: list[CommandResult]) -> float:
     """Return how bad a policy is, m.
 
     Mean over commands of ``command_score`` and of a penalty where hops are skipped or the body hits
-    the ground at all: who seldom does so must not win by scattering less. And a penalty
-    for every pair of neighbouring commands of which the higher one does not give the higher hops: a
-    policy that ignores its command must not win by hopping in between.
+    the ground at all, and a penalty for every pair of neighbouring commands of which the higher one
+    does not give the higher hops.
     """
     heights = [v.command_m + v.median_error_m for v in results]
     disordered = sum(not low < high for low, high in itertools.pairwise(heights))

@@ -2,7 +2,6 @@
 
 import time
 from collections import deque
-from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -22,9 +21,6 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
 
     Observations are (n, size); with ``privileged`` the true state follows in the same
     rows, for critics that may see it in training.
-
-    Attributes:
-        hops: In-flight apexes so far, of all legs.
     """
 
     def __init__(self, task: HoppingTask, *, privileged: bool = False) -> None:
@@ -34,6 +30,7 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
         self.render_mode = None
         super().__init__(task.count, space, gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32))
         self.hops = 0
+        """In-flight apexes so far, of all legs."""
         self._recent: deque[tuple[float, float]] = deque(maxlen=_RECENT_HOPS)
         self._terms, self._steps = np.zeros(len(task.reward.names)), 0
         self._return = np.zeros(task.count)
@@ -132,25 +129,15 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
     def close(self) -> None:
         """Do nothing: the legs hold no resources beyond memory."""
 
-    def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Do nothing: the task's generator is seeded where it is made."""
-        return [None] * self.num_envs
-
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:  # noqa: ANN401
         """Return an attribute once per selected leg."""
         return [getattr(self, attr_name)] * len(list(self._get_indices(indices)))
 
-    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:  # noqa: ANN401
+    def set_attr(self, *_args: Any, **_kwargs: Any) -> None:  # noqa: ANN401
         """Refuse: legs have no attributes of their own."""
         raise NotImplementedError("legs have no attributes of their own; set them on the task")
 
-    def env_method(
-        self,
-        method_name: str,
-        *args: Any,  # noqa: ANN401
-        indices: Any = None,  # noqa: ANN401
-        **kwargs: Any,  # noqa: ANN401
-    ) -> list[Any]:
+    def env_method(self, *_args: Any, **_kwargs: Any) -> list[Any]:  # noqa: ANN401
         """Refuse: legs have no methods of their own."""
         raise NotImplementedError("legs have no methods of their own; call the task's")
 

@@ -57,9 +57,7 @@ class _Split(nn.Module):
 class AsymmetricPolicy(ActorCriticPolicy):  # type: ignore[misc]
     """PPO policy whose actor sees the first ``actor_size`` entries and whose critic the others.
 
-    Args:
-        actor_size: Entries that are measured.
-        actor_sees: Entries that the actor sees instead.
+    The actor sees the entries ``actor_sees`` instead where they are given.
     """
 
     def __init__(
@@ -104,15 +102,13 @@ class AsymmetricSACPolicy(SACPolicy):  # type: ignore[misc]
 
     def make_actor(self, features_extractor: BaseFeaturesExtractor | None = None) -> Actor:
         """Build the actor on the measurements."""
-        seen = _Columns(self.observation_space, slice(None, self._actor_size))
-        return super().make_actor(seen)
+        return super().make_actor(_Columns(self.observation_space, slice(self._actor_size)))
 
     def make_critic(
         self, features_extractor: BaseFeaturesExtractor | None = None
     ) -> ContinuousCritic:
         """Build a pair of critics on the true state."""
-        seen = _Columns(self.observation_space, slice(self._actor_size, None))
-        return super().make_critic(seen)
+        return super().make_critic(_Columns(self.observation_space, slice(self._actor_size, None)))
 
 
 def _width(part: slice | list[int], inputs: int) -> int:
@@ -133,11 +129,7 @@ _NAMES = {nn.ReLU: "relu", nn.Tanh: "tanh", nn.ELU: "elu"}
 
 
 def network_of(model: BaseAlgorithm, observation: Observation) -> Network:
-    """Return a model's actor with the task's normalisation, for the observation's layout.
-
-    Args:
-        model: SAC, or PPO with separate networks of plain layers.
-        observation: Observation of the task it learns.
+    """Return the actor of SAC or PPO with the task's normalisation, for the observation's layout.
 
     Raises:
         UsageError: The actor is no stack of dense layers.

@@ -31,7 +31,7 @@ def test_the_policy_file_acts_as_the_student_and_aims_as_it_does():
         }
     )  # fmt: skip
     model = learner(recipe)
-    model.policy.student.trust = 1.0
+    model.policy.student.estimate_share = 1.0
     task, student = model.env.task, model.policy.student
     policy = policy_of(recipe, model)
     for _ in range(2):
@@ -53,7 +53,7 @@ def test_the_policy_file_acts_as_the_student_and_aims_as_it_does():
 
 
 @pytest.mark.parametrize("command", [-1.0, -0.4, 1.0])
-def test_an_aim_follows_the_truth_by_its_share_of_every_hop(command):
+def test_a_correction_follows_the_true_error_by_its_share_of_every_hop(command):
     model = learner(TINY_ADAPTIVE)
     student = model.policy.student
     places = student._places
@@ -69,8 +69,8 @@ def test_an_aim_follows_the_truth_by_its_share_of_every_hop(command):
     pass_by(command - 0.1, 1.0, 40)
     pass_by(command - 0.5, 0.0, 22 + 5)
     shares = np.array([(1 - command) / 2, (1 + command) / 2])
-    aim = student._memory[0, :2].numpy() @ shares
-    assert aim == pytest.approx(0.1 * TINY_ADAPTIVE.value("integrator.share"), rel=1e-4)
+    correction = student._memory[0, :2].numpy() @ shares
+    assert correction == pytest.approx(0.1 * TINY_ADAPTIVE.value("integrator.share"), rel=1e-4)
 
 
 def test_an_identified_leg_may_differ_too():
@@ -92,8 +92,7 @@ def test_an_identified_leg_may_differ_too():
         assert np.ptp(seen[:, -len(WIDE_RANGES) :], axis=0).max() > 0
 
 
-def test_what_a_student_learns_from_is_what_it_was_told():
-    """The teacher is asked at the aim, and the network that feels is shown the truth."""
+def test_the_teacher_is_asked_at_the_corrected_command():
     model = learner(TINY_ADAPTIVE)
     student = model.policy.student
     places = student._places
@@ -110,38 +109,37 @@ def test_what_a_student_learns_from_is_what_it_was_told():
         student.act(torch.from_numpy(row), first)
     student.add_rollout(seen, begun, np.ones_like(begun))
     student.loss(64, wanted)
-    aims = student._memory[:, :2].mean(dim=1)
+    corrections = student._memory[:, :2].mean(dim=1)
     assert asked[0].abs().max() > 0
-    distance = (asked[0][:, None] - aims[None]).abs().min(dim=1).values
+    distance = (asked[0][:, None] - corrections[None]).abs().min(dim=1).values
     assert distance.max() < 1e-3
 
 
-def test_the_aims_of_ever_more_legs_follow_what_is_felt():
+def test_the_corrections_of_ever_more_legs_follow_the_estimate():
     model = learner(TINY_ADAPTIVE)
-    trust = []
+    shares = []
     for share in np.linspace(TINY_ADAPTIVE.distillation.teacher_share, 1, 21):
         TINY_ADAPTIVE.anneal(model, model.env, share)
-        trust.append(model.policy.student.trust)
-    assert trust[0] == 0
-    assert trust[-1] == 1
-    assert (np.diff(trust) >= 0).all()
+        shares.append(model.policy.student.estimate_share)
+    assert shares[0] == 0
+    assert shares[-1] == 1
+    assert (np.diff(shares) >= 0).all()
 
 
-def test_legs_are_alike_until_the_policy_can_act_and_change_from_then_on():
-    draws = [
-        TINY_ADAPTIVE.distillation.draw(student_progress)
+def test_legs_are_nominal_until_the_policy_can_act_and_change_from_then_on():
+    numbers = [
+        TINY_ADAPTIVE.distillation.randomization(student_progress)
         for student_progress in np.linspace(-0.5, 1, 301)
     ]
-    alike = np.linspace(-0.5, 1, 301) < TINY_ADAPTIVE.distillation.alike
-    assert not np.array(draws)[alike].any()
-    later = np.array(draws)[~alike]
+    nominal = np.linspace(-0.5, 1, 301) < TINY_ADAPTIVE.distillation.nominal_share
+    assert not np.array(numbers)[nominal].any()
+    later = np.array(numbers)[~nominal]
     assert later[0] == 1
     assert set(np.diff(later)) == {0, 1}
-    assert later[-1] == TINY_ADAPTIVE.distillation.draws + 1
+    assert later[-1] == TINY_ADAPTIVE.distillation.randomizations + 1
 
 
-def test_it_can_learn_to_feel():
-    """The truth is shown among the measurements: the network that feels finds it."""
+def test_it_learns_to_estimate_an_error_that_is_among_the_measurements():
     model = learner(TINY_ADAPTIVE)
     student = model.policy.student
     places = student._places
@@ -149,7 +147,7 @@ def test_it_can_learn_to_feel():
     rng = np.random.default_rng(0)
     rows = np.zeros((50, 4, places.size + 3), np.float32)
     rows[..., 0] = rows[..., -1] = rng.uniform(-1, 1, (50, 4))
-    student._lessons.add(rows)
+    student._buffer.add(rows, np.ones(rows.shape[:2], bool))
     for _ in range(300):
         loss = student.loss(64, lambda seen: torch.zeros(len(seen), 2))
         optimizer.zero_grad()
@@ -168,41 +166,41 @@ FLIGHT, STANCE = 40, 30
 
 
 def watch(apexes, commands=None, one=None):
-    """Let one leg hop; return what is told in every tick of every hop, (hops, ticks)."""
+    """Let one leg hop; return the error in every tick of every hop, (hops, ticks)."""
     one = one or HopErrors(1, 0.005)
     commands = commands or [0.3] * len(apexes)
-    told = []
+    errors = []
     for apex, command in zip(apexes, commands, strict=True):
         rise = np.sin(np.linspace(0, np.pi, FLIGHT + 1))
         gap = np.concatenate([0.1 * rise[1:-1], np.zeros(STANCE)])
         height = np.concatenate([0.2 + (apex - 0.2) * rise[1:-1], np.full(STANCE, 0.19)])
-        told.append(
+        errors.append(
             [
-                one.see(np.array([h]), np.array([g]), np.array([command]), np.zeros(1, bool))[0]
+                one.update(np.array([h]), np.array([g]), np.array([command]), np.zeros(1, bool))[0]
                 for h, g in zip(height, gap, strict=True)
             ]
         )
-    return np.array(told)
+    return np.array(errors)
 
 
-def test_the_last_hops_error_is_told_while_the_foot_stands():
-    told = watch([0.31, 0.28])
+def test_the_last_hops_error_counts_while_the_foot_stands():
+    errors = watch([0.31, 0.28])
     landed = FLIGHT - 1
     shown = slice(landed + 6, landed + 22)
-    np.testing.assert_allclose(told[0, shown], 0.01, atol=1e-3)
-    np.testing.assert_allclose(told[1, shown], -0.02, atol=1e-3)
-    told[:, shown] = 0.0
-    assert not told.any()
+    np.testing.assert_allclose(errors[0, shown], 0.01, atol=1e-3)
+    np.testing.assert_allclose(errors[1, shown], -0.02, atol=1e-3)
+    errors[:, shown] = 0.0
+    assert not errors.any()
 
 
-def test_nothing_is_told_once_the_command_has_changed():
+def test_nothing_counts_once_the_command_has_changed():
     one = HopErrors(1, 0.005)
     watch([0.31], one=one)
     assert watch([0.31], [0.25], one).any()
     for _ in range(FLIGHT):
-        one.see(np.array([0.3]), np.array([0.1]), np.array([0.25]), np.zeros(1, bool))
+        one.update(np.array([0.3]), np.array([0.1]), np.array([0.25]), np.zeros(1, bool))
     after = [
-        one.see(np.array([0.2]), np.zeros(1), np.array([0.35]), np.zeros(1, bool))[0]
+        one.update(np.array([0.2]), np.zeros(1), np.array([0.35]), np.zeros(1, bool))[0]
         for _ in range(STANCE)
     ]
     assert not np.any(after)
@@ -213,20 +211,22 @@ def test_a_bounce_is_no_hop(ticks):
     one = HopErrors(1, 0.005)
     nobody = np.zeros(1, bool)
     for _ in range(ticks):
-        one.see(np.array([0.25]), np.array([0.01]), np.array([0.3]), nobody)
-    told = [one.see(np.array([0.2]), np.zeros(1), np.array([0.3]), nobody) for _ in range(40)]
-    assert not np.any(told)
+        one.update(np.array([0.25]), np.array([0.01]), np.array([0.3]), nobody)
+    errors = [one.update(np.array([0.2]), np.zeros(1), np.array([0.3]), nobody) for _ in range(40)]
+    assert not np.any(errors)
 
 
 def test_a_new_episode_knows_of_no_hop():
     one = HopErrors(1, 0.005)
     for tick in range(FLIGHT):
-        one.see(np.array([0.3]), np.array([0.1]), np.array([0.25]), np.array([tick == FLIGHT - 1]))
-    told = [
-        one.see(np.array([0.2]), np.zeros(1), np.array([0.25]), np.zeros(1, bool))
+        one.update(
+            np.array([0.3]), np.array([0.1]), np.array([0.25]), np.array([tick == FLIGHT - 1])
+        )
+    errors = [
+        one.update(np.array([0.2]), np.zeros(1), np.array([0.25]), np.zeros(1, bool))
         for _ in range(40)
     ]
-    assert not np.any(told)
+    assert not np.any(errors)
 
 
 def test_it_goes_on_from_its_state():

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
-import numpy as np
 from torch import nn
 
 from hopping_leg.controllers.observation_history import make_observation_history
@@ -28,7 +27,7 @@ from hopping_leg.rl.distillation.adaptive_student import (
     Places,
 )
 from hopping_leg.rl.distillation.students import RecurrentStudent, WindowStudent
-from hopping_leg.rl.distillation.teacher import Teacher
+from hopping_leg.rl.distillation.teacher import Teacher, last_torque
 from hopping_leg.rl.distillation.teacher_student import (
     DaggerConfig,
     TeacherStudentPolicy,
@@ -60,7 +59,7 @@ class StudentConfig:
 
     memory: Literal["window", "gru", "integrator"] = "window"
     """What it remembers: the samples that the observation shows; a gated recurrent unit's state; or
-    where to aim, see ``AdaptiveStudent``."""
+    a correction of the command, see ``AdaptiveStudent``."""
     hidden: tuple[int, ...] = (256, 128)
     """Hidden layers, tanh; the recurrent unit has none."""
     size: int = 128
@@ -86,16 +85,16 @@ class Distillation:
     dagger: DaggerConfig = field(default_factory=DaggerConfig)
     """How the student learns from the teacher."""
     integrator: CommandIntegratorConfig = field(default_factory=CommandIntegratorConfig)
-    """The memory of where to aim."""
+    """The memory of the command's correction."""
     dagger_mixing_share: float = 0.15
     """Share of the student's learning over which the teacher acts ever less in its stead."""
-    alike: float = 0.0
-    """Share of the student's learning in which legs are alike."""
-    draws: int = 0
-    """How often legs change into others in the rest."""
-    trusting: tuple[float, float] = (0.2, 0.6)
-    """Shares of that rest between which ever more legs' aims follow the estimate rather than the
-    truth."""
+    nominal_share: float = 0.0
+    """Share of the student's learning in which all legs are the robot."""
+    randomizations: int = 0
+    """How often legs are randomized anew in the rest."""
+    estimate_ramp: tuple[float, float] = (0.2, 0.6)
+    """Shares of that rest between which ever more legs' corrections follow the estimated error
+    rather than the true one."""
 
     @property
     def stages(self) -> list[Stage]:
@@ -105,9 +104,9 @@ class Distillation:
             Stage(f"teacher {k + 1}", (k + 1) * each, accept if self.teachers > 1 else None)
             for k in range(self.teachers)
         ]
-        own = 1 - self.teacher_share
-        alike = [Stage("student, legs alike", self.teacher_share + self.alike * own, None)]
-        return [*taught, *(alike if self.alike else []), Stage("student", 1.0, None)]
+        until = self.teacher_share + self.nominal_share * (1 - self.teacher_share)
+        nominal = [Stage("student, legs alike", until, None)] if self.nominal_share else []
+        return [*taught, *nominal, Stage("student", 1.0, None)]
 
     def make_model(
         self,
@@ -119,12 +118,7 @@ class Distillation:
     ) -> TeacherStudentPPO:
         """Build the teacher's PPO with the student beside it.
 
-        Args:
-            env: From the recipe.
-            ppo: The teacher's algorithm.
-            network: The teacher's.
-            commands: Heights between which teachers are evaluated, m.
-            seed: Seed of weights and exploration.
+        Teachers are evaluated between the lowest and the highest of the commands, m.
         """
         task = env.task
         measured = task.observation.size
@@ -150,7 +144,7 @@ class Distillation:
         """Build the untrained student.
 
         Raises:
-            UsageError: It is to aim by a single command, and the observation shows several.
+            UsageError: It corrects a single command, and the observation shows several.
         """
         (size,) = env.observation_space.shape
         measured, task = env.task.observation.size, env.task.options
@@ -161,9 +155,8 @@ class Distillation:
             return WindowStudent(measured, size, list(config.hidden), room, nn.Tanh)
         if make_observation_history(task.observation, 1 / task.rate).shapes["command"] != (1,):
             raise UsageError(
-                "A student with an integrator is told another command than the one it is given and"
-                f" needs an observation with a single one, not '{task.observation}'; choose"
-                " --observation dated-long."
+                "A student with an integrator corrects its command and needs an observation with a"
+                f" single one, not '{task.observation}'; choose --observation dated-long."
             )
         places = Places(
             measured=measured,
@@ -193,19 +186,13 @@ class Distillation:
         One that is on the ground for more than half of the time is marked down, too: next to
         standing, the student may fall into it.
         """
-        teacher = make_teacher(policy, robot, task, self.teacher_action_noise)
+        teacher = Teacher(policy, robot, task, self.teacher_action_noise)
         heights = every_centimetre(commands)
         results = evaluate_policy(teacher, robot, heights, rate=task.rate, threads=threads)
         return max(command_score(v) + _FLIGHT * max(0.0, 0.5 - v.flight_fraction) for v in results)
 
     def pace(self, share: float, scores: Sequence[float], rate: float) -> float:
-        """Return the learning rate; it falls along a cosine, for every teacher and again after.
-
-        Args:
-            share: Share of the training that is done.
-            scores: Teachers' scores so far, m.
-            rate: Learning rate at the start.
-        """
+        """Return the learning rate; it falls along a cosine, for every teacher and again after."""
         until = self.student_from(scores)
         if share < until:
             return rate * cosine(1 - self._learnt(share)[1])
@@ -214,13 +201,11 @@ class Distillation:
     def student_from(self, scores: Sequence[float]) -> float:
         """Return the share of the training with which the student begins to learn.
 
-        Args:
-            scores: Teachers' scores so far, m; one that is accepted gives away the rest.
+        A teacher whose score, m, is accepted gives away the time of those after it.
         """
         if not self._accepted(scores):
             return self.teacher_share
-        before = len(scores) - 1
-        return self.teacher_share * (before + 1.0) / self.teachers
+        return self.teacher_share * len(scores) / self.teachers
 
     def student_progress(self, share: float, scores: Sequence[float]) -> float:
         """Return the share of the student's own learning that is done, negative before it."""
@@ -244,21 +229,19 @@ class Distillation:
         env.task.reward.anneal(learnt if progress < 0 else 1.0)
         ppo.anneal(model, learnt if progress < 0 else 1.0)
         model.policy.student_learns = progress >= 0
-        if draw := self.draw(progress):
-            env.task.randomize(draw)
+        if number := self.randomization(progress):
+            env.task.randomize(number)
         model.policy.mixing = max(0.0, 1 - progress / self.dagger_mixing_share)
         if self.student.memory == "integrator":
-            first, last = self.trusting
-            trust = (self._apart(progress) - first) / (last - first)
-            model.policy.student.trust = min(1.0, max(0.0, trust))
+            first, last = self.estimate_ramp
+            ramp = (self._randomized_progress(progress) - first) / (last - first)
+            model.policy.student.estimate_share = min(1.0, max(0.0, ramp))
 
-    def draw(self, progress: float) -> int:
-        """Return which draw of differing legs hops, 0 for legs that are alike.
-
-        Args:
-            progress: Share of the student's learning that is done, negative before it.
-        """
-        return 1 + int(self.draws * self._apart(progress)) if progress >= self.alike else 0
+    def randomization(self, progress: float) -> int:
+        """Return the number of the randomization at a share of the student's learning, 0 before."""
+        if progress < self.nominal_share:
+            return 0
+        return 1 + int(self.randomizations * self._randomized_progress(progress))
 
     def early_score(self, model: Any) -> float | None:  # noqa: ANN401
         """Return the first teacher's score, m, once it has learnt."""
@@ -296,30 +279,6 @@ class Distillation:
         before = min(int(learnt), self.teachers - 1)
         return before, learnt - before
 
-    def _apart(self, progress: float) -> float:
-        """Return the share of the learning on differing legs that is done, negative before it."""
-        return (progress - self.alike) / (1 - self.alike)
-
-
-def make_teacher(
-    policy: TeacherStudentPolicy, robot: Robot, task: TaskConfig, action_noise: float = 0.0
-) -> Teacher:
-    """Return a policy's teacher as a controller.
-
-    Args:
-        policy: Whose teacher.
-        robot: The leg that it learns on.
-        task: The learning problem.
-        action_noise: Errors of its torques, of the largest.
-    """
-    return Teacher(policy, robot, task, last_torque(task), action_noise)
-
-
-def last_torque(task: TaskConfig) -> list[int]:
-    """Return where the torques of the last control step stand in an observation, if they do."""
-    shapes = make_observation_history(task.observation, 1 / task.rate).shapes
-    if "past_torque" not in shapes:
-        return []
-    before = list(shapes)[: list(shapes).index("past_torque")]
-    first = sum(int(np.prod(shapes[name])) for name in before)
-    return [first, first + 1]
+    def _randomized_progress(self, progress: float) -> float:
+        """Return the share of the learning on randomized legs that is done, negative before it."""
+        return (progress - self.nominal_share) / (1 - self.nominal_share)

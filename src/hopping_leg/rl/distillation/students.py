@@ -18,6 +18,8 @@ from hopping_leg.rl.checkpoint import Tree
 from hopping_leg.rl.onnx_export import Network, RecurrentUnit
 from hopping_leg.rl.sb3_policies import dense, dense_network, layer_weights
 
+Bools = npt.NDArray[np.bool_]
+
 
 class DaggerBuffer:
     """The newest observations, each on its own.
@@ -31,24 +33,20 @@ class DaggerBuffer:
         self._seen = torch.zeros((room, size), dtype=torch.float16)
         self._next = self._count = 0
 
-    def add(
-        self, observations: npt.NDArray[np.float32], known: npt.NDArray[np.bool_] | None = None
-    ) -> None:
-        """Keep a rollout's observations in the place of the oldest.
+    def add(self, observations: npt.NDArray[np.float32], known: Bools) -> None:
+        """Keep a rollout's observations, (ticks, n, size), in the place of the oldest.
 
-        Args:
-            observations: (ticks, n, size).
-            known: For which it is known what to do, (ticks, n); None for all.
+        Only those are kept for which it is known what to do, (ticks, n).
         """
         size = observations.shape[2]
-        chosen = slice(None) if known is None else torch.from_numpy(known.reshape(-1))
+        chosen = slice(None) if known.all() else torch.from_numpy(known.reshape(-1))
         rows = torch.from_numpy(observations).reshape(-1, size)[chosen]
         places = (self._next + torch.arange(len(rows))) % len(self._seen)
         self._seen[places] = rows.half()
         self._next = int(places[-1]) + 1
         self._count = min(self._count + len(rows), len(self._seen))
 
-    def draw(self, count: int) -> torch.Tensor:
+    def sample(self, count: int) -> torch.Tensor:
         """Return some of them at random, (count, size)."""
         return self._seen[torch.randint(self._count, (count,))].float()
 
@@ -62,7 +60,7 @@ class DaggerBuffer:
         self._seen[: self._count] = torch.from_numpy(state["seen"])
 
 
-class Drawn(NamedTuple):
+class SequenceBatch(NamedTuple):
     """Sequences of some legs out of a rollout."""
 
     seen: torch.Tensor
@@ -87,8 +85,8 @@ class SequenceBuffer:
     def add(
         self,
         observations: npt.NDArray[np.float32],
-        begun: npt.NDArray[np.bool_],
-        known: npt.NDArray[np.bool_],
+        begun: Bools,
+        known: Bools,
         memory: torch.Tensor,
     ) -> None:
         """Keep a rollout and forget those for which there is no more room.
@@ -109,12 +107,12 @@ class SequenceBuffer:
         while len(self._rollouts) > most:
             self._rollouts.popleft()
 
-    def draw(self, count: int) -> Drawn:
+    def sample(self, count: int) -> SequenceBatch:
         """Return about so many ticks of a rollout at random."""
         seen, counts, memory = self._rollouts[int(torch.randint(len(self._rollouts), ()))]
         ticks, legs = counts.shape
         chosen = torch.randperm(legs)[: max(1, count // ticks)]
-        return Drawn(seen[:, chosen].float(), counts[:, chosen], memory[chosen])
+        return SequenceBatch(seen[:, chosen].float(), counts[:, chosen], memory[chosen])
 
     def state(self) -> Tree:
         """Return everything that is kept."""
@@ -127,8 +125,6 @@ class SequenceBuffer:
             for seen, counts, memory in state["rollouts"]
         )
 
-
-Bools = npt.NDArray[np.bool_]
 
 Wanted = Callable[[torch.Tensor], torch.Tensor]
 """From observations, (n, size), to what the teacher would do, (n, 2)."""
@@ -193,7 +189,7 @@ class WindowStudent(nn.Module):
         self._measured = measured
         self.layers = dense(measured, hidden, activation)
         self.layers.append(nn.Linear(hidden[-1], 2))
-        self._lessons = DaggerBuffer(room, size)
+        self._buffer = DaggerBuffer(room, size)
 
     def act(self, observation: torch.Tensor, begun: Bools) -> torch.Tensor:
         """Return what to do in a tick; no tick depends on another."""
@@ -204,11 +200,11 @@ class WindowStudent(nn.Module):
         self, observations: npt.NDArray[np.float32], begun: Bools, known: Bools
     ) -> None:
         """Keep a rollout, tick by tick."""
-        self._lessons.add(observations, None if known.all() else known)
+        self._buffer.add(observations, known)
 
     def loss(self, count: int, wanted: Wanted) -> torch.Tensor:
         """Return the loss over ticks drawn at random."""
-        seen = self._lessons.draw(count)
+        seen = self._buffer.sample(count)
         return functional.mse_loss(self.layers(seen[:, : self._measured]), wanted(seen))
 
     def network(self, observation: Observation) -> Network:
@@ -216,12 +212,12 @@ class WindowStudent(nn.Module):
         return dense_network([self.layers], observation, "clip")
 
     def state(self) -> Tree:
-        """Return the lessons."""
-        return {"lessons": self._lessons.state()}
+        """Return the buffer."""
+        return {"lessons": self._buffer.state()}
 
     def restore(self, state: Tree) -> None:
         """Go on from a ``state``."""
-        self._lessons.restore(state["lessons"])
+        self._buffer.restore(state["lessons"])
 
 
 class RecurrentStudent(nn.Module):
@@ -243,7 +239,7 @@ class RecurrentStudent(nn.Module):
         self.readout = nn.Linear(memory, 2)
         self._memory = torch.zeros(legs, memory)
         self._before = self._memory.clone()
-        self._lessons = SequenceBuffer(room)
+        self._buffer = SequenceBuffer(room)
 
     def act(self, observation: torch.Tensor, begun: Bools) -> torch.Tensor:
         """Return what to do in a tick and remember it."""
@@ -258,12 +254,12 @@ class RecurrentStudent(nn.Module):
         self, observations: npt.NDArray[np.float32], begun: Bools, known: Bools
     ) -> None:
         """Keep a rollout with what was remembered when it began."""
-        self._lessons.add(observations, begun, known, self._before)
+        self._buffer.add(observations, begun, known, self._before)
         self._before = self._memory.clone()
 
     def loss(self, count: int, wanted: Wanted) -> torch.Tensor:
         """Return the loss over some legs' sequences, each up to its first new episode."""
-        seen, counts, memory = self._lessons.draw(count)
+        seen, counts, memory = self._buffer.sample(count)
         remembered, _ = self.unit(seen[..., : self._measured], memory[None])
         acted = self.readout(remembered[counts])
         return functional.mse_loss(acted, wanted(seen[counts]))
@@ -278,15 +274,15 @@ class RecurrentStudent(nn.Module):
         return Network(scaling.offset, scaling.gain, layers, "tanh", "clip", memory=memory)
 
     def state(self) -> Tree:
-        """Return memory and lessons."""
+        """Return memory and buffer."""
         return {
             "memory": self._memory.numpy().copy(),
             "before": self._before.numpy().copy(),
-            "lessons": self._lessons.state(),
+            "lessons": self._buffer.state(),
         }
 
     def restore(self, state: Tree) -> None:
         """Go on from a ``state``."""
         self._memory = torch.from_numpy(state["memory"].copy())
         self._before = torch.from_numpy(state["before"].copy())
-        self._lessons.restore(state["lessons"])
+        self._buffer.restore(state["lessons"])

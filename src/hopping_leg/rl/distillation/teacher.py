@@ -2,12 +2,12 @@
 
 import hashlib
 import math
-from collections.abc import Sequence
 
 import numpy as np
 import torch
 
 from hopping_leg.arrays import Array
+from hopping_leg.controllers.observation_history import make_observation_history
 from hopping_leg.envs import TaskConfig
 from hopping_leg.envs.observation import PRIVILEGED, privileged_observation, sample_scaling
 from hopping_leg.rl.distillation.teacher_student import TeacherStudentPolicy
@@ -25,7 +25,6 @@ class Teacher:
         policy: Whose teacher it is.
         robot: The leg that it learns on.
         options: The learning problem.
-        last_torque: Where the torques of the last tick stand in an observation, if they do.
         action_noise: Standard deviation of what is added to its torques, of the largest: errors as
             somebody makes who imitates it, which last for some ticks.
     """
@@ -37,14 +36,10 @@ class Teacher:
         policy: TeacherStudentPolicy,
         robot: Robot,
         options: TaskConfig,
-        last_torque: Sequence[int],
         action_noise: float = 0.0,
     ) -> None:
-        self._policy, self._last_torque, self._action_noise = (
-            policy,
-            list(last_torque),
-            action_noise,
-        )
+        self._policy, self._action_noise = policy, action_noise
+        self._last_torque = last_torque(options)
         self._sample = sample_scaling(robot, options)
         self._torque = np.array(options.action_torque)
         self.command_range = options.command_bounds
@@ -59,7 +54,7 @@ class Teacher:
         return weights.hexdigest()[:16]
 
     def watch(self, legs: Simulator) -> None:
-        """Take the legs whose state it sees."""
+        """Set the legs whose state it sees."""
         self._legs = legs
 
     def reset(self, count: int) -> None:
@@ -73,17 +68,13 @@ class Teacher:
         seen = np.zeros((count, self._policy.features_dim), np.float32)
         first = self._policy.measured
         seen[:, self._last_torque] = self._last
-        told = measurement.command[:, 0]
-        privileged_observation(
-            self._legs, told, self._sample, out=seen[:, first : first + PRIVILEGED]
-        )
+        state = seen[:, first : first + PRIVILEGED]
+        privileged_observation(self._legs, measurement.command[:, 0], self._sample, out=state)
         with torch.no_grad():
             self._last = self._policy.teacher_action(torch.from_numpy(seen)).double().numpy()
         if self._action_noise > 0:
-            fresh = (
-                self._action_noise * math.sqrt(1 - _LASTING**2) * self._rng.normal(size=(count, 2))
-            )
-            self._error = _LASTING * self._error + fresh
+            spread = self._action_noise * math.sqrt(1 - _LASTING**2)
+            self._error = _LASTING * self._error + spread * self._rng.normal(size=(count, 2))
             self._last = (self._last + self._error).clip(-1, 1)
         torque: Array = self._last * self._torque
         return torque
@@ -91,3 +82,13 @@ class Teacher:
     def internals(self) -> dict[str, Array]:
         """Return nothing."""
         return {}
+
+
+def last_torque(task: TaskConfig) -> list[int]:
+    """Return where the torques of the last control step stand in an observation, if they do."""
+    shapes = make_observation_history(task.observation, 1 / task.rate).shapes
+    if "past_torque" not in shapes:
+        return []
+    before = list(shapes)[: list(shapes).index("past_torque")]
+    first = sum(int(np.prod(shapes[name])) for name in before)
+    return [first, first + 1]

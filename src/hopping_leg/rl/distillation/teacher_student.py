@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import torch
-from stable_baselines3.common.type_aliases import Schedule
 
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.envs.observation import PRIVILEGED_COMMAND
@@ -25,8 +24,8 @@ _OUTLIER = 0.01
 """Error beyond which a hop counts no more, m: those after a new command miss by far."""
 
 _FARTHEST = 0.2
-"""Largest correction of the aim, of half the range of commands: where hops cannot be as low or high
-as the command, no aim helps."""
+"""Largest correction, of half the range of commands: it is of no use where hops cannot be as low or
+high as the command."""
 
 
 @dataclass(frozen=True)
@@ -40,16 +39,16 @@ class DaggerConfig:
     batch_size: int = 1024
     """Ticks per gradient step."""
     knots: int = 8
-    """Heights at which the teacher's aim is corrected."""
+    """Heights at which the teacher's command is corrected."""
     correction_rate: float = 0.1
-    """Share of the recent hops' mean error by which a rollout corrects the aim."""
+    """Share of the recent hops' mean error that a rollout corrects."""
 
 
 class CommandCorrection:
-    """How much higher than the command the teacher is told, so that the student's hops come true.
+    """Correction of the teacher's command, so that the student's hops are as high as desired.
 
-    A student sees less than its teacher and hops lower or higher on average; what it is off at a
-    height is added up there, as an integral controller does.
+    A student sees less than its teacher and hops lower or higher on average; its error at a height
+    is added up there, as an integral controller does.
 
     Args:
         offset: Command that an observation shows as 0, m.
@@ -64,13 +63,7 @@ class CommandCorrection:
         """At the knots, of half the range of commands, (knots,)."""
 
     def correct(self, commands: Array, errors: Array, rate: float) -> None:
-        """Aim lower where hops were too high.
-
-        Args:
-            commands: Commands of recent hops, m.
-            errors: Apex minus command, m.
-            rate: Share of the mean error that is corrected.
-        """
+        """Correct a share of the mean error of recent hops, apex minus command, m."""
         if not len(errors):
             return
         seen = torch.from_numpy((commands - self._offset) * self._gain).float()
@@ -80,11 +73,11 @@ class CommandCorrection:
         self.values.clamp_(-_FARTHEST, _FARTHEST)
 
     def __call__(self, command: torch.Tensor) -> torch.Tensor:
-        """Return what the teacher is told at commands as observed, (n,)."""
+        """Return the teacher's commands instead of those that are observed, (n,)."""
         return command + _shares(command, self._knots) @ self.values
 
     def state(self) -> Tree:
-        """Return where it aims."""
+        """Return the corrections."""
         return {"values": self.values.numpy().copy()}
 
     def restore(self, state: Tree) -> None:
@@ -133,19 +126,11 @@ class TeacherStudentPolicy(AsymmetricPolicy):
         super()._build_mlp_extractor()
         self.mlp_extractor.student = self._make_student()
 
-    def begin_anew(self, rate: Schedule) -> None:
-        """Forget all that teacher and critic have learnt, and what the optimiser remembers.
-
-        Args:
-            rate: Learning rate over the share that is left.
-        """
-        self._build(rate)
-
     @property
     def student(self) -> Student:
         """What learns from the teacher."""
-        minds: Any = self.mlp_extractor
-        student: Student = minds.student
+        networks: Any = self.mlp_extractor
+        student: Student = networks.student
         return student
 
     def student_action(self, observation: torch.Tensor) -> torch.Tensor:
@@ -162,10 +147,7 @@ class TeacherStudentPolicy(AsymmetricPolicy):
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """Return actions, values and log-likelihoods, the latter two zero if the student learns."""
         if not self.student_learns:
-            result: tuple[torch.Tensor, torch.Tensor, torch.Tensor] = super().forward(
-                obs, deterministic
-            )
-            return result
+            return super().forward(obs, deterministic)  # type: ignore[no-any-return]
         mixed = torch.rand(len(obs), 1) < self.mixing
         action = torch.where(mixed, self.teacher_action(obs), self.student_action(obs))
         nothing = torch.zeros(len(obs), 1)
@@ -199,7 +181,7 @@ class TeacherStudentPPO(ResumablePPO):
         super().__init__(*args, **kwargs)
         task = self.env.task
         scaling = task.observation.scaling
-        self._told = task.observation.size + PRIVILEGED_COMMAND
+        self._true_command = task.observation.size + PRIVILEGED_COMMAND
         self._correction = CommandCorrection(scaling.offset[-1], scaling.gain[-1], dagger.knots)
         self.policy.begun = lambda: self._last_episode_starts
 
@@ -211,8 +193,8 @@ class TeacherStudentPPO(ResumablePPO):
             self._best = {k: v.clone() for k, v in self.policy.state_dict().items()}
 
     def next_teacher(self) -> None:
-        """Let another teacher begin."""
-        self.policy.begin_anew(self.lr_schedule)
+        """Forget all that teacher, critic and optimiser have learnt."""
+        self.policy._build(self.lr_schedule)
 
     def choose_teacher(self) -> None:
         """Let the best teacher go on to teach."""
@@ -226,7 +208,8 @@ class TeacherStudentPPO(ResumablePPO):
             super().train()
             return
         self._update_learning_rate(policy.optimizer)
-        self._correct_command()
+        commands, errors = self.env.recent_hops
+        self._correction.correct(commands, errors, self._dagger.correction_rate)
         buffer = self.rollout_buffer
         begun = buffer.episode_starts.astype(np.bool_)
         seen, known = shift_to_arrival(
@@ -245,21 +228,16 @@ class TeacherStudentPPO(ResumablePPO):
         policy.optimizer.step()
         return loss.item()
 
-    def _correct_command(self) -> None:
-        """Let the hops of the rollout tell where the teacher should aim."""
-        commands, errors = self.env.recent_hops
-        self._correction.correct(commands, errors, self._dagger.correction_rate)
-
     def _wanted(self, seen: torch.Tensor) -> torch.Tensor:
-        """Return what the teacher would do where it is told what it should aim at, (n, 2)."""
-        told = seen.clone()
-        told[:, self._told] = self._correction(seen[:, self._told])
+        """Return what the teacher would do at the corrected command, (n, 2)."""
+        shown, column = seen.clone(), self._true_command
+        shown[:, column] = self._correction(seen[:, column])
         policy: TeacherStudentPolicy = self.policy
         with torch.no_grad():
-            return policy.teacher_action(told)
+            return policy.teacher_action(shown)
 
     def own_state(self) -> Tree:
-        """Return what the student learns from, where the teacher aims, and the scores so far."""
+        """Return what the student learns from, the teacher's correction, and the scores so far."""
         policy: TeacherStudentPolicy = self.policy
         return {
             "teacher_scores": list(self.teacher_scores),
@@ -271,9 +249,7 @@ class TeacherStudentPPO(ResumablePPO):
     def restore_own(self, state: Tree) -> None:
         """Go on from an ``own_state``."""
         policy: TeacherStudentPolicy = self.policy
-        self.teacher_scores = list(
-            state["teacher_scores" if "teacher_scores" in state else "exams"]
-        )
+        self.teacher_scores = list(state["teacher_scores"])
         self._best = {k: torch.from_numpy(v.copy()) for k, v in state["best"].items()}
         policy.student.restore(state["student"])
         self._correction.restore(state["aim"])

@@ -36,7 +36,7 @@ ADAPTIVE = Recipe(
         teacher_share=0.4,
         teachers=1,
         student=StudentConfig(memory="integrator"),
-        alike=0.35,
-        draws=40,
+        nominal_share=0.35,
+        randomizations=40,
     ),
 )
