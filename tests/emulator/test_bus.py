@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hopping_leg.emulator.bus import ReplyWriter
 from hopping_leg.emulator.frames import Frame
-from hopping_leg.emulator.registers import ReplyWriter
 from tests.emulator.bench import Bench, R
 
 

@@ -16,7 +16,6 @@ _ANSWER_SECONDS = 1.0
 _TRIES = 3
 _TALK_SECONDS = 5.0
 _ALL_SECONDS = 30.0
-
 _IDENTITY = {
     int(Register.MODEL_NUMBER): multiplex.INT32,
     int(Register.FIRMWARE_VERSION): multiplex.INT32,

@@ -13,7 +13,6 @@ from hopping_leg.errors import UsageError
 _HOST = "127.0.0.1"
 _LONGEST = 1000
 """Bytes of a request's body that are read."""
-
 _PAGE = """<!doctype html>
 <html lang="en"><meta charset="utf-8"><title>Hopping leg</title>
 <link rel="icon" href="data:,">

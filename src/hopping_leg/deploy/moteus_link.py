@@ -27,9 +27,7 @@ from hopping_leg.robot.parameters import Robot
 
 _SEND_SECONDS = 0.004
 """A command that could not leave within this time is dropped: it is outdated."""
-
 _OPENING_SECONDS = 10.0
-
 _NO_POSITION_CONTROL = {"position": math.nan, "velocity": 0.0} | dict.fromkeys(
     ("kp_scale", "kd_scale", "ilimit_scale"), 0.0
 )

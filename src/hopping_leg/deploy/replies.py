@@ -18,7 +18,6 @@ _WRAP = 1 << 32
 _HALF = 1 << 31
 _DRIFT = 2e-4
 """Most that two clocks drift apart, s/s: both are quartzes."""
-
 _RESTART = -500
 """A counter that falls back further than this, ms, began anew: no reply is held up so long."""
 

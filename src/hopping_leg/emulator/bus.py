@@ -1,25 +1,87 @@
-"""The CAN bus: what a drive makes of a frame, and what it answers."""
+"""The CAN bus: what a drive makes of a frame, and what it answers.
+
+Scales, saturation and NaN come from the client library, so both ends agree.
+"""
 
 import contextlib
+import functools
+import io
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from moteus import multiplex
 from moteus.multiplex import FlowStreamSubframe, RegisterSubframe, StreamSubframe, SubframeType
-from moteus.protocol import Register
+from moteus.protocol import Register, Writer, scale_register
 
 from hopping_leg.emulator.diagnostic import CHANNEL
 from hopping_leg.emulator.drive import UNKNOWN_REGISTER, EmulatedDrive
 from hopping_leg.emulator.frames import BROADCAST, Frame
-from hopping_leg.emulator.registers import ReplyWriter
 
 _UUID_MASKS = range(Register.UUID_MASK1, Register.UUID_MASK4 + 1)
-
 _WORDS_ONLY = range(Register.MODEL_NUMBER, Register.UUID_MASK_CAPABLE)
 """Registers that can be read as 32-bit integers only."""
+_MAX_RUN = 3
+"""Registers whose count fits in the first byte of a subframe."""
 
-
+Subframes = tuple[multiplex.Subframe, ...]
 Errors = list[tuple[int, int]]
 """Register and error code of each write that failed."""
+
+
+@functools.cache
+def _scales(register: int) -> tuple[float, ...]:
+    """Return what a count is worth at 8, 16 and 32 bits, as the client knows it; 1 in integers."""
+    if register == Register.COMMAND_FIXED_CURRENT_OVERRIDE:  # of which the client knows nothing
+        register = Register.Q_CURRENT
+    resolutions = (multiplex.INT8, multiplex.INT16, multiplex.INT32)
+    return tuple(float(scale_register(register, each, 1)) for each in resolutions)
+
+
+class ReplyWriter:
+    """Builds the payload that answers a frame's reads."""
+
+    def __init__(self) -> None:
+        self._buffer = io.BytesIO()
+        self._writer = Writer(self._buffer)
+
+    @property
+    def data(self) -> bytes:
+        """The payload so far."""
+        return self._buffer.getvalue()
+
+    def values(self, first: int, resolution: int, values: Sequence[float]) -> None:
+        """Add a run of registers, all of one resolution: that of ``multiplex``."""
+        head = multiplex.REPLY_BASE | (resolution << 2)
+        short = len(values) <= _MAX_RUN
+        self._buffer.write(bytes([head | len(values)] if short else [head, len(values)]))
+        self._writer.write_varuint(first)
+        for register, value in enumerate(values, first):
+            scales = _scales(register)
+            if resolution == multiplex.F32:
+                self._writer.write_f32(value)
+            elif scales[-1] != 1:
+                self._writer.write_mapped(value, *scales, resolution)
+            else:  # as the firmware's cast to fewer bits leaves an integer
+                half = 1 << ((8, 16, 32)[resolution] - 1)
+                self._writer.write((int(value) + half) % (2 * half) - half, resolution)
+
+    def error(self, register: int, code: int, *, reading: bool) -> None:
+        """Add the report that a register could not be read or written."""
+        kind = multiplex.READ_ERROR if reading else multiplex.WRITE_ERROR
+        self._buffer.write(bytes([kind]))
+        self._writer.write_varuint(register)
+        self._writer.write_varuint(code)
+
+    def stream(self, channel: int, data: bytes, packet: int | None = None) -> None:
+        """Add a piece of the diagnostic stream, numbered where the host asked for that."""
+        flow = packet is not None
+        kind = multiplex.STREAM_SERVER_DATA_FLOW if flow else multiplex.STREAM_SERVER_DATA
+        self._buffer.write(bytes([kind]))
+        self._writer.write_varuint(channel)
+        if packet is not None:
+            self._buffer.write(bytes([packet]))
+        self._writer.write_varuint(len(data))
+        self._buffer.write(data)
 
 
 @dataclass(frozen=True)
@@ -32,7 +94,7 @@ class Message:
     """
 
     frame: Frame
-    subframes: tuple[multiplex.Subframe, ...]
+    subframes: Subframes
 
     @staticmethod
     def read(frame: Frame) -> "Message":
@@ -42,7 +104,7 @@ class Message:
             subframes.extend(multiplex.parse_frame(frame.data))
         return Message(frame, tuple(subframes))
 
-    def subframes_for(self, drive: EmulatedDrive) -> tuple[multiplex.Subframe, ...]:
+    def subframes_for(self, drive: EmulatedDrive) -> Subframes:
         """Return what is meant for a drive: nothing if another is addressed."""
         if self.frame.destination not in (drive.id, BROADCAST):
             return ()
@@ -75,7 +137,7 @@ def answer(message: Message, drive: EmulatedDrive, time: float, errors: Errors) 
     return message.frame.reply(drive.id, reply.data) if message.frame.wants_reply else None
 
 
-def _addressed(subframes: tuple[multiplex.Subframe, ...], drive: EmulatedDrive) -> bool:
+def _addressed(subframes: Subframes, drive: EmulatedDrive) -> bool:
     """Whether a frame that names a UUID, or its beginning, means this drive."""
     return all(
         s.value == drive.identity.get(s.register - Register.UUID_MASK1 + Register.UUID1)
@@ -86,7 +148,10 @@ def _addressed(subframes: tuple[multiplex.Subframe, ...], drive: EmulatedDrive) 
 
 
 def _stream(
-    subframes: tuple[multiplex.Subframe, ...], drive: EmulatedDrive, reply: ReplyWriter, time: float
+    subframes: Subframes,
+    drive: EmulatedDrive,
+    reply: ReplyWriter,
+    time: float,
 ) -> None:
     for s in subframes:
         if not isinstance(s, StreamSubframe | FlowStreamSubframe) or s.channel != CHANNEL:
@@ -100,9 +165,7 @@ def _stream(
             reply.stream(s.channel, drive.diagnostic.poll(s.data[0]))
 
 
-def _read(
-    subframes: tuple[multiplex.Subframe, ...], drive: EmulatedDrive, reply: ReplyWriter
-) -> None:
+def _read(subframes: Subframes, drive: EmulatedDrive, reply: ReplyWriter) -> None:
     """Answer reads in runs of consecutive registers of one resolution, as they were asked."""
     state = drive.state()
     run: list[float] = []

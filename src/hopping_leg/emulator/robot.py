@@ -3,11 +3,14 @@
 Time comes as an argument. Nothing here knows of sockets, terminals or the clock on the wall.
 """
 
+import hashlib
 import math
+import struct
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from moteus.protocol import Register
 
 from hopping_leg.arrays import Array
 from hopping_leg.deploy.preflight import required_settings
@@ -16,11 +19,15 @@ from hopping_leg.emulator.drive import EmulatedDrive
 from hopping_leg.emulator.faults import KINDS, Delivery, Fault, FaultKind
 from hopping_leg.emulator.frames import Frame, QueuedReply, TimedQueue
 from hopping_leg.emulator.leg import TIMESTEP, EmulatedLeg
-from hopping_leg.emulator.registers import identity
 from hopping_leg.emulator.settings import Settings
 from hopping_leg.emulator.wire_log import WireLog
+from hopping_leg.robot.hardware import REGISTER_MAP
 from hopping_leg.robot.parameters import JOINTS, Robot
 
+_MODEL = 0x0000
+"""Board r4."""
+_FIRMWARE = 0x010D
+"""Firmware version in its binary-coded form."""
 NOMINAL_VOLTAGE = 26.0
 """Bus voltage at which the qdd100 has the speed limit of the robot files, V."""
 
@@ -119,6 +126,23 @@ class EmulatedRobot:
             self.log.record_mode(self.time, joint, drive)
 
 
+def _identity(seed: str) -> dict[int, int]:
+    """Return the registers that tell what a drive was made with: versions, serial number, UUID.
+
+    The seed makes serial number and UUID; two drives on a bus need different ones.
+    """
+    words = struct.unpack("<7I", hashlib.sha256(seed.encode()).digest()[:28])
+    registers: dict[int, int] = {
+        Register.MODEL_NUMBER: _MODEL,
+        Register.FIRMWARE_VERSION: _FIRMWARE,
+        Register.REGISTER_MAP_VERSION: REGISTER_MAP,
+        Register.UUID_MASK_CAPABLE: 1,
+    }
+    numbers = [Register.SERIAL_NUMBER + k for k in range(3)]
+    numbers += [Register.UUID1 + k for k in range(4)]
+    return registers | {n: word & 0x7FFFFFFF for n, word in zip(numbers, words, strict=True)}
+
+
 def _drive(robot: Robot, joint: int, configured: bool) -> EmulatedDrive:
     servo = robot.hardware.servos[joint]
     motor = (robot.hip, robot.knee)[joint].motor
@@ -126,7 +150,7 @@ def _drive(robot: Robot, joint: int, configured: bool) -> EmulatedDrive:
     if configured:
         changes |= {setting.name: setting.value for setting in required_settings(robot, joint)}
     return EmulatedDrive(
-        identity(f"{robot.name} {JOINTS[joint]}"),
+        _identity(f"{robot.name} {JOINTS[joint]}"),
         Settings(**changes),
         gear_ratio=motor.gear_ratio,
         brake=motor.peak_torque / motor.no_load_speed,

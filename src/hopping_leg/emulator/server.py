@@ -112,7 +112,6 @@ def posture(robot: Robot, pose: str) -> Array:
 
 _IDLE = 0.001
 """Longest sleep between two looks at the clock, s."""
-
 _FURTHEST = 0.02
 """Most that is caught up with at once after the process was held off, s; the rest is lost."""
 

@@ -55,7 +55,6 @@ class ModeChange:
 _TOLD = (Register.MODE, Register.FAULT, Register.VOLTAGE, Register.TEMPERATURE)
 _STATE = set(_TOLD)
 """Registers of an answer that is noted."""
-
 _REMEMBERED = 100_000
 """Commands and answers each, about a minute's."""
 
