@@ -1,8 +1,12 @@
 """Tables of what the package itself knows: robots, ranges, axes, faults."""
 
+import ast
 import dataclasses
+import inspect
+import itertools
 import math
-import operator
+import textwrap
+from typing import Any
 
 from macros_results import grid, number
 from studies.fault_campaign.families import FAMILIES
@@ -37,19 +41,38 @@ def trace_columns() -> str:
     return grid(["column", "unit", "meaning"], rows)
 
 
-def hyperparameters(recipe: str) -> str:
-    """Return every option of a recipe by its name in `hop train --set` as a table."""
+def hyperparameters(recipe: str, base: str | None = None) -> str:
+    """Return the options of a recipe, or those that differ from another's, as a table."""
     from hopping_leg.rl.recipes import get_recipe
 
-    shipped = get_recipe(recipe)
-    found = {name: operator.attrgetter(path)(shipped) for name, path in shipped.paths()}
-    shown = (bool, int, float, str, tuple)
-    rows = [
-        [f"`{name}`", str(value).replace("|", "or")]
-        for name, value in found.items()
-        if isinstance(value, shown) and value != ()
-    ]
-    return grid(["option", "value"], rows)
+    shown, usual = get_recipe(recipe), get_recipe(base) if base else None
+    theirs = dict(usual.paths()) if usual else {}
+    rows = []
+    for name, path in shown.paths():
+        found, owner = shown.value(name), shown
+        if name in theirs and usual is not None and usual.value(name) == found:
+            continue
+        for part in path.split(".")[:-1]:
+            owner = getattr(owner, part)
+        if name == "task.randomised":
+            found = [r.path for r in found]
+        elif dataclasses.is_dataclass(found):
+            continue
+        rows.append([f"`{name}`", number(_plain(found)), _meaning(type(owner), path.split(".")[-1])])
+    return grid(["option", "value", "meaning"], rows)
+
+
+def _plain(found: Any) -> Any:  # noqa: ANN401
+    return [_plain(one) for one in found] if isinstance(found, tuple | list) else found
+
+
+def _meaning(kind: type, name: str) -> str:
+    """Return the docstring of a dataclass's field, on one line."""
+    body = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0].body  # type: ignore[attr-defined]
+    for entry, text in itertools.pairwise(body):
+        if isinstance(entry, ast.AnnAssign) and ast.unparse(entry.target) == name:
+            return inspect.cleandoc(text.value.value).replace("\n", " ").replace("``", "`")
+    return ""
 
 
 def search_space(recipe: str) -> str:
