@@ -58,7 +58,8 @@ def hyperparameters(recipe: str, base: str | None = None) -> str:
             found = [r.path for r in found]
         elif dataclasses.is_dataclass(found):
             continue
-        rows.append([f"`{name}`", number(_plain(found)), _meaning(type(owner), path.split(".")[-1])])
+        meaning = _meaning(type(owner), path.split(".")[-1])
+        rows.append([f"`{name}`", number(_plain(found)), meaning])
     return grid(["option", "value", "meaning"], rows)
 
 
@@ -68,8 +69,8 @@ def _plain(found: Any) -> Any:  # noqa: ANN401
 
 def _meaning(kind: type, name: str) -> str:
     """Return the docstring of a dataclass's field, on one line."""
-    body = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0].body  # type: ignore[attr-defined]
-    for entry, text in itertools.pairwise(body):
+    tree: Any = ast.parse(textwrap.dedent(inspect.getsource(kind)))
+    for entry, text in itertools.pairwise(tree.body[0].body):
         if isinstance(entry, ast.AnnAssign) and ast.unparse(entry.target) == name:
             return inspect.cleandoc(text.value.value).replace("\n", " ").replace("``", "`")
     return ""
