@@ -5,6 +5,7 @@ left out; the defaults are leg V2's: mjbots qdd100 at 24 V, hip 1, knee 2.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -65,23 +66,19 @@ class Hardware:
         return self.hip, self.knee
 
 
-def contradiction(hardware: Hardware) -> str | None:
-    """Return a sentence about fields that contradict each other, or None."""
+def contradictions(hardware: Hardware) -> Iterator[str]:
+    """Yield sentences about fields that contradict each other."""
     for name, servo in (("hip", hardware.hip), ("knee", hardware.knee)):
+        at = f"'hardware.{name}"
         if servo.id not in range(1, 127):
-            return f"'hardware.{name}.id' is {servo.id:g} but must be a whole number, 1 to 126."
+            yield f"{at}.id' is {servo.id:g} but must be a whole number, 1 to 126."
         if abs(servo.sign) != 1:
-            return f"'hardware.{name}.sign' is {servo.sign:g} but must be 1 or -1."
+            yield f"{at}.sign' is {servo.sign:g} but must be 1 or -1."
         if servo.lower >= servo.upper:
-            return (
-                f"'hardware.{name}.lower' ({servo.lower:g} rad) must lie below"
-                f" 'hardware.{name}.upper' ({servo.upper:g})."
-            )
+            yield f"{at}.lower' ({servo.lower:g} rad) must lie below {at}.upper' ({servo.upper:g})."
     if hardware.hip.id == hardware.knee.id:
-        return f"'hardware.hip.id' and 'hardware.knee.id' are both {hardware.hip.id:g}."
-    if hardware.voltage_low >= hardware.voltage_high:
-        return (
-            f"'hardware.voltage_low' ({hardware.voltage_low:g} V) must lie below"
-            f" 'hardware.voltage_high' ({hardware.voltage_high:g})."
-        )
-    return None
+        yield f"'hardware.hip.id' and 'hardware.knee.id' are both {hardware.hip.id:g}."
+    low, high = hardware.voltage_low, hardware.voltage_high
+    if low >= high:
+        at = "'hardware.voltage"
+        yield f"{at}_low' ({low:g} V) must lie below {at}_high' ({high:g})."

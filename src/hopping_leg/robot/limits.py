@@ -41,7 +41,7 @@ class MotorLimit:
     speed; the software limit caps it; braking is limited by the software limit alone.
 
     Args:
-        robot: Whose motors; one robot per leg where legs differ, all inputs being (n, 2).
+        robot: The motors' robot; one per leg where legs differ, all inputs being (n, 2).
         count: Number of legs n if all inputs are (n, 2), which is faster; any shape if None.
     """
 
@@ -96,9 +96,9 @@ class SoftLimits:
     """
 
     stiffness: float = 20.0
-    """N m/rad."""
+    """Stiffness of the PD, N m/rad."""
     damping: float = 0.15
-    """N m s/rad; above 2 I/dt of the shank a 200 Hz loop would ring."""
+    """Damping of the PD, N m s/rad; above 2 I/dt of the shank a 200 Hz loop would ring."""
     inset: float = 0.0
     """How far inside the limit the PD aims, rad."""
     replace: bool = False
@@ -117,7 +117,7 @@ class SoftLimiter:
     """Applies soft limits to a robot's joint torques.
 
     Args:
-        robot: Whose joint limits.
+        robot: The joint limits' robot.
         soft: The PD.
         count: Number of legs n if all inputs are (n, 2), which is faster; any shape if None.
     """

@@ -38,10 +38,8 @@ def get_spec(robot: Robot, timestep: float = TIMESTEP) -> mujoco.MjSpec:
     _set_link(spec, "shank", robot.shank, robot.knee)
     spec.body("shank").pos = [0, 0, -robot.thigh.length]
     spec.geom("knee_cap").size[0] = robot.knee_cap.radius
-    tip = [0, 0, -robot.shank.length]
     spec.geom("foot").size[0] = robot.foot.radius
-    spec.geom("foot").pos = tip
-    spec.site("foot").pos = tip
+    spec.geom("foot").pos = spec.site("foot").pos = [0, 0, -robot.shank.length]
     _set_contact(spec, robot)
     for name, joint in (("hip", robot.hip), ("knee", robot.knee)):
         _add_motor(spec, name, joint)

@@ -53,7 +53,7 @@ class Link:
     com: float = field(metadata={"unit": "m"})
     """Distance of the centre of mass from the link's upper joint, along the link."""
     inertia: float = field(metadata={"unit": "kg m2"})
-    """About the centre of mass, around the joint's axis (the paper's Z)."""
+    """Inertia about the centre of mass, around the joint's axis (the paper's Z)."""
 
 
 @dataclass(frozen=True)
@@ -80,11 +80,11 @@ class Motor:
     rotor_inertia: float = field(metadata={"unit": "kg m2"})
     """Inertia of the rotor itself, before the gear."""
     torque_limit: float = field(metadata={"unit": "N m"})
-    """What the software allows."""
+    """Largest torque that the software allows."""
     peak_torque: float = field(metadata={"unit": "N m"})
     """Stall torque; the torque-speed line falls from here to zero at ``no_load_speed``."""
     rated_torque: float = field(metadata={"unit": "N m"})
-    """Continuous."""
+    """Torque that the motor gives continuously."""
     no_load_speed: float = field(metadata={"unit": "rad/s"})
 
 

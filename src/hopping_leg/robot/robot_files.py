@@ -3,6 +3,7 @@
 import json
 import math
 import tomllib
+from collections.abc import Iterator
 from functools import partial
 from importlib import resources
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 
 from hopping_leg.errors import RobotError, unknown_name
 from hopping_leg.io import Field, Tree, is_number, read_dataclass
-from hopping_leg.robot.hardware import contradiction
+from hopping_leg.robot.hardware import contradictions
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.robot.parameters import KINDS, Robot
 
@@ -186,72 +187,64 @@ def check_physics(robot: Robot, origin: str) -> None:
     Raises:
         RobotError: Naming the fields that contradict each other.
     """
-    for name, joint in (("hip", robot.hip), ("knee", robot.knee)):
-        motor = joint.motor
-        bounds = (f"{name}.lower", joint.lower), (f"{name}.upper", joint.upper)
-        _check_order(origin, *bounds, "rad", equal=False)
+    for sentence in _contradictions(robot):
+        raise RobotError(f"{origin}: {sentence}")
+
+
+def _contradictions(robot: Robot) -> Iterator[str]:
+    joints = (("hip", robot.hip), ("knee", robot.knee))
+    for name, joint in joints:
+        peak = joint.motor.peak_torque
+        if joint.lower >= joint.upper:
+            yield (
+                f"'{name}.lower' ({joint.lower:g} rad) must lie below '{name}.upper'"
+                f" ({joint.upper:g})."
+            )
         for smaller in ("torque_limit", "rated_torque"):
-            limit = (f"{name}.motor.{smaller}", getattr(motor, smaller))
-            peak = (f"{name}.motor.peak_torque", motor.peak_torque)
-            _check_order(origin, limit, peak, "N m")
+            limit = getattr(joint.motor, smaller)
+            yield from _above(
+                f"{name}.motor.{smaller}", limit, f"{name}.motor.peak_torque", peak, "N m"
+            )
         if joint.load_friction >= 1:
-            raise RobotError(
-                f"{origin}: '{name}.load_friction' is {joint.load_friction:g} but a gear that takes"
-                " all that it gets never turns; give less than 1."
+            yield (
+                f"'{name}.load_friction' is {joint.load_friction:g} but a gear that takes all that"
+                " it gets never turns; give less than 1."
             )
     for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
-        _check_order(origin, (f"{name}.com", link.com), (f"{name}.length", link.length), "m")
+        yield from _above(f"{name}.com", link.com, f"{name}.length", link.length, "m")
     if robot.kind not in KINDS:
-        raise RobotError(f"{origin}: 'kind': {unknown_name('kind of robot', robot.kind, KINDS)}")
+        yield f"'kind': {unknown_name('kind of robot', robot.kind, KINDS)}"
     if robot.kind == "leg" and (robot.knee.lower < -math.pi or robot.knee.upper > 0):
-        raise RobotError(
-            f"{origin}: 'knee.lower' and 'knee.upper' must lie between -pi and 0 rad,"
-            " because a leg's knee bends to the negative side;"
-            " for a robot that only swings write kind = 'pendulum'."
+        yield (
+            "'knee.lower' and 'knee.upper' must lie between -pi and 0 rad, because a leg's knee"
+            " bends to the negative side; for a robot that only swings write kind = 'pendulum'."
         )
-    _check_mismatch(robot, origin)
-    if wiring := contradiction(robot.hardware):
-        raise RobotError(f"{origin}: {wiring}")
-    least = 2 * TIMESTEP
-    if robot.contact.time_constant < least:
-        raise RobotError(
-            f"{origin}: 'contact.time_constant' is {robot.contact.time_constant:g} s but must be at"
-            f" least {least:g} s, two physics steps; MuJoCo would silently take that instead."
-        )
-
-
-def _check_mismatch(robot: Robot, origin: str) -> None:
-    """Check that the fields of ``[reality]`` do not contradict each other."""
     reality = robot.reality
-    for name, joint, drive in (("hip", robot.hip, reality.hip), ("knee", robot.knee, reality.knee)):
-        at = f"reality.{name}"
+    for (name, joint), drive in zip(joints, (reality.hip, reality.knee), strict=True):
         if drive.efficiency > 1:
-            raise RobotError(
-                f"{origin}: '{at}.efficiency' is {drive.efficiency:g} but no gear gives more than"
+            yield (
+                f"'reality.{name}.efficiency' is {drive.efficiency:g} but no gear gives more than"
                 " it gets; give at most 1."
             )
         if drive.stiction < 1:
-            raise RobotError(
-                f"{origin}: '{at}.stiction' is {drive.stiction:g} but friction at rest is not below"
+            yield (
+                f"'reality.{name}.stiction' is {drive.stiction:g} but friction at rest is not below"
                 " Coulomb friction; give 1 or more."
             )
         if drive.torque_limit is not None:
             peak = joint.motor.peak_torque * joint.belt_ratio
-            limit = (f"{at}.torque_limit", drive.torque_limit)
-            _check_order(origin, limit, (f"{name}.motor.peak_torque x belt_ratio", peak), "N m")
-    softest = reality.ground.time_constant
-    if softest is not None and softest < 2 * TIMESTEP:
-        raise RobotError(
-            f"{origin}: 'reality.ground.time_constant' is {softest:g} s but must be at least"
-            f" {2 * TIMESTEP:g} s, two physics steps."
-        )
+            high = f"{name}.motor.peak_torque x belt_ratio"
+            yield from _above(f"reality.{name}.torque_limit", drive.torque_limit, high, peak, "N m")
+    least, ground = 2 * TIMESTEP, reality.ground.time_constant
+    for name, softest in (("reality.ground", ground), ("contact", robot.contact.time_constant)):
+        if softest is not None and softest < least:
+            yield (
+                f"'{name}.time_constant' is {softest:g} s but must be at least {least:g} s, two"
+                " physics steps; MuJoCo would silently take that instead."
+            )
+    yield from contradictions(robot.hardware)
 
 
-def _check_order(
-    origin: str, low: tuple[str, float], high: tuple[str, float], unit: str, *, equal: bool = True
-) -> None:
-    if low[1] > high[1] or (low[1] == high[1] and not equal):
-        relation = "must not exceed" if equal else "must lie below"
-        raise RobotError(
-            f"{origin}: '{low[0]}' ({low[1]:g} {unit}) {relation} '{high[0]}' ({high[1]:g})."
-        )
+def _above(low_name: str, low: float, high_name: str, high: float, unit: str) -> Iterator[str]:
+    if low > high:
+        yield f"'{low_name}' ({low:g} {unit}) must not exceed '{high_name}' ({high:g})."
