@@ -26,8 +26,17 @@ LEG = load_robot("legv2-paper")
 LIMITS = hopping_limits(LEG, 200.0)
 
 
-def emulated(**start):
-    return Lockstep(EmulatorConfig(robot="legv2-paper", **start).build())
+@pytest.fixture
+def emulated():
+    """What starts an emulator in lockstep, to be closed after the test."""
+    with contextlib.ExitStack() as running:
+
+        def start(**options):
+            lockstep = Lockstep(EmulatorConfig(robot="legv2-paper", **options).build())
+            running.callback(lockstep.link.close)
+            return lockstep
+
+        yield start
 
 
 def run(lockstep, path, *, controller="energy-shaping", hop=0.5, rise=0.5):
@@ -40,15 +49,10 @@ def run(lockstep, path, *, controller="energy-shaping", hop=0.5, rise=0.5):
         SequenceTiming(hop=hop, rise=rise, settle=0.2, sink=0.6),
     )
     header = header_of(LEG, controller, 200.0)
-    try:
-        return perform(
-            lockstep.link, sequence, LIMITS, path, header, clock=lockstep, realtime=False
-        )
-    finally:
-        lockstep.link.close()
+    return perform(lockstep.link, sequence, LIMITS, path, header, clock=lockstep, realtime=False)
 
 
-def test_healthy_drives_pass_every_check_and_say_who_they_are():
+def test_healthy_drives_pass_every_check_and_say_who_they_are(emulated):
     lockstep = emulated()
     facts = inspect(lockstep.link)
     findings = check_drives(LEG, LIMITS, facts)
@@ -57,7 +61,6 @@ def test_healthy_drives_pass_every_check_and_say_who_they_are():
     assert len(findings) == 2 * 14
     assert facts[0].serial != facts[1].serial
     np.testing.assert_allclose([f.position for f in facts], lockstep.robot.leg.q, atol=1e-3)
-    lockstep.link.close()
 
 
 @pytest.mark.parametrize(
@@ -74,7 +77,7 @@ def test_healthy_drives_pass_every_check_and_say_who_they_are():
         ({"faults": (Fault("silence", since="start", drive="knee"),)}, "knee's drive (id 2) does"),
     ],
 )
-def test_a_drive_that_is_not_fit_is_refused_with_the_reason(start, words):
+def test_a_drive_that_is_not_fit_is_refused_with_the_reason(emulated, start, words):
     lockstep = emulated(**start)
     lockstep.robot.advance(0.01)
     findings = check_drives(LEG, LIMITS, inspect(lockstep.link))
@@ -82,10 +85,9 @@ def test_a_drive_that_is_not_fit_is_refused_with_the_reason(start, words):
     assert any(words in complaint for complaint in complaints), complaints
     with pytest.raises(HardwareError, match="Not armed"):
         require_fit(findings)
-    lockstep.link.close()
 
 
-def test_configuring_and_homing_make_a_delivered_drive_fit():
+def test_configuring_and_homing_make_a_delivered_drive_fit(emulated):
     lockstep = emulated(configured=False, homed=False)
     findings = check_drives(LEG, LIMITS, inspect(lockstep.link))
     for joint in (0, 1):
@@ -100,10 +102,9 @@ def test_configuring_and_homing_make_a_delivered_drive_fit():
     np.testing.assert_allclose([f.position for f in facts], lockstep.robot.leg.q, atol=1e-3)
     lockstep.robot.drives[0].settings.load()
     assert lockstep.robot.drives[0].settings["servo.timeout_mode"] == 15
-    lockstep.link.close()
 
 
-def test_a_run_is_a_trace_like_any_other(tmp_path):
+def test_a_run_is_a_trace_like_any_other(emulated, tmp_path):
     lockstep = emulated()
     done = run(lockstep, tmp_path / "run.parquet", hop=1.0)
     assert done.outcome.supervisor.stop_cause.reason.name == "FINISHED"
@@ -123,7 +124,7 @@ def test_a_run_is_a_trace_like_any_other(tmp_path):
     assert final == [0, 0]
 
 
-def test_the_motors_give_what_was_sent(tmp_path):
+def test_the_motors_give_what_was_sent(emulated, tmp_path):
     trace = run(emulated(), tmp_path / "run.parquet").trace
     hopping = trace.column("part") == Part.HOP
     for joint in ("hip", "knee"):
@@ -158,7 +159,7 @@ CASES = [
 
 @pytest.mark.parametrize(("controller", "fault", "reason"), CASES)
 def test_each_fault_ends_the_run_for_its_reason_and_nothing_starts_again(
-    tmp_path, controller, fault, reason
+    emulated, tmp_path, controller, fault, reason
 ):
     lockstep = emulated(faults=(fault,))
     done = run(lockstep, tmp_path / "run.parquet", controller=controller)
@@ -192,11 +193,10 @@ def deployed(tmp_path, lockstep, ready=lambda seconds: None):
 
 
 @pytest.mark.slow
-def test_a_trial_holds_the_hops_alone_and_counts_all_of_its_time(tmp_path):
+def test_a_trial_holds_the_hops_alone_and_counts_all_of_its_time(emulated, tmp_path):
     lockstep = emulated()
     asked = []
     trial = deployed(tmp_path, lockstep, asked.append).hop(load_policy("fast"), SCHEDULE, 1)
-    lockstep.link.close()
     assert asked == [1.5]
     assert not trial.complaint
     assert len(trial.trace.table) == 300
@@ -211,7 +211,7 @@ def test_a_trial_holds_the_hops_alone_and_counts_all_of_its_time(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("ticks", [10, 230])
-def test_a_stop_by_the_supervisor_comes_back_as_a_complaint(tmp_path, ticks):
+def test_a_stop_by_the_supervisor_comes_back_as_a_complaint(emulated, tmp_path, ticks):
     lockstep = emulated()
     robot = deployed(tmp_path, lockstep)
     if ticks < 200:
@@ -221,4 +221,3 @@ def test_a_stop_by_the_supervisor_comes_back_as_a_complaint(tmp_path, ticks):
         trial = robot.hop(Still(fail_after=ticks), SCHEDULE, 1)
         assert "error" in trial.complaint
         assert len(trial.trace.table) <= ticks + 1
-    lockstep.link.close()

@@ -50,20 +50,16 @@ def test_torques_leave_only_in_between_and_never_beyond_the_limit(tmp_path):
     assert {out.action for out in link.told} == set(Action)
 
 
-def test_an_operator_may_stop_before_and_after_arming(tmp_path):
-    for name, early in (("a", True), ("b", False)):
-        loop, link, box = make_loop(tmp_path / name)
-        stop_at = 0 if early else 60
-        link.alter = lambda tick, _, reply, at=stop_at, loop=loop: (
-            (loop.stop() if tick == at else None) or reply
-        )
-        outcome = loop.run()
-        box.close()
-        assert outcome.supervisor.state is State.STOPPED
-        assert link.told[-1] == STOP
-        assert (BRAKE in link.told) is not early
-        if not early:
-            assert outcome.supervisor.stop_cause.reason is Reason.OPERATOR_STOP
+@pytest.mark.parametrize(("tick", "reason"), [(0, Reason.NONE), (60, Reason.OPERATOR_STOP)])
+def test_an_operator_may_stop_before_and_after_arming(tmp_path, tick, reason):
+    loop, link, box = make_loop(tmp_path)
+    link.alter = lambda now, _, reply: (loop.stop() if now == tick else None) or reply
+    outcome = loop.run()
+    box.close()
+    assert outcome.supervisor.state is State.STOPPED
+    assert outcome.supervisor.stop_cause.reason is reason
+    assert link.told[-1] == STOP
+    assert (BRAKE in link.told) is (tick > 0)
 
 
 @pytest.mark.parametrize(

@@ -78,17 +78,6 @@ def adapter():
     return Adapter()
 
 
-@pytest.fixture(params=["like USB", "like UART"])
-def link(adapter, request):
-    """A link without the real adapter's safeguards, or with them."""
-    link = MoteusLink(LEG, opener(adapter.path))
-    if request.param == "like USB":
-        (device,) = link.transport.devices()
-        device._is_fdcanusb, device._checksum_active = True, False
-    yield link
-    link.close()
-
-
 def exchange(link, outgoing=STOP, wait=WAIT):
     """Return an exchange of another tick; fail if it took much longer than it may."""
     time.sleep(0.005)
@@ -102,6 +91,24 @@ def whole(result):
     return None not in result.replies
 
 
+def opened(adapter, *, checksums=True):
+    """Return a link over which both drives have answered."""
+    link = MoteusLink(LEG, opener(adapter.path))
+    if not checksums:
+        (device,) = link.transport.devices()
+        device._is_fdcanusb, device._checksum_active = True, False
+    assert whole(exchange(link))
+    return link
+
+
+@pytest.fixture(params=["like USB", "like UART"])
+def link(adapter, request):
+    """A link without the real adapter's safeguards, or with them."""
+    link = opened(adapter, checksums=request.param == "like UART")
+    yield link
+    link.close()
+
+
 def test_both_drives_answer_in_joint_units(link, adapter):
     result = exchange(link)
     assert [reply.mode for reply in result.replies] == [0, 0]
@@ -110,7 +117,6 @@ def test_both_drives_answer_in_joint_units(link, adapter):
 
 
 def test_a_lost_reply_costs_that_reply_and_nothing_else(link, adapter):
-    assert whole(exchange(link))
     adapter.spoil = lambda number, lines: [] if number == 4 else lines
     result = exchange(link, wait=0.1)
     assert [reply is None for reply in result.replies] == [False, True]
@@ -119,14 +125,12 @@ def test_a_lost_reply_costs_that_reply_and_nothing_else(link, adapter):
 
 
 def test_garbage_on_the_line_is_skipped(link, adapter):
-    assert whole(exchange(link))
     for line in (b"@#!%", b"rcv", b"rcv 100", b"rcv zz 2400 E", b"rcv 100 2 E", b"OK"):
         adapter.say(line)
         assert whole(exchange(link)), line
 
 
 def test_an_error_of_the_adapter_costs_one_tick_at_most(link, adapter):
-    assert whole(exchange(link))
     adapter.say(b"ERR overrun")
     exchange(link)
     assert whole(exchange(link))
@@ -141,7 +145,6 @@ def test_a_late_reply_is_not_taken_for_a_fresh_one(link, adapter):
             return []
         return [*held, *lines] if number == 5 else lines
 
-    assert whole(exchange(link))
     adapter.spoil = hold
     before = exchange(link, wait=0.1)
     assert before.replies[1] is None
@@ -154,29 +157,22 @@ def test_a_late_reply_is_not_taken_for_a_fresh_one(link, adapter):
 
 
 def test_a_pulled_adapter_is_silence_and_another_may_be_opened(adapter):
-    link = MoteusLink(LEG, opener(adapter.path))
-    assert whole(exchange(link))
+    link = opened(adapter)
     adapter.pull_out()
     for _ in range(3):
         assert exchange(link, wait=0.05).replies == (None, None)
     assert link.transport.devices()[0]._descriptor is None
     link.close()
-    again = Adapter()
-    link = MoteusLink(LEG, opener(again.path))
-    assert whole(exchange(link))
-    link.close()
+    opened(Adapter()).close()
 
 
 def test_a_port_may_be_closed_and_opened_again(adapter):
     for _ in range(3):
-        link = MoteusLink(LEG, opener(adapter.path))
-        assert whole(exchange(link))
-        link.close()
+        opened(adapter).close()
 
 
 def test_an_adapter_that_reads_nothing_blocks_no_one(adapter):
-    link = MoteusLink(LEG, opener(adapter.path))
-    assert whole(exchange(link))
+    link = opened(adapter)
     adapter.reading.clear()
     start = time.monotonic()
     for _ in range(200):

@@ -30,5 +30,6 @@ def test_no_leg_may_go_where_its_mechanism_ends():
     for (low, high), lower, upper in zip(stops, limits.lower, limits.upper, strict=True):
         assert low <= lower < upper <= high
     recording = recording_limits(LEG, 200.0)
-    assert (np.array(recording.lower) <= limits.lower).all()
-    assert (np.array(recording.upper) >= limits.upper).all()
+    for index, joint in enumerate((LEG.hip, LEG.knee)):
+        assert recording.lower[index] < limits.lower[index] < joint.lower
+        assert joint.upper < limits.upper[index] < recording.upper[index]
