@@ -199,6 +199,6 @@ def test_damping_ends_at_rest_or_after_its_time():
 
 
 def test_the_manual_explains_every_message():
-    page = (Path(__file__).parents[2] / "docs" / "deploy.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "supervisor.md").read_text(encoding="utf-8")
     for reason in Reason:
         assert f"| {reason.sentence} |" in page

@@ -54,7 +54,7 @@ class Emulate:
     start_pose: str = "stand"
     """stand, crouch, stretch, zero (straight down), or joint angles as HIP,KNEE in rad."""
     faults: Path | None = None
-    """TOML script of what goes wrong, and when."""
+    """TOML script of faults and their times."""
     interface: Literal["pty", "udp_multicast", "socketcan"] = "pty"
     """pty is a serial terminal like an fdcanusb's; the others are buses of python-can."""
     channel: str | None = None
@@ -72,7 +72,7 @@ class Emulate:
     realtime: bool = True
     """Take real-time priority where that is permitted, so that the drives answer in time."""
     seconds: float | None = None
-    """End by itself after this time; default: with Ctrl-C."""
+    """Time after which the emulator ends; default: with Ctrl-C."""
     kinds: bool = False
     """List the kinds of faults and end."""
 

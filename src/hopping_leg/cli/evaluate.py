@@ -55,7 +55,7 @@ class Conditions:
     seeds: int = 5
     """Realisations of noise and delay per trial."""
     seed: int = 1000
-    """All of them follow from it; choose one that selected nothing."""
+    """Seed of noise and delay; choose one that selected no policy."""
     json: JsonFile = None
     noise: bool = True
     """The paper's sensor noise, torque noise and delay."""
@@ -99,9 +99,9 @@ class Evaluate(Conditions):
     """The robot's own contact (soft), the engine's default (stiff), or all trials on the first and
     the fixed ones on the second."""
     engine: Engine = "mujoco"
-    """What computes the physics; pybullet needs the extra `bullet` and is much slower."""
+    """Physics engine; pybullet needs the extra `bullet` and is much slower."""
     video: bool = True
-    """Put a short video of each controller into the report, where OpenGL is to be had."""
+    """Put a short video of each controller into the report, if OpenGL is available."""
 
 
 def run(args: Evaluate, notes: Sequence[str] = ()) -> None:

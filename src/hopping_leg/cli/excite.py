@@ -39,9 +39,9 @@ class Common:
     track_velocity: bool = False
     """Velocity targets are the positions' derivative, as in the lab's recordings, not zero."""
     hip_range: Pair = HardwareRange().hip
-    """How far the real hip turns, rad."""
+    """Range of the real hip, rad."""
     knee_range: Pair = HardwareRange().knee
-    """How far the real knee turns, rad."""
+    """Range of the real knee, rad."""
 
 
 @dataclass(frozen=True)

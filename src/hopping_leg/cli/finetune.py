@@ -46,11 +46,11 @@ class Finetune:
     transport: str | None = None
     """The drives of the real leg instead, as for `hop deploy`."""
     robot: str = "legv2-paper"
-    """What is believed of the leg: the robot that the policy was trained on."""
+    """Model of the leg: the robot that the policy was trained on."""
     method: Literal["aim", "sac", "both"] = "both"
-    """What is learnt: the command that the network is told, its weights, or one after the other."""
+    """Method: correct the command, train the weights, or one after the other."""
     minutes: float = 10.0
-    """Robot time at most."""
+    """Longest time on the robot."""
     commands: Heights = (0.25, 0.30, 0.35)
     """Heights of the checks, m; explorations hop between the lowest and the highest."""
     trial_seconds: float = 15.0
@@ -62,7 +62,7 @@ class Finetune:
     out: Path = Path("runs/finetune")
     """The run's folder."""
     resume: bool = False
-    """Go on with the run in the folder; without one there, begin."""
+    """Continue the run in the folder; start one if there is none."""
     yes: bool = False
     """Arm the drives without asking before every trial."""
     json: JsonFile = None

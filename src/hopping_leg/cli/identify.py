@@ -80,7 +80,7 @@ class Identify:
     folder: Path | None = None
     """Folder for checkpoints and the result; default: runs/identify-NAME, after --out."""
     resume: bool = False
-    """Go on with the run in the folder even if it is finished, instead of repeating it; an
+    """Continue the run in the folder even if it is finished, instead of repeating it; an
     unfinished one goes on anyway."""
 
 

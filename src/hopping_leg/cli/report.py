@@ -47,7 +47,7 @@ class Figures:
     format: Format = "svg"
     """Kind of file."""
     width: Width = "screen"
-    """What a figure shall fill: a screen, or a column (3.5 in) or page (7.16 in) of a paper."""
+    """Width of the figures: a screen, or a column (3.5 in) or page (7.16 in) of a paper."""
     animation: Animation | None = None
     """Also render a hop at each command, side by side at half speed, one file per controller; needs
     OpenGL and traces of a shipped robot."""

@@ -28,7 +28,7 @@ class Options:
     """What to train and where to keep it."""
 
     recipe: str = "fast"
-    """How to train: `fast` for accurate hopping soon, `precise` for more accurate hopping later,
+    """Recipe: `fast` for accurate hopping soon, `precise` for more accurate hopping later,
     `adaptive` for one that corrects itself on legs that differ, `paper` for the paper's method; or
     FILE.py:NAME, a recipe of your own."""
     robot: RobotFile = "legv2-paper"
@@ -37,7 +37,7 @@ class Options:
     out: Path | None = None
     """The run's folder; default: runs/RECIPE-seedSEED."""
     resume: bool = False
-    """Go on with the run in the folder; without one there, begin."""
+    """Continue the run in the folder; start one if there is none."""
     source: Path | None = None
     """Begin from the newest checkpoint of this folder's run instead of from scratch."""
     set: tuple[str, ...] = ()
@@ -50,9 +50,9 @@ class Options:
     """Observation history that the policy sees instead of the recipe's, e.g. the paper's
     `three-samples`, or `dated-long`; an unknown name lists all."""
     heights: tuple[float, float] | None = None
-    """Lowest and highest height that the policy can be told, m, instead of the recipe's."""
+    """Lowest and highest command, m, instead of the recipe's."""
     minutes: float | None = None
-    """Stop after so much wall-clock time; default: when the recipe's steps are done."""
+    """Wall-clock time of the training; default: when the recipe's steps are done."""
     steps: int | None = None
     """Control steps of experience, all legs together, instead of the recipe's."""
     threads: int = 1
@@ -60,9 +60,9 @@ class Options:
     parallel_seeds: int = 1
     """Trainings that begin side by side, each with a seed and in a process of its own. As soon as
     the recipe can tell how they will end, when their teachers are scored or else at the end, the
-    best goes on alone with the threads of all. A training may fail by bad luck; two hardly do."""
+    best goes on alone with the threads of all. Two trainings seldom fail both."""
     log: Literal["tensorboard", "wandb", "trackio"] = "tensorboard"
-    """Who gets the curves besides TensorBoard; wandb and trackio are packages of their own."""
+    """Logger besides TensorBoard; wandb and trackio have to be installed."""
     json: JsonFile = None
 
 

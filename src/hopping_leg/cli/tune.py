@@ -53,7 +53,7 @@ class RecipeSearch:
     recipe: tyro.conf.Suppress[str]
     robot: RobotFile = "legv2-paper"
     trials: int = 50
-    """Trials in the study when it is over, of all processes together."""
+    """Trials of the finished study, summed over all processes."""
     steps: int = 1_000_000
     """Control steps of each training, all legs together."""
     study: str | None = None
@@ -65,13 +65,13 @@ class RecipeSearch:
     """Let the Ray cluster at this address work, each worker on one CPU; `local` starts one on this
     machine, `auto` finds the one that it belongs to."""
     snapshots: int = 5
-    """Times that a training is tried before it ends, and may be given up."""
+    """Evaluations of each training before it ends, at which it may be pruned."""
     startup: int = 10
-    """Finished trials before any is given up, and before the search learns from them."""
+    """Finished trials before any is pruned, and before the search uses them."""
     seed: int = 0
     """Seed of the trainings, and of the search."""
     set: tuple[str, ...] = ()
-    """Numbers of the recipe that every trial takes, e.g. `--set num_envs=256`."""
+    """Options of the recipe for every trial, e.g. `--set num_envs=256`."""
     out: Path | None = None
     """Folder of the trainings, trials.json and the figures; default: runs/tune/RECIPE."""
     json: JsonFile = None
