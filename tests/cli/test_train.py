@@ -1,3 +1,5 @@
+import json
+
 import pytest
 
 from hopping_leg import cli
@@ -54,3 +56,17 @@ def test_a_folder_with_other_things_is_left_alone(tmp_path, refused):
     (tmp_path / "thesis.tex").write_text("years of work")
     refused(["train", "--out", tmp_path], "holds no run")
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_an_option_is_changed_by_its_name_and_an_unknown_name_lists_the_valid_ones(
+    tiny, tmp_path, capsys
+):
+    arguments = ["train", "--recipe", "tiny", "--out", str(tmp_path / "run"), "--set"]
+    assert cli.main([*arguments, "discount=0.9"]) == cli.FAILED
+    (said,) = capsys.readouterr().err.strip().splitlines()
+    assert "There is no number of recipe 'tiny' 'discount'" in said
+    assert "Available: " in said
+    assert "gamma, " in said
+    assert cli.main([*arguments, "gamma=0.9"]) == 0
+    config = json.loads((tmp_path / "run" / "config.json").read_text())
+    assert config["options"]["algorithm"]["gamma"] == 0.9

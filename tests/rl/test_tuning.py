@@ -15,8 +15,8 @@ from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.figure_style import to_svg
 from hopping_leg.rl import policy_evaluation, tuning
 from hopping_leg.rl.recipes import RECIPES, SPACES
-from hopping_leg.rl.search_space import defaults
-from hopping_leg.rl.tuning import Tuning, open_study, tune
+from hopping_leg.rl.search_space import Tuning, defaults
+from hopping_leg.rl.tuning import open_study, tune
 from hopping_leg.rl.tuning_figures import FIGURES
 from tests.clusters import local
 
@@ -135,7 +135,7 @@ def test_another_search_in_the_same_study_is_refused(small, trained):
     with pytest.raises(UsageError, match="another 'steps'"):
         tune(dataclasses.replace(small, steps=200))
     with pytest.raises(UsageError, match="Cannot use the database"):
-        tune(dataclasses.replace(small, storage="sqlite:////no/such/folder/x.db"))
+        tune(dataclasses.replace(small, study="sqlite:////no/such/folder/x.db"))
     for wrong in ({"trials": 0}, {"seed": -1}):
         with pytest.raises(UsageError):
             dataclasses.replace(small, **wrong)
@@ -182,18 +182,8 @@ if __name__ == "__main__":
 @pytest.mark.slow
 def test_two_processes_share_a_study(tmp_path):
     out, script = tmp_path / "out", tmp_path / "script.py"
-    words = [
-        "tune",
-        "fast",
-        "--trials",
-        "3",
-        "--steps",
-        "128",
-        "--snapshots",
-        "1",
-        "--workers",
-        "2",
-    ]
+    words = ["tune", "fast", "--trials", "3", "--steps", "128", "--snapshots", "1"]
+    words += ["--workers", "2"]
     words += ["--set", "num_envs=2", "--study", str(tmp_path / "study.db"), "--out", str(out)]
     script.write_text(SHARED.format(words=words))
     result = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=900)

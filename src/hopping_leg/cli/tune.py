@@ -28,6 +28,7 @@ from rich.progress import Progress
 from hopping_leg.cli.options import JsonFile, RobotFile, at_least, say, show_table
 from hopping_leg.controllers.energy_shaping.tuning import Search, tune
 from hopping_leg.io import write_atomically, write_json
+from hopping_leg.rl.search_space import Tuning
 from hopping_leg.robot import load_robot
 
 
@@ -50,40 +51,24 @@ class GainSearch:
 class RecipeSearch:
     """Search the numbers of a recipe with Optuna."""
 
-    recipe: tyro.conf.Suppress[str]
-    robot: RobotFile = "legv2-paper"
-    trials: int = 50
-    """Trials of the finished study, summed over all processes."""
-    steps: int = 1_000_000
-    """Control steps of each training, all legs together."""
-    study: str | None = None
-    """SQLite file, or URL of another database; default: runs/tune/RECIPE.db."""
+    tuning: Annotated[Tuning, tyro.conf.arg(name="")]
     workers: int | None = None
     """Processes on this machine, one by default; more machines: the same command with the same
     --study, or --ray, where it counts the cluster's workers, by default one per CPU."""
     ray: str | None = None
     """Let the Ray cluster at this address work, each worker on one CPU; `local` starts one on this
     machine, `auto` finds the one that it belongs to."""
-    snapshots: int = 5
-    """Evaluations of each training before it ends, at which it may be pruned."""
-    startup: int = 10
-    """Finished trials before any is pruned, and before the search uses them."""
-    seed: int = 0
-    """Seed of the trainings, and of the search."""
-    set: tuple[str, ...] = ()
-    """Options of the recipe for every trial, e.g. `--set num_envs=256`."""
-    out: Path | None = None
-    """Folder of the trainings, trials.json and the figures; default: runs/tune/RECIPE."""
     json: JsonFile = None
+
+
+FAST, PAPER, PRECISE = (RecipeSearch(Tuning(name)) for name in ("fast", "paper", "precise"))
 
 
 def run(
     args: Annotated[GainSearch, tyro.conf.subcommand(name="energy-shaping")]
-    | Annotated[RecipeSearch, tyro.conf.subcommand(name="fast", default=RecipeSearch("fast"))]
-    | Annotated[RecipeSearch, tyro.conf.subcommand(name="paper", default=RecipeSearch("paper"))]
-    | Annotated[
-        RecipeSearch, tyro.conf.subcommand(name="precise", default=RecipeSearch("precise"))
-    ],
+    | Annotated[RecipeSearch, tyro.conf.subcommand(name="fast", default=FAST)]
+    | Annotated[RecipeSearch, tyro.conf.subcommand(name="paper", default=PAPER)]
+    | Annotated[RecipeSearch, tyro.conf.subcommand(name="precise", default=PRECISE)],
 ) -> None:
     """Search."""
     if isinstance(args, GainSearch):
@@ -122,40 +107,18 @@ def _tune_gains(args: GainSearch) -> None:
 def _tune_recipe(args: RecipeSearch) -> None:
     """Search, print the best, write all trials and the figures."""
     from hopping_leg.figure_style import to_svg
-    from hopping_leg.rl.tuning import Tuning
     from hopping_leg.rl.tuning import tune as tune_recipe
     from hopping_leg.rl.tuning_figures import FIGURES
 
     at_least(1, workers=args.workers)
-    out = args.out or Path("runs/tune") / args.recipe
-    tuning = Tuning(
-        args.recipe,
-        _storage(args.study or f"runs/tune/{args.recipe}.db"),
-        out,
-        args.robot,
-        args.trials,
-        args.steps,
-        args.snapshots,
-        args.startup,
-        args.seed,
-        args.set,
-    )
-    result = tune_recipe(tuning, args.workers, args.ray)
+    out = args.tuning.folder
+    result = tune_recipe(args.tuning, args.workers, args.ray)
     for file in filter(None, (out / "trials.json", args.json)):
         write_json(file, result)
     for name, draw in FIGURES.items():
         write_atomically(out / f"{name}.svg", to_svg(draw(result)))
     _show(result)
     say(f"Wrote {out}/trials.json and the figures beside it.")
-
-
-def _storage(study: str) -> str:
-    """Return the URL of a study's database; the folder of a file is made."""
-    if "://" in study:
-        return study
-    file = Path(study).resolve()
-    file.parent.mkdir(parents=True, exist_ok=True)
-    return f"sqlite:///{file}"
 
 
 def _show(result: dict[str, Any]) -> None:

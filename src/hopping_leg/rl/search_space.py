@@ -2,10 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import tyro
 
 from hopping_leg.errors import UsageError
-from hopping_leg.rl.recipe import Recipe
+
+if TYPE_CHECKING:
+    from hopping_leg.rl.recipe import Recipe
 
 Value = int | float | tuple[int, ...]
 
@@ -59,12 +64,7 @@ SearchSpace = Mapping[str, Real | OneOf]
 """Options by name, each with the values that are searched."""
 
 
-def suggest(trial: Any, space: SearchSpace) -> dict[str, Any]:  # noqa: ANN401
-    """Return the values that a trial shall try, by name."""
-    return {name: found.suggest(trial, name) for name, found in space.items()}
-
-
-def defaults(recipe: Recipe, space: SearchSpace) -> dict[str, Any]:
+def defaults(recipe: "Recipe", space: SearchSpace) -> dict[str, Any]:
     """Return a recipe's own values as a study stores them.
 
     Raises:
@@ -77,3 +77,54 @@ def defaults(recipe: Recipe, space: SearchSpace) -> dict[str, Any]:
             raise UsageError(f"'{name}' of recipe '{recipe.name}' is {value}, outside {dimension}.")
         stored[name] = dimension.stored(value)
     return stored
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Search the numbers of a recipe with Optuna."""
+
+    recipe: tyro.conf.Suppress[str]
+    study: str | None = None
+    """SQLite file, or URL of another database; default: runs/tune/RECIPE.db."""
+    out: Path | None = None
+    """Folder of the trainings, trials.json and the figures; default: runs/tune/RECIPE."""
+    robot: str = "legv2-paper"
+    """A shipped robot or the path of a .toml file."""
+    trials: int = 50
+    """Trials of the finished study, summed over all processes."""
+    steps: int = 1_000_000
+    """Control steps of each training, all legs together."""
+    snapshots: int = 5
+    """Evaluations of each training before it ends, at which it may be pruned."""
+    startup: int = 10
+    """Finished trials before any is pruned, and before the search uses them."""
+    seed: int = 0
+    """Seed of the trainings, and of the search."""
+    set: tuple[str, ...] = ()
+    """Options of the recipe for every trial, e.g. `--set num_envs=256`."""
+    heartbeat: tyro.conf.Suppress[int] = 15
+    """Time between two signs of life of a trial, s; after three without one it is given to the
+    next process."""
+
+    def __post_init__(self) -> None:
+        for name in ("trials", "steps", "snapshots", "startup", "heartbeat"):
+            if getattr(self, name) < 1:
+                raise UsageError(f"--{name} is {getattr(self, name)} but must be 1 or more.")
+        if self.seed < 0:
+            raise UsageError(f"--seed is {self.seed} but must be 0 or more.")
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the trainings."""
+        return self.out or Path("runs/tune") / self.recipe
+
+    @property
+    def storage(self) -> str:
+        """URL of the study's database."""
+        study = self.study or f"runs/tune/{self.recipe}.db"
+        return study if "://" in study else f"sqlite:///{Path(study).resolve()}"
+
+    @property
+    def in_file(self) -> bool:
+        """Whether the database is a file, of SQLite."""
+        return self.storage.startswith("sqlite")

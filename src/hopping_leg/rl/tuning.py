@@ -8,7 +8,6 @@ the training's checkpoint where it can reach it.
 import dataclasses
 import shutil
 import warnings
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +28,7 @@ from hopping_leg.rl.policy_evaluation import FINAL_SEEDS, FIRST_SEED
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes import SPACES, change, get_recipe
 from hopping_leg.rl.run_folder import read_result
-from hopping_leg.rl.search_space import SearchSpace, defaults, suggest
+from hopping_leg.rl.search_space import Tuning, defaults
 from hopping_leg.rl.train import train
 from hopping_leg.robot import load_robot
 from hopping_leg.workers import ProcessWorkers, RayWorkers
@@ -39,23 +38,19 @@ FOLDER, ERROR = "folder", "error"
 
 
 def record(study: Study) -> dict[str, Any]:
-    """Return all trials, the best, and each number's importance, as JSON values."""
+    """Return all trials, the best, and each number's importance (PED-ANOVA), as JSON values."""
     trials = study.get_trials(deepcopy=False)
     done = [t for t in trials if t.state is TrialState.COMPLETE]
     best = min(done, key=lambda t: float(t.value or 0.0)) if done else None
+    importance = {}
+    if len(done) >= 4 and len({trial.value for trial in done}) > 1:
+        importance = {k: float(share) for k, share in get_param_importances(study).items()}
     return {
         "trials": [_row(trial) for trial in trials],
         "best": None if best is None else _row(best),
-        "importance": _importance(study, done),
+        "importance": importance,
         "versions": versions("hopping-leg", "optuna", "torch", "mujoco"),
     }
-
-
-def _importance(study: Study, done: list[FrozenTrial]) -> dict[str, float]:
-    """Return how much each number matters (PED-ANOVA), empty where too few trials tell."""
-    if len(done) < 4 or len({trial.value for trial in done}) < 2:
-        return {}
-    return {name: float(share) for name, share in get_param_importances(study).items()}
 
 
 def _row(trial: FrozenTrial) -> dict[str, Any]:
@@ -79,59 +74,26 @@ _PATIENCE = 60.0
 """How long a worker waits for others to let go of SQLite's file, s."""
 
 
-@dataclass(frozen=True)
-class Tuning:
-    """What is searched, and where it is kept."""
+def conditions(tuning: Tuning) -> dict[str, Any]:
+    """Return what all trials of a study share, as JSON values.
 
-    recipe: str
-    """Name of the recipe."""
-    storage: str
-    """URL of the study's database."""
-    out: Path
-    """Folder of the trainings."""
-    robot: str = "legv2-paper"
-    """A shipped name or the path of a .toml file."""
-    trials: int = 50
-    """Trials in the study when it is over, of all processes together."""
-    steps: int = 1_000_000
-    """Control steps of each training."""
-    snapshots: int = 5
-    """Times that a training is tried before it ends, and may be given up."""
-    startup: int = 10
-    """Finished trials before any is given up, and before the search learns from them."""
-    seed: int = 0
-    """Seed of the trainings, and of the search."""
-    fixed: tuple[str, ...] = ()
-    """Numbers of the recipe that every trial takes, each ``name=number``."""
-    heartbeat: int = 15
-    """Time between two signs of life of a trial, s; after three without one it is given to the
-    next process."""
-
-    def __post_init__(self) -> None:
-        for name in ("trials", "steps", "snapshots", "startup", "heartbeat"):
-            if getattr(self, name) < 1:
-                raise UsageError(f"--{name} is {getattr(self, name)} but must be 1 or more.")
-        if self.seed < 0:
-            raise UsageError(f"--seed is {self.seed} but must be 0 or more.")
-
-    @property
-    def in_file(self) -> bool:
-        """Whether the database is a file, of SQLite."""
-        return self.storage.startswith("sqlite")
-
-    @property
-    def conditions(self) -> dict[str, Any]:
-        """What all trials of a study share, as JSON values."""
-        return {
-            "recipe": self.recipe,
-            "robot_digest": load_robot(self.robot).digest,
-            "steps": self.steps,
-            "snapshots": self.snapshots,
-            "training_seed": self.seed,
-            "selection_seeds": [FIRST_SEED, *FINAL_SEEDS],
-            "fixed": list(self.fixed),
-            "space": {n: dataclasses.asdict(d) for n, d in _searched(self).items()},
-        }
+    Raises:
+        UsageError: The recipe has no search space.
+    """
+    if tuning.recipe not in SPACES:
+        raise UsageError(
+            f"Recipe '{tuning.recipe}' has no search space; valid: {', '.join(SPACES)}."
+        )
+    return {
+        "recipe": tuning.recipe,
+        "robot_digest": load_robot(tuning.robot).digest,
+        "steps": tuning.steps,
+        "snapshots": tuning.snapshots,
+        "training_seed": tuning.seed,
+        "selection_seeds": [FIRST_SEED, *FINAL_SEEDS],
+        "fixed": list(tuning.set),
+        "space": {n: dataclasses.asdict(d) for n, d in SPACES[tuning.recipe].items()},
+    }
 
 
 def tune(tuning: Tuning, workers: int | None = None, ray: str | None = None) -> dict[str, Any]:
@@ -148,13 +110,21 @@ def tune(tuning: Tuning, workers: int | None = None, ray: str | None = None) -> 
             such cluster, or some of it cannot reach the database.
     """
     cluster = None if ray is None else _reach(tuning, ray, workers)
+    if tuning.study is None or "://" not in tuning.study:
+        Path(tuning.storage.removeprefix("sqlite:///")).parent.mkdir(parents=True, exist_ok=True)
     study = open_study(tuning)
     if cluster is not None:
-        cluster.map(work, ((_anywhere(tuning), k) for k in range(cluster.count)))
+        # Workers start in folders of their own.
+        robot = tuning.robot
+        robot = str(Path(robot).resolve()) if robot.endswith(".toml") else robot
+        here = dataclasses.replace(
+            tuning, study=tuning.storage, out=tuning.folder.resolve(), robot=robot
+        )
+        cluster.map(work, ((here, k) for k in range(cluster.count)))
     else:
-        with ProcessWorkers(workers or 1) as here:
-            here.map(work, ((tuning, k) for k in range(here.count)))
-    return {**tuning.conditions, "robot": tuning.robot, **record(study)}
+        with ProcessWorkers(workers or 1) as processes:
+            processes.map(work, ((tuning, k) for k in range(processes.count)))
+    return {**conditions(tuning), "robot": tuning.robot, **record(study)}
 
 
 def work(tuning: Tuning, worker: int = 0) -> None:
@@ -175,7 +145,7 @@ def open_study(tuning: Tuning, worker: int = 0) -> Study:
         UsageError: The database cannot be used, or holds a study of something else.
     """
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    conditions = tuning.conditions
+    wanted = conditions(tuning)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ExperimentalWarning)
@@ -191,11 +161,11 @@ def open_study(tuning: Tuning, worker: int = 0) -> Study:
         raise UsageError(
             f"Cannot use the database {tuning.storage}: {str(error).splitlines()[0]}."
         ) from error
-    for name, wanted in conditions.items():
+    for name, value in wanted.items():
         stored = study.user_attrs.get(name)
         if stored is None:
-            study.set_user_attr(name, wanted)
-        elif stored != plain(wanted):
+            study.set_user_attr(name, value)
+        elif stored != plain(value):
             raise UsageError(
                 f"The study in {tuning.storage} was begun with another '{name}'; go on with the"
                 " options that it began with, or name another --study."
@@ -247,8 +217,9 @@ def _lock_before_reading(engine: Engine) -> None:
 def _run_trial(trial: Trial, tuning: Tuning) -> float:
     """Train with a trial's numbers; return the score of the policy it selects, m."""
     space = SPACES[tuning.recipe]
-    recipe = _recipe(tuning).replace(suggest(trial, space))
-    folder = tuning.out / f"trial-{trial.user_attrs.get(FOLDER, trial.number):04d}"
+    values = {name: found.suggest(trial, name) for name, found in space.items()}
+    recipe = _recipe(tuning).replace(values)
+    folder = tuning.folder / f"trial-{trial.user_attrs.get(FOLDER, trial.number):04d}"
     if (folder / "policy.onnx").exists():
         return float(read_result(folder)["selected"]["score_m"])
 
@@ -258,15 +229,8 @@ def _run_trial(trial: Trial, tuning: Tuning) -> float:
             raise optuna.TrialPruned
 
     try:
-        train(
-            recipe,
-            load_robot(tuning.robot),
-            tuning.seed,
-            folder,
-            resume=True,
-            quiet=True,
-            on_snapshot=watch,
-        )
+        robot = load_robot(tuning.robot)
+        train(recipe, robot, tuning.seed, folder, resume=True, quiet=True, on_snapshot=watch)
     except KeyboardInterrupt:
         _take_up(trial.study, trial)
         raise
@@ -291,14 +255,6 @@ def _reach(tuning: Tuning, address: str, workers: int | None) -> RayWorkers:
     return cluster
 
 
-def _anywhere(tuning: Tuning) -> Tuning:
-    """Return the same search, from whichever folder a worker starts."""
-    robot = tuning.robot
-    if robot.endswith(".toml"):
-        robot = str(Path(robot).resolve())
-    return dataclasses.replace(tuning, out=tuning.out.resolve(), robot=robot)
-
-
 def _take_up(study: Study, trial: FrozenTrial | Trial) -> None:
     """Let the next process go on with a trial that was cut off."""
     folder = trial.user_attrs.get(FOLDER, trial.number)
@@ -317,12 +273,4 @@ def _recipe(tuning: Tuning) -> Recipe:
     recipe = get_recipe(tuning.recipe).replace(
         steps=tuning.steps, eval_every=max(tuning.steps // tuning.snapshots, 1)
     )
-    return change(recipe, tuning.fixed)
-
-
-def _searched(tuning: Tuning) -> SearchSpace:
-    if tuning.recipe not in SPACES:
-        raise UsageError(
-            f"Recipe '{tuning.recipe}' has no search space; valid: {', '.join(SPACES)}."
-        )
-    return SPACES[tuning.recipe]
+    return change(recipe, tuning.set)
