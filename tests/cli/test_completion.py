@@ -42,13 +42,9 @@ def test_bash_completes_verbs_options_choices_and_subcommands(bash, words, found
     assert bash(*words) == found
 
 
-@pytest.mark.parametrize("shell", ["zsh", "fish"])
-def test_other_shells_know_every_verb(capsys, shell):
-    assert cli.main(["--tyro-print-completion", shell]) == 0
-    text = capsys.readouterr().out
-    assert all(verb in text for verb in cli.VERBS)
-    assert "recipe" in text
-
-
-def test_another_shell_is_refused():
-    assert cli.main(["--tyro-print-completion", "tcsh"]) == 2
+def test_other_shells_know_every_verb_and_another_is_refused(capsys, refused):
+    for shell in ("zsh", "fish"):
+        assert cli.main(["--tyro-print-completion", shell]) == 0
+        text = capsys.readouterr().out
+        assert all(verb in text for verb in (*cli.VERBS, "recipe"))
+    refused(["--tyro-print-completion", "tcsh"], "There is no shell 'tcsh'")

@@ -169,13 +169,11 @@ def test_bad_input_is_one_sentence_and_overwrites_nothing(words, sentence, tmp_p
     assert {p.name: p.read_bytes() for p in tmp_path.iterdir() if p.is_file()} == before
 
 
-@pytest.mark.parametrize(
-    ("out", "sentence"),
-    [("leg.json", "must end in .toml"), ("good.toml", "would replace an input")],
-)
-def test_the_robot_file_replaces_no_input(out, sentence, tmp_path, refused):
+def test_the_robot_file_replaces_no_input(tmp_path, refused):
     write_bad(tmp_path)
-    refused(["identify", tmp_path / "good.csv", "--out", tmp_path / out], sentence)
+    words = ["identify", tmp_path / "good.csv", "--out"]
+    refused([*words, tmp_path / "leg.json"], "must end in .toml")
+    refused([*words, tmp_path / "good.toml"], "would replace an input")
 
 
 def test_warnings_of_recordings_are_shown(tmp_path, capsys):

@@ -55,19 +55,17 @@ def test_the_paper_sizes_have_every_twin_method_and_second(calls, tmp_path):
     assert names >= {"identified", "cad", "table-1", "randomised", "two-pass", "one-pass"}
 
 
-def test_a_twin_of_your_own_plays_the_real_leg(calls, tmp_path):
-    assert main(["reproduce", "--quick", "--twin", "twin", "--out", str(tmp_path)]) == 0
-    [(study, _)] = calls["transfer"]
-    assert [(twin.name, twin.believed) for twin in study.twins] == [("twin", "legv2-paper")]
-    assert calls["evaluate"][0].seeds == 1
-
-
-def test_sizes_have_folders_of_their_own(calls, tmp_path, monkeypatch):
+def test_sizes_have_folders_of_their_own_and_a_twin_of_your_own_plays_the_real_leg(
+    calls, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
-    for words in ([], ["--quick"], ["--full"]):
+    for words in ([], ["--quick", "--twin", "twin"], ["--full"]):
         assert main(["reproduce", *words]) == 0
-    folders = [study.folder.parent for study, _ in calls["transfer"]]
+    studies = [study for study, _ in calls["transfer"]]
+    folders = [study.folder.parent for study in studies]
     assert folders == [Path("runs") / name for name in ("reproduce", "quick", "full")]
+    assert [(twin.name, twin.believed) for twin in studies[1].twins] == [("twin", "legv2-paper")]
+    assert calls["evaluate"][1].seeds == 1
 
 
 @pytest.mark.parametrize(("first", "then"), [([], ["--quick"]), (["--quick"], [])])

@@ -44,7 +44,7 @@ from hopping_leg.sim import CONTROL_RATE, NO_NOISE, Engine, NoiseAndDelay
 
 @dataclass(frozen=True)
 class Conditions:
-    """Controllers and what they meet, whatever is measured of them."""
+    """Controllers, and the robot, noise and physics that they are measured with."""
 
     controllers: tyro.conf.Positional[tuple[str, ...]]
     """Names (energy-shaping, paper, fast, ...), .onnx files, a quoted pattern of them, or Python
@@ -67,7 +67,7 @@ class Conditions:
     """Threads of the physics, 0 for all cores; results do not depend on it."""
 
     def load(self) -> tuple[list[Entry], RolloutConfig]:
-        """Return the controllers and the world that they believe in.
+        """Return the controllers and how they are rolled out.
 
         Raises:
             UsageError: An option has no meaning, or there is no such robot or controller.
