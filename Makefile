@@ -6,7 +6,7 @@ STAMP := .venv/.complete
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 WORKERS ?= auto
 ARGS ?=
-STUDIES := $(notdir $(patsubst %/__init__.py,%,$(wildcard studies/*/__init__.py)))
+STUDIES := $(notdir $(patsubst %/__main__.py,%,$(wildcard studies/*/__main__.py)))
 
 .PHONY: help install reproduce test test-fast golden check format lint types docs wheel results lock clean
 help:

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
-from studies.speed.env import EnvBenchmark, bench_env, record
-from studies.timing import interleave
 
 from hopping_leg.envs import HoppingTask, TaskConfig, paper_reward
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import MujocoSimulator
+from studies.speed.env import EnvBenchmark, bench_env, record
+from studies.timing import interleave
 
 ROBOT = load_robot("legv2-paper")
 

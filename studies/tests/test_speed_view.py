@@ -5,6 +5,7 @@ pytest.importorskip("viser", reason="the extra 'view' is not installed")
 pytest.importorskip("playwright", reason="playwright is not installed")
 
 from PIL import Image
+
 from studies.shared import main
 from studies.speed import browser
 from studies.speed.view import View, ViewBenchmark, bench_view

@@ -3,10 +3,10 @@
 import json
 
 import pytest
-from studies.sim_to_real.run import Foretell, Meet, foretold, met, prediction_rows
+from tests.sim_to_real.studies import study
 
 from hopping_leg.sim_to_real import stages
-from tests.sim_to_real.studies import study
+from studies.sim_to_real.run import Foretell, Meet, foretold, met, prediction_rows
 
 
 def write(job, *apexes):

@@ -5,11 +5,11 @@ import shlex
 from pathlib import Path
 
 import pytest
-from studies.shared import LONGEST, ROOT, condensed, results, store, stored_file
 
 from hopping_leg.cli import VERBS
+from studies.shared import LONGEST, ROOT, condensed, results, store, stored_file
 
-NAMES = sorted(path.parent.name for path in ROOT.glob("studies/*/__init__.py"))
+NAMES = sorted(path.parent.name for path in ROOT.glob("studies/*/__main__.py"))
 LARGEST = 2_000_000
 
 

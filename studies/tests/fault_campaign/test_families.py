@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
-from studies.fault_campaign.families import FAMILIES, HOP_SECONDS
-from studies.fault_campaign.live import LIVE
 
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.emulator.faults import KINDS
+from studies.fault_campaign.families import FAMILIES, HOP_SECONDS
+from studies.fault_campaign.live import LIVE
 
 RNG = np.random.default_rng
 

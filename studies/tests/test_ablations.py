@@ -1,9 +1,9 @@
 """All variants train as long, and one that does not hop says so."""
 
 import pytest
-from studies.ablations import run as bench
 
 from hopping_leg.rl.recipes import VARIANTS
+from studies.ablations import run as bench
 
 
 def row(command, error, skipped):

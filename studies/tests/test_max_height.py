@@ -1,8 +1,8 @@
 import numpy as np
-from studies.max_height.run import KNOTS, ReachStudy, _interpolate, flight_tops, measure_reach
 
 from hopping_leg.evaluate.result_cache import ResultCache
 from hopping_leg.robot import load_robot
+from studies.max_height.run import KNOTS, ReachStudy, _interpolate, flight_tops, measure_reach
 
 ROBOT = load_robot("legv2-paper")
 

@@ -2,15 +2,6 @@ import json
 
 import numpy as np
 import pytest
-from studies.identification import mujoco_sysid
-from studies.identification.bars import bars
-from studies.identification.fits import compare, summary
-from studies.identification.plain_loop import PlainLoop
-from studies.identification.real import real
-from studies.identification.run import bench_identify
-from studies.identification.study import FitCache, Study
-from studies.identification.synthetic import FIXED, identify_twin
-from studies.identification.twin import AIR, GROUND, record, twin
 
 from hopping_leg.cli import main
 from hopping_leg.errors import UsageError
@@ -20,6 +11,15 @@ from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import cut
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.model import TIMESTEP
+from studies.identification import mujoco_sysid
+from studies.identification.bars import bars
+from studies.identification.fits import compare, summary
+from studies.identification.plain_loop import PlainLoop
+from studies.identification.real import real
+from studies.identification.run import bench_identify
+from studies.identification.study import FitCache, Study
+from studies.identification.synthetic import FIXED, identify_twin
+from studies.identification.twin import AIR, GROUND, record, twin
 
 
 def test_twins_are_recorded_with_the_step_that_fits_take():
@@ -126,6 +126,7 @@ def test_a_missing_extra_is_said(monkeypatch, tmp_path):
 @pytest.mark.parametrize(("way", "error"), [("windows", 1e-12), ("whole", 1e-3)])
 def test_the_truth_explains_the_data_to_mujoco_sysid(way, error):
     from mujoco import sysid
+
     from studies.identification.sequences import sequences
 
     names, values = tuple(AIR), tuple(AIR.values())

@@ -4,10 +4,6 @@ import json
 
 import numpy as np
 import pytest
-from studies.probing.exposed import Exposed, record
-from studies.probing.fitting import interval, probe
-from studies.probing.run import Study
-from studies.probing.targets import TARGETS
 
 from hopping_leg.cli import main
 from hopping_leg.controllers import RolloutConfig, rollout
@@ -15,6 +11,10 @@ from hopping_leg.controllers.energy_shaping.phases import Phase
 from hopping_leg.controllers.registry import load_policy
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.onnx_export import expose_hidden
+from studies.probing.exposed import Exposed, record
+from studies.probing.fitting import interval, probe
+from studies.probing.run import Study
+from studies.probing.targets import TARGETS
 
 RNG = np.random.default_rng(3)
 BY_NAME = {target.name: target for target in TARGETS}

@@ -3,10 +3,10 @@
 import json
 
 import pytest
-from studies.training_time import run as bench
 
 from hopping_leg.rl import parallel_seeds as module
 from hopping_leg.rl.recipes import get_recipe
+from studies.training_time import run as bench
 
 
 @pytest.fixture

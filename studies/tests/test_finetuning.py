@@ -4,12 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
-from studies.finetuning import run as module
-from studies.finetuning.run import FIRST_JUDGE, Study, draw_finetuning, measure
+from tests.rl.finetune.trials import OPTIONS, POLICY, ROBOT, Imagined
 
 from hopping_leg.rl.finetune.simulated import Guard
 from hopping_leg.robot import load_robot
-from tests.rl.finetune.trials import OPTIONS, POLICY, ROBOT, Imagined
+from studies.finetuning import run as module
+from studies.finetuning.run import FIRST_JUDGE, Study, draw_finetuning, measure
 
 WIDE = Guard(np.full(2, -9.0), np.full(2, 9.0), np.full(2, 999.0))
 

@@ -1,9 +1,9 @@
 """A computer that is too slow disturbs a trial; anything else that ends it is judged."""
 
 import pytest
-from studies.fault_campaign.live import _gave_up
 
 from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorder
+from studies.fault_campaign.live import _gave_up
 
 
 @pytest.mark.parametrize(

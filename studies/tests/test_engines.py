@@ -2,6 +2,13 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+
+from hopping_leg.controllers import RolloutConfig
+from hopping_leg.controllers.registry import load_controller
+from hopping_leg.errors import UsageError
+from hopping_leg.evaluate import Entry, evaluate
+from hopping_leg.evaluate.trials import on_floor
+from hopping_leg.robot import load_robot
 from studies.engines.run import (
     BAR,
     WORLDS,
@@ -10,13 +17,6 @@ from studies.engines.run import (
     _judge,
     bench_engines,
 )
-
-from hopping_leg.controllers import RolloutConfig
-from hopping_leg.controllers.registry import load_controller
-from hopping_leg.errors import UsageError
-from hopping_leg.evaluate import Entry, evaluate
-from hopping_leg.evaluate.trials import on_floor
-from hopping_leg.robot import load_robot
 
 ROBOT = load_robot("legv2-paper")
 

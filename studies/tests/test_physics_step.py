@@ -1,12 +1,12 @@
 import pytest
+
+from hopping_leg.robot import load_robot
 from studies.physics_step.run import (
     ConvergenceStudy,
     _sufficient,
     bench_convergence,
     stiff,
 )
-
-from hopping_leg.robot import load_robot
 
 ROBOT = load_robot("legv2-paper")
 

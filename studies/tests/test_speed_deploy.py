@@ -3,11 +3,11 @@ import json
 import numpy as np
 import polars as pl
 import pytest
-from studies.shared import main
-from studies.speed.deploy import Deploy, Truth, apexes_of
 
 from hopping_leg.deploy.motion_sequence import Part
 from hopping_leg.trace import Trace
+from studies.shared import main
+from studies.speed.deploy import Deploy, Truth, apexes_of
 
 
 def test_apexes_are_matched_with_what_was_commanded():

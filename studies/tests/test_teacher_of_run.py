@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import torch
-from studies.limits.run import teacher_of_run
+from tests.rl.learners import ROBOT, learner
 
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.errors import UsageError
@@ -13,7 +13,7 @@ from hopping_leg.rl.recipes import change, get_recipe
 from hopping_leg.rl.resumable import learner_state
 from hopping_leg.rl.run_folder import RunFolder
 from hopping_leg.robot import load_robot
-from tests.rl.learners import ROBOT, learner
+from studies.limits.run import teacher_of_run
 
 
 def stop_early(folder, name="precise"):

@@ -3,13 +3,13 @@
 from dataclasses import asdict, replace
 
 import pytest
-from studies.limits import run as module
-from studies.limits.run import CONDITIONS, LimitsStudy, condense, measure_limits
 
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Entry
 from hopping_leg.evaluate.result_cache import ResultCache
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
+from studies.limits import run as module
+from studies.limits.run import CONDITIONS, LimitsStudy, condense, measure_limits
 
 OF = {"joint noise": "joint_noise", "torque noise": "torque_noise", "delay": "delay_probability"}
 

@@ -2,15 +2,15 @@ import dataclasses
 import json
 
 import pytest
+
+from hopping_leg.deploy import loop
+from hopping_leg.deploy.drive_link import Action, DriveCommand
+from hopping_leg.errors import UsageError
 from studies.fault_campaign.campaign import Campaign, Faults, play_case, run_campaign
 from studies.fault_campaign.case import Case
 from studies.fault_campaign.families import FAMILIES
 from studies.fault_campaign.live import LIVE
 from studies.shared import main
-
-from hopping_leg.deploy import loop
-from hopping_leg.deploy.drive_link import Action, DriveCommand
-from hopping_leg.errors import UsageError
 
 QUICK = Campaign(
     controllers=("energy-shaping",),

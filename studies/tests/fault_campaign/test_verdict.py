@@ -1,15 +1,15 @@
 import math
 
 import pytest
+
+from hopping_leg.deploy.drive_link import DriveMode
+from hopping_leg.emulator.wire_log import CommandEvent, ReplyEvent, WireLog
 from studies.fault_campaign.verdict import (
     Limits,
     problems_of_commands,
     reaction,
     restarts,
 )
-
-from hopping_leg.deploy.drive_link import DriveMode
-from hopping_leg.emulator.wire_log import CommandEvent, ReplyEvent, WireLog
 
 LIMITS = Limits((10.0, 10.0), (18.0, 42.0), 65.0)
 

@@ -3,9 +3,9 @@
 import json
 
 import pytest
-from studies.sim_to_real.run import Experiment
 
 from studies import shared
+from studies.sim_to_real.run import Experiment
 
 pytest.importorskip("torch")
 
