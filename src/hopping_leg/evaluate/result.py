@@ -113,37 +113,29 @@ class Group:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Everything measured, without the traces.
-
-    Attributes:
-        summary: One row per controller and command: fixed trials and the sequence pooled.
-        sequence: One row per controller and command: the sequence alone.
-        ladder: One row per controller and command of the ladder.
-        staircase: One entry per controller.
-        neighbours: One entry per controller.
-        distributions: Apexes behind ``summary``: controller, command_m, apexes_m.
-        estimators: One entry per controller that estimates its height.
-        groups: One row per group of policies and command.
-        conditions: Robot, digest, floor, disturbance, seeds, steps, rates.
-        versions: Versions of the software.
-        notes: What was left out and why.
-        command: What makes this evaluation again.
-        secondary: The same on another floor, if that was asked for.
-    """
+    """Everything measured, without the traces."""
 
     summary: list[Summary]
+    """One row per controller and command: fixed trials and the sequence pooled."""
     sequence: list[Summary]
+    """The sequence alone."""
     ladder: list[Summary]
     staircase: list[Staircase]
     neighbours: list[Comparison]
     distributions: list[dict[str, Any]]
+    """Apexes behind ``summary``: controller, command_m, apexes_m."""
     estimators: list[Estimator] = field(default_factory=list)
     groups: list[Group] = field(default_factory=list)
     conditions: dict[str, Any] = field(default_factory=dict)
+    """Robot, digest, floor, disturbance, seeds, steps, rates."""
     versions: dict[str, str] = field(default_factory=dict)
+    """Versions of the software."""
     notes: list[str] = field(default_factory=list)
+    """What was left out and why."""
     command: str = ""
+    """What makes this evaluation again."""
     secondary: "Evaluation | None" = None
+    """The same on another floor, if that was asked for."""
 
     @property
     def controllers(self) -> list[str]:

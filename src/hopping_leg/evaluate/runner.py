@@ -8,7 +8,7 @@ from typing import Any
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.evaluate.aggregation import pool_group, tabulate
 from hopping_leg.evaluate.entries import Entry, check_labels, check_range
-from hopping_leg.evaluate.result import Evaluation, Group, Summary
+from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.evaluate.trials import (
     FLOORS,
     KINDS,
@@ -85,11 +85,29 @@ def evaluate(
         notes += _note_stopped(entry.label, own, setup)
         runs += own
     measured = tabulate(runs, [c.label for c in entries], seed)
+    members: dict[str, list[str]] = {}
+    for entry in entries:
+        members.setdefault(entry.group or "", []).append(entry.label)
+    groups = {
+        name: [row for row in measured.summary if row.controller in labels]
+        for name, labels in members.items()
+        if name and len(labels) > 1
+    }
     return EvaluationRun(
         replace(
             measured,
-            groups=_groups(entries, measured.summary, seed),
-            conditions=_conditions(world, setup, floor, repeats, seed),
+            groups=[row for name in groups for row in pool_group(name, groups[name], seed)],
+            conditions={
+                **setup_conditions(setup),
+                "floor": floor,
+                "floor_meaning": _FLOOR_MEANINGS.get(world.ground, FLOORS[floor]),
+                "engine": world.engine,
+                "ground": world.ground,
+                "contact_time_constant_s": world.robot.contact.time_constant,
+                "contact_damping_ratio": world.robot.contact.damping_ratio,
+                "seed": seed,
+                "seeds": repeats,
+            },
             versions=software_versions(setup.engine),
             notes=notes,
         ),
@@ -147,32 +165,6 @@ def _note_stopped(label: str, runs: Sequence[Run], setup: RolloutConfig) -> list
         f"{label} swings a joint beyond what `hop deploy` allows in {stopped} of {len(runs)} runs;"
         " its supervisor would stop the leg there."
     ]
-
-
-def _groups(entries: Sequence[Entry], summary: Sequence[Summary], seed: int) -> list[Group]:
-    names = list(dict.fromkeys(c.group for c in entries if c.group))
-    rows: list[Group] = []
-    for name in names:
-        members = {c.label for c in entries if c.group == name}
-        if len(members) > 1:
-            rows += pool_group(name, [s for s in summary if s.controller in members], seed)
-    return rows
-
-
-def _conditions(
-    world: RolloutConfig, setup: RolloutConfig, floor: str, repeats: int, seed: int
-) -> dict[str, Any]:
-    return {
-        **setup_conditions(setup),
-        "floor": floor,
-        "floor_meaning": _FLOOR_MEANINGS.get(world.ground, FLOORS[floor]),
-        "engine": world.engine,
-        "ground": world.ground,
-        "contact_time_constant_s": world.robot.contact.time_constant,
-        "contact_damping_ratio": world.robot.contact.damping_ratio,
-        "seed": seed,
-        "seeds": repeats,
-    }
 
 
 _FLOOR_MEANINGS = {

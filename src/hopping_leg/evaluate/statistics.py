@@ -20,34 +20,22 @@ def of(statistic: Callable[[Array], Any], values: Array) -> float:
 
 @dataclass(frozen=True)
 class Neighbours:
-    """Two neighbouring commands compared, as in the paper's Fig. 9.
-
-    Attributes:
-        lower_m: The lower command, m.
-        upper_m: The higher command, m.
-        p: P-value of the two-sided Wilcoxon rank-sum test, normal approximation.
-        cliffs_delta: P(upper > lower) - P(upper < lower) over all pairs of hops; 1 is full
-            separation in the right order.
-        overlap: Share of all hops that lie between the smallest of the higher and the largest of
-            the lower command; 0 when the distributions do not overlap.
-    """
+    """Two neighbouring commands compared, as in the paper's Fig. 9."""
 
     lower_m: float
+    """The lower command, m."""
     upper_m: float
+    """The higher command, m."""
     p: float
+    """P-value of the two-sided Wilcoxon rank-sum test, normal approximation."""
     cliffs_delta: float
+    """P(upper > lower) - P(upper < lower) over all pairs of hops; 1 is full separation in order."""
     overlap: float
+    """Share of all hops between the smallest of the higher and the largest of the lower command."""
 
 
 def compare(lower_m: float, lower: Array, upper_m: float, upper: Array) -> Neighbours:
-    """Compare the apexes of two commands.
-
-    Args:
-        lower_m: The lower command, m.
-        lower: Apexes there, m, (hops,).
-        upper_m: The higher command, m.
-        upper: Apexes there, m, (hops,).
-    """
+    """Compare the apexes, m, (hops,) each, of two commands, m."""
     if not len(lower) or not len(upper):
         return Neighbours(lower_m, upper_m, float("nan"), float("nan"), float("nan"))
     both = np.concatenate([lower, upper])

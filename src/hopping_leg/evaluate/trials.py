@@ -193,9 +193,8 @@ def run_trials(
         on_progress: Called with the share done.
     """
     seconds = operator.attrgetter("seconds")
-    batches = [
-        list(group) for _, group in itertools.groupby(sorted(trials, key=seconds), key=seconds)
-    ]
+    ordered = sorted(trials, key=seconds)
+    batches = [list(group) for _, group in itertools.groupby(ordered, key=seconds)]
     total = sum(len(b) * b[0].seconds for b in batches)
     done = 0.0
     runs: list[Run] = []
@@ -205,36 +204,17 @@ def run_trials(
         def on_tick(tick: int, ticks: int, done: float = done, share: float = share) -> None:
             on_progress(done + share * tick / ticks)
 
-        runs += _run_batch(label, controller, setup, batch, repeats, seed, on_tick)
+        legs = [(trial, repeat) for trial in batch for repeat in range(repeats)]
+        commands = np.stack([trial.commands(setup.rate) for trial, _ in legs], axis=1)
+        noise = np.random.SeedSequence([seed, round(1000 * batch[0].seconds)]).generate_state(1)
+        record = rollout(controller, setup, commands, int(noise[0]), on_tick)
+        for leg, (trial, repeat) in enumerate(legs):
+            header = {"trial": trial.name, "kind": trial.kind, "repeat": repeat, "seed": seed}
+            trace = record.trace(leg, controller=label, **header)
+            runs.append(Run(label, trial, repeat, trace))
         done += share
     order = {trial.name: i for i, trial in enumerate(trials)}
     return sorted(runs, key=lambda run: (order[run.trial.name], run.repeat))
-
-
-def _run_batch(
-    label: str,
-    controller: Controller,
-    setup: RolloutConfig,
-    trials: list[Trial],
-    repeats: int,
-    seed: int,
-    on_tick: Callable[[int, int], None],
-) -> list[Run]:
-    legs = [(trial, repeat) for trial in trials for repeat in range(repeats)]
-    commands = np.stack([trial.commands(setup.rate) for trial, _ in legs], axis=1)
-    noise = np.random.SeedSequence([seed, round(1000 * trials[0].seconds)]).generate_state(1)
-    record = rollout(controller, setup, commands, int(noise[0]), on_tick)
-    return [
-        Run(
-            label,
-            trial,
-            repeat,
-            record.trace(
-                leg, controller=label, trial=trial.name, kind=trial.kind, repeat=repeat, seed=seed
-            ),
-        )
-        for leg, (trial, repeat) in enumerate(legs)
-    ]
 
 
 def save_traces(runs: Sequence[Run], directory: Path) -> list[Path]:

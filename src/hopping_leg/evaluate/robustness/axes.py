@@ -7,7 +7,6 @@ measured on a leg.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import reduce
 from operator import attrgetter
 
 from hopping_leg.errors import UsageError, unknown_name
@@ -32,12 +31,7 @@ class Case:
 
 
 def with_numbers(robot: Robot, numbers: Mapping[str, float]) -> Robot:
-    """Return a robot with other numbers.
-
-    Args:
-        robot: What stays otherwise.
-        numbers: Dotted path, e.g. ``"rail.friction"``, to value.
-    """
+    """Return a robot with other numbers, each at a dotted path, e.g. ``"rail.friction"``."""
     for path, value in numbers.items():
         robot = replace_at(robot, path, value)
     return robot
@@ -46,21 +40,6 @@ def with_numbers(robot: Robot, numbers: Mapping[str, float]) -> Robot:
 def times(robot: Robot, factor: float, *paths: str) -> Robot:
     """Return a robot with the numbers at some dotted paths multiplied."""
     return with_numbers(robot, {path: factor * attrgetter(path)(robot) for path in paths})
-
-
-def of_both_joints(robot: Robot, path: str, value: float) -> Robot:
-    """Return a robot with a number of both joints' drives set.
-
-    Args:
-        robot: What stays otherwise.
-        path: Dotted path below ``reality.hip`` and ``reality.knee``.
-        value: The number.
-    """
-    return reduce(
-        lambda one, joint: with_numbers(one, {f"reality.{joint}.{path}": value}),
-        JOINTS,
-        robot,
-    )
 
 
 Alter = Callable[[Case, float], Case]
@@ -106,12 +85,15 @@ def _times(*paths: str) -> Alter:
     return lambda case, factor: replace(case, robot=times(case.robot, factor, *paths))
 
 
+def _numbers(*paths: str) -> Alter:
+    return lambda case, value: replace(
+        case, robot=with_numbers(case.robot, dict.fromkeys(paths, value))
+    )
+
+
 def _joints(path: str) -> Alter:
-    return lambda case, value: replace(case, robot=of_both_joints(case.robot, path, value))
-
-
-def _number(path: str) -> Alter:
-    return lambda case, value: replace(case, robot=with_numbers(case.robot, {path: value}))
+    """Set a number of both joints' drives."""
+    return _numbers(*(f"reality.{joint}.{path}" for joint in JOINTS))
 
 
 AXES = (
@@ -135,7 +117,7 @@ AXES = (
          lambda case, value: replace(case, ground=value)),
     Axis("delay", "latency of every torque command, on top of the paper's delay",
          "s", 0.0, (0.0025, 0.005, 0.0075, 0.01, 0.015, 0.02), (0.0, 0.005),
-         _number("reality.latency.command"), "delay"),
+         _numbers("reality.latency.command"), "delay"),
     Axis("position-noise",
          "standard deviation of white noise on the joint positions, on top of the paper's noise",
          "rad", 0.0, (0.01, 0.03, 0.1, 0.2, 0.3, 0.5), (0.0, 0.01),
@@ -154,7 +136,7 @@ AXES = (
          "s", 0.0, (0.001, 0.0025, 0.005, 0.0075, 0.01, 0.02), (0.0, 0.0025),
          _joints("torque_lag"), "torque response"),
     Axis("voltage", "battery over its nominal voltage, which moves the motors' torque-speed line",
-         "1", 1.0, (0.9, 0.8, 0.7, 0.6, 0.5, 0.4), (0.8, 1.0), _number("reality.voltage")),
+         "1", 1.0, (0.9, 0.8, 0.7, 0.6, 0.5, 0.4), (0.8, 1.0), _numbers("reality.voltage")),
     Axis("backlash", "dead band between motor and link of both joints",
          "rad", 0.0, (0.005, 0.01, 0.02, 0.05, 0.1, 0.2), (0.0, 0.02), _joints("backlash")),
     Axis("pushes", "impulse on the base, up or down, at a random moment of every second",

@@ -12,8 +12,9 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.evaluate.metrics import START_SECONDS
-from hopping_leg.evaluate.robustness.axes import Case, axis_named, times, with_numbers
+from hopping_leg.evaluate.robustness.axes import Case, axis_named, times
 from hopping_leg.hop_detection import trace_hops
+from hopping_leg.io import replace_at
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.perturbation import Perturbation
 from hopping_leg.trace import Trace
@@ -39,9 +40,7 @@ def _on_axis(name: str, level: float) -> Callable[[Robot], Robot]:
 CHANGES: dict[str, Callable[[Robot], Robot]] = {
     "payload +20 %": _on_axis("payload", 0.2),
     "payload -20 %": _on_axis("payload", -0.2),
-    "ground time constant 0.02 s": lambda robot: with_numbers(
-        robot, {"contact.time_constant": 0.02}
-    ),
+    "ground time constant 0.02 s": lambda robot: replace_at(robot, "contact.time_constant", 0.02),
     "ground time constant x2": lambda robot: times(robot, 2.0, "contact.time_constant"),
     "delay +5 ms": _on_axis("delay", 0.005),
     "rail friction x3": lambda robot: times(robot, 3.0, "rail.friction"),
@@ -66,15 +65,9 @@ def study_changes(
     seed: int,
     on_tick: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
-    """Let a controller meet all changes and steps, in one batch.
+    """Let a controller that knows ``setup`` alone meet all changes and steps, in one batch.
 
-    Args:
-        controller: Knows ``setup`` alone.
-        setup: What it believes, with the paper's noise and delay.
-        commands: Desired heights, m; steps go from the lowest to the highest and back.
-        repeats: Realisations of noise and delay.
-        seed: All randomness follows from it.
-        on_tick: Called with (ticks done, ticks in all).
+    Steps go from the lowest command to the highest and back.
 
     Returns:
         ``recovery``, a row per change and command, and ``steps``, a row per step. Of recoveries,
@@ -122,6 +115,9 @@ def hops_after(trace: Trace, tick: int) -> Array:
 
 
 def _recovery(run: _Run, traces: Sequence[Trace], change: int) -> dict[str, Any]:
+    start = round(START_SECONDS * change / AT)
+    found = [trace_hops(trace) for trace in traces]
+    before = [h.apex[(h.tick >= start) & (h.tick < change)] for h in found]
     after = [hops_after(trace, change) - run.after for trace in traces]
     sizes = [_median(np.abs(_kth(after, hop))) for hop in range(HOPS)]
     centres = [_median(_kth(after, hop)) for hop in range(HOPS)]
@@ -130,7 +126,7 @@ def _recovery(run: _Run, traces: Sequence[Trace], change: int) -> dict[str, Any]
     return {
         "change": run.change,
         "command_m": run.after,
-        "before_abs_error_m": _median(np.abs(_before(run, traces, change))),
+        "before_abs_error_m": _median(np.abs(np.concatenate(before) - run.before)),
         "hop_abs_errors_m": sizes,
         "later_abs_error_m": settled,
         "later_error_m": centre,
@@ -138,13 +134,6 @@ def _recovery(run: _Run, traces: Sequence[Trace], change: int) -> dict[str, Any]
         "hop_errors_m": centres,
         "centred_after_hops": _back([*centres, centre]),
     }
-
-
-def _before(run: _Run, traces: Sequence[Trace], change: int) -> Array:
-    start = round(START_SECONDS * change / AT)
-    found = [trace_hops(trace) for trace in traces]
-    apexes = [h.apex[(h.tick >= start) & (h.tick < change)] for h in found]
-    return np.concatenate(apexes) - run.before
 
 
 def _step(run: _Run, traces: Sequence[Trace], change: int) -> dict[str, Any]:
@@ -173,9 +162,6 @@ def _median(values: Array) -> float | None:
 
 def _back(sizes: Sequence[float | None]) -> int | None:
     """Return the number of hops after which all others are near; None if the last is not."""
-    near = [size is not None and abs(size) <= BACK for size in sizes]
-    return (
-        max((k + 1 for k, is_near in enumerate(near) if not is_near), default=0)
-        if near[-1]
-        else None
-    )
+    far = [k + 1 for k, size in enumerate(sizes) if size is None or abs(size) > BACK]
+    last = max(far, default=0)
+    return last if last < len(sizes) else None

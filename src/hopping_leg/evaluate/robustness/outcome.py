@@ -9,9 +9,8 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.evaluate.metrics import HopWindow, measure, pooled_apexes
-from hopping_leg.evaluate.robustness.trials import AxisTrials, RobustnessTrial
+from hopping_leg.evaluate.robustness.trials import AxisTrials
 from hopping_leg.evaluate.statistics import bootstrap
-from hopping_leg.trace import Trace
 
 TOLERANCE = 0.02
 """Largest magnitude of the median apex minus the command in a successful trial, m."""
@@ -19,24 +18,21 @@ TOLERANCE = 0.02
 
 @dataclass(frozen=True)
 class Outcome:
-    """What is kept of a trial.
-
-    Attributes:
-        level: Level of the axis.
-        command_m: Desired apex height.
-        repeat: Number of the realisation.
-        error_m: Median apex minus command; where the command steps, of the height that is missed
-            most; None without a hop.
-        skipped: Hops that should have happened and did not.
-        contacts: Times base or knee touched the ground.
-    """
+    """What is kept of a trial."""
 
     level: float
+    """Level of the axis."""
     command_m: float
+    """Desired apex height."""
     repeat: int
+    """Number of the realisation."""
     error_m: float | None
+    """Median apex minus command; where the command steps, of the height that is missed most; None
+    without a hop."""
     skipped: int
+    """Hops that should have happened and did not."""
     contacts: int
+    """Times base or knee touched the ground."""
 
     @property
     def success(self) -> bool:
@@ -50,42 +46,35 @@ def run_axis(
     plan: AxisTrials,
     on_tick: Callable[[int, int], None] | None = None,
 ) -> list[Outcome]:
-    """Let a controller meet all trials of an axis.
-
-    Args:
-        controller: Knows ``setup`` alone.
-        setup: What it believes, with the paper's noise and delay.
-        plan: What it meets.
-        on_tick: Called with (ticks done, ticks in all).
-    """
+    """Let a controller that knows ``setup`` alone meet all trials of an axis."""
     run = rollout(
         controller, setup, plan.commands, plan.seed, on_tick, perturbation=plan.perturbation
     )
-    return [judge(trial, run.trace(leg)) for leg, trial in enumerate(plan.trials)]
+    outcomes = []
+    for leg, trial in enumerate(plan.trials):
+        windows = measure(run.trace(leg))
+        outcomes.append(
+            Outcome(
+                trial.level,
+                trial.command,
+                trial.repeat,
+                _worst_error(windows),
+                sum(w.skipped for w in windows),
+                sum(w.body_contacts for w in windows),
+            )
+        )
+    return outcomes
 
 
-def judge(trial: RobustnessTrial, trace: Trace) -> Outcome:
-    """Measure one trial."""
-    windows = measure(trace)
-    return Outcome(
-        trial.level,
-        trial.command,
-        trial.repeat,
-        _worst([_median_error(windows, command) for command in {w.command for w in windows}]),
-        sum(w.skipped for w in windows),
-        sum(w.body_contacts for w in windows),
-    )
-
-
-def _median_error(windows: list[HopWindow], command: float) -> float | None:
-    apex = pooled_apexes([w for w in windows if w.command == command])
-    return float(np.median(apex)) - command if len(apex) else None
-
-
-def _worst(errors: list[float | None]) -> float | None:
-    """Return the error of largest magnitude; None if one does not exist."""
-    known = [error for error in errors if error is not None]
-    return max(known, key=abs) if len(known) == len(errors) else None
+def _worst_error(windows: list[HopWindow]) -> float | None:
+    """Return the median error of the command that is missed most; None if one has no hop."""
+    errors = []
+    for command in {w.command for w in windows}:
+        apex = pooled_apexes([w for w in windows if w.command == command])
+        if not len(apex):
+            return None
+        errors.append(float(np.median(apex)) - command)
+    return max(errors, key=abs)
 
 
 OVERALL = "overall"
@@ -125,48 +114,41 @@ def by_level(outcomes: Sequence[Outcome]) -> dict[float, list[Outcome]]:
 
 def level_rows(controller: str, axis: str, outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
     """Return the results of each level of an axis, by rising level."""
-    return [
-        {
-            "controller": controller,
-            "axis": axis,
-            "level": level,
-            "success": float(np.mean([one.success for one in group])),
-            "median_abs_error_m": _median_size([one.error_m for one in group]),
-            "skipped_hops": sum(one.skipped for one in group),
-            "body_contacts": sum(one.contacts for one in group),
-            "trials": len(group),
-        }
-        for level, group in by_level(outcomes).items()
-    ]
+    rows = []
+    for level, group in by_level(outcomes).items():
+        sizes = [abs(one.error_m) for one in group if one.error_m is not None]
+        rows.append(
+            {
+                "controller": controller,
+                "axis": axis,
+                "level": level,
+                "success": float(np.mean([one.success for one in group])),
+                "median_abs_error_m": float(np.median(sizes)) if sizes else None,
+                "skipped_hops": sum(one.skipped for one in group),
+                "body_contacts": sum(one.contacts for one in group),
+                "trials": len(group),
+            }
+        )
+    return rows
 
 
 def score_rows(
     controller: str, outcomes: dict[str, list[Outcome]], seed: int
 ) -> list[dict[str, Any]]:
-    """Return a controller's score on every axis, and overall.
-
-    Args:
-        controller: As named on the command line.
-        outcomes: Trials by axis.
-        seed: Seed of the bootstrap.
-    """
+    """Return a controller's score on every axis, given its trials by axis, and overall."""
     levels = {
         axis: [
-            np.array([one.success for one in group], np.float64)
-            for group in by_level(found).values()
+            np.array([one.success for one in group], float) for group in by_level(found).values()
         ]
         for axis, found in outcomes.items()
     }
     rows = []
-    for axis in (*levels, OVERALL):
-        groups = list(levels.values()) if axis == OVERALL else [levels[axis]]
+    for axis, groups in {
+        **{a: [own] for a, own in levels.items()},
+        OVERALL: [*levels.values()],
+    }.items():
         score, low, high = share(groups, seed)
         trials = sum(len(level) for group in groups for level in group)
         row = {"controller": controller, "axis": axis, "score": score, "low": low, "high": high}
         rows.append({**row, "trials": trials})
     return rows
-
-
-def _median_size(errors: Sequence[float | None]) -> float | None:
-    sizes = [abs(error) for error in errors if error is not None]
-    return float(np.median(sizes)) if sizes else None

@@ -8,15 +8,9 @@ from typing import Any
 from hopping_leg.controllers import Controller, RolloutConfig
 from hopping_leg.evaluate.entries import Entry, check_labels, check_range, fingerprint
 from hopping_leg.evaluate.result_cache import ResultCache
+from hopping_leg.evaluate.robustness import axes as all_axes
 from hopping_leg.evaluate.robustness import changes
-from hopping_leg.evaluate.robustness.axes import (
-    AXES,
-    JOINT,
-    JOINT_LEVELS,
-    NOMINAL,
-    axis_named,
-    axis_names,
-)
+from hopping_leg.evaluate.robustness.axes import AXES, JOINT, JOINT_LEVELS, NOMINAL
 from hopping_leg.evaluate.robustness.outcome import (
     TOLERANCE,
     Outcome,
@@ -88,25 +82,19 @@ def make_suite(
     seed: int = 1000,
     seconds: float = SECONDS,
 ) -> Suite:
-    """Return a suite that can be run.
+    """Return a suite that can be run; without axes, all and the changes in the middle of a run.
 
-    Args:
-        setup: What controllers believe.
-        axes: Names; none takes all, and the changes in the middle of a run.
-        commands: Desired heights, m; the paper's by default, scaled to the leg.
-        repeats: Realisations per level and command.
-        seed: All randomness follows from it.
-        seconds: Duration of each trial, s.
+    Commands are the paper's by default, scaled to the leg.
 
     Raises:
         UsageError: There is no such axis, or a command is out of reach.
     """
     for name in axes:
         if name != JOINT:
-            axis_named(name)
+            all_axes.axis_named(name)
     check_repeats(repeats)
     chosen = choose_commands(setup.robot, commands)
-    names = tuple(name for name in axis_names() if not axes or name in axes)
+    names = tuple(name for name in all_axes.axis_names() if not axes or name in axes)
     return Suite(setup, names, chosen, repeats, seed, recovery=not axes, seconds=seconds)
 
 
@@ -116,13 +104,7 @@ def run_suite(
     cache: ResultCache,
     on_progress: Callable[[str, float], None] = lambda label, share: None,
 ) -> dict[str, Any]:
-    """Let every controller meet every axis.
-
-    Args:
-        entries: What is judged.
-        suite: What it meets.
-        cache: Keeps the result of each entry and axis.
-        on_progress: Called with a label and the share done of its axes.
+    """Let every controller meet every axis; the cache keeps the result of each pair.
 
     Returns:
         ``scores``, ``levels``, ``recovery``, ``steps``, ``axes``, ``conditions``, ``versions`` and
@@ -140,7 +122,10 @@ def run_suite(
     for entry in entries:
         outcomes: dict[str, list[Outcome]] = {}
         for number, part in enumerate(parts):
-            tick = functools.partial(_report, on_progress, entry.label, number, len(parts))
+
+            def tick(done: int, ticks: int, label: str = entry.label, number: int = number) -> None:
+                on_progress(label, (number + done / ticks) / len(parts))
+
             kept = cache.load_or_run(
                 f"{safe_file_name(entry.label)}-{part}",
                 f"{entry.label}: {part}",
@@ -184,17 +169,6 @@ def _run_part(
     robot, rate, seconds = setup.robot, setup.rate, suite.seconds
     plan = make_trials(part, robot, commands, repeats, seed, rate=rate, seconds=seconds)
     return {"outcomes": [asdict(one) for one in run_axis(controller, setup, plan, on_tick)]}
-
-
-def _report(
-    on_progress: Callable[[str, float], None],
-    label: str,
-    number: int,
-    parts: int,
-    tick: int,
-    ticks: int,
-) -> None:
-    on_progress(label, (number + tick / ticks) / parts)
 
 
 def _axes(suite: Suite) -> list[dict[str, Any]]:

@@ -34,40 +34,32 @@ GROUND_SECONDS, SWITCH_SECONDS = 1.0, 2.5
 
 @dataclass(frozen=True)
 class RobustnessTrial:
-    """One leg of an axis' batch.
-
-    Attributes:
-        level: Level of the axis.
-        command: Desired apex height, m.
-        repeat: Number of the realisation, from 0.
-        point: Number of the hypercube's point, 0 elsewhere.
-        case: What is simulated.
-    """
+    """One leg of an axis' batch."""
 
     level: float
+    """Level of the axis."""
     command: float
+    """Desired apex height, m."""
     repeat: int
+    """Number of the realisation, from 0."""
     point: int
+    """Number of the hypercube's point, 0 elsewhere."""
     case: Case
+    """What is simulated."""
 
 
 @dataclass(frozen=True)
 class AxisTrials:
-    """All trials of an axis, run as one batch.
+    """All trials of an axis, run as one batch."""
 
-    Attributes:
-        axis: Name of the axis.
-        trials: n of them.
-        commands: Desired heights, m, (ticks, n).
-        perturbation: What changes and pushes the legs.
-        seed: Seed of noise and delay.
-    """
-
-    axis: str
     trials: tuple[RobustnessTrial, ...]
+    """n of them."""
     commands: Array
+    """Desired heights, m, (ticks, n)."""
     perturbation: Perturbation
+    """What changes and pushes the legs."""
     seed: int
+    """Seed of noise and delay."""
 
 
 def make_trials(
@@ -97,66 +89,34 @@ def make_trials(
         UsageError: There is no such axis.
     """
     entropy = [seed, zlib.crc32(axis.encode())]
+    pairs = [(command, repeat) for command in commands for repeat in range(repeats)]
     if axis == JOINT:
-        trials = _joint_trials(robot, commands, repeats, levels or JOINT_LEVELS, entropy)
+        # the hypercube is drawn once; a level is a share of the way from neutral to its points
+        each = [(*pair, point) for pair in pairs for point in range(JOINT_POINTS)]
+        cube = qmc.LatinHypercube(len(AXES), rng=np.random.default_rng(entropy)).random(len(each))
+        trials = [
+            RobustnessTrial(level, *one, _joint_case(robot, row, level))
+            for level in levels or JOINT_LEVELS
+            for one, row in zip(each, cube, strict=True)
+        ]
     else:
-        trials = _trials(axis, robot, commands, repeats, levels)
+        cases = {0.0: Case(robot)}
+        if axis != NOMINAL:
+            found = axis_named(axis)
+            cases = {level: found.alter(Case(robot), level) for level in levels or found.levels}
+        trials = [
+            RobustnessTrial(lv, *pair, 0, case) for lv, case in cases.items() for pair in pairs
+        ]
     ticks, within = round(seconds * rate), (min(commands), max(commands))
-    events = [_Events(trial, seed, ticks, rate, within) for trial in trials]
+    events = [_events(trial, seed, ticks, rate, within) for trial in trials]
+    command, torque, force, ground = (np.stack(e, axis=1) for e in zip(*events, strict=True))
+    robots = tuple(trial.case.robot for trial in trials)
     return AxisTrials(
-        axis,
         tuple(trials),
-        np.stack([event.command for event in events], axis=1),
-        Perturbation(
-            tuple(trial.case.robot for trial in trials),
-            np.stack([event.torque for event in events], axis=1),
-            np.stack([event.force for event in events], axis=1),
-            np.stack([event.ground for event in events], axis=1),
-        ),
+        command,
+        Perturbation(robots, torque, force, ground),
         int(np.random.SeedSequence(entropy).generate_state(1)[0]),
     )
-
-
-def _trials(
-    axis: str,
-    robot: Robot,
-    commands: Sequence[float],
-    repeats: int,
-    levels: Sequence[float] | None,
-) -> list[RobustnessTrial]:
-    if axis == NOMINAL:
-        cases = {0.0: Case(robot)}
-    else:
-        found = axis_named(axis)
-        cases = {level: found.alter(Case(robot), level) for level in levels or found.levels}
-    return [
-        RobustnessTrial(level, command, repeat, 0, case)
-        for level, case in cases.items()
-        for command in commands
-        for repeat in range(repeats)
-    ]
-
-
-def _joint_trials(
-    robot: Robot,
-    commands: Sequence[float],
-    repeats: int,
-    levels: Sequence[float],
-    entropy: Sequence[int],
-) -> list[RobustnessTrial]:
-    """Draw a hypercube once; a level is a share of the way from neutral to its points."""
-    each = [
-        (command, repeat, point)
-        for command in commands
-        for repeat in range(repeats)
-        for point in range(JOINT_POINTS)
-    ]
-    cube = qmc.LatinHypercube(len(AXES), rng=np.random.default_rng(entropy)).random(len(each))
-    return [
-        RobustnessTrial(level, command, repeat, point, _joint_case(robot, row, level))
-        for level in levels
-        for (command, repeat, point), row in zip(each, cube, strict=True)
-    ]
 
 
 def _joint_case(robot: Robot, row: Array, share: float) -> Case:
@@ -168,36 +128,20 @@ def _joint_case(robot: Robot, row: Array, share: float) -> Case:
     return case
 
 
-class _Events:
-    """What happens in one trial over time.
+def _events(
+    trial: RobustnessTrial, seed: int, ticks: int, rate: float, within: tuple[float, float]
+) -> tuple[Array, Array, Array, Array]:
+    """Return command, torques, force on the base and ground of a trial over time.
 
     Draws depend on seed, command, repeat and point alone, so that levels differ in size only.
-
-    Args:
-        trial: Whose.
-        seed: Seed of the suite.
-        ticks: Control periods of the trial.
-        rate: Control rate, Hz.
-        within: Lowest and highest command of the suite, m.
     """
-
-    def __init__(
-        self,
-        trial: RobustnessTrial,
-        seed: int,
-        ticks: int,
-        rate: float,
-        within: tuple[float, float],
-    ) -> None:
-        entropy = [seed, trial.repeat, trial.point, round(1e4 * trial.command)]
-        rng = np.random.default_rng(entropy)
-        case, time = trial.case, np.arange(ticks) / rate
-        self.torque = case.torque_noise * rng.standard_normal((ticks, 2))
-        self.force = case.push / PUSH_SECONDS * _pushes(rng, ticks, rate)
-        up = rng.choice((-1, 1))
-        at = np.floor(time / GROUND_SECONDS).astype(int)
-        self.ground = case.ground * up * np.array([0, 1, 0, -1])[at % 4]
-        self.command = _stepped(trial, within, time)
+    rng = np.random.default_rng([seed, trial.repeat, trial.point, round(1e4 * trial.command)])
+    case, time = trial.case, np.arange(ticks) / rate
+    torque = case.torque_noise * rng.standard_normal((ticks, 2))
+    force = case.push / PUSH_SECONDS * _pushes(rng, ticks, rate)
+    at = np.floor(time / GROUND_SECONDS).astype(int)
+    ground = case.ground * rng.choice((-1, 1)) * np.array([0, 1, 0, -1])[at % 4]
+    return _stepped(trial, within, time), torque, force, ground
 
 
 def _pushes(rng: np.random.Generator, ticks: int, rate: float) -> Array:

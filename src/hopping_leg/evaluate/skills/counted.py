@@ -55,15 +55,7 @@ def count_hops(
     repeats: int,
     seed: int,
 ) -> list[Counted]:
-    """Ask a controller for each of ``COUNTS`` at each command, all from standing.
-
-    Args:
-        controller: Hops.
-        setup: The world.
-        commands: Desired apex heights, m.
-        repeats: Realisations of noise and delay.
-        seed: All of them follow from it.
-    """
+    """Ask a controller for each of ``COUNTS`` at each command, all from standing."""
     rows: list[Counted] = []
     for asked in COUNTS:
         seconds = STAND_SECONDS + asked * _HOP_SECONDS + _END_SECONDS

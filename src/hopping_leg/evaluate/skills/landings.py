@@ -19,12 +19,8 @@ from hopping_leg.trace import Trace
 def ground_force(robot: Robot, trace: Trace) -> Array:
     """Return the force on the leg from outside but for gravity, N, (ticks,).
 
-    It is the mass times the acceleration of the centre of mass plus gravity, from three ticks
-    each; on the ground it is the ground's force but for the rail's small friction.
-
-    Args:
-        robot: The leg.
-        trace: With true heights.
+    It is the mass times the acceleration of the centre of mass plus gravity, from three ticks of
+    true heights each; on the ground it is the ground's force but for the rail's small friction.
     """
     q = np.stack([trace.column(f"{joint}_position_rad") for joint in JOINTS], axis=1)
     weight = robot.mass * GRAVITY
@@ -41,11 +37,7 @@ def peak_force(robot: Robot, trace: Trace, start: int) -> float:
 
 
 def rebound(trace: Trace, touchdown: int) -> tuple[float, float]:
-    """Return how far a landing bounced.
-
-    Args:
-        trace: A run that ends at rest.
-        touchdown: Tick of the landing.
+    """Return how far a landing at a tick bounced, in a run that ends at rest.
 
     Returns:
         Highest rise of the base above where it comes to rest, after its lowest point, and highest
@@ -94,35 +86,24 @@ class Landed:
 
 
 def land(setup: RolloutConfig, *, drop: float, repeats: int, seed: int) -> list[Landed]:
-    """Drop legs in the landing posture.
-
-    Args:
-        setup: The world.
-        drop: Clearance of the foot, m.
-        repeats: Realisations of noise and delay.
-        seed: All of them follow from it.
-    """
+    """Drop legs in the landing posture, the foot ``drop`` m above the ground."""
     robot = setup.robot
     posture = landing_posture(robot)
-    landing = StandHopLand(None, robot, 0, rate=setup.rate, dropped=True)
-    ways: list[Controller] = [landing, JointPD(posture[None])]
-    return [_row(robot, drop, _drop(way, setup, posture, drop, repeats, seed)) for way in ways]
-
-
-def _drop(
-    way: Controller, setup: RolloutConfig, posture: Array, drop: float, repeats: int, seed: int
-) -> list[Trace]:
-    robot = setup.robot
     length = float(kinematics.foot_position(robot, posture)[0])
     height = float(kinematics.stance_height(robot, posture)) + drop
-    run = rollout(
-        way,
-        replace(setup, start_length=length),
-        np.full((round(_SECONDS * setup.rate), repeats), height),
-        seed,
-        on_legs=lambda legs: legs.place(slice(None), height, posture),
-    )
-    return [run.trace(leg) for leg in range(repeats)]
+    landing = StandHopLand(None, robot, 0, rate=setup.rate, dropped=True)
+    ways: list[Controller] = [landing, JointPD(posture[None])]
+    rows = []
+    for way in ways:
+        run = rollout(
+            way,
+            replace(setup, start_length=length),
+            np.full((round(_SECONDS * setup.rate), repeats), height),
+            seed,
+            on_legs=lambda legs: legs.place(slice(None), height, posture),
+        )
+        rows.append(_row(robot, drop, [run.trace(leg) for leg in range(repeats)]))
+    return rows
 
 
 def _row(robot: Robot, drop: float, traces: list[Trace]) -> Landed:
@@ -133,10 +114,8 @@ def _row(robot: Robot, drop: float, traces: list[Trace]) -> Landed:
     windows = [window for trace in traces for window in measure(trace)]
 
     def torque(joint: str) -> float:
-        name = f"{joint}_torque_nm"
-        return float(
-            np.median([np.abs(trace.column(name)[start:]).max() for trace, start in pairs])
-        )
+        torques = [trace.column(f"{joint}_torque_nm")[start:] for trace, start in pairs]
+        return float(np.median([np.abs(torque).max() for torque in torques]))
 
     return Landed(
         controller=str(traces[0].header["controller"]),

@@ -61,16 +61,7 @@ def climb(
     repeats: int,
     seed: int,
 ) -> tuple[list[Stair], list[Stairs]]:
-    """Let a controller hop over stairs.
-
-    Args:
-        controller: Hops.
-        setup: The world; its engine is MuJoCo.
-        commands: Desired apex heights, m.
-        stairs: Height of the ground on each step, m.
-        repeats: Realisations of noise and delay.
-        seed: All of them follow from it.
-    """
+    """Let a controller hop over stairs, in MuJoCo; ``stairs`` are heights of the ground, m."""
     each = np.repeat(np.asarray(commands, float), repeats)
     ticks, count = round(_SECONDS * setup.rate), len(each)
     ground = np.repeat(np.asarray(stairs, float), ticks)
@@ -93,21 +84,22 @@ def climb(
             begin = step * ticks if step else round(START_SECONDS * setup.rate)
             rise = level - stairs[step - 1] if step else 0.0
             errors = [_errors(trace, range(begin, (step + 1) * ticks), rise) for trace in own]
-            rows.append(_row(command, step, level, errors))
-        wholes.append(_whole(rows[-len(stairs) :], own))
+            first = np.array([e[0] for e in errors if len(e)])
+            later = np.concatenate([e[1:] for e in errors])
+            medians = (of(np.median, first), of(np.median, later))
+            rows.append(Stair(command, step, level, *medians, sum(map(len, errors)), len(own)))
+        steps = rows[-len(stairs) :]
+        wholes.append(
+            Stairs(
+                command_m=command,
+                worst_first_error_m=_worst([step.first_error_m for step in steps]),
+                worst_error_m=_worst([step.median_error_m for step in steps]),
+                skipped_hops=sum(map(skipped_in_run, own)),
+                body_contacts=sum(w.body_contacts for trace in own for w in measure(trace)),
+                runs=len(own),
+            )
+        )
     return rows, wholes
-
-
-def _whole(steps: Sequence[Stair], traces: Sequence[Trace]) -> Stairs:
-    windows = [window for trace in traces for window in measure(trace)]
-    return Stairs(
-        command_m=steps[0].command_m,
-        worst_first_error_m=_worst([step.first_error_m for step in steps]),
-        worst_error_m=_worst([step.median_error_m for step in steps]),
-        skipped_hops=sum(skipped_in_run(trace) for trace in traces),
-        body_contacts=sum(w.body_contacts for w in windows),
-        runs=len(traces),
-    )
 
 
 def _worst(errors: Sequence[float]) -> float:
@@ -115,27 +107,10 @@ def _worst(errors: Sequence[float]) -> float:
     return max((e for e in errors if np.isfinite(e)), key=abs, default=float("nan"))
 
 
-def _row(command: float, step: int, level: float, errors: list[Array]) -> Stair:
-    first = np.array([e[0] for e in errors if len(e)])
-    later = np.concatenate([e[1:] for e in errors])
-    return Stair(
-        command_m=command,
-        step=step,
-        ground_m=level,
-        first_error_m=of(np.median, first),
-        median_error_m=of(np.median, later),
-        hops=sum(len(e) for e in errors),
-        runs=len(errors),
-    )
-
-
 def _errors(trace: Trace, steps: range, rise: float) -> Array:
     """Return apex minus command of the hops that began on a step, m.
 
-    Args:
-        trace: Whose ground moves in flight, once the foot is clear.
-        steps: Ticks in which the ground is asked to be that of the step.
-        rise: Rise of the ground at the beginning of the step, m.
+    The ground is asked to rise at the first tick of ``steps`` and moves once the foot is clear.
     """
     height, rate = trace.column("height_m"), trace.column("height_rate_m_s")
     hops = trace_hops(trace)

@@ -28,14 +28,7 @@ def run_skills(
 ) -> dict[str, Any]:
     """Let every entry hop so many times and stop, and over stairs; drop a leg.
 
-    Args:
-        entries: What is judged.
-        setup: The world, with the paper's noise and delay.
-        floors: Names of floors, see ``evaluate.trials.FLOORS``.
-        commands: Desired apex heights, m; the paper's by default, scaled to the leg.
-        repeats: Realisations of noise and delay.
-        seed: All randomness follows from it.
-        on_progress: Called with a label and the share done.
+    Floors are named as in ``evaluate.trials.FLOORS``; commands are the paper's by default.
 
     Returns:
         ``counted``, ``stairs``, ``climbs``, ``landings``, ``conditions``, ``versions``, ``notes``.
