@@ -40,19 +40,13 @@ _CODES: dict[str, type[Enum]] = {"state": State, "part": Part, "action": Action,
 
 @dataclass(frozen=True)
 class Performance:
-    """A finished run.
-
-    Attributes:
-        outcome: How it ended.
-        trace: What happened.
-        path: Trace on disk.
-        notices: What the computer did not permit.
-    """
+    """A finished run, its trace, and where that lies on disk."""
 
     outcome: LoopOutcome
     trace: Trace
     path: Path
     notices: tuple[str, ...]
+    """What the computer did not permit."""
 
 
 def perform(

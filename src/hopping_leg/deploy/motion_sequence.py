@@ -62,12 +62,10 @@ class SequenceTiming:
 
 @dataclass(frozen=True)
 class Poses:
-    """Where the sequence leads, rad, (2,) each."""
+    """Where the sequence leads, rad, (2,) each: to the first hop, and down before it brakes."""
 
     start: Array
-    """Pose of the first hop."""
     rest: Array
-    """Where the leg sinks to before the drives brake."""
 
 
 def hopping_poses(robot: Robot) -> Poses:
@@ -80,19 +78,13 @@ def hopping_poses(robot: Robot) -> Poses:
 
 @dataclass(frozen=True)
 class SequenceStep:
-    """What the sequence asks for at a tick.
-
-    Attributes:
-        torque: At the joints, N m.
-        command: Desired height, m.
-        phase: Part of the sequence.
-        controller: What the controller alone asked for, N m; NaN outside of the hop.
-    """
+    """What the sequence asks for at a tick: joint torques, N m, and the desired height, m."""
 
     torque: Pair
     command: float
     phase: Part
     controller: Pair = (math.nan, math.nan)
+    """What the controller alone asked for, N m; NaN outside of the hop."""
 
 
 @dataclass

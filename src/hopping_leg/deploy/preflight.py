@@ -19,13 +19,7 @@ from hopping_leg.robot.parameters import JOINTS, Robot
 
 @dataclass(frozen=True)
 class Setting:
-    """One entry of a drive's configuration.
-
-    Attributes:
-        name: As the firmware calls it.
-        value: As wanted.
-        why: What depends on it.
-    """
+    """One entry of a drive's configuration as wanted, and what depends on it."""
 
     name: str
     value: float

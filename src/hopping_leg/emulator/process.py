@@ -24,21 +24,14 @@ _PATIENCE = 60.0
 
 @dataclass(frozen=True)
 class EmulatorState:
-    """The truth about the emulated robot at one time; pairs are hip and knee.
-
-    Attributes:
-        time: Since the start, s.
-        modes: Modes of the drives.
-        q: Joint angles, rad.
-        height: Height of the base, m.
-        flown: When the foot left the ground for the first time, s; infinite if it did not yet.
-    """
+    """The truth about the emulated robot at a time, s, since the start: hip and knee, rad, m."""
 
     time: float
     modes: tuple[int, ...]
     q: tuple[float, ...]
     height: float
     flown: float
+    """When the foot left the ground for the first time, s; infinite if it did not yet."""
 
 
 @dataclass(frozen=True)

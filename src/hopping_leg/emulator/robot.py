@@ -41,12 +41,7 @@ class EmulatedRobot:
     Args:
         robot: What stands behind the wire; its ``reality`` holds.
         q: Joint angles at the start, rad, (2,).
-        configured: Whether the drives are configured as the robot's file asks; else as the
-            firmware is delivered, but for their ids.
-        homed: Whether somebody homed the drives already.
-        held: Whether a person holds the leg where it stands until both drives are powered.
-        seed: Seed of sensor noise and jitter.
-        faults: What goes wrong, and when.
+        configured, homed, held, seed, faults: See ``EmulatorConfig``.
     """
 
     def __init__(

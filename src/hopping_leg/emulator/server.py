@@ -39,7 +39,7 @@ class EmulatorConfig:
     pose: str = "stand"
     """One of POSES or joint angles as 'HIP,KNEE' in rad."""
     configured: bool = True
-    """Drives configured as the robot's file asks; else as the firmware is delivered."""
+    """Drives configured as the robot's file asks; else as delivered, but for their ids."""
     homed: bool = True
     """Drives homed, as somebody did by hand; else known only within a turn of their rotors."""
     held: bool = True

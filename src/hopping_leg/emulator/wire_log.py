@@ -6,18 +6,15 @@ soon after a bad answer the host reacted. Times are in s; joint 0 is the hip, 1 
 
 from collections import deque
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from moteus.multiplex import RegisterSubframe, SubframeType
 from moteus.protocol import Register, parse_reply
 
 from hopping_leg.deploy.drive_link import DriveMode
+from hopping_leg.emulator.bus import Message
+from hopping_leg.emulator.drive import EmulatedDrive
+from hopping_leg.emulator.frames import Frame
 from hopping_leg.emulator.mode_machine import MODES
-
-if TYPE_CHECKING:
-    from hopping_leg.emulator.bus import Message
-    from hopping_leg.emulator.drive import EmulatedDrive
-    from hopping_leg.emulator.frames import Frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +50,6 @@ class ModeChange:
 
 
 _TOLD = (Register.MODE, Register.FAULT, Register.VOLTAGE, Register.TEMPERATURE)
-_STATE = set(_TOLD)
 """Registers of an answer that is noted."""
 _REMEMBERED = 100_000
 """Commands and answers each, about a minute's."""
@@ -69,32 +65,30 @@ class WireLog:
         self._modes = [DriveMode.STOPPED, DriveMode.STOPPED]
 
     def record_command(
-        self, time: float, joint: int, message: "Message", drive: "EmulatedDrive"
+        self, time: float, joint: int, message: Message, drive: EmulatedDrive
     ) -> None:
         """Note what a message commands a drive, if it does."""
-        mode, torque, most = None, 0.0, 0.0
-        for s in message.subframes_for(drive):
-            if not isinstance(s, RegisterSubframe) or s.type is not SubframeType.WRITE:
-                continue
-            if s.register == Register.MODE and s.value in MODES:
-                mode = DriveMode(int(s.value or 0))
-            elif s.register == Register.COMMAND_FEEDFORWARD_TORQUE:
-                torque = float(s.value or 0.0)
-            elif s.register == Register.COMMAND_POSITION_MAX_TORQUE:
-                most = float(s.value or 0.0)
-        if mode is not None:
+        written = {
+            s.register: s.value or 0.0
+            for s in message.subframes_for(drive)
+            if isinstance(s, RegisterSubframe) and s.type is SubframeType.WRITE
+        }
+        if written.get(Register.MODE) in MODES:
+            mode = DriveMode(int(written[Register.MODE]))
+            torque = float(written.get(Register.COMMAND_FEEDFORWARD_TORQUE, 0.0))
+            most = float(written.get(Register.COMMAND_POSITION_MAX_TORQUE, 0.0))
             self.commands.append(CommandEvent(time, joint, mode, torque, most))
 
-    def record_reply(self, time: float, joint: int, answer: "Frame") -> None:
+    def record_reply(self, time: float, joint: int, answer: Frame) -> None:
         """Note a drive's answer, if it tells the drive's state."""
         values = parse_reply(answer.data)
-        if values.keys() >= _STATE:
+        if values.keys() >= set(_TOLD):
             mode, fault, voltage, temperature = (values[register] for register in _TOLD)
             self.answers.append(
                 ReplyEvent(time, joint, DriveMode(int(mode)), int(fault), voltage, temperature)
             )
 
-    def record_mode(self, time: float, joint: int, drive: "EmulatedDrive") -> None:
+    def record_mode(self, time: float, joint: int, drive: EmulatedDrive) -> None:
         """Note a drive's mode after a step, if it is another."""
         mode = drive.machine.mode
         if mode is not self._modes[joint]:
