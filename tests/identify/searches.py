@@ -15,9 +15,9 @@ TWO = choose(CAD, ["hip.friction", "knee.friction"])
 BOTTOM = np.array([1.0, -0.5])
 
 
-def objective(parameters, scoring=SCORING, recordings=(RUN,)):
+def objective(parameters=TWO, scoring=SCORING, recordings=(RUN,), length=0.5):
     """Return what is searched: residuals over windows of half a second."""
-    return Objective(tuple(recordings), tuple(cut(recordings, 0.5)), parameters, scoring, STEP)
+    return Objective(tuple(recordings), tuple(cut(recordings, length)), parameters, scoring, STEP)
 
 
 def bowl(vectors):

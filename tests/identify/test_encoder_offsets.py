@@ -1,4 +1,5 @@
 import numpy as np
+import polars as pl
 import pytest
 
 from hopping_leg.identify.encoder_offsets import OffsetFinder
@@ -15,16 +16,14 @@ TRUE = LegHypothesis(PENDULUM)
 OFF = np.array([0.04, -0.07])
 
 
-def off_zero(run):
-    """Return the run as encoders with offsets show it; the metadata says so."""
-    columns = [
-        (run.trace.table[name] + off).alias(name)
-        for name, off in zip(PAIRS["position"], OFF, strict=True)
-    ]
-    return changed(run, *columns).with_metadata(zeroed=True)
+SHOWN = [pl.col(name) + off for name, off in zip(PAIRS["position"], OFF, strict=True)]
+"""Positions as encoders with offsets show them."""
+RUN = record(PENDULUM, swing(3.0, rate=500.0), rate=500.0, onboard="torque")
+RUN = changed(RUN, *SHOWN).with_metadata(zeroed=True)
 
 
-RUN = off_zero(record(PENDULUM, swing(3.0, rate=500.0), rate=500.0, onboard="torque"))
+def simulated(run, duration=None):
+    return WindowSimulator([run], cut([run], duration), timestep=STEP).run([TRUE]).position[0]
 
 
 def test_zeros_follow_from_the_balance_of_momentum():
@@ -37,11 +36,9 @@ def test_a_wrong_robot_finds_about_the_same_zeros():
 
 
 def test_simulations_show_what_the_encoders_show():
-    got = WindowSimulator([RUN], cut([RUN], 0.25), timestep=STEP).run([TRUE]).position
     measured = RUN.array("position").reshape(12, 125, 2)
-    believed = RUN.with_metadata(zeroed=False)
-    wrong = WindowSimulator([believed], cut([believed], 0.25), timestep=STEP).run([TRUE]).position
-    assert np.abs(got[0] - measured).max() < 0.2 * np.abs(wrong[0] - measured).max()
+    got, wrong = simulated(RUN, 0.25), simulated(RUN.with_metadata(zeroed=False), 0.25)
+    assert np.abs(got - measured).max() < 0.2 * np.abs(wrong - measured).max()
 
 
 def test_what_tells_the_zeros_is_not_predicted():
@@ -53,8 +50,4 @@ def test_what_tells_the_zeros_is_not_predicted():
 @pytest.mark.parametrize("onboard", ["zoh", "continuous"])
 def test_a_drive_that_tracks_positions_is_believed(onboard):
     run = record(PENDULUM, swing(1.0)).with_metadata(onboard=onboard, zeroed=True)
-    plain = run.with_metadata(zeroed=False)
-    pair = [
-        WindowSimulator([r], cut([r]), timestep=STEP).run([TRUE]).position for r in (run, plain)
-    ]
-    np.testing.assert_array_equal(*pair)
+    np.testing.assert_array_equal(simulated(run), simulated(run.with_metadata(zeroed=False)))

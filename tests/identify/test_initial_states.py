@@ -6,22 +6,10 @@ from hopping_leg.identify.actuator_model import build_rig_model
 from hopping_leg.identify.initial_states import base_rate, full_states, start_states
 from hopping_leg.identify.recording import make_recording
 from hopping_leg.robot import kinematics
-from tests.identify.twin import LEG, STEP, record, swing
+from tests.identify.twin import LEG, STEP, noisy, record, swing
 
 RUN = record(LEG, swing(3.0))
 FAST = record(LEG, np.repeat(swing(2.0), 3, axis=0), rate=500.0)
-
-
-def noisy(run, seed=0):
-    """Return the run as seen by poor sensors."""
-    rng = np.random.default_rng(seed)
-    columns = {"position_rad": 1e-4, "velocity_rad_s": 0.1}
-    table = run.trace.table.with_columns(
-        run.trace.table[f"{joint}_{name}"] + rng.normal(scale=scale, size=len(run))
-        for joint in ("hip", "knee")
-        for name, scale in columns.items()
-    )
-    return make_recording(table, run.metadata, "noisy")
 
 
 @pytest.mark.parametrize("run", [RUN, FAST], ids=["200 Hz", "500 Hz"])
@@ -31,7 +19,7 @@ def test_clean_sensors_are_believed(states, run):
 
 
 def test_smoothing_comes_nearer_to_the_truth():
-    position, velocity = start_states(noisy(FAST))
+    position, velocity = start_states(noisy(FAST, position_rad=1e-4, velocity_rad_s=0.1))
     error = np.std(velocity - FAST.array("velocity"), axis=0)
     assert (error < 0.05).all()
     assert np.abs(position - FAST.array("position")).max() < 1e-3

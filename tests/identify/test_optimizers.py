@@ -5,15 +5,8 @@ import numpy as np
 import pytest
 
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.optimizers import (
-    CmaOptions,
-    Found,
-    LeastSquaresOptions,
-    cma_es,
-    jacobian,
-    least_squares,
-    multi_start,
-)
+from hopping_leg.identify import optimizers
+from hopping_leg.identify.optimizers import CmaOptions, cma_es, jacobian, least_squares
 from hopping_leg.identify.parameters import choose
 from tests.identify.searches import BOTTOM, CAD, RUN, SCORING, TRUTH, TWO, bowl, killed, objective
 from tests.identify.twin import record, swing
@@ -101,7 +94,7 @@ def test_a_killed_least_squares_resumes_exactly(tmp_path):
     def curved(vectors):
         return np.concatenate([bowl(vectors), 0.5 * np.sin(3 * vectors)], axis=1)
 
-    options = LeastSquaresOptions(rounds=5, evaluations=2, tolerance=-1.0)
+    options = optimizers.LeastSquaresOptions(rounds=5, evaluations=2, tolerance=-1.0)
     whole = least_squares(curved, TWO, options)
     file = tmp_path / "state.json"
     with pytest.raises(KeyboardInterrupt):
@@ -126,9 +119,9 @@ def test_many_starts_return_the_best_first():
 
     def search(number, start):
         seen.append(start)
-        return Found(start, float(np.sum(start**2)), 1, [])
+        return optimizers.Found(start, float(np.sum(start**2)), 1, [])
 
-    found = multi_start(search, TWO, 5, seed=0)
+    found = optimizers.multi_start(search, TWO, 5, seed=0)
     assert [f.cost for f in found] == sorted(f.cost for f in found)
     assert all((low <= s).all() and (s <= high).all() for s in seen)
     np.testing.assert_array_equal(seen[0], [0.0, 0.0])

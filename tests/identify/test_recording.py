@@ -138,16 +138,13 @@ FIELDS = st.one_of(
 )
 
 
-def sentences_about(path):
-    """Return what a person would read: the refusal, or the warnings."""
-    try:
-        return list(load_recording(path).warnings)
-    except HoppingLegError as error:
-        return [str(error)]
-
-
 def read(path):
-    for sentence in sentences_about(path):
+    """Check what a person would read: the refusal, or the warnings."""
+    try:
+        sentences = load_recording(path).warnings
+    except HoppingLegError as error:
+        sentences = [str(error)]
+    for sentence in sentences:
         assert sentence.startswith(str(path.parent))
         assert sentence.endswith((".", "?"))
 

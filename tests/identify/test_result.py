@@ -51,11 +51,9 @@ def test_what_does_not_exist_is_null():
 
 
 def test_without_a_closed_loop_its_pairs_are_null_and_nobody_tells_of_it():
-    nothing = (np.nan, np.nan)
+    nothing = dict.fromkeys(("closed_loop_position", "closed_loop_torque"), (np.nan, np.nan))
     known = {
-        when: dataclasses.replace(
-            getattr(identified(), when), closed_loop_position=nothing, closed_loop_torque=nothing
-        )
+        when: dataclasses.replace(getattr(identified(), when), **nothing)
         for when in ("validation", "start_validation")
     }
     tree = as_json(dataclasses.replace(identified(), **known))
@@ -99,13 +97,12 @@ def found_of(name, unit, value):
     """Return the identification as if its second parameter had been another."""
     found = identified()
     values = np.array([found.identifiability.values[0], value])
-    known = dataclasses.replace(found.identifiability, names=["hip.friction", name], values=values)
-    start = found.passes[-1].parameters.parameters[0]
-    parameters = dataclasses.replace(
-        found.passes[-1].parameters,
-        parameters=(start, dataclasses.replace(start, name=name, unit=unit)),
-    )
-    last = dataclasses.replace(found.passes[-1], parameters=parameters)
+    known = dataclasses.replace(found.identifiability, values=values)
+    searched = found.passes[-1].parameters
+    first = searched.parameters[0]
+    pair = (first, dataclasses.replace(first, name=name, unit=unit))
+    searched = dataclasses.replace(searched, parameters=pair)
+    last = dataclasses.replace(found.passes[-1], parameters=searched)
     return dataclasses.replace(found, identifiability=known, passes=(last,))
 
 
@@ -129,11 +126,8 @@ def test_a_delay_that_was_found_is_one_that_training_has(tmp_path, delay, latenc
 def test_an_impossible_robot_is_not_written(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text("old")
-    values = np.array([-1.0, 0.1])
-    found = dataclasses.replace(
-        identified(),
-        identifiability=dataclasses.replace(identified().identifiability, values=values),
-    )
+    known = dataclasses.replace(identified().identifiability, values=np.array([-1.0, 0.1]))
+    found = dataclasses.replace(identified(), identifiability=known)
     with pytest.raises(RobotError, match=r"hip\.friction"):
         save_robot(found, path, "legv2")
     assert path.read_text() == "old"

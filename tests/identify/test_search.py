@@ -3,31 +3,17 @@ import pickle
 import numpy as np
 import pytest
 
-from hopping_leg.identify.cost import Objective, Scoring
+from hopping_leg.identify.cost import Scoring
 from hopping_leg.identify.optimizers import CmaOptions, Found
-from hopping_leg.identify.parameters import LegHypothesis, choose
+from hopping_leg.identify.parameters import choose
 from hopping_leg.identify.plan import make_plan, pass_names
-from hopping_leg.identify.recording import make_recording
-from hopping_leg.identify.search import (
-    Searcher,
-    SearchOptions,
-    second_pass,
-)
-from hopping_leg.identify.windows import cut
+from hopping_leg.identify.search import Searcher, SearchOptions, second_pass
 from hopping_leg.workers import RayWorkers, map_rows
 from tests.clusters import two_machines
-from tests.identify.searches import CAD, TRUTH
-from tests.identify.searches import RUN as TWIN_RUN
-from tests.identify.twin import LEG, STEP, record, swing
+from tests.identify.searches import CAD, RUN, TRUTH, objective
+from tests.identify.twin import LEG, noisy
 
-RUN = record(LEG, swing(0.5))
-PARAMETERS = choose(LegHypothesis(LEG), ["hip.friction", "knee.damping"])
 VECTORS = np.random.default_rng(0).uniform(0, 1, (5, 2))
-
-
-def objective():
-    windows = tuple(cut([RUN], 0.25))
-    return Objective((RUN,), windows, PARAMETERS, Scoring(), STEP, threads=1)
 
 
 def test_a_population_in_parts_gets_the_same_costs():
@@ -68,20 +54,9 @@ def test_the_second_pass_stays_near_the_first():
             assert p.low == 0 or p.low >= 0.49 * p.start - p.scale
 
 
-def noisy(run):
-    """Return the run as seen by poor sensors, so that windows disagree."""
-    rng = np.random.default_rng(0)
-    table = run.trace.table.with_columns(
-        run.trace.table[f"{joint}_position_rad"] + rng.normal(scale=1e-3, size=len(run))
-        for joint in ("hip", "knee")
-    )
-    return make_recording(table, run.metadata, "noisy")
-
-
 def test_shares_of_the_windows_find_more_in_the_same_time():
-    parameters = choose(CAD, list(TRUTH))
-    run = noisy(TWIN_RUN)
-    goal = Objective((run,), tuple(cut([run], 0.1)), parameters, Scoring(), STEP)
+    run = noisy(RUN, position_rad=1e-3)  # so that windows disagree
+    goal = objective(choose(CAD, list(TRUTH)), Scoring(), [run], 0.1)
     plan = make_plan([run], LEG, parameters=tuple(TRUTH), search="cma")
     ends = []
     for generations, seconds in ((5, np.inf), (20, 0.5)):

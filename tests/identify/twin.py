@@ -62,6 +62,17 @@ def record(robot, targets, rig="fixed-base", rate=200.0, onboard="zoh", name="tw
     return make_recording(pl.DataFrame(columns), metadata, name)
 
 
+def noisy(run, **scales):
+    """Return a recording as seen by poor sensors, with these deviations."""
+    rng = np.random.default_rng(0)
+    table = run.trace.table.with_columns(
+        run.trace.table[f"{joint}_{name}"] + rng.normal(scale=scale, size=len(run))
+        for joint in ("hip", "knee")
+        for name, scale in scales.items()
+    )
+    return make_recording(table, run.metadata, "noisy")
+
+
 def changed(run, *expressions, **columns):
     """Return a recording with other columns, unchecked."""
     table = run.trace.table.with_columns(*expressions, **columns)

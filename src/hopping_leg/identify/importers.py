@@ -56,7 +56,7 @@ class LogFormat:
     derived: Callable[[pl.DataFrame], list[pl.Series]] = lambda _table: []
     """From the rig's table to columns of the recording beside those that are renamed."""
     own_rate: bool = False
-    """Whether the rate is that of the clock, which was never stated."""
+    """Whether the rate, never stated, is that of the clock to three digits, or 1 where unknown."""
 
     def read(self, table: pl.DataFrame) -> tuple[pl.DataFrame, RecordingMetadata]:
         """Return a recording's table and metadata from the rig's own table."""
@@ -64,16 +64,12 @@ class LogFormat:
         renamed = table.select(present).with_columns(pl.int_range(pl.len()).alias("row"))
         metadata = self.metadata
         if self.own_rate:
-            metadata = dataclasses.replace(metadata, rate_hz=_median_rate(table["t"]))
+            time = table["t"].drop_nulls().to_numpy()
+            steps = np.diff(time[np.isfinite(time)])
+            step = float(np.median(steps)) if len(steps) else 0.0
+            rate = float(f"{1 / step:.3g}") if 0 < step < np.inf else 1.0
+            metadata = dataclasses.replace(metadata, rate_hz=rate)
         return renamed.with_columns(self.derived(table)), metadata
-
-
-def _median_rate(time: pl.Series) -> float:
-    """Return the rate of a clock, Hz, to three digits; 1 where unknown."""
-    known = time.drop_nulls().to_numpy()
-    steps = np.diff(known[np.isfinite(known)])
-    step = float(np.median(steps)) if len(steps) else 0.0
-    return float(f"{1 / step:.3g}") if 0 < step < np.inf else 1.0
 
 
 _MEASURED = {"position": "{}_pos", "velocity": "{}_vel", "torque": "{}_tau"}

@@ -74,7 +74,7 @@ def jacobian(
 
     Args:
         residuals: Function of search vectors.
-        vector: Where, (k,).
+        vector: Where, (k,), within the bounds.
         bounds: Lower and upper, (k,) each.
         step: Difference in search coordinates.
         groups: Number of each residual's group, (m,), where groups jump now and then: each takes
@@ -297,8 +297,7 @@ def cma_es(
     for generation in range(options.generations):
         vectors = np.array(strategy.ask())
         if generation == len(costs):
-            judge = judges[generation % len(judges)]
-            costs.append(np.asarray(judge(vectors)).tolist())
+            costs.append(judges[generation % len(judges)](vectors).tolist())
             _save_state(checkpoint, identity, {"costs": costs})
         found = np.array(costs[generation])
         strategy.tell(list(vectors), found.tolist())
@@ -317,7 +316,7 @@ def cma_es(
         return Found(bests[-1], history[-1], count, history)
     spans = (1, len(shares), len(means) // 3 + 1)
     elected = np.array([*bests[-_RECENT:], *(np.mean(means[-n:], axis=0) for n in spans)])
-    final = np.asarray(values(elected))
+    final = values(elected)
     least = float(final.min())
     return Found(elected[final.argmin()], least, count + len(elected), [*history, least])
 

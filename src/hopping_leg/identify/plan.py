@@ -43,10 +43,10 @@ def check_recordings(recordings: Sequence[Recording], robot: Robot) -> None:
         RecordingError: Naming the file and what is wrong.
     """
     for recording in recordings:
-        torques = recording.metadata.onboard == "torque"
-        wanted = "torque_command" if torques else "position_command"
+        wanted, what = "position_command", "targets of its on-board PD"
+        if recording.metadata.onboard == "torque":
+            wanted, what = "torque_command", "commanded torques"
         if not recording.has(wanted):
-            what = "commanded torques" if torques else "targets of its on-board PD"
             raise RecordingError(
                 f"{recording.name} has no {what} ({', '.join(PAIRS[wanted])}), so that nothing says"
                 " what moved the leg; record them."
@@ -61,7 +61,7 @@ def check_recordings(recordings: Sequence[Recording], robot: Robot) -> None:
                 f" '{robot.name}' is a {robot.kind}; give its robot file with --robot."
             )
         for link in ("thigh", "shank"):
-            measured, given = getattr(own, link).length, getattr(robot, link).length
+            measured, given = (getattr(r, link).length for r in (own, robot))
             if abs(given / measured - 1) > _TOLERANCE:
                 raise RecordingError(
                     f"{recording.name} is of '{recording.metadata.robot}', whose {link} is"

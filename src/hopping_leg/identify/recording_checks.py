@@ -92,15 +92,15 @@ def _drop_zeros(inspection: Inspection) -> None:
 def _drop_startup(inspection: Inspection) -> None:
     """Leave out first rows in which sensors slept or commands were not applied."""
     known = inspection.metadata.startup_rows
+    already = inspection.row(0)
+    if known and already:
+        return  # saved again after they were left out
     rows, reason = max(
         (min(known, inspection.table.height), "the rig's start-up"),
         (_asleep(inspection), "all joints read zero, then jump"),
         (_unapplied(inspection), "commands beyond all later ones that no measured torque follows"),
         key=lambda found: found[0],
     )
-    already = inspection.row(0)
-    if known and already:
-        return  # saved again after they were left out
     if rows:
         pairs = PAIRS["torque_command"] + PAIRS["position"]
         present = [c for c in pairs if c in inspection.table.columns]
@@ -114,13 +114,11 @@ def _drop_startup(inspection: Inspection) -> None:
 
 def _asleep(inspection: Inspection) -> int:
     q = np.stack([inspection.floats(c) for c in PAIRS["position"]], axis=-1)
-    recorded = ~np.isnan(q).all(axis=0)
-    q = q[:, recorded]
+    q = q[:, ~np.isnan(q).all(axis=0)]
     awake = np.flatnonzero((np.nan_to_num(q) != 0).any(axis=-1))
     if not len(awake) or awake[0] == 0 or awake[0] > len(q) // 2:
         return 0
-    first = int(awake[0])
-    return first if np.nanmax(np.abs(q[first])) > _JUMP else 0
+    return int(awake[0]) if np.nanmax(np.abs(q[awake[0]])) > _JUMP else 0
 
 
 def _unapplied(inspection: Inspection) -> int:

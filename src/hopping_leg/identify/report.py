@@ -141,8 +141,7 @@ def _subtitle(identified: Identified) -> str:
 
 
 def _provenance(tree: dict[str, Any]) -> dict[str, str]:
-    rows = {"seed": str(tree["seed"]), "split": tree["split"]}
-    rows |= tree["versions"]
+    rows = {"seed": str(tree["seed"]), "split": tree["split"], **tree["versions"]}
     search = dict(tree["search"])
     passes, scales = search.pop("passes"), search.pop("scoring")
     rows |= {k.replace("_", " "): str(v) for k, v in search.items()}
