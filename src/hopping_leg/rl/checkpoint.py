@@ -29,13 +29,7 @@ _ARRAY = "__array__"
 
 
 def write_checkpoint(folder: Path, steps: int, tree: Tree) -> Path:
-    """Write ``folder/checkpoint-<steps>`` and delete all but the newest ``KEPT``.
-
-    Args:
-        folder: Folder of the run's checkpoints.
-        steps: Control steps so far; orders the checkpoints.
-        tree: Everything to keep.
-    """
+    """Write ``folder/checkpoint-<steps>`` and delete all but the newest ``KEPT``."""
     final = folder / f"{_PREFIX}{steps:012d}"
     part = folder / f"{final.name}.tmp"
     if final.exists():
@@ -86,7 +80,7 @@ def read_checkpoint(path: Path) -> Tree:
 
 
 def _split(node: Any, path: str, arrays: dict[str, Any]) -> Any:  # noqa: ANN401
-    """Return the tree with arrays moved to ``arrays`` and their places marked."""
+    """Return the tree with arrays moved to ``arrays``, a mark in the place of each."""
     if isinstance(node, dict):
         return {str(key): _split(value, f"{path}/{key}", arrays) for key, value in node.items()}
     if isinstance(node, list | tuple):

@@ -90,12 +90,7 @@ class Recipe:
     """``FILE.py:NAME`` of a recipe of one's own."""
 
     def replace(self, changes: Mapping[str, Any] | None = None, **more: Any) -> Self:  # noqa: ANN401
-        """Return the recipe with some options changed.
-
-        Args:
-            changes: By the names of ``paths``, or of whole parts.
-            more: The same, as keywords.
-        """
+        """Return the recipe with options changed, by the names of ``paths`` or of whole parts."""
         paths, changed = dict(self.paths()), self
         for name, value in {**(changes or {}), **more}.items():
             changed = replace_at(changed, paths.get(name, name), value)
@@ -142,12 +137,7 @@ class Recipe:
         return reward.with_terms(*self.reward_terms) if self.reward_terms else reward
 
     def make_model(self, env: TaskVecEnv, seed: int) -> Any:  # noqa: ANN401
-        """Build the untrained stable-baselines3 model, a subclass of ``AtBoundary``.
-
-        Args:
-            env: From ``make_env``.
-            seed: Seed of weights and exploration.
-        """
+        """Build the untrained stable-baselines3 model, a subclass of ``AtBoundary``."""
         if self.distillation is None:
             return self.algorithm.make_model(env, self.network, seed)
         commands = self.selection.eval_commands
@@ -165,10 +155,7 @@ class Recipe:
         self.algorithm.anneal(model, share)
 
     def early_score(self, model: Any) -> float | None:  # noqa: ANN401
-        """Return how bad a training is likely to end, m, None as long as that cannot be told.
-
-        Trainings side by side are compared as soon as it can.
-        """
+        """Return how bad a training is likely to end, m; None as long as that is unknown."""
         return self.distillation.early_score(model) if self.distillation else None
 
     def extra_results(self, model: Any) -> dict[str, Any]:  # noqa: ANN401

@@ -165,21 +165,21 @@ def test_an_observation_with_three_commands_is_refused():
 FLIGHT, STANCE = 40, 30
 
 
+def step(one, height, gap, command, begun=False):
+    """Show one leg for a tick; return the error that counts."""
+    shown = (np.array([value]) for value in (height, gap, command, begun))
+    return one.update(*shown)[0]
+
+
 def watch(apexes, commands=None, one=None):
     """Let one leg hop; return the error in every tick of every hop, (hops, ticks)."""
     one = one or HopErrors(1, 0.005)
-    commands = commands or [0.3] * len(apexes)
     errors = []
-    for apex, command in zip(apexes, commands, strict=True):
+    for apex, command in zip(apexes, commands or [0.3] * len(apexes), strict=True):
         rise = np.sin(np.linspace(0, np.pi, FLIGHT + 1))
         gap = np.concatenate([0.1 * rise[1:-1], np.zeros(STANCE)])
         height = np.concatenate([0.2 + (apex - 0.2) * rise[1:-1], np.full(STANCE, 0.19)])
-        errors.append(
-            [
-                one.update(np.array([h]), np.array([g]), np.array([command]), np.zeros(1, bool))[0]
-                for h, g in zip(height, gap, strict=True)
-            ]
-        )
+        errors.append([step(one, h, g, command) for h, g in zip(height, gap, strict=True)])
     return np.array(errors)
 
 
@@ -198,35 +198,23 @@ def test_nothing_counts_once_the_command_has_changed():
     watch([0.31], one=one)
     assert watch([0.31], [0.25], one).any()
     for _ in range(FLIGHT):
-        one.update(np.array([0.3]), np.array([0.1]), np.array([0.25]), np.zeros(1, bool))
-    after = [
-        one.update(np.array([0.2]), np.zeros(1), np.array([0.35]), np.zeros(1, bool))[0]
-        for _ in range(STANCE)
-    ]
-    assert not np.any(after)
+        step(one, 0.3, 0.1, 0.25)
+    assert not any(step(one, 0.2, 0.0, 0.35) for _ in range(STANCE))
 
 
 @pytest.mark.parametrize("ticks", [1, 10])
 def test_a_bounce_is_no_hop(ticks):
     one = HopErrors(1, 0.005)
-    nobody = np.zeros(1, bool)
     for _ in range(ticks):
-        one.update(np.array([0.25]), np.array([0.01]), np.array([0.3]), nobody)
-    errors = [one.update(np.array([0.2]), np.zeros(1), np.array([0.3]), nobody) for _ in range(40)]
-    assert not np.any(errors)
+        step(one, 0.25, 0.01, 0.3)
+    assert not any(step(one, 0.2, 0.0, 0.3) for _ in range(40))
 
 
 def test_a_new_episode_knows_of_no_hop():
     one = HopErrors(1, 0.005)
     for tick in range(FLIGHT):
-        one.update(
-            np.array([0.3]), np.array([0.1]), np.array([0.25]), np.array([tick == FLIGHT - 1])
-        )
-    errors = [
-        one.update(np.array([0.2]), np.zeros(1), np.array([0.25]), np.zeros(1, bool))
-        for _ in range(40)
-    ]
-    assert not np.any(errors)
+        step(one, 0.3, 0.1, 0.25, begun=tick == FLIGHT - 1)
+    assert not any(step(one, 0.2, 0.0, 0.25) for _ in range(40))
 
 
 def test_it_goes_on_from_its_state():

@@ -1,4 +1,4 @@
-"""Heights reckoned from the time in the air are those of a leg that flies like a stone."""
+"""Heights estimated from the time in the air are those of a leg that flies like a stone."""
 
 import numpy as np
 
@@ -7,11 +7,14 @@ from hopping_leg.rl.finetune.trial_data import TrialData
 from .trials import PERIOD, estimator, flying_leg
 
 
+def measured(q):
+    nothing = np.zeros_like(q)
+    return TrialData(q, nothing, nothing, nothing, np.full((len(q), 1), 0.3), PERIOD)
+
+
 def estimate(hops):
     q, height, flying = flying_leg(hops)
-    nothing = np.zeros_like(q)
-    data = TrialData(q, nothing, nothing, nothing, np.full((len(q), 1), 0.3), PERIOD)
-    return estimator(flying)(data), height, flying
+    return estimator(flying)(measured(q)), height, flying
 
 
 def test_apexes_of_a_stone_are_found_within_the_clocks_resolution():
@@ -29,18 +32,14 @@ def test_a_flicker_of_contact_does_not_cut_a_flight():
     q, _, flying = flying_leg([0.36])
     middle = int(np.flatnonzero(flying).mean())
     flying[middle : middle + 2] = False
-    nothing = np.zeros_like(q)
-    data = TrialData(q, nothing, nothing, nothing, np.full((len(q), 1), 0.3), PERIOD)
-    found = estimator(flying)(data).apexes[0]
+    found = estimator(flying)(measured(q)).apexes[0]
     assert len(found) == 1
     np.testing.assert_allclose(found[0, 1], 0.36, atol=0.004)
 
 
 def test_drag_lowers_apexes():
     q, _, flying = flying_leg([0.33])
-    nothing = np.zeros_like(q)
-    data = TrialData(q, nothing, nothing, nothing, np.full((len(q), 1), 0.3), PERIOD)
-    one = estimator(flying)
+    one, data = estimator(flying), measured(q)
     free = one(data).apexes[0][0, 1]
     one.drag = np.array([0.005, 0.0])
     np.testing.assert_allclose(free - one(data).apexes[0][0, 1], 0.005)

@@ -50,10 +50,7 @@ _KINDS = {bool: "true or false", int: "a whole number", float: "a number"}
 
 
 def get_recipe(name: str) -> Recipe:
-    """Return a shipped recipe, or one of the user's own.
-
-    Args:
-        name: Name of a shipped one, or ``path/to/file.py:NAME``, a ``Recipe`` or what makes one.
+    """Return a shipped recipe, or that of ``path/to/file.py:NAME``, a ``Recipe`` or its maker.
 
     Raises:
         UsageError: There is no such recipe.
@@ -71,11 +68,7 @@ def get_recipe(name: str) -> Recipe:
 
 
 def change(recipe: Recipe, changes: Sequence[str]) -> Recipe:
-    """Return a recipe with some of its options changed.
-
-    Args:
-        recipe: The defaults.
-        changes: Each ``name=value``, or ``part.name=value`` for an option of its reward, say.
+    """Return a recipe with options changed, each by ``name=value`` or ``part.name=value``.
 
     Raises:
         UsageError: The recipe has no such option, or the value is none.
@@ -86,27 +79,18 @@ def change(recipe: Recipe, changes: Sequence[str]) -> Recipe:
         name, _, text = entry.partition("=")
         if name not in known:
             raise UsageError(unknown_name(f"number of recipe '{recipe.name}'", name, known))
-        if name in _TEXTS:
-            if text not in _TEXTS[name]:
-                raise UsageError(unknown_name(f"value of '{name}'", text, _TEXTS[name]))
-            values[name] = text
-            continue
+        if name in _TEXTS and text not in _TEXTS[name]:
+            raise UsageError(unknown_name(f"value of '{name}'", text, _TEXTS[name]))
         kind = type(known[name])
         try:
-            value: float = (
-                _SWITCH[text.lower()]
-                if kind is bool
-                else float(text)
-                if kind is float
-                else int(text)
-            )
+            values[name] = _SWITCH[text.lower()] if kind is bool else kind(text)
+            valid = kind is str or math.isfinite(values[name])
         except (ValueError, KeyError):
-            value = math.nan
-        if not math.isfinite(value):
+            valid = False
+        if not valid:
             raise UsageError(
                 f"'{entry}' does not say {_KINDS[kind]}; give e.g. {name}={known[name]}."
             )
-        values[name] = value
     return recipe.replace(values)
 
 
@@ -127,23 +111,16 @@ def settings_of(recipe: Recipe) -> dict[str, int | float | str]:
 
 
 def changes_of(usual: Recipe, options: dict[str, Any]) -> list[str]:
-    """Return the ``name=value`` entries in which stored options differ from a recipe's defaults.
-
-    Args:
-        usual: The recipe as it is given by its name.
-        options: As in a run's ``config.json``.
-    """
+    """Return ``name=value`` of the options of a ``config.json`` that differ from a recipe's."""
     paths = dict(usual.paths())
     stored = {name: _at(options, paths[name], v) for name, v in settings_of(usual).items()}
     return [f"{name}={v}" for name, v in stored.items() if v != usual.value(name)]
 
 
 def words_of(name: str, options: dict[str, Any]) -> list[str]:
-    """Return the options of ``hop train`` beside ``--recipe`` that make a recipe.
+    """Return the words of ``hop train`` beside ``--recipe`` that make a recipe.
 
-    Args:
-        name: Name of the recipe; one that is neither shipped nor a file's has no defaults.
-        options: As in a run's ``config.json``.
+    A recipe that is neither shipped nor a file's has none. The options are as in ``config.json``.
     """
     given = options.get("source") or name
     if name not in RECIPES and given == name:
@@ -162,10 +139,6 @@ def words_of(name: str, options: dict[str, Any]) -> list[str]:
 
 def recipe_of(name: str, options: dict[str, Any]) -> Recipe:
     """Return the recipe that a run was asked for, the inverse of ``words_of``.
-
-    Args:
-        name: Name of the recipe.
-        options: As in the run's ``config.json``.
 
     Raises:
         UsageError: There is no such recipe.
