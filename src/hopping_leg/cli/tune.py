@@ -91,17 +91,17 @@ def _tune_gains(args: GainSearch) -> None:
         ("command, m", "median before", "after", "std before, mm", "after"),
         [
             (
-                f"{before.command:.2f}",
-                *(f"{result.median:.4f}" for result in (before, after)),
-                *(f"{1e3 * result.std:.1f}" for result in (before, after)),
+                f"{before['command']:.2f}",
+                *(f"{score['median']:.4f}" for score in (before, after)),
+                *(f"{1e3 * score['std']:.1f}" for score in (before, after)),
             )
-            for before, after in zip(tuned.before, tuned.after, strict=True)
+            for before, after in zip(tuned["before"], tuned["after"], strict=True)
         ],
     )
     gains = args.out / "gains.toml"
     say(f"Gains: {gains}; use: hop evaluate {gains}")
     if args.json is not None:
-        write_json(args.json, tuned.record())
+        write_json(args.json, tuned)
 
 
 def _tune_recipe(args: RecipeSearch) -> None:

@@ -3,14 +3,13 @@
 A thin layer around any controller, since none was made to stand; it measures the joints alone.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.controllers.energy_shaping.gains import load_gains, scale_gains
-from hopping_leg.controllers.energy_shaping.observer import DatedObserver
 from hopping_leg.controllers.energy_shaping.phases import FLIGHT_LIMIT, TouchdownDetector
 from hopping_leg.controllers.energy_shaping.virtual_leg import (
     LegView,
@@ -23,6 +22,7 @@ from hopping_leg.controllers.energy_shaping.virtual_leg import (
 from hopping_leg.controllers.joint_pd import JointGains
 from hopping_leg.controllers.protocol import Controller, Measurement
 from hopping_leg.controllers.rollout import RolloutConfig
+from hopping_leg.controllers.sample_history import DatedObserver
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import kinematics, load_robot
 from hopping_leg.robot.model import GRAVITY
@@ -46,11 +46,10 @@ class LandingGains:
     """Damping of the damper."""
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            if not 0 <= getattr(self, field.name) < float("inf"):
+        for name, value in vars(self).items():
+            if not 0 <= value < float("inf"):
                 raise UsageError(
-                    f"'{field.name}' of the landing is {getattr(self, field.name)} but must be zero"
-                    " or more and finite."
+                    f"Landing: '{name}' is {value} but must be finite and not below 0."
                 )
         if not 0 < self.length < 1:
             raise UsageError(f"'length' of the landing is {self.length} but must be below 1.")
@@ -248,9 +247,10 @@ class StandHopLand:
 
     def act(self, measurement: Measurement) -> Array:
         """Return joint torques, N m, (n, 2)."""
-        leg = view_leg(self.robot, self._observer.update(measurement))
+        leg = view_leg(self.robot, *self._observer.update(measurement))
         self._clock = self._clock + self._period
-        self._hand_over()
+        ready = (self._mode == Mode.STAND) & (self._clock > STAND_SECONDS)
+        self._enter(ready & (self._made < self.hops), Mode.HOP)
         hopping = self._mode == Mode.HOP
         if hopping.any():
             self._count_hops(leg, hopping)
@@ -259,27 +259,18 @@ class StandHopLand:
         rested = (self._mode == Mode.BRAKE) & (self._clock > _BRAKE_SECONDS)
         self._from = np.where(rested[:, None], leg.q, self._from)
         self._enter(rested, Mode.STAND)
-        torque = np.zeros_like(leg.q)
-        for mode, answer in (
-            (Mode.STAND, self._stand(leg)),
-            (Mode.FLY, falling),
-            (Mode.BRAKE, self._landing.brake(leg)),
-        ):
-            torque = np.where((self._mode == mode)[:, None], answer, torque)
+        modes = self._mode[:, None]
+        torque = np.where(modes == Mode.STAND, self._stand(leg), 0.0)
+        torque = np.where(modes == Mode.FLY, falling, torque)
+        torque = np.where(modes == Mode.BRAKE, self._landing.brake(leg), torque)
         if self._controller is not None and (self._mode == Mode.HOP).any():
-            wanted = self._controller.act(measurement)
-            torque = np.where((self._mode == Mode.HOP)[:, None], wanted, torque)
+            torque = np.where(modes == Mode.HOP, self._controller.act(measurement), torque)
         self._torque = torque
         return torque
 
     def internals(self) -> dict[str, Array]:
         """Return mode and hops counted at the last tick."""
         return {"mode": self._mode.astype(np.float64), "counted_hops": self._made.astype(float)}
-
-    def _hand_over(self) -> None:
-        """Let all standing legs that have not hopped yet hop, once they have stood long enough."""
-        ready = (self._mode == Mode.STAND) & (self._clock > STAND_SECONDS)
-        self._enter(ready & (self._made < self.hops), Mode.HOP)
 
     def _count_hops(self, leg: LegView, hopping: BoolArray) -> None:
         left = self._liftoff.update(leg, leg_force(self.robot, leg.q, self._torque))

@@ -10,7 +10,6 @@ import numpy as np
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.controllers.energy_shaping import equations
 from hopping_leg.controllers.energy_shaping.gains import Gain, ShapingGains, ShapingOptions
-from hopping_leg.controllers.energy_shaping.observer import DatedObserver, LatestObserver
 from hopping_leg.controllers.energy_shaping.phases import (
     BRAKE_LIMIT,
     FLIGHT_LIMIT,
@@ -26,6 +25,7 @@ from hopping_leg.controllers.energy_shaping.virtual_leg import (
     retraction,
     view_leg,
 )
+from hopping_leg.controllers.sample_history import DatedObserver
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
@@ -75,7 +75,9 @@ class EnergyShaping:
         self.gains = gains or ShapingGains()
         self.options = options or ShapingOptions()
         self.truth: Truth | None = None
-        self._longest = _longest_leg(robot)
+        thigh, shank = robot.thigh.length, robot.shank.length
+        bent = 2 * thigh * shank * np.cos(robot.knee.upper)
+        self._longest = float(np.sqrt(thigh**2 + shank**2 + bent))
 
     def watch(self, legs: Truth) -> None:
         """Take the true state where an option reads ``"true"``, else ignore it."""
@@ -84,17 +86,10 @@ class EnergyShaping:
 
     def reset(self, count: int) -> None:
         """Forget everything; the legs stand and push next."""
-        options = self.options
-        if options.state == "dated":
-            self._observer: DatedObserver | LatestObserver = DatedObserver(
-                self.period, self.gains.position_pull
-            )
-        else:
-            self._observer = LatestObserver()
+        self._observer = DatedObserver(self.period, self.gains.position_pull)
         self._observer.reset(count)
-        self._detector = TouchdownDetector(
-            self.robot, count, debounced=options.contact == "debounced"
-        )
+        debounced = self.options.contact == "debounced"
+        self._detector = TouchdownDetector(self.robot, count, debounced=debounced)
         self._phases = Phases(count)
         self._k_ratio = np.ones(count)
         self._length_0 = np.full(count, np.nan)
@@ -110,7 +105,10 @@ class EnergyShaping:
     def act(self, measurement: Measurement) -> Array:
         """Return joint torques, N m, (n, 2)."""
         command = measurement.command[:, 0]
-        leg = view_leg(self.robot, self._observer.update(measurement))
+        joints = measurement.q[:, 0], measurement.qd[:, 0]
+        if self.options.state == "dated":
+            joints = self._observer.update(measurement)
+        leg = view_leg(self.robot, *joints)
         self._length_0 = np.where(np.isnan(self._length_0), leg.length, self._length_0)
         self._pushed = np.where(np.isnan(self._pushed), command, self._pushed)
         self._phases.tick(self.period)
@@ -119,13 +117,16 @@ class EnergyShaping:
         landing = self._length(gains.landing_length, gains.landing_slope, command)
         self._end_touchdown(leg, command)
         self._end_push(leg, liftoff)
-        posture, posture_rate = self._posture(landing)
+        target = kinematics.joint_angles(self.robot, np.stack([landing, 0 * landing], axis=-1))
+        posture, posture_rate = retraction(
+            self._liftoff_q, target, self._phases.clock, gains.retract_time
+        )
         flying = flight_torque(gains, leg, posture, posture_rate)
         self._end_flight(leg, posture_rate, flying, command)
         self._estimate_height(leg)
-        pressing = foot_force_torque(
-            self.robot, leg.q, self._force(leg, command, liftoff, landing), self._side(leg)
-        )
+        push = self._force(leg, command, liftoff, landing)
+        side = -gains.kp_y * leg.y - gains.kd_y * leg.y_rate
+        pressing = foot_force_torque(self.robot, leg.q, push, side)
         self._share, self._rate = self._pressing_share(leg, liftoff), leg.rate
         return flying + self._share[:, None] * (pressing - flying)
 
@@ -160,9 +161,6 @@ class EnergyShaping:
         brake = brake - gains.touchdown_damping * leg.rate
         return np.where(self._phases.are(Phase.LIFTOFF), thrust, brake)
 
-    def _side(self, leg: LegView) -> Array:
-        return -self.gains.kp_y * leg.y - self.gains.kd_y * leg.y_rate
-
     def _pressing_share(self, leg: LegView, liftoff: Array) -> Array:
         """Return how much of the coming period the foot presses the ground, 0 to 1, (n,)."""
         share = np.where(self._phases.are(Phase.FLIGHT), 0.0, 1.0)
@@ -170,10 +168,6 @@ class EnergyShaping:
             until = equations.share_of_period(leg.length, leg.rate, liftoff, self.period)
             share = np.where(self._phases.are(Phase.LIFTOFF), until, share)
         return share
-
-    def _posture(self, landing: Array) -> tuple[Array, Array]:
-        target = kinematics.joint_angles(self.robot, np.stack([landing, 0 * landing], axis=-1))
-        return retraction(self._liftoff_q, target, self._phases.clock, self.gains.retract_time)
 
     def _end_push(self, leg: LegView, liftoff: Array) -> None:
         clock, rate, since = self._phases.clock, leg.rate, np.zeros_like(leg.rate)
@@ -245,9 +239,3 @@ class EnergyShaping:
                 "Options that read 'true' exist in simulation only, where `watch` shows the legs."
             )
         return self.truth
-
-
-def _longest_leg(robot: Robot) -> float:
-    """Return the leg length at the knee's soft limit, m."""
-    thigh, shank, knee = robot.thigh.length, robot.shank.length, robot.knee.upper
-    return float(np.sqrt(thigh**2 + shank**2 + 2 * thigh * shank * np.cos(knee)))

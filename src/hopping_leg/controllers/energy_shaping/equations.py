@@ -77,13 +77,7 @@ def updated_gain(gain: Array, desired: Array, reached: Array, exponent: Gain) ->
 
 
 def ballistic_height(liftoff_height: Array, liftoff_rate: Array, airborne: Array) -> Array:
-    """Return the height in free flight, m, (n,).
-
-    Args:
-        liftoff_height: x_l, m, (n,).
-        liftoff_rate: Base velocity at lift-off, m/s, (n,).
-        airborne: Time since lift-off, s, (n,).
-    """
+    """Return the height in free flight from x_l at a time since lift-off, s, m, (n,)."""
     return liftoff_height + liftoff_rate * airborne - 0.5 * GRAVITY * airborne**2
 
 

@@ -4,6 +4,7 @@ A gain file is one TOML per tuned set, beside the leg it was found on.
 """
 
 import dataclasses
+import json
 import tomllib
 from dataclasses import dataclass
 from importlib import resources
@@ -15,7 +16,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
 from hopping_leg.io import read_dataclass, write_atomically
-from hopping_leg.robot.parameters import Joint, Robot
+from hopping_leg.robot.parameters import JOINTS, Robot
 
 Gain = float | Array
 """One value for all legs or one per leg, (n,)."""
@@ -110,49 +111,44 @@ TRUE_CONTACT = ShapingOptions(contact="true", height="true")
 ROBUST = ShapingOptions("dated", "debounced", "timed", "flight_time", "pushed")
 """The readings of the tuned controller."""
 
-_LENGTHS = ("liftoff_length", "landing_length", "height_offset", "reference")
-_FORCES = (
-    "kp_y",
-    "kd_y",
-    "push_damping",
-    "touchdown_stiffness",
-    "touchdown_damping",
-    "touchdown_force",
-)
-_TIMES = ("retract_time", "flight_min", "push_rate", "touchdown_rate")
-_TIMES_PER_LENGTH = ("flight_min_slope", "push_rate_slope")
+_POWERS_OF_SIZE = {
+    "liftoff_length": 1.0,
+    "landing_length": 1.0,
+    "height_offset": 1.0,
+    "reference": 1.0,
+    "retract_time": 0.5,
+    "flight_min": 0.5,
+    "push_rate": 0.5,
+    "touchdown_rate": 0.5,
+    "flight_min_slope": -0.5,
+    "push_rate_slope": -0.5,
+}
+_FORCES: tuple[str, ...] = ("kp_y", "kd_y", "push_damping")
+_FORCES += ("touchdown_stiffness", "touchdown_damping", "touchdown_force")
 
 
 def scale_gains(gains: ShapingGains, origin: Robot, robot: Robot) -> ShapingGains:
-    """Carry gains over to another leg.
+    """Carry gains over from the leg ``origin`` to another.
 
     Lengths grow with its size, forces with its mass, times and speeds with the root of its size
     as those of a fall do, and the flight PD with its inertia, less what its joints damp anyway.
-
-    Args:
-        gains: Found for ``origin``.
-        origin: The leg they were found for.
-        robot: The leg they are wanted for.
     """
-    size = _reach(robot) / _reach(origin)
-    mass = robot.mass / origin.mass
-    hip, knee = joint_inertia(robot) / joint_inertia(origin)
-    factors = dict.fromkeys(_LENGTHS, size) | dict.fromkeys(_FORCES, mass)
-    factors |= dict.fromkeys(_TIMES, size**0.5) | dict.fromkeys(_TIMES_PER_LENGTH, size**-0.5)
-    factors |= {"k0_slope": 1 / size}
-    factors |= {"hip_stiffness": hip, "knee_stiffness": knee}
+    size = (robot.thigh.length + robot.shank.length) / (origin.thigh.length + origin.shank.length)
+    factors = {name: size**power for name, power in _POWERS_OF_SIZE.items()}
+    factors["k0_slope"] = 1 / size
+    factors |= dict.fromkeys(_FORCES, robot.mass / origin.mass)
     scaled = {name: getattr(gains, name) * factor for name, factor in factors.items()}
-    scaled["hip_damping"] = _damping(gains.hip_damping, origin.hip, robot.hip, hip)
-    scaled["knee_damping"] = _damping(gains.knee_damping, origin.knee, robot.knee, knee)
+    inertia = _joint_inertia(robot) / _joint_inertia(origin)
+    for joint, factor in zip(JOINTS, inertia, strict=True):
+        scaled[f"{joint}_stiffness"] = getattr(gains, f"{joint}_stiffness") * factor
+        damped = getattr(gains, f"{joint}_damping") + getattr(origin, joint).damping
+        scaled[f"{joint}_damping"] = np.maximum(
+            damped * factor - getattr(robot, joint).damping, 0.0
+        )
     return dataclasses.replace(gains, **scaled)
 
 
-def _damping(gain: Gain, origin: Joint, joint: Joint, inertia: float) -> Array:
-    """Return the gain that makes the joint as damped as at its origin, N m s/rad."""
-    return np.maximum((gain + origin.damping) * inertia - joint.damping, 0.0)
-
-
-def joint_inertia(robot: Robot) -> Array:
+def _joint_inertia(robot: Robot) -> Array:
     """Return the inertia about hip and knee with the knee bent by a right angle, kg m2, (2,)."""
     thigh, shank = robot.thigh, robot.shank
     knee = shank.inertia + shank.mass * shank.com**2
@@ -160,29 +156,20 @@ def joint_inertia(robot: Robot) -> Array:
     return np.array([hip, knee]) + robot.of_joints("armature")
 
 
-def _reach(robot: Robot) -> float:
-    return robot.thigh.length + robot.shank.length
-
-
 _SHIPPED = resources.files("hopping_leg.controllers") / "gains"
-_NAMES = [field.name for field in dataclasses.fields(ShapingGains)]
 
 TUNED = "energy-shaping"
 """Name of the shipped set."""
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class GainFile:
-    """A tuned set.
-
-    Attributes:
-        robot: Name or path of the leg it was found on.
-        source: How it was found.
-        gains: The set.
-    """
+    """A tuned set."""
 
     robot: str
+    """Name or path of the leg it was found on."""
     source: str
+    """How it was found."""
     gains: ShapingGains
 
 
@@ -205,10 +192,7 @@ def load_gains(name_or_path: str | Path = TUNED) -> GainFile:
 
 def save_gains(path: Path, found: GainFile) -> None:
     """Write a tuned set; an existing file is replaced only once the new one is complete."""
-    lines = [f"robot = {_quoted(found.robot)}", f"source = {_quoted(found.source)}", "", "[gains]"]
-    lines += [f"{name} = {float(getattr(found.gains, name))!r}" for name in _NAMES]
+    # A JSON string is a TOML one.
+    lines = [f"robot = {json.dumps(found.robot)}", f"source = {json.dumps(found.source)}", ""]
+    lines += ["[gains]", *(f"{name} = {float(v)!r}" for name, v in vars(found.gains).items())]
     write_atomically(path, ("\n".join(lines) + "\n").encode())
-
-
-def _quoted(text: str) -> str:
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'

@@ -5,6 +5,7 @@ call repeats the search from them without simulating.
 """
 
 import dataclasses
+import itertools
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -45,25 +46,22 @@ _KNEE, _BASE = 0.012, 0.06
 
 @dataclass(frozen=True)
 class CommandScore:
-    """How a candidate hops at one command.
-
-    Attributes:
-        command: Desired apex, m.
-        median: Median of all apexes, m; NaN without hops.
-        std: Standard deviation of all apexes, m.
-        rate: Hops per second.
-        flight: Share of the time with the foot off the ground.
-        knee_clearance: Least gap between knee and ground, m.
-        base_clearance: Least gap between base and ground, m.
-    """
+    """How a candidate hops at one command."""
 
     command: float
+    """Desired apex, m."""
     median: float
+    """Median of all apexes, m; NaN without hops."""
     std: float
+    """Standard deviation of all apexes, m; NaN without hops."""
     rate: float
+    """Hops per second."""
     flight: float
+    """Share of the time with the foot off the ground."""
     knee_clearance: float
+    """Least gap between knee and ground, m."""
     base_clearance: float
+    """Least gap between base and ground, m."""
 
 
 def score(rollout: Rollout, command: float, legs: slice) -> CommandScore:
@@ -153,18 +151,19 @@ SPACE: dict[str, tuple[float, float]] = {
 k0 only sets the first hops, the height calibration follows from the medians."""
 
 
+_LOW, _HIGH = np.array(list(SPACE.values())).T
+
+
 def to_unit(gains: ShapingGains) -> Array:
     """Return the searched gains as a point in the unit cube."""
-    low, high = np.array(list(SPACE.values())).T
     values = np.array([float(getattr(gains, name)) for name in SPACE])
-    point: Array = np.clip((values - low) / (high - low), 0.0, 1.0)
+    point: Array = np.clip((values - _LOW) / (_HIGH - _LOW), 0.0, 1.0)
     return point
 
 
 def from_unit(point: Array, base: ShapingGains) -> ShapingGains:
     """Return ``base`` with the searched gains of a point in the unit cube."""
-    low, high = np.array(list(SPACE.values())).T
-    values = low + np.clip(point, 0.0, 1.0) * (high - low)
+    values = _LOW + np.clip(point, 0.0, 1.0) * (_HIGH - _LOW)
     return dataclasses.replace(base, **dict(zip(SPACE, values.tolist(), strict=True)))
 
 
@@ -205,37 +204,34 @@ class Search:
 
 
 def evaluate(
-    candidates: list[ShapingGains], setup: RolloutConfig, seconds: float, seed: int
+    candidates: list[ShapingGains], config: RolloutConfig, seconds: float, seed: int
 ) -> list[list[CommandScore]]:
     """Let candidates hop at every command and first gain, all in one rollout.
 
     Returns:
         For each candidate its score at each of ``COMMANDS``.
     """
-    runs = len(COMMANDS) * len(FIRST_GAINS)
-    stacked = stack_gains(candidates, runs)
-    factor = np.tile(FIRST_GAINS, len(candidates) * len(COMMANDS))
-    stacked = dataclasses.replace(stacked, k0=stacked.k0 * factor)
-    command = np.tile(np.repeat(COMMANDS, len(FIRST_GAINS)), len(candidates))
-    ticks = round(seconds * setup.rate)
-    controller = EnergyShaping(setup.robot, stacked, ROBUST, rate=setup.rate)
-    run = rollout(controller, setup, np.tile(command, (ticks, 1)), seed)
+    firsts = len(FIRST_GAINS)
+    runs = len(COMMANDS) * firsts
+    fields = [field.name for field in dataclasses.fields(ShapingGains)]
+    stacked = {n: np.repeat([getattr(c, n) for c in candidates], runs) for n in fields}
+    stacked["k0"] = stacked["k0"] * np.tile(FIRST_GAINS, len(candidates) * len(COMMANDS))
+    command = np.tile(np.repeat(COMMANDS, firsts), len(candidates))
+    controller = EnergyShaping(config.robot, ShapingGains(**stacked), ROBUST, rate=config.rate)
+    ticks = round(seconds * config.rate)
+    run = rollout(controller, config, np.tile(command, (ticks, 1)), seed)
     return [
-        [_score_command(run, c, i * runs + j * len(FIRST_GAINS)) for j, c in enumerate(COMMANDS)]
-        for i in range(len(candidates))
+        [
+            score(run, c, slice(first, first + firsts))
+            for c, first in zip(COMMANDS, range(i, i + runs, firsts), strict=True)
+        ]
+        for i in range(0, len(candidates) * runs, runs)
     ]
-
-
-def stack_gains(candidates: list[ShapingGains], runs: int) -> ShapingGains:
-    """Return one set whose gains have a value per leg, each candidate ``runs`` times in a row."""
-    names = [f.name for f in dataclasses.fields(ShapingGains)]
-    columns = {n: np.repeat([getattr(c, n) for c in candidates], runs) for n in names}
-    return ShapingGains(**columns)
 
 
 def search(
     start: ShapingGains,
-    setup: RolloutConfig,
+    config: RolloutConfig,
     options: Search,
     seed: int,
     log: Path,
@@ -245,7 +241,7 @@ def search(
 
     Args:
         start: Where to begin.
-        setup: The world to hop in.
+        config: The world to hop in.
         options: How long.
         seed: Seed of the search; noise and delay take seeds 0 to 8 in turn.
         log: One JSON line per generation; an interrupted search goes on from it.
@@ -253,6 +249,7 @@ def search(
     """
     strategy = seeded_strategy(to_unit(start), options.step, [0.0, 1.0], options.population, seed)
     known = _read_log(log, options, seed)
+    log.parent.mkdir(parents=True, exist_ok=True)
     lowest = np.inf
     for generation in range(options.generations):
         points = strategy.ask()
@@ -260,57 +257,15 @@ def search(
             costs = known[generation]
         else:
             candidates = [from_unit(np.asarray(p), start) for p in points]
-            scores = evaluate(candidates, setup, options.seconds, generation % _LAST_SEED)
+            scores = evaluate(candidates, config, options.seconds, generation % _LAST_SEED)
             costs = [cost(s, options.flight) for s in scores]
-            _append_log(log, {"seed": seed, "flight": options.flight, "costs": costs})
+            entry = {"seed": seed, "flight": options.flight, "costs": costs}
+            with log.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(entry) + "\n")
         strategy.tell(points, costs)
         lowest = min(lowest, *costs)
         report(generation + 1, lowest)
     return from_unit(np.asarray(strategy.result.xfavorite), start)
-
-
-def calibrate(
-    gains: ShapingGains, setup: RolloutConfig, seconds: float, rounds: int = 2
-) -> ShapingGains:
-    """Return the gains with the height estimate corrected so that medians meet the commands."""
-    for seed in range(rounds):
-        scores = evaluate([gains] * 4, setup, seconds, seed)
-        gains = calibrated(gains, [s for candidate in scores for s in candidate])
-    return gains
-
-
-@dataclass(frozen=True)
-class Tuned:
-    """What a search found.
-
-    Attributes:
-        gains: The better of start and find, calibrated.
-        before: Scores of the start, calibrated as well, one per command.
-        after: Scores of the find.
-        generations: How long the search was.
-        flight: Share of the time in the air that was asked for.
-        seed: Seed of the search.
-    """
-
-    gains: ShapingGains
-    before: list[CommandScore]
-    after: list[CommandScore]
-    generations: int
-    flight: float
-    seed: int
-
-    def record(self) -> dict[str, Any]:
-        """Return everything as plain values."""
-        return {
-            "generations": self.generations,
-            "seed": self.seed,
-            "flight": self.flight,
-            "cost_before_mm": cost(self.before, self.flight),
-            "cost_after_mm": cost(self.after, self.flight),
-            "before": [dataclasses.asdict(s) for s in self.before],
-            "after": [dataclasses.asdict(s) for s in self.after],
-            "gains": {k: float(v) for k, v in dataclasses.asdict(self.gains).items()},
-        }
 
 
 def tune(
@@ -321,8 +276,8 @@ def tune(
     seed: int,
     out: Path,
     report: Callable[[int, float], None],
-) -> Tuned:
-    """Search gains for a leg and write them to ``out / "gains.toml"``.
+) -> dict[str, Any]:
+    """Search gains for a leg and write the better of start and find to ``out / "gains.toml"``.
 
     Args:
         robot: The leg.
@@ -332,17 +287,31 @@ def tune(
         seed: Seed of the search.
         out: Folder for the log and the gains.
         report: Called with (generations done, lowest cost so far).
+
+    Returns:
+        Plain values: the search, its costs, gains, and scores of start and find, both calibrated.
     """
-    setup = RolloutConfig(robot, threads=options.threads)
+    config = RolloutConfig(robot, threads=options.threads)
     found = load_gains(start)
     first = scale_gains(found.gains, load_robot(found.robot), robot)
-    best = search(first, setup, options, seed, out / "log.jsonl", report)
-    before, after = (calibrate(g, setup, options.seconds) for g in (first, best))
-    scores = [evaluate([g], setup, 2 * options.seconds, _LAST_SEED)[0] for g in (before, after)]
+    pair = [first, search(first, config, options, seed, out / "log.jsonl", report)]
+    for noise, i in itertools.product(range(2), range(2)):
+        tried = evaluate([pair[i]] * 4, config, options.seconds, noise)
+        pair[i] = calibrated(pair[i], list(itertools.chain(*tried)))
+    scores = [evaluate([g], config, 2 * options.seconds, _LAST_SEED)[0] for g in pair]
     costs = [cost(s, options.flight) for s in scores]
-    better = after if costs[1] < costs[0] else before
+    better = pair[1] if costs[1] < costs[0] else pair[0]
     save_gains(out / "gains.toml", GainFile(robot_name, _command(start, options, seed), better))
-    return Tuned(better, scores[0], scores[1], options.generations, options.flight, seed)
+    return {
+        "generations": options.generations,
+        "seed": seed,
+        "flight": options.flight,
+        "cost_before_mm": costs[0],
+        "cost_after_mm": costs[1],
+        "before": [dataclasses.asdict(s) for s in scores[0]],
+        "after": [dataclasses.asdict(s) for s in scores[1]],
+        "gains": {k: float(v) for k, v in vars(better).items()},
+    }
 
 
 def _command(start: str, options: Search, seed: int) -> str:
@@ -356,32 +325,21 @@ def _command(start: str, options: Search, seed: int) -> str:
     return " ".join(words)
 
 
-def _score_command(rollout: Rollout, command: float, first: int) -> CommandScore:
-    return score(rollout, command, slice(first, first + len(FIRST_GAINS)))
-
-
 def _read_log(log: Path, options: Search, seed: int) -> list[list[float]]:
     """Return the costs of finished generations; a line cut short by a kill is dropped."""
+    known: list[list[float]] = []
     if not log.is_file():
-        return []
-    lines, known = log.read_text(encoding="utf-8").splitlines(), []
-    for line in lines:
-        try:
-            entry = json.loads(line)
-        except json.JSONDecodeError:
-            break
+        return known
+    whole = [
+        line for line in log.read_text(encoding="utf-8").splitlines(True) if line[-2:] == "}\n"
+    ]
+    for entry in map(json.loads, whole):
         found = entry["seed"], len(entry["costs"]), entry.get("flight", 0.0)
         if found != (seed, options.population, options.flight):
             raise UsageError(
                 f"{log} belongs to a search with seed {found[0]}, population {found[1]} and flight"
                 f" {found[2]:g}; repeat with those or choose another --out."
             )
-        known.append([float(c) for c in entry["costs"]])
-    write_atomically(log, "".join(f"{line}\n" for line in lines[: len(known)]).encode())
+        known.append(entry["costs"])
+    write_atomically(log, "".join(whole).encode())
     return known
-
-
-def _append_log(log: Path, entry: dict[str, object]) -> None:
-    log.parent.mkdir(parents=True, exist_ok=True)
-    with log.open("a", encoding="utf-8") as file:
-        file.write(json.dumps(entry) + "\n")

@@ -10,40 +10,36 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.controllers.energy_shaping.gains import Gain, ShapingGains
-from hopping_leg.controllers.energy_shaping.observer import JointState
 from hopping_leg.robot import kinematics
 from hopping_leg.robot.parameters import Robot
 
 
 @dataclass(frozen=True)
 class LegView:
-    """State of n legs, all estimated.
-
-    Attributes:
-        q: Joint positions, rad, (n, 2).
-        qd: Joint velocities, rad/s, (n, 2).
-        length: Distance of the foot below the hip, m, (n,).
-        rate: Its derivative, m/s, (n,).
-        y: Forward offset of the foot, m, (n,).
-        y_rate: Its derivative, m/s, (n,).
-        stand: Base height if the foot stood on hard ground, m, (n,).
-    """
+    """State of n legs, all estimated."""
 
     q: Array
+    """Joint positions, rad, (n, 2)."""
     qd: Array
+    """Joint velocities, rad/s, (n, 2)."""
     length: Array
+    """Distance of the foot below the hip, m, (n,)."""
     rate: Array
+    """Its derivative, m/s, (n,)."""
     y: Array
+    """Forward offset of the foot, m, (n,)."""
     y_rate: Array
+    """Its derivative, m/s, (n,)."""
     stand: Array
+    """Base height if the foot stood on hard ground, m, (n,)."""
 
 
-def view_leg(robot: Robot, joints: JointState) -> LegView:
-    """Return the virtual leg of a joint state."""
-    foot = kinematics.foot_position(robot, joints.q)
-    speed = kinematics.foot_velocity(robot, joints.q, joints.qd)
+def view_leg(robot: Robot, q: Array, qd: Array) -> LegView:
+    """Return the virtual leg of joint positions and velocities, rad, rad/s, (n, 2)."""
+    foot = kinematics.foot_position(robot, q)
+    speed = kinematics.foot_velocity(robot, q, qd)
     stand = foot[:, 0] + robot.foot.radius
-    return LegView(joints.q, joints.qd, foot[:, 0], speed[:, 0], foot[:, 1], speed[:, 1], stand)
+    return LegView(q, qd, foot[:, 0], speed[:, 0], foot[:, 1], speed[:, 1], stand)
 
 
 def foot_force_torque(robot: Robot, q: Array, push: Array, side: Array) -> Array:
@@ -98,11 +94,7 @@ def retraction(start: Array, end: Array, elapsed: Array, duration: Gain) -> tupl
 
 def flight_torque(gains: ShapingGains, leg: LegView, target: Array, rate: Array) -> Array:
     """Return the torques of the flight PD towards a posture that moves, N m, (n, 2)."""
-    torque = per_joint(gains.hip_stiffness, gains.knee_stiffness) * (target - leg.q)
-    torque += per_joint(gains.hip_damping, gains.knee_damping) * (rate - leg.qd)
-    return torque
-
-
-def per_joint(hip: Gain, knee: Gain) -> Array:
-    """Return a gain of both joints, (2,) or (n, 2)."""
-    return np.stack(np.broadcast_arrays(np.asarray(hip, float), np.asarray(knee, float)), axis=-1)
+    stiffness = np.broadcast_arrays(gains.hip_stiffness, gains.knee_stiffness)
+    damping = np.broadcast_arrays(gains.hip_damping, gains.knee_damping)
+    behind, slower = target - leg.q, rate - leg.qd
+    return np.stack(stiffness, axis=-1) * behind + np.stack(damping, axis=-1) * slower
