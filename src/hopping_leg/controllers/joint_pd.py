@@ -34,8 +34,7 @@ class JointGains:
     """Torque per velocity error, N m s/rad."""
 
     def __post_init__(self) -> None:
-        for name in ("stiffness", "damping"):
-            values = getattr(self, name)
+        for name, values in vars(self).items():
             if not all(0 <= value < float("inf") for value in values):
                 raise UsageError(f"'{name}' of the joint PD is {values} but must be zero or more.")
 
@@ -65,9 +64,8 @@ class JointPD:
             raise UsageError(
                 f"Joint velocities are {self.velocity.shape} but the positions {position.shape}."
             )
-        self.gains = gains or JointGains()
-        self._stiffness = np.array(self.gains.stiffness)
-        self._damping = np.array(self.gains.damping)
+        gains = gains or JointGains()
+        self._stiffness, self._damping = np.array(gains.stiffness), np.array(gains.damping)
         self.name = "joint-pd"
         self.reset(1)
 
@@ -86,11 +84,9 @@ class JointPD:
     def internals(self) -> dict[str, Array]:
         """Return the targets of the last ``act``, each (n,)."""
         tick = max(self._tick, 0)
+        targets = {"position_command_rad": self.position, "velocity_command_rad_s": self.velocity}
         return {
-            f"{joint}_{kind}": np.full(self._count, row[tick, column])
-            for kind, row in (
-                ("position_command_rad", self.position),
-                ("velocity_command_rad_s", self.velocity),
-            )
+            f"{joint}_{kind}": np.full(self._count, rows[tick, column])
+            for kind, rows in targets.items()
             for column, joint in enumerate(JOINTS)
         }

@@ -87,12 +87,8 @@ class ThreeSamples(ObservationHistory):
 
     def inputs(self) -> Inputs:
         """Return the samples as they are."""
-        m = self._measurement
-        return {
-            "q": m.q.astype(np.float32),
-            "qd": m.qd.astype(np.float32),
-            "command": m.command.astype(np.float32),
-        }
+        names = ("q", "qd", "command")
+        return {name: getattr(self._measurement, name).astype(np.float32) for name in names}
 
 
 def _dated_shapes(

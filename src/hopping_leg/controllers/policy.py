@@ -91,26 +91,21 @@ class Card:
 class Policy:
     """Runs a policy file; implements ``Controller``.
 
+    Args:
+        content: The ONNX file.
+        origin: Where it came from, for error messages.
+        name: Shown in tables.
+
     Attributes:
         card: What the file says about itself.
-        content: The ONNX file.
         digest: First 16 hex digits of the file's SHA-256.
+
+    Raises:
+        PolicyError: The content is no policy file that this version can run.
     """
 
     def __init__(self, content: bytes, origin: str, name: str) -> None:
-        """Load a policy.
-
-        Args:
-            content: The ONNX file.
-            origin: Where it came from, for error messages.
-            name: Shown in tables.
-
-        Raises:
-            PolicyError: The content is no policy file that this version can run.
-        """
-        self.name = name
-        self.origin = origin
-        self.content = content
+        self.name, self.origin, self.content = name, origin, content
         self.digest = hashlib.sha256(content).hexdigest()[:16]
         self._session = _open(content, origin)
         text = self._session.get_modelmeta().custom_metadata_map.get(METADATA_KEY)
@@ -217,11 +212,10 @@ class Policy:
         return {}
 
     def _check_command(self, command: Array) -> None:
-        newest = command[:, 0]
-        low, high = (newest[0], newest[0]) if len(newest) == 1 else (newest.min(), newest.max())
-        card = self.card
-        if not (low >= card.command_low - _ROUNDING and high <= card.command_high + _ROUNDING):
-            worst = low if not low >= card.command_low - _ROUNDING else high
+        newest, card = command[:, 0], self.card
+        low, high = card.command_low - _ROUNDING, card.command_high + _ROUNDING
+        if not (low <= newest.min() and newest.max() <= high):
+            worst = newest[~((low <= newest) & (newest <= high))][0]
             raise UsageError(
                 f"{self.name} was trained for commands from {card.command_low:g} to"
                 f" {card.command_high:g} m, not for {worst:g} m."

@@ -26,7 +26,7 @@ from hopping_leg.sim import (
     make_simulator,
 )
 from hopping_leg.sim.perturbation import Perturbation, Perturber
-from hopping_leg.trace import Trace
+from hopping_leg.trace import COLUMNS, Trace
 
 _START_SHARE = 0.2 / 0.29
 """Leg length of the standing start as a share of the straight leg's."""
@@ -34,22 +34,8 @@ _START_SHARE = 0.2 / 0.29
 _IMPOSSIBLE = 1e4
 """Joint speed that no leg reaches, rad/s."""
 
-_STACKED = {
-    "height_m": 0,
-    "height_rate_m_s": 1,
-    "hip_position_rad": 2,
-    "knee_position_rad": 3,
-    "hip_velocity_rad_s": 4,
-    "knee_velocity_rad_s": 5,
-    "hip_command_nm": 6,
-    "knee_command_nm": 7,
-    "hip_torque_nm": 8,
-    "knee_torque_nm": 9,
-    "foot_clearance_m": 10,
-    "knee_clearance_m": 11,
-    "base_clearance_m": 12,
-    "command_m": 13,
-}
+_COLUMNS = (*list(COLUMNS)[2:], "command_m")
+"""Columns of a rollout that ``_record_state`` and the loop fill by their places."""
 
 
 @dataclass(frozen=True)
@@ -111,17 +97,14 @@ class PrivilegedController(Protocol):
 
 @dataclass(frozen=True)
 class Rollout:
-    """Recorded runs of n legs.
-
-    Attributes:
-        time: (ticks,), s.
-        data: Trace columns to (ticks, n) arrays.
-        header: Shared header of the traces.
-    """
+    """Recorded runs of n legs."""
 
     time: Array
+    """Start of each control period, s, (ticks,)."""
     data: dict[str, Array]
+    """Trace columns to (ticks, n) arrays."""
     header: dict[str, Any]
+    """Shared header of the traces."""
 
     def trace(self, leg: int, **header: Any) -> Trace:  # noqa: ANN401
         """Return one leg's run; ``header`` entries are added to the shared ones."""
@@ -131,7 +114,7 @@ class Rollout:
 
 def rollout(
     controller: Controller,
-    setup: RolloutConfig,
+    config: RolloutConfig,
     commands: Array,
     seed: int,
     on_tick: Callable[[int, int], None] | None = None,
@@ -142,12 +125,12 @@ def rollout(
 
     Args:
         controller: Controls all legs at once; a ``PrivilegedController`` is shown them.
-        setup: The world it meets.
+        config: The world it meets.
         commands: Desired height for every tick and leg, m, (ticks, n).
         seed: Seed of noise and delay.
         on_tick: Called with (ticks done, ticks in all), for progress bars.
         on_legs: Called once with the legs, which it may place where they shall start instead.
-        perturbation: Changes of the legs that ``setup`` does not know; recorded heights are above
+        perturbation: Changes of the legs that ``config`` does not know; recorded heights are above
             the ground of the moment, recorded commands are the controller's.
 
     Raises:
@@ -158,17 +141,30 @@ def rollout(
         torques during it.
     """
     ticks, count = commands.shape
-    perturber = _perturb(setup, perturbation) if perturbation else None
-    legs = perturber.legs if perturber else _make_legs(setup, count)
-    plant = Plant(legs, setup.disturbance, setup.soft_limits, np.random.default_rng(seed))
-    legs.stand(slice(None), setup.start_posture)
+    legs: Simulator
+    if perturbation is None:
+        perturber = None
+        legs = make_simulator(
+            config.robot,
+            count,
+            engine=config.engine,
+            ground=config.ground,
+            rate=config.rate,
+            timestep=config.timestep,
+            threads=config.threads,
+        )
+    else:
+        perturber = _perturb(config, perturbation)
+        legs = perturber.legs
+    plant = Plant(legs, config.disturbance, config.soft_limits, np.random.default_rng(seed))
+    legs.stand(slice(None), config.start_posture)
     plant.channel.restart(slice(None), legs.q, legs.qd, commands[0])
     controller.reset(count)
     if isinstance(controller, PrivilegedController):
         controller.watch(legs)
     if on_legs is not None:
         on_legs(legs)
-    data = np.empty((len(_STACKED), ticks, count))
+    data = np.empty((len(_COLUMNS), ticks, count))
     internals: dict[str, Array] = {}
     for tick in range(ticks):
         if perturber is not None:
@@ -183,57 +179,40 @@ def rollout(
         data[8:10, tick] = plant.drive(torque).T
         if on_tick is not None:
             on_tick(tick + 1, ticks)
-    _check_stable(data, setup)
+    # MuJoCo resets an unstable simulation and goes on, so that only its speed shows it.
+    if not np.abs(data[4:6]).max() < _IMPOSSIBLE:
+        raise PhysicsError(
+            f"The simulation of {config.robot.name} became unstable at a physics step of"
+            f" {config.timestep:g} s; take a smaller one or check masses and inertias."
+        )
     header = {
-        "robot": setup.robot.name,
-        "robot_digest": setup.robot.digest,
+        "robot": config.robot.name,
+        "robot_digest": config.robot.digest,
         "controller": controller.name,
         "seed": seed,
-        "rate_hz": setup.rate,
-        "timestep_s": setup.timestep,
-        "engine": setup.engine,
-        "ground": setup.ground,
+        "rate_hz": config.rate,
+        "timestep_s": config.timestep,
+        "engine": config.engine,
+        "ground": config.ground,
     }
-    columns = {name: data[row] for name, row in _STACKED.items()}
-    return Rollout(np.arange(ticks) / setup.rate, columns | internals, header)
+    columns = dict(zip(_COLUMNS, data, strict=True))
+    return Rollout(np.arange(ticks) / config.rate, columns | internals, header)
 
 
-def _make_legs(setup: RolloutConfig, count: int) -> Simulator:
-    return make_simulator(
-        setup.robot,
-        count,
-        engine=setup.engine,
-        ground=setup.ground,
-        rate=setup.rate,
-        timestep=setup.timestep,
-        threads=setup.threads,
-    )
-
-
-def _perturb(setup: RolloutConfig, perturbation: Perturbation) -> Perturber:
+def _perturb(config: RolloutConfig, perturbation: Perturbation) -> Perturber:
     """Return newly made legs that are perturbed, which needs MuJoCo."""
-    if setup.engine != "mujoco":
-        raise UsageError(f"Perturbations need the engine mujoco, not {setup.engine}.")
+    if config.engine != "mujoco":
+        raise UsageError(f"Perturbations need the engine mujoco, not {config.engine}.")
     legs = MujocoSimulator(
-        setup.robot,
+        config.robot,
         len(perturbation.robots),
-        rate=setup.rate,
-        timestep=setup.timestep,
-        threads=setup.threads,
+        rate=config.rate,
+        timestep=config.timestep,
+        threads=config.threads,
         robots=perturbation.robots,
         detailed=bool(perturbation.later),
     )
     return Perturber(perturbation, legs)
-
-
-def _check_stable(data: Array, setup: RolloutConfig) -> None:
-    """MuJoCo resets an unstable simulation and goes on, so that only its speed shows it."""
-    speed = np.abs(data[4:6]).max()
-    if not speed < _IMPOSSIBLE:
-        raise PhysicsError(
-            f"The simulation of {setup.robot.name} became unstable at a physics step of"
-            f" {setup.timestep:g} s; take a smaller one or check masses and inertias."
-        )
 
 
 def _record_state(row: Array, legs: Simulator, command: Array) -> None:

@@ -19,6 +19,7 @@ import inspect
 import sys
 import traceback
 from collections.abc import Callable
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
@@ -233,9 +234,7 @@ def load_user_controller(name: str, robot: Robot, rate: float) -> UserController
     module, kind, wanted = _find(name, "class", callable)
     make: Callable[[], Any] = functools.partial(kind, robot, rate=rate)
     controller = attempt(name, make, f"could not be made as {wanted}(robot, rate={rate:g})")
-    if not callable(getattr(controller, "act", None)) and callable(
-        getattr(controller, METHOD, None)
-    ):
+    if hasattr(controller, METHOD) and not hasattr(controller, "act"):
         controller = attempt(name, lambda: SingleLeg(make, rate, name))
     missing = [m for m in ("reset", "act") if not callable(getattr(controller, m, None))]
     if missing:
@@ -245,8 +244,10 @@ def load_user_controller(name: str, robot: Robot, rate: float) -> UserController
         )
     # Kept results tell controllers apart by class: with the digest in its name, an edited file is
     # judged anew.
-    guard = type(f"{UserController.__name__}_{_digest(module)}", (UserController,), {})
-    made: UserController = guard(controller, name)
+    file = getattr(module, "__file__", None)
+    content = Path(file).read_bytes() if file else module.__name__.encode()
+    digest = hashlib.sha256(content).hexdigest()[:16]
+    made: UserController = type(f"UserController_{digest}", (UserController,), {})(controller, name)
     return made
 
 
@@ -271,7 +272,8 @@ def _find(name: str, what: str, suits: Callable[[object], bool]) -> tuple[Module
     module = _load_file(Path(source)) if source.endswith(".py") else _load_module(source)
     found = getattr(module, wanted, None) if wanted else None
     if not suits(found):
-        known = [n for n, v in vars(module).items() if _defined_here(v, module)]
+        classes = inspect.getmembers(module, inspect.isclass)
+        known = [n for n, kind in classes if kind.__module__ == module.__name__]
         if not wanted:
             raise ControllerError(
                 f"'{name}' names no {what}; write {source}:{what.upper()}, one of:"
@@ -306,12 +308,10 @@ def _load_file(path: Path) -> ModuleType:
         raise ControllerError(f"Cannot read {path}: {error.strerror}.") from error
     # A name of its own keeps files of equal names apart; dataclasses look their module up by it.
     name = f"hopping_leg_user_file_{hashlib.sha256(content).hexdigest()[:16]}"
-    spec = importlib.util.spec_from_file_location(name, path)
+    loader = SourceFileLoader(name, str(path))
+    spec = importlib.util.spec_from_loader(name, loader)
     assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    loader = spec.loader
+    sys.modules[name] = module = importlib.util.module_from_spec(spec)
     attempt(str(path), lambda: loader.exec_module(module), "could not be imported")
     return module
 
@@ -327,13 +327,3 @@ def _load_module(name: str) -> ModuleType:
             " a file as path/to/file.py:CLASS."
         )
     return attempt(name, lambda: importlib.import_module(name), "could not be imported")
-
-
-def _digest(module: ModuleType) -> str:
-    file = getattr(module, "__file__", None)
-    content = Path(file).read_bytes() if file else module.__name__.encode()
-    return hashlib.sha256(content).hexdigest()[:16]
-
-
-def _defined_here(value: object, module: ModuleType) -> bool:
-    return isinstance(value, type) and value.__module__ == module.__name__

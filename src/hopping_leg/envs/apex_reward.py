@@ -81,13 +81,7 @@ class ApexRewardConfig:
 
 
 def apex_reward(robot: Robot, config: ApexRewardConfig, rate: float) -> Reward:
-    """Return the reward that judges ticks by predicted and reached apexes.
-
-    Args:
-        robot: Leg whose joint limits and clearances count.
-        config: Weights and widths.
-        rate: Control rate, Hz.
-    """
+    """Return the reward that judges ticks by predicted and reached apexes; rate is in Hz."""
     c = config
     return Reward(
         (
@@ -112,10 +106,6 @@ class ApexEvent:
     """How near an apex is to the command, by the motion and the time before it.
 
     Time goes on over the end of an episode, so that the first apex of the next one pays like any.
-
-    Args:
-        config: Widths and times.
-        rate: Control rate, Hz.
     """
 
     def __init__(self, config: ApexRewardConfig, rate: float) -> None:
@@ -158,7 +148,8 @@ def predicted_apex_accuracy(effective_gravity: float) -> Callable[[Transition], 
     """Return base speed times how near the ballistic apex is to the command, 0 on the ground."""
 
     def term(t: Transition) -> Array:
-        error = np.abs(_ballistic_apex(t, effective_gravity) - t.command)
+        apex = t.height + np.square(t.rate) / (2 * effective_gravity)
+        error = np.abs(apex - t.command)
         narrow, wide = _PREDICTION_WIDTHS
         kernel = np.exp(-error / narrow) + 0.5 * np.exp(-error / wide)
         return np.where(t.flying, np.abs(t.rate) * kernel, 0.0)
@@ -172,17 +163,12 @@ def bounded_energy_gain(beyond: float, effective_gravity: float) -> Callable[[Tr
     def term(t: Transition) -> Array:
         most: float | Array = _FASTEST_SQUARED
         if beyond > 0:
-            above = np.maximum(_ballistic_apex(t, effective_gravity) - t.command, 0.0)
-            most = most * np.exp(-above / beyond)
+            apex = t.height + np.square(t.rate) / (2 * effective_gravity)
+            most = most * np.exp(-np.maximum(apex - t.command, 0.0) / beyond)
         gain: Array = np.minimum(np.square(t.rate), most)
         return gain
 
     return term
-
-
-def _ballistic_apex(t: Transition, effective_gravity: float) -> Array:
-    apex: Array = t.height + np.square(t.rate) / (2 * effective_gravity)
-    return apex
 
 
 def flight_effort(t: Transition) -> Array:

@@ -33,29 +33,23 @@ _LARGEST = float(np.finfo(np.float32).max)
 
 
 class Camera:
-    """Draws one of many legs from the side; takes OpenGL up with its first picture.
+    """Draws one of many legs from the side; takes OpenGL up with its first picture."""
 
-    Args:
-        legs: The simulations.
-        width: Width of the picture, pixels.
-        height: Height of the picture, pixels.
-    """
-
-    def __init__(self, legs: MujocoSimulator, width: int = 640, height: int = 480) -> None:
-        self.legs, self._size = legs, (height, width)
+    def __init__(self, legs: MujocoSimulator) -> None:
+        self.legs = legs
         self._model = build_model(legs.robot)
         self._data = mujoco.MjData(self._model)
         self._renderer: Any = None
 
     def picture(self, leg: int = 0) -> Image:
-        """Return an RGB picture of a leg, (height, width, 3).
+        """Return an RGB picture of a leg, (480, 640, 3).
 
         Raises:
             UsageError: This computer offers no OpenGL.
         """
         if self._renderer is None:
             try:
-                self._renderer = mujoco.Renderer(self._model, *self._size)
+                self._renderer = mujoco.Renderer(self._model, height=480, width=640)
             except Exception as error:  # each OpenGL backend raises its own kind
                 raise UsageError(
                     f"Pictures need OpenGL, which is not available here ({error}); install a driver"
@@ -139,24 +133,15 @@ class HoppingEnv(gymnasium.Env[Array32, npt.NDArray[np.float32]]):
     ) -> tuple[Array32, float, bool, bool, dict[str, Any]]:
         """Act for one control period."""
         step = self.task.step(action[None])
-        return (
-            step.observation[0],
-            step.reward.item(),
-            step.terminated.item(),
-            step.truncated.item(),
-            self._info(step),
-        )
-
-    def _info(self, step: Step) -> dict[str, Any]:
         info: dict[str, Any] = {
             "base_height": step.height.item(),
             "command": self.task.command.item(),
             "reward_terms": dict(zip(self.task.reward.names, step.terms[0].tolist(), strict=True)),
         }
-        apex_height = step.apex_height.item()
-        if not math.isnan(apex_height):
+        if not math.isnan(apex_height := step.apex_height.item()):
             info["apex_height"], info["apex_error"] = apex_height, step.apex_error.item()
-        return info
+        ended = step.terminated.item(), step.truncated.item()
+        return step.observation[0], step.reward.item(), *ended, info
 
     def render(self) -> Image | None:
         """Return a picture from the side, (480, 640, 3), in mode ``"rgb_array"``."""

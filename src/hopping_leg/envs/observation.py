@@ -47,15 +47,12 @@ CLEARANCE_GAIN = 10.0
 
 @dataclass(frozen=True)
 class Scaling:
-    """Normalised value = (value - offset) * gain.
-
-    Attributes:
-        offset: In SI units, (k,).
-        gain: Inverse scales of the same, (k,).
-    """
+    """Normalised value = (value - offset) * gain."""
 
     offset: Array
+    """In SI units, (k,)."""
     gain: Array
+    """Inverse scales of the same, (k,)."""
 
 
 class Observation(ABC):
@@ -150,24 +147,24 @@ class HistoryObservation(Observation):
         self._layout.restore(state)
 
 
-def sample_scaling(robot: Robot, options: TaskConfig) -> Scaling:
+def sample_scaling(robot: Robot, config: TaskConfig) -> Scaling:
     """Return the normalisation of (q1, q2, qd1, qd2, command), rad, rad/s, m, (5,)."""
     lower, upper = robot.of_joints("lower"), robot.of_joints("upper")
-    low, high = options.command_bounds
+    low, high = config.command_bounds
     half = max((high - low) / 2, _LEAST_SPAN)
     offset = np.concatenate([(lower + upper) / 2, [0.0, 0.0, (low + high) / 2]])
-    velocity = options.velocity_scale
+    velocity = config.velocity_scale
     span = np.concatenate([(upper - lower) / 2, [velocity, velocity, half]])
     return Scaling(offset, 1 / span)
 
 
-def make_observation(robot: Robot, options: TaskConfig, count: int) -> Observation:
+def make_observation(robot: Robot, config: TaskConfig, count: int) -> Observation:
     """Return the observation that a task asks for."""
-    sample = sample_scaling(robot, options)
-    if options.observation == ThreeSamples.name:
+    sample = sample_scaling(robot, config)
+    if config.observation == ThreeSamples.name:
         return PaperObservation(sample, count)
-    layout = make_observation_history(options.observation, 1 / options.rate)
-    torque = np.array(options.action_torque)
+    layout = make_observation_history(config.observation, 1 / config.rate)
+    torque = np.array(config.action_torque)
     parts = {
         "q": (sample.offset[0:2], sample.gain[0:2]),
         "qd": (sample.offset[2:4], sample.gain[2:4]),

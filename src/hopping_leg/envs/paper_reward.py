@@ -39,12 +39,7 @@ class PaperRewardConfig:
 
 
 def paper_reward(robot: Robot, config: PaperRewardConfig = PaperRewardConfig()) -> Reward:
-    """Return the paper's reward.
-
-    Args:
-        robot: Leg whose joint limits and motors count.
-        config: Weights and readings.
-    """
+    """Return the paper's reward for a leg, whose joint limits and motors count."""
     c, limit = config, config.velocity_limit
     speed = robot.of_joints("no_load_speed") if limit is None else np.full(2, limit)
     return Reward(

@@ -23,10 +23,10 @@ class ResetSampler:
         UsageError: A start asks for a leg length that the robot does not reach.
     """
 
-    def __init__(self, robot: Robot, options: TaskConfig) -> None:
+    def __init__(self, robot: Robot, config: TaskConfig) -> None:
         robot.require_leg()
-        self.robot, self.options = robot, options
-        lengths = (options.start_length, *options.drop_length)
+        self.robot, self.config = robot, config
+        lengths = (config.start_length, *config.drop_length)
         self._standing = kinematics.joint_angles(robot, np.array([lengths[0], 0.0]))
         reach = robot.thigh.length + robot.shank.length
         if np.isnan(self._standing).any() or not all(0 < length < reach for length in lengths):
@@ -45,31 +45,25 @@ class ResetSampler:
         Returns:
             Base heights, m, (k,), and joint angles, rad, (k, 2).
         """
-        count = len(command)
-        if self.options.reset_distribution == "hop":
-            return self._hop(command, rng)
-        if self.options.reset_distribution == "standing":
-            q, gap = np.tile(self._standing, (count, 1)), np.zeros(count)
-        else:
-            q, gap = self._drop(count, rng)
-        if self.options.reset_distribution == "mixed":
+        count, kind = len(command), self.config.reset_distribution
+        if kind == "standing":
+            q = np.tile(self._standing, (count, 1))
+            return kinematics.stance_height(self.robot, q), q
+        q, gap = self._drop(count, rng)
+        if kind == "mixed":
             stands = rng.random(count) < 0.5
             q[stands], gap[stands] = self._standing, 0.0
-        return kinematics.stance_height(self.robot, q) + gap, q
-
-    def _hop(self, command: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-        """Begin near the apex of the commanded hop, or standing in a random posture."""
-        count = len(command)
-        q, _ = self._drop(count, rng)
         standing = kinematics.stance_height(self.robot, q)
+        if kind != "hop":
+            return standing + gap, q
         stands = rng.random(count) < _STANDING_SHARE
         apex = command + rng.uniform(*_NEAR_APEX, count)
         return np.where(stands, standing, np.maximum(standing, apex)), q
 
     def _drop(self, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
-        options = self.options
-        length = rng.uniform(*options.drop_length, count)
-        offset = rng.uniform(-options.drop_offset, options.drop_offset, count)
+        config = self.config
+        length = rng.uniform(*config.drop_length, count)
+        offset = rng.uniform(-config.drop_offset, config.drop_offset, count)
         q = kinematics.joint_angles(self.robot, np.stack([length, offset], axis=-1))
         q = np.clip(q, self.robot.of_joints("lower"), self.robot.of_joints("upper"))
-        return q, rng.uniform(0.0, options.drop_clearance, count)
+        return q, rng.uniform(0.0, config.drop_clearance, count)

@@ -1,6 +1,5 @@
 """The learning problem for many legs at once: observation, reward, commands, episodes."""
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -77,11 +76,7 @@ class HoppingTask:
         self._draw_seed, self._draw = int(draws.integers(2**62)), 0
         self._numbers = np.zeros((count, len(options.randomised)))
         self.legs = MujocoSimulator(
-            robot,
-            count,
-            rate=options.rate,
-            timestep=options.timestep,
-            threads=threads,
+            robot, count, rate=options.rate, timestep=options.timestep, threads=threads
         )
         if options.randomize_from_start:
             self.randomize()
@@ -233,12 +228,6 @@ class HoppingTask:
         """What the observation was made of: samples and their age."""
         return self.plant.channel.measurement(self._samples)
 
-    def _observe(self) -> Array32:
-        """Return what is seen at a new tick."""
-        self._samples = self.plant.samples(self.command)
-        self.observation.advance(self._samples, self.plant.channel, self._last)
-        return self.observation.view(self._samples)
-
     def _see_anew(self, rows: IntArray) -> Array32:
         """Return what is seen once some legs have begun anew within the tick."""
         self._samples = self.plant.samples(self.command)
@@ -254,11 +243,14 @@ class HoppingTask:
         if self._tick >= self._next_end:
             truncated = ended = self._end <= self._tick
         if self.options.fall_clearance is not None:
-            terminated = self._fallen(self.options.fall_clearance)
+            gap = np.minimum(self.legs.base_clearance(), self.legs.knee_clearance())
+            terminated = gap < self.options.fall_clearance
             reward = reward - self.options.fall_penalty * terminated
             truncated = truncated & ~terminated
             ended = truncated | terminated
-        observation = self._observe()
+        self._samples = self.plant.samples(self.command)
+        self.observation.advance(self._samples, self.plant.channel, self._last)
+        observation = self.observation.view(self._samples)
         final_observation = final_privileged = None
         height = self.legs.height.copy()
         if self.autoreset and ended is not self._never and np.count_nonzero(ended):
@@ -270,11 +262,6 @@ class HoppingTask:
             observation, reward, terminated, truncated, apex_error, apex_height, height, terms,
             final_observation, final_privileged,
         )  # fmt: skip
-
-    def _fallen(self, least: float) -> BoolArray:
-        """Return which legs have base or knee less than a gap above the ground, (n,)."""
-        gap: Array = np.minimum(self.legs.base_clearance(), self.legs.knee_clearance())
-        return gap < least
 
     def _begin(self, rows: IntArray) -> None:
         count = len(rows)
@@ -307,6 +294,8 @@ class HoppingTask:
 
     def _draw_holds(self, count: int) -> IntArray:
         """Return after how many ticks commands change, (count,)."""
-        shortest, longest = self.options.command_resampling_time or (math.inf, math.inf)
-        ticks = [max(1, round(time * self.options.rate)) for time in (shortest, longest)]
-        return self._rng.integers(ticks[0], ticks[1] + 1, count)
+        assert self.options.command_resampling_time is not None
+        shortest, longest = (
+            max(1, round(time * self.options.rate)) for time in self.options.command_resampling_time
+        )
+        return self._rng.integers(shortest, longest + 1, count)

@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
+import numpy as np
+
 from hopping_leg.controllers.observation_history import OBSERVATION_HISTORIES
 from hopping_leg.errors import UsageError
 from hopping_leg.robot.limits import SoftLimits
@@ -71,40 +73,34 @@ class TaskConfig:
     """PD at the joint limits, added to the action's torque."""
 
     def __post_init__(self) -> None:
-        _check(self)
+        if not self.commands or not all(0 < c < math.inf for c in self.commands):
+            raise UsageError(
+                f"Commands must be positive heights in m, not {self.commands}; e.g. 0.25 0.30 0.35."
+            )
+        for name in ("command_range", "command_resampling_time", "drop_length"):
+            pair = getattr(self, name)
+            if pair is not None and not 0 < pair[0] <= pair[1] < math.inf:
+                raise UsageError(
+                    f"'{name}' is {pair} but must be two positive numbers, the smaller first."
+                )
+        for name in (
+            "action_torque", "command_skew", "start_length", "episode", "velocity_scale", "rate",
+            "timestep",
+        ):  # fmt: skip
+            value = getattr(self, name)
+            if not all(0 < v < math.inf for v in np.atleast_1d(value)):
+                raise UsageError(f"'{name}' is {value} but must be positive and finite.")
+        for name in ("randomize_probability", "nominal_fraction"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise UsageError(f"'{name}' is {getattr(self, name)} but must lie between 0 and 1.")
+        for name, valid in (
+            ("observation", tuple(OBSERVATION_HISTORIES)),
+            ("reset_distribution", get_args(ResetDistribution)),
+        ):
+            if getattr(self, name) not in valid:
+                raise UsageError(f"'{name}' is '{getattr(self, name)}'; valid: {', '.join(valid)}.")
 
     @property
     def command_bounds(self) -> tuple[float, float]:
         """Lowest and highest desired height, m."""
         return self.command_range or (min(self.commands), max(self.commands))
-
-
-def _check(options: TaskConfig) -> None:
-    if not options.commands or not all(math.isfinite(c) and c > 0 for c in options.commands):
-        raise UsageError(
-            f"Commands must be positive heights in m, not {options.commands}; e.g. 0.25 0.30 0.35."
-        )
-    for name in ("command_range", "command_resampling_time", "drop_length"):
-        pair = getattr(options, name)
-        if pair is not None and not 0 < pair[0] <= pair[1] < math.inf:
-            raise UsageError(
-                f"'{name}' is {pair} but must be two positive numbers, the smaller first."
-            )
-    positive = ("command_skew", "start_length", "episode", "velocity_scale", "rate", "timestep")
-    for name in positive:
-        value = getattr(options, name)
-        if not 0 < value < math.inf:
-            raise UsageError(f"'{name}' is {value} but must be positive and finite.")
-    for name in ("randomize_probability", "nominal_fraction"):
-        if not 0 <= getattr(options, name) <= 1:
-            raise UsageError(f"'{name}' is {getattr(options, name)} but must lie between 0 and 1.")
-    if not all(0 < t < math.inf for t in options.action_torque):
-        raise UsageError(
-            f"'action_torque' is {options.action_torque} but both torques must be positive, N m."
-        )
-    for name, valid in (
-        ("observation", tuple(OBSERVATION_HISTORIES)),
-        ("reset_distribution", get_args(ResetDistribution)),
-    ):
-        if getattr(options, name) not in valid:
-            raise UsageError(f"'{name}' is '{getattr(options, name)}'; valid: {', '.join(valid)}.")
