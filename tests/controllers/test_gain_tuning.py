@@ -37,27 +37,23 @@ def fake_evaluate(candidates, setup, seconds, seed):
     return [scores(std=abs(g.exponent - 1.0) + 0.001) for g in candidates]
 
 
-def quiet(done, lowest):
-    pass
+def searched(start, log, generations=15, seed=3, **options):
+    search_options = Search(generations=generations, **options)
+    return search(start, SETUP, search_options, seed, log, lambda done, lowest: None)
 
 
-def test_unit_cube_round_trip():
+def test_unit_cube_round_trip_and_shipped_gains_lie_in_the_box():
     point = np.linspace(0.1, 0.9, len(SPACE))
     np.testing.assert_allclose(to_unit(from_unit(point, GAINS)), point)
-
-
-def test_shipped_gains_lie_in_the_box():
-    np.testing.assert_allclose(
-        [getattr(from_unit(to_unit(GAINS), GAINS), n) for n in SPACE],
-        [getattr(GAINS, n) for n in SPACE],
-    )
+    there_and_back = from_unit(to_unit(GAINS), GAINS)
+    for name in SPACE:
+        assert getattr(there_and_back, name) == pytest.approx(getattr(GAINS, name)), name
 
 
 def test_cost_ignores_what_calibration_removes_and_counts_the_rest():
     assert cost(scores(shift=0.02, scale=0.9)) == pytest.approx(cost(scores()))
-    assert cost(scores(std=0.010)) > cost(scores()) + 7
-    assert cost(scores(rate=0.5)) > cost(scores()) + 7
-    assert cost(scores(knee_clearance=-0.01)) > cost(scores()) + 7
+    for worse in ({"std": 0.010}, {"rate": 0.5}, {"knee_clearance": -0.01}):
+        assert cost(scores(**worse)) > cost(scores()) + 7, worse
     assert cost(scores(median=float("nan"))) > 100
 
 
@@ -75,24 +71,23 @@ def test_calibration_moves_the_estimate_by_what_the_medians_missed():
 def test_search_goes_down_and_resumes_without_simulating(tmp_path, monkeypatch):
     monkeypatch.setattr(tuning, "evaluate", fake_evaluate)
     start, log = replace(GAINS, exponent=1.9), tmp_path / "log.jsonl"
-    found = search(start, SETUP, Search(generations=15), 3, log, quiet)
+    found = searched(start, log)
     assert abs(found.exponent - 1.0) < 0.3
     lines = log.read_text().splitlines()
     log.write_text("\n".join(lines[:7]) + "\n" + lines[7][:20])
-    again = search(start, SETUP, Search(generations=15), 3, log, quiet)
-    assert again == found
+    assert searched(start, log) == found
     monkeypatch.setattr(tuning, "evaluate", None)
-    assert search(start, SETUP, Search(generations=15), 3, log, quiet) == found
+    assert searched(start, log) == found
 
 
 def test_log_of_another_search_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(tuning, "evaluate", fake_evaluate)
     log = tmp_path / "log.jsonl"
-    search(GAINS, SETUP, Search(generations=1), 3, log, quiet)
+    searched(GAINS, log, 1)
     with pytest.raises(UsageError, match="seed 3"):
-        search(GAINS, SETUP, Search(generations=1), 4, log, quiet)
+        searched(GAINS, log, 1, seed=4)
     with pytest.raises(UsageError, match="flight 0;"):
-        search(GAINS, SETUP, Search(generations=1, flight=0.5), 3, log, quiet)
+        searched(GAINS, log, 1, flight=0.5)
 
 
 def test_candidates_are_judged_side_by_side():

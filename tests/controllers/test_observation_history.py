@@ -24,30 +24,29 @@ def measurements(ticks, count=4, seed=0, disturbance=LATE):
         channel.actuate(np.zeros((count, 2)))
 
 
-@given(seed=st.integers(0, 2**32 - 1))
-def test_every_known_sample_stands_at_its_tick(seed):
+def tracks(ticks, **options):
+    """Yield (tick, history of 15 ticks) after each measurement but the first."""
     track = SampleHistory(15, PERIOD)
     track.reset(4)
-    for tick, measurement in measurements(40, seed=seed):
+    for tick, measurement in measurements(ticks, **options):
         if tick == 0:
             track.fill(slice(None), measurement)
             continue
         track.shift()
         track.insert(measurement)
+        yield tick, track
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_every_known_sample_stands_at_its_tick(seed):
+    for tick, track in tracks(40, seed=seed):
         expected = np.maximum(tick - np.arange(15), 0)[:, None] * np.ones(4)
         np.testing.assert_array_equal(track.q[..., 0][track.known], expected[track.known])
         np.testing.assert_array_equal(track.qd[..., 1][track.known], -10 * expected[track.known])
 
 
 def test_what_has_not_arrived_holds_the_sample_before():
-    track = SampleHistory(15, PERIOD)
-    track.reset(4)
-    for tick, measurement in measurements(60):
-        if tick == 0:
-            track.fill(slice(None), measurement)
-            continue
-        track.shift()
-        track.insert(measurement)
+    for _, track in tracks(60):
         track.hold(10)
         for leg in range(4):
             known = np.flatnonzero(track.known[:, leg])
@@ -56,9 +55,14 @@ def test_what_has_not_arrived_holds_the_sample_before():
                 assert track.q[back, leg, 0] == track.q[newest_before, leg, 0]
 
 
-def test_without_delay_the_lags_are_exact():
+@pytest.fixture
+def layout():
     layout = Dated(PERIOD)
     layout.reset(4)
+    return layout
+
+
+def test_without_delay_the_lags_are_exact(layout):
     quiet = NoiseAndDelay(0.0, 0.0, 0.0)
     for tick, measurement in measurements(40, disturbance=quiet):
         layout.update(measurement, np.full((4, 2), tick - 1.0))
@@ -71,9 +75,7 @@ def test_without_delay_the_lags_are_exact():
             np.testing.assert_array_equal(inputs["past_torque"][0, :, 0], torque)
 
 
-def test_age_is_that_of_the_newest_sample():
-    layout = Dated(PERIOD)
-    layout.reset(4)
+def test_age_is_that_of_the_newest_sample(layout):
     ages = []
     for tick, measurement in measurements(300):
         layout.update(measurement, np.zeros((4, 2)))
@@ -85,9 +87,8 @@ def test_age_is_that_of_the_newest_sample():
     assert 0.6 < np.mean(np.array(ages) == 0) < 0.7  # 0.5 + 0.5 * 3 / 10
 
 
-def test_state_restores_the_whole_memory():
-    one, other = Dated(PERIOD), Dated(PERIOD)
-    one.reset(4)
+def test_state_restores_the_whole_memory(layout):
+    one, other = layout, Dated(PERIOD)
     for tick, measurement in measurements(50):
         one.update(measurement, np.full((4, 2), float(tick)))
         if tick == 30:
@@ -99,9 +100,7 @@ def test_state_restores_the_whole_memory():
 
 
 @pytest.mark.parametrize("rows", [[1], [0, 3]])
-def test_a_restarted_leg_forgets_and_the_others_do_not(rows):
-    layout = Dated(PERIOD)
-    layout.reset(4)
+def test_a_restarted_leg_forgets_and_the_others_do_not(layout, rows):
     for _, measurement in measurements(30):
         layout.update(measurement, np.ones((4, 2)))
     before = layout.inputs()

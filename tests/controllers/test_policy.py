@@ -85,16 +85,20 @@ def test_truncated_file_is_refused_in_a_sentence(tmp_path, keep):
         Policy.load(path)
 
 
+def refused(tmp_path, model, says):
+    path = tmp_path / "wrong.onnx"
+    onnx.save(model, path)
+    with pytest.raises(PolicyError, match=says):
+        Policy.load(path)
+
+
 def test_foreign_onnx_file_is_refused(tmp_path):
     node = helper.make_node("Relu", ["x"], ["y"])
     values = [helper.make_tensor_value_info(n, TensorProto.FLOAT, ["n", 2]) for n in "xy"]
     graph = helper.make_graph([node], "g", [values[0]], [values[1]])
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)])
     model.ir_version = 8
-    path = tmp_path / "foreign.onnx"
-    onnx.save(model, path)
-    with pytest.raises(PolicyError, match="not a policy"):
-        Policy.load(path)
+    refused(tmp_path, model, "not a policy")
 
 
 @pytest.mark.parametrize(
@@ -109,10 +113,7 @@ def test_wrong_metadata_is_refused(tmp_path, change, says):
     model = onnx.load_from_string(build_policy(network(), CARD))
     card = json.loads(model.metadata_props[0].value) | change
     model.metadata_props[0].value = json.dumps(card)
-    path = tmp_path / "wrong.onnx"
-    onnx.save(model, path)
-    with pytest.raises(PolicyError, match=says):
-        Policy.load(path)
+    refused(tmp_path, model, says)
 
 
 def test_missing_file_and_unknown_name(tmp_path):

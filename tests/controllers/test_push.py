@@ -29,13 +29,8 @@ def test_feedforward_force_stays_bounded_for_an_extended_leg():
 def test_gain_rests_at_the_desired_height_and_moves_towards_it(exponent):
     one, desired = np.ones(3), np.full(3, 0.3)
     gain = equations.updated_gain(one, desired, np.array([0.27, 0.30, 0.33]), exponent)
-    assert gain[0] > 1 > gain[2]
+    np.testing.assert_allclose(gain, (0.30 / np.array([0.27, 0.30, 0.33])) ** exponent)
     assert gain[1] == 1
-
-
-def test_paper_exponent_squares_the_energy_ratio():
-    gain = equations.updated_gain(np.ones(1), np.array([0.30]), np.array([0.27]), 2.0)
-    assert gain == pytest.approx((0.30 / 0.27) ** 2)
 
 
 @pytest.mark.parametrize("reached", [0.0, -1.0, 1.2])
@@ -66,11 +61,8 @@ def test_torques_of_a_foot_force_do_the_force_s_work():
     q, push_force = np.array([[0.6, -1.3]]), np.array([30.0])
     torque = foot_force_torque(ROBOT, q, push_force, np.array([4.0]))
     np.testing.assert_allclose(leg_force(ROBOT, q, torque), push_force)
-
-
-def test_leg_force_is_finite_for_the_straight_leg():
-    force = leg_force(ROBOT, np.zeros((1, 2)), np.ones((1, 2)))
-    assert np.isfinite(force).all()
+    straight = leg_force(ROBOT, np.zeros((1, 2)), np.ones((1, 2)))
+    assert np.isfinite(straight).all()
 
 
 def test_retraction_starts_and_ends_at_rest_at_its_ends():

@@ -8,7 +8,6 @@ from hopping_leg.controllers.energy_shaping.virtual_leg import LegView
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.controllers.stand_hop_land import (
     STAND_SECONDS,
-    LandingGains,
     LiftoffDetector,
     Mode,
     StandHopLand,
@@ -23,10 +22,14 @@ ROBOT = load_robot("legv2-paper")
 COLUMNS = ("height_m", "height_rate_m_s", "foot_clearance_m")
 
 
-@pytest.fixture(scope="module")
-def hopped():
+def hop_twice():
     supervised = StandHopLand(load_controller("energy-shaping", ROBOT), ROBOT, 2)
     return rollout(supervised, RolloutConfig(ROBOT, threads=1), np.full((900, 4), 0.3), seed=11)
+
+
+@pytest.fixture(scope="module")
+def hopped():
+    return hop_twice()
 
 
 def test_it_hops_as_often_as_asked_and_ends_at_rest(hopped):
@@ -53,8 +56,7 @@ def test_modes_follow_each_other_and_the_catch_is_in_the_air(hopped):
 
 
 def test_same_seed_same_run(hopped):
-    supervised = StandHopLand(load_controller("energy-shaping", ROBOT), ROBOT, 2)
-    again = rollout(supervised, RolloutConfig(ROBOT, threads=1), np.full((900, 4), 0.3), seed=11)
+    again = hop_twice()
     for name, values in hopped.data.items():
         np.testing.assert_array_equal(values, again.data[name])
 
@@ -90,9 +92,6 @@ def test_what_makes_no_sense_is_refused():
     for controller, hops in ((spring, 0), (spring, -1), (None, 3)):
         with pytest.raises(UsageError, match="make no sense"):
             StandHopLand(controller, ROBOT, hops)
-    for wrong in ({"length": 1.2}, {"damping": -1.0}, {"stiffness": float("nan")}):
-        with pytest.raises(UsageError, match=next(iter(wrong))):
-            LandingGains(**wrong)
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ from gymnasium.vector import AutoresetMode
 from hopping_leg import ENV_ID
 from hopping_leg.envs import HoppingTask, TaskConfig, paper_reward
 from hopping_leg.robot import load_robot
+from hopping_leg.sim import NO_NOISE
 
 SHORT = TaskConfig(episode=0.1)
 
@@ -83,8 +84,6 @@ def test_vector_env_is_the_batched_task():
 
 
 def test_single_and_vector_agree_on_a_motion_without_noise():
-    from hopping_leg.sim import NO_NOISE
-
     options = TaskConfig(commands=(0.3,), disturbance=NO_NOISE)
     env = gymnasium.make(ENV_ID, options=options)
     vector = gymnasium.make_vec(ENV_ID, num_envs=2, options=options)
@@ -100,10 +99,9 @@ def test_single_and_vector_agree_on_a_motion_without_noise():
 
 def test_a_layout_may_be_chosen():
     options = TaskConfig(observation="dated")
-    for env in (
-        gymnasium.make(ENV_ID, options=options),
-        gymnasium.make_vec(ENV_ID, num_envs=3, options=options),
-    ):
+    single = gymnasium.make(ENV_ID, options=options)
+    vector = gymnasium.make_vec(ENV_ID, num_envs=3, options=options)
+    for env in (single, vector):
         observation, _ = env.reset(seed=0)
         assert env.observation_space.contains(observation)
         assert observation.shape[-1] > 15

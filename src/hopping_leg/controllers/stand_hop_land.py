@@ -3,14 +3,13 @@
 A thin layer around any controller, since none was made to stand; it measures the joints alone.
 """
 
-from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.controllers.energy_shaping.gains import load_gains, scale_gains
-from hopping_leg.controllers.energy_shaping.phases import FLIGHT_LIMIT, TouchdownDetector
+from hopping_leg.controllers.energy_shaping.phases import FLIGHT_LIMIT, Phases, TouchdownDetector
 from hopping_leg.controllers.energy_shaping.virtual_leg import (
     LegView,
     flight_torque,
@@ -29,30 +28,12 @@ from hopping_leg.robot.model import GRAVITY
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import CONTROL_RATE
 
+_LANDING_LENGTH = 0.85
+"""Share of the straight leg at which the foot waits for the ground; a longer one has more way to
+brake."""
 
-@dataclass(frozen=True)
-class LandingGains:
-    """Gains of the landing, in units of the leg's weight, length and time (length / gravity)^(1/2).
-
-    Raises:
-        UsageError: A value has no meaning.
-    """
-
-    length: float = 0.85
-    """Leg length at which the foot waits for the ground; a longer leg has more way to brake."""
-    stiffness: float = 3.0
-    """Stiffness of the spring."""
-    damping: float = 1.5
-    """Damping of the damper."""
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not 0 <= value < float("inf"):
-                raise UsageError(
-                    f"Landing: '{name}' is {value} but must be finite and not below 0."
-                )
-        if not 0 < self.length < 1:
-            raise UsageError(f"'length' of the landing is {self.length} but must be below 1.")
+_LANDING_STIFFNESS, _LANDING_DAMPING = 3.0, 1.5
+"""Spring and damper of the landing, in units of the leg's weight, length and (length / g)^(1/2)."""
 
 
 class Landing:
@@ -62,21 +43,17 @@ class Landing:
         robot: The leg.
         count: Number of legs n.
         standing: Leg length to end at, m.
-        gains: Gains of the landing.
     """
 
-    def __init__(
-        self, robot: Robot, count: int, standing: float, gains: LandingGains | None = None
-    ) -> None:
+    def __init__(self, robot: Robot, count: int, standing: float) -> None:
         shipped = load_gains()
         self.robot = robot
         self._shared = scale_gains(shipped.gains, load_robot(shipped.robot), robot)
-        gains = gains or LandingGains()
         reach = robot.thigh.length + robot.shank.length
         self._weight, self._standing = robot.mass * GRAVITY, standing
-        self._stiffness = gains.stiffness * self._weight / reach
-        self._damping = gains.damping * self._weight / np.sqrt(reach * GRAVITY)
-        self._waiting = landing_posture(robot, gains)
+        self._stiffness = _LANDING_STIFFNESS * self._weight / reach
+        self._damping = _LANDING_DAMPING * self._weight / np.sqrt(reach * GRAVITY)
+        self._waiting = landing_posture(robot)
         self._detector = TouchdownDetector(robot, count, debounced=True)
         self._from = np.tile(self._waiting, (count, 1))
 
@@ -110,9 +87,9 @@ class Landing:
         return float(self._shared.flight_min)
 
 
-def landing_posture(robot: Robot, gains: LandingGains | None = None) -> Array:
+def landing_posture(robot: Robot) -> Array:
     """Return the posture in which a leg waits for the ground, foot below the hip, rad, (2,)."""
-    length = (gains or LandingGains()).length * (robot.thigh.length + robot.shank.length)
+    length = _LANDING_LENGTH * (robot.thigh.length + robot.shank.length)
     return kinematics.joint_angles(robot, np.array([length, 0.0]))
 
 
@@ -206,7 +183,6 @@ class StandHopLand:
         hops: To make, before the leg is caught.
         rate: Control rate, Hz.
         dropped: The legs begin in the air, in ``landing_posture``, and do not hop.
-        landing: Gains of the landing.
 
     Raises:
         UsageError: The number of hops has no meaning.
@@ -220,13 +196,12 @@ class StandHopLand:
         *,
         rate: float = CONTROL_RATE,
         dropped: bool = False,
-        landing: LandingGains | None = None,
     ) -> None:
         if hops < 0 or (hops > 0) == (controller is None):
             raise UsageError(f"{hops} hops make no sense here; give 1 or more, with a controller.")
         self.name = "landing" if controller is None else controller.name
         self.robot, self.hops, self._controller, self._period = robot, hops, controller, 1 / rate
-        self._dropped, self._gains = dropped, landing
+        self._dropped = dropped
         setup = RolloutConfig(robot)
         self._standing, self._posture = setup.standing_length, setup.start_posture
         self._stiffness, self._damping = (np.array(g) for g in vars(JointGains()).values())
@@ -236,9 +211,10 @@ class StandHopLand:
         """Forget everything; the legs stand, or fall."""
         self._observer.reset(count)
         self._liftoff = LiftoffDetector(self.robot, self._period, count)
-        self._landing = Landing(self.robot, count, self._standing, self._gains)
-        self._mode = np.full(count, int(Mode.FLY if self._dropped else Mode.STAND))
-        self._clock = np.full(count, self._landing.blind if self._dropped else 0.0)
+        self._landing = Landing(self.robot, count, self._standing)
+        self._modes = Phases(count)
+        if self._dropped:
+            self._modes.enter(np.ones(count, np.bool_), Mode.FLY, self._landing.blind)
         self._made = np.zeros(count, np.int64)
         self._from = np.tile(self._posture, (count, 1))
         self._torque = np.zeros((count, 2))
@@ -248,43 +224,43 @@ class StandHopLand:
     def act(self, measurement: Measurement) -> Array:
         """Return joint torques, N m, (n, 2)."""
         leg = view_leg(self.robot, *self._observer.update(measurement))
-        self._clock = self._clock + self._period
-        ready = (self._mode == Mode.STAND) & (self._clock > STAND_SECONDS)
-        self._enter(ready & (self._made < self.hops), Mode.HOP)
-        hopping = self._mode == Mode.HOP
+        modes = self._modes
+        modes.tick(self._period)
+        ready = modes.are(Mode.STAND) & (modes.clock > STAND_SECONDS)
+        modes.enter(ready & (self._made < self.hops), Mode.HOP)
+        hopping = modes.are(Mode.HOP)
         if hopping.any():
             self._count_hops(leg, hopping)
-        falling, met = self._landing.wait(leg, self._clock)
-        self._enter((self._mode == Mode.FLY) & met, Mode.BRAKE)
-        rested = (self._mode == Mode.BRAKE) & (self._clock > _BRAKE_SECONDS)
+        falling, met = self._landing.wait(leg, modes.clock)
+        modes.enter(modes.are(Mode.FLY) & met, Mode.BRAKE)
+        rested = modes.are(Mode.BRAKE) & (modes.clock > _BRAKE_SECONDS)
         self._from = np.where(rested[:, None], leg.q, self._from)
-        self._enter(rested, Mode.STAND)
-        modes = self._mode[:, None]
-        torque = np.where(modes == Mode.STAND, self._stand(leg), 0.0)
-        torque = np.where(modes == Mode.FLY, falling, torque)
-        torque = np.where(modes == Mode.BRAKE, self._landing.brake(leg), torque)
-        if self._controller is not None and (self._mode == Mode.HOP).any():
-            torque = np.where(modes == Mode.HOP, self._controller.act(measurement), torque)
+        modes.enter(rested, Mode.STAND)
+        mode = modes.phase[:, None]
+        torque = np.where(mode == Mode.STAND, self._stand(leg), 0.0)
+        torque = np.where(mode == Mode.FLY, falling, torque)
+        torque = np.where(mode == Mode.BRAKE, self._landing.brake(leg), torque)
+        if self._controller is not None and modes.are(Mode.HOP).any():
+            torque = np.where(mode == Mode.HOP, self._controller.act(measurement), torque)
         self._torque = torque
         return torque
 
     def internals(self) -> dict[str, Array]:
         """Return mode and hops counted at the last tick."""
-        return {"mode": self._mode.astype(np.float64), "counted_hops": self._made.astype(float)}
+        return {
+            "mode": self._modes.phase.astype(np.float64),
+            "counted_hops": self._made.astype(float),
+        }
 
     def _count_hops(self, leg: LegView, hopping: BoolArray) -> None:
         left = self._liftoff.update(leg, leg_force(self.robot, leg.q, self._torque))
         self._made += left & hopping
         enough = hopping & (self._made >= self.hops)
         self._landing.begin(enough, leg.q)
-        self._enter(enough, Mode.FLY)
+        self._modes.enter(enough, Mode.FLY)
 
     def _stand(self, leg: LegView) -> Array:
-        target, _ = retraction(self._from, self._posture, self._clock, _RISE_SECONDS)
+        target, _ = retraction(self._from, self._posture, self._modes.clock, _RISE_SECONDS)
         weight = np.full(len(leg.q), self.robot.mass * GRAVITY)
         held: Array = self._stiffness * (target - leg.q) - self._damping * leg.qd
         return held + foot_force_torque(self.robot, leg.q, weight, 0 * weight)
-
-    def _enter(self, who: BoolArray, mode: Mode) -> None:
-        self._mode = np.where(who, int(mode), self._mode)
-        self._clock = np.where(who, 0.0, self._clock)

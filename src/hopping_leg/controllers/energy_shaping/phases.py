@@ -35,27 +35,27 @@ class Phase(IntEnum):
 
 
 class Phases:
-    """Phase of each leg and the time spent in it.
+    """Phase of each leg, the one of value 0 at first, and the time spent in it.
 
     Attributes:
-        phase: Values of ``Phase``, (n,).
+        phase: Values of ``Phase`` or another enumeration, (n,).
         clock: Time since the phase began, s, (n,).
     """
 
     def __init__(self, count: int) -> None:
-        self.phase = np.full(count, int(Phase.LIFTOFF))
+        self.phase = np.zeros(count, np.int64)
         self.clock = np.zeros(count)
 
     def tick(self, period: float) -> None:
         """Let a control period pass, s."""
         self.clock = self.clock + period
 
-    def are(self, phase: Phase) -> BoolArray:
+    def are(self, phase: IntEnum) -> BoolArray:
         """Return which legs are in a phase, (n,)."""
         answer: BoolArray = self.phase == phase
         return answer
 
-    def enter(self, who: BoolArray, phase: Phase, since: Array | float = 0.0) -> None:
+    def enter(self, who: BoolArray, phase: IntEnum, since: Array | float = 0.0) -> None:
         """Put legs into a phase that began ``since`` seconds ago, (n,)."""
         self.phase = np.where(who, int(phase), self.phase)
         self.clock = np.where(who, since, self.clock)
