@@ -85,7 +85,7 @@ def table(file: str, path: str, *columns: str, **where: Any) -> str:  # noqa: AN
 
     Args:
         file: Name of the result.
-        path: Dotted path of the list.
+        path: Dotted path of the list, or of one record.
         columns: See ``Column``; default: every key of the first record.
         where: Show only records with these entries.
     """
@@ -115,7 +115,9 @@ def pivot(file: str, path: str, row: str, column: str, cell: str, **where: Any) 
 
 
 def _rows(file: str, path: str, where: dict[str, Any]) -> list[dict[str, Any]]:
-    rows = [r for r in pick(read(file), path) if all(r[k] == v for k, v in where.items())]
+    found = pick(read(file), path)
+    records = found if isinstance(found, list) else [found]
+    rows = [r for r in records if all(r[k] == v for k, v in where.items())]
     if not rows:
         raise PluginError(f"The result {file} has no rows at '{path}' with {where}.")
     return rows

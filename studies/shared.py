@@ -1,7 +1,7 @@
 """What every study's command shares: options, errors in a sentence, the results that it stores.
 
 A study's ``RESULTS`` are the shell commands behind ``studies/NAME/results`` and ``figures``;
-``python -m studies.NAME --results`` runs them.
+``python -m studies.NAME --results`` runs them and fills the tables of its README.
 """
 
 import importlib
@@ -19,6 +19,7 @@ from hopping_leg.cli import guard, read_options
 from hopping_leg.cli.options import KEPT, command_line, verb_of
 from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically, write_json
+from studies import readmes
 
 ROOT = Path(__file__).parent.parent
 
@@ -86,6 +87,7 @@ def run_results(name: str) -> int:
             raise UsageError(f"`{command}` failed with exit code {done.returncode}; see above.")
         if file := stored_file(command):
             store(ROOT / file, command)
+    readmes.write(name)
     return 0
 
 

@@ -8,3 +8,16 @@ RESULTS = (
     "--generations 40 --population 16 --step 0.1 --out runs/flying --json "
     "studies/energy_shaping/results/flying.json",
 )
+
+TABLES = (
+    (
+        "table",
+        "energy_shaping.json",
+        "cases",
+        "case",
+        "mean_abs_median_error_m*1000=error, mm",
+        "mean_std_m*1000=std, mm",
+        "hop_rate_hz=hops/s",
+        "skipped_hops=skipped hops",
+    ),
+)

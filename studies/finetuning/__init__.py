@@ -5,3 +5,17 @@ RESULTS = (
     "studies/finetuning/figures/finetuning.svg --json "
     "studies/finetuning/results/finetuning.json",
 )
+
+TABLES = (
+    (
+        "table",
+        "finetuning.json",
+        "rows",
+        "twin",
+        "method",
+        "policies",
+        "median_abs_error_m*1000=error, mm",
+        "best_m*1000=best",
+        "worst_m*1000=worst",
+    ),
+)

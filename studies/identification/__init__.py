@@ -13,3 +13,17 @@ RESULTS = (
     "python -m studies.identification --parts recordings --json "
     "studies/identification/results/recordings.json",
 )
+
+TABLES = (
+    ("table", "known_legs.json", "bars", "what", "bar", "measured", "unit", "reached"),
+    (
+        "table",
+        "known_legs.json",
+        "throughput.rows",
+        "what",
+        "s_per_candidate=s per candidate",
+        "times_faster=times faster",
+    ),
+    ("table", "paper_size.json", "bars", "what", "bar", "measured", "unit", "reached"),
+    ("table", "recordings.json", "bars", "what", "bar", "measured", "unit", "reached"),
+)

@@ -6,3 +6,17 @@ RESULTS = (
     "python -m studies.learning_curves recipe=runs/paper-seed0 'critics on "
     "measurements=runs/paper-blind' --json studies/learning_curves/results/paper.json",
 )
+
+TABLES = (
+    (
+        "table",
+        "paper.json",
+        "last",
+        "setting",
+        "steps",
+        "minutes",
+        "median_error_0.25_m*1000=error at 0.25 m, mm",
+        "median_error_0.30_m*1000=at 0.30 m",
+        "median_error_0.35_m*1000=at 0.35 m",
+    ),
+)

@@ -4,3 +4,7 @@ RESULTS = (
     "python -m studies.probing fast precise adaptive recurrent paper --figure "
     "studies/probing/figures/probing.svg --json studies/probing/results/probing.json",
 )
+
+TABLES = (
+    ("pivot", "probing.json", "rows", "features", "target", "{score:.2f}", {"controller": "fast"}),
+)

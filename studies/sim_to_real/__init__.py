@@ -21,3 +21,34 @@ RESULTS = (
     "studies/sim_to_real/results/fast.json",
     "python -m studies.sim_to_real prediction --json studies/sim_to_real/results/prediction.json",
 )
+
+TABLES = (
+    (
+        "table",
+        "fast.json",
+        "methods",
+        "meaning=policies trained on",
+        "policies",
+        "median_abs_error_m*1000=error, mm",
+        "ordered=heights in order",
+    ),
+    (
+        "table",
+        "fast.json",
+        "comparison",
+        "method",
+        "over",
+        "ratio",
+        "ratio_low=from",
+        "ratio_high=to",
+    ),
+    (
+        "table",
+        "prediction.json",
+        "methods",
+        "meaning=simulation",
+        "median_abs_error_m*1000=error, mm",
+        "median_abs_error_low_m*1000=from",
+        "median_abs_error_high_m*1000=to",
+    ),
+)

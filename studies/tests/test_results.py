@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from hopping_leg.cli import VERBS
+from studies import readmes
 from studies.shared import LONGEST, ROOT, condensed, results, store, stored_file
 
 NAMES = sorted(path.parent.name for path in ROOT.glob("studies/*/__main__.py"))
@@ -23,7 +24,7 @@ def test_every_result_is_made_by_a_command_of_the_study(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_commands_are_verbs_or_studies_and_a_page_tells_what_came_out(name):
+def test_commands_are_verbs_or_studies(name):
     for command in results(name):
         words = shlex.split(command)
         if words[0] == "hop":
@@ -33,7 +34,12 @@ def test_commands_are_verbs_or_studies_and_a_page_tells_what_came_out(name):
             assert words[2].removeprefix("studies.") in NAMES
         else:
             assert words[0] == "cp"
-    assert (ROOT / "studies" / name / "README.md").is_file()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_tables_of_a_readme_are_those_of_its_stored_results(name):
+    pytest.importorskip("mkdocs", reason="the extra 'docs' is not installed")
+    assert readmes.filled(name) == (ROOT / "studies" / name / "README.md").read_text()
 
 
 def test_results_are_small():

@@ -15,3 +15,22 @@ RESULTS = (
     "0.41,0.42,0.43,0.44,0.45 "
     "--json studies/training_time/results/precise_hops.json",
 )
+
+TABLES = (
+    (
+        "table",
+        "fast.json",
+        "",
+        "recipe",
+        "minutes_max=longest, min",
+        "worst_abs_median_error_m*1000=worst error, mm",
+    ),
+    (
+        "table",
+        "precise.json",
+        "",
+        "recipe",
+        "minutes_max=longest, min",
+        "worst_abs_median_error_m*1000=worst error, mm",
+    ),
+)

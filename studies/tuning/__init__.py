@@ -4,3 +4,7 @@ RESULTS = (
     "hop tune fast --trials 20 --steps 1000000 --workers 2 --json studies/tuning/results/fast.json",
     "cp runs/tune/fast/*.svg studies/tuning/figures",
 )
+
+TABLES = (
+    ("table", "fast.json", "trials", "number=trial", "state", "score_m*1000=score, mm", "minutes"),
+)
