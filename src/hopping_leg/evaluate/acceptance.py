@@ -5,7 +5,7 @@ The limits hold for a leg of the paper's size at commands up to ``HIGHEST``.
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from statistics import mean
 from typing import Any
 
@@ -55,16 +55,13 @@ class Accuracy:
     @property
     def shortfalls(self) -> list[str]:
         """What is not as asked, in words, each with its limit."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
-        found = [
-            f"{_words(name, values[name])} (asked: at most {_amount(name, limit)})"
-            for name, limit in AT_MOST.items()
-            if not values[name] <= limit
-        ]
-        return found + [
-            f"{_words(name, values[name])} (asked: at least {_amount(name, limit)})"
-            for name, limit in AT_LEAST.items()
-            if not values[name] >= limit
+        values = vars(self)
+        over = [("most", n, limit) for n, limit in AT_MOST.items() if not values[n] <= limit]
+        under = [("least", n, limit) for n, limit in AT_LEAST.items() if not values[n] >= limit]
+        return [
+            f"{name.removesuffix('_m').removesuffix('_per_s').replace('_', ' ')}"
+            f" {_amount(name, values[name])} (asked: at {bound} {_amount(name, limit)})"
+            for bound, name, limit in over + under
         ]
 
     @property
@@ -116,11 +113,6 @@ def _accuracy(rows: list[Mapping[str, Any]]) -> Accuracy:
 def _known(value: float | None) -> float:
     """Return a length; infinity where there was no hop to measure it of."""
     return math.inf if value is None or math.isnan(value) else value
-
-
-def _words(name: str, value: float) -> str:
-    words = name.removesuffix("_m").removesuffix("_per_s").replace("_", " ")
-    return f"{words} {_amount(name, value)}"
 
 
 def _amount(name: str, value: float) -> str:

@@ -27,25 +27,31 @@ def tabulate(runs: Sequence[Run], controllers: Sequence[str], seed: int) -> Eval
         seed: Seed of the bootstrap.
     """
     own = {name: [run for run in runs if run.controller == name] for name in controllers}
-    fixed = {name: _windows(own[name], "fixed") for name in controllers}
-    sequence = {name: _windows(own[name], "sequence") for name in controllers}
-    pooled = {name: fixed[name] + sequence[name] for name in controllers}
-    ladder = {name: _windows(own[name], "ladder") for name in controllers}
     robot = str(runs[0].trace.header.get("robot", "")) if runs else ""
 
-    def rows(windows: dict[str, list[HopWindow]]) -> list[Summary]:
+    def windows(name: str, *kinds: str) -> dict[float, list[HopWindow]]:
+        """Return a controller's windows in trials of some kinds, by rising command."""
+        chosen = [run for kind in kinds for run in own[name] if run.trial.kind == kind]
+        found = [window for run in chosen for window in measure(run.trace)]
+        commands = sorted({w.command for w in found})
+        return {c: [w for w in found if w.command == c] for c in commands}
+
+    def rows(*kinds: str) -> list[Summary]:
         return [
             summarise(name, robot, command, group, seed)
             for name in controllers
-            for command, group in _by_command(windows[name]).items()
+            for command, group in windows(name, *kinds).items()
         ]
 
-    apexes = {name: _apexes(pooled[name]) for name in controllers}
+    apexes = {
+        name: {c: pooled_apexes(g) for c, g in windows(name, "fixed", "sequence").items()}
+        for name in controllers
+    }
     stairs = {n: [run for run in own[n] if run.trial.kind == "staircase"] for n in controllers}
     return Evaluation(
-        summary=rows(pooled),
-        sequence=rows(sequence),
-        ladder=rows(ladder),
+        summary=rows("fixed", "sequence"),
+        sequence=rows("sequence"),
+        ladder=rows("ladder"),
         staircase=[_staircase(name, found) for name, found in stairs.items() if found],
         neighbours=[Comparison(name, _compare(apexes[name])) for name in controllers],
         distributions=[
@@ -59,19 +65,6 @@ def tabulate(runs: Sequence[Run], controllers: Sequence[str], seed: int) -> Eval
             if (found := judge_estimator(name, [run.trace for run in own[name]]))
         ],
     )
-
-
-def _windows(runs: Sequence[Run], kind: str) -> list[HopWindow]:
-    return [w for run in runs if run.trial.kind == kind for w in measure(run.trace)]
-
-
-def _by_command(windows: Sequence[HopWindow]) -> dict[float, list[HopWindow]]:
-    commands = sorted({w.command for w in windows})
-    return {c: [w for w in windows if w.command == c] for c in commands}
-
-
-def _apexes(windows: Sequence[HopWindow]) -> dict[float, Array]:
-    return {c: pooled_apexes(group) for c, group in _by_command(windows).items()}
 
 
 def _compare(apexes: dict[float, Array]) -> list[Neighbours]:
@@ -99,15 +92,7 @@ def _staircase(label: str, runs: Sequence[Run]) -> Staircase:
 def summarise(
     controller: str, robot: str, command: float, windows: Sequence[HopWindow], seed: int
 ) -> Summary:
-    """Pool all windows of one controller at one command.
-
-    Args:
-        controller: As named on the command line.
-        robot: Name of the leg.
-        command: Desired apex height, m.
-        windows: One per run and stretch at this command.
-        seed: Seed of the bootstrap.
-    """
+    """Pool all windows of one controller at one command; the seed is of the bootstrap."""
     apex = pooled_apexes(windows)
     low, high = median_interval([w.error for w in windows], seed)
     settled = sum(w.settled for w in windows)
@@ -145,13 +130,7 @@ def summarise(
 
 
 def pool_group(group: str, rows: Sequence[Summary], seed: int) -> list[Group]:
-    """Aggregate several policies of one recipe, one row per command.
-
-    Args:
-        group: Name of the recipe or pattern.
-        rows: Summary rows of all its policies.
-        seed: Seed of the bootstrap.
-    """
+    """Aggregate the summary rows of several policies of one recipe, one row per command."""
     return [
         _group_row(group, command, [row for row in rows if row.command_m == command], seed)
         for command in sorted({row.command_m for row in rows})

@@ -1,7 +1,6 @@
 """Several stored runs beside each other: one evaluation of all, where they differ, and its page."""
 
 import dataclasses
-import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,9 +15,6 @@ from hopping_leg.evaluate.result_files import StoredRun
 from hopping_leg.evaluate.tables import SUMMARY, column, millimetres
 from hopping_leg.evaluate.trials import Run, load_run
 from hopping_leg.html_page import Column, page_template, svg_uri, table
-
-_DRAWN = ("sequence", "staircase")
-"""Trials whose heights are drawn, of one run each."""
 
 _OF_CONTROLLERS = ("summary", "sequence", "ladder", "staircase", "neighbours", "estimators")
 """Tables of an evaluation whose rows belong to a controller."""
@@ -54,10 +50,7 @@ class Compared:
 
 
 def set_beside(runs: Sequence[StoredRun]) -> Compared:
-    """Compare runs.
-
-    Args:
-        runs: Two or more.
+    """Compare two runs or more.
 
     Raises:
         UsageError: They are too few or have nothing in common.
@@ -87,7 +80,7 @@ def traces_of(compared: Compared) -> list[Run]:
             continue
         others = {r.label: r.evaluation for r in compared.runs if r.evaluation}
         name = _name(others, stored.label)
-        for kind in _DRAWN:
+        for kind in ("sequence", "staircase"):
             runs = [load_run(path) for path in sorted(stored.traces.glob(f"*-{kind}-0.parquet"))]
             known = [run for run in runs if run.controller in evaluation.controllers]
             found += [dataclasses.replace(r, controller=name(r.controller)) for r in known]
@@ -138,27 +131,20 @@ def _heights(commands: set[float]) -> str:
 
 
 def _merge(evaluations: dict[str, Evaluation]) -> Evaluation:
-    named = [_renamed(e, _name(evaluations, label)) for label, e in evaluations.items()]
-    fields: dict[str, Any] = {
-        field: list(itertools.chain.from_iterable(getattr(e, field) for e in named))
-        for field in (*_OF_CONTROLLERS, "distributions")
-    }
-    fields["notes"] = list(dict.fromkeys(note for e in named for note in e.notes))
-    return Evaluation(**fields)
-
-
-def _renamed(evaluation: Evaluation, name: Callable[[str], str]) -> Evaluation:
-    fields: dict[str, Any] = {
-        field: [
-            dataclasses.replace(row, controller=name(row.controller))
-            for row in getattr(evaluation, field)
+    """Return all rows as one evaluation, controllers named apart."""
+    fields: dict[str, list[Any]] = {field: [] for field in (*_OF_CONTROLLERS, "distributions")}
+    for label, evaluation in evaluations.items():
+        name = _name(evaluations, label)
+        for field in _OF_CONTROLLERS:
+            fields[field] += [
+                dataclasses.replace(row, controller=name(row.controller))
+                for row in getattr(evaluation, field)
+            ]
+        fields["distributions"] += [
+            {**entry, "controller": name(entry["controller"])} for entry in evaluation.distributions
         ]
-        for field in _OF_CONTROLLERS
-    }
-    fields["distributions"] = [
-        {**entry, "controller": name(entry["controller"])} for entry in evaluation.distributions
-    ]
-    return dataclasses.replace(evaluation, **fields)
+    notes = dict.fromkeys(note for e in evaluations.values() for note in e.notes)
+    return Evaluation(**fields, notes=list(notes))
 
 
 def _name(evaluations: dict[str, Evaluation], label: str) -> Callable[[str], str]:
@@ -208,12 +194,7 @@ def _notes(runs: Sequence[StoredRun], differences: list[dict[str, str]]) -> list
 
 
 def write_comparison(compared: Compared, command: str = "") -> bytes:
-    """Return the comparison as HTML.
-
-    Args:
-        compared: Runs beside each other.
-        command: That makes the page again.
-    """
+    """Return the comparison as HTML, with the command that makes the page again."""
     evaluation = compared.evaluation
     rows = [training_row(label, training) for label, training in compared.trainings.items()]
     histories = {label: training["history"] for label, training in compared.trainings.items()}
@@ -222,18 +203,24 @@ def write_comparison(compared: Compared, command: str = "") -> bytes:
         title=f"Compared: {', '.join(run.label for run in compared.runs)}",
         command=command,
         compared=compared,
-        beside=beside_table(evaluation),
+        beside=_beside_table(evaluation),
         summary=table(SUMMARY, evaluation.summary),
         pictures=pictures,
         learning=svg_uri(draw_learning(histories)) if histories else "",
         trainings=table(_TRAINING, rows),
-        differences=difference_table(compared),
+        differences=table(
+            [
+                column(name.removeprefix("in "), name)
+                for name in next(iter(compared.differences), {})
+            ],
+            compared.differences,
+        ),
         commands={run.label: command_of(run) for run in compared.runs},
     )
     return page.encode()
 
 
-def beside_table(evaluation: Evaluation) -> Markup:
+def _beside_table(evaluation: Evaluation) -> Markup:
     """Return median error and spread, one line per command and one column per controller."""
     cells = {
         (row.command_m, row.controller): (
@@ -261,10 +248,3 @@ _TRAINING = (
     column("selected at step", "selected_steps"),
     column("its score / mm", "selected_score_m", ".1f", 1e3),
 )
-
-
-def difference_table(compared: Compared) -> Markup:
-    """Return the conditions that are not the same in all evaluations."""
-    rows = compared.differences
-    names = list(rows[0]) if rows else []
-    return table([column(name.removeprefix("in "), name) for name in names], rows)

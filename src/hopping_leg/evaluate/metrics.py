@@ -27,32 +27,29 @@ class HopWindow:
     Apexes, skipped hops and flight are taken after the start (2 s) or switch (1 s) has settled;
     heights, sink, contacts and torques over the whole stretch.
 
-    Attributes:
-        command: Desired apex height, m.
-        apex: Height of every in-flight apex, m, (hops,).
-        settled: Time in which apexes were counted, s.
-        flight: Time in which the foot was clear of the ground, s, of ``settled``.
-        skipped: Hops that should have happened and did not.
-        bounces: Bounces that never left the ground.
-        min_height: Lowest base height, m.
-        max_sink: Deepest the foot sank in, m.
-        base_contacts: Times the base touched the ground.
-        knee_contacts: Times the knee touched the ground.
-        peak_torque: Largest magnitude the motors gave at hip and knee, N m, (2,).
-        rms_torque: Root mean square of the same, N m, (2,).
     """
 
     command: float
+    """Desired apex height, m."""
     apex: Array
+    """Height of every in-flight apex, m, (hops,)."""
     settled: float
+    """Time in which apexes were counted, s."""
     flight: float
+    """Time of ``settled`` in which the foot was clear of the ground, s."""
     skipped: int
+    """Hops that should have happened and did not."""
     bounces: int
+    """Bounces that never left the ground."""
     min_height: float
+    """Lowest base height, m."""
     max_sink: float
+    """Deepest the foot sank in, m."""
     base_contacts: int
+    """Times the base touched the ground."""
     knee_contacts: int
     peak_torque: Array
+    """Largest magnitude the motors gave at hip and knee, N m, (2,)."""
     rms_torque: Array
 
     @property

@@ -11,15 +11,11 @@ from hopping_leg.io import write_json
 
 @dataclass(frozen=True)
 class ResultCache:
-    """Runs work once: its result lies in a folder and is taken from there the next time.
-
-    Attributes:
-        folder: Where results lie.
-        on_begin: Told, in words, what begins.
-    """
+    """Runs work once: its result lies in a folder and is taken from there the next time."""
 
     folder: Path
     on_begin: Callable[[str], None] = lambda words: None
+    """Told, in words, what begins."""
 
     def load_or_run(
         self, name: str, words: str, asked: dict[str, Any], work: Callable[[], dict[str, Any]]
