@@ -27,9 +27,6 @@ def test_policies_of_one_recipe_are_pooled(rows):
     assert group.worst_abs_error_m == 0.004
     assert (group.skipped_hops, group.body_contacts) == (3, 6)
     assert ERRORS[0] <= group.median_error_low_m <= group.median_error_high_m <= ERRORS[-1]
-
-
-def test_commands_are_kept_apart(rows):
     other = [dataclasses.replace(row, command_m=0.35, median_error_m=0.02) for row in rows]
     groups = pool_group("fast", rows + other, 0)
     assert [(g.command_m, g.median_error_m) for g in groups] == [(0.25, 0.001), (0.35, 0.02)]

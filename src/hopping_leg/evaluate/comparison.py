@@ -132,7 +132,7 @@ def _heights(commands: set[float]) -> str:
 
 def _merge(evaluations: dict[str, Evaluation]) -> Evaluation:
     """Return all rows as one evaluation, controllers named apart."""
-    fields: dict[str, list[Any]] = {field: [] for field in (*_OF_CONTROLLERS, "distributions")}
+    fields: dict[str, Any] = {field: [] for field in (*_OF_CONTROLLERS, "distributions")}
     for label, evaluation in evaluations.items():
         name = _name(evaluations, label)
         for field in _OF_CONTROLLERS:
