@@ -170,12 +170,7 @@ class Policy:
             _log.warning(sentence)
 
     def stranger(self, robot: Robot, name: str) -> str:
-        """Return what there is to say if a robot is not the one it was trained for, else nothing.
-
-        Args:
-            robot: The leg it shall drive.
-            name: Name of the policy in the sentence.
-        """
+        """Return a sentence that names the policy if a robot is not that of its training, or ""."""
         card = self.card
         if robot.digest == card.robot_digest:
             return ""

@@ -46,9 +46,7 @@ class RingBuffer(Generic[T]):
 class SampleHistory:
     """Joint samples of n legs by tick, newest first; a measurement's ages tell their places.
 
-    Args:
-        length: Ticks to remember; older samples are ignored.
-        period: Control period, s.
+    ``length`` is the number of ticks to remember, ``period`` that of control, s.
     """
 
     def __init__(self, length: int, period: float) -> None:

@@ -111,13 +111,7 @@ _BLIND = 0.9
 
 
 class LiftoffDetector:
-    """Detects when n legs leave the ground.
-
-    Args:
-        robot: The leg.
-        period: Control period, s.
-        count: Number of legs n.
-    """
+    """Detects when n legs leave the ground; ``period`` is that of control, s."""
 
     def __init__(self, robot: Robot, period: float, count: int) -> None:
         self._period, self._weight = period, robot.mass * GRAVITY

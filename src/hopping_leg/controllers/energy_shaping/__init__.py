@@ -18,13 +18,7 @@ from hopping_leg.sim import CONTROL_RATE
 def tuned_energy_shaping(
     robot: Robot, *, rate: float = CONTROL_RATE, gains: str = TUNED
 ) -> EnergyShaping:
-    """Return the baseline with a tuned set of gains, carried over to ``robot``.
-
-    Args:
-        robot: The leg.
-        rate: Control rate, Hz.
-        gains: Shipped name or path of a gain file.
-    """
+    """Return the baseline with shipped gains or those of a file, carried over to ``robot``."""
     found = load_gains(gains)
     scaled = scale_gains(found.gains, load_robot(found.robot), robot)
     return EnergyShaping(robot, scaled, ROBUST, rate=rate, name=gains)
@@ -35,11 +29,8 @@ def paper_energy_shaping(
 ) -> EnergyShaping:
     """Return the paper's law and gains with nothing added.
 
-    Args:
-        robot: The leg.
-        rate: Control rate, Hz.
-        true_contact: Take contact, base velocity and height from the simulator, so that the law
-            is judged apart from what feeds it.
+    With ``true_contact``, contact, base velocity and height come from the simulator, so that the
+    law is judged apart from what feeds it.
     """
     origin = load_robot(load_gains().robot)
     gains = scale_gains(ShapingGains(), origin, robot)

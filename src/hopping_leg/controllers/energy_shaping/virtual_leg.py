@@ -45,13 +45,8 @@ def view_leg(robot: Robot, q: Array, qd: Array) -> LegView:
 def foot_force_torque(robot: Robot, q: Array, push: Array, side: Array) -> Array:
     """Return the joint torques that press the foot with a force, N m, (n, 2).
 
-    The Jacobian is that of (x_down, y), so a positive ``push`` presses the foot to the ground.
-
-    Args:
-        robot: The leg.
-        q: Joint positions, rad, (n, 2).
-        push: Force downwards, N, (n,).
-        side: Force forwards, N, (n,).
+    The Jacobian is that of (x_down, y), so a positive ``push`` presses the foot to the ground, N,
+    (n,); ``side`` is the force forwards.
     """
     force = np.stack(np.broadcast_arrays(push, side), axis=-1)
     torque: Array = np.einsum("nij,ni->nj", kinematics.jacobian(robot, q), force)
