@@ -66,6 +66,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:  # noqa: ANN401
         undefined=jinja2.StrictUndefined, autoescape=False, keep_trailing_newline=True
     )
     try:
-        return environment.from_string(markdown).render(MACROS)
+        text = environment.from_string(markdown).render(MACROS)
     except (jinja2.TemplateError, OSError, LookupError, TypeError, ValueError) as error:
         raise PluginError(f"docs/{page.file.src_uri}: {type(error).__name__}: {error}") from error
+    return text.replace("](results/", "](" + "../" * page.file.src_uri.count("/") + "results/")
