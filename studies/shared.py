@@ -1,24 +1,30 @@
-"""What every study's command shares: options, errors in a sentence, the results that it stores.
+"""What studies share: options, errors in a sentence, the results that they store, timing.
 
 A study's ``RESULTS`` are the shell commands behind ``studies/NAME/results`` and ``figures``;
 ``python -m studies.NAME --results`` runs them and fills the tables of its README.
+Timings alternate what is compared and take medians, so that other load cannot bias them.
 """
 
 import importlib
 import inspect
 import json
 import os
+import platform
 import shlex
 import subprocess
 import sys
-from collections.abc import Collection, Sequence
+import time
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
+import numpy as np
+
+from hopping_leg.arrays import Array
 from hopping_leg.cli import guard, read_options
 from hopping_leg.cli.options import KEPT, command_line, verb_of
 from hopping_leg.errors import UsageError
-from hopping_leg.io import write_atomically, write_json
+from hopping_leg.io import versions, write_atomically, write_json
 from studies import readmes
 
 ROOT = Path(__file__).parent.parent
@@ -125,3 +131,54 @@ def _lines(tree: Any, indent: str = "") -> str:  # noqa: ANN401
         return json.dumps(tree, ensure_ascii=False)
     left, right = "{}" if isinstance(tree, dict) else "[]"
     return f"{left}\n" + ",\n".join(f"{inner}{part}" for part in parts) + f"\n{indent}{right}"
+
+
+Timed = Callable[[], None]
+
+
+def seconds(function: Timed) -> float:
+    """Return how long one call takes, s."""
+    start = time.perf_counter()
+    function()
+    return time.perf_counter() - start
+
+
+def interleave(
+    functions: Mapping[str, Timed],
+    repeats: int,
+    on_repeat: Callable[[int, int], None] | None = None,
+) -> dict[str, Array]:
+    """Time functions in turn, again and again.
+
+    Args:
+        functions: What to time, by name.
+        repeats: Rounds.
+        on_repeat: Called with (rounds done, rounds in all), for progress bars.
+
+    Returns:
+        Seconds by name, (repeats,); the first, cold round is not in it.
+    """
+    for function in functions.values():
+        function()
+    taken: dict[str, list[float]] = {name: [] for name in functions}
+    for done in range(repeats):
+        for name, function in functions.items():
+            taken[name].append(seconds(function))
+        if on_repeat is not None:
+            on_repeat(done + 1, repeats)
+    return {name: np.array(values) for name, values in taken.items()}
+
+
+def median_ratio(numerator: Array, denominator: Array) -> float:
+    """Return the median over rounds of the ratio of two durations."""
+    return float(np.median(numerator / denominator))
+
+
+def host() -> dict[str, Any]:
+    """Return what a timing depends on: processor, load, versions."""
+    return {
+        "cores": os.cpu_count(),
+        "machine": platform.machine(),
+        "load_average": os.getloadavg()[0],
+        **versions("mujoco", "numpy", "gymnasium"),
+    }

@@ -30,7 +30,7 @@ from studies.fault_campaign.case import Case, Result
 from studies.fault_campaign.families import FAMILIES
 from studies.fault_campaign.live import LIVE, play_live
 from studies.fault_campaign.trial import play
-from studies.timing import host
+from studies.shared import host
 
 _TRIALS = "trials.jsonl"
 _ABOUT = "campaign.json"
@@ -259,8 +259,6 @@ class Faults:
 
     def measure(self) -> dict[str, Any]:
         """Run it, print a table, return every number."""
-        from studies.fault_campaign.families import FAMILIES
-
         at_least(1, repeats=self.repeats)
         at_least(0, seed=self.seed, workers=self.workers, live=self.live or 0)
         campaign = Campaign(

@@ -19,12 +19,11 @@ from hopping_leg.identify.search import Report
 from studies.identification.bars import bars
 from studies.identification.fits import METHODS
 from studies.identification.mujoco_sysid import mujoco_sysid
-from studies.identification.paper_size import paper_size
 from studies.identification.real import real
 from studies.identification.study import FitCache, Study
-from studies.identification.synthetic import synthetic
+from studies.identification.synthetic import paper_size, synthetic
 from studies.identification.throughput import throughput
-from studies.timing import host
+from studies.shared import host
 
 PARTS = ("synthetic", "throughput", "mujoco-sysid", "paper-size", "recordings")
 """What can be measured, in order."""
@@ -152,8 +151,6 @@ class Identify:
 
     def measure(self) -> dict[str, Any]:
         """Run it, print what was to be reached and what was, return every number."""
-        from studies.identification.study import FitCache, Study
-
         at_least(1, generations=self.generations, repeats=self.repeats, threads=self.threads)
         at_least(4, population=self.population)
         at_least(0, seed=self.seed)

@@ -1,4 +1,4 @@
-"""Known twins identified: with a fixed base, on the ground, and hopping."""
+"""Known twins identified: with a fixed base, on the ground, hopping, and as long as the paper's."""
 
 import functools
 from typing import Any
@@ -7,7 +7,7 @@ from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from studies.identification.fits import fit, unseen_errors
 from studies.identification.study import FitCache, Study
-from studies.identification.twin import AIR, GROUND, Motion, believed, record
+from studies.identification.twin import AIR, GROUND, Motion, believed, record, record_paper
 
 Case = tuple[str, dict[str, float], tuple[Motion, ...], tuple[Motion, ...], tuple[str, ...]]
 
@@ -98,3 +98,37 @@ def identify_twin(
 
 def _parameters(case: str) -> tuple[str, ...] | None:
     return tuple(AIR) if case == FIXED else None
+
+
+def paper_size(study: Study, cache: FitCache, method: str) -> dict[str, Any]:
+    """Identify the twin from recordings of the paper's size.
+
+    Args:
+        study: Length of the recordings and effort.
+        cache: Has the checkpoints: a killed fit goes on, and then says that it was resumed.
+        method: How to search.
+
+    Returns:
+        As ``fits.fit``, with minutes.
+    """
+    unseen = {
+        motion: record(GROUND, motion, study.seconds)
+        for motion in ("other swings", "other squats", "other hops")
+    }
+    parameters = BEYOND_TABLE if method == "two-pass" else None
+    found = fit(
+        study,
+        cache,
+        f"paper-size-{method}",
+        method,
+        record_paper(study.paper_seconds),
+        unseen,
+        GROUND,
+        parameters,
+    )
+    return {
+        "recorded_s": 2 * study.paper_seconds,
+        "wall_minutes": found["wall_s"] / 60,
+        "cpu_minutes": found["cpu_s"] / 60,
+        **found,
+    }

@@ -40,8 +40,8 @@ from hopping_leg.robot.limits import SoftLimiter, SoftLimits
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE
 from hopping_leg.trace import Trace
+from studies.shared import host
 from studies.speed.inference import bench_inference
-from studies.timing import host
 
 _SAMPLE_SECONDS = 0.01
 

@@ -24,7 +24,7 @@ from hopping_leg.robot import Robot, build_model, load_robot
 from hopping_leg.robot.kinematics import joint_angles
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.sim import MujocoSimulator
-from studies.timing import Timed, host, interleave, median_ratio
+from studies.shared import Timed, host, interleave, median_ratio
 
 _BENT, _STRETCHED = 0.55, 0.8
 """Leg lengths of the recorded motion over the straight leg's."""

@@ -18,7 +18,7 @@ from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_policy, shipped_policies
 from hopping_leg.errors import UsageError
 from hopping_leg.sim import SAMPLES, Measurement
-from studies.timing import host
+from studies.shared import host
 
 
 def bench_inference(policies: Sequence[str], calls: int = 5000) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from hopping_leg.io import write_atomically
 from hopping_leg.viewer import scene
 from hopping_leg.viewer.live_leg import LiveSimulation
 from hopping_leg.viewer.viewer import FRAME_RATE, Viewer
+from studies.shared import host
 from studies.speed.browser import (
     SIZE,
     SMALL_SIZE,
@@ -34,7 +35,6 @@ from studies.speed.browser import (
     running,
     wait_for_leg,
 )
-from studies.timing import host
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page

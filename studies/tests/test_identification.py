@@ -3,7 +3,6 @@ import json
 import numpy as np
 import pytest
 
-from hopping_leg.cli import main
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import make_plan
@@ -14,12 +13,13 @@ from hopping_leg.robot.model import TIMESTEP
 from studies.identification import mujoco_sysid
 from studies.identification.bars import bars
 from studies.identification.fits import compare, summary
-from studies.identification.plain_loop import PlainLoop
 from studies.identification.real import real
-from studies.identification.run import bench_identify
+from studies.identification.run import Identify, bench_identify
 from studies.identification.study import FitCache, Study
 from studies.identification.synthetic import FIXED, identify_twin
+from studies.identification.throughput import PlainLoop
 from studies.identification.twin import AIR, GROUND, record, twin
+from studies.shared import main
 
 
 def test_twins_are_recorded_with_the_step_that_fits_take():
@@ -111,8 +111,8 @@ def test_bad_input_is_one_sentence(tmp_path):
         bench_identify(Study(), FitCache(tmp_path), parts=["physics"])
     with pytest.raises(UsageError, match="legv2_fixed_base"):
         real(Study(), FitCache(tmp_path), tmp_path)
-    assert main(["bench", "identify", "--population", "1"]) == 2
-    assert main(["bench", "identify", "--seconds", "8"]) == 2
+    assert main("identification", Identify, ["--population", "1"]) == 2
+    assert main("identification", Identify, ["--seconds", "8"]) == 2
 
 
 def test_a_missing_extra_is_said(monkeypatch, tmp_path):
@@ -152,9 +152,9 @@ def test_the_truth_explains_the_data_to_mujoco_sysid(way, error):
 @pytest.mark.slow
 def test_the_command_measures_keeps_and_goes_on(tmp_path):
     file = tmp_path / "identify.json"
-    words = ["bench", "identify", "--parts", "throughput", "--population", "4", "--repeats", "1"]
+    words = ["--parts", "throughput", "--population", "4", "--repeats", "1"]
     sizes = ["--throughput-seconds", "12", "--out", str(tmp_path / "kept"), "--json", str(file)]
-    assert main([*words, *sizes]) == 0
+    assert main("identification", Identify, [*words, *sizes]) == 0
     first = json.loads(file.read_text())
     speed = first["throughput"]
     assert speed["largest_difference_rad"] < 1e-6
@@ -162,7 +162,7 @@ def test_the_command_measures_keeps_and_goes_on(tmp_path):
     assert [row["bar"] for row in first["bars"]] == [3.0, 1.8]
     assert "--throughput-seconds 12" in first["command"]
     assert "--out" not in first["command"]
-    assert main([*words, *sizes]) == 0
+    assert main("identification", Identify, [*words, *sizes]) == 0
     assert json.loads(file.read_text())["throughput"] == speed
 
 

@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 
-from hopping_leg.cli import main
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.energy_shaping.phases import Phase
 from hopping_leg.controllers.registry import load_policy
@@ -13,8 +12,9 @@ from hopping_leg.errors import UsageError
 from hopping_leg.rl.onnx_export import expose_hidden
 from studies.probing.exposed import Exposed, record
 from studies.probing.fitting import interval, probe
-from studies.probing.run import Study
+from studies.probing.run import Probe, Study
 from studies.probing.targets import TARGETS
+from studies.shared import main
 
 RNG = np.random.default_rng(3)
 BY_NAME = {target.name: target for target in TARGETS}
@@ -95,9 +95,9 @@ def test_too_little_is_refused():
 @pytest.mark.slow
 def test_command_line_probes_a_policy(tmp_path, capsys):
     file, figure = tmp_path / "probe.json", tmp_path / "probe.svg"
-    words = ["bench", "probe", "fast", "--commands", "0.28", "0.32", "--legs", "3"]
+    words = ["fast", "--commands", "0.28", "0.32", "--legs", "3"]
     words += ["--seconds", "4", "--threads", "1", "--json", str(file), "--figure", str(figure)]
-    assert main(words) == 0
+    assert main("probing", Probe, words) == 0
     rows = json.loads(file.read_text())["rows"]
     assert {row["target"] for row in rows} == set(BY_NAME)
     scores = {(row["target"], row["features"]): row["score"] for row in rows}
@@ -105,7 +105,7 @@ def test_command_line_probes_a_policy(tmp_path, capsys):
     assert all(row["low"] <= row["high"] for row in rows)
     assert all(row["gain"] == 0 for row in rows if row["features"] == "observation")
     assert figure.read_bytes().startswith(b"<?xml")
-    assert main(["bench", "probe", "fast", "--commands", "0.9"]) == 2
+    assert main("probing", Probe, ["fast", "--commands", "0.9"]) == 2
     assert "trained for" in capsys.readouterr().err
 
 

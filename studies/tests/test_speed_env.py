@@ -4,8 +4,8 @@ import pytest
 from hopping_leg.envs import HoppingTask, TaskConfig, paper_reward
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import MujocoSimulator
+from studies.shared import interleave
 from studies.speed.env import EnvBenchmark, bench_env, record
-from studies.timing import interleave
 
 ROBOT = load_robot("legv2-paper")
 
