@@ -99,19 +99,18 @@ def test_a_run_on_ranges_of_ones_own_still_says_how_it_was_made(tmp_path):
     assert "--randomise" not in folder.command
 
 
-def test_a_run_says_what_its_policy_saw_where_that_is_not_the_recipes(tmp_path):
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"task.observation": "three-samples"}, "--observation three-samples"),
+        ({"heights": (0.2, 0.46)}, "--heights 0.2 0.46"),
+    ],
+)
+def test_a_run_says_what_is_not_the_recipes(changes, words, tmp_path):
     recipe, robot = get_recipe("precise"), load_robot("legv2")
-    assert "--observation" not in RunFolder(tmp_path, recipe, robot, 0, None).command
-    bare = recipe.replace({"task.observation": "three-samples"})
-    command = RunFolder(tmp_path, bare, robot, 0, None).command
-    assert "--observation three-samples" in command
-
-
-def test_a_run_says_for_which_heights_it_was_asked(tmp_path):
-    recipe, robot = get_recipe("precise"), load_robot("legv2")
-    assert "--heights" not in RunFolder(tmp_path, recipe, robot, 0, None).command
-    wide = recipe.replace(heights=(0.2, 0.46)).fit(robot)
-    assert "--heights 0.2 0.46" in RunFolder(tmp_path, wide, robot, 0, None).command
+    assert words.split()[0] not in RunFolder(tmp_path, recipe, robot, 0, None).command
+    other = recipe.replace(changes).fit(robot)
+    assert words in RunFolder(tmp_path, other, robot, 0, None).command
 
 
 @given(
