@@ -122,8 +122,6 @@ class Identify:
 
     parts: tuple[str, ...] = ()
     """Of synthetic, throughput, mujoco-sysid, paper-size and recordings; default: all."""
-    skip_paper_size: bool = False
-    """Leave out the recordings of the paper's size, which take longest."""
     searches: tuple[str, ...] = ("least-squares", "cma", "two-pass")
     """Of known twins and of recordings of the paper's size."""
     recordings: Path | None = None
@@ -171,13 +169,12 @@ class Identify:
             self.seed,
             self.searches,
         )
-        left_out = {"paper-size"} if self.skip_paper_size else set()
         console = Console()
         with _Progress(console) as progress:
             result = bench_identify(
                 study,
                 FitCache(self.out, progress.begin, progress.report),
-                parts=self.parts or [part for part in PARTS if part not in left_out],
+                parts=self.parts or PARTS,
                 recordings=self.recordings or _recordings(),
                 on_repeat=lambda done, total: console.print(f"round {done} of {total}"),
             )
