@@ -13,8 +13,7 @@ from hopping_leg.cli.options import at_least, mm
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.evaluate.runner import software_versions
 from hopping_leg.rl.recipes import VARIANTS
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, load_robot
 from studies.training_time.run import bench_training, over_commands
 
 _OF_A_RUN = ("seed", "minutes", "teacher_scores_m")

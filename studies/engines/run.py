@@ -25,9 +25,8 @@ from hopping_leg.evaluate.entries import load_entries
 from hopping_leg.evaluate.result import Summary
 from hopping_leg.evaluate.runner import evaluate, software_versions
 from hopping_leg.evaluate.trials import FIXED_SECONDS, on_floor
-from hopping_leg.robot import Robot, load_robot
+from hopping_leg.robot import TIMESTEP, Robot, load_robot
 from hopping_leg.robot.kinematics import joint_angles
-from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.sim import CONTROL_RATE, Engine, Ground, make_simulator
 from hopping_leg.sim.pybullet.world import import_pybullet
 from hopping_leg.workers import ProcessWorkers

@@ -23,8 +23,7 @@ from rich.table import Table
 
 from hopping_leg.cli.options import at_least
 from hopping_leg.errors import UsageError, unknown_name
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, load_robot
 from hopping_leg.workers import ProcessWorkers
 from studies.fault_campaign.case import Case, Result
 from studies.fault_campaign.families import FAMILIES

@@ -29,8 +29,7 @@ from hopping_leg.rl.finetune.finetuning import Row
 from hopping_leg.rl.finetune.running import POLICY, RESULT, finetune
 from hopping_leg.rl.finetune.simulated import Guard, SimulatedTrials
 from hopping_leg.rl.finetune.trial_data import score
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, load_robot
 from hopping_leg.sim.twins import draw_twin
 
 FIRST_JUDGE = 1000

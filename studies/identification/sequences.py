@@ -15,8 +15,7 @@ from hopping_leg.identify.initial_states import base_rate, start_states
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.windows import Window, cut
-from hopping_leg.robot.limits import MotorLimit
-from hopping_leg.robot.model import TIMESTEP
+from hopping_leg.robot import TIMESTEP, MotorLimit
 from studies.identification.twin import believed
 
 Way = Literal["whole", "windows"]

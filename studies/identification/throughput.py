@@ -15,9 +15,7 @@ from hopping_leg.identify.plan import make_plan
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import Window, cut
-from hopping_leg.robot.limits import MotorLimit
-from hopping_leg.robot.model import TIMESTEP
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import TIMESTEP, MotorLimit, Robot
 from studies.identification.study import Study
 from studies.identification.twin import believed, record_paper
 from studies.shared import Timed, host, interleave, median_ratio

@@ -15,9 +15,7 @@ from hopping_leg.identify.paper_excitation import (
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.play_excitation import play
 from hopping_leg.identify.recording import Recording
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.model import TIMESTEP
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import TIMESTEP, Robot, load_robot
 
 BELIEVED = "legv2"
 """Where fits begin: the CAD program's values."""

@@ -31,8 +31,7 @@ from hopping_leg.rl.distillation.teacher import Teacher
 from hopping_leg.rl.legacy_names import upgrade_config
 from hopping_leg.rl.recipes import recipe_of
 from hopping_leg.rl.resumable import restore_learner
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, load_robot
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 
 _FULL = NoiseAndDelay()

@@ -24,9 +24,8 @@ from hopping_leg.cma_strategy import seeded_strategy
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.result_cache import ResultCache
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
-from hopping_leg.robot import load_robot
+from hopping_leg.robot import JOINTS, Robot, load_robot
 from hopping_leg.robot.kinematics import foot_position, joint_angles
-from hopping_leg.robot.parameters import JOINTS, Robot
 from hopping_leg.sim import MujocoSimulator
 
 KNOTS = (0.45, 0.65, 0.85, 0.97)

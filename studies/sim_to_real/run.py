@@ -15,14 +15,14 @@ from hopping_leg.cli.reproduce import show_transfer
 from hopping_leg.controllers.registry import load_policy
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.statistics import median_interval
-from hopping_leg.robot.model_mismatch import (
+from hopping_leg.robot import (
     DriveMismatch,
     GroundMismatch,
     Latency,
     MassScale,
     ModelMismatch,
+    Robot,
 )
-from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim_to_real.methods import DEFAULT, FORETOLD, Method, choose_methods
 from hopping_leg.sim_to_real.stages import HopOnTwin, HopTrial
 from hopping_leg.sim_to_real.study import Study, find_twins

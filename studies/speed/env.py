@@ -20,9 +20,8 @@ from rich.table import Table
 from hopping_leg.arrays import Array
 from hopping_leg.cli.options import at_least
 from hopping_leg.envs import HoppingEnv, HoppingTask, TaskConfig, paper_reward
-from hopping_leg.robot import Robot, build_model, load_robot
+from hopping_leg.robot import TIMESTEP, Robot, build_model, load_robot
 from hopping_leg.robot.kinematics import joint_angles
-from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.sim import MujocoSimulator
 from studies.shared import Timed, host, interleave, median_ratio
 

@@ -8,8 +8,7 @@ from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import make_plan
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import cut
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.model import TIMESTEP
+from hopping_leg.robot import TIMESTEP, load_robot
 from studies.identification import mujoco_sysid
 from studies.identification.bars import bars
 from studies.identification.fits import compare, summary

@@ -22,8 +22,7 @@ from hopping_leg.evaluate.runner import evaluate, software_versions
 from hopping_leg.rl.parallel_seeds import ParallelSeeds
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.run_folder import read_result
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, load_robot
 
 JUDGING_SEED = 1000
 """First of the evaluation seeds."""

@@ -4,8 +4,7 @@ import pytest
 
 from hopping_leg.cli import main
 from hopping_leg.cli.robots import numbers
-from hopping_leg.robot import load_robot, shipped_robots
-from hopping_leg.robot.robot_files import load_tree
+from hopping_leg.robot import load_robot, load_tree, shipped_robots
 
 
 def test_list_names_every_shipped_robot(capsys, tmp_path):

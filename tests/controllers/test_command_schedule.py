@@ -9,8 +9,7 @@ from hopping_leg.controllers.command_schedule import (
 )
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.limits import command_limits
+from hopping_leg.robot import command_limits, load_robot
 
 LEG = load_robot("legv2-paper")
 

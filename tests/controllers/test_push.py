@@ -7,8 +7,7 @@ from hopping_leg.controllers.energy_shaping.virtual_leg import (
     leg_force,
     retraction,
 )
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.model import GRAVITY
+from hopping_leg.robot import GRAVITY, load_robot
 
 ROBOT = load_robot("legv2-paper")
 

@@ -14,8 +14,7 @@ from hopping_leg.controllers.stand_hop_land import (
 )
 from hopping_leg.errors import UsageError
 from hopping_leg.hop_detection import find_hops
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.model import GRAVITY
+from hopping_leg.robot import GRAVITY, load_robot
 from tests.evaluate.conftest import Spring
 
 ROBOT = load_robot("legv2-paper")

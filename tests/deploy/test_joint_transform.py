@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from hopping_leg.deploy.joint_transform import JointTransform, joint_transforms
 from hopping_leg.deploy.preflight import required_settings
 from hopping_leg.errors import RobotError
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.hardware import Hardware, Servo
+from hopping_leg.robot import Hardware, Servo, load_robot
 
 ANGLES = st.floats(-10, 10)
 WIRES = st.builds(

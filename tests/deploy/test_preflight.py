@@ -6,8 +6,7 @@ import pytest
 from hopping_leg.deploy.preflight import DriveInfo, check_drives, require_fit, required_settings
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.errors import HardwareError
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.hardware import REGISTER_MAP, Servo
+from hopping_leg.robot import REGISTER_MAP, Servo, load_robot
 
 LEG = load_robot("legv2")
 LIMITS = hopping_limits(LEG, 200.0)

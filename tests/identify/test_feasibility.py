@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.identify.feasibility import inverse_dynamics
-from hopping_leg.robot import build_model, kinematics, load_robot
-from hopping_leg.robot.model import GRAVITY
+from hopping_leg.robot import GRAVITY, build_model, kinematics, load_robot
 
 
 def frictionless(name="legv2"):

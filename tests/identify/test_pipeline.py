@@ -12,8 +12,7 @@ from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import identify
 from hopping_leg.identify.result import as_json
 from hopping_leg.identify.search import SearchOptions
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.robot_files import check_physics
+from hopping_leg.robot import check_physics, load_robot
 from tests.identify.fitting import EFFORT, RATE, TRUTH, TWIN, identified, options, run
 from tests.identify.twin import LEG, changed, record, swing
 

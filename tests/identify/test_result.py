@@ -7,8 +7,7 @@ import pytest
 
 from hopping_leg.errors import RobotError
 from hopping_leg.identify.result import as_json, save_robot
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.robot_files import load_tree
+from hopping_leg.robot import load_robot, load_tree
 from tests.identify.fitting import TRUTH, identified, run
 
 

@@ -9,9 +9,7 @@ import polars as pl
 from hopping_leg.identify.actuator_model import build_rig_model
 from hopping_leg.identify.recording import make_recording
 from hopping_leg.identify.recording_format import PAIRS, RecordingMetadata
-from hopping_leg.robot import kinematics
-from hopping_leg.robot.limits import MotorLimit
-from hopping_leg.robot.robot_files import load_robot
+from hopping_leg.robot import MotorLimit, kinematics, load_robot
 
 STEP = 1e-3
 LEG = load_robot("legv2")

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.limits import MotorLimit, SoftLimiter, SoftLimits
+from hopping_leg.robot import MotorLimit, SoftLimiter, SoftLimits, load_robot
 
 ROBOT = load_robot("legv2")
 MOTORS = MotorLimit(ROBOT)

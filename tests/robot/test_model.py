@@ -2,8 +2,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from hopping_leg.robot import build_model, load_robot, shipped_robots
-from hopping_leg.robot.model import GRAVITY
+from hopping_leg.robot import GRAVITY, build_model, load_robot, shipped_robots
 
 
 @pytest.mark.parametrize("name", shipped_robots())

@@ -1,8 +1,7 @@
 import pytest
 
 from hopping_leg.errors import RobotError
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.model_mismatch import NO_MISMATCH
+from hopping_leg.robot import NO_MISMATCH, load_robot
 
 
 def twin_file(tmp_path, text):

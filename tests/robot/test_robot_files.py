@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.envs import HoppingEnv
 from hopping_leg.errors import RobotError
-from hopping_leg.robot import build_model, load_robot, shipped_robots
-from hopping_leg.robot.robot_files import load_tree
+from hopping_leg.robot import build_model, load_robot, load_tree, shipped_robots
 
 EXAMPLE = "examples/my_leg.toml"
 

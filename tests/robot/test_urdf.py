@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from hopping_leg.robot import dynamics, load_robot, shipped_robots
-from hopping_leg.robot.urdf import to_urdf
+from hopping_leg.robot import dynamics, load_robot, shipped_robots, to_urdf
 from tests.robot.legs import SEEDS, random_robot, random_state
 
 

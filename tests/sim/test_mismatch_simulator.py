@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from hopping_leg.errors import RobotError
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.model_mismatch import (
+from hopping_leg.robot import (
     DriveMismatch,
     GroundMismatch,
     Latency,
     MassScale,
     ModelMismatch,
     SensorMismatch,
+    load_robot,
 )
 from hopping_leg.sim import NO_NOISE, MujocoSimulator, NoiseAndDelay, Plant
 from hopping_leg.sim.mismatch_model import mismatch_model

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.limits import SoftLimits
+from hopping_leg.robot import SoftLimits, load_robot
 from hopping_leg.sim import MujocoSimulator, NoiseAndDelay, Plant
 from tests.sim.legs import POSTURE, without_friction
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.model_mismatch import DriveMismatch, Latency, ModelMismatch, SensorMismatch
+from hopping_leg.robot import DriveMismatch, Latency, ModelMismatch, SensorMismatch, load_robot
 from hopping_leg.sim import MujocoSimulator
 from hopping_leg.sim.perturbation import Perturbation, Perturber
 from tests.sim.legs import POSTURE, without_friction

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import dynamics, load_robot
+from hopping_leg.robot import SoftLimits, dynamics, load_robot
 from hopping_leg.robot.kinematics import joint_angles
-from hopping_leg.robot.limits import SoftLimits
 from hopping_leg.sim import MujocoSimulator, NoiseAndDelay, Plant
 from hopping_leg.sim.pybullet import PyBulletSimulator
 from tests.robot.legs import random_state

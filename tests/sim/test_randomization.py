@@ -9,8 +9,7 @@ import pytest
 from hopping_leg.envs import HoppingTask, TaskConfig, paper_reward
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.io import replace_at
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.model_mismatch import Latency, ModelMismatch
+from hopping_leg.robot import Latency, ModelMismatch, load_robot
 from hopping_leg.sim import MujocoSimulator
 from hopping_leg.sim.randomization import (
     IDENTIFIABLE_RANGES,

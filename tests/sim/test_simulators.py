@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.model import GRAVITY
+from hopping_leg.robot import GRAVITY, load_robot
 from hopping_leg.sim import make_simulator
 from tests.sim.legs import energy, without_friction
 

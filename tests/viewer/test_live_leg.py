@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from hopping_leg.errors import PhysicsError, RobotError, UsageError
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.model_mismatch import GroundMismatch
+from hopping_leg.robot import GroundMismatch, load_robot
 from hopping_leg.viewer.live_leg import LiveSimulation
 from hopping_leg.viewer.live_settings import LiveSettings, default_settings
 

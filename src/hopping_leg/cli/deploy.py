@@ -45,9 +45,7 @@ from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.identify.excitation import load_excitation
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.limits import SoftLimiter, SoftLimits
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, SoftLimiter, SoftLimits, load_robot
 from hopping_leg.sim import CONTROL_RATE
 
 _SECONDS = 10.0

@@ -21,8 +21,7 @@ from hopping_leg.cli.options import say
 from hopping_leg.deploy.preflight import Finding, required_settings
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.errors import HardwareError, UsageError
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.parameters import JOINTS, Robot
+from hopping_leg.robot import JOINTS, Robot, load_robot
 from hopping_leg.sim import CONTROL_RATE
 
 if TYPE_CHECKING:

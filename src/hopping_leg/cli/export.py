@@ -16,8 +16,7 @@ import tyro
 from hopping_leg.cli.options import JsonFile, RobotFile, say_written, show_table
 from hopping_leg.controllers.registry import load_policy
 from hopping_leg.io import write_atomically, write_json
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.urdf import to_urdf
+from hopping_leg.robot import load_robot, to_urdf
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,7 @@ from hopping_leg.deploy.hardware_trials import DeployedRobot
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.io import write_json
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, load_robot
 
 if TYPE_CHECKING:
     from hopping_leg.controllers.hardware_trial import TrialRobot

@@ -37,8 +37,7 @@ from hopping_leg.identify.result import (
 from hopping_leg.identify.search import SearchOptions
 from hopping_leg.io import write_atomically, write_json
 from hopping_leg.progress import LiveProgress, minutes
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.parameters import JOINTS
+from hopping_leg.robot import JOINTS, load_robot
 
 _FILES = {"out": "Robot", "json": "Numbers", "report": "Report"}
 

@@ -34,9 +34,7 @@ from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.identify.excitation import Excitation, load_excitation
 from hopping_leg.identify.play_excitation import play, recording_of
 from hopping_leg.identify.recording_format import Pair
-from hopping_leg.robot import Robot, load_robot
-from hopping_leg.robot.model import TIMESTEP
-from hopping_leg.robot.robot_files import parent_robot
+from hopping_leg.robot import TIMESTEP, Robot, load_robot, parent_robot
 
 
 @dataclass(frozen=True)

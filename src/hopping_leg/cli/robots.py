@@ -16,8 +16,7 @@ import tyro
 
 from hopping_leg.cli.options import show_table
 from hopping_leg.io import Tree, write_json
-from hopping_leg.robot import Robot, build_model, load_robot, shipped_robots
-from hopping_leg.robot.robot_files import load_tree
+from hopping_leg.robot import Robot, build_model, load_robot, load_tree, shipped_robots
 
 Target = tyro.conf.Positional[str]
 

@@ -10,8 +10,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.errors import UsageError
-from hopping_leg.robot.limits import command_limits
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, command_limits
 
 Range = tuple[float, float]
 """Lowest and highest, m."""

@@ -11,9 +11,7 @@ import polars as pl
 from hopping_leg.arrays import Array
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.errors import PhysicsError, UsageError
-from hopping_leg.robot import kinematics
-from hopping_leg.robot.limits import SoftLimits
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, SoftLimits, kinematics
 from hopping_leg.sim import (
     CONTROL_RATE,
     Engine,

@@ -23,9 +23,7 @@ from hopping_leg.controllers.protocol import Controller, Measurement
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.controllers.sample_history import DatedObserver
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import kinematics, load_robot
-from hopping_leg.robot.model import GRAVITY
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import GRAVITY, Robot, kinematics, load_robot
 from hopping_leg.sim import CONTROL_RATE
 
 _LANDING_LENGTH = 0.85

@@ -27,8 +27,7 @@ from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.supervisor import State
 from hopping_leg.errors import HardwareError
 from hopping_leg.io import safe_file_name, versions
-from hopping_leg.robot.limits import SoftLimiter, SoftLimits
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, SoftLimiter, SoftLimits
 from hopping_leg.trace import Trace
 
 if TYPE_CHECKING:

@@ -16,9 +16,7 @@ from hopping_leg.controllers.joint_pd import JointGains
 from hopping_leg.controllers.protocol import Controller, Measurement
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.deploy.drive_link import Pair
-from hopping_leg.robot import kinematics
-from hopping_leg.robot.limits import SoftLimiter
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, SoftLimiter, kinematics
 
 _ROUNDING = 1e-6
 """Rounding of tick times, s; far less than a tick."""

@@ -13,8 +13,7 @@ from hopping_leg.deploy.joint_transform import joint_transforms
 from hopping_leg.deploy.safety_limits import SafetyLimits
 from hopping_leg.deploy.stop_reasons import fault_text
 from hopping_leg.errors import HardwareError
-from hopping_leg.robot.hardware import REGISTER_MAP
-from hopping_leg.robot.parameters import JOINTS, Robot
+from hopping_leg.robot import JOINTS, REGISTER_MAP, Robot
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 
 from hopping_leg.deploy.drive_link import Pair
-from hopping_leg.robot.limits import hopping_ranges
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, hopping_ranges
 
 RECORDING_MARGIN = 0.1
 """How far a recorded leg may pass its mechanical range, rad: backlash and the belt's give."""

@@ -21,8 +21,7 @@ from hopping_leg.emulator.frames import Frame, QueuedReply, TimedQueue
 from hopping_leg.emulator.leg import TIMESTEP, EmulatedLeg
 from hopping_leg.emulator.settings import Settings
 from hopping_leg.emulator.wire_log import WireLog
-from hopping_leg.robot.hardware import REGISTER_MAP
-from hopping_leg.robot.parameters import JOINTS, Robot
+from hopping_leg.robot import JOINTS, REGISTER_MAP, Robot
 
 _MODEL = 0x0000
 """Board r4."""

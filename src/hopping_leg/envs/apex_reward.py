@@ -18,8 +18,7 @@ import numpy as np
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.envs.paper_reward import action_jerk, joint_position_penalty
 from hopping_leg.envs.rewards import Reward, RewardTerm, Transition, sum_of_joints
-from hopping_leg.robot import kinematics
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, kinematics
 
 _FASTEST_SQUARED = 4.0
 """Base velocity squared beyond which the energy gain grows no more, m2/s2."""

@@ -5,8 +5,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.envs.task_config import TaskConfig
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import kinematics
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, kinematics
 
 _STANDING_SHARE = 0.3
 """Of the starts ``hop``."""

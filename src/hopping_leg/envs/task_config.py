@@ -8,8 +8,7 @@ import numpy as np
 
 from hopping_leg.controllers.observation_history import OBSERVATION_HISTORIES
 from hopping_leg.errors import UsageError
-from hopping_leg.robot.limits import SoftLimits
-from hopping_leg.robot.model import TIMESTEP
+from hopping_leg.robot import TIMESTEP, SoftLimits
 from hopping_leg.sim import CONTROL_RATE, NoiseAndDelay
 from hopping_leg.sim.randomization import Range
 

@@ -21,9 +21,7 @@ from hopping_leg.evaluate.trials import (
     within,
 )
 from hopping_leg.io import versions
-from hopping_leg.robot.limits import hopping_ranges
-from hopping_leg.robot.model import TIMESTEP
-from hopping_leg.robot.parameters import JOINTS
+from hopping_leg.robot import JOINTS, TIMESTEP, hopping_ranges
 from hopping_leg.sim import NO_NOISE, Engine
 
 

@@ -14,9 +14,7 @@ from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.evaluate.metrics import stretches
 from hopping_leg.io import safe_file_name
-from hopping_leg.robot.limits import command_limits
-from hopping_leg.robot.model_mismatch import GroundMismatch
-from hopping_leg.robot.parameters import Contact, Robot
+from hopping_leg.robot import Contact, GroundMismatch, Robot, command_limits
 from hopping_leg.trace import Trace
 
 COMMANDS = (0.25, 0.30, 0.35)

@@ -10,8 +10,7 @@ from hopping_leg.errors import RobotError
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.recording_format import Rig
-from hopping_leg.robot.model import GRAVITY, get_spec
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import GRAVITY, Robot, get_spec
 
 _PARTS = {
     "actuator": ("biasprm", "forcerange"),

@@ -16,8 +16,7 @@ from hopping_leg.identify.initial_states import start_states
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.recording_format import RecordingMetadata
-from hopping_leg.robot import dynamics
-from hopping_leg.robot.model import GRAVITY
+from hopping_leg.robot import GRAVITY, dynamics
 
 SETTLING = 1.0
 """Beginning of a recording from which its offsets are found, s."""

@@ -13,8 +13,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.errors import TraceError, UsageError
 from hopping_leg.identify.feasibility import HardwareRange, check_demand, demand
 from hopping_leg.identify.recording_format import PAIRS, Pair, Rig
-from hopping_leg.robot import kinematics
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, kinematics
 from hopping_leg.trace import Trace
 
 

@@ -8,9 +8,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.recording_format import Pair, Rig
-from hopping_leg.robot import dynamics, kinematics
-from hopping_leg.robot.limits import MotorLimit
-from hopping_leg.robot.parameters import JOINTS, Robot
+from hopping_leg.robot import JOINTS, MotorLimit, Robot, dynamics, kinematics
 
 LEAST_CLEARANCE = 0.005
 """Least clearance of base and knee above the ground, m."""

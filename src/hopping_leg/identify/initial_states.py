@@ -10,8 +10,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RecordingError
 from hopping_leg.identify.recording import Recording
-from hopping_leg.robot import kinematics
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, kinematics
 
 _REACH = 0.02
 """Time to either side of a row that its cubic spans, s."""

@@ -15,8 +15,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.identify.excitation import RATE, require_positive
 from hopping_leg.identify.feasibility import HardwareRange, check_demand, demand
 from hopping_leg.identify.recording_format import Rig
-from hopping_leg.robot import kinematics
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, kinematics
 
 DURATION = 240.0
 """Duration of the paper's recordings, s."""

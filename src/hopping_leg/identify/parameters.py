@@ -13,8 +13,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.io import quantity, replace_at
-from hopping_leg.robot.model import TIMESTEP
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import TIMESTEP, Robot
 
 
 @dataclass(frozen=True)

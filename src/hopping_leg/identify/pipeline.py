@@ -21,9 +21,7 @@ from hopping_leg.identify.result import Identified, as_json, software_versions
 from hopping_leg.identify.search import Pass, Report, Searcher, SearchOptions
 from hopping_leg.identify.windows import SHORTEST, cut, duration, hold_out
 from hopping_leg.io import write_json
-from hopping_leg.robot.model_mismatch import NO_MISMATCH
-from hopping_leg.robot.parameters import Robot
-from hopping_leg.robot.robot_files import check_physics
+from hopping_leg.robot import NO_MISMATCH, Robot, check_physics
 
 _CONFIG, _RESULT = "config.json", "result.json"
 

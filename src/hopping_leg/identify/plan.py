@@ -11,9 +11,7 @@ from hopping_leg.identify.initial_states import full_states
 from hopping_leg.identify.parameters import LegHypothesis, ParameterSet, choose
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.recording_format import PAIRS, Rig
-from hopping_leg.robot.model import TIMESTEP
-from hopping_leg.robot.parameters import JOINTS, Robot
-from hopping_leg.robot.robot_files import load_robot
+from hopping_leg.robot import JOINTS, TIMESTEP, Robot, load_robot
 
 _TOLERANCE = 0.2
 """Share by which link lengths may differ between files of one leg."""

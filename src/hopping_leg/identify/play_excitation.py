@@ -10,8 +10,7 @@ from hopping_leg.errors import PhysicsError, RecordingError
 from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.recording import Recording, make_recording
 from hopping_leg.identify.recording_format import MEASURED, PAIRS, Quantisation, RecordingMetadata
-from hopping_leg.robot.model import TIMESTEP
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import TIMESTEP, Robot
 from hopping_leg.sim import NO_NOISE, MujocoSimulator, Plant
 from hopping_leg.trace import Trace
 

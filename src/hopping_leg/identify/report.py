@@ -13,9 +13,7 @@ from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.result import Identified, as_json, parameters_json, quality_json
 from hopping_leg.identify.validation import RESTART, Overlay, overlays, rms
 from hopping_leg.io import Tree
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.parameters import JOINTS
-from hopping_leg.robot.robot_files import load_tree
+from hopping_leg.robot import JOINTS, load_robot, load_tree
 
 _CAD, _PAPER = "legv2", "legv2-paper"
 _UNITS = {"rad": ("mrad", 1e3), "N m": ("N m", 1.0)}

@@ -15,8 +15,7 @@ from hopping_leg.identify.recording_format import Rig
 from hopping_leg.identify.search import Pass
 from hopping_leg.identify.validation import Validation
 from hopping_leg.io import plain, replace_at, versions, write_atomically
-from hopping_leg.robot.parameters import Robot
-from hopping_leg.robot.robot_files import load_tree, robot_from_tree, robot_text
+from hopping_leg.robot import Robot, load_tree, robot_from_tree, robot_text
 
 _LIBRARIES = ("hopping-leg", "mujoco", "numpy", "scipy", "cma", "polars")
 

@@ -24,9 +24,7 @@ from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.resampling import HeldSignal, RowResampling
 from hopping_leg.identify.windows import Window
-from hopping_leg.robot import kinematics
-from hopping_leg.robot.model import TIMESTEP
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import TIMESTEP, Robot, kinematics
 
 _GAINS = ("stiffness", "damping", "integral")
 _BLOCK = 256

@@ -1,7 +1,68 @@
 """What the leg is: parameters, geometry, kinematics and dynamics."""
 
-from hopping_leg.robot.model import build_model, get_spec
-from hopping_leg.robot.parameters import Robot
-from hopping_leg.robot.robot_files import load_robot, shipped_robots
+from hopping_leg.robot.hardware import REGISTER_MAP, Hardware, Servo
+from hopping_leg.robot.limits import (
+    MotorLimit,
+    SoftLimiter,
+    SoftLimits,
+    command_limits,
+    hopping_ranges,
+)
+from hopping_leg.robot.model import GRAVITY, TIMESTEP, build_model, compile_spec, get_spec
+from hopping_leg.robot.model_mismatch import (
+    NO_MISMATCH,
+    DriveMismatch,
+    GroundMismatch,
+    Latency,
+    MassScale,
+    ModelMismatch,
+    SensorMismatch,
+)
+from hopping_leg.robot.parameters import JOINTS, Contact, Joint, Link, Robot
+from hopping_leg.robot.robot_files import (
+    check_physics,
+    load_robot,
+    load_tree,
+    parent_robot,
+    robot_from_tree,
+    robot_text,
+    shipped_robots,
+)
+from hopping_leg.robot.urdf import to_urdf
 
-__all__ = ["Robot", "build_model", "get_spec", "load_robot", "shipped_robots"]
+
+__all__ = [
+    "GRAVITY",
+    "JOINTS",
+    "NO_MISMATCH",
+    "REGISTER_MAP",
+    "TIMESTEP",
+    "Contact",
+    "DriveMismatch",
+    "GroundMismatch",
+    "Hardware",
+    "Joint",
+    "Latency",
+    "Link",
+    "MassScale",
+    "ModelMismatch",
+    "MotorLimit",
+    "Robot",
+    "SensorMismatch",
+    "Servo",
+    "SoftLimiter",
+    "SoftLimits",
+    "build_model",
+    "check_physics",
+    "command_limits",
+    "compile_spec",
+    "get_spec",
+    "hopping_ranges",
+    "load_robot",
+    "load_tree",
+    "parent_robot",
+    "robot_from_tree",
+    "robot_text",
+    "shipped_robots",
+    "to_urdf",
+]

@@ -1,8 +1,7 @@
 """The same leg in either engine."""
 
 from hopping_leg.errors import UsageError
-from hopping_leg.robot.model import TIMESTEP
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import TIMESTEP, Robot
 from hopping_leg.sim.mujoco_simulator import MujocoSimulator
 from hopping_leg.sim.simulator import CONTROL_RATE, Engine, Ground, Simulator
 

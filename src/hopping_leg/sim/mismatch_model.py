@@ -16,9 +16,7 @@ import numpy as np
 
 from hopping_leg.arrays import IntArray
 from hopping_leg.errors import RobotError
-from hopping_leg.robot.model import compile_spec, get_spec
-from hopping_leg.robot.model_mismatch import DriveMismatch
-from hopping_leg.robot.parameters import Contact, Joint, Link, Robot
+from hopping_leg.robot import Contact, DriveMismatch, Joint, Link, Robot, compile_spec, get_spec
 
 _HARD = (0.99, 0.999, 1e-4, 0.5, 2.0)
 """``solimp`` of hard limits and of friction that holds."""

@@ -13,8 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hopping_leg.arrays import Array, IntArray
-from hopping_leg.robot.limits import MotorLimit
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import MotorLimit, Robot
 from hopping_leg.sim.mismatch_model import true_parameters
 
 _REST = 0.1

@@ -8,9 +8,7 @@ from mujoco import batch
 
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import UsageError
-from hopping_leg.robot.limits import MotorLimit
-from hopping_leg.robot.model import TIMESTEP, build_model
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import TIMESTEP, MotorLimit, Robot, build_model
 from hopping_leg.sim.mismatch_simulator import MismatchSimulator
 from hopping_leg.sim.model_fields import JointFriction, friction_grows_with_load, set_model_fields
 from hopping_leg.sim.simulator import CONTROL_RATE, Simulator

@@ -16,8 +16,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.io import replace_at
-from hopping_leg.robot.parameters import JOINTS, Robot
-from hopping_leg.robot.robot_files import check_physics
+from hopping_leg.robot import JOINTS, Robot, check_physics
 
 RANDOMIZABLE = (
     "base.mass",

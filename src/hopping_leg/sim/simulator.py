@@ -7,8 +7,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import kinematics
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, kinematics
 from hopping_leg.sim.mismatch_simulator import MismatchSimulator
 
 Engine = Literal["mujoco", "pybullet"]

@@ -13,8 +13,7 @@ import numpy as np
 
 from hopping_leg.errors import UsageError
 from hopping_leg.io import Tree, replace_at, write_atomically
-from hopping_leg.robot.parameters import Robot
-from hopping_leg.robot.robot_files import robot_from_tree, robot_text, shipped_robots
+from hopping_leg.robot import Robot, robot_from_tree, robot_text, shipped_robots
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, Range
 
 _CHOSEN = "[C]"

@@ -33,8 +33,7 @@ from hopping_leg.identify.recording_format import Rig
 from hopping_leg.identify.result import Identified, as_json, save_robot
 from hopping_leg.identify.search import SearchOptions
 from hopping_leg.io import write_json
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, load_robot
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 from hopping_leg.sim_to_real.jobs import Job
 from hopping_leg.sim_to_real.methods import Fit, Method

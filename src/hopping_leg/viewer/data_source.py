@@ -7,8 +7,7 @@ import polars as pl
 
 from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorderTail
 from hopping_leg.errors import RobotError, UsageError
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, load_robot
 from hopping_leg.sim import CONTROL_RATE
 from hopping_leg.trace import Trace
 from hopping_leg.viewer.live_leg import MOST

@@ -9,8 +9,7 @@ import numpy as np
 import viser
 
 from hopping_leg.arrays import Array
-from hopping_leg.robot.model import build_model
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, build_model
 
 Colour = tuple[int, int, int]
 

@@ -9,9 +9,7 @@ from hopping_leg.controllers.protocol import Controller
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.errors import PhysicsError, UsageError
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.limits import SoftLimits
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, SoftLimits, load_robot
 from hopping_leg.sim import CONTROL_RATE, MujocoSimulator, Plant
 from hopping_leg.viewer.live_settings import PUSH, LiveSettings, default_settings
 from hopping_leg.viewer.tracks import FIELDS, Track

@@ -9,8 +9,7 @@ import viser
 
 from hopping_leg.controllers.registry import controller_names
 from hopping_leg.errors import HoppingLegError
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.robot_files import shipped_robots
+from hopping_leg.robot import load_robot, shipped_robots
 from hopping_leg.viewer import live_settings as ranges
 from hopping_leg.viewer.data_source import ReplaySource
 from hopping_leg.viewer.live_leg import LiveSimulation

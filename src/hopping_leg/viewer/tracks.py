@@ -12,8 +12,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.errors import TraceError
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE, find_hops
-from hopping_leg.robot import kinematics
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, kinematics
 from hopping_leg.trace import Trace
 
 FIELDS = (

@@ -9,8 +9,7 @@ from hopping_leg.controllers.registry import load_policy
 from hopping_leg.rl.finetune.apex_estimate import ApexEstimator, ContactConfig, ContactEstimator
 from hopping_leg.rl.finetune.config import FinetuneConfig, StoppingRules
 from hopping_leg.rl.finetune.learner import SacConfig
-from hopping_leg.robot import kinematics, load_robot
-from hopping_leg.robot.model import GRAVITY
+from hopping_leg.robot import GRAVITY, kinematics, load_robot
 from hopping_leg.trace import Trace
 
 ROBOT = load_robot("legv2-paper")

@@ -10,8 +10,7 @@ from hopping_leg.controllers.energy_shaping.gains import (
     load_gains,
     scale_gains,
 )
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, load_robot
 from hopping_leg.sim import CONTROL_RATE
 
 

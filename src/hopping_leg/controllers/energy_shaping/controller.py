@@ -27,8 +27,7 @@ from hopping_leg.controllers.energy_shaping.virtual_leg import (
 )
 from hopping_leg.controllers.sample_history import DatedObserver
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import kinematics
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, kinematics
 from hopping_leg.sim import CONTROL_RATE
 from hopping_leg.sim.channel import Measurement
 

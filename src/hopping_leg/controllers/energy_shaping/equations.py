@@ -9,8 +9,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.controllers.energy_shaping.gains import Gain
-from hopping_leg.robot.model import GRAVITY
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import GRAVITY, Robot
 
 SHORTEST_PUSH = 0.02
 """Least Delta x_l, m: the paper's quotient has no bound where the leg lands almost extended."""

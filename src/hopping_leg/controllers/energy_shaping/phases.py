@@ -10,8 +10,7 @@ import numpy as np
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.controllers.energy_shaping.gains import ShapingGains
 from hopping_leg.controllers.energy_shaping.virtual_leg import LegView, leg_force
-from hopping_leg.robot import kinematics
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, kinematics
 
 PUSH_LIMIT = 0.4
 """Longest push, s: a leg that has not reached lift-off by then gives up and tries afresh."""

@@ -10,8 +10,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.controllers.energy_shaping.gains import Gain, ShapingGains
-from hopping_leg.robot import kinematics
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, kinematics
 
 
 @dataclass(frozen=True)

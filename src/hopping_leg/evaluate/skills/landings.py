@@ -9,10 +9,8 @@ from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.controllers.joint_pd import JointPD
 from hopping_leg.controllers.stand_hop_land import StandHopLand, landing_posture
 from hopping_leg.evaluate.metrics import measure
-from hopping_leg.robot import kinematics
+from hopping_leg.robot import GRAVITY, JOINTS, Robot, kinematics
 from hopping_leg.robot.dynamics import potential_energy
-from hopping_leg.robot.model import GRAVITY
-from hopping_leg.robot.parameters import JOINTS, Robot
 from hopping_leg.trace import Trace
 
 

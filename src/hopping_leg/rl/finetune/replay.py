@@ -22,8 +22,7 @@ from hopping_leg.rl.finetune.apex_estimate import ApexEstimator
 from hopping_leg.rl.finetune.simulated import hop_many, traces_of
 from hopping_leg.rl.finetune.trial_data import ApexEstimate, TrialData
 from hopping_leg.rl.onnx_export import PREFIX, Network, expose_hidden
-from hopping_leg.robot import kinematics
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, kinematics
 
 EDGE = 0.995
 """Largest action: exploration and gradients end where tanh is flat."""

@@ -6,10 +6,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import kinematics
-from hopping_leg.robot.limits import MotorLimit
-from hopping_leg.robot.model import TIMESTEP
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import TIMESTEP, MotorLimit, Robot, kinematics
 from hopping_leg.sim.pybullet.ground_law import GroundLaw
 from hopping_leg.sim.pybullet.world import PyBulletWorld
 from hopping_leg.sim.simulator import CONTROL_RATE, Ground, Simulator

@@ -20,9 +20,7 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 
 from hopping_leg.arrays import Array
-from hopping_leg.robot import dynamics, kinematics
-from hopping_leg.robot.model import build_model
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, build_model, dynamics, kinematics
 
 _EDGES = np.array([2.0, 1.0, 1.0])
 """How many of the pyramid's edges push upwards, forwards and backwards."""

@@ -21,9 +21,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RobotError, UsageError
-from hopping_leg.robot.model import GRAVITY
-from hopping_leg.robot.parameters import Robot
-from hopping_leg.robot.urdf import to_urdf
+from hopping_leg.robot import GRAVITY, Robot, to_urdf
 
 ROTOR = "knee_rotor"
 """Name of the rotor's link and joint."""
