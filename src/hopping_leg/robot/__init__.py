@@ -30,7 +30,6 @@ from hopping_leg.robot.robot_files import (
 )
 from hopping_leg.robot.urdf import to_urdf
 
-
 __all__ = [
     "GRAVITY",
     "JOINTS",
