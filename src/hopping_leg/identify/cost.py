@@ -69,8 +69,7 @@ def total_costs(residuals: Array, loss: RobustLoss | None) -> Array:
 
 
 _QUANTITIES = ("position", "velocity", "torque", "height")
-_FAILED = 1e3
-"""Residual of a simulation that broke down, in units of the scales."""
+_FAILED = 1e3  # residual of a simulation that broke down, in units of the scales
 
 
 @dataclass(frozen=True)

@@ -88,7 +88,6 @@ RATE = 200.0
 """Rate of the paper's recordings, Hz."""
 _KEY = "excitation"
 _FACTS = {"rig": "rig", "rate_hz": "rate", "robot": "robot", "description": "description"}
-"""Attributes in the file's header."""
 
 
 @dataclass(frozen=True)

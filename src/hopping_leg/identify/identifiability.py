@@ -14,10 +14,8 @@ from hopping_leg.arrays import Array
 from hopping_leg.identify.parameters import ParameterSet
 
 _NINETY_FIVE = 1.959963984540054
-_UNTOLD = 0.5
-"""An interval wider than this share of the value, to either side, tells little."""
-_TIED = 0.95
-"""Correlation beyond which only a combination of two parameters is known."""
+_UNTOLD = 0.5  # an interval wider than this share of the value, to either side, tells little
+_TIED = 0.95  # correlation beyond which only a combination of two parameters is known
 _SINGULAR = 1e-10
 
 

@@ -14,7 +14,6 @@ BOOM_RADIUS = 1.146
 
 
 def _joint_columns(patterns: Mapping[str, str], hip: str, knee: str) -> dict[str, str]:
-    """Return a recording's column for each of a rig's, from its pattern for each quantity."""
     return {
         pattern.format(joint): column
         for quantity, pattern in patterns.items()
@@ -30,13 +29,10 @@ def _base_rise(table: pl.DataFrame) -> list[pl.Series]:
 def _hip_velocity(table: pl.DataFrame) -> list[pl.Series]:
     """Return the hip's velocity command that its drive got.
 
-    The foot moved along q = (theta - k/2, k): the leg swung by theta and stretched by k, with equal
-    links. The file's velocity commands are those of both motions, yet the drives got the
-    stretching's alone: in all segments, with stretching periods of 0.25 s to 1 s and swinging ones
-    of 5 s to 40 s, the hip lags behind the swing as its damping would make it without the swing's
-    velocity (60 ms), but not behind the stretching. So the hip's velocity command is that of -k/2.
-    With it, a hip gain of 13 N m/rad and no integral explain the mean, the slow and the fast errors
-    alike.
+    The leg swung by theta and stretched by k: q = (theta - k/2, k), with equal links. The file's
+    velocity commands are those of both, yet in all segments the hip lags behind the swing as its
+    damping would make it without the swing's velocity (60 ms), but not behind the stretching. So
+    the drive got -k/2 alone; with it a hip gain of 13 N m/rad explains all errors alike.
     """
     columns = [(table["t_exact"] > 0).alias("exact_time")]
     if "knee_vel_cmd" in table.columns:

@@ -22,11 +22,8 @@ Evaluate = Callable[[Array], Array]
 Progress = Callable[[float, float], None]
 """Called with the share done (0 to 1) and the lowest cost so far."""
 
-_NOTHING = 1e-3
-"""A cost that is nothing, as residuals are in units of errors that matter."""
-_MARGIN = 1.0
-"""Distance from its bounds, near which the trust region would barely move it, at which a parameter
-starts, in units of its scale."""
+_NOTHING = 1e-3  # a cost that is nothing, as residuals are in units of errors that matter
+_MARGIN = 1.0  # scales that a start keeps from bounds, near which the trust region barely moves it
 
 
 @dataclass(frozen=True)
@@ -64,22 +61,13 @@ def jacobian(
     step: float,
     groups: IntArray | None = None,
 ) -> Array:
-    """Return d residuals / d vector, (m, k), by differences.
+    """Return d residuals / d vector, (m, k), by differences of a step in search coordinates.
 
     A simulated touchdown falls on one physics step or the next, so that residuals of a window on
     the ground jump a little wherever a parameter moves it across. A difference that spans such a
-    jump is the jump over the step, hundreds of times the slope, and one bad column misleads the
-    whole search. So there every slope is taken on both sides, and each window goes by the calmer
-    one: a jump seldom lies on both.
-
-    Args:
-        residuals: Function of search vectors.
-        vector: Where, (k,), within the bounds.
-        bounds: Lower and upper, (k,) each.
-        step: Difference in search coordinates.
-        groups: Number of each residual's group, (m,), where groups jump now and then: each takes
-            the smaller of two differences, to either side, or inside one bound at two distances.
-            None takes one, towards the inside.
+    jump is hundreds of times the slope, and one bad column misleads the whole search. So with
+    ``groups``, the number of each residual's window, (m,), every slope is taken on both sides, or
+    inside one bound at two distances, and each group goes by the calmer one.
     """
     low, high = bounds
     room = np.minimum(step, np.maximum(high - vector, vector - low))
@@ -113,16 +101,9 @@ def least_squares(
 ) -> Found:
     """Search from one start; a run that was killed resumes with its round and ends the same.
 
-    Args:
-        residuals: Function of search vectors.
-        parameters: Bounds and scales.
-        options: How.
-        loss: Weighs residuals that no parameters explain; None counts every one in full.
-        groups: Groups of residuals that jump now and then, as for ``jacobian``.
-        start: Search vector to start from, (k,); None takes the parameters' start.
-        about: What else tells this search from others, e.g. the recordings' hashes.
-        checkpoint: File for the state after each round.
-        report: Called after each step that is tried.
+    The loss weighs residuals that no parameters explain; ``groups`` are those of ``jacobian``;
+    without a start, (k,), the search begins at the parameters'. ``about`` tells this search from
+    others, e.g. by the recordings' hashes.
 
     Raises:
         UsageError: The checkpoint belongs to another search.
@@ -139,9 +120,8 @@ def least_squares(
         history = list(saved["history"])
     while len(history) < options.rounds and not _settled(history, options.tolerance):
         least = history[-1] if history else np.inf
-        problem = _Problem(
-            residuals, (low, high), options, loss, groups, report, len(history), least
-        )
+        rounds = len(history)
+        problem = _Problem(residuals, (low, high), options, loss, groups, report, rounds, least)
         result = optimize.least_squares(
             problem.values,
             vector,
@@ -241,10 +221,8 @@ class CmaOptions:
     judged by another share, and the end by all."""
 
 
-_RECENT = 4
-"""Generations whose best stand for election at the end of a search that is judged by shares."""
-_COLLAPSED = 1e-3
-"""Standard deviation, in units of the parameters' scales, below which such a search has ended."""
+_RECENT = 4  # generations whose best stand for election at the end of a search by shares
+_COLLAPSED = 1e-3  # standard deviation, in scales, below which such a search has ended
 
 
 def cma_es(
@@ -259,7 +237,7 @@ def cma_es(
     checkpoint: Path | None = None,
     report: Progress = lambda share, cost: None,
 ) -> Found:
-    """Search from one start.
+    """Search from one start by CMA-ES.
 
     Costs only rank the candidates of a generation, so a share of the data is enough to judge it
     by. As shares take turns, the distribution's mean wanders about where all of them agree; its
@@ -267,17 +245,9 @@ def cma_es(
     resumed run draws the same generations from the same seed and takes their costs from the
     checkpoint, so it ends bit for bit as if never killed.
 
-    Args:
-        values: Function of search vectors; judges everything if there are no ``shares``.
-        parameters: Bounds and scales.
-        options: How.
-        seed: Seed of all randomness.
-        start: Search vector to start from, (k,); None takes the parameters' start.
-        shares: Functions whose sum is ``values``; each generation is judged by the next one in
-            turn, and what comes out by ``values``.
-        about: What else tells this search from others.
-        checkpoint: File for the state after each generation.
-        report: Called after each generation with the best cost, or what its share makes of it.
+    Each generation is judged by the next of ``shares``, whose sum is ``values``, or by ``values``
+    itself; start and ``about`` are those of ``least_squares``. Progress reports what the
+    generation's share makes of the best cost.
 
     Raises:
         UsageError: The checkpoint belongs to another search.
@@ -324,7 +294,6 @@ def cma_es(
 def _identity(
     parameters: ParameterSet, start: Array, options: object, about: Mapping[str, object] | None
 ) -> dict[str, Any]:
-    """Return what tells a search from others."""
     return {
         "parameters": repr(parameters.parameters),
         "start": start.tolist(),
@@ -340,7 +309,6 @@ def _save_state(path: Path | None, identity: dict[str, Any], state: dict[str, An
 
 
 def _load_state(path: Path | None, identity: dict[str, Any]) -> dict[str, Any] | None:
-    """Return the saved state of this very search, or None if there is none."""
     if path is None or not path.exists():
         return None
     try:

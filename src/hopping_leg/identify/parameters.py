@@ -94,7 +94,6 @@ def _units(owner: Any, prefix: str = "") -> dict[str, str]:  # noqa: ANN401
 
 
 def _path(hypothesis: LegHypothesis, name: str) -> str:
-    """Return where a parameter stands in a hypothesis."""
     units = parameter_units(hypothesis)
     if name not in units:
         raise UsageError(unknown_name("parameter", name, units))
@@ -123,9 +122,7 @@ _RANGES = {
     "load_friction": (0.0, 0.5),
 }
 """Widest bounds: by full name, else by the last part, prefixed by ``drive`` for drives."""
-
-_FACTOR = 4.0
-"""Parameters without a range may lie between a quarter and four times their start."""
+_FACTOR = 4.0  # parameters without a range may lie between a quarter and four times their start
 
 
 @dataclass(frozen=True)

@@ -60,17 +60,9 @@ def identify(
     """Identify a robot.
 
     A run that was killed goes on from its last generation with ``resume`` and ends bit for bit as
-    if it had not been.
-
-    Args:
-        recordings: To fit to. A quarter is held out, in stretches, unless ``validate`` is given.
-        robot: Its values before the fit; a table [reality] is left out.
-        validate: Recordings to judge by.
-        options: What and how.
-        folder: Folder for checkpoints and the result; None keeps none.
-        resume: Go on with the folder's run, if there is one.
-        seed: Seed of all randomness.
-        report: Called with the progress.
+    if it had not been. A quarter of the recordings is held out, in stretches, unless others are
+    given to ``validate``; the robot's table [reality] is left out. The folder keeps checkpoints
+    and the result; None keeps none.
 
     Raises:
         UsageError: An option has no meaning.
@@ -116,11 +108,9 @@ def identify(
     report("judging", 1.0, passes[-1].found.cost)
     effort = (plan.timestep, options.threads)
     before, after = (validation.validate(held, h, *effort) for h in (plan.start, hypothesis))
-    by_rig = {}
-    for rig in dict.fromkeys(r.metadata.rig for r in held):
-        group = [r for r in held if r.metadata.rig == rig]
-        if len(group) < len(held):
-            by_rig[rig] = validation.validate(group, hypothesis, *effort)
+    rigs = dict.fromkeys(r.metadata.rig for r in held)
+    groups = {rig: [r for r in held if r.metadata.rig == rig] for rig in rigs if len(rigs) > 1}
+    by_rig = {k: validation.validate(group, hypothesis, *effort) for k, group in groups.items()}
     parts = (tuple(passes), known, tuple(fit), tuple(held), split, after, before, by_rig, seed)
     identified = Identified(hypothesis, plan.start, plan, *parts)
     _finish(folder, as_json(identified))
@@ -128,7 +118,6 @@ def identify(
 
 
 def _finish(folder: Path | None, result: dict[str, Any]) -> None:
-    """Write the result, or why there is none; either marks the run as finished."""
     if folder is not None:
         write_json(folder / _RESULT, result)
 
@@ -216,10 +205,7 @@ def _config(
 
 
 def _prepare(folder: Path, config: dict[str, Any], *, resume: bool) -> None:
-    """Prepare a run's folder; the run in it goes on if it is the same one and unfinished.
-
-    With ``resume`` a finished run goes on, too, instead of being replaced.
-    """
+    """Let a folder's own run go on if unfinished or with ``resume``, else begin anew."""
     file, result = folder / _CONFIG, folder / _RESULT
     checkpoints = list(folder.glob("search-*.json"))
     if not file.exists():

@@ -13,8 +13,7 @@ from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.recording_format import PAIRS, Rig
 from hopping_leg.robot import JOINTS, TIMESTEP, Robot, load_robot
 
-_TOLERANCE = 0.2
-"""Share by which link lengths may differ between files of one leg."""
+_TOLERANCE = 0.2  # share by which link lengths may differ between files of one leg
 
 
 def robot_of(recordings: Sequence[Recording]) -> str:
@@ -75,13 +74,10 @@ _RAIL_PARAMETERS = ["rail.friction", "rail.damping"]
 _INERTIAS = ["thigh.inertia", "shank.inertia"]
 _SOLVER_PARAMETERS = ["contact.time_constant", "contact.damping_ratio"]
 """Table I; inertias and the contact's are fixed in the first pass."""
-_COARSE = 1e-3
-"""Physics step for a clamped leg whose drives' own loop the model only approximates, s; half of
-it would cost twice as much and change less than the model errs by."""
+_COARSE = 1e-3  # physics step for a clamped leg whose drives' loop is only approximated, s
 _GAINS = {"stiffness": 10.0, "damping": 0.5, "integral": 1.0}
 """Where a search for an unknown gain begins, in the gain's unit at the joint."""
-_OFTEN, _BEYOND = 0.8, 1.5
-"""Share of the time, and factor, that tell a torque limit from a spike."""
+_OFTEN, _BEYOND = 0.8, 1.5  # share of the time, and factor, that tell a torque limit from a spike
 _FASTEST, _REACHED = 0.999, 0.8
 """Quantile that leaves spikes out, and share of it that a motor at least reaches by itself."""
 
@@ -115,8 +111,7 @@ def make_plan(
 ) -> FitPlan:
     """Decide how to identify a robot from recordings, on whatever rigs, as far as it is not said.
 
-    Bounds are those that differ from the widest ones. ``search`` is one of ``SEARCHES``;
-    ``two-pass`` is the paper's: CMA-ES on positions only.
+    Bounds are those that differ from the widest ones; ``two-pass`` is the paper's search.
 
     Raises:
         UsageError: There is no recording, a parameter or search does not exist, or bounds
@@ -167,12 +162,8 @@ def _names(recordings: Sequence[Recording], *, paper: bool) -> list[str]:
 
 
 def _tell_load(recordings: Sequence[Recording]) -> bool:
-    """Return whether recordings tell friction that grows with torque from one that does not.
-
-    Torques must be known: commanded as such, or measured beside a loop that was computed here. In
-    the air such a loop asks for torque where it meets damping, and the two cannot be told apart;
-    on the ground the leg's weight asks for it.
-    """
+    """Return whether recordings tell friction that grows with torque from one that does not."""
+    # In the air a loop asks for torque where it meets damping; on the ground weight asks for it.
     commanded = [r.metadata.onboard == "torque" for r in recordings]
     grounded = any(r.metadata.rig != "fixed-base" for r in recordings)
     known = (c or _tells_gain(r) for c, r in zip(commanded, recordings, strict=True))
@@ -185,7 +176,6 @@ def _tells_gain(recording: Recording) -> bool:
 
 
 def _open_gains(recordings: Sequence[Recording]) -> list[str]:
-    """Return gains of the on-board loop that a recording leaves open."""
     found = []
     for gain in _GAINS:
         if any(_is_open(r, gain) for r in recordings):
@@ -204,11 +194,7 @@ def _is_open(recording: Recording, gain: str) -> bool:
 
 
 def _limits(recordings: Sequence[Recording]) -> list[str]:
-    """Return the torque-speed line of each joint that a recording drove into it.
-
-    There the on-board loop, with the gains as far as they are known, asked for far more torque
-    than was measured.
-    """
+    """Return the torque-speed line of joints whose loop asked for far more than was measured."""
     beyond = np.zeros(2, dtype=bool)
     for recording in recordings:
         metadata, torque = recording.metadata, recording.array("torque")
@@ -239,7 +225,6 @@ def _speed_bounds(recordings: Sequence[Recording], robot: Robot) -> dict[str, tu
 
 
 def _start(recordings: Sequence[Recording], robot: Robot) -> LegHypothesis:
-    """Return the robot with the drives that the recordings state."""
     values = {}
     for name in _open_gains(recordings):
         _, joint, gain = name.split(".")
@@ -269,11 +254,8 @@ def _timestep(recordings: Sequence[Recording]) -> float:
 
 
 def _window(recordings: Sequence[Recording]) -> tuple[float, float]:
-    """Return window and unscored beginning, s.
-
-    On the ground a longer window is rugged: whether and when the foot lifts off or lands decides
-    all that follows, so that a search from far off is caught long before the truth.
-    """
+    """Return window and unscored beginning, s."""
+    # On the ground a longer one is rugged: the moment of touchdown decides all that follows.
     if any(r.metadata.rig != "fixed-base" for r in recordings):
         return 0.25, 0.0
     if any(r.metadata.onboard == "torque" for r in recordings):

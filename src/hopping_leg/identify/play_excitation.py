@@ -15,8 +15,7 @@ from hopping_leg.sim import NO_NOISE, MujocoSimulator, Plant
 from hopping_leg.trace import Trace
 
 _TARGETS = PAIRS["position_command"] + PAIRS["velocity_command"]
-_IMPOSSIBLE = 1e4
-"""Joint speed that no leg reaches, rad/s."""
+_IMPOSSIBLE = 1e4  # joint speed that no leg reaches, rad/s
 
 
 def play(
@@ -32,16 +31,9 @@ def play(
     """Record a leg that tracks an excitation by the paper's joint PD.
 
     Each row holds what the sensors reported when the command of the row was computed; the PD acts
-    from that report, once per row. Height and contact, where there is a rail, are the truth.
-
-    Args:
-        excitation: What the joints shall do.
-        robot: The leg that plays the real one; its ``reality`` holds.
-        believed: Robot file that the recording is filed under, where identification begins.
-        seed: Seed of jitter and sensor noise.
-        gains: Gains of the PD.
-        timestep: Physics step, s.
-        on_tick: Called with (ticks done, ticks in all).
+    from that report, once per row. Height and contact, where there is a rail, are the truth. The
+    robot plays the real leg with its ``reality``; ``believed`` is the robot file that the recording
+    is filed under; the seed is of jitter and noise; ``on_tick`` gets ticks done and in all.
 
     Raises:
         PhysicsError: The simulation became unstable.
@@ -96,7 +88,6 @@ def play(
 def _metadata(
     excitation: Excitation, robot: str, gains: JointGains, source: str, steps: Quantisation
 ) -> RecordingMetadata:
-    """Return how a leg on the paper's joint PD is recorded."""
     return RecordingMetadata(
         excitation.rig,
         excitation.rate,

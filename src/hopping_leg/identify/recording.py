@@ -239,7 +239,6 @@ def sidecar_path(path: Path) -> Path:
 
 
 def _native(path: Path) -> tuple[pl.DataFrame, dict[str, Any]]:
-    """Return a Parquet file's table, and its header if it is a trace."""
     try:
         text = pl.read_parquet_metadata(path).get("hopping_leg")
         if text is not None:
@@ -288,7 +287,6 @@ def _read_metadata(tree: object, origin: str) -> RecordingMetadata:
 
 
 def _cast(table: pl.DataFrame, kinds: Mapping[str, type[pl.DataType]], origin: str) -> pl.DataFrame:
-    """Return the columns that have a type, in it; others are left out."""
     series = []
     for name, kind in ((n, k) for n, k in kinds.items() if n in table.columns):
         try:

@@ -15,18 +15,12 @@ from hopping_leg.identify.unit_checks import STALL, Inspection, row_period
 
 TINY, HUGE = 1e-30, 1e30
 """No sensor gives a magnitude beyond these; uninitialised memory read as a float does."""
-_MOSTLY = 0.1
-"""Share of garbage above which nothing in a column is believed."""
-_STARTUP = 10
-"""Rows at the beginning that are searched for commands that were not applied."""
-_JUMP = 0.05
-"""Step out of rows of zeros, rad, that only a sensor that woke up makes."""
-_LEAST_ROWS = 20
-"""Rows with a position that a recording needs."""
-_LEAST_MOTION = 0.02
-"""Motion of the joint that moves more, rad; below it nothing can be identified."""
-_SMALL_MOTION = 0.5
-"""Below it, rad, positions may be revolutions."""
+_MOSTLY = 0.1  # share of garbage above which nothing in a column is believed
+_STARTUP = 10  # rows at the beginning that are searched for commands that were not applied
+_JUMP = 0.05  # step out of rows of zeros, rad, that only a sensor that woke up makes
+_LEAST_ROWS = 20  # rows with a position that a recording needs
+_LEAST_MOTION = 0.02  # motion of the joint that moves more, rad; below it nothing can be identified
+_SMALL_MOTION = 0.5  # below it, rad, positions may be revolutions
 
 
 def check_table(inspection: Inspection) -> None:
@@ -52,7 +46,6 @@ def check_table(inspection: Inspection) -> None:
 
 
 def _drop_garbage(inspection: Inspection) -> None:
-    """Leave out denormal, infinite and huge values."""
     for column in inspection.table.select(pl.selectors.float()).columns:
         values = inspection.floats(column)
         size = np.abs(values)
@@ -90,7 +83,6 @@ def _drop_zeros(inspection: Inspection) -> None:
 
 
 def _drop_startup(inspection: Inspection) -> None:
-    """Leave out first rows in which sensors slept or commands were not applied."""
     known = inspection.metadata.startup_rows
     already = inspection.row(0)
     if known and already:
@@ -140,7 +132,6 @@ def _unapplied(inspection: Inspection) -> int:
 
 
 def _check_motion(inspection: Inspection) -> None:
-    """Refuse what is too short or at rest."""
     table, origin = inspection.table, inspection.origin
     spans = {}
     for column in PAIRS["position"]:

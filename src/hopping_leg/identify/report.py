@@ -18,8 +18,7 @@ from hopping_leg.robot import JOINTS, load_robot, load_tree
 _CAD, _PAPER = "legv2", "legv2-paper"
 _UNITS = {"rad": ("mrad", 1e3), "N m": ("N m", 1.0)}
 """What is shown for an SI unit, and how many of them it is."""
-_MOST = 12
-"""Recordings drawn, those that fit worst."""
+_MOST = 12  # recordings drawn, those that fit worst
 
 
 def write_fit_report(identified: Identified, command: str = "", threads: int = 0) -> bytes:
@@ -109,7 +108,6 @@ def _table_one(tree: Tree, prefix: str = "") -> dict[str, float]:
 
 
 def _worst(drawn: list[Overlay]) -> list[Overlay]:
-    """Return the overlays that fit worst, in their order."""
     squares = (np.square(overlay.errors("position")[-1]) for overlay in drawn)
     errors = [float(np.nansum(s) / max(1, np.isfinite(s).sum())) for s in squares]
     ranked = sorted(range(len(drawn)), key=lambda index: errors[index], reverse=True)

@@ -14,12 +14,9 @@ from hopping_leg.identify.validation import Overlay
 from hopping_leg.robot.parameters import JOINTS
 
 _LABELS = {"position": "position / rad", "torque": "torque / N m"}
-_SHOWN = 6.0
-"""Longest stretch that is drawn, s."""
-_SAMPLES = 4000
-"""Residuals that a spectrum takes at most; more change nothing that can be seen."""
-_FREQUENCIES = 500
-"""Frequencies of a spectrum, from slow to half the rate."""
+_SHOWN = 6.0  # longest stretch that is drawn, s
+_SAMPLES = 4000  # residuals that a spectrum takes at most; more change nothing that can be seen
+_FREQUENCIES = 500  # frequencies of a spectrum, from slow to half the rate
 
 
 @styled
@@ -46,7 +43,6 @@ def draw_overlay(overlay: Overlay) -> Figure:
 
 
 def _panels(x_label: str) -> tuple[Figure, dict[tuple[str, int], Axes]]:
-    """Return a figure with a panel for each quantity of each joint."""
     figure = Figure(figsize=(WIDTH, 4.4), layout="constrained")
     grid, panels = figure.subplots(2, 2, sharex=True, squeeze=False), {}
     for line, (quantity, label) in zip(grid, _LABELS.items(), strict=True):

@@ -198,7 +198,6 @@ def save_robot(identified: Identified, path: Path, origin: str | Path) -> None:
 
 
 def _place(name: str) -> str:
-    """Return where a fit's parameter stands in a robot file."""
     return _LATENCY if name == "drive.delay" else name
 
 

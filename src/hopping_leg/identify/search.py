@@ -26,8 +26,7 @@ from hopping_leg.identify.recording_format import Rig
 from hopping_leg.identify.windows import deal
 from hopping_leg.workers import RayWorkers, map_rows
 
-_FACTOR = 2.0
-"""The paper's second pass keeps the first one's parameters within this factor."""
+_FACTOR = 2.0  # the paper's second pass keeps the first one's parameters within this factor
 
 Report = Callable[[str, float, float], None]
 """Called with what is being done, its share done (0 to 1) and the lowest cost so far."""
@@ -148,7 +147,6 @@ class Searcher:
         )
 
     def _spread(self, evaluate: Evaluate) -> Evaluate:
-        """Return a function of a population, on the cluster if there is one."""
         return evaluate if self.ray is None else partial(map_rows, RayWorkers(self.ray), evaluate)
 
 

@@ -18,8 +18,12 @@ from hopping_leg.identify.actuator_model import (
     drive_values,
     recorded_gains,
 )
-from hopping_leg.identify.encoder_offsets import OffsetFinder, has_encoder_offsets
-from hopping_leg.identify.initial_states import base_rate, start_states
+from hopping_leg.identify.initial_states import (
+    OffsetFinder,
+    base_rate,
+    has_encoder_offsets,
+    start_states,
+)
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.resampling import HeldSignal, RowResampling
@@ -27,12 +31,9 @@ from hopping_leg.identify.windows import Window
 from hopping_leg.robot import TIMESTEP, Robot, kinematics
 
 _GAINS = ("stiffness", "damping", "integral")
-_BLOCK = 256
-"""Ticks whose commands are prepared at once."""
-_TICKS_PER_PERIOD = 5
-"""Ticks per period at which a drive that closes its own loop renews target, integral and limits."""
-_WILD = 1e4
-"""Joint velocity beyond which a simulation has broken down, rad/s."""
+_BLOCK = 256  # ticks whose commands are prepared at once
+_TICKS_PER_PERIOD = 5  # at which a drive that closes its own loop renews target and limits
+_WILD = 1e4  # joint velocity beyond which a simulation has broken down, rad/s
 
 
 class WindowGroup:
@@ -101,7 +102,6 @@ class WindowGroup:
         return position, velocity, measured, height
 
     def _prepare_rows(self, recordings: Sequence[Recording], windows: Sequence[Window]) -> None:
-        """Place every window's rows among the ticks and collect initial states."""
         times = []
         self._begin = np.empty(len(windows))
         states = {n: start_states(recordings[n]) for n in self._numbers}
@@ -129,7 +129,6 @@ class WindowGroup:
             self._gains.append(HeldSignal(time, np.concatenate(rows, axis=1)))
 
     def _start(self, hypotheses: Sequence[LegHypothesis], offsets: Array) -> batch.Batch:
-        """Return the batch with each simulation's model and initial state set."""
         metadata, windows = self._metadata, len(self._begin)
         models = [
             build_rig_model(h.robot, metadata.rig, self._timestep, metadata.effective_gravity)

@@ -59,35 +59,22 @@ class Inspection:
 STALL = 2.0
 """A gap between rows of more than this many periods is a stall."""
 _TIME_UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1 / 60}
-_SPARSEST = 20.0
-"""Periods per row beyond which the rate or the time's unit must be wrong."""
+_SPARSEST = 20.0  # periods per row beyond which the rate or the time's unit must be wrong
 _DEGREE, _TURN = 180 / np.pi, 1 / (2 * np.pi)
 _POSITION_UNITS = {"degrees": _DEGREE, "revolutions": _TURN}
 _VELOCITY_UNITS = {"degrees/s": 1 / _DEGREE, "revolutions/s": 1 / _TURN, "rpm": 1 / _TURN / 60}
-"""What a unit of these is in SI."""
-_HALF_TURNS = 12.5
-"""Largest distance of a joint from its middle, rad, two turns; degrees exceed it."""
+_HALF_TURNS = 12.5  # largest distance of a joint from its middle, rad, two turns; degrees exceed it
 _FASTEST = 150.0
 """Speed of a joint, rad/s, far beyond any leg's motor; degrees per second exceed it."""
-_HIGHEST = 5.0
-"""Base height, m; millimetres exceed it."""
-_STRONGEST = 5.0
-"""Torque in units of the motor's peak; mN m exceed it."""
-_COMMON_PEAK = 60.0
-"""Peak torque where the robot is unknown, N m."""
-_BLOCK = 0.05
-"""Time over which velocity is integrated and compared with the way, s; shorter blocks would
-compare the position's quantisation."""
-
+_HIGHEST = 5.0  # base height, m; millimetres exceed it
+_STRONGEST = 5.0  # torque in units of the motor's peak; mN m exceed it
+_COMMON_PEAK = 60.0  # peak torque where the robot is unknown, N m
+_BLOCK = 0.05  # integration of velocity, s; shorter blocks would compare quantisation
 _LEAST_BLOCKS = 20
-_LEAST_WAY = 5e-3
-"""Root mean square way within a block below which nothing can be said, rad."""
-_GAP = 0.2
-"""Longest time between two velocities that is integrated across, s."""
-_DENSE = 0.9
-"""Share of rows with a velocity above which interpolation plays no role."""
-_ALIKE = 0.9
-"""Correlation above which two columns are one quantity, maybe in two units."""
+_LEAST_WAY = 5e-3  # root mean square way within a block below which nothing can be said, rad
+_GAP = 0.2  # longest time between two velocities that is integrated across, s
+_DENSE = 0.9  # share of rows with a velocity above which interpolation plays no role
+_ALIKE = 0.9  # correlation above which two columns are one quantity, maybe in two units
 
 
 def row_period(time: np.ndarray, period: float) -> float:
@@ -149,7 +136,6 @@ def check_units(inspection: Inspection) -> None:
 def _check_size(
     inspection: Inspection, column: str, limit: float, unit: str, guess: str, centred: bool = False
 ) -> None:
-    """Refuse values beyond a limit to either side of zero, or of their middle."""
     values = inspection.floats(column)
     if np.isnan(values).all():
         return
@@ -183,7 +169,6 @@ def _check_command(inspection: Inspection, measured: str, commanded: str) -> Non
 
 
 def _unit_of(factor: float, units: dict[str, float]) -> str | None:
-    """Return the unit whose factor to SI is the given one, if any."""
     return next((u for u, f in units.items() if abs(factor / f - 1) < 0.1), None)
 
 
@@ -223,11 +208,7 @@ def check_velocity(inspection: Inspection) -> None:
 
 
 def _compare(time: Array, position: Array, velocity: Array) -> tuple[float, float, int] | None:
-    """Compare the way with the integral of velocity, (ticks,) each, NaN where not measured.
-
-    Return way over integral, their correlation, and the row that ends the block where they differ
-    most; None where the data cannot tell.
-    """
+    """Return way over integral, their correlation and the worst row; None if nothing tells."""
     moving = np.flatnonzero(~np.isnan(velocity))
     placed = np.flatnonzero(~np.isnan(position))
     if len(moving) < 2 or len(placed) < 2:

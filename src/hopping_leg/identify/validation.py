@@ -9,7 +9,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.identify.cost import measured
-from hopping_leg.identify.encoder_offsets import SETTLING, has_encoder_offsets
+from hopping_leg.identify.initial_states import SETTLING, has_encoder_offsets
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.recording_format import PAIRS, Pair
@@ -19,8 +19,7 @@ from hopping_leg.robot.model import TIMESTEP
 
 HORIZONS = (0.2, 0.5, 1.0)
 """How far to predict without looking at the recording again, s."""
-_UNSCORED = 1.0
-"""Beginning of a recording that does not count in closed loop, s, or a quarter of a short one."""
+_UNSCORED = 1.0  # beginning that does not count in closed loop, s, or a quarter of a short one
 
 
 @dataclass(frozen=True)
@@ -52,9 +51,8 @@ def validate(
     """
     controlled = [r for r in recordings if r.metadata.onboard != "torque"]
     windows = cut(controlled, None, unscored=_unscored(recordings))
-    position, torque = _errors(
-        controlled, windows, hypothesis, timestep, threads, "position", "torque"
-    )
+    effort = (hypothesis, timestep, threads)
+    position, torque = _errors(controlled, windows, *effort, "position", "torque")
     predicted = {}
     rows = [max(s.stop - s.start for s in r.segments()) for r in recordings]
     for horizon in HORIZONS:
@@ -73,9 +71,7 @@ def open_loop(
 ) -> Pair:
     """Return the rms position error of predictions restarted every half horizon, rad.
 
-    The motors get the measured torque, or the commanded one where the rig drives torques itself;
-    every measured row of a horizon counts. The beginning of a recording from which its own offsets
-    are found predicts nothing.
+    The motors get the measured torque, or the commanded one where the rig drives torques itself.
     """
     driven = [d for d in map(as_torque_driven, recordings) if d.has("torque_command")]
     windows = [w for w in cut(driven, horizon, stride=horizon / 2) if _starts_known(driven, w)]
@@ -90,7 +86,6 @@ def _errors(
     threads: int,
     *quantities: str,
 ) -> list[Pair]:
-    """Return the rms errors of simulated windows."""
     if not windows:
         return [(math.nan, math.nan)] * len(quantities)
     simulator = WindowSimulator(recordings, windows, timestep=timestep, threads=threads)

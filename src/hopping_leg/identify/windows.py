@@ -79,10 +79,8 @@ def deal(
     return [tuple(w for w, owner in pairs if owner == share) for share in range(count)]
 
 
-_SHARE = 4
-"""One stretch in so many is held out."""
-_STRETCH = 5.0
-"""Usual length of a stretch, s."""
+_SHARE = 4  # one stretch in so many is held out
+_STRETCH = 5.0  # usual length of a stretch, s
 SHORTEST = 1.0
 """A stretch below this, s, judges nothing."""
 
