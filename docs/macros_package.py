@@ -16,7 +16,7 @@ from hopping_leg.emulator.faults import KINDS
 from hopping_leg.evaluate.robustness.axes import AXES
 from hopping_leg.robot import load_robot
 from hopping_leg.robot.robot_files import load_tree
-from hopping_leg.sim.twins import TWIN_RANGES
+from hopping_leg.sim.randomization import TWIN_RANGES
 from hopping_leg.trace import COLUMNS
 
 

@@ -12,7 +12,7 @@ from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.flight_recorder import FlightRecorder
 from hopping_leg.robot import load_robot
-from hopping_leg.sim.twins import draw_twin
+from hopping_leg.sim.randomization import draw_twin
 from hopping_leg.trace import Trace
 from tests.doc_pages import ROOT, blocks
 

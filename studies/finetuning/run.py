@@ -30,7 +30,7 @@ from hopping_leg.rl.finetune.running import POLICY, RESULT, finetune
 from hopping_leg.rl.finetune.simulated import Guard, SimulatedTrials
 from hopping_leg.rl.finetune.trial_data import score
 from hopping_leg.robot import Robot, load_robot
-from hopping_leg.sim.twins import draw_twin
+from hopping_leg.sim.randomization import draw_twin
 
 FIRST_JUDGE = 1000
 """Of the seeds that judge; none of them has chosen anything."""

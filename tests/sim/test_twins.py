@@ -3,8 +3,7 @@ import pytest
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot, load_tree, robot_text
 from hopping_leg.sim import MujocoSimulator
-from hopping_leg.sim.randomization import Range
-from hopping_leg.sim.twins import TWIN_RANGES, draw_twin
+from hopping_leg.sim.randomization import TWIN_RANGES, Range, draw_twin
 
 
 def entry(tree, path):

@@ -1,8 +1,7 @@
 """The leg simulated: many legs at once at the control rate, with noise and delay."""
 
 from hopping_leg.sim.channel import NO_NOISE, SAMPLES, Channel, Measurement, NoiseAndDelay
-from hopping_leg.sim.engines import check_ground, make_simulator
-from hopping_leg.sim.mujoco_simulator import MujocoSimulator
+from hopping_leg.sim.mujoco_simulator import MujocoSimulator, check_ground, make_simulator
 from hopping_leg.sim.plant import Plant
 from hopping_leg.sim.simulator import CONTROL_RATE, Engine, Ground, Simulator
 

@@ -77,13 +77,7 @@ class Channel:
 
     Every tick calls ``sense``, then ``actuate`` once. Noisy samples enter a buffer of the last ten
     ticks; with probability 0.5 three of them, in order of time, replace the latest three. Sensing
-    again within a tick gives the same noise.
-
-    Args:
-        count: Number of legs n.
-        disturbance: How strong.
-        period: Control period, s.
-        rng: Source of all randomness.
+    again within a tick gives the same noise. ``period`` is the control period, s.
     """
 
     def __init__(
@@ -111,11 +105,8 @@ class Channel:
     def restart(self, ids: IntArray | slice, q: Array, qd: Array, command: Array) -> None:
         """Forget the past of some legs: the buffer fills with their present, noiseless state.
 
-        Args:
-            ids: Which legs.
-            q: Joint positions, rad, (k, 2).
-            qd: Joint velocities, rad/s, (k, 2).
-            command: Desired heights, m, (k,).
+        Shapes are (k, 2) for ``q``, rad, and ``qd``, rad/s, and (k,) for the heights ``command``,
+        m.
         """
         self._buffer[:, ids, 0:2] = q
         self._buffer[:, ids, 2:4] = qd
@@ -124,10 +115,8 @@ class Channel:
     def sense(self, q: Array, qd: Array, command: Array) -> Measurement:
         """Return what the controllers see of the true state; again in a tick, the same noise.
 
-        Args:
-            q: Joint positions, rad, (n, 2).
-            qd: Joint velocities, rad/s, (n, 2).
-            command: Desired heights, m, (n,).
+        Shapes are (n, 2) for ``q``, rad, and ``qd``, rad/s, and (n,) for the heights ``command``,
+        m.
         """
         return self.measurement(self.samples(q, qd, command))
 
@@ -173,7 +162,6 @@ class Channel:
         self._prepare(self._tick - self._index)
 
     def _draw(self) -> None:
-        """Draw the random numbers of a whole block, which starts at this tick."""
         self.rng.random(out=self._draws)
         self._prepare(self._tick)
 
@@ -197,12 +185,6 @@ class MismatchChannel(Channel):
 
     The disturbance acts on top of what the legs' sensors report; judge a twin with ``NO_NOISE`` to
     meet it as it is.
-
-    Args:
-        simulator: The legs behind the channel.
-        disturbance: How strong.
-        period: Control period, s.
-        rng: Source of all randomness.
     """
 
     def __init__(

@@ -19,9 +19,7 @@ DRAWS = 6
 class EncoderEffects:
     """Sensors of n legs; ``q``, ``qd`` and ``torque`` (n, 2) are the latest readings, live.
 
-    Args:
-        realities: The effects, one of each leg, n of them.
-        timestep: Physics step, s; the measurement's latency is rounded to it.
+    ``realities`` has one for each leg; the measurement's latency is rounded to ``timestep``, s.
     """
 
     def __init__(self, realities: Sequence[ModelMismatch], timestep: float) -> None:
@@ -46,12 +44,9 @@ class EncoderEffects:
         self._step = step[:, self._rounded]
 
     def watch(self, q: Array, qd: Array, torque: Array) -> None:
-        """Record the true state after a physics step.
+        """Record the true state of the motors, at the joints' side, after a physics step.
 
-        Args:
-            q: Motor angle at the joint's side, rad, (n, 2).
-            qd: Motor speed at the joint's side, rad/s, (n, 2).
-            torque: Motor torque at the joint's side, N m, (n, 2).
+        Angles are in rad, speeds in rad/s and torques in N m, (n, 2).
         """
         self._newest = (self._newest + 1) % len(self._past)
         slot = self._past[self._newest]

@@ -9,12 +9,15 @@ inertia.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 
 import mujoco
 import numpy as np
+from mujoco import batch
 
-from hopping_leg.arrays import IntArray
+from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import RobotError
 from hopping_leg.robot import Contact, DriveMismatch, Joint, Link, Robot, compile_spec, get_spec
 
@@ -42,12 +45,9 @@ class MismatchModel:
 
 
 def mismatch_model(robot: Robot, timestep: float, *, clamped: bool) -> MismatchModel:
-    """Build the model of a leg as it really is.
+    """Build the model of a leg as its ``reality`` says, for a physics step, s.
 
-    Args:
-        robot: The leg; its ``reality`` holds.
-        timestep: Physics step, s.
-        clamped: Whether the base is fixed; then it has no rail and touches nothing.
+    A ``clamped`` base is fixed: it has no rail and touches nothing.
 
     Raises:
         RobotError: A belt is too stiff for the physics step, or MuJoCo refuses a number.
@@ -155,3 +155,51 @@ def _check_stiffness(robot: Robot, name: str, joint: Joint, link: Link, timestep
             f" a physics step of {timestep:g} s; give at most {highest:.3g}, a smaller step"
             f" (below {math.sqrt(reduced / stiffness):.2g} s), or leave it out for a rigid belt."
         )
+
+
+def set_model_fields(simulation: batch.Batch, models: Sequence[mujoco.MjModel]) -> None:
+    """Give every simulation the numbers of its model, in its present state.
+
+    The models, one per simulation, differ in floating point alone. Their numbers become per-
+    simulation fields, which go on holding what is not written again: unlike whole models, single
+    ones of them may then change from step to step (``JointFriction``).
+    """
+    shared = simulation.model
+    for name in _numbers(shared):
+        number = attrgetter(name)
+        own = np.stack([number(model) for model in models])
+        if simulation.expanded(name) is not None or (own != number(shared)).any():
+            simulation.expand(name)[:] = own
+
+
+def _numbers(model: mujoco.MjModel) -> list[str]:
+    """Return the names of all that is floating point and not empty, in alphabetical order."""
+    found = []
+    for name in sorted(batch.MODEL_FIELDS):
+        value = attrgetter(name)(model)
+        if isinstance(value, np.ndarray) and value.dtype.kind == "f" and value.size:
+            found.append(name)
+    return found
+
+
+class JointFriction:
+    """Sets MuJoCo's friction loss, whose solver holds a joint at rest.
+
+    ``joints`` are the degrees of freedom of hip and knee, (2,).
+    """
+
+    def __init__(self, robots: Sequence[Robot], simulation: batch.Batch, joints: IntArray) -> None:
+        self._coulomb, self._load = (
+            np.array([robot.of_joints(name) for robot in robots])
+            for name in ("friction", "load_friction")
+        )
+        self._joints, self._loss = joints, simulation.expand("dof_frictionloss")
+
+    def set(self, torque: Array, further: Array | float = 0.0) -> None:
+        """Set the friction at the motors' torque, and ``further`` friction, N m, (n, 2)."""
+        self._loss[:, self._joints] = self._coulomb + self._load * np.abs(torque) + further
+
+
+def friction_grows_with_load(robots: Sequence[Robot]) -> bool:
+    """Tell whether any leg's friction grows with load."""
+    return any(robot.of_joints("load_friction").any() for robot in robots)

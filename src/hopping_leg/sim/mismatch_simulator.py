@@ -20,25 +20,24 @@ from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import UsageError
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.encoder_effects import DRAWS, EncoderEffects
-from hopping_leg.sim.mismatch_model import mismatch_model
-from hopping_leg.sim.model_fields import JointFriction, friction_grows_with_load, set_model_fields
+from hopping_leg.sim.mismatch_model import (
+    JointFriction,
+    friction_grows_with_load,
+    mismatch_model,
+    set_model_fields,
+)  # fmt: skip
 from hopping_leg.sim.motor_effects import MotorEffects
 
 
 class MismatchSimulator:
     """Simulations of a leg with its ``reality``, stepped by one physics step at a time.
 
-    ``state`` (n, 6) is (x, q1, q2 and rates) of base and links, as in ``MujocoSimulator``. It is
-    a copy of the physics', renewed after each control period; what is written to it moves motor and
+    ``state`` (n, 6) is (x, q1, q2 and rates) of base and links, as in ``MujocoSimulator``. It is a
+    copy of the physics', renewed after each control period; what is written to it moves motor and
     link alike before the next.
 
-    Args:
-        robots: The leg of each simulation, n of them; those that differ must agree in which joints
-            have backlash or a belt, and have no stiction.
-        timestep: Physics step, s.
-        substeps: Physics steps per control period.
-        threads: Worker threads, 0 for one per core.
-        clamped: Whether the base is fixed; it then stays at the height where it was placed.
+    There is a robot per simulation; those that differ must agree in which joints have backlash or
+    a belt, and have no stiction. A clamped base stays at the height where it was placed.
 
     Raises:
         UsageError: The robots cannot be simulated side by side.
@@ -82,7 +81,6 @@ class MismatchSimulator:
         self.sensors.set_robots([robot.reality for robot in robots])
 
     def _set_models(self, robots: Sequence[Robot], *, differ: bool) -> None:
-        """Set the robots' models, if they differ, and their friction, if it changes."""
         if differ:
             set_model_fields(self.batch, self._models(robots))
         self._friction: JointFriction | None = None
@@ -141,11 +139,7 @@ class MismatchSimulator:
         self.sensors.forget(rows, self._q[:, self._motor], self._qd[:, self._motor])
 
     def step(self, torque: Array) -> Array:
-        """Command joint torques for a control period; return their mean at the joints, N m, (n, 2).
-
-        Args:
-            torque: As the controller asks, N m, (n, 2).
-        """
+        """Command joint torques for a control period; return their mean, N m, (n, 2)."""
         self._push()
         self.drive.take(torque, self.rng.random(self.count))
         mean = np.zeros((self.count, 2))

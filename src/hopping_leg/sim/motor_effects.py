@@ -21,12 +21,10 @@ _REST = 0.1
 
 
 class MotorEffects:
-    """Both drives of n legs.
+    """Both drives of n legs, whose ``reality`` holds.
 
-    Args:
-        robots: The legs, whose ``reality`` holds, n of them.
-        timestep: Physics step, s; latency and jitter are rounded to it.
-        substeps: Physics steps per control period.
+    Latency and jitter are rounded to the physics step ``timestep``, s; ``substeps`` of them make a
+    control period.
     """
 
     def __init__(self, robots: Sequence[Robot], timestep: float, substeps: int) -> None:
@@ -71,13 +69,10 @@ class MotorEffects:
         self._taken[rows] = self._wanted[rows] = self.motor_torque[rows] = 0
 
     def take(self, torque: Array, jitter: Array) -> None:
-        """Take the controller's command at the start of a control period.
+        """Take the controller's command, N m, (n, 2), at the start of a control period.
 
-        A command replaces all that would arrive after it, so that none overtakes another.
-
-        Args:
-            torque: N m, (n, 2).
-            jitter: Share of the jitter by which it is late, [0, 1), (n,).
+        It replaces all that would arrive after it, so that none overtakes another. ``jitter`` is
+        the share of the jitter by which it is late, [0, 1), (n,).
         """
         keep, rest = self._line[self._substeps :], self._line[-1:]
         numbers, last = self._number[self._substeps :], self._number[-1:]
@@ -90,14 +85,10 @@ class MotorEffects:
         np.copyto(self._number, self._command, where=after)
 
     def torque(self, substep: int, q: Array, qd: Array) -> Array:
-        """Return the torque at the joints during a physics step, N m, (n, 2).
+        """Return the torque at the joints during a physics step of a control period, N m, (n, 2).
 
-        As in the simulator for training, the limit holds for the speed at which a command arrives.
-
-        Args:
-            substep: Number of the physics step in its control period.
-            q: Motor angle at the joint's side, rad, (n, 2).
-            qd: Motor speed at the joint's side, rad/s, (n, 2).
+        ``q``, rad, and ``qd``, rad/s, are the motors' at the joints' side, (n, 2). As in the
+        simulator for training, the limit holds for the speed at which a command arrives.
         """
         arrived = self._number[substep] != self._taken
         if arrived.any():

@@ -9,39 +9,26 @@ from mujoco import batch
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import TIMESTEP, MotorLimit, Robot, build_model
+from hopping_leg.sim.mismatch_model import JointFriction, friction_grows_with_load, set_model_fields
 from hopping_leg.sim.mismatch_simulator import MismatchSimulator
-from hopping_leg.sim.model_fields import JointFriction, friction_grows_with_load, set_model_fields
-from hopping_leg.sim.simulator import CONTROL_RATE, Simulator
+from hopping_leg.sim.simulator import CONTROL_RATE, Engine, Ground, Simulator
 
 _JOINTS = np.array([1, 2])
 """Degrees of freedom of hip and knee; the base comes first."""
 
 
 class MujocoSimulator(Simulator):
-    """Legs in MuJoCo; results do not depend on the number of threads.
+    """Legs in MuJoCo; results do not depend on the number of threads, 0 for one per core.
 
     ``measured_q`` and ``measured_qd`` are the true state, unless the robot's ``reality`` says
-    otherwise.
+    otherwise. Commands that are late by a constant time are all of a ``reality`` that is simulated
+    here, and if legs differ in it, by whole control periods; the rest is left to
+    ``MismatchSimulator``, which is slower.
 
-    Commands that are late by a constant time are all of a ``reality`` that is simulated here, and
-    if legs differ in it, by whole control periods; the rest is left to ``MismatchSimulator``,
-    which is slower.
-
-    Attributes:
-        threads: Worker threads, 0 for one per core.
-
-    Args:
-        robot: The leg.
-        count: Number of simulations n.
-        rate: Control rate, Hz; one ``step`` lasts ``1 / rate``.
-        timestep: Physics step, s; must divide the control period.
-        threads: Worker threads, 0 for one per core.
-        clamped: Fix the base where it is placed, for fixed-base runs.
-        robots: One robot per simulation, which may differ from ``robot`` in what
-            ``RANDOMIZABLE`` of ``sim.randomization`` names and in ``reality``;
-            none simulates ``robot`` n times.
-        detailed: Leave everything to ``MismatchSimulator``, also what it is not needed for, so that
-            ``set_robots`` takes robots with any ``reality``.
+    ``robots`` has one per simulation, which may differ from ``robot`` in what ``RANDOMIZABLE`` of
+    ``sim.randomization`` names and in ``reality``. ``clamped`` fixes the base where it is placed.
+    ``detailed`` leaves everything to ``MismatchSimulator``, so that ``set_robots`` takes any
+    ``reality``.
 
     Raises:
         UsageError: The physics step does not divide the control period, or the robots do not fit.
@@ -91,13 +78,11 @@ class MujocoSimulator(Simulator):
         self._show(self.batch.state[:, first : first + 6])
 
     def _set_models(self, robots: Sequence[Robot]) -> None:
-        """Build every robot's model, once where legs share a robot."""
         distinct = {id(robot): robot for robot in robots}
         models = {key: build_model(robot, self.timestep) for key, robot in distinct.items()}
         set_model_fields(self.batch, [models[id(robot)] for robot in robots])
 
     def _set_load_friction(self, robots: Sequence[Robot]) -> None:
-        """Let friction change with torque where it does for some leg."""
         self._friction: JointFriction | None = None
         if friction_grows_with_load(robots):
             self._friction = JointFriction(robots, self.batch, _JOINTS)
@@ -218,3 +203,43 @@ class MujocoSimulator(Simulator):
         self._applied = after + self._late / self.substeps * (before - after)
         self.pending_torque = np.concatenate([after[None], under_way[1:]])
         return self._applied
+
+
+def make_simulator(
+    robot: Robot,
+    count: int,
+    *,
+    engine: Engine = "mujoco",
+    ground: Ground = "robot",
+    rate: float = CONTROL_RATE,
+    timestep: float = TIMESTEP,
+    threads: int = 0,
+) -> Simulator:
+    """Return legs in the engine and on the ground asked for.
+
+    ``rate`` is the control rate, Hz, whose period the physics step, s, must divide. MuJoCo has
+    worker ``threads``, 0 for one per core; PyBullet has one.
+
+    Raises:
+        UsageError: Engine and ground do not go together, or the engine refuses the robot.
+    """
+    check_ground(engine, ground)
+    if engine == "mujoco":
+        return MujocoSimulator(robot, count, rate=rate, timestep=timestep, threads=threads)
+    # What runs on the robot shall not import what only PyBullet needs.
+    from hopping_leg.sim.pybullet import PyBulletSimulator
+
+    return PyBulletSimulator(robot, count, rate=rate, timestep=timestep, ground=ground)
+
+
+def check_ground(engine: Engine, ground: Ground) -> None:
+    """Refuse what MuJoCo has not.
+
+    Raises:
+        UsageError: Engine and ground do not go together.
+    """
+    if engine == "mujoco" and ground != "robot":
+        raise UsageError(
+            f"MuJoCo has no ground '{ground}', only 'robot'; take the engine pybullet, or a robot"
+            " with another contact."
+        )

@@ -36,12 +36,7 @@ class Perturbation:
 
 
 class Perturber:
-    """Applies a perturbation to legs, tick by tick.
-
-    Args:
-        perturbation: What happens.
-        legs: To whom; made of the perturbation's robots.
-    """
+    """Applies a perturbation, tick by tick, to legs that were made of its robots."""
 
     def __init__(self, perturbation: Perturbation, legs: MujocoSimulator) -> None:
         self.perturbation, self.legs = perturbation, legs

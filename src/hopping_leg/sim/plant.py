@@ -9,16 +9,10 @@ from hopping_leg.sim.simulator import Simulator
 
 
 class Plant:
-    """Legs behind a disturbed channel, with the soft joint limits in force.
+    """Legs behind a disturbed channel, with the soft joint limits in force unless None.
 
-    The soft limits act on what the encoders report, free of noise and delay, as they run beside the
-    motors, after the torque noise and before the motors' own limit.
-
-    Args:
-        legs: The simulations.
-        disturbance: Noise and delay.
-        soft_limits: The PD at the joint limits, or None to go without.
-        rng: Source of all randomness.
+    The soft limits act on what the encoders report, free of noise and delay, as they run beside
+    the motors, after the torque noise and before the motors' own limit.
     """
 
     def __init__(

@@ -3,20 +3,32 @@
 The paper fits one simulation to the robot and rejects the alternative, training on many; this is
 that alternative. Controllers and rewards go on believing the robot itself, so only what the physics
 alone reads may vary: sizes, motors' speeds and joint limits may not.
+
+Twins are drawn, too: legs that play the real one. A twin differs from the robot it extends in what
+a fit can find (friction, inertia, ground) and in what it cannot (``[reality]``). Ranges span what
+is known of leg V2: CAD, the lab's own identification, the paper's Table I, recordings.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import attrgetter
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError, unknown_name
-from hopping_leg.io import replace_at
-from hopping_leg.robot import JOINTS, Robot, check_physics
+from hopping_leg.io import Tree, replace_at, write_atomically
+from hopping_leg.robot import (
+    JOINTS,
+    Robot,
+    check_physics,
+    robot_from_tree,
+    robot_text,
+    shipped_robots,
+)  # fmt: skip
 
 RANDOMIZABLE = (
     "base.mass",
@@ -64,12 +76,7 @@ class Range:
             )
 
     def sample(self, rng: np.random.Generator, own: float = 0.0) -> float:
-        """Return one value.
-
-        Args:
-            rng: Source of randomness.
-            own: What the robot itself has.
-        """
+        """Return one value; ``own`` is what the robot itself has."""
         drawn = self._sample(rng)
         if self.bounds == "values":
             return drawn
@@ -85,9 +92,7 @@ class Range:
     def normalize(self, value: float, own: float = 0.0) -> float:
         """Return where a value lies in the range, -1 at its lower and 1 at its upper bound.
 
-        Args:
-            value: As drawn.
-            own: What the robot itself has; no factor of zero lies anywhere but in the middle.
+        ``own`` is what the robot has; no factor of zero lies anywhere but in the middle.
         """
         if self.bounds == "factors":
             if own == 0:
@@ -151,14 +156,9 @@ def sample(
     rng: np.random.Generator,
     probability: float = 1.0,
 ) -> tuple[Robot, ...]:
-    """Return a robot as often as asked for, each with its own numbers.
+    """Return ``count`` variants of a robot, each with its own numbers, drawn range by range.
 
-    Args:
-        robot: What is not drawn.
-        ranges: What is drawn, in this order, leg by leg.
-        count: How many.
-        rng: Source of randomness.
-        probability: That a number is drawn rather than the robot's own.
+    A number is drawn with a probability and the robot's own otherwise.
 
     Raises:
         UsageError: A range's number may not differ from leg to leg.
@@ -186,3 +186,105 @@ def normalized(robot: Robot, variants: Sequence[Robot], ranges: Sequence[Range])
         number = attrgetter(spread.path)
         found[:, column] = [spread.normalize(number(v), number(robot)) for v in variants]
     return found
+
+
+_CHOSEN = "[C]"
+
+
+def _drives() -> tuple[Range, ...]:
+    ranges: list[Range] = []
+    for name, belt in (("hip", 1.0), ("knee", 2.0)):
+        at = f"reality.{name}"
+        gear = "[M] qdd100 +-0.1 deg at its output"
+        noise = {"hip": (1.4e-4, 0.09, 0.06), "knee": (4e-5, 0.04, 0.03)}[name]
+        steps = (6.4e-5 / belt, 0.0, 0.0)
+        ranges += [
+            Range(f"{at}.torque_gain", "1", 0.9, 1.0, "[R] boom recordings 0.91"),
+            Range(f"{at}.torque_lag", "s", 5e-4, 2e-3, f"{_CHOSEN} current loop; [R] V1 3 ms"),
+            Range(f"{at}.ripple", "N m", 0.01 * belt, 0.08 * belt, f"{_CHOSEN} below [R] noise"),
+            Range(
+                f"{at}.ripple_periods", "1", 252 * belt, 252 * belt, f"{_CHOSEN} 42 a rotor turn"
+            ),
+            Range(f"{at}.efficiency", "1", 0.9, 0.98, f"{_CHOSEN} one planetary stage"),
+            Range(f"{at}.stiction", "1", 1.0, 1.6, f"{_CHOSEN} greased gear"),
+            Range(f"{at}.backlash", "rad", 2e-3 / belt, 7e-3 / belt, f"around {gear}"),
+        ]
+        ranges += [
+            Range(f"{at}.sensor.{kind}_noise", unit, value, value, "[R] standing noise, leg V2")
+            for kind, unit, value in zip(
+                ("position", "velocity", "torque"), ("rad", "rad/s", "N m"), noise, strict=True
+            )
+        ]
+        ranges.append(
+            Range(
+                f"{at}.sensor.position_step", "rad", steps[0], steps[0], "[M] 14 bit at the rotor"
+            )
+        )
+    return tuple(ranges)
+
+
+MISMATCH_RANGES = (
+    Range("reality.voltage", "1", 0.85, 1.0, f"{_CHOSEN} a battery from full to nearly empty"),
+    Range("reality.latency.command", "s", 1e-3, 4e-3, f"{_CHOSEN} bus cycle and computer"),
+    Range("reality.latency.measurement", "s", 0.0, 1.5e-3, f"{_CHOSEN} bus cycle"),
+    Range("reality.latency.jitter", "s", 0.0, 1e-3, f"{_CHOSEN} computer without real time"),
+    *_drives(),
+    Range(
+        "reality.knee.stiffness", "N m/rad", 150.0, 600.0, f"{_CHOSEN} timing belt", "logarithmic"
+    ),
+    Range("reality.knee.stiffness_damping", "N m s/rad", 0.01, 0.05, f"{_CHOSEN} rubber"),
+    Range("reality.mass.base", "1", 0.97, 1.03, f"{_CHOSEN} cables and screws"),
+    Range("reality.mass.thigh", "1", 0.97, 1.03, f"{_CHOSEN} cables and screws"),
+    Range("reality.mass.shank", "1", 0.95, 1.05, f"{_CHOSEN} cables and screws"),
+)
+"""What the simulator for training does not know."""
+
+TWIN_RANGES = IDENTIFIABLE_RANGES + MISMATCH_RANGES
+"""The distribution of twins."""
+
+
+@dataclass(frozen=True)
+class Twin:
+    """A drawn twin and its file, with the range of each drawn number as its source."""
+
+    robot: Robot
+    tree: Tree
+
+    def save(self, path: Path) -> None:
+        """Write the robot file.
+
+        Raises:
+            TraceError: The file cannot be written.
+        """
+        write_atomically(path, robot_text(self.tree).encode())
+
+
+def draw_twin(seed: int, base: str = "legv2", ranges: Sequence[Range] = TWIN_RANGES) -> Twin:
+    """Draw a twin of a robot; the same seed, 0 or more, gives the same twin.
+
+    ``base`` is the shipped robot or file that it extends: what is believed before identification.
+
+    Raises:
+        RobotError: There is no such robot, or a drawn number contradicts it.
+        UsageError: The seed is negative.
+    """
+    if seed < 0:
+        raise UsageError(f"A seed of {seed} has no meaning; give 0 or more.")
+    rng = np.random.default_rng(seed)
+    parent = base if base in shipped_robots() else str(Path(base).resolve())
+    tree: Tree = {
+        "name": f"twin-{seed}",
+        "description": f"twin {seed} of {Path(base).stem}, drawn",
+        "extends": parent,
+    }
+    for spread in ranges:
+        value = float(f"{spread.sample(rng):.6g}")
+        tree = replace_at(tree, spread.path, _entry(spread, value, seed))
+    return Twin(robot_from_tree(tree, f"twin {seed}"), tree)
+
+
+def _entry(spread: Range, value: float, seed: int) -> Tree:
+    drawn = f"seed {seed}, {spread.scale} from {spread.low:g} to {spread.high:g}"
+    fixed = spread.low == spread.high
+    source = spread.source if fixed else f"{drawn}: {spread.source}"
+    return {"value": value, "unit": spread.unit, "source": source}

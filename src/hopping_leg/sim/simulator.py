@@ -26,14 +26,9 @@ class Simulator(ABC):
 
     ``state`` (n, 6) is a live view of the true state (x, q1, q2 and their rates), and so are its
     parts ``height``, ``height_rate`` (n,), ``q`` and ``qd`` (n, 2), in m, m/s, rad and rad/s.
-
     ``measured_q`` and ``measured_qd`` (n, 2) are what the joints' encoders report, live.
 
-    Args:
-        robot: The leg.
-        count: Number of simulations n.
-        rate: Control rate, Hz; one ``step`` lasts ``1 / rate``.
-        timestep: Physics step, s; must divide the control period.
+    One ``step`` lasts ``1 / rate``, Hz, which is a whole number of physics steps ``timestep``, s.
 
     Raises:
         UsageError: The physics step does not divide the control period.
@@ -67,21 +62,11 @@ class Simulator(ABC):
 
     @abstractmethod
     def place(self, ids: IntArray | slice, height: Array | float, q: Array) -> None:
-        """Put legs at rest at a height and posture.
-
-        Args:
-            ids: Which legs.
-            height: Height of the base above the ground, m, (k,).
-            q: Joint angles, rad, (k, 2) or (2,).
-        """
+        """Put legs at rest at a base height, m, (k,), and joint angles, rad, (k, 2) or (2,)."""
 
     @abstractmethod
     def step(self, torque: Array) -> Array:
-        """Hold joint torques for one control period; return what the motors gave, N m, (n, 2).
-
-        Args:
-            torque: Asked for at the joints, N m, (n, 2).
-        """
+        """Hold joint torques for one control period; return what the motors gave, N m, (n, 2)."""
 
     def stand(self, ids: IntArray | slice, q: Array, clearance: Array | float = 0.0) -> None:
         """Put legs at rest in a posture with the foot ``clearance`` above the ground, m, (k,)."""

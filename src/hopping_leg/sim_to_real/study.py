@@ -8,7 +8,7 @@ from pathlib import Path
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.optimizers import LeastSquaresOptions
 from hopping_leg.robot import NO_MISMATCH, Latency, Robot, load_robot, parent_robot, shipped_robots
-from hopping_leg.sim.twins import draw_twin
+from hopping_leg.sim.randomization import draw_twin
 from hopping_leg.sim_to_real.methods import Method
 
 SHORTEST = 30.0

@@ -29,8 +29,7 @@ from hopping_leg.rl.finetune.simulated import hop_many, traces_of
 from hopping_leg.rl.finetune.trial_data import ApexEstimate, TrialData
 from hopping_leg.rl.run_folder import as_stored
 from hopping_leg.robot import JOINTS, Robot, kinematics
-from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, Range, sample
-from hopping_leg.sim.twins import TWIN_RANGES
+from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, TWIN_RANGES, Range, sample
 
 _CHOSEN = "[C]"
 

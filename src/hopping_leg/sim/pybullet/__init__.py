@@ -16,19 +16,12 @@ class PyBulletSimulator(Simulator):
     """Legs in PyBullet, each in a world of its own, one after the other.
 
     Dynamics, motors' limits, friction and damping are those of ``MujocoSimulator``, see
-    ``pybullet_urdf``; for the ground see ``ground_law``. Knee and base meet PyBullet's rigid ground
-    where the foot meets the robot's, and else the foot's.
-
-    Args:
-        robot: The leg.
-        count: Number of simulations n.
-        rate: Control rate, Hz; one ``step`` lasts ``1 / rate``.
-        timestep: Physics step, s; must divide the control period.
-        ground: What the foot stands on.
+    ``pybullet_urdf``; for the ground see ``ground_law``. Knee and base meet PyBullet's rigid
+    ground where the foot meets the robot's, and else the foot's.
 
     Raises:
         UsageError: PyBullet is not installed, the physics step does not divide the control period,
-            or the robot has a ``reality`` or friction that grows with load.
+        or the robot has a ``reality`` or friction that grows with load.
     """
 
     def __init__(

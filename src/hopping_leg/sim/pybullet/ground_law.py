@@ -32,11 +32,8 @@ _SLOW = 1e-2
 class GroundLaw:
     """Force of the robot's ground on the foot; knee and base are not its business.
 
-    MuJoCo solves the joints' Coulomb friction together with the contact; here it is a load like any
-    other, known from the speed.
-
-    Args:
-        robot: The leg.
+    MuJoCo solves the joints' Coulomb friction together with the contact; here it is a load like
+    any other, known from the speed.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -63,9 +60,7 @@ class GroundLaw:
     def force(self, state: Array, torque: Array) -> Array:
         """Return the upward and forward force on the foot, N, (n, 2); see ``reach``.
 
-        Args:
-            state: (x, q1, q2 and their rates), (n, 6).
-            torque: At the joints, N m, (n, 2).
+        ``state`` is (x, q1, q2 and their rates), (n, 6), ``torque`` the joints', N m, (n, 2).
         """
         force = np.zeros((len(state), 2))
         depth = kinematics.foot_clearance(self._robot, state[:, 0], state[:, 1:3])

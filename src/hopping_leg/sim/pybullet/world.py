@@ -43,14 +43,9 @@ class PyBulletWorld:
     """A leg, its ground and nothing else; coordinates are (rail height, hip, knee).
 
     Coulomb friction is a motor that holds the joint's speed at zero with that much torque at most;
-    viscous damping is the URDF's. PyBullet's own damping of bodies (0.04 of their speed per second)
-    and its limit of joint speeds (100 rad/s) are off.
-
-    Args:
-        robot: The leg.
-        timestep: Physics step, s.
-        spring: The ground, or None for PyBullet's rigid one.
-        foot_collides: Whether PyBullet finds the foot's contact, or it comes as a push.
+    viscous damping is the URDF's. PyBullet's own damping of bodies (0.04 of their speed per
+    second) and its limit of joint speeds (100 rad/s) are off. Without a ``spring`` the ground is
+    rigid; a foot that does not collide gets its contact as a push.
     """
 
     def __init__(
@@ -63,17 +58,14 @@ class PyBulletWorld:
     ) -> None:
         self._bullet = bullet = import_pybullet()
         self._id = bullet.connect(bullet.DIRECT)
+        self._world = {"physicsClientId": self._id}
         if self._id < 0:
             raise UsageError(
                 "PyBullet has no world left for another leg; simulate fewer at once or in MuJoCo."
             )
-        bullet.setGravity(0, 0, -GRAVITY, physicsClientId=self._id)
-        bullet.setPhysicsEngineParameter(
-            fixedTimeStep=timestep,
-            numSolverIterations=_ITERATIONS,
-            solverResidualThreshold=0,
-            physicsClientId=self._id,
-        )
+        bullet.setGravity(0, 0, -GRAVITY, **self._world)
+        solver = {"numSolverIterations": _ITERATIONS, "solverResidualThreshold": 0}
+        bullet.setPhysicsEngineParameter(fixedTimeStep=timestep, **solver, **self._world)
         self._leg = self._load(pybullet_urdf(robot, foot_collides=foot_collides))
         self._joints = self._find_joints()
         self._make_free(robot)
@@ -87,75 +79,48 @@ class PyBulletWorld:
                 str(path),
                 useFixedBase=True,
                 flags=self._bullet.URDF_USE_INERTIA_FROM_FILE,
-                physicsClientId=self._id,
+                **self._world,
             )
         return leg
 
     def _find_joints(self) -> dict[str, int]:
-        count = self._bullet.getNumJoints(self._leg, physicsClientId=self._id)
+        count = self._bullet.getNumJoints(self._leg, **self._world)
         infos = [
-            self._bullet.getJointInfo(self._leg, joint, physicsClientId=self._id)
-            for joint in range(count)
+            self._bullet.getJointInfo(self._leg, joint, **self._world) for joint in range(count)
         ]
         return {info[1].decode(): info[0] for info in infos}
 
     def _make_free(self, robot: Robot) -> None:
-        bullet, joints = self._bullet, self._joints
-        friction = {"rail": robot.rail.friction, ROTOR: 0.0}
-        friction |= {"hip": robot.hip.friction, "knee": robot.knee.friction}
+        bullet, leg, joints, world = self._bullet, self._leg, self._joints, self._world
+        free = {"linearDamping": 0, "angularDamping": 0, "maxJointVelocity": _NO_LIMIT}
+        friction = {name: getattr(robot, name).friction for name in ("rail", "hip", "knee")}
+        hold = bullet.VELOCITY_CONTROL
         for name, joint in joints.items():
-            bullet.changeDynamics(
-                self._leg,
-                joint,
-                linearDamping=0,
-                angularDamping=0,
-                maxJointVelocity=_NO_LIMIT,
-                lateralFriction=1,
-                physicsClientId=self._id,
-            )
-            bullet.setJointMotorControl2(
-                self._leg,
-                joint,
-                bullet.VELOCITY_CONTROL,
-                targetVelocity=0,
-                force=friction[name],
-                physicsClientId=self._id,
-            )
+            force = friction.get(name, 0.0)
+            bullet.changeDynamics(leg, joint, **free, lateralFriction=1, **world)
+            bullet.setJointMotorControl2(leg, joint, hold, targetVelocity=0, force=force, **world)
+        knee, rotor, gear = joints["knee"], joints[ROTOR], bullet.JOINT_GEAR
         here = [0, 0, 0]
-        gear = bullet.createConstraint(
-            self._leg,
-            joints["knee"],
-            self._leg,
-            joints[ROTOR],
-            bullet.JOINT_GEAR,
-            [0, -1, 0],
-            here,
-            here,
-            physicsClientId=self._id,
-        )
-        bullet.changeConstraint(gear, gearRatio=-1, maxForce=_NO_LIMIT, physicsClientId=self._id)
+        gear = bullet.createConstraint(leg, knee, leg, rotor, gear, [0, -1, 0], here, here, **world)
+        bullet.changeConstraint(gear, gearRatio=-1, maxForce=_NO_LIMIT, **world)
         self._coordinates = [joints[name] for name in ("rail", "hip", "knee")]
         self._motors = [joints["hip"], joints["knee"]]
 
     def _add_ground(self, robot: Robot, spring: Spring | None) -> None:
         bullet = self._bullet
-        shape = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=self._id)
-        ground = bullet.createMultiBody(0, shape, physicsClientId=self._id)
+        shape = bullet.createCollisionShape(bullet.GEOM_PLANE, **self._world)
+        ground = bullet.createMultiBody(0, shape, **self._world)
         surface: dict[str, float] = {"lateralFriction": robot.contact.friction}
         if spring is not None:
             surface |= {"contactStiffness": spring[0], "contactDamping": spring[1]}
-        bullet.changeDynamics(ground, -1, **surface, physicsClientId=self._id)
+        bullet.changeDynamics(ground, -1, **surface, **self._world)
 
     def put(self, state: Array) -> None:
         """Give the leg a state (x, q1, q2 and their rates), (6,)."""
         places = [*self._coordinates, self._joints[ROTOR]]
         for joint, source in zip(places, (0, 1, 2, 2), strict=True):
             self._bullet.resetJointState(
-                self._leg,
-                joint,
-                float(state[source]),
-                float(state[source + 3]),
-                physicsClientId=self._id,
+                self._leg, joint, float(state[source]), float(state[source + 3]), **self._world
             )
 
     def step(self, torque: Array, substeps: int) -> Array:
@@ -163,22 +128,16 @@ class PyBulletWorld:
         bullet, forces = self._bullet, torque.tolist()
         for _ in range(substeps):
             bullet.setJointMotorControlArray(
-                self._leg,
-                self._motors,
-                bullet.TORQUE_CONTROL,
-                forces=forces,
-                physicsClientId=self._id,
+                self._leg, self._motors, bullet.TORQUE_CONTROL, forces=forces, **self._world
             )
-            bullet.stepSimulation(physicsClientId=self._id)
-        joints = bullet.getJointStates(self._leg, self._coordinates, physicsClientId=self._id)
+            bullet.stepSimulation(**self._world)
+        joints = bullet.getJointStates(self._leg, self._coordinates, **self._world)
         return np.array([joint[0] for joint in joints] + [joint[1] for joint in joints])
 
     def push(self, force: Array, place: Array) -> None:
-        """Push the shank during the next step.
+        """Push the shank during the next step by an upward and forward force, N, (2,).
 
-        Args:
-            force: Upward and forward, N, (2,).
-            place: Height above the ground and forward offset from the hip, m, (2,).
+        ``place`` is the height above the ground and the forward offset from the hip, m, (2,).
         """
         self._bullet.applyExternalForce(
             self._leg,
@@ -186,13 +145,13 @@ class PyBulletWorld:
             [float(force[1]), 0.0, float(force[0])],
             [float(place[1]), 0.0, float(place[0])],
             self._bullet.WORLD_FRAME,
-            physicsClientId=self._id,
+            **self._world,
         )
 
     def close(self) -> None:
         """Free the world; PyBullet has room for about a thousand."""
         if self._id >= 0:
-            self._bullet.disconnect(physicsClientId=self._id)
+            self._bullet.disconnect(self._id)
             self._id = -1
 
 
@@ -215,11 +174,7 @@ def pybullet_urdf(robot: Robot, *, foot_collides: bool = True) -> str:
     """Return the URDF to be loaded with ``URDF_USE_INERTIA_FROM_FILE``.
 
     The fixed frame ``foot`` is left out (a link without inertia weighs 1 kg in PyBullet), and so
-    are the joints' limits, which act in control.
-
-    Args:
-        robot: The leg.
-        foot_collides: Let PyBullet find the foot's contact; the knee's and the base's it does.
+    are the joints' limits, which act in control. Knee and base collide in any case.
 
     Raises:
         RobotError: The base is too light to give the rotor its mass.

@@ -4,7 +4,7 @@ import numpy as np
 from mujoco import batch
 
 from hopping_leg.robot import build_model, load_robot
-from hopping_leg.sim.model_fields import set_model_fields
+from hopping_leg.sim.mismatch_model import set_model_fields
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES, sample
 
 LEG = load_robot("legv2-paper")
