@@ -11,15 +11,7 @@ from hopping_leg.arrays import Array
 def seeded_strategy(
     first: Array, step: float, bounds: Sequence[object], population: int, seed: int
 ) -> cma.CMAEvolutionStrategy:
-    """Return pycma's strategy; randomness comes from a generator of our own.
-
-    Args:
-        first: Where to begin, (size,).
-        step: First step size.
-        bounds: Lower and upper ones, a number or a list each.
-        population: Candidates per generation.
-        seed: Seed of the generator.
-    """
+    """Return pycma's strategy that begins at ``first``, (size,); bounds are numbers or lists."""
     rng = np.random.default_rng(seed)
     settings = {
         "popsize": population,

@@ -41,13 +41,7 @@ class HardwareError(HoppingLegError):
 
 
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> str:
-    """Return the sentence for a name that does not exist, with the valid ones.
-
-    Args:
-        kind: What the name should have been, e.g. ``"controller"``.
-        name: What was given.
-        valid: All names that exist.
-    """
+    """Return the sentence for a name that does not exist, with the valid ones."""
     names = sorted(valid)
     close = get_close_matches(name, names, n=1)
     hint = f" Did you mean '{close[0]}'?" if close else ""

@@ -56,13 +56,7 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
 
 
 def panels(rows: int, columns: int = 1, height: float = 2.2) -> tuple[Figure, list[list[Axes]]]:
-    """Return a figure of panels that share their axes.
-
-    Args:
-        rows: Rows of panels.
-        columns: Columns of panels.
-        height: Height of a row, inches.
-    """
+    """Return a figure of panels that share their axes; a row's height is in inches."""
     figure = Figure(figsize=(WIDTH, height * rows + 0.5), layout="constrained")
     axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     return figure, [list(row) for row in axes]
@@ -101,19 +95,19 @@ _PRINT_DPI = 300
 
 
 def encode(figure: Figure, kind: Format, width: Width = "screen") -> bytes:
-    """Return a figure as a file's content, the same bytes every time.
+    """Return a figure as a file's content, the same bytes every time, resized for print.
 
-    Args:
-        figure: Is resized if ``width`` is not ``screen``.
-        kind: Kind of file; fonts are embedded in a PDF.
-        width: What it shall fill.
+    Fonts are embedded in a PDF.
     """
     if width != "screen":
         fit_width(figure, width)
     if kind == "svg":
         return to_svg(figure)
     if kind == "pdf":
-        return _to_pdf(figure)
+        buffer = io.BytesIO()
+        with mpl.rc_context({"pdf.fonttype": 42}):
+            figure.savefig(buffer, format="pdf", dpi=_PRINT_DPI, metadata={"CreationDate": None})
+        return buffer.getvalue()
     return to_png(figure, dpi=130 if width == "screen" else _PRINT_DPI)
 
 
@@ -141,10 +135,3 @@ def _fold_legends(figure: Figure) -> None:
         figure.legend(
             handles, labels, loc="outside upper right", ncols=2, fontsize=size, frameon=False
         )
-
-
-def _to_pdf(figure: Figure) -> bytes:
-    buffer = io.BytesIO()
-    with mpl.rc_context({"pdf.fonttype": 42}):
-        figure.savefig(buffer, format="pdf", dpi=_PRINT_DPI, metadata={"CreationDate": None})
-    return buffer.getvalue()

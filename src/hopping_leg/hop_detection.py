@@ -33,12 +33,7 @@ USUAL_PERIOD = 0.5
 class HopMeasurement:
     """What is measured of the hops in a stretch of a run.
 
-    Attributes:
-        apex: Base height at each apex, m, (hops,).
-        ticks: Length of the stretch.
-        flight_ticks: Ticks with the foot clear of the ground.
-        skipped: Hops that should have happened and did not.
-        bounces: Bounces that never left the ground.
+    Heights of the apexes, (hops,), are in m; skipped hops should have happened and did not.
     """
 
     apex: Array
@@ -50,13 +45,7 @@ class HopMeasurement:
 
 @dataclass(frozen=True)
 class Hops:
-    """Hops of one run.
-
-    Attributes:
-        tick: Index of the apex of each hop, (hops,).
-        apex: Base height there, m, (hops,).
-        in_flight: Whether the foot is clear of the ground, (ticks,).
-    """
+    """Ticks and heights, m, of one run's apexes, (hops,), and where it flies, (ticks,)."""
 
     tick: IntArray
     apex: Array
@@ -64,25 +53,13 @@ class Hops:
 
 
 def at_apex(rose: BoolArray, rises: BoolArray, clearance: Array) -> BoolArray:
-    """Return where a leg has just passed an apex in flight, (...).
-
-    Args:
-        rose: Whether the base rose one tick ago, (...).
-        rises: Whether it rises now, (...).
-        clearance: Foot clearance now, m, (...).
-    """
+    """Return where a leg in flight that rose a tick ago rises no more, (...)."""
     apex: BoolArray = (rose > rises) & (clearance >= FLIGHT_CLEARANCE)
     return apex
 
 
 def find_hops(height: Array, velocity: Array, clearance: Array) -> Hops:
-    """Find the hops of a run, one per flight.
-
-    Args:
-        height: Base height, m, (ticks,).
-        velocity: Base velocity, m/s, (ticks,).
-        clearance: Foot clearance, m, (ticks,).
-    """
+    """Find the hops of a run, one per flight; heights in m, velocity in m/s, (ticks,) each."""
     rises, flying = velocity > 0, clearance >= FLIGHT_CLEARANCE
     tick = np.flatnonzero(at_apex(rises[:-1], rises[1:], clearance[1:])) + 1
     apex = np.maximum(height[tick], height[tick - 1])
@@ -100,15 +77,7 @@ def trace_hops(trace: Trace) -> Hops:
 def measure_hops(
     height: Array, velocity: Array, clearance: Array, rate: float, first: int = 0
 ) -> HopMeasurement:
-    """Measure the hops of a run from a tick on.
-
-    Args:
-        height: Base height, m, (ticks,).
-        velocity: Base velocity, m/s, (ticks,).
-        clearance: Foot clearance, m, (ticks,).
-        rate: Ticks per second, Hz.
-        first: Apexes and bounces before this tick do not count.
-    """
+    """Measure the hops of a run from the tick ``first`` on, arguments as for ``find_hops``."""
     hops = find_hops(height, velocity, clearance)
     counted = hops.tick >= first
     bounces = find_bounces(height, clearance)
@@ -125,10 +94,6 @@ def measure_hops(
 def find_bounces(height: Array, clearance: Array) -> IntArray:
     """Find maxima of the base height with the foot on the ground: hops that never took off.
 
-    Args:
-        height: Base height, m, (ticks,).
-        clearance: Foot clearance, m, (ticks,).
-
     Returns:
         Index of each maximum that stands at least ``BOUNCE`` out of its surroundings, (bounces,).
     """
@@ -138,12 +103,7 @@ def find_bounces(height: Array, clearance: Array) -> IntArray:
 
 
 def hop_period(apex_tick: IntArray, rate: float) -> float:
-    """Return the median time between successive hops, s; ``USUAL_PERIOD`` below three hops.
-
-    Args:
-        apex_tick: Index of each apex, (hops,).
-        rate: Ticks per second, Hz.
-    """
+    """Return the median time between successive hops, s; ``USUAL_PERIOD`` below three hops."""
     if len(apex_tick) < 3:
         return USUAL_PERIOD
     return float(np.median(np.diff(apex_tick))) / rate
@@ -159,12 +119,7 @@ def count_skipped(
     ``floor(gap / period)`` at the ends of the window; a bounce misses one. Each gap counts the
     larger of the two, so that a bounce in a long gap is one skipped hop, not two.
 
-    Args:
-        apex_tick: Index of each in-flight apex in the window, rising, (hops,).
-        bounce_tick: Index of each bounce, (bounces,).
-        start: First tick of the window.
-        end: One past the last tick.
-        rate: Ticks per second, Hz.
+    Indices of apexes rise; ``end`` is one past the last tick of the window.
     """
     period = hop_period(apex_tick, rate) * rate
     edges = np.concatenate([[start], apex_tick, [end]])

@@ -46,8 +46,7 @@ def table(columns: Sequence[Column], rows: Sequence[Any], caption: str = "") -> 
     if not rows:
         return Markup("")
     head = Markup("").join(Markup("<th>{}</th>").format(_unbroken(c.heading)) for c in columns)
-    lines = []
-    before = ""
+    lines, before = [], ""
     for row in rows:
         cells = Markup("").join(
             Markup('<td class="{}">{}</td>').format("bad" if c.bad(row) else "", c.text(row))

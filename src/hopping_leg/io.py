@@ -51,10 +51,6 @@ def write_atomically(path: Path, content: bytes) -> None:
 def write_json(path: Path, value: object) -> None:
     """Write a value as readable JSON; an existing file stays whole if that fails.
 
-    Args:
-        path: The file.
-        value: See ``plain``.
-
     Raises:
         TraceError: The file cannot be written.
     """
@@ -92,12 +88,9 @@ def versions(*packages: str) -> dict[str, str]:
 
 
 def replace_at(tree: Kind, path: str, value: object) -> Kind:
-    """Return nested dataclasses or dictionaries with one entry replaced.
+    """Return nested dataclasses or dictionaries with the entry at a dotted path replaced.
 
-    Args:
-        tree: What stays otherwise; dictionaries on the way are made where there are none.
-        path: Names of the entry and of what holds it, outermost first, joined by dots.
-        value: The new entry.
+    Dictionaries on the way are made where there are none.
     """
     name, _, rest = path.partition(".")
     if isinstance(tree, dict):
@@ -110,10 +103,7 @@ def replace_at(tree: Kind, path: str, value: object) -> Kind:
 def quantity(unit: str, default: float | None, **valid: bool) -> Any:  # noqa: ANN401
     """Return a field of a dataclass that is a number with a unit, and may be left out.
 
-    Args:
-        unit: Unit of the number.
-        default: Its value where it is left out.
-        valid: ``zero`` or ``signed`` where zero, or any sign, is valid beside positive numbers.
+    Give ``zero`` or ``signed`` where zero, or any sign, is valid beside positive numbers.
     """
     return dataclasses.field(default=default, metadata={"unit": unit, **valid})
 

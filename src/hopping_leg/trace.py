@@ -41,15 +41,12 @@ COLUMNS = {
 
 @dataclass(frozen=True)
 class Trace:
-    """One leg's run.
-
-    Attributes:
-        table: One row per control period, columns as in ``COLUMNS``.
-        header: Robot, its digest, controller, seed, rate, versions.
-    """
+    """One leg's run."""
 
     table: pl.DataFrame
+    """One row per control period, columns as in ``COLUMNS``."""
     header: dict[str, Any] = field(default_factory=dict)
+    """Robot, its digest, controller, seed, rate, versions."""
 
     def column(self, name: str) -> Array:
         """Return a column as floats, (ticks,).

@@ -20,11 +20,8 @@ from hopping_leg.errors import HoppingLegError, UsageError
 P = ParamSpec("P")
 R = TypeVar("R")
 
-_PATIENCE = 5.0
-"""How long an address may take to answer, s."""
-
-_LOOK_EVERY = 0.5
-"""Time between two looks for an interruption, s."""
+_PATIENCE = 5.0  # how long an address may take to answer, s
+_LOOK_EVERY = 0.5  # between two looks for an interruption, s
 
 
 class Workers(Protocol):
@@ -46,13 +43,7 @@ class Workers(Protocol):
 
 
 def map_rows(workers: Workers, function: Callable[[Array], Array], rows: Array) -> Array:
-    """Return what a function returns for rows (n, k), computed in parts of nearly equal size.
-
-    Args:
-        workers: Compute a part each.
-        function: Maps any number of rows, one by one independent, (n, k) to (n, ...).
-        rows: Its argument.
-    """
+    """Return what a function of independent rows (n, k) returns, computed in about equal parts."""
     parts = np.array_split(rows, min(workers.count, len(rows)))
     return np.concatenate(workers.map(function, ((part,) for part in parts)))
 

@@ -13,22 +13,17 @@ from hopping_leg.viewer.tracks import Track, in_flight
 SECONDS = 5.0
 """Shown."""
 
-_POINTS = 400
-_GRID = np.linspace(-SECONDS, 0.0, _POINTS)
+_GRID = np.linspace(-SECONDS, 0.0, 400)
 _LIMIT = "#9a9996"
 _AXIS = "#5e5c64"
 
 
 class Charts:
-    """Four plots in a panel of their own.
-
-    Args:
-        server: Of the page.
-        panel: Where they stand.
-    """
+    """Four plots in a panel of their own."""
 
     def __init__(self, server: viser.ViserServer, panel: Any) -> None:  # noqa: ANN401
-        self._server, self._panel = server, panel
+        self._gui: Any = server.gui
+        self._panel = panel
         self._tracks: list[Track] = []
         self._plots: list[Any] = []
         self._curves: list[tuple[Array, ...]] = []
@@ -36,44 +31,36 @@ class Charts:
     def show(self, tracks: list[Track], now: float, turn: int) -> None:
         """Draw the seconds before ``now``, s; other legs than before get curves of their own.
 
-        A browser without a GPU misses a frame if all plots change in one.
-
-        Args:
-            tracks: Of the legs.
-            now: Time, s.
-            turn: Number of the plot that is drawn; none if there are fewer. The first turn takes
-                the data for all.
+        A turn changes the plot of its number alone, as a browser without a GPU else misses a
+        frame; the first takes the data for all.
         """
         if turn == 0 or tracks is not self._tracks:
             self._curves = _curves(tracks, [track.sample(now + _GRID) for track in tracks])
         if tracks is not self._tracks:
             self._tracks = tracks
-            self._build(tracks, self._curves)
+            self._build()
         elif turn < len(self._plots):
             self._plots[turn].data = self._curves[turn]
 
-    def _build(self, tracks: list[Track], curves: list[tuple[Array, ...]]) -> None:
+    def _build(self) -> None:
         for plot in self._plots:
             plot.remove()
         self._plots = []
-        axes: Any = (_axis(28), _axis(44))
-        if not tracks:
-            return
-        with self._panel:
-            for (title, series, scale, height), data in zip(_layouts(tracks), curves, strict=True):
-                scales: Any = {"x": {"time": False, "range": (-SECONDS, 0.0)}, "y": scale}
-                self._plots.append(
-                    self._server.gui.add_uplot(
-                        data,
-                        series,
-                        title=title,
-                        scales=scales,
-                        axes=axes,
-                        legend={"show": False},
-                        height=height,
-                        padding=(4, 10, 0, 0),
-                    )
+        for data, (title, series, scale, height) in zip(
+            self._curves, _layouts(self._tracks), strict=True
+        ):
+            with self._panel:
+                plot = self._gui.add_uplot(
+                    data,
+                    series,
+                    title=title,
+                    scales={"x": {"time": False, "range": (-SECONDS, 0.0)}, "y": scale},
+                    axes=(_axis(28), _axis(44)),
+                    legend={"show": False},
+                    height=height,
+                    padding=(4, 10, 0, 0),
                 )
+            self._plots.append(plot)
 
 
 def _curves(tracks: list[Track], shown: list[dict[str, Array]]) -> list[tuple[Array, ...]]:
@@ -83,23 +70,21 @@ def _curves(tracks: list[Track], shown: list[dict[str, Array]]) -> list[tuple[Ar
     heights = (_GRID, shown[0]["command_m"], *(s["height_m"] for s in shown))
     torques = []
     for joint in JOINTS:
-        limit = np.full(_POINTS, getattr(tracks[0].robot, joint).torque_limit)
+        limit = np.full(len(_GRID), getattr(tracks[0].robot, joint).torque_limit)
         torques.append((_GRID, limit, -limit, *(s[f"{joint}_torque_nm"] for s in shown)))
-    phases = [in_flight(s["foot_clearance_m"]) for s in shown]
-    own = [s["phase"] for s in shown]
-    return [heights, *torques, (_GRID, *phases, *own)]
+    phases = *(in_flight(s["foot_clearance_m"]) for s in shown), *(s["phase"] for s in shown)
+    return [heights, *torques, (_GRID, *phases)]
 
 
 def _layouts(tracks: list[Track]) -> list[tuple[str, tuple[Any, ...], dict[str, Any], int]]:
     """Return title, series, vertical scale and height in pixels of each plot."""
-    names = [track.name for track in tracks]
-    lines = [_line(name, _css(COLOURS[i])) for i, name in enumerate(names)]
-    steps = [_line(f"{name}, in the air", _css(COLOURS[i]), 2) for i, name in enumerate(names)]
-    own = [
-        _line(f"{name}, its phase", _css(COLOURS[i]), 1, dash=(2, 2))
-        for i, name in enumerate(names)
-    ]
-    command = _line("command", _css(COMMAND), 2, dash=(6, 4))
+    if not tracks:
+        return []
+    named = [(track.name, css(colour)) for track, colour in zip(tracks, COLOURS, strict=False)]
+    lines = [_line(name, colour) for name, colour in named]
+    steps = [_line(f"{name}, in the air", colour, 2) for name, colour in named]
+    own = [_line(f"{name}, its phase", colour, 1, dash=(2, 2)) for name, colour in named]
+    command = _line("command", css(COMMAND), 2, dash=(6, 4))
     bounds = [_line(f"{side} limit", _LIMIT, 1, dash=(4, 4)) for side in ("upper", "lower")]
     tall = 1.5 * tracks[0].robot.straight_height
     found = [("Base height, m", ({}, command, *lines), {"range": (0.0, tall)}, 160)]
@@ -120,5 +105,6 @@ def _axis(size: int) -> dict[str, Any]:
     return {"size": size, "stroke": _AXIS, "font": "11px sans-serif", "grid": {"width": 0.5}}
 
 
-def _css(colour: tuple[int, int, int]) -> str:
+def css(colour: tuple[int, int, int]) -> str:
+    """Return a colour as HTML has it."""
     return "#{:02x}{:02x}{:02x}".format(*colour)

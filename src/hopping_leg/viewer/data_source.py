@@ -17,12 +17,9 @@ from hopping_leg.viewer.tracks import Track, load_track, trace_rows
 class DataSource(Protocol):
     """A live simulation, a replay, or a run on the real leg."""
 
-    tracks: list[Track]
-    """One per leg."""
-    now: float
-    """Time that is shown, s."""
-    notices: list[str]
-    """What the reader should be told; whoever shows them empties the list."""
+    tracks: list[Track]  # one per leg
+    now: float  # time that is shown, s
+    notices: list[str]  # to be told; whoever shows them empties the list
 
     def advance(self, seconds: float) -> None:
         """Let time pass."""
@@ -31,12 +28,6 @@ class DataSource(Protocol):
 
 class ReplaySource:
     """One or two traces side by side; both begin at zero.
-
-    Attributes:
-        tracks: One per trace.
-        now: Time that is shown, s.
-        length: Of the longest, s.
-        notices: What the reader should be told.
 
     Args:
         paths: Of the traces.
@@ -70,22 +61,25 @@ class ReplaySource:
 
     def _robot(self, path: Path, robot: str | None) -> Robot:
         header = Trace.load(path).header
-        name = robot or str(header.get("robot", ""))
-        try:
-            found = load_robot(name)
-        except RobotError as error:
-            if robot is not None:
-                raise
-            raise RobotError(
-                f"{path} was recorded from '{name}', which is no shipped robot; give its file with"
-                " --robot."
-            ) from error
+        if robot:
+            found = load_robot(robot)
+        else:
+            found = _load_shipped(str(header.get("robot", "")), f"{path} was recorded from")
         found.require_leg()
         if header.get("robot_digest", found.digest) != found.digest:
             self.notices.append(
                 f"{path.name} was recorded from other parameters than those of {found.name}."
             )
         return found
+
+
+def _load_shipped(name: str, origin: str) -> Robot:
+    try:
+        return load_robot(name)
+    except RobotError as error:
+        raise RobotError(
+            f"{origin} '{name}', which is no shipped robot; give its file with --robot."
+        ) from error
 
 
 KEPT_SECONDS = 20.0
@@ -97,11 +91,6 @@ _LOOK = 0.5
 
 class RecorderSource:
     """Shows the newest run; the robot that runs it learns nothing of it.
-
-    Attributes:
-        tracks: Of the run, none before the first one.
-        now: Time of its newest row, s.
-        notices: What the reader should be told.
 
     Args:
         path: Of a black box, or of the folder in which `hop deploy` writes them.
@@ -143,7 +132,11 @@ class RecorderSource:
         if not len(rows):
             return
         if not self.tracks:
-            self.tracks = [self._track(self._tail)]
+            header = self._tail.header
+            name = self._robot or str(header.get("robot", ""))
+            robot = _load_shipped(name, f"{self._tail.path} is of")
+            depth = round(KEPT_SECONDS * CONTROL_RATE)
+            self.tracks = [Track(str(header.get("controller", "")), robot, depth=depth)]
         track = self.tracks[0]
         table = pl.DataFrame(dict(zip(self._tail.columns, rows.T, strict=True)))
         last = tuple(track.moment(self.now)[1]) if len(track) else None
@@ -170,15 +163,3 @@ class RecorderSource:
             return self._path if self._path.exists() else None
         boxes = [(box.stat().st_mtime_ns, box) for box in self._path.glob(f"*{SUFFIX}")]
         return max(boxes)[1] if boxes else None
-
-    def _track(self, tail: FlightRecorderTail) -> Track:
-        name = self._robot or str(tail.header.get("robot", ""))
-        try:
-            robot = load_robot(name)
-        except RobotError as error:
-            raise RobotError(
-                f"{tail.path} is of '{name}', which is no shipped robot; give its file with"
-                " --robot."
-            ) from error
-        depth = round(KEPT_SECONDS * CONTROL_RATE)
-        return Track(str(tail.header.get("controller", "")), robot, depth=depth)

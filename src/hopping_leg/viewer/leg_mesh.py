@@ -25,14 +25,7 @@ _ACROSS = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
 
 @dataclass(frozen=True)
 class LegMesh:
-    """Handles of one leg.
-
-    Attributes:
-        root: Everything of the leg.
-        base: Slides on the rail.
-        thigh: Turns about the hip.
-        shank: Turns about the knee.
-    """
+    """Handles of one leg: the base slides, thigh and shank turn."""
 
     root: viser.FrameHandle
     base: viser.FrameHandle
@@ -49,15 +42,7 @@ class LegMesh:
 def add_leg(
     server: viser.ViserServer, name: str, robot: Robot, x: float, colour: Colour
 ) -> LegMesh:
-    """Put a leg into the scene.
-
-    Args:
-        server: Whose scene.
-        name: Path in the scene.
-        robot: Its geometry.
-        x: Where its rail stands, m.
-        colour: Of its motors.
-    """
+    """Put a leg into the scene at a path; its rail stands at ``x``, m."""
     model = build_model(robot)
     root = server.scene.add_frame(name, show_axes=False, position=(x, 0.0, 0.0))
     paths, frames = {0: name}, []
@@ -77,31 +62,24 @@ def _add_shape(
     server: viser.ViserServer, path: str, model: mujoco.MjModel, geom: int, colour: Colour
 ) -> None:
     name, size = model.geom(geom).name, model.geom_size[geom]
-    rgba = model.mat_rgba[model.geom_matid[geom]]
-    red, green, blue = (int(255 * value) for value in rgba[:3])
+    red, green, blue = (int(255 * value) for value in model.mat_rgba[model.geom_matid[geom]][:3])
     rgb = (red, green, blue)
-    at = tuple(model.geom_pos[geom])
-    turned = tuple(model.geom_quat[geom])
     kind = model.geom_type[geom]
     scene = server.scene
+    place: Any = {"position": tuple(model.geom_pos[geom]), **PLAIN}
+    turned = tuple(model.geom_quat[geom])
     if name in _HOUSINGS:
         width = 1.1 * size[0] if name == "base" else 1.8 * size[0]
-        scene.add_cylinder(path, size[0], width, colour, wxyz=_ACROSS, position=at, **PLAIN)
-        scene.add_cylinder(
-            f"{path}_axle",
-            0.35 * size[0],
-            width + 0.008,
-            (235, 238, 242),
-            wxyz=_ACROSS,
-            position=at,
-            **PLAIN,
-        )
+        scene.add_cylinder(path, size[0], width, colour, wxyz=_ACROSS, **place)
+        axle = (235, 238, 242)
+        path += "_axle"
+        scene.add_cylinder(path, 0.35 * size[0], width + 0.008, axle, wxyz=_ACROSS, **place)
     elif kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-        scene.add_icosphere(path, size[0], rgb, position=at, **PLAIN)
+        scene.add_icosphere(path, size[0], rgb, **place)
     elif kind == mujoco.mjtGeom.mjGEOM_BOX:
-        scene.add_box(path, rgb, tuple(2 * size), position=at, wxyz=turned, **PLAIN)
+        scene.add_box(path, rgb, tuple(2 * size), wxyz=turned, **place)
     elif kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-        scene.add_cylinder(path, size[0], 2 * size[1], rgb, position=at, wxyz=turned, **PLAIN)
+        scene.add_cylinder(path, size[0], 2 * size[1], rgb, wxyz=turned, **place)
 
 
 def _turned(angle: float) -> Array:

@@ -27,15 +27,6 @@ PUSH_SECONDS = 0.05
 class LiveSimulation:
     """The simulation behind the page; knows nothing of it.
 
-    Attributes:
-        robot: What the controllers believe.
-        names: Of the controllers, as they were asked for.
-        height: Commanded, m.
-        settings: Ground, payload, delay and noise of all legs.
-        tracks: One per leg.
-        now: Simulated time, s.
-        notices: What the reader should be told; whoever shows them empties the list.
-
     Args:
         controllers: One or two names or files.
         robot: Name or file.
@@ -58,9 +49,6 @@ class LiveSimulation:
         self.robot = load_robot(robot)
         self.settings = default_settings(self.robot)
         self.names: tuple[str, ...] = ()
-        self.tracks: list[Track] = []
-        self._controllers: list[Controller] = []
-        self._legs: list[LiveLeg] = []
         self._begin(controllers, self.robot)
 
     @property
@@ -124,19 +112,14 @@ class LiveSimulation:
             return
         loaded = _load(names, self.robot)
         _shared_range(loaded, self.robot)
-        changed = [new != old for new, old in zip(names, self.names, strict=True)]
+        changed = [i for i, name in enumerate(names) if name != self.names[i]]
         self.names = names
-        self._controllers = [
-            new if other else old
-            for new, old, other in zip(loaded, self._controllers, changed, strict=True)
-        ]
+        for i in changed:
+            self._controllers[i] = loaded[i]
         self.set_height(self.height)
-        for leg, track, controller, other in zip(
-            self._legs, self.tracks, self._controllers, changed, strict=True
-        ):
-            if other:
-                track.name = controller.name
-                leg.set_controller(controller, self.height)
+        for i in changed:
+            self.tracks[i].name = loaded[i].name
+            self._legs[i].set_controller(loaded[i], self.height)
 
     def set_robot(self, robot: str) -> None:
         """Begin anew with another robot and its own settings.
@@ -152,11 +135,15 @@ class LiveSimulation:
         _shared_range(loaded, robot)
         if robot != self.robot:
             self.settings = default_settings(robot)
-        self.robot, self.names, self._controllers = robot, names, loaded
+        self.robot = robot
+        self.names = names
+        self._controllers: list[Controller] = loaded
         self.set_height(self.height)
-        self._legs = [LiveLeg(c, robot, self.settings, self.height, self._seed) for c in loaded]
+        self._legs: list[LiveLeg] = [
+            LiveLeg(c, robot, self.settings, self.height, self._seed) for c in loaded
+        ]
         depth = round(KEPT_SECONDS * CONTROL_RATE)
-        self.tracks = [Track(c.name, robot, depth=depth) for c in loaded]
+        self.tracks: list[Track] = [Track(c.name, robot, depth=depth) for c in loaded]
 
 
 def _load(names: tuple[str, ...], robot: Robot) -> list[Controller]:
@@ -180,15 +167,7 @@ _IMPOSSIBLE = 1e4
 
 
 class LiveLeg:
-    """A leg that hops.
-
-    Args:
-        controller: Believes that the leg is ``robot``.
-        robot: The leg as its file has it.
-        settings: Ground, payload, delay and noise.
-        height: Commanded first, m.
-        seed: Of noise and random delay.
-    """
+    """A leg that hops under a controller that believes it to be as its file has it."""
 
     def __init__(
         self, controller: Controller, robot: Robot, settings: LiveSettings, height: float, seed: int
@@ -225,9 +204,7 @@ class LiveLeg:
     def tick(self, height: float, force: float) -> Array:
         """Let one control period pass; return its row, (fields of a track,).
 
-        Args:
-            height: Commanded, m.
-            force: Upward push on the base, N.
+        ``height`` is what is commanded, m, ``force`` pushes the base up, N.
 
         Raises:
             PhysicsError: The simulation became unstable.
@@ -236,12 +213,11 @@ class LiveLeg:
         if force != self._force:
             self._force = force
             legs.push(np.array([force]))
-        command = np.array([height])
         row = np.empty(len(FIELDS))
         row[:3] = height, legs.height[0], legs.height_rate[0]
         row[3:5] = legs.q[0]
         row[7] = legs.foot_clearance()[0]
-        torque = self.controller.act(self._plant.sense(command))
+        torque = self.controller.act(self._plant.sense(np.array([height])))
         try:
             row[5:7] = self._plant.drive(torque)[0]
         except batch.SimulationError as error:

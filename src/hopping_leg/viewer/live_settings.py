@@ -9,17 +9,10 @@ from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 
 Range = tuple[float, float]
 
-PAYLOAD: Range = (0.0, 1.0)
-"""Mass that can be put on the base, kg."""
-
-TIME_CONSTANT: Range = (0.005, 0.15)
-"""Time constant of the ground, s: from hard to soft."""
-
-DELAY: Range = (0.0, 0.03)
-"""Further delay of commands, s."""
-
-PUSH: Range = (5.0, 60.0)
-"""Force of a push, N."""
+PAYLOAD: Range = (0.0, 1.0)  # on the base, kg
+TIME_CONSTANT: Range = (0.005, 0.15)  # of the ground, from hard to soft, s
+DELAY: Range = (0.0, 0.03)  # of commands, beyond the robot's own, s
+PUSH: Range = (5.0, 60.0)  # N
 
 
 @dataclass(frozen=True)
@@ -56,8 +49,7 @@ class LiveSettings:
     def apply(self, robot: Robot) -> Robot:
         """Return the robot with these settings."""
         reality = robot.reality
-        latency = reality.latency
-        ground = reality.ground
+        latency, ground = reality.latency, reality.ground
         if ground.time_constant is not None:
             ground = dataclasses.replace(ground, time_constant=self.time_constant)
         return dataclasses.replace(

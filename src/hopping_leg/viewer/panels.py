@@ -1,6 +1,5 @@
 """Inputs of the page and the queue that carries them to the thread that simulates."""
 
-import dataclasses
 from collections.abc import Callable, Coroutine
 from queue import Empty, SimpleQueue
 from typing import Any
@@ -64,41 +63,23 @@ class GuiQueue:
         return callback
 
 
-NOBODY = "nobody"
-"""Beside the leg."""
-
-HEIGHT_STEP = 0.005
-"""Of the slider, m."""
-
+NOBODY = "nobody"  # beside the leg
+HEIGHT_STEP = 0.005  # of the slider, m
 KEY_STEP = 0.01
 """Of the keys K and J, m; arrows are the slider's own once it has the focus."""
 
 
 class LivePanel:
-    """Puts what the page asks for to a live simulation.
-
-    Args:
-        server: Of the page.
-        queue: For what is asked.
-        live: The simulation.
-        robot: Name or file that it was started with.
-    """
+    """Puts what the page asks for to a live simulation, started with a robot's name or file."""
 
     def __init__(
         self, server: viser.ViserServer, queue: GuiQueue, live: LiveSimulation, robot: str
     ) -> None:
         self._live = live
         gui = server.gui
-        low, high = live.valid
-        self._height = gui.add_slider(
-            "Height, m",
-            min=low,
-            max=high,
-            step=HEIGHT_STEP,
-            initial_value=live.height,
-            hint="Commanded apex; keys K and J",
-        )
-        self._height.on_update(queue.from_page(lambda: self._set_height(self._height.value)))
+        hint = "Commanded apex; keys K and J"
+        self._height = _slider(gui, "Height, m", live.valid, HEIGHT_STEP, live.height, hint)
+        self._height.on_update(queue.from_page(self._set_height))
         names = (*controller_names(), *(n for n in live.names if n not in controller_names()))
         self._first = gui.add_dropdown("Controller", names, initial_value=live.names[0])
         beside = live.names[1] if len(live.names) > 1 else NOBODY
@@ -154,8 +135,8 @@ class LivePanel:
         for handle in (self._payload, self._ground, self._delay, self._noise):
             handle.on_update(queue.from_page(self._settings))
 
-    def _set_height(self, height: float) -> None:
-        self._live.set_height(height)
+    def _set_height(self) -> None:
+        self._live.set_height(self._height.value)
 
     def _change(self, by: float) -> None:
         put_value(self._height, self._live.set_height(self._live.height + by))
@@ -175,14 +156,9 @@ class LivePanel:
             self._show()
 
     def _settings(self) -> None:
+        ground, delay = 1e-3 * self._ground.value, 1e-3 * self._delay.value
         self._live.set_settings(
-            dataclasses.replace(
-                self._live.settings,
-                payload=self._payload.value,
-                time_constant=1e-3 * self._ground.value,
-                delay=1e-3 * self._delay.value,
-                noise=self._noise.value,
-            )
+            ranges.LiveSettings(ground, self._payload.value, delay, self._noise.value)
         )
 
     def _show(self) -> None:
@@ -215,13 +191,7 @@ def _thousandfold(bounds: ranges.Range) -> ranges.Range:
 
 
 class ReplayPanel:
-    """A slider for the time, which follows the replay as it plays.
-
-    Args:
-        server: Of the page.
-        queue: For what is asked.
-        replay: To be steered.
-    """
+    """A slider for the time, which follows the replay as it plays."""
 
     def __init__(self, server: viser.ViserServer, queue: GuiQueue, replay: ReplaySource) -> None:
         self._replay = replay
@@ -242,18 +212,8 @@ class ReplayPanel:
         self._shown = self._replay.now
 
 
-STEP_TICKS = 1
-"""Control periods of a single step."""
-
-
 class TimeControls:
-    """Pause, step and speed, by buttons and keys.
-
-    Args:
-        server: Of the page.
-        queue: For what is asked.
-        clock: To be changed.
-    """
+    """Pause, step and speed, by buttons and keys."""
 
     def __init__(self, server: viser.ViserServer, queue: GuiQueue, clock: PlaybackClock) -> None:
         self._clock = clock
@@ -262,21 +222,19 @@ class TimeControls:
         step = gui.add_button("Single step", icon=viser.Icon.PLAYER_SKIP_FORWARD, hint="Key S")
         names = tuple(f"{speed:g}" for speed in SPEEDS)
         speed = gui.add_dropdown("Speed", names, initial_value="1", hint="1 is real time")
-        self._pause.on_click(queue.from_page(self.pause))
-        step.on_click(queue.from_page(self.step))
+        self._pause.on_click(queue.from_page(self._toggle))
+        step.on_click(queue.from_page(self._step))
         speed.on_update(queue.from_page(lambda: clock.set_speed(float(speed.value))))
-        keys = (("Pause or go on", "space", self.pause), ("Single step", "S", self.step))
+        keys = (("Pause or go on", "space", self._toggle), ("Single step", "S", self._step))
         for label, key, action in keys:
             gui.add_command(label, hotkey=key).on_trigger(queue.from_keys(action))  # type: ignore[arg-type]
 
-    def pause(self) -> None:
-        """Pause, or go on."""
+    def _toggle(self) -> None:
         self._clock.paused = not self._clock.paused
         self._label()
 
-    def step(self) -> None:
-        """Pause, and show one control period more."""
-        self._clock.step(STEP_TICKS)
+    def _step(self) -> None:
+        self._clock.step()
         self._label()
 
     def _label(self) -> None:

@@ -12,15 +12,7 @@ _WINDOW = 2.0
 
 
 class PlaybackClock:
-    """Turns time on the wall into time to be shown.
-
-    Attributes:
-        speed: Shown seconds per second.
-        paused: Whether time stands still, but for single steps.
-
-    Args:
-        tick: What a single step lasts, and what shown time is rounded to, s.
-    """
+    """Turns time on the wall into time to be shown, in whole ticks of so many seconds."""
 
     def __init__(self, tick: float) -> None:
         self.speed, self.paused = 1.0, False
@@ -36,21 +28,21 @@ class PlaybackClock:
         self._steps += ticks
 
     def due(self, elapsed: float) -> float:
-        """Return how much time to show, whole ticks, s.
-
-        Args:
-            elapsed: Time on the wall since the last call, s.
-        """
+        """Return how much time to show, s, given the time on the wall since the last call, s."""
         ticks = self._steps
         self._steps = 0
         if self.paused:
             self._owed = 0.0
-            self._forget()
+            self._past.clear()
             return ticks * self._tick
         self._owed += min(elapsed, LONGEST) * self.speed
         ticks += int(self._owed / self._tick + 1e-9)
         self._owed = max(self._owed - ticks * self._tick, 0.0)
-        self._remember(elapsed, ticks * self._tick)
+        self._wall += elapsed
+        self._shown += ticks * self._tick
+        self._past.append((self._wall, self._shown))
+        while self._wall - self._past[0][0] > _WINDOW:
+            self._past.popleft()
         return ticks * self._tick
 
     @property
@@ -64,14 +56,4 @@ class PlaybackClock:
     def set_speed(self, speed: float) -> None:
         """Go on at another speed."""
         self.speed = speed
-        self._forget()
-
-    def _remember(self, elapsed: float, shown: float) -> None:
-        self._wall += elapsed
-        self._shown += shown
-        self._past.append((self._wall, self._shown))
-        while self._wall - self._past[0][0] > _WINDOW:
-            self._past.popleft()
-
-    def _forget(self) -> None:
         self._past.clear()

@@ -2,8 +2,8 @@
 
 import math
 import sys
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import viser
@@ -11,42 +11,23 @@ import viser
 from hopping_leg.viewer.leg_mesh import PLAIN, Colour, LegMesh, add_leg
 from hopping_leg.viewer.tracks import Track
 
-COLOURS: tuple[Colour, ...] = ((28, 113, 216), (230, 97, 0))
-"""Of the legs and their curves."""
-
+COLOURS: tuple[Colour, ...] = ((28, 113, 216), (230, 97, 0))  # of the legs and their curves
 COMMAND: Colour = (38, 162, 105)
-"""Of what is commanded."""
-
-_APART = 0.36
-"""Between legs, m."""
-
-_AWAY = 1.2
-"""Of the camera from a single leg, m."""
-
+_APART = 0.36  # between legs, m
+_AWAY = 1.2  # of the camera from a single leg, m
 _FIELD_OF_VIEW = math.radians(32)
-
-_FLOOR = (1.2, 0.5)
-"""Half its size, m."""
-
-_LEGS = "/legs"
+_FLOOR = (1.2, 0.5)  # half its size, m
 _APEX_SECONDS = 3.0
 
 
-@dataclass(frozen=True)
-class _Drawn:
-    """One leg's handles."""
-
+class _Drawn(NamedTuple):
     mesh: LegMesh
     command: viser.BoxHandle
     apex: viser.BoxHandle
 
 
 class Scene:
-    """Draws tracks; call ``show`` for every picture.
-
-    Args:
-        server: Of the page.
-    """
+    """Draws tracks; call ``show`` for every picture."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
@@ -67,9 +48,8 @@ class Scene:
     def mark(self, now: float) -> None:
         """Move the marks of command and last apex; may be called less often than ``show``."""
         for drawn, track in zip(self._drawn, self._tracks, strict=True):
-            command = track.latest("command_m", now)
             _, apexes = track.apexes(now, _APEX_SECONDS)
-            _put(drawn.command, command)
+            _put(drawn.command, track.latest("command_m", now))
             _put(drawn.apex, apexes[-1] if len(apexes) else math.nan)
 
     def _build(self, tracks: list[Track]) -> None:
@@ -90,7 +70,7 @@ class Scene:
             client.camera.look_at = look_at
 
     def _add(self, number: int, track: Track) -> _Drawn:
-        name = f"{_LEGS}/{number}"
+        name = f"/legs/{number}"
         mesh = add_leg(self._server, name, track.robot, _APART * number, COLOURS[number])
         for tenth in range(1, 6):
             self._server.scene.add_label(
@@ -167,11 +147,7 @@ _DEVICES = ("dri/renderD*", "nvidia[0-9]*", "dxg")
 
 
 def has_gpu(devices: Path = Path("/dev")) -> bool:
-    """Tell whether this computer has something to draw with, as far as its system shows it.
-
-    Args:
-        devices: Where Linux lists its devices; other systems always have one.
-    """
+    """Tell whether something draws here, as far as Linux lists it; other systems always have it."""
     if sys.platform != "linux":
         return True
     return any(found for pattern in _DEVICES for found in devices.glob(pattern))

@@ -69,16 +69,16 @@ class Track:
 
     def extend(self, time: Array, values: Array) -> None:
         """Add rows: times (rows,) and values (fields, rows)."""
-        new = len(time)
-        self._make_room(new)
+        new, room = len(time), self._rows.shape[1]
+        if self._count + new > room:
+            keep = self._count if self._depth is None else min(self._count, self._depth)
+            grown = np.empty((len(self._rows), max(room, 2 * (keep + new))))
+            grown[:, :keep] = self._rows[:, self._count - keep : self._count]
+            self._rows, self._count = grown, keep
         into = slice(self._count, self._count + new)
         self._rows[0, into] = time
         self._rows[1:, into] = values
         self._count += new
-
-    def clear(self) -> None:
-        """Forget all rows."""
-        self._count = 0
 
     def moment(self, time: float) -> tuple[float, Array]:
         """Return base height, m, and joint angles, rad, (2,), at a time, between rows if need be.
@@ -89,7 +89,7 @@ class Track:
         if not self._count:
             raise TraceError(f"{self.name} has no rows yet.")
         names = ("height_m", "hip_position_rad", "knee_position_rad")
-        height, hip, knee = (self._at(name, time) for name in names)
+        height, hip, knee = (float(np.interp(time, self.time, self.field(n))) for n in names)
         return height, np.array([hip, knee])
 
     def latest(self, name: str, time: float) -> float:
@@ -119,18 +119,6 @@ class Track:
         hops = find_hops(height, rate, clearance)
         return self.time[part][hops.tick], hops.apex
 
-    def _at(self, name: str, time: float) -> float:
-        return float(np.interp(time, self.time, self.field(name)))
-
-    def _make_room(self, new: int) -> None:
-        room = self._rows.shape[1]
-        if self._count + new <= room:
-            return
-        keep = self._count if self._depth is None else min(self._count, self._depth)
-        grown = np.empty((len(self._rows), max(room, 2 * (keep + new))))
-        grown[:, :keep] = self._rows[:, self._count - keep : self._count]
-        self._rows, self._count = grown, keep
-
 
 def trace_rows(
     trace: Trace, robot: Robot, before: tuple[float, float] | None = None
@@ -141,17 +129,11 @@ def trace_rows(
     recorded one; else the leg is shown standing, at the height its joints give a foot on the
     ground, which is right in stance and too low in flight. The clearance stays unknown.
 
-    Args:
-        trace: At least one tick.
-        robot: The leg.
-        before: Joint angles that stand in where measurements are missing at the beginning, rad.
+    Joint angles that are missing at the beginning are those ``before``, rad.
     """
-    columns = {
-        name: trace.column(name)
-        if name in trace.table.columns
-        else np.full(len(trace.table), np.nan)
-        for name in FIELDS
-    }
+    unknown = np.full(len(trace.table), np.nan)
+    known = trace.table.columns
+    columns = {name: trace.column(name) if name in known else unknown for name in FIELDS}
     for joint, name in enumerate(("hip_position_rad", "knee_position_rad")):
         columns[name] = _filled(columns[name], before[joint] if before else None)
     note = ""
@@ -159,7 +141,7 @@ def trace_rows(
         q = np.stack([columns["hip_position_rad"], columns["knee_position_rad"]], axis=-1)
         columns["height_m"] = kinematics.stance_height(robot, q)
         note = "The height was not measured: the leg is shown standing."
-        if _ESTIMATE in trace.table.columns:
+        if _ESTIMATE in known:
             estimate = trace.column(_ESTIMATE)
             columns["height_m"] = np.where(np.isfinite(estimate), estimate, columns["height_m"])
             note = "The height was not measured: it is the controller's estimate."

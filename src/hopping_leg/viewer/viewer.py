@@ -11,7 +11,7 @@ import viser
 
 from hopping_leg.errors import UsageError
 from hopping_leg.sim import CONTROL_RATE
-from hopping_leg.viewer.charts import Charts
+from hopping_leg.viewer.charts import Charts, css
 from hopping_leg.viewer.data_source import DataSource, RecorderSource, ReplaySource
 from hopping_leg.viewer.live_leg import LiveSimulation
 from hopping_leg.viewer.panels import GuiQueue, LivePanel, ReplayPanel, TimeControls
@@ -19,22 +19,14 @@ from hopping_leg.viewer.playback_clock import PlaybackClock
 from hopping_leg.viewer.scene import COLOURS, Scene
 
 FRAME_RATE = 60.0
-"""Per second."""
-
 _SLOW = 6
 """Pictures per update of each plot and of the text; they take turns."""
-
 _NOTICE_SECONDS = 8.0
 _APEX_SECONDS = 3.0
 
 
 class Viewer:
     """Serves the page from when it is made; nothing moves before ``run``.
-
-    Attributes:
-        address: Of the page.
-        clock: How fast time passes.
-        frames: Number of frames shown.
 
     Args:
         source: What is shown.
@@ -133,18 +125,16 @@ class Viewer:
         for number, track in enumerate(source.tracks):
             _, apexes = track.apexes(source.now, _APEX_SECONDS)
             apex = f"{apexes[-1]:.3f} m" if len(apexes) else "none yet"
-            colour = "#{:02x}{:02x}{:02x}".format(*COLOURS[number])
             lines.append(
-                f'<b style="color:{colour}">{html.escape(track.name)}</b>: last apex'
+                f'<b style="color:{css(COLOURS[number])}">{html.escape(track.name)}</b>: last apex'
                 f' <span class="apex">{apex}</span>'
             )
             if track.note:
                 lines.append(html.escape(track.note))
         if isinstance(source, LiveSimulation):
             lines.insert(0, f'Commanded: <b><span id="command">{source.height:.3f}</span> m</b>')
-        keeps = (
-            "" if math.isnan(self.clock.real_time) else f", real time {self.clock.real_time:.2f}"
-        )
+        real_time = self.clock.real_time
+        keeps = "" if math.isnan(real_time) else f", real time {real_time:.2f}"
         lines.append(f'<span style="color:#77767b">{source.now:.2f} s{keeps}</span>')
         return f'<div style="padding:0.4em 1em;line-height:1.5">{"<br>".join(lines)}</div>'
 
