@@ -58,13 +58,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def guard(program: Callable[[], int]) -> int:
     """Return a program's exit code; what a user can mend is said in a sentence on stderr."""
+    code = FAILED
     try:
         return program()
     except HoppingLegError as error:
         sentence = str(error)
     except KeyboardInterrupt:
-        _complain("Interrupted; finished files are whole and nothing was half-written.")
-        return INTERRUPTED
+        sentence = "Interrupted; finished files are whole and nothing was half-written."
+        code = INTERRUPTED
     except BrokenPipeError:
         sys.stderr.close()
         return FAILED
@@ -81,12 +82,8 @@ def guard(program: Callable[[], int]) -> int:
             f"This needs {error.name}, which comes with the extra '{extra}':"
             f" pip install 'hopping-leg[{extra}]'."
         )
-    return _complain(sentence)
-
-
-def _complain(sentence: str) -> int:
     print(f"hop: {sentence}", file=sys.stderr)
-    return FAILED
+    return code
 
 
 _EXTRAS = {
@@ -122,16 +119,9 @@ def read_options(
     description: str | None,
     arguments: Sequence[str],
 ) -> Any:  # noqa: ANN401
-    """Return an instance of a dataclass of options, or of one of a union's.
+    """Return an instance of a dataclass of options, or of one of a union's, as subcommands.
 
-    Args:
-        options: The dataclass, or a union of dataclasses, which become subcommands.
-        program: Name of the program in its help.
-        description: Beginning of its help.
-        arguments: Words behind the program.
-
-    Raises:
-        UsageError: An option is given twice, which would silently lose its first values.
+    An option that is given twice, which would silently lose its first values, is a UsageError.
     """
     flags = [word.partition("=")[0] for word in arguments if word.startswith("--")]
     for flag in flags:

@@ -26,12 +26,7 @@ from rich.console import Console
 
 from hopping_leg.cli.motors import ask, check, connect
 from hopping_leg.cli.options import say, say_written
-from hopping_leg.controllers.command_schedule import (
-    CommandSchedule,
-    Range,
-    check_schedule,
-    command_range,
-)
+from hopping_leg.controllers.command_schedule import CommandSchedule, check_schedule, command_range
 from hopping_leg.controllers.joint_pd import JointPD
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.protocol import Controller
@@ -81,22 +76,11 @@ class Deploy:
     """Folder for the trace."""
 
 
-@dataclass(frozen=True)
-class Plan:
-    """What was asked for, checked against controller and robot."""
-
-    controller: Controller
-    rate: float
-    schedule: CommandSchedule
-    seconds: float
-    valid: Range
-
-
 def run(args: Deploy) -> None:
     """Check everything, ask, run, record."""
     robot = load_robot(args.robot)
     robot.require_leg()
-    done = _perform(args, robot, _plan(args, robot))
+    done = _perform(args, robot, *_plan(args, robot))
     cause = done.outcome.supervisor.stop_cause
     say(*done.notices, f"{cause} {done.outcome.ticks} ticks, {done.outcome.skipped} left out.")
     say_written(done.path)
@@ -105,8 +89,8 @@ def run(args: Deploy) -> None:
         raise HardwareError(" ".join([f"The leg was stopped: {cause}", *filter(None, errors)]))
 
 
-def _plan(args: Deploy, robot: Robot) -> Plan:
-    """Return what to do; everything that can be wrong with it is found here."""
+def _plan(args: Deploy, robot: Robot) -> tuple[Controller, float, CommandSchedule, float]:
+    """Return controller, rate, schedule and seconds; whatever is wrong with them is found here."""
     if args.schedule is not None and args.command is not None:
         raise UsageError("--command and --schedule exclude each other; give one of them.")
     controller: Controller
@@ -131,24 +115,28 @@ def _plan(args: Deploy, robot: Robot) -> Plan:
     seconds = args.seconds or seconds
     if not 0 < seconds <= 3600:
         raise UsageError(f"--seconds is {seconds:g} but must lie between 0 and 3600.")
-    return Plan(controller, rate, schedule, seconds, valid)
+    return controller, rate, schedule, seconds
 
 
-def _perform(args: Deploy, robot: Robot, plan: Plan) -> Performance:
-    live = args.live or args.web is not None
-    height = LiveHeight(plan.schedule.at(0.0), plan.valid) if live else None
+def _perform(
+    args: Deploy,
+    robot: Robot,
+    controller: Controller,
+    rate: float,
+    schedule: CommandSchedule,
+    seconds: float,
+) -> Performance:
+    height = None
+    if args.live or args.web is not None:
+        height = LiveHeight(schedule.at(0.0), command_range(controller, robot))
     page = None if args.web is None or height is None else HeightPage(height, args.web)
     poses = hopping_poses(robot)
-    if isinstance(plan.controller, JointPD):
-        poses = replace(poses, start=plan.controller.position[0])
-    sequence = MotionSequence(
-        plan.controller,
-        height or plan.schedule,
-        poses,
-        SoftLimiter(robot, SoftLimits()) if args.soft_limits else None,
-        SequenceTiming(hop=plan.seconds),
-    )
-    limits = hopping_limits(robot, plan.rate)
+    if isinstance(controller, JointPD):
+        poses = replace(poses, start=controller.position[0])
+    limiter = SoftLimiter(robot, SoftLimits()) if args.soft_limits else None
+    timing = SequenceTiming(hop=seconds)
+    sequence = MotionSequence(controller, height or schedule, poses, limiter, timing)
+    limits = hopping_limits(robot, rate)
 
     @contextlib.contextmanager
     def beside(loop: ControlLoop) -> Iterator[None]:
@@ -161,13 +149,11 @@ def _perform(args: Deploy, robot: Robot, plan: Plan) -> Performance:
     if page is not None:
         say(f"Height and stop: {page.address}")
     with connect(robot, args.transport) as link:
-        drives, name = check(link, robot, limits), plan.controller.name
+        drives, name = check(link, robot, limits), controller.name
         ask(
-            f"All checks passed. {robot.name} will move and hop for {plan.seconds:g} s with {name};"
+            f"All checks passed. {robot.name} will move and hop for {seconds:g} s with {name};"
             " keep a hand on the switch.",
             yes=args.yes,
         )
-        header = header_of(
-            robot, plan.controller, plan.rate, transport=args.transport, drives=drives
-        )
+        header = header_of(robot, controller, rate, transport=args.transport, drives=drives)
         return perform(link, sequence, limits, new_path(args.out, name), header, beside=beside)

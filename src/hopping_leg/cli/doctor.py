@@ -39,7 +39,6 @@ PURPOSES = {
     "docs": "build the documentation (make docs)",
     "dev": "test and check a clone (make test, make check)",
 }
-"""Every extra, with what it is for."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,11 @@ def run(args: Doctor) -> None:
     if args.transport is None:
         if changes:
             raise UsageError("--write and --home need the drives; name their --transport.")
-        show_extras()
+        for extra, missing in missing_requirements(requires("hopping-leg") or []).items():
+            state = f"missing {', '.join(missing)}" if missing else "installed"
+            say(f"{extra}: {state}; {PURPOSES[extra]}")
+            if missing:
+                say(f"  pip install 'hopping-leg[{extra}]'")
         return
     robot = load_robot(args.robot)
     limits = hopping_limits(robot, CONTROL_RATE)
@@ -84,7 +87,6 @@ def run(args: Doctor) -> None:
 
 
 def _write(link: "MoteusLink", robot: Robot, findings: list[Finding], *, yes: bool) -> None:
-    """Write the settings that were found wrong."""
     from hopping_leg.deploy.drive_info import configure
 
     for joint, name in enumerate(JOINTS):
@@ -104,37 +106,22 @@ def _home(link: "MoteusLink", angles: tuple[float, float], *, yes: bool) -> None
     home(link, angles)
 
 
-def show_extras() -> None:
-    """Print a line per extra, and the command for those that are missing."""
-    for extra, missing in missing_requirements(requires("hopping-leg") or []).items():
-        if missing:
-            say(f"{extra}: missing {', '.join(missing)}; {PURPOSES[extra]}")
-            say(f"  pip install 'hopping-leg[{extra}]'")
-        else:
-            say(f"{extra}: installed; {PURPOSES[extra]}")
-
-
 def missing_requirements(requirements: Sequence[str]) -> dict[str, list[str]]:
     """Return what of each extra's requirements is absent or of a version that does not fit."""
     wanted = [Requirement(line) for line in requirements]
-    return {
-        extra: [_text(r) for r in wanted if _belongs(r, extra) and not _met(r)]
-        for extra in PURPOSES
-    }
-
-
-def _text(requirement: Requirement) -> str:
-    """Return a requirement without its condition."""
-    extras = f"[{','.join(sorted(requirement.extras))}]" if requirement.extras else ""
-    return f"{requirement.name}{extras}{requirement.specifier}"
+    found: dict[str, list[str]] = {extra: [] for extra in PURPOSES}
+    for extra, missing in found.items():
+        for r in wanted:
+            if _belongs(r, extra) and not _met(r):
+                brings = f"[{','.join(sorted(r.extras))}]" if r.extras else ""
+                missing.append(f"{r.name}{brings}{r.specifier}")
+    return found
 
 
 def _belongs(requirement: Requirement, extra: str) -> bool:
     """Tell whether an extra asks for a requirement, which holds on this platform."""
-    marker = requirement.marker
-    if marker is None:
-        return False
-    return marker.evaluate({"extra": extra}) and not marker.evaluate({"extra": ""})
+    holds = requirement.marker and requirement.marker.evaluate
+    return bool(holds and holds({"extra": extra}) and not holds({"extra": ""}))
 
 
 def _met(requirement: Requirement) -> bool:

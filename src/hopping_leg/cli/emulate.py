@@ -41,8 +41,7 @@ if TYPE_CHECKING:
     from hopping_leg.emulator.drive import EmulatedDrive
     from hopping_leg.emulator.robot import EmulatedRobot
 
-_RENEWED = 0.2
-"""How often the status line is renewed, s."""
+_STATUS_PERIOD = 0.2  # s
 
 
 @dataclass(frozen=True)
@@ -103,10 +102,8 @@ def run(args: Emulate) -> None:
         with _ending_signals() as over:
             ids = " and ".join(str(drive.id) for drive in robot.drives)
             where = f"on {port}." if ":" in str(port) else f"behind {port}"
-            say(
-                f"Drives {ids} of {robot.robot.name} {where}",
-                f"  hop deploy fast --transport {port}",
-            )
+            say(f"Drives {ids} of {robot.robot.name} {where}")
+            say(f"  hop deploy fast --transport {port}")
             sys.stdout.flush()
             if args.realtime and prefer_this_thread() is not None:
                 say("Without real-time priority the drives may answer late under load.")
@@ -156,17 +153,16 @@ class _Display:
         for line in self._events():
             print(f"{clear}{line}", flush=True)
         if self._live and time.monotonic() >= self._due:
-            self._due = time.monotonic() + _RENEWED
+            self._due = time.monotonic() + _STATUS_PERIOD
             print(f"{clear}{self._status(lost)}", end="", flush=True)
 
     def end(self) -> None:
-        """Leave the line."""
         if self._live:
             print()
         print(f"The emulator ended after {self._robot.time:.1f} s.", flush=True)
 
     def _events(self) -> Iterator[str]:
-        """Yield a line for each fault that began and each change of mode since the last call."""
+        """Yield a line for each new fault and change of mode."""
         robot, log = self._robot, self._robot.fault_injector.log
         for begun, fault in log[self._faults_shown :]:
             who = "" if fault.kind == "unplug" else f" ({fault.drive})"
@@ -176,11 +172,13 @@ class _Display:
             mode = drive.machine.mode
             if mode is not self._modes[joint]:
                 self._modes[joint] = mode
-                why = f": {_code_text(drive.machine.fault)}" if mode is DriveMode.FAULT else ""
+                why, code = "", drive.machine.fault
+                if mode is DriveMode.FAULT:
+                    known = [kind(code) for kind in (FaultCode, Notice) if code in set(kind)]
+                    why = f": {known[0].name.lower().replace('_', ' ') if known else 'unknown'}"
                 yield f"{robot.time:7.3f} s  {JOINTS[joint]}: {_mode_text(drive)}{why}"
 
     def _status(self, lost: float) -> str:
-        """Return the state in one line."""
         robot = self._robot
         parts = [f"{robot.time:7.1f} s"]
         for joint, (name, drive) in enumerate(zip(JOINTS, robot.drives, strict=True)):
@@ -199,9 +197,3 @@ def _mode_text(drive: "EmulatedDrive") -> str:
     mode, code = drive.machine.mode, drive.machine.fault
     text = mode.name.lower().replace("_", " ")
     return f"{text} {code}" if code else text
-
-
-def _code_text(code: int) -> str:
-    """Return what a fault code or notice means."""
-    known = [kind(code) for kind in (FaultCode, Notice) if code in set(kind)]
-    return known[0].name.lower().replace("_", " ") if known else "unknown"

@@ -67,20 +67,13 @@ class Conditions:
     """Threads of the physics, 0 for all cores; results do not depend on it."""
 
     def load(self) -> tuple[list[Entry], RolloutConfig]:
-        """Return the controllers and how they are rolled out.
-
-        Raises:
-            UsageError: An option has no meaning, or there is no such robot or controller.
-        """
+        """Return the controllers and how they are rolled out; a wrong option is a UsageError."""
         at_least(0, seed=self.seed)
         check_file(self.json)
         robot = load_robot(self.robot)
+        noise = NoiseAndDelay() if self.noise else NO_NOISE
         setup = RolloutConfig(
-            robot,
-            NoiseAndDelay() if self.noise else NO_NOISE,
-            rate=self.rate,
-            timestep=self.timestep,
-            threads=self.threads,
+            robot, noise, rate=self.rate, timestep=self.timestep, threads=self.threads
         )
         return load_entries(self.controllers, robot, self.rate), setup
 
@@ -133,7 +126,6 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
 
 
 def _judge(entries: list[Entry], setup: RolloutConfig, args: Evaluate) -> EvaluationRun:
-    """Run all trials under a progress bar."""
     floors = ("soft", "stiff") if args.floor == "both" else (args.floor,)
     with ShareProgress() as bar:
         judged = [

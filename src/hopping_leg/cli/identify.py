@@ -22,18 +22,12 @@ from rich.table import Column
 
 from hopping_leg.cli.options import JsonFile, Names, command_line, say, show_table
 from hopping_leg.errors import UsageError
+from hopping_leg.identify import result
 from hopping_leg.identify.optimizers import CmaOptions
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.plan import robot_of
-from hopping_leg.identify.recording import Recording, load_recording, sidecar_path
+from hopping_leg.identify.recording import load_recording, sidecar_path
 from hopping_leg.identify.report import write_fit_report
-from hopping_leg.identify.result import (
-    Identified,
-    as_json,
-    parameters_json,
-    quality_json,
-    save_robot,
-)
 from hopping_leg.identify.search import SearchOptions
 from hopping_leg.io import write_atomically, write_json
 from hopping_leg.progress import LiveProgress, minutes
@@ -112,10 +106,15 @@ def run(args: Identify) -> None:
     recordings = [load_recording(path) for path in args.recordings]
     judges = [load_recording(path) for path in args.validate]
     origin = args.robot or robot_of([*recordings, *judges])
-    _check_out(args, origin)
+    outputs = [(name, path) for name in _FILES if (path := getattr(args, name)) is not None]
+    _check_outputs(args, origin, outputs)
     robot = load_robot(origin)
-    _show_recordings("fit", recordings)
-    _show_recordings("judge", judges)
+    for use, group in (("fit", recordings), ("judge", judges)):
+        for r in group:
+            about, seconds = f"{r.name}, {r.metadata.rig}", r.time[-1] - r.time[0]
+            rate, source = r.metadata.rate_hz, r.metadata.source
+            say(f"{use}: {about}, {seconds:.4g} s at {rate:g} Hz, {source}")
+            say(*(f"  {warning}" for warning in r.warnings))
     folder = args.folder or Path("runs") / f"identify-{args.out.stem}"
     try:
         with FitProgress() as progress:
@@ -130,25 +129,17 @@ def run(args: Identify) -> None:
                 report=progress.update,
             )
     except KeyboardInterrupt:
-        print(
-            f"Stopped; the same command goes on in {folder}, with --resume or without.",
-            file=sys.stderr,
-        )
+        how = f"the same command goes on in {folder}, with --resume or without."
+        print(f"Stopped; {how}", file=sys.stderr)
         raise
-    save_robot(identified, args.out, origin)
+    result.save_robot(identified, args.out, origin)
     command = command_line("hop identify", args, ("folder", "resume", "threads", "ray"))
     if args.json:
-        write_json(args.json, {"command": command, **as_json(identified)})
+        write_json(args.json, {"command": command, **result.as_json(identified)})
     if args.report:
         write_atomically(args.report, write_fit_report(identified, command, args.threads))
     _show(identified)
-    for name, path in _outputs(args):
-        say(f"{_FILES[name]}: {path}")
-
-
-def _outputs(args: Identify) -> list[tuple[str, Path]]:
-    """Return name and path of every file that was asked for."""
-    return [(name, path) for name in _FILES if (path := getattr(args, name)) is not None]
+    say(*(f"{_FILES[name]}: {path}" for name, path in outputs))
 
 
 def _bounds(text: str) -> tuple[str, tuple[float, float]]:
@@ -162,13 +153,13 @@ def _bounds(text: str) -> tuple[str, tuple[float, float]]:
     return name.strip(), (low, high)
 
 
-def _check_out(args: Identify, origin: str) -> None:
+def _check_outputs(args: Identify, origin: str, outputs: list[tuple[str, Path]]) -> None:
     """Refuse an output that would replace an input, before any time is spent."""
     if args.out.suffix != ".toml":
         raise UsageError(f"--out {args.out} must end in .toml, as robot files do.")
     recordings = (*args.recordings, *args.validate)
     inputs = {p.resolve() for p in (Path(origin), *recordings, *map(sidecar_path, recordings))}
-    for name, path in _outputs(args):
+    for name, path in outputs:
         if path.resolve() in inputs:
             raise UsageError(f"--{name} {path} would replace an input; give another file.")
         if path.is_dir():
@@ -178,28 +169,18 @@ def _check_out(args: Identify, origin: str) -> None:
             raise UsageError(f"--{name} {path} cannot be written there; give another place.")
 
 
-def _show_recordings(use: str, recordings: list[Recording]) -> None:
-    for r in recordings:
-        about, seconds = r.metadata, r.time[-1] - r.time[0]
-        say(
-            f"{use}: {r.name}, {about.rig}, {seconds:.4g} s at {about.rate_hz:g} Hz,"
-            f" {about.source}",
-            *(f"  {warning}" for warning in r.warnings),
-        )
-
-
-def _show(identified: Identified) -> None:
+def _show(identified: result.Identified) -> None:
     rows = []
-    for row in parameters_json(identified):
+    for row in result.parameters_json(identified):
         value = f"{row['value']:.4g}{' (at bound)' if row['at_bound'] else ''}"
         interval = f"{row['interval_low']:.4g} .. {row['interval_high']:.4g}"
         known = math.isfinite(row["interval_high"])
-        name, start, unit = row["name"], f"{row['start']:.4g}", row["unit"]
-        rows.append((name, start, value, interval if known else "unknown", unit))
+        start = f"{row['start']:.4g}"
+        rows.append((row["name"], start, value, interval if known else "unknown", row["unit"]))
     first = Column("parameter", no_wrap=True)
     show_table((first, "start", "identified", "95 % interval", "unit"), rows)
     rows = []
-    for row in quality_json(identified):
+    for row in result.quality_json(identified):
         unit, factor = ("mrad", 1e3) if row["unit"] == "rad" else (row["unit"], 1.0)
         values = [row[f"{joint}_{when}"] for when in ("before", "after") for joint in JOINTS]
         shown = (f"{factor * value:.3g}" if math.isfinite(value) else "-" for value in values)

@@ -19,12 +19,7 @@ if TYPE_CHECKING:
 
 
 def connect(robot: Robot, transport: str) -> "contextlib.closing[MoteusLink]":
-    """Open the way to a robot's drives, as a context manager that closes it.
-
-    Raises:
-        UsageError: There is no such transport.
-        HardwareError: It cannot be opened.
-    """
+    """Open a robot's drives, to be closed; UsageError and HardwareError say why that fails."""
     from hopping_leg.deploy.moteus_link import MoteusLink
     from hopping_leg.deploy.transport import opener
 
@@ -39,11 +34,7 @@ def find(link: "MoteusLink", robot: Robot, limits: SafetyLimits) -> list[Finding
 
 
 def check(link: "MoteusLink", robot: Robot, limits: SafetyLimits) -> dict[str, dict[str, str]]:
-    """Refuse drives that are not fit; return what was found, for the trace.
-
-    Raises:
-        HardwareError: Why they may not be armed.
-    """
+    """Refuse unfit drives with a HardwareError; return what was found, for the trace."""
     findings = find(link, robot, limits)
     require_fit(findings)
     return {
@@ -53,11 +44,7 @@ def check(link: "MoteusLink", robot: Robot, limits: SafetyLimits) -> dict[str, d
 
 
 def ask(question: str, *, yes: bool) -> None:
-    """Wait for the operator's consent, unless ``yes`` says that the command line gave it.
-
-    Raises:
-        UsageError: Nobody can be asked, or the answer is no.
-    """
+    """Ask the operator, unless ``yes``; UsageError if nobody can be asked or the answer is no."""
     if yes:
         return
     if not sys.stdin.isatty():
@@ -71,12 +58,10 @@ def show(findings: Sequence[Finding]) -> None:
     table = Table("check", *JOINTS)
     found = {(f.check, f.joint): f for f in findings}
     for name in dict.fromkeys(f.check for f in findings):
-        table.add_row(name, *(_cell(found.get((name, joint))) for joint in range(len(JOINTS))))
+        cells = []
+        for joint in range(len(JOINTS)):
+            f = found.get((name, joint))
+            cells.append(f"[red]{f.found}[/red]" if f and f.complaint else f.found if f else "")
+        table.add_row(name, *cells)
     Console().print(table)
     say(*(f"- {f.complaint[0].upper()}{f.complaint[1:]}" for f in findings if f.complaint))
-
-
-def _cell(finding: Finding | None) -> str:
-    if finding is None:
-        return ""
-    return f"[red]{finding.found}[/red]" if finding.complaint else finding.found

@@ -16,11 +16,7 @@ from hopping_leg.errors import UsageError
 
 
 def parse_heights(text: str) -> tuple[float, ...]:
-    """Read comma-separated heights, m.
-
-    Raises:
-        UsageError: An entry is not a number.
-    """
+    """Return comma-separated heights, m; an entry that is no number is a UsageError."""
     try:
         return tuple(float(part) for part in text.split(","))
     except ValueError as error:
@@ -64,14 +60,10 @@ def at_least(least: int, **values: int | None) -> None:
 
 
 def check_file(path: Path | None) -> None:
-    """Make the folder of a file that will be written.
-
-    Raises:
-        UsageError: It is a folder itself.
-    """
-    if path and path.is_dir():
-        raise UsageError(f"{path} is a folder; name a file.")
+    """Make the folder of a file that will be written; a folder instead is a UsageError."""
     if path:
+        if path.is_dir():
+            raise UsageError(f"{path} is a folder; name a file.")
         path.parent.mkdir(parents=True, exist_ok=True)
 
 
@@ -108,13 +100,7 @@ KEPT = frozenset({"out", "folder", "figure", "resume", "jobs", "ray"})
 def command_line(verb: str, args: Any, leave_out: Collection[str] = KEPT) -> str:  # noqa: ANN401
     """Return a command whose options have the values of a dataclass, as the shell reads it.
 
-    Options with their default values are left out; those of dataclasses among the fields stand
-    beside the others.
-
-    Args:
-        verb: What comes before the options, e.g. ``python -m studies.speed env``.
-        args: The dataclass that tyro reads the options into.
-        leave_out: Names of further fields to leave out.
+    Defaults are left out; options of dataclasses among the fields stand beside the others.
     """
     before, behind = verb.split(), []
     for name, value, hint in _given(args, leave_out):

@@ -12,7 +12,6 @@ Examples:
   hop record fixed-base.parquet --robot my_leg.toml --transport /dev/fdcanusb --out recordings
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -64,6 +63,9 @@ class Record:
     """Physics step, s."""
 
 
+_Excitations = list[tuple[str, Excitation]]
+
+
 def run(args: Record) -> None:
     """Play every excitation and write its recording."""
     if not args.excitations:
@@ -89,11 +91,7 @@ def run(args: Record) -> None:
 
 
 def _record_simulated(
-    args: Record,
-    robot: Robot,
-    excitations: Sequence[tuple[str, Excitation]],
-    believed: str,
-    gains: JointGains,
+    args: Record, robot: Robot, excitations: _Excitations, believed: str, gains: JointGains
 ) -> None:
     with Progress(console=Console(stderr=True)) as bar:
         for number, (name, excitation) in enumerate(excitations):
@@ -117,11 +115,10 @@ def _record_motors(
     args: Record,
     transport: str,
     robot: Robot,
-    excitations: Sequence[tuple[str, Excitation]],
+    excitations: _Excitations,
     believed: str,
     gains: JointGains,
 ) -> None:
-    """Play excitations on motors one after the other and write their recordings and traces."""
     rates = {excitation.rate for _, excitation in excitations}
     if len(rates) > 1:
         raise UsageError("The excitations have different rates; record them one by one.")
@@ -138,9 +135,17 @@ def _record_motors(
             )
             controller = JointPD(excitation.position, excitation.velocity, gains)
             header = header_of(robot, controller, rate, transport=transport, drives=drives)
+            rest = np.zeros(2) if excitation.rig == "fixed-base" else hopping_poses(robot).rest
             done = perform(
                 link,
-                _sequence(robot, excitation, controller, gains),
+                MotionSequence(
+                    controller,
+                    CommandSchedule(((float("nan"), 1.0),)),
+                    Poses(excitation.position[0], rest),
+                    None,
+                    SequenceTiming(hop=seconds),
+                    gains,
+                ),
                 limits,
                 new_path(args.out / "traces", name),
                 header,
@@ -156,18 +161,3 @@ def _record_motors(
             recording.save(file)
             say(*(f"  {notice}" for notice in (*done.notices, *recording.warnings)))
             say_written(file)
-
-
-def _sequence(
-    robot: Robot, excitation: Excitation, controller: JointPD, gains: JointGains
-) -> MotionSequence:
-    """Return the way to the excitation's first posture, the excitation, and the way to rest."""
-    rest = np.zeros(2) if excitation.rig == "fixed-base" else hopping_poses(robot).rest
-    return MotionSequence(
-        controller,
-        CommandSchedule(((float("nan"), 1.0),)),
-        Poses(excitation.position[0], rest),
-        None,
-        SequenceTiming(hop=len(excitation) / excitation.rate),
-        gains,
-    )

@@ -124,7 +124,6 @@ def _animation(runs: Sequence[Run], controller: str, kind: Animation) -> bytes:
 
 
 def _trace(path: Path) -> Path:
-    """Return the trace of a run; that of a black box is made first."""
     if path.suffix != SUFFIX:
         return path
     trace = path.with_suffix(".parquet")

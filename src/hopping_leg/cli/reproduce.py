@@ -36,7 +36,6 @@ NOTHING_MEANT = (
     "This was a quick run: fit, training and trials were cut so short that its numbers mean"
     " nothing. It shows only that every step works; leave out --quick for numbers."
 )
-"""What a quick run says of itself wherever its numbers stand."""
 
 
 @dataclass(frozen=True)

@@ -106,7 +106,5 @@ def _source(args: View) -> "DataSource":
 
 
 def _has_screen() -> bool:
-    """Tell whether a browser that is opened here would be seen."""
-    if sys.platform in ("win32", "darwin"):
-        return True
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+    screens = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    return bool(screens) or sys.platform in ("win32", "darwin")
