@@ -12,15 +12,10 @@ from moteus.protocol import Register
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.preflight import DriveInfo, Setting, required_settings
 
-_ANSWER_SECONDS = 1.0
+_ANSWER_SECONDS, _TALK_SECONDS, _ALL_SECONDS = 1.0, 5.0, 30.0
 _TRIES = 3
-_TALK_SECONDS = 5.0
-_ALL_SECONDS = 30.0
-_IDENTITY = {
-    int(Register.MODEL_NUMBER): multiplex.INT32,
-    int(Register.FIRMWARE_VERSION): multiplex.INT32,
-    int(Register.REGISTER_MAP_VERSION): multiplex.INT32,
-}
+_VERSIONS = (Register.MODEL_NUMBER, Register.FIRMWARE_VERSION, Register.REGISTER_MAP_VERSION)
+_IDENTITY = {int(register): multiplex.INT32 for register in _VERSIONS}
 _SERIAL = {int(Register.SERIAL_NUMBER) + word: multiplex.INT32 for word in range(3)}
 _STATE = {
     int(Register.MODE): multiplex.INT8,
@@ -54,9 +49,7 @@ def configure(link: MoteusLink, joint: int, settings: Sequence[Setting]) -> None
 def home(link: MoteusLink, angles: Sequence[float]) -> None:
     """Tell both stopped drives where their joints are; the rotor's own position makes it exact.
 
-    Args:
-        link: To the drives.
-        angles: Hip and knee, rad, within a twelfth of a turn of the motors' outputs.
+    Angles, rad, are of hip and knee, within a twelfth of a turn of the motors' outputs.
 
     Raises:
         HardwareError: A drive does not answer.

@@ -23,20 +23,16 @@ import polars as pl
 from hopping_leg.errors import TraceError
 from hopping_leg.trace import Trace
 
-HEADER, ROW, EVENT = range(3)
-"""Kinds of frames."""
+_HEADER, _ROW, _EVENT = range(3)  # Kinds of frames
 
 SUFFIX = ".blackbox"
 """End of the files' names."""
 
-MAGIC = b"HOPBOX1\n"
-"""What every file begins with."""
-
+_MAGIC = b"HOPBOX1\n"  # What every file begins with
 _FRAME = struct.Struct("<BI")
 _CRC = struct.Struct("<I")
 _SYNC_SECONDS = 1.0
-_LARGEST = 1 << 24
-"""Content that no frame exceeds, bytes; a length beyond it is damage."""
+_LARGEST = 1 << 24  # Content that no frame exceeds, bytes; a length beyond it is damage
 
 
 class FlightRecorder:
@@ -61,18 +57,18 @@ class FlightRecorder:
         except OSError as error:
             raise TraceError(f"Cannot create {path}: {error.strerror}.") from error
         first = json.dumps({"columns": self.columns, "header": header}).encode()
-        os.write(self._file, MAGIC + _frame(HEADER, first))
+        os.write(self._file, _MAGIC + _frame(_HEADER, first))
         self._queue: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._write, name="black-box", daemon=True)
         self._thread.start()
 
     def row(self, values: Sequence[float]) -> None:
         """Record a tick; ``values`` are in the order of ``columns``."""
-        self._queue.put(_frame(ROW, self._row.pack(*values)))
+        self._queue.put(_frame(_ROW, self._row.pack(*values)))
 
     def event(self, **facts: Any) -> None:  # noqa: ANN401
         """Record what happened beside the ticks, e.g. a transition with its reason."""
-        self._queue.put(_frame(EVENT, json.dumps(facts).encode()))
+        self._queue.put(_frame(_EVENT, json.dumps(facts).encode()))
 
     def close(self) -> None:
         """Write what is left and close the file."""
@@ -126,8 +122,7 @@ class FlightRecorderTail:
         self.columns: tuple[str, ...] = ()
         self.header: dict[str, Any] = {}
         self.events: list[dict[str, Any]] = []
-        self._rest = b""
-        self._begun = False
+        self._rest, self._begun = b"", False
         try:
             self._file = path.open("rb", buffering=0)
         except OSError as error:
@@ -152,19 +147,19 @@ class FlightRecorderTail:
         content = self._rest + self._file.read()
         at = 0
         if not self._begun:
-            if not content.startswith(MAGIC[: len(content)]):
+            if not content.startswith(_MAGIC[: len(content)]):
                 raise TraceError(f"{self.path} is no flight recording of `hop deploy`.")
-            if len(content) < len(MAGIC):
+            if len(content) < len(_MAGIC):
                 self._rest = content
                 return np.empty((0, 0))
-            at, self._begun = len(MAGIC), True
+            at, self._begun = len(_MAGIC), True
         found = []
         for kind, data, end in _frames(content, at):
             at = end
-            if kind == HEADER:
+            if kind == _HEADER:
                 first = json.loads(data)
                 self.columns, self.header = tuple(first["columns"]), first["header"]
-            elif kind == ROW:
+            elif kind == _ROW:
                 found.append(data)
             else:
                 self.events.append(json.loads(data))

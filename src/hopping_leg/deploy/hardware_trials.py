@@ -199,8 +199,7 @@ class DeployedRobot:
         if cause.reason is Reason.OPERATOR_STOP:
             raise HardwareError("You stopped the leg; the same command with --resume goes on.")
         table = done.trace.table
-        hopping = (pl.col("part") == Part.HOP) & (pl.col("state") == State.RUNNING)
-        hopped = table.filter(hopping)
+        hopped = table.filter(pl.col("part") == Part.HOP, pl.col("state") == State.RUNNING)
         if hopped.height < self.rate:
             raise HardwareError(f"The leg was stopped before it hopped: {cause}")
         complaint = "" if cause.reason is Reason.FINISHED else str(cause)

@@ -11,8 +11,7 @@ from hopping_leg.deploy.keyboard import LiveHeight
 from hopping_leg.errors import UsageError
 
 _HOST = "127.0.0.1"
-_LONGEST = 1000
-"""Bytes of a request's body that are read."""
+_LONGEST = 1000  # Bytes of a request's body that are read
 _PAGE = """<!doctype html>
 <html lang="en"><meta charset="utf-8"><title>Hopping leg</title>
 <link rel="icon" href="data:,">
@@ -54,9 +53,8 @@ class HeightPage:
     """
 
     def __init__(self, height: LiveHeight, port: int) -> None:
-        self._height = height
+        self._height, self._stopping = height, False
         self._stop: Callable[[], None] | None = None
-        self._stopping = False
         try:
             self._server = ThreadingHTTPServer((_HOST, port), self._handler())
         except (OSError, OverflowError) as error:

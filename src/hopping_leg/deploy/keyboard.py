@@ -12,9 +12,7 @@ from collections.abc import Callable, Iterator
 
 from hopping_leg.controllers.command_schedule import Range
 
-STEP = 0.01
-"""Change of the commanded height by one key, m."""
-
+_STEP = 0.01  # Change of the commanded height by one key, m
 _UP = (b"+", b"k", b"\x1b[A")
 _DOWN = (b"-", b"j", b"\x1b[B")
 _STOP = (b" ", b"q", b"\x1b", b"\r", b"\n")
@@ -52,7 +50,7 @@ def handle_key(key: bytes, height: LiveHeight | None, stop: Callable[[], None]) 
         stop()
         return "stopping"
     if height is not None and key in _UP + _DOWN:
-        return f"height {height.change(STEP if key in _UP else -STEP):.2f} m"
+        return f"height {height.change(_STEP if key in _UP else -_STEP):.2f} m"
     return ""
 
 

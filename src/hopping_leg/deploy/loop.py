@@ -24,14 +24,10 @@ from hopping_leg.robot.parameters import JOINTS
 REPLY_SHARE = 0.7
 """Share of the period after which a tick goes on without the replies that are not in."""
 
-_LEAST_WAIT = 0.3
-"""Share of the period that replies get even in a tick that began late."""
-_WARM_TICKS = 10
-"""Ticks of listening before the operator's arming takes effect."""
-_STOP_TICKS = 10
-"""Ticks in which the drives are told to stop at the end."""
-_REMEMBERED = 16
-"""Ticks; older samples are forgotten."""
+_LEAST_WAIT = 0.3  # Share of the period that replies get even in a tick that began late
+_WARM_TICKS = 10  # Ticks of listening before the operator's arming takes effect
+_STOP_TICKS = 10  # Ticks in which the drives are told to stop at the end
+_REMEMBERED = 16  # Ticks; older samples are forgotten
 _LOOP = ("time_s", "command_m", "state", "reason", "part", "action")
 _TIMES = ("wake_late_s", "exchange_s", "control_s", "tick_s", "skipped_ticks")
 _MEASURED = ("position", "velocity", "torque")

@@ -25,8 +25,7 @@ from hopping_leg.deploy.transport import Opener
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot.parameters import Robot
 
-_SEND_SECONDS = 0.004
-"""A command that could not leave within this time is dropped: it is outdated."""
+_SEND_SECONDS = 0.004  # A command that could not leave within this time is dropped: it is outdated
 _OPENING_SECONDS = 10.0
 _NO_POSITION_CONTROL = {"position": math.nan, "velocity": 0.0} | dict.fromkeys(
     ("kp_scale", "kd_scale", "ilimit_scale"), 0.0
@@ -137,7 +136,7 @@ class MoteusLink:
         commands = self._commands(outgoing, query=True)
         for joint, command in enumerate(commands):
             command.reply_filter = functools.partial(self._judge, question, joint)
-            command.parse = _as_it_is
+            command.parse = lambda frame: frame
         self._client.start_soon(lambda: self._ask(question, commands, until))
         question.done.wait(self._clock.patience(until))
         return question.result()
@@ -218,11 +217,6 @@ class MoteusLink:
 
 def _resolution() -> QueryResolution:
     resolution = QueryResolution()
-    resolution.voltage = multiplex.INT16
-    resolution.temperature = multiplex.INT16
+    resolution.voltage = resolution.temperature = multiplex.INT16
     resolution._extra = {int(Register.MILLISECOND_COUNTER): multiplex.INT32}
     return resolution
-
-
-def _as_it_is(frame: Any) -> Any:  # noqa: ANN401
-    return frame

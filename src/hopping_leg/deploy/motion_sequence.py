@@ -18,8 +18,7 @@ from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.deploy.drive_link import Pair
 from hopping_leg.robot import Robot, SoftLimiter, kinematics
 
-_ROUNDING = 1e-6
-"""Rounding of tick times, s; far less than a tick."""
+_ROUNDING = 1e-6  # Rounding of tick times, s; far less than a tick
 
 
 class Part(IntEnum):
@@ -107,8 +106,7 @@ class MotionSequence:
 
     def __post_init__(self) -> None:
         self._began: float | None = None
-        self._from = np.zeros(2)
-        self._phase = Part.WAIT
+        self._from, self._phase = np.zeros(2), Part.WAIT
         self.controller.reset(1)
 
     @property

@@ -50,8 +50,7 @@ def required_settings(robot: Robot, joint: int) -> tuple[Setting, ...]:
     )
 
 
-HOMED = 2
-"""Home state of a drive that knows where its output is (register 0x00c)."""
+_HOMED = 2  # Home state of a drive that knows where its output is (register 0x00c)
 
 
 @dataclass(frozen=True)
@@ -192,8 +191,8 @@ def _check(robot: Robot, limits: SafetyLimits, joint: int, facts: DriveInfo) -> 
         ),
         finding(
             "homed",
-            "yes" if facts.home == HOMED else "no",
-            facts.home == HOMED,
+            "yes" if facts.home == _HOMED else "no",
+            facts.home == _HOMED,
             f"the {name} is not homed: after power-up its encoder is absolute only within a turn"
             " of its rotor; bring the leg into a pose that you know and run `hop doctor --home`.",
         ),

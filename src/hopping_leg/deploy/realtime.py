@@ -48,7 +48,7 @@ class RealClock:
         return max(until - time.monotonic(), 0.0)
 
 
-PRIORITY = 60
+_PRIORITY = 60
 """Priority in SCHED_FIFO, 1 to 99; above ordinary work, below the kernel's own threads."""
 
 _NOTICE = (
@@ -61,7 +61,7 @@ _SWITCH_SECONDS = 1e-4
 
 def prefer_this_thread() -> str | None:
     """Give the calling thread real-time priority; return a notice where that is not permitted."""
-    return None if _schedule(0, os.SCHED_FIFO, PRIORITY) else _NOTICE
+    return None if _schedule(0, os.SCHED_FIFO, _PRIORITY) else _NOTICE
 
 
 def prefer_this_process() -> str | None:
@@ -70,7 +70,7 @@ def prefer_this_process() -> str | None:
     One thread is not enough: whichever holds the interpreter must not be preempted either. New
     threads inherit it.
     """
-    return None if _schedule_all(os.SCHED_FIFO, PRIORITY) else _NOTICE
+    return None if _schedule_all(os.SCHED_FIFO, _PRIORITY) else _NOTICE
 
 
 def _schedule_all(policy: int, priority: int) -> bool:

@@ -14,10 +14,8 @@ from moteus.protocol import Register, parse_reply
 from hopping_leg.deploy.drive_link import Exchange, Reply
 from hopping_leg.deploy.joint_transform import JointTransform
 
-_WRAP = 1 << 32
-_HALF = 1 << 31
-_DRIFT = 2e-4
-"""Most that two clocks drift apart, s/s: both are quartzes."""
+_WRAP, _HALF = 1 << 32, 1 << 31
+_DRIFT = 2e-4  # Most that two clocks drift apart, s/s: both are quartzes
 _RESTART = -500
 """A counter that falls back further than this, ms, began anew: no reply is held up so long."""
 
@@ -30,16 +28,12 @@ class DriveClock:
 
     def __init__(self) -> None:
         self._counter: int | None = None
-        self._time = 0.0
-        self._offset = 0.0
-        self._updated = 0.0
+        self._time = self._offset = self._updated = 0.0
 
     def date(self, counter: int, arrived: float) -> float | None:
         """Return when a reply was measured, None if it was seen before; s on the host's clock.
 
-        Args:
-            counter: Drive's counter, ms; wraps after 49 days.
-            arrived: On the host's clock, s.
+        The drive's counter, ms, wraps after 49 days.
         """
         step = (counter - (self._counter or 0) + _HALF) % _WRAP - _HALF
         if self._counter is None or step < _RESTART:

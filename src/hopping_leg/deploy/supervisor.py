@@ -12,7 +12,7 @@ latched.
 from dataclasses import dataclass
 from enum import IntEnum
 
-from hopping_leg.deploy.drive_link import BRAKE, LIMP, STOP, Action, DriveCommand, DriveMode, Pair
+from hopping_leg.deploy.drive_link import BRAKE, LIMP, STOP, Action, DriveCommand, DriveMode
 from hopping_leg.deploy.safety_limits import SafetyLimits
 from hopping_leg.deploy.stop_reasons import (
     Cause,
@@ -130,12 +130,9 @@ def _outgoing(limits: SafetyLimits, state: State, seen: SupervisorInput) -> Driv
         case State.ARMING:
             return LIMP
         case State.RUNNING if seen.wanted is not None:
-            return DriveCommand(Action.TORQUE, _clip(seen.wanted, limits.torque))
+            pairs = zip(seen.wanted, limits.torque, strict=True)
+            hip, knee = (max(-most, min(most, value)) for value, most in pairs)
+            return DriveCommand(Action.TORQUE, (hip, knee))
         case State.DAMPING:
             return BRAKE
     return STOP
-
-
-def _clip(torque: Pair, limit: Pair) -> Pair:
-    hip, knee = (max(-most, min(most, value)) for value, most in zip(torque, limit, strict=True))
-    return hip, knee

@@ -20,8 +20,7 @@ from hopping_leg.emulator.frames import BROADCAST, Frame
 _UUID_MASKS = range(Register.UUID_MASK1, Register.UUID_MASK4 + 1)
 _WORDS_ONLY = range(Register.MODEL_NUMBER, Register.UUID_MASK_CAPABLE)
 """Registers that can be read as 32-bit integers only."""
-_MAX_RUN = 3
-"""Registers whose count fits in the first byte of a subframe."""
+_MAX_RUN = 3  # Registers whose count fits in the first byte of a subframe
 
 Subframes = tuple[multiplex.Subframe, ...]
 Errors = list[tuple[int, int]]
@@ -74,8 +73,7 @@ class ReplyWriter:
 
     def stream(self, channel: int, data: bytes, packet: int | None = None) -> None:
         """Add a piece of the diagnostic stream, numbered where the host asked for that."""
-        flow = packet is not None
-        kind = multiplex.STREAM_SERVER_DATA_FLOW if flow else multiplex.STREAM_SERVER_DATA
+        kind = multiplex.STREAM_SERVER_DATA if packet is None else multiplex.STREAM_SERVER_DATA_FLOW
         self._buffer.write(bytes([kind]))
         self._writer.write_varuint(channel)
         if packet is not None:
@@ -117,8 +115,7 @@ def act(message: Message, drive: EmulatedDrive, time: float) -> Errors:
     for s in message.subframes_for(drive):
         if isinstance(s, RegisterSubframe) and s.type is SubframeType.WRITE:
             assert s.value is not None
-            error = drive.write(s.register, s.resolution, s.value)
-            if error:
+            if error := drive.write(s.register, s.resolution, s.value):
                 errors.append((s.register, error))
     drive.commit(time)
     return errors
@@ -147,12 +144,7 @@ def _addressed(subframes: Subframes, drive: EmulatedDrive) -> bool:
     )
 
 
-def _stream(
-    subframes: Subframes,
-    drive: EmulatedDrive,
-    reply: ReplyWriter,
-    time: float,
-) -> None:
+def _stream(subframes: Subframes, drive: EmulatedDrive, reply: ReplyWriter, time: float) -> None:
     for s in subframes:
         if not isinstance(s, StreamSubframe | FlowStreamSubframe) or s.channel != CHANNEL:
             continue

@@ -23,15 +23,10 @@ from hopping_leg.emulator.torque_law import (
     TorqueLaw,
 )
 
-AMBIENT = 30.0
-"""Temperature of an idle drive, degrees C."""
-
-_HEATING = 0.008
-"""Rise at rest over the square of the phase current, K/A2."""
-_WARMING_TIME = 60.0
-"""Time constant of the output stage, s."""
-_LOWEST_VOLTAGE = 4.0
-"""Below it the firmware reports under-voltage, V."""
+_AMBIENT = 30.0  # Temperature of an idle drive, degrees C
+_HEATING = 0.008  # Rise at rest over the square of the phase current, K/A2
+_WARMING_TIME = 60.0  # Time constant of the output stage, s
+_LOWEST_VOLTAGE = 4.0  # Below it the firmware reports under-voltage, V
 
 UNKNOWN_REGISTER, NOT_WRITABLE, INVALID_VALUE = 1, 2, 3
 """Error codes of reads and writes."""
@@ -80,9 +75,8 @@ class EmulatedDrive:
         self.disturbances = Disturbances()
         self.uptime = 0.0
         self._brake, self.nominal_voltage = brake * 2 * math.pi, voltage
-        self._warmth = 0.0
         self._commanded = False
-        self._velocity = self._torque = self._asked = 0.0
+        self._warmth = self._velocity = self._torque = self._asked = 0.0
 
     @property
     def id(self) -> int:
@@ -97,7 +91,7 @@ class EmulatedDrive:
     @property
     def temperature(self) -> float:
         """Temperature of the output stage, degrees C."""
-        return AMBIENT + self._warmth + self.disturbances.temperature
+        return _AMBIENT + self._warmth + self.disturbances.temperature
 
     @property
     def active(self) -> bool:
@@ -142,9 +136,8 @@ class EmulatedDrive:
         """Act on a frame's mode write, once all its registers are written."""
         if self._commanded:
             self._commanded = False
-            command = self.command
-            timeout = command.timeout or self.settings["servo.default_timeout_s"]
-            self.machine.command(command.mode, time, timeout)
+            timeout = self.command.timeout or self.settings["servo.default_timeout_s"]
+            self.machine.command(self.command.mode, time, timeout)
 
     def stop(self, time: float) -> None:
         """Stop, as ``d stop`` does."""
@@ -161,13 +154,14 @@ class EmulatedDrive:
         """Begin one step of physics; return the torque asked of the motor's output, N m, finite."""
         self.uptime += dt
         self._warmth += dt / _WARMING_TIME * (_HEATING * self._amperes**2 - self._warmth)
-        free = bool(self.command.ignore_bounds)
-        if self.machine.advance(time, outside_limits=not free and self._outside_limits()):
+        low, high = self.settings.position_bounds
+        outside = self.encoder.position < low or self.encoder.position > high
+        bounded = not self.command.ignore_bounds
+        if self.machine.advance(time, outside_limits=bounded and outside):
             self.law.begin()
         self._check()
         self.law.notice = 0
-        wanted = self._control(dt)
-        self._asked = wanted
+        wanted = self._asked = self._control(dt)
         if self.active:
             self.machine.fault = self.disturbances.notice or self.law.notice
         if math.isnan(wanted):
@@ -205,10 +199,6 @@ class EmulatedDrive:
             machine.trip(FaultCode.UNDER_VOLTAGE)
         if self.temperature > settings["servo.fault_temperature"]:
             machine.trip(FaultCode.OVER_TEMPERATURE)
-
-    def _outside_limits(self) -> bool:
-        low, high = self.settings.position_bounds
-        return self.encoder.position < low or self.encoder.position > high
 
     def stored(self, register: int) -> float | None:
         """Return a command or identity register, None if it is neither."""

@@ -33,14 +33,13 @@ if TYPE_CHECKING:
 KINDS: "dict[str, type[FaultKind]]" = {}
 """Every kind that a script may name."""
 
-SINCE = ("start", "powered", "flight")
+_SINCE = ("start", "powered", "flight")
 """From when on ``at`` counts: the emulator's start, both drives powered, first lift-off."""
 
-PHASES = ("any", "stance", "flight", "rising", "falling", "touchdown", "apex")
+_PHASES = ("any", "stance", "flight", "rising", "falling", "touchdown", "apex")
 """Moments of a hop cycle."""
 
-DRIVES = (*JOINTS, "both")
-
+_DRIVES = (*JOINTS, "both")
 _FLIPS = 1 << 16
 _NOISE = b"@#!%\x07~ moteus?"
 
@@ -70,7 +69,7 @@ class Fault:
     """Setting that is wrong, for ``configuration``."""
 
     def __post_init__(self) -> None:
-        valid = {"kind": KINDS, "since": SINCE, "phase": PHASES, "drive": DRIVES}
+        valid = {"kind": KINDS, "since": _SINCE, "phase": _PHASES, "drive": _DRIVES}
         for name, choices in valid.items():
             if getattr(self, name) not in choices:
                 raise UsageError(unknown_name(f"fault {name}", str(getattr(self, name)), choices))
@@ -101,8 +100,7 @@ class Fault:
 class FaultyRobot(Protocol):
     """What faults change."""
 
-    time: float
-    """s"""
+    time: float  # s
     plugged: bool
     """Whether the adapter is plugged in."""
     leg: "EmulatedLeg"
@@ -117,8 +115,7 @@ class FaultyRobot(Protocol):
 class Delivery:
     """How a drive's reply reaches the host."""
 
-    due: float
-    """s"""
+    due: float  # s
     copies: int = 1
     flip: int = -1
     """Which bits flip, see ``QueuedReply``."""

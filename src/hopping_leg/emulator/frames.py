@@ -99,8 +99,7 @@ class TimedQueue(Generic[Item]):
 
 
 _POLYNOMIAL = 0x97
-_LONGEST = 512
-"""A longer line is noise: no frame needs more than 160 characters."""
+_LONGEST = 512  # A longer line is noise: no frame needs more than 160 characters
 
 
 def _divided(byte: int) -> int:
@@ -131,8 +130,7 @@ class LineProtocol:
 
     def __init__(self) -> None:
         self._buffer = b""
-        self.checksums = False
-        """Whether lines carry checksums: since the host sent one."""
+        self.checksums = False  # Whether lines carry checksums: since the host sent one
 
     def feed(self, data: bytes) -> list[Frame | bytes]:
         """Take bytes from the host; return, in order, frames for the bus and answers to send.

@@ -37,8 +37,7 @@ class EmulatedLeg:
         if self._legs.mismatch is not None:
             self._legs.mismatch.reseed(np.random.default_rng(seed))
         self._legs.stand(slice(None), np.asarray(q, np.float64))
-        self._links = (robot.thigh.length, robot.shank.length)
-        self._foot = robot.foot.radius
+        self._links = (robot.thigh.length, robot.shank.length, robot.foot.radius)
 
     @property
     def height(self) -> float:
@@ -54,9 +53,9 @@ class EmulatedLeg:
     def foot_clearance(self) -> float:
         """Gap between foot and ground, m."""
         hip, knee = float(self._legs.q[0, 0]), float(self._legs.q[0, 1])
-        thigh, shank = self._links
+        thigh, shank, foot = self._links
         down = thigh * math.cos(hip) + shank * math.cos(hip + knee)
-        return self.height - down - self._foot
+        return self.height - down - foot
 
     @property
     def q(self) -> Array:

@@ -37,8 +37,7 @@ CONTROLLING = MODES - {DriveMode.STOPPED, *BETWEEN}
 """Modes in which the output stage is powered."""
 
 
-ENABLING_TIME = 0.001
-"""From stopped to calibrating, s."""
+_ENABLING_TIME = 0.001  # From stopped to calibrating, s
 
 STARTING_TIME = 0.0085
 """From stopped to the commanded mode, s."""
@@ -51,10 +50,8 @@ class ModeMachine:
 
     def __init__(self) -> None:
         self.mode = DriveMode.STOPPED
-        self.fault = 0
-        """FaultCode code; in other modes than fault, the notice of the last step."""
-        self.wanted = DriveMode.STOPPED
-        """What was commanded last."""
+        self.fault = 0  # FaultCode code; in other modes than fault, the notice of the last step
+        self.wanted = DriveMode.STOPPED  # What was commanded last
         self._started = 0.0
         self._deadline = math.inf
 
@@ -78,7 +75,7 @@ class ModeMachine:
         before = self.mode
         if self.wanted != self.mode:
             self._change(time, outside_limits)
-        if self.mode is DriveMode.ENABLING and time >= self._started + ENABLING_TIME:
+        if self.mode is DriveMode.ENABLING and time >= self._started + _ENABLING_TIME:
             self.mode = DriveMode.CALIBRATING
         if self.mode is DriveMode.CALIBRATING and time >= self._started + STARTING_TIME:
             self.mode = DriveMode.CALIBRATED

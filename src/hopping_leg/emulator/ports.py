@@ -4,6 +4,7 @@
 as well where there is one.
 """
 
+import contextlib
 import os
 import termios
 import tty
@@ -14,10 +15,7 @@ import can
 from hopping_leg.emulator.frames import Frame, LineProtocol, QueuedReply, received_line
 from hopping_leg.errors import UsageError
 
-UDP_MULTICAST = "udp_multicast"
-"""The interface that needs no driver."""
-
-DEFAULT_CHANNELS = {UDP_MULTICAST: "239.74.163.2", "socketcan": "vcan0"}
+DEFAULT_CHANNELS = {"udp_multicast": "239.74.163.2", "socketcan": "vcan0"}
 """Interfaces of python-can that the emulator serves, with the channel that it takes by default."""
 
 
@@ -76,13 +74,10 @@ class PtyPort:
             items = self._protocol.feed(os.read(self._master, 65536))
         except BlockingIOError:
             return []
-        frames = []
         for item in items:
-            if isinstance(item, Frame):
-                frames.append(item)
-            else:
+            if not isinstance(item, Frame):
                 self._write(item)
-        return frames
+        return [item for item in items if isinstance(item, Frame)]
 
     def send(self, item: QueuedReply) -> None:
         """Send what is due as a line."""
@@ -95,11 +90,8 @@ class PtyPort:
         self._write(line)
 
     def _write(self, data: bytes) -> None:
-        """Write; a host that does not read loses it."""
-        try:
+        with contextlib.suppress(BlockingIOError):  # a host that does not read loses it
             os.write(self._master, data)
-        except BlockingIOError:
-            return
 
 
 def _flipped(line: bytes, digits: int, flip: int) -> bytes:
@@ -116,7 +108,7 @@ class CanPort:
         UsageError: The bus cannot be opened.
     """
 
-    def __init__(self, interface: str = UDP_MULTICAST, channel: str | None = None) -> None:
+    def __init__(self, interface: str = "udp_multicast", channel: str | None = None) -> None:
         self.interface = interface
         self.channel = channel or DEFAULT_CHANNELS[interface]
         self._bus: can.BusABC | None = None

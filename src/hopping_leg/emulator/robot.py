@@ -23,15 +23,10 @@ from hopping_leg.emulator.settings import Settings
 from hopping_leg.emulator.wire_log import WireLog
 from hopping_leg.robot import JOINTS, REGISTER_MAP, Robot
 
-_MODEL = 0x0000
-"""Board r4."""
-_FIRMWARE = 0x010D
-"""Firmware version in its binary-coded form."""
-NOMINAL_VOLTAGE = 26.0
-"""Bus voltage at which the qdd100 has the speed limit of the robot files, V."""
-
-_AIRBORNE = 0.01
-"""Height of the foot in a flight that counts as the first, m: no bounce."""
+_MODEL = 0x0000  # Board r4
+_FIRMWARE = 0x010D  # Firmware version in its binary-coded form
+_NOMINAL_VOLTAGE = 26.0  # Bus voltage at which the qdd100 has the speed limit of the robot files, V
+_AIRBORNE = 0.01  # Height of the foot in a flight that counts as the first, m: no bounce
 
 
 class EmulatedRobot:
@@ -65,14 +60,10 @@ class EmulatedRobot:
             drive.boot(position)
             if homed:
                 drive.encoder.set_nearest(position)
-        self.reply_queue = TimedQueue[QueuedReply]()
-        """What is on its way to the host."""
-        self.wire_time = 0.0
-        """What a reply takes at least, s."""
-        self.plugged = True
-        """Whether the adapter is plugged in."""
-        self.log = WireLog()
-        """What went over the wire."""
+        self.reply_queue = TimedQueue[QueuedReply]()  # What is on its way to the host
+        self.wire_time = 0.0  # What a reply takes at least, s
+        self.plugged = True  # Whether the adapter is plugged in
+        self.log = WireLog()  # What went over the wire
         self._sense()
         self.fault_injector = FaultInjector(self, faults, self._rng)
 
@@ -90,9 +81,8 @@ class EmulatedRobot:
         message = bus.Message.read(frame)
         late = self._latency.command + self._latency.jitter * float(self._rng.random())
         if late:
-            due = max(self.time + late, self._last_delivery)
-            self._last_delivery = due
-            self._late_messages.put(due, message)
+            self._last_delivery = max(self.time + late, self._last_delivery)
+            self._late_messages.put(self._last_delivery, message)
         for joint, drive in enumerate(self.drives):
             errors = [] if late else bus.act(message, drive, self.time)
             answer = bus.answer(message, drive, self.time, errors)
@@ -148,7 +138,7 @@ def _drive(robot: Robot, joint: int, configured: bool) -> EmulatedDrive:
         Settings(**changes),
         gear_ratio=motor.gear_ratio,
         brake=motor.peak_torque / motor.no_load_speed,
-        voltage=NOMINAL_VOLTAGE * robot.reality.voltage,
+        voltage=_NOMINAL_VOLTAGE * robot.reality.voltage,
     )
 
 

@@ -7,10 +7,8 @@ it is (homing).
 
 from hopping_leg.emulator.settings import Settings
 
-HOMED_ROTOR = 1
-"""Register 0x00c: known within a turn of the rotor."""
-HOMED_OUTPUT = 2
-"""Register 0x00c: the host has told where the output is."""
+_HOMED_ROTOR = 1  # Register 0x00c: known within a turn of the rotor
+_HOMED_OUTPUT = 2  # Register 0x00c: the host has told where the output is
 
 
 class RotorEncoder:
@@ -21,11 +19,9 @@ class RotorEncoder:
 
     def __init__(self, settings: Settings, gear_ratio: float) -> None:
         self._settings, self.gear_ratio = settings, gear_ratio
-        self.home = HOMED_ROTOR
-        self._rotor = 0.0
-        self._shift = 0.0
-        self.jump = 0.0
-        """Turns of the rotor by which the encoder errs since a fault."""
+        self.home = _HOMED_ROTOR
+        self._rotor = self._shift = 0.0
+        self.jump = 0.0  # Turns of the rotor by which the encoder errs since a fault
 
     @property
     def _ratio(self) -> float:
@@ -39,12 +35,12 @@ class RotorEncoder:
         """Begin anew with the true output at a position, revolutions."""
         self._rotor = output * self.gear_ratio
         self._shift = -float(round(self._rotor))
-        self.jump, self.home = 0.0, HOMED_ROTOR
+        self.jump, self.home = 0.0, _HOMED_ROTOR
 
     def shift_rotor(self, turns: float) -> None:
         """Err by turns of the rotor, as after power-up in another pose; homing is lost."""
         self._shift += turns
-        self.home = HOMED_ROTOR
+        self.home = _HOMED_ROTOR
 
     def update(self, output: float) -> None:
         """Set the true position of the output, revolutions."""
@@ -64,12 +60,12 @@ class RotorEncoder:
     def set_nearest(self, position: float) -> None:
         """Home: the output is within half a turn of the rotor of a position, revolutions."""
         self._shift += round((position - self.position) * self._sign / self._ratio)
-        self.home = HOMED_OUTPUT
+        self.home = _HOMED_OUTPUT
 
     def set_exact(self, position: float) -> None:
         """Home: the output is exactly at a position, revolutions."""
         self._shift += (position - self.position) * self._sign / self._ratio
-        self.home = HOMED_OUTPUT
+        self.home = _HOMED_OUTPUT
 
     def torque_to_output(self, torque: float) -> float:
         """Return the output's true torque when the firmware believes to give ``torque``, N m."""

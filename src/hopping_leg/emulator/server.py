@@ -25,8 +25,7 @@ _LENGTHS = {"stand": 0.69, "crouch": 0.5, "stretch": 0.93}
 POSES = (*_LENGTHS, "zero")
 """Named poses; ``zero`` is the leg straight down, where the joints' angles are zero."""
 
-PTY = "pty"
-"""A serial terminal, as an fdcanusb's."""
+_PTY = "pty"  # A serial terminal, as an fdcanusb's
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ class EmulatorConfig:
     """Seed of sensor noise and jitter."""
     faults: tuple[Fault, ...] = ()
     """What goes wrong, and when."""
-    interface: str = PTY
+    interface: str = _PTY
     """How the host reaches it: ``pty`` or a bus of python-can, see ``ports``."""
     channel: str | None = None
     """Channel of a bus; none takes the interface's default."""
@@ -79,14 +78,14 @@ class EmulatorConfig:
         Raises:
             UsageError: The interface has no such option or cannot be opened.
         """
-        if self.interface == PTY:
+        if self.interface == _PTY:
             if self.channel is not None:
                 raise UsageError("A channel is for CAN buses; a pty has a link.")
             return PtyPort(self.link)
         if self.link is not None:
             raise UsageError("A link is for the interface pty; a CAN bus has a channel.")
         if self.interface not in DEFAULT_CHANNELS:
-            raise UsageError(unknown_name("interface", self.interface, (PTY, *DEFAULT_CHANNELS)))
+            raise UsageError(unknown_name("interface", self.interface, (_PTY, *DEFAULT_CHANNELS)))
         return CanPort(self.interface, self.channel)
 
 
@@ -109,8 +108,7 @@ def posture(robot: Robot, pose: str) -> Array:
     return np.array([hip, knee])
 
 
-_IDLE = 0.001
-"""Longest sleep between two looks at the clock, s."""
+_IDLE = 0.001  # Longest sleep between two looks at the clock, s
 _FURTHEST = 0.02
 """Most that is caught up with at once after the process was held off, s; the rest is lost."""
 
@@ -122,8 +120,7 @@ class Server:
         self.robot, self.port = robot, port
         self.on_turn: Callable[[], None] = lambda: None
         """Called every few milliseconds, e.g. to show the state."""
-        self.lost = 0.0
-        """Time that was not simulated as the process did not get the processor, s."""
+        self.lost = 0.0  # Time that was not simulated as the process did not get the processor, s
         self._offset = time.monotonic() - robot.time
 
     def run(self, stop: Callable[[], bool]) -> None:
@@ -134,14 +131,12 @@ class Server:
     def turn(self) -> None:
         """Wait for the host or the clock, then do what is due."""
         waiting = [self.port] if self.port.plugged else []
-        ready, _, _ = select.select(waiting, [], [], self._patience())
+        due = self.robot.reply_queue.next_due()
+        patience = _IDLE if due is None else min(max(due - self.robot.time, 0.0), _IDLE)
+        ready, _, _ = select.select(waiting, [], [], patience)
         self._catch_up()
         serve(self.robot, self.port, ready=bool(ready))
         self.on_turn()
-
-    def _patience(self) -> float:
-        due = self.robot.reply_queue.next_due()
-        return _IDLE if due is None else min(max(due - self.robot.time, 0.0), _IDLE)
 
     def _catch_up(self) -> None:
         now = time.monotonic() - self._offset

@@ -6,7 +6,7 @@ only values that the emulator obeys or a host may want to check are here.
 
 from hopping_leg.errors import UsageError, unknown_name
 
-NAN = float("nan")
+_NAN = float("nan")
 
 DEFAULTS: dict[str, int | float] = {
     "id.id": 1,
@@ -24,22 +24,22 @@ DEFAULTS: dict[str, int | float] = {
     "motor_position.rotor_to_output_override": 0,
     "servo.pwm_rate_hz": 30000,
     "servo.max_voltage": 46.0,
-    "servo.max_power_W": NAN,
+    "servo.max_power_W": _NAN,
     "servo.temperature_margin": 25.0,
     "servo.fault_temperature": 75.0,
     "servo.enable_motor_temperature": 0,
     "servo.motor_temperature_margin": 20.0,
-    "servo.motor_fault_temperature": NAN,
-    "servo.fault_position_error": NAN,
-    "servo.fault_velocity_error": NAN,
+    "servo.motor_fault_temperature": _NAN,
+    "servo.fault_position_error": _NAN,
+    "servo.fault_velocity_error": _NAN,
     "servo.velocity_threshold": 0.0,
     "servo.position_derate": 0.02,
     "servo.pid_position.kp": 50.0,
     "servo.pid_position.ki": 0.0,
     "servo.pid_position.kd": 1.0,
     "servo.pid_position.ilimit": 0.0,
-    "servo.default_velocity_limit": NAN,
-    "servo.default_accel_limit": NAN,
+    "servo.default_velocity_limit": _NAN,
+    "servo.default_accel_limit": _NAN,
     "servo.default_timeout_s": 0.1,
     "servo.timeout_max_torque_Nm": 5.0,
     "servo.timeout_mode": 12,

@@ -74,10 +74,8 @@ class TorqueLaw:
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        self.control_position = math.nan
-        self.control_velocity = math.nan
-        self.notice = 0
-        """Limit that was at work in the last step, 0 if none."""
+        self.begin()
+        self.notice = 0  # Limit that was at work in the last step, 0 if none
 
     def begin(self) -> None:
         """Forget where the last mode was heading."""
@@ -140,25 +138,20 @@ class TorqueLaw:
         return self._capped(torque, left, Notice.FET_TEMPERATURE)
 
     def _in_bounds(self, torque: float, position: float) -> float:
-        derate = self._settings["servo.position_derate"]
         low, high = self._settings.position_bounds
         beyond = max(position - high, 0.0) if torque > 0 else max(low - position, 0.0)
         if not beyond > 0:
             return torque
         self.notice = Notice.POSITION_BOUNDS
-        return torque * max(0.0, 1 - beyond / derate)
+        return torque * max(0.0, 1 - beyond / self._settings["servo.position_derate"])
 
     def _capped(self, torque: float, amperes: float, notice: Notice) -> float:
         ratio = self._settings["motor_position.rotor_to_output_ratio"]
-        most = amperes * TORQUE_CONSTANT / ratio
+        return self._within(torque, amperes * TORQUE_CONSTANT / ratio, notice)
+
+    def _within(self, torque: float, most: float, notice: Notice = Notice.MAX_TORQUE) -> float:
         if abs(torque) > most:
             self.notice = notice
-            return math.copysign(most, torque)
-        return torque
-
-    def _within(self, torque: float, most: float) -> float:
-        if abs(torque) > most:
-            self.notice = Notice.MAX_TORQUE
             return math.copysign(most, torque)
         return torque
 

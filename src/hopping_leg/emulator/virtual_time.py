@@ -22,14 +22,11 @@ from hopping_leg.errors import HardwareError
 
 Result = TypeVar("Result")
 
-_BUSY = 20
-"""Rounds that a busy loop may go without a look at the line."""
-
-WIRE_TIME = 5e-4
+_BUSY = 20  # Rounds that a busy loop may go without a look at the line
+_WIRE_TIME = 5e-4
 """Time from a question to its answer, s, as measured with two motors on an fdcanusb."""
 
-_FOREVER = 60.0
-"""Virtual time after which nobody waits for anything any more, s."""
+_FOREVER = 60.0  # Virtual time after which nobody waits for anything any more, s
 
 
 class VirtualTime(asyncio.SelectorEventLoop):
@@ -49,8 +46,7 @@ class _Waiting(selectors.SelectSelector):
 
     def __init__(self, robot: EmulatedRobot, port: Port) -> None:
         super().__init__()
-        self._robot, self._port = robot, port
-        self._busy = 0
+        self._robot, self._port, self._busy = robot, port, 0
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
         """Return what is ready now or becomes ready within a virtual timeout, s."""
@@ -80,8 +76,7 @@ class Lockstep:
     """
 
     def __init__(self, robot: EmulatedRobot, *, checksums: bool = True) -> None:
-        self.robot = robot
-        robot.wire_time = WIRE_TIME
+        self.robot, robot.wire_time = robot, _WIRE_TIME
         self.truth: list[tuple[float, float, float]] = []
         self._port, self._checksums = PtyPort(), checksums
         self.loop = VirtualTime(robot, self._port)

@@ -51,8 +51,7 @@ class ModeChange:
 
 _TOLD = (Register.MODE, Register.FAULT, Register.VOLTAGE, Register.TEMPERATURE)
 """Registers of an answer that is noted."""
-_REMEMBERED = 100_000
-"""Commands and answers each, about a minute's."""
+_REMEMBERED = 100_000  # Commands and answers each, about a minute's
 
 
 class WireLog:
