@@ -25,11 +25,7 @@ class Commands(Protocol):
 
 @dataclass(frozen=True)
 class CommandSchedule:
-    """Steps of height; the last one stays.
-
-    Attributes:
-        steps: (height in m, duration in s) in order.
-    """
+    """Steps of (height in m, duration in s); the last height stays."""
 
     steps: tuple[tuple[float, float], ...]
 
@@ -73,11 +69,7 @@ class CommandSchedule:
         return self.steps[-1][0]
 
     def commands(self, rate: float) -> Array:
-        """Return the height commanded in every control period, m, (ticks,).
-
-        Args:
-            rate: Control rate, Hz.
-        """
+        """Return the height commanded in every control period at a rate in Hz, m, (ticks,)."""
         return np.concatenate([np.full(round(s * rate), height) for height, s in self.steps])
 
 

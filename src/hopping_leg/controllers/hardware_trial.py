@@ -44,13 +44,7 @@ class TrialRobot(Protocol):
         ...
 
     def hop(self, controller: Controller, schedule: CommandSchedule, seed: int) -> HardwareTrial:
-        """Let a controller hop from standing.
-
-        Args:
-            controller: Drives the leg.
-            schedule: Heights in order.
-            seed: Seed of the trial's own randomness, where there is any to choose.
-        """
+        """Let a controller hop from standing; ``seed`` is that of the trial's own randomness."""
         ...
 
 
@@ -64,13 +58,7 @@ MEASURED = {
 
 
 def measured_table(time: Array, command: Array, joints: dict[str, Array]) -> pl.DataFrame:
-    """Return the table of a trial.
-
-    Args:
-        time: s, (ticks,).
-        command: Desired heights, m, (ticks,).
-        joints: By the names of ``MEASURED``, (ticks, 2) each.
-    """
+    """Return a trial's table of s, m, (ticks,), and ``MEASURED`` quantities, (ticks, 2) each."""
     columns = {"time_s": time, "command_m": command}
     for name, values in joints.items():
         columns |= dict(zip(MEASURED[name], values.T, strict=True))

@@ -20,12 +20,9 @@ Inputs = dict[str, npt.NDArray[np.float32]]
 
 
 class ObservationHistory(ABC):
-    """Turns measurements into a policy's inputs; may remember past ticks.
+    """Turns measurements into a policy's inputs; may remember past ticks of a period, s.
 
     One of your own needs a class and an entry in ``OBSERVATION_HISTORIES``.
-
-    Args:
-        period: Control period, s.
     """
 
     name: ClassVar[str]
@@ -45,12 +42,7 @@ class ObservationHistory(ABC):
 
     @abstractmethod
     def update(self, measurement: Measurement, last_torque: Array) -> None:
-        """Update with the measurement of a tick.
-
-        Args:
-            measurement: Measurement of this tick.
-            last_torque: What the policy asked for one tick ago, N m, (n, 2); zero after a reset.
-        """
+        """Update with a tick; the policy's last torque is in N m, (n, 2), zero after a reset."""
 
     @abstractmethod
     def inputs(self) -> Inputs:

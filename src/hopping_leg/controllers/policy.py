@@ -89,15 +89,9 @@ class Card:
 
 
 class Policy:
-    """Runs a policy file; implements ``Controller``.
-
-    Args:
-        content: The ONNX file.
-        origin: Where it came from, for error messages.
-        name: Shown in tables.
+    """Runs a policy file that came from ``origin``; implements ``Controller``.
 
     Attributes:
-        card: What the file says about itself.
         digest: First 16 hex digits of the file's SHA-256.
 
     Raises:
@@ -144,12 +138,7 @@ class Policy:
     def check_robot(
         self, robot: Robot, rate: float | None = None, *, other: OtherRobot = "refuse"
     ) -> None:
-        """Make sure that the policy was trained for this robot and control rate.
-
-        Args:
-            robot: The leg it shall drive.
-            rate: Control rate, Hz; None to skip that check.
-            other: What to do if it was trained for another one.
+        """Make sure that the policy was trained for this robot and control rate, Hz, if given.
 
         Raises:
             PolicyError: The rate differs, or the robot where that is refused.
@@ -191,7 +180,13 @@ class Policy:
         Raises:
             UsageError: A command lies outside the range that the policy was trained for.
         """
-        self._check_command(measurement.command)
+        newest, card = measurement.command[:, 0], self.card
+        fits = (card.command_low - _ROUNDING <= newest) & (newest <= card.command_high + _ROUNDING)
+        if not fits.all():
+            raise UsageError(
+                f"{self.name} was trained for commands from {card.command_low:g} to"
+                f" {card.command_high:g} m, not for {newest[~fits][0]:g} m."
+            )
         self._layout.update(measurement, self._torque)
         feeds = self._layout.inputs()
         if self.remembers:
@@ -206,16 +201,6 @@ class Policy:
         """Return nothing: a network has no state to show."""
         return {}
 
-    def _check_command(self, command: Array) -> None:
-        newest, card = command[:, 0], self.card
-        low, high = card.command_low - _ROUNDING, card.command_high + _ROUNDING
-        if not (low <= newest.min() and newest.max() <= high):
-            worst = newest[~((low <= newest) & (newest <= high))][0]
-            raise UsageError(
-                f"{self.name} was trained for commands from {card.command_low:g} to"
-                f" {card.command_high:g} m, not for {worst:g} m."
-            )
-
 
 def _open(content: bytes, origin: str) -> Any:  # noqa: ANN401
     options = onnxruntime.SessionOptions()
@@ -225,8 +210,7 @@ def _open(content: bytes, origin: str) -> Any:  # noqa: ANN401
     options.log_severity_level = 4
     try:
         return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
-    except Exception as error:
-        # onnxruntime raises many unrelated types, all derived from Exception only.
+    except Exception as error:  # onnxruntime raises many unrelated types
         raise PolicyError(
             f"{origin} is not a readable ONNX file: truncated, damaged or of another kind."
         ) from error

@@ -76,20 +76,20 @@ def load_controller(
             file (``.toml``) for energy shaping, or a Python class, see ``user_controllers``.
         robot: The leg it shall drive.
         rate: Control rate, Hz.
-        other: What to do with a policy that was trained for another robot.
+        other: See ``OtherRobot``.
 
     Raises:
         PolicyError: The file is missing, truncated or foreign, or does not fit the robot or rate.
         ControllerError: A Python class cannot be loaded or is no controller.
         UsageError: There is no such controller.
     """
-    factory = _FACTORIES.get(str(name_or_path))
-    if factory is not None:
-        return factory(robot, rate=rate)
-    if str(name_or_path).endswith(".toml"):
-        return tuned_energy_shaping(robot, rate=rate, gains=str(name_or_path))
-    if is_user_controller(str(name_or_path)):
-        return load_user_controller(str(name_or_path), robot, rate)
+    name = str(name_or_path)
+    if name in _FACTORIES:
+        return _FACTORIES[name](robot, rate=rate)
+    if name.endswith(".toml"):
+        return tuned_energy_shaping(robot, rate=rate, gains=name)
+    if is_user_controller(name):
+        return load_user_controller(name, robot, rate)
     policy = load_policy(name_or_path)
     policy.check_robot(robot, rate, other=other)
     return policy

@@ -26,11 +26,8 @@ from hopping_leg.sim import (
 from hopping_leg.sim.perturbation import Perturbation, Perturber
 from hopping_leg.trace import COLUMNS, Trace
 
-_START_SHARE = 0.2 / 0.29
-"""Leg length of the standing start as a share of the straight leg's."""
-
-_IMPOSSIBLE = 1e4
-"""Joint speed that no leg reaches, rad/s."""
+_START_SHARE = 0.2 / 0.29  # leg length of the standing start as a share of the straight leg's
+_IMPOSSIBLE = 1e4  # joint speed that no leg reaches, rad/s
 
 _COLUMNS = (*list(COLUMNS)[2:], "command_m")
 """Columns of a rollout that ``_record_state`` and the loop fill by their places."""
@@ -119,10 +116,10 @@ def rollout(
     on_legs: Callable[[Simulator], None] | None = None,
     perturbation: Perturbation | None = None,
 ) -> Rollout:
-    """Let a controller hop from a standing start.
+    """Let a controller hop from a standing start; a ``PrivilegedController`` is shown the legs.
 
     Args:
-        controller: Controls all legs at once; a ``PrivilegedController`` is shown them.
+        controller: Controls all legs at once.
         config: The world it meets.
         commands: Desired height for every tick and leg, m, (ticks, n).
         seed: Seed of noise and delay.
@@ -131,29 +128,28 @@ def rollout(
         perturbation: Changes of the legs that ``config`` does not know; recorded heights are above
             the ground of the moment, recorded commands are the controller's.
 
+    Returns:
+        One row per control period: the state at its start and the torques during it.
+
     Raises:
         PhysicsError: The simulation became unstable.
-
-    Returns:
-        What happened, one row per control period; each row holds the state at its start and the
-        torques during it.
     """
     ticks, count = commands.shape
     legs: Simulator
     if perturbation is None:
         perturber = None
         legs = make_simulator(
-            config.robot,
-            count,
-            engine=config.engine,
-            ground=config.ground,
-            rate=config.rate,
-            timestep=config.timestep,
-            threads=config.threads,
-        )
+            config.robot, count, engine=config.engine, ground=config.ground, rate=config.rate,
+            timestep=config.timestep, threads=config.threads,
+        )  # fmt: skip
     else:
-        perturber = _perturb(config, perturbation)
-        legs = perturber.legs
+        if config.engine != "mujoco":
+            raise UsageError(f"Perturbations need the engine mujoco, not {config.engine}.")
+        legs = MujocoSimulator(
+            config.robot, len(perturbation.robots), rate=config.rate, timestep=config.timestep,
+            threads=config.threads, robots=perturbation.robots, detailed=bool(perturbation.later),
+        )  # fmt: skip
+        perturber = Perturber(perturbation, legs)
     plant = Plant(legs, config.disturbance, config.soft_limits, np.random.default_rng(seed))
     legs.stand(slice(None), config.start_posture)
     plant.channel.restart(slice(None), legs.q, legs.qd, commands[0])
@@ -195,22 +191,6 @@ def rollout(
     }
     columns = dict(zip(_COLUMNS, data, strict=True))
     return Rollout(np.arange(ticks) / config.rate, columns | internals, header)
-
-
-def _perturb(config: RolloutConfig, perturbation: Perturbation) -> Perturber:
-    """Return newly made legs that are perturbed, which needs MuJoCo."""
-    if config.engine != "mujoco":
-        raise UsageError(f"Perturbations need the engine mujoco, not {config.engine}.")
-    legs = MujocoSimulator(
-        config.robot,
-        len(perturbation.robots),
-        rate=config.rate,
-        timestep=config.timestep,
-        threads=config.threads,
-        robots=perturbation.robots,
-        detailed=bool(perturbation.later),
-    )
-    return Perturber(perturbation, legs)
 
 
 def _record_state(row: Array, legs: Simulator, command: Array) -> None:

@@ -8,18 +8,13 @@ import numpy.typing as npt
 from hopping_leg.arrays import Array, BoolArray, IntArray
 from hopping_leg.sim.channel import Measurement
 
-_ROOM = 4
-"""Length of the buffer over that of the window."""
+_ROOM = 4  # length of the buffer over that of the window
 
 T = TypeVar("T", bound=np.generic)
 
 
 class RingBuffer(Generic[T]):
-    """A window of frames that moves through a larger buffer, so that a tick moves no frame.
-
-    Args:
-        frames: The window at the start, newest first, (length, ...); copied.
-    """
+    """A window of frames, (length, ...), that moves through a larger buffer: no tick moves one."""
 
     def __init__(self, frames: npt.NDArray[T]) -> None:
         self._length = len(frames)

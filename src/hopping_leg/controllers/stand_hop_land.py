@@ -35,13 +35,7 @@ _LANDING_STIFFNESS, _LANDING_DAMPING = 3.0, 1.5
 
 
 class Landing:
-    """Lands n legs; flight PD, touchdown detection and retraction are those of energy shaping.
-
-    Args:
-        robot: The leg.
-        count: Number of legs n.
-        standing: Leg length to end at, m.
-    """
+    """Lands n legs on a standing length, m, with flight PD and detector of energy shaping."""
 
     def __init__(self, robot: Robot, count: int, standing: float) -> None:
         shipped = load_gains()
@@ -60,12 +54,7 @@ class Landing:
         self._from = np.where(who[:, None], q, self._from)
 
     def wait(self, leg: LegView, clock: Array) -> tuple[Array, BoolArray]:
-        """Return the torques of flight, N m, (n, 2), and which legs have met the ground, (n,).
-
-        Args:
-            leg: State of the legs.
-            clock: Time since the legs left the ground, s, (n,).
-        """
+        """Return flight torques, N m, (n, 2), and who met the ground; clock of flight in s."""
         gains = self._shared
         target, rate = retraction(self._from, self._waiting, clock, gains.retract_time)
         torque = flight_torque(gains, leg, target, rate)
@@ -91,11 +80,8 @@ def landing_posture(robot: Robot) -> Array:
     return kinematics.joint_angles(robot, np.array([length, 0.0]))
 
 
-_SMOOTHING = 0.25
-"""Share of the newest force in the pressing force."""
-
-_LEAST_PRESS = 1 / 3
-"""Pressing force that begins a push, weights."""
+_SMOOTHING = 0.25  # share of the newest force in the pressing force
+_LEAST_PRESS = 1 / 3  # pressing force that begins a push, weights
 
 _BEGIN, _END, _LEAST = 0.2, 0.06, 0.3
 """Leg rate that begins a push, ends it, and must have been reached, sqrt(gravity x height)."""
@@ -104,8 +90,7 @@ _SUDDEN = 0.15
 """Time between the fastest leg rate and the end of a push, s; who only rises slows down for longer.
 """
 
-_BLIND = 0.9
-"""Share of the ballistic flight in which no push is believed."""
+_BLIND = 0.9  # share of the ballistic flight in which no push is believed
 
 
 class LiftoffDetector:
@@ -119,12 +104,7 @@ class LiftoffDetector:
         self._blind, self._slowing = np.zeros(count), np.zeros(count)
 
     def update(self, leg: LegView, force: Array) -> BoolArray:
-        """Return which legs have just left the ground, (n,).
-
-        Args:
-            leg: State of the legs.
-            force: Along the leg, that the joints' torques press with, N, (n,).
-        """
+        """Return which legs, pressing with a force along them, N, just left the ground, (n,)."""
         bounded = np.clip(force, -4 * self._weight, 8 * self._weight)
         self._press += _SMOOTHING * (bounded - self._press)
         self._blind = np.maximum(self._blind - self._period, 0.0)
@@ -143,14 +123,10 @@ class LiftoffDetector:
         return left
 
 
-STAND_SECONDS = 1.0
-"""The leg stands so long before it hops."""
+STAND_SECONDS = 1.0  # before it hops
 
-_BRAKE_SECONDS = 0.4
-"""After a touchdown spring and damper hold the leg so long."""
-
-_RISE_SECONDS = 0.5
-"""Of the way back to the standing posture."""
+_BRAKE_SECONDS = 0.4  # after a touchdown spring and damper hold the leg so long
+_RISE_SECONDS = 0.5  # of the way back to the standing posture
 
 
 class Mode(IntEnum):

@@ -33,20 +33,12 @@ from hopping_leg.sim import CONTROL_RATE
 from hopping_leg.sim.channel import Measurement
 from hopping_leg.trace import COLUMNS
 
-METHOD = "get_control_output"
-"""What a controller of one leg is called by."""
-
-COMMAND = "desired_height"
-"""Attribute that holds the commanded apex height, m, whenever ``METHOD`` is called."""
+METHOD = "get_control_output"  # of a controller of one leg
+COMMAND = "desired_height"  # its attribute that holds the commanded apex height, m
 
 
 class SingleLeg:
-    """Gives every leg a controller of its own; implements ``Controller``.
-
-    Args:
-        make: Returns a new controller; called once a leg at every reset.
-        rate: Control rate, Hz.
-        name: For tables and error messages.
+    """Gives every leg a controller of its own, made at every reset; implements ``Controller``.
 
     Raises:
         ControllerError: The method takes other arguments than the known ones.
@@ -69,10 +61,7 @@ class SingleLeg:
         self._tick = 0
 
     def act(self, measurement: Measurement) -> Array:
-        """Return joint torques, N m, (n, 2).
-
-        Each leg is shown its newest sample; as measured torque it is given its last answer, since
-        a measurement holds none.
+        """Return joint torques, N m, (n, 2); the measured torque shown is the last answer.
 
         Raises:
             ControllerError: An answer is no pair of torques.
@@ -134,12 +123,7 @@ T = TypeVar("T")
 
 
 class UserController:
-    """Guards a controller of someone else; implements ``Controller``.
-
-    Args:
-        controller: With ``reset`` and ``act``.
-        origin: As it was named, for error messages.
-    """
+    """Guards a controller of someone else, named ``origin``; implements ``Controller``."""
 
     def __init__(self, controller: Any, origin: str) -> None:  # noqa: ANN401
         self.controller, self.origin = controller, origin
@@ -221,12 +205,7 @@ def is_user_controller(name: str) -> bool:
 
 
 def load_user_controller(name: str, robot: Robot, rate: float) -> UserController:
-    """Make a controller from a Python class.
-
-    Args:
-        name: ``path/to/file.py:Class``, or ``package.module:Class`` for what Python can import.
-        robot: The leg it shall drive.
-        rate: Control rate, Hz.
+    """Make a controller from ``path/to/file.py:Class`` or ``module:Class``; rate is in Hz.
 
     Raises:
         ControllerError: There is no such file, module or class, it fails, or is no controller.
@@ -252,10 +231,7 @@ def load_user_controller(name: str, robot: Robot, rate: float) -> UserController
 
 
 def load_user_object(name: str) -> Any:  # noqa: ANN401
-    """Return what a Python file or module holds under a name.
-
-    Args:
-        name: ``path/to/file.py:NAME``, or ``package.module:NAME``.
+    """Return what is called ``path/to/file.py:NAME`` or ``package.module:NAME``.
 
     Raises:
         ControllerError: There is no such file, module or name, or importing it fails.

@@ -20,11 +20,8 @@ from hopping_leg.envs.paper_reward import action_jerk, joint_position_penalty
 from hopping_leg.envs.rewards import Reward, RewardTerm, Transition, sum_of_joints
 from hopping_leg.robot import Robot, kinematics
 
-_FASTEST_SQUARED = 4.0
-"""Base velocity squared beyond which the energy gain grows no more, m2/s2."""
-
-_PREDICTION_WIDTHS = (0.015, 0.06)
-"""Widths of the two kernels around the predicted apex, m."""
+_FASTEST_SQUARED = 4.0  # base velocity squared beyond which the energy gain grows no more, m2/s2
+_PREDICTION_WIDTHS = (0.015, 0.06)  # widths of the two kernels around the predicted apex, m
 
 
 @dataclass(frozen=True)

@@ -42,11 +42,7 @@ class Camera:
         self._renderer: Any = None
 
     def picture(self, leg: int = 0) -> Image:
-        """Return an RGB picture of a leg, (480, 640, 3).
-
-        Raises:
-            UsageError: This computer offers no OpenGL.
-        """
+        """Return an RGB picture of a leg, (480, 640, 3); a UsageError where there is no OpenGL."""
         if self._renderer is None:
             try:
                 self._renderer = mujoco.Renderer(self._model, height=480, width=640)
@@ -84,7 +80,6 @@ def _make_task(
 
 
 def _observation_space(task: HoppingTask) -> "gymnasium.spaces.Box[np.float32]":
-    """Return the space of a task's observations; unbounded, as joints may pass their limits."""
     return gymnasium.spaces.Box(-_LARGEST, _LARGEST, (task.observation.size,), np.float32)
 
 
@@ -95,11 +90,8 @@ class HoppingEnv(gymnasium.Env[Array32, npt.NDArray[np.float32]]):
     terms by name, and, in a step that passes an in-flight apex, ``apex_height`` and ``apex_error``
     (its height above the command), m.
 
-    Args:
-        robot: The leg, or its name, or the path of its TOML file.
-        options: The learning problem.
-        reward: List of terms; the paper's if None.
-        render_mode: ``"rgb_array"`` or None.
+    The robot may be a name or the path of a TOML file; the reward is the paper's if None; the
+    render mode is ``"rgb_array"`` or None.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 200}  # noqa: RUF012
@@ -156,15 +148,8 @@ class HoppingVectorEnv(gymnasium.vector.VectorEnv[Array32, npt.NDArray[np.float3
     """Legs hopping to commanded heights, on the batched simulation.
 
     Episodes restart in the step that ends them (``AutoresetMode.SAME_STEP``):
-    ``info["final_obs"]`` and ``info["final_info"]`` then hold what was seen last.
-
-    Args:
-        num_envs: Number of legs n.
-        robot: The leg, or its name, or the path of its TOML file.
-        options: The learning problem.
-        reward: List of terms; the paper's if None.
-        threads: Worker threads, 0 for one per core; results do not depend on it.
-        render_mode: ``"rgb_array"`` or None.
+    ``info["final_obs"]`` and ``info["final_info"]`` then hold what was seen last. Arguments are
+    those of ``HoppingEnv``; the threads, 0 for one per core, change no result.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012

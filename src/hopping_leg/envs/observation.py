@@ -31,8 +31,7 @@ Array32 = npt.NDArray[np.float32]
 _LEAST_SPAN = 0.05
 """Half the command range of an observation at least, m, so that a single command has a scale."""
 
-_LATE = 0.025
-"""Age of a sample that an observation shows as 1, s."""
+_LATE = 0.025  # age of a sample that an observation shows as 1, s
 
 
 PRIVILEGED = 10
@@ -68,12 +67,9 @@ class Observation(ABC):
     """Scaling of the history's joined inputs."""
 
     def advance(self, samples: Array, channel: Channel, last_action: Array) -> None:  # noqa: B027
-        """Update with the samples of a new tick.
+        """Update with a tick's samples (q1, q2, qd1, qd2, command), newest first, (n, 3, 5).
 
-        Args:
-            samples: (q1, q2, qd1, qd2, command), newest first, (n, 3, 5).
-            channel: Channel that delivered them in this tick.
-            last_action: Taken one tick ago, zero at the start of an episode, (n, 2).
+        The last action is that of a tick ago, zero at the start of an episode, (n, 2).
         """
 
     def restart(self, rows: IntArray, samples: Array, channel: Channel) -> None:  # noqa: B027
@@ -118,8 +114,8 @@ class HistoryObservation(Observation):
     def __init__(
         self, layout: ObservationHistory, scaling: Scaling, torque: Array, count: int
     ) -> None:
-        self._layout, self.layout, self.scaling = layout, layout.name, scaling
-        self._torque = torque
+        self._layout, self.layout = layout, layout.name
+        self.scaling, self._torque = scaling, torque
         self.size = len(scaling.offset)
         self.order = np.arange(self.size)
         layout.reset(count)
@@ -183,14 +179,8 @@ def make_observation(robot: Robot, config: TaskConfig, count: int) -> Observatio
 def privileged_observation(legs: Simulator, command: Array, sample: Scaling, out: Array32) -> None:
     """Write the normalised true state.
 
-    Base height and rate, q (2), qd (2), command, clearance of foot, knee and base.
-
-    Args:
-        legs: n legs.
-        command: Desired heights, m, (n,).
-        sample: Normalisation of joints and command, from ``sample_scaling``; the base's height has
-            the command's.
-        out: (n, ``PRIVILEGED``).
+    Base height and rate, q (2), qd (2), command, clearance of foot, knee and base, to ``out``, (n,
+    ``PRIVILEGED``); the base's height is scaled like the command.
     """
     offset, gain = sample.offset, sample.gain
     out[:, PRIVILEGED_HEIGHT] = (legs.height - offset[4]) * gain[4]

@@ -12,8 +12,7 @@ from hopping_leg.robot.parameters import Robot
 
 Barrier = Literal["step", "printed"]
 
-_SHARPNESS = 10.0
-"""Steepness of Pjp around the joint limits, 1/rad."""
+_SHARPNESS = 10.0  # steepness of Pjp around the joint limits, 1/rad
 
 
 @dataclass(frozen=True)

@@ -113,14 +113,7 @@ class RewardTerm(NamedTuple):
 
 
 class Reward:
-    """The weighted sum of a list of terms.
-
-    Args:
-        terms: In the order of a step's ``terms``.
-        scale: Factor of the whole sum, for the critic's sake.
-
-    Attributes:
-        names: Names of the terms, k in all.
+    """The weighted sum of a list of k terms, scaled for the critic's sake.
 
     Raises:
         UsageError: Two terms have the same name.

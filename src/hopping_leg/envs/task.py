@@ -12,12 +12,63 @@ from hopping_leg.envs.observation import (
     privileged_observation,
     sample_scaling,
 )
-from hopping_leg.envs.reset import ResetSampler
 from hopping_leg.envs.rewards import Reward, Transition
 from hopping_leg.envs.task_config import TaskConfig
+from hopping_leg.errors import UsageError
 from hopping_leg.hop_detection import at_apex
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, kinematics
 from hopping_leg.sim import Measurement, MujocoSimulator, Plant, randomization
+
+_STANDING_SHARE = 0.3  # of the starts ``hop``
+
+_NEAR_APEX = (-0.06, 0.03)
+"""Where the other starts ``hop`` begin, relative to the commanded apex, m."""
+
+
+class ResetSampler:
+    """Draws initial states: standing, or dropped in a random posture.
+
+    Raises:
+        RobotError: The robot is no leg.
+        UsageError: A start asks for a leg length that the robot does not reach.
+    """
+
+    def __init__(self, robot: Robot, config: TaskConfig) -> None:
+        robot.require_leg()
+        self.robot, self.config = robot, config
+        lengths = (config.start_length, *config.drop_length)
+        self._standing = kinematics.joint_angles(robot, np.array([lengths[0], 0.0]))
+        reach = robot.thigh.length + robot.shank.length
+        if np.isnan(self._standing).any() or not all(0 < length < reach for length in lengths):
+            raise UsageError(
+                f"The starting leg lengths {lengths} m do not all lie within reach of {robot.name};"
+                f" take lengths below {reach:g} m."
+            )
+
+    def draw(self, command: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Draw base heights, m, (k,), and joint angles, rad, (k, 2), for desired heights, m."""
+        count, kind = len(command), self.config.reset_distribution
+        if kind == "standing":
+            q = np.tile(self._standing, (count, 1))
+            return kinematics.stance_height(self.robot, q), q
+        q, gap = self._drop(count, rng)
+        if kind == "mixed":
+            stands = rng.random(count) < 0.5
+            q[stands], gap[stands] = self._standing, 0.0
+        standing = kinematics.stance_height(self.robot, q)
+        if kind != "hop":
+            return standing + gap, q
+        stands = rng.random(count) < _STANDING_SHARE
+        apex = command + rng.uniform(*_NEAR_APEX, count)
+        return np.where(stands, standing, np.maximum(standing, apex)), q
+
+    def _drop(self, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
+        config = self.config
+        length = rng.uniform(*config.drop_length, count)
+        offset = rng.uniform(-config.drop_offset, config.drop_offset, count)
+        q = kinematics.joint_angles(self.robot, np.stack([length, offset], axis=-1))
+        q = np.clip(q, self.robot.of_joints("lower"), self.robot.of_joints("upper"))
+        return q, rng.uniform(0.0, config.drop_clearance, count)
 
 
 class Step(NamedTuple):
@@ -48,15 +99,8 @@ class Step(NamedTuple):
 class HoppingTask:
     """n legs learning to hop; the only place where observation and reward are put together.
 
-    Args:
-        robot: The leg.
-        count: Number of legs n.
-        options: The learning problem.
-        reward: Judges every tick.
-        rng: Source of all randomness; results do not depend on the number of threads.
-        threads: Worker threads, 0 for one per core.
-        autoreset: Begin the next episode within the tick that ends one; otherwise the leg goes on
-            until ``reset``.
+    All randomness comes from ``rng``; the threads, 0 for one per core, change no result. With
+    ``autoreset`` the next episode begins within the tick that ends one, else with ``reset``.
     """
 
     def __init__(
@@ -87,24 +131,18 @@ class HoppingTask:
         self._torque = np.tile(options.action_torque, (count, 1))
         self._lowest, self._highest = np.full((count, 2), -1.0), np.full((count, 2), 1.0)
         self._horizon = max(1, round(options.episode * options.rate))
-        self._never = np.zeros(count, np.bool_)
-        self._nan = np.full(count, np.nan)
+        self._never, self._nan = np.zeros(count, np.bool_), np.full(count, np.nan)
         for constant in (self._never, self._nan):
             constant.flags.writeable = False
         self.command = np.empty(count)
         self._tick = 0
         self._end = np.empty(count, np.int64)
         self._switch = np.full(count, np.iinfo(np.int64).max)
-        self._last = np.zeros((count, 2))
-        self._rises = np.zeros(count, np.bool_)
+        self._last, self._rises = np.zeros((count, 2)), np.zeros(count, np.bool_)
         self.reset()
 
     def randomize(self, draw: int = 1) -> None:
-        """Let every leg go on with numbers of its own, if the task's options let legs differ.
-
-        Args:
-            draw: Each gives other numbers, always the same; those of the present one stay.
-        """
+        """Let every leg go on with numbers of its own, the same ones for the same draw."""
         ranges = self.options.randomised
         if not ranges or draw == self._draw:
             return
@@ -129,14 +167,7 @@ class HoppingTask:
         return self.reset()
 
     def reset(self, ids: IntArray | None = None) -> Array32:
-        """Begin new episodes.
-
-        Args:
-            ids: Which legs; all if None, and only then episodes are staggered.
-
-        Returns:
-            Observations of all legs, (n, size).
-        """
+        """Begin new episodes of some legs, or of all, staggered; return all observations."""
         rows = np.arange(self.count) if ids is None else np.asarray(ids)
         self._begin(rows)
         if ids is None and self.options.random_episode_start:
@@ -145,11 +176,7 @@ class HoppingTask:
         return self._see_anew(rows)
 
     def step(self, action: Array | Array32) -> Step:
-        """Act for one control period.
-
-        Args:
-            action: Hip and knee torque over ``action_torque``, clipped to [-1, 1], (n, 2).
-        """
+        """Act for a period; actions are torques over ``action_torque`` in [-1, 1], (n, 2)."""
         legs = self.legs
         taken = action.astype(np.float64)
         np.maximum(taken, self._lowest, out=taken)
@@ -167,7 +194,6 @@ class HoppingTask:
         return self._next(reward, terms, apex_error, apex_height)
 
     def _apexes(self, height_before: Array) -> tuple[BoolArray, Array, Array]:
-        """Return which legs passed an in-flight apex, its height and error, m, (n,) each."""
         legs = self.legs
         rose, self._rises = self._rises, legs.height_rate > 0
         if not np.count_nonzero(rose > self._rises):
@@ -177,11 +203,7 @@ class HoppingTask:
         return apex, height, height - self.command
 
     def privileged(self) -> Array32:
-        """Return what a critic may see in training, (n, size).
-
-        The true state, then where the leg's own numbers lie in their ranges, if legs may differ; 0
-        while they are alike.
-        """
+        """Return true states, and where the legs' numbers lie in their ranges, (n, size)."""
         result = np.empty((self.count, self.privileged_size), np.float32)
         privileged_observation(self.legs, self.command, self._scaling, out=result[:, :PRIVILEGED])
         if self._numbers.size:
@@ -229,13 +251,11 @@ class HoppingTask:
         return self.plant.channel.measurement(self._samples)
 
     def _see_anew(self, rows: IntArray) -> Array32:
-        """Return what is seen once some legs have begun anew within the tick."""
         self._samples = self.plant.samples(self.command)
         self.observation.restart(rows, self._samples, self.plant.channel)
         return self.observation.view(self._samples)
 
     def _next(self, reward: Array, terms: Array, apex_error: Array, apex_height: Array) -> Step:
-        """End the tick: episodes that are over, new commands, what is seen."""
         self._tick += 1
         if self._tick >= self._next_switch:
             self._change_commands()

@@ -31,8 +31,7 @@ from hopping_leg.robot import Robot, kinematics
 from hopping_leg.sim import CONTROL_RATE
 from hopping_leg.sim.channel import Measurement
 
-_BLIND_TICKS = 4
-"""Ticks after a change of phase in which true contact still flickers."""
+_BLIND_TICKS = 4  # ticks after a change of phase in which true contact still flickers
 
 
 class Truth(Protocol):
@@ -47,14 +46,7 @@ class Truth(Protocol):
 
 
 class EnergyShaping:
-    """The baseline controller.
-
-    Args:
-        robot: The leg, as far as the controller knows it.
-        gains: Each one number, or one per leg.
-        options: Readings of the paper.
-        rate: Control rate, Hz.
-        name: Shown in tables.
+    """The baseline controller, at a control rate in Hz.
 
     Attributes:
         truth: What ``watch`` was shown, where an option reads ``"true"``; None for a controller
@@ -145,12 +137,10 @@ class EnergyShaping:
         return np.minimum(wanted, self._longest)
 
     def _gain(self, command: Array) -> Array:
-        """Return k, (n,)."""
         gains = self.gains
         return (gains.k0 + gains.k0_slope * (command - gains.reference)) * self._k_ratio
 
     def _force(self, leg: LegView, command: Array, liftoff: Array, landing: Array) -> Array:
-        """Return the force along the leg: k F_f in the push, spring and damper before, N, (n,)."""
         gains = self.gains
         final = gains.push_rate + gains.push_rate_slope * (command - gains.reference)
         intended = equations.intended_rate(leg.length, self._length_0, liftoff, final)
@@ -161,7 +151,6 @@ class EnergyShaping:
         return np.where(self._phases.are(Phase.LIFTOFF), thrust, brake)
 
     def _pressing_share(self, leg: LegView, liftoff: Array) -> Array:
-        """Return how much of the coming period the foot presses the ground, 0 to 1, (n,)."""
         share = np.where(self._phases.are(Phase.FLIGHT), 0.0, 1.0)
         if self.options.liftoff == "timed":
             until = equations.share_of_period(leg.length, leg.rate, liftoff, self.period)
@@ -192,16 +181,12 @@ class EnergyShaping:
         if self.options.contact == "true":
             touched = (self._true().foot_clearance() <= 0) & (clock > _BLIND_TICKS * self.period)
         who = self._phases.are(Phase.FLIGHT) & (touched | (clock > FLIGHT_LIMIT))
-        if who.any():
+        if who.any():  # a touchdown that nobody noticed came before contact was believed
             too_short = np.minimum(clock, shortest)
             self._judge_hop(who, leg, command, np.where(touched, clock, too_short))
         self._phases.enter(who, Phase.TOUCHDOWN)
 
     def _judge_hop(self, who: BoolArray, leg: LegView, command: Array, airborne: Array) -> None:
-        """Estimate the apex that is over and correct k.
-
-        A touchdown that nobody noticed came before contact was believed: the hop was that short.
-        """
         gains, options = self.gains, self.options
         airborne = np.maximum(airborne, self.period)
         ballistic = equations.ballistic_apex(self._liftoff_height, self._liftoff_rate)
@@ -224,7 +209,6 @@ class EnergyShaping:
         self._phases.enter(who, Phase.LIFTOFF)
 
     def _estimate_height(self, leg: LegView) -> None:
-        """Ballistic in flight, forward kinematics on the ground."""
         flying = equations.ballistic_height(
             self._liftoff_height, self._liftoff_rate, self._phases.clock
         )

@@ -11,24 +11,15 @@ from hopping_leg.arrays import Array
 from hopping_leg.controllers.energy_shaping.gains import Gain
 from hopping_leg.robot import GRAVITY, Robot
 
-SHORTEST_PUSH = 0.02
-"""Least Delta x_l, m: the paper's quotient has no bound where the leg lands almost extended."""
-
-STEP = (0.7, 1.4)
-"""Bounds of E_d / E_{j-1}: one missed touchdown must not spoil the gain."""
-
-RANGE = (0.3, 4.0)
-"""Bounds of k over its first value."""
+SHORTEST_PUSH = 0.02  # least Delta x_l, m; the paper sets no bound for a leg almost extended
+STEP = (0.7, 1.4)  # bounds of E_d / E_{j-1}: one missed touchdown must not spoil the gain
+RANGE = (0.3, 4.0)  # bounds of k over its first value
 
 
 def feedforward_force(robot: Robot, command: Array, length_0: Array, liftoff: Array) -> Array:
     """Return F_f = m g (x_d - x_0) / Delta x_l (paper, Eq. 3), N, (n,).
 
-    Args:
-        robot: The leg.
-        command: x_d, m, (n,).
-        length_0: Leg length at the turning point; x_0 lies a foot radius above it, m, (n,).
-        liftoff: Leg length at the intended lift-off, m, (n,).
+    x_d is the command; x_0 lies a foot radius above the leg length at the turning point, m, (n,).
     """
     rise = np.maximum(command - length_0 - robot.foot.radius, 0.0)
     return robot.mass * GRAVITY * rise / push_distance(length_0, liftoff)
@@ -44,13 +35,7 @@ def intended_rate(length: Array, length_0: Array, liftoff: Array, final: Array) 
 
     An almost constant force makes the rate grow with the root of the distance; joint damping and
     the lighter load towards the end flatten it. Only the shape matters: the gain update makes up
-    for a wrong ``final``.
-
-    Args:
-        length: Now, m, (n,).
-        length_0: At the turning point, m, (n,).
-        liftoff: At the intended lift-off, m, (n,).
-        final: Leg rate there, m/s, (n,).
+    for a wrong ``final`` rate at lift-off. ``length_0`` is that of the turning point.
     """
     share = np.clip((length - length_0) / push_distance(length_0, liftoff), 0.0, 1.0)
     return final * np.sqrt(share * (2 - share))
@@ -65,11 +50,7 @@ def share_of_period(length: Array, rate: Array, liftoff: Array, period: float) -
 def updated_gain(gain: Array, desired: Array, reached: Array, exponent: Gain) -> Array:
     """Return k_j = k_{j-1} (E_d / E_{j-1})^2 with E = m g x (paper, Eqs. 1, 2 and 6), (n,).
 
-    Args:
-        gain: k_{j-1} over its first value, (n,).
-        desired: x_d, m, (n,).
-        reached: Estimated apex x_{j-1}, m, (n,); nonsense is cut to ``STEP``.
-        exponent: 2 in the paper.
+    The gain is over its first value, heights are in m; the paper's exponent is 2.
     """
     step = np.clip(desired / np.maximum(reached, 1e-3), *STEP)
     return np.clip(gain * step**exponent, *RANGE)
@@ -88,12 +69,8 @@ def ballistic_apex(liftoff_height: Array, liftoff_rate: Array) -> Array:
 def flight_time_apex(liftoff_height: Array, touchdown_height: Array, airborne: Array) -> Array:
     """Return the apex of the parabola through lift-off and touchdown, m, (n,).
 
-    Both heights and the time between them fix the speed at lift-off, which itself is noisy.
-
-    Args:
-        liftoff_height: Leg length and foot radius at lift-off, m, (n,).
-        touchdown_height: The same at touchdown, m, (n,).
-        airborne: Time between the two, s, (n,); must be positive.
+    Both heights, m, and the positive time between them, s, fix the speed at lift-off, which itself
+    is noisy.
     """
     speed = (touchdown_height - liftoff_height) / airborne + 0.5 * GRAVITY * airborne
     return ballistic_apex(liftoff_height, speed)

@@ -103,10 +103,8 @@ class ShapingOptions:
 
 
 LITERAL = ShapingOptions()
-"""The paper's description."""
-
 TRUE_CONTACT = ShapingOptions(contact="true", height="true")
-"""The paper's description with perfect knowledge of contact and height."""
+"""The paper's description, and the same with perfect knowledge of contact and height."""
 
 ROBUST = ShapingOptions("dated", "debounced", "timed", "flight_time", "pushed")
 """The readings of the tuned controller."""
@@ -157,9 +155,7 @@ def _joint_inertia(robot: Robot) -> Array:
 
 
 _SHIPPED = resources.files("hopping_leg.controllers") / "gains"
-
-TUNED = "energy-shaping"
-"""Name of the shipped set."""
+TUNED = "energy-shaping"  # name of the shipped set
 
 
 @dataclass(frozen=True)

@@ -12,14 +12,9 @@ from hopping_leg.controllers.energy_shaping.gains import ShapingGains
 from hopping_leg.controllers.energy_shaping.virtual_leg import LegView, leg_force
 from hopping_leg.robot import Robot, kinematics
 
-PUSH_LIMIT = 0.4
-"""Longest push, s: a leg that has not reached lift-off by then gives up and tries afresh."""
-
-FLIGHT_LIMIT = 0.5
-"""Longest flight, s: that of a jump by 0.3 m; beyond it, touchdown was missed."""
-
-BRAKE_LIMIT = 0.25
-"""Longest touchdown, s: an overdamped leg creeps and its velocity never turns."""
+PUSH_LIMIT = 0.4  # longest push, s: a leg without lift-off by then gives up and tries afresh
+FLIGHT_LIMIT = 0.5  # longest flight, s: that of a jump by 0.3 m; beyond it, touchdown was missed
+BRAKE_LIMIT = 0.25  # longest touchdown, s: the velocity of an overdamped leg never turns
 
 
 class Phase(IntEnum):
@@ -64,13 +59,9 @@ _MEMORY = 3
 
 
 class TouchdownDetector:
-    """Watches how the leg deviates from the planned retraction.
+    """Watches how n legs deviate from the planned retraction.
 
-    Args:
-        robot: The leg.
-        count: Number of legs n.
-        debounced: Judge the median of the last three ticks, so that one noisy sample cannot fake
-            a touchdown.
+    ``debounced`` judges the median of three ticks: one noisy sample cannot fake a touchdown.
     """
 
     def __init__(self, robot: Robot, count: int, *, debounced: bool) -> None:
@@ -79,15 +70,10 @@ class TouchdownDetector:
         self._resisting = np.zeros((depth, count))
 
     def update(self, leg: LegView, planned: Array, torque: Array, gains: ShapingGains) -> BoolArray:
-        """Return which legs meet the ground, (n,).
+        """Return which legs meet the ground, (n,): a soft one gives way, a stiff one resists.
 
-        A soft leg gives way, a stiff one resists: either shows it.
-
-        Args:
-            leg: State of the legs.
-            planned: Joint velocities of the retraction, rad/s, (n, 2).
-            torque: Joint torques of the flight PD, N m, (n, 2).
-            gains: Thresholds of leg rate and force.
+        Planned are the joint velocities of the retraction, rad/s; torques are those of the flight
+        PD, N m, (n, 2) each; the gains hold the thresholds.
         """
         along = kinematics.jacobian(self._robot, leg.q)[:, 0]
         excess = leg.rate - np.einsum("ni,ni->n", along, planned)

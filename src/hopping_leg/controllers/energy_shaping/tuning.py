@@ -31,17 +31,10 @@ from hopping_leg.hop_detection import measure_hops
 from hopping_leg.io import write_atomically
 from hopping_leg.robot import Robot, load_robot
 
-SETTLED = 2.0
-"""Hops before this do not count, s."""
-
-_RATE = 1.5
-"""Fewer hops per second than this cost."""
-
-_FLIGHT = 0.1
-"""Cost of a lack of flight, m: a tenth of the time, 1 cm."""
-
-_KNEE, _BASE = 0.012, 0.06
-"""Less room than this between knee or base and the ground costs, m."""
+SETTLED = 2.0  # hops before this do not count, s
+_RATE = 1.5  # fewer hops per second than this cost
+_FLIGHT = 0.1  # cost of a lack of flight, m: a tenth of the time, 1 cm
+_KNEE, _BASE = 0.012, 0.06  # less room than this between knee or base and the ground costs, m
 
 
 @dataclass(frozen=True)
@@ -87,9 +80,7 @@ def score(rollout: Rollout, command: float, legs: slice) -> CommandScore:
 def cost(scores: list[CommandScore], flight: float = 0.0) -> float:
     """Return scatter, what bias no calibration removes, missed hops and lack of room, mm.
 
-    Args:
-        scores: One per command.
-        flight: Share of the time in the air that is asked for at every command; less costs.
+    Less than the asked share of the time in flight costs too.
     """
     if any(np.isnan(s.median) for s in scores):
         return 500.0
@@ -150,7 +141,6 @@ SPACE: dict[str, tuple[float, float]] = {
 """Range of each searched gain; units as in ``ShapingGains``. What is not here stays as it is:
 k0 only sets the first hops, the height calibration follows from the medians."""
 
-
 _LOW, _HIGH = np.array(list(SPACE.values())).T
 
 
@@ -206,11 +196,7 @@ class Search:
 def evaluate(
     candidates: list[ShapingGains], config: RolloutConfig, seconds: float, seed: int
 ) -> list[list[CommandScore]]:
-    """Let candidates hop at every command and first gain, all in one rollout.
-
-    Returns:
-        For each candidate its score at each of ``COMMANDS``.
-    """
+    """Return each candidate's scores at ``COMMANDS``, over all first gains, in one rollout."""
     firsts = len(FIRST_GAINS)
     runs = len(COMMANDS) * firsts
     fields = [field.name for field in dataclasses.fields(ShapingGains)]
@@ -237,13 +223,13 @@ def search(
     log: Path,
     report: Callable[[int, float], None],
 ) -> ShapingGains:
-    """Improve gains.
+    """Improve gains; noise and delay take seeds 0 to 8 in turn.
 
     Args:
         start: Where to begin.
         config: The world to hop in.
         options: How long.
-        seed: Seed of the search; noise and delay take seeds 0 to 8 in turn.
+        seed: Seed of the search.
         log: One JSON line per generation; an interrupted search goes on from it.
         report: Called with (generations done, lowest cost so far).
     """
@@ -279,14 +265,8 @@ def tune(
 ) -> dict[str, Any]:
     """Search gains for a leg and write the better of start and find to ``out / "gains.toml"``.
 
-    Args:
-        robot: The leg.
-        robot_name: As the gain file shall name it.
-        start: Shipped name or path of the gains to begin from.
-        options: How long.
-        seed: Seed of the search.
-        out: Folder for the log and the gains.
-        report: Called with (generations done, lowest cost so far).
+    The gain file names the leg ``robot_name``; ``start`` is the shipped name or path of gains, and
+    ``report`` is called with (generations done, lowest cost so far).
 
     Returns:
         Plain values: the search, its costs, gains, and scores of start and find, both calibrated.
@@ -317,11 +297,8 @@ def tune(
 def _command(start: str, options: Search, seed: int) -> str:
     """Return the command that searches so, what goes without saying left out."""
     words = ["hop tune energy-shaping", f"--start {start}", f"--seed {seed}"]
-    usual = Search()
-    for field in dataclasses.fields(options):
-        value = getattr(options, field.name)
-        if field.name != "threads" and value != getattr(usual, field.name):
-            words.append(f"--{field.name} {value}")
+    usual = vars(Search()) | {"threads": options.threads}
+    words += [f"--{n} {value}" for n, value in vars(options).items() if value != usual[n]]
     return " ".join(words)
 
 
@@ -330,9 +307,8 @@ def _read_log(log: Path, options: Search, seed: int) -> list[list[float]]:
     known: list[list[float]] = []
     if not log.is_file():
         return known
-    whole = [
-        line for line in log.read_text(encoding="utf-8").splitlines(True) if line[-2:] == "}\n"
-    ]
+    lines = log.read_text(encoding="utf-8").splitlines(True)
+    whole = [line for line in lines if line[-2:] == "}\n"]
     for entry in map(json.loads, whole):
         found = entry["seed"], len(entry["costs"]), entry.get("flight", 0.0)
         if found != (seed, options.population, options.flight):

@@ -55,15 +55,10 @@ def foot_force_torque(robot: Robot, q: Array, push: Array, side: Array) -> Array
 def leg_force(robot: Robot, q: Array, torque: Array) -> Array:
     """Return the force along the leg that joint torques press with at rest, N, (n,).
 
-    The straight leg is singular; there the force of a slightly bent one is returned.
-
-    Args:
-        robot: The leg.
-        q: Joint positions, rad, (n, 2).
-        torque: At the joints, N m, (n, 2).
+    Joint positions are in rad, torques in N m, (n, 2). The straight leg is singular; there the
+    force of a slightly bent one is returned.
     """
-    jacobian = kinematics.jacobian(robot, q)
-    (a, b), (c, d) = np.moveaxis(jacobian, 0, -1)
+    (a, b), (c, d) = np.moveaxis(kinematics.jacobian(robot, q), 0, -1)
     determinant = a * d - b * c
     least = 0.1 * robot.thigh.length * robot.shank.length
     bounded = np.where(determinant < 0, -1.0, 1.0) * np.maximum(np.abs(determinant), least)
@@ -72,14 +67,7 @@ def leg_force(robot: Robot, q: Array, torque: Array) -> Array:
 
 
 def retraction(start: Array, end: Array, elapsed: Array, duration: Gain) -> tuple[Array, Array]:
-    """Return where the joints should be and how fast, rad and rad/s, (n, 2).
-
-    Args:
-        start: Joint positions at lift-off, rad, (n, 2).
-        end: Landing posture, rad, (n, 2).
-        elapsed: Time since lift-off, s, (n,).
-        duration: Duration of the movement, s.
-    """
+    """Return where the joints should be and how fast, rad and rad/s, (n, 2); times are in s."""
     lasts = np.broadcast_to(duration, elapsed.shape)[:, None]
     share = elapsed[:, None] / lasts
     rate = (end - start) * kinematics.smooth_step_rate(share) / lasts
