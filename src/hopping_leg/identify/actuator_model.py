@@ -31,10 +31,8 @@ def build_rig_model(
     gains stand in ``biasprm`` and are zero here. So a drive's own loop acts at every physics step
     if ``ctrl = kp q* + kd qd* + feed-forward``.
 
-    The timestep is in s, gravity is the acceleration of the base in free flight, m/s2.
-
-    Raises:
-        RobotError: MuJoCo refuses the parameters.
+    The timestep is in s, gravity is the acceleration of the base in free flight, m/s2. RobotError
+    says that MuJoCo refuses the parameters.
     """
     spec = get_spec(robot, timestep)
     spec.option.gravity = [0, 0, -gravity]

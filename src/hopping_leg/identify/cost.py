@@ -19,10 +19,9 @@ from hopping_leg.robot.model import TIMESTEP
 class RobustLoss:
     """Loss by which each window's say depends on its own level of errors.
 
-    A window whose mean squared residual m, in one quantity of one joint, is beyond a level L counts
-    2 L (1 - (1 + m / L)^-1/2): nearly m far below the level, and far beyond it nearly the same
-    whatever is changed. So windows that the model cannot explain, as where a drive saturates,
-    hardly move the parameters, while those that it explains in part keep some say.
+    A window of mean squared residual m, in one quantity of one joint, counts
+    2 L (1 - (1 + m / L)^-1/2) with a level L: nearly m far below it, and far beyond it nearly the
+    same whatever is changed, so that windows that the model cannot explain hardly move parameters.
 
     Gauss-Newton steps on such a cost are those on residuals that are weighted by the levels of the
     moment; the rest of the cost beside their squares is residuals that no parameter moves.
@@ -76,10 +75,8 @@ _FAILED = 1e3  # residual of a simulation that broke down, in units of the scale
 class Scoring:
     """What counts and how much: a residual is an error divided by its quantity's scale.
 
-    The paper's J, the sum of squared joint position errors in rad2, is the default.
-
-    Raises:
-        UsageError: A scale is not positive, or nothing counts.
+    The paper's J, the sum of squared joint position errors in rad2, is the default. UsageError
+    says that a scale is not positive, or nothing counts.
     """
 
     position: float | None = 1.0
@@ -132,10 +129,9 @@ class Objective:
     @cached_property
     def _scored(self) -> dict[str, tuple[float, Array, BoolArray]]:
         """Scale, measured values and which of them count, by quantity."""
-        scales = {name: getattr(self.scoring, name) for name in _QUANTITIES}
         scored = {}
-        for name, scale in scales.items():
-            if scale is not None:
+        for name in _QUANTITIES:
+            if (scale := getattr(self.scoring, name)) is not None:
                 values = measured(self.simulator, name)
                 scored[name] = (scale, values, ~np.isnan(values))
         if not any(mask.any() for _, _, mask in scored.values()):
@@ -171,10 +167,10 @@ class Objective:
     def residuals(self, vectors: Array) -> Array:
         """Return residuals of search vectors (n, k) in units of the scales, (n, size)."""
         simulated = self.simulator.run(self.parameters.hypotheses(vectors))
-        parts = []
-        for name, (scale, values, mask) in self._scored.items():
-            error = getattr(simulated, name) - values
-            parts.append(error[:, mask] / scale)
+        parts = [
+            (getattr(simulated, name) - values)[:, mask] / scale
+            for name, (scale, values, mask) in self._scored.items()
+        ]
         joined = np.ascontiguousarray(np.concatenate(parts, axis=1))
         finite = np.nan_to_num(joined, nan=_FAILED, posinf=_FAILED)
         raw: Array = np.clip(finite, -_FAILED, _FAILED)

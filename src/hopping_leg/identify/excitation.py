@@ -40,8 +40,7 @@ def require_positive(**numbers: float | None) -> None:
 class Multisine:
     """Harmonics with Schroeder phases around a posture: a flat spectrum with low peaks.
 
-    Raises:
-        UsageError: A number has no meaning.
+    UsageError says that a number has no meaning.
     """
 
     centre: Pair = (0.7, -1.4)
@@ -117,11 +116,7 @@ class Excitation:
         return hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
 
     def save(self, path: Path) -> None:
-        """Write a Parquet file.
-
-        Raises:
-            TraceError: The file cannot be written.
-        """
+        """Write a Parquet file, or raise TraceError if that fails."""
         names = (*PAIRS["position_command"], *PAIRS["velocity_command"])
         targets = (*self.position.T, *self.velocity.T)
         columns = {"time_s": self.time} | dict(zip(names, targets, strict=True))
@@ -130,11 +125,7 @@ class Excitation:
 
 
 def load_excitation(path: Path) -> Excitation:
-    """Load an excitation.
-
-    Raises:
-        TraceError: The file is missing, foreign or no excitation.
-    """
+    """Load an excitation, or raise TraceError if the file is missing, foreign or none."""
     trace = Trace.load(path)
     facts = trace.header.get(_KEY)
     if facts is None:

@@ -10,8 +10,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.identify.recording_format import Pair, Rig
 from hopping_leg.robot import JOINTS, MotorLimit, Robot, dynamics, kinematics
 
-LEAST_CLEARANCE = 0.005
-"""Least clearance of base and knee above the ground, m."""
+LEAST_CLEARANCE = 0.005  # of base and knee above the ground, m
 
 
 @dataclass(frozen=True)
@@ -74,11 +73,7 @@ def demand(robot: Robot, rig: Rig, position: Array, rate: float) -> Demand:
 
 
 def check_demand(robot: Robot, wanted: Demand, rate: float, limits: HardwareRange) -> None:
-    """Refuse what the joints' range, the ground or the motors' torque-speed lines do not allow.
-
-    Raises:
-        UsageError: Naming joint, time and limit.
-    """
+    """Raise UsageError for what range, ground or torque-speed lines forbid, by joint and time."""
     lower, upper = np.array([limits.hip, limits.knee]).T
     fastest = robot.of_joints("no_load_speed")
     possible = MotorLimit(robot).clip(wanted.torque, wanted.velocity)

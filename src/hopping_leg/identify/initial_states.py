@@ -49,10 +49,9 @@ def start_states(recording: Recording) -> tuple[Array, Array]:
 def base_rate(recording: Recording, robot: Robot) -> Array:
     """Return the speed of the base at every row, m/s, (rows,), from its measured height.
 
-    A foot on the ground tells most of it: that much is known from the joints' velocities, and
-    only how far the ground gives is left to differences. Three rows from the same side of
-    touchdown and lift-off make a difference, where there are so many. Where both joints stand
-    still to the last digit the leg has not begun to move.
+    With the foot on the ground the joints' velocities tell it, but for how far the ground gives.
+    Differences are of three rows from the same side of touchdown and lift-off, where possible.
+    Where both joints stand still to the last digit the leg has not begun to move.
     """
     time, height = recording.time, recording.trace.column("height_m")
     position, velocity = full_states(recording)

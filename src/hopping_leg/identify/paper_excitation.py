@@ -19,10 +19,8 @@ from hopping_leg.robot import Robot, kinematics
 
 DURATION = 240.0
 """Duration of the paper's recordings, s."""
-
 AMPLITUDES, PERIODS, SWINGS = (0.15, 0.1, 0.05), (0.75, 0.5, 0.25), (10.0, 20.0)
 """A in m, T1 and T2 in s of the paper's recordings."""
-
 LAB_MARGIN = 0.005
 """How far from straight the lab kept the leg in its recordings, m; the paper says nothing."""
 _SHRINK = 0.95

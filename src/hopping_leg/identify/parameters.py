@@ -58,19 +58,11 @@ class LegHypothesis:
     drive: Actuators = field(default_factory=Actuators)
 
     def get(self, name: str) -> float:
-        """Return a parameter's value.
-
-        Raises:
-            UsageError: There is no such parameter.
-        """
+        """Return a parameter's value, or raise UsageError if there is no such parameter."""
         return float(attrgetter(_path(self, name))(self))
 
     def replace(self, values: dict[str, float]) -> "LegHypothesis":
-        """Return the hypothesis with some parameters' values changed.
-
-        Raises:
-            UsageError: There is no such parameter.
-        """
+        """Return the hypothesis with other values of parameters; UsageError if one is unknown."""
         hypothesis = self
         for name, value in values.items():
             hypothesis = replace_at(hypothesis, _path(self, name), float(value))
@@ -127,11 +119,7 @@ _FACTOR = 4.0  # parameters without a range may lie between a quarter and four t
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number to find, named as ``LegHypothesis`` says.
-
-    Raises:
-        UsageError: The bounds exclude the start.
-    """
+    """One number to find, named as ``LegHypothesis`` says; its bounds must hold its start."""
 
     name: str
     unit: str
@@ -214,8 +202,7 @@ def choose(
 ) -> ParameterSet:
     """Return a set of parameters with sensible bounds and scales.
 
-    ``bounds`` are those that differ from the widest ones; ``start`` has values that differ from the
-    base's, or are of drives' gains that it leaves to the recording.
+    ``bounds`` differ from the widest ones; ``start`` has values that differ from the base's.
 
     Raises:
         UsageError: A name does not exist, or bounds exclude the start.
@@ -227,10 +214,8 @@ def choose(
         if math.isnan(value):
             raise UsageError(f"'{name}' has no value to start from; give one.")
         low, high = (bounds or {}).get(name) or _widest_bounds(name, value)
-        if value == low == 0.0 or math.isclose(value, low, rel_tol=1e-12):
-            scale = 0.02 * (high - low)
-        else:
-            scale = max(0.3 * abs(value), 1e-3 * (high - low))
+        at_low = value == low == 0.0 or math.isclose(value, low, rel_tol=1e-12)
+        scale = 0.02 * (high - low) if at_low else max(0.3 * abs(value), 1e-3 * (high - low))
         parameters.append(Parameter(name, units[name], value, low, high, scale))
     return ParameterSet(base, tuple(parameters))
 

@@ -17,11 +17,7 @@ _TOLERANCE = 0.2  # share by which link lengths may differ between files of one 
 
 
 def robot_of(recordings: Sequence[Recording]) -> str:
-    """Return the name or path of the robot that recordings were filed under.
-
-    Raises:
-        UsageError: There is no recording, or they name several robots.
-    """
+    """Return the robot of recordings, or raise UsageError if there is none or there are several."""
     names = list(dict.fromkeys(r.metadata.robot for r in recordings))
     if not names:
         raise UsageError("No recording was given; name at least one file.")
@@ -34,11 +30,7 @@ def robot_of(recordings: Sequence[Recording]) -> str:
 
 
 def check_recordings(recordings: Sequence[Recording], robot: Robot) -> None:
-    """Refuse recordings of another leg, or without the commands that their rig was driven by.
-
-    Raises:
-        RecordingError: Naming the file and what is wrong.
-    """
+    """Raise RecordingError for another leg's recordings, or ones without their rig's commands."""
     for recording in recordings:
         wanted, what = "position_command", "targets of its on-board PD"
         if recording.metadata.onboard == "torque":
@@ -176,11 +168,8 @@ def _tells_gain(recording: Recording) -> bool:
 
 
 def _open_gains(recordings: Sequence[Recording]) -> list[str]:
-    found = []
-    for gain in _GAINS:
-        if any(_is_open(r, gain) for r in recordings):
-            found += [f"drive.{joint}.{gain}" for joint in JOINTS]
-    return found
+    found = [gain for gain in _GAINS if any(_is_open(r, gain) for r in recordings)]
+    return [f"drive.{joint}.{gain}" for gain in found for joint in JOINTS]
 
 
 def _is_open(recording: Recording, gain: str) -> bool:

@@ -107,10 +107,7 @@ def recording_of(
 
     Each row holds what the drives reported when the command of the row was computed; ticks without
     a reply have no measurement. The joint PD runs on the host, once per row; ``believed`` is the
-    robot file that the recording is filed under.
-
-    Raises:
-        RecordingError: The excitation was not played, or the recording cannot be believed.
+    robot file that the recording is filed under. RecordingError says that it was not played.
     """
     lacking = [column for column in MEASURED + _TARGETS if column not in trace.table.columns]
     if lacking:

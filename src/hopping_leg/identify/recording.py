@@ -29,10 +29,8 @@ from hopping_leg.identify.unit_checks import STALL, Inspection, row_period
 from hopping_leg.io import read_dataclass
 from hopping_leg.trace import Trace
 
-_KEY = "recording"
-_FLAGS = {"true": 1.0, "false": 0.0}
-_PARQUET = b"PAR1"
-_GZIP = b"\x1f\x8b"
+_KEY, _FLAGS = "recording", {"true": 1.0, "false": 0.0}
+_PARQUET, _GZIP = b"PAR1", b"\x1f\x8b"
 
 
 def _read_csv(content: bytes, origin: str) -> pl.DataFrame:
@@ -136,11 +134,7 @@ class Recording:
         return bool(np.isfinite(self.array(quantity)).any())
 
     def array(self, quantity: str) -> Array:
-        """Return a quantity of ``PAIRS``, (ticks, 2), NaN where it was not recorded.
-
-        Raises:
-            UsageError: There is no such quantity.
-        """
+        """Return a quantity of ``PAIRS``, (ticks, 2), NaN if not recorded; others UsageError."""
         if quantity not in PAIRS:
             raise UsageError(unknown_name("quantity of a recording", quantity, PAIRS))
         return np.stack([float_column(self.trace.table, c) for c in PAIRS[quantity]], axis=-1)
@@ -157,11 +151,7 @@ class Recording:
         return dataclasses.replace(self, metadata=dataclasses.replace(self.metadata, **changes))
 
     def save(self, path: Path) -> None:
-        """Write the native form.
-
-        Raises:
-            TraceError: The file cannot be written.
-        """
+        """Write the native form, or raise TraceError if that fails."""
         tree = dataclasses.asdict(self.metadata).items()
         header = {**self.trace.header, _KEY: {k: v for k, v in tree if v is not None}}
         Trace(self.trace.table, header).save(path)
@@ -179,10 +169,7 @@ def make_recording(
     """Check a table in the columns of ``COLUMNS`` and return it as a recording.
 
     Messages name the file, and its own columns by ``names`` where they differ from a recording's;
-    ``header`` is further entries for the file's header, ``digest`` the hash of the file.
-
-    Raises:
-        RecordingError: The table cannot be believed; names file, column and row.
+    RecordingError says that the table cannot be believed.
     """
     table = _cast(table, COLUMNS, name).with_columns(pl.selectors.float().fill_nan(None))
     inspection = Inspection(table, metadata, name, names or {})
@@ -192,9 +179,7 @@ def make_recording(
 
 
 def load_recording(path: str | Path) -> Recording:
-    """Load a recording: native Parquet, a table with a sidecar, or a known rig's log.
-
-    The sidecar of ``run.csv`` or ``run.csv.gz`` is ``run.toml`` beside it.
+    """Load native Parquet, a table with a sidecar, ``run.toml``, or a known rig's log.
 
     Raises:
         RecordingError: It cannot be read or believed; names file, column and row.
@@ -210,15 +195,15 @@ def load_recording(path: str | Path) -> Recording:
     if not content:
         raise RecordingError(f"{path} is empty; record again.")
     digest = hashlib.sha256(content).hexdigest()
-    table, header = (
-        _native(path) if content.startswith(_PARQUET) else (_read_csv(content, origin), {})
-    )
+    native = content.startswith(_PARQUET)
+    table, header = _native(path) if native else (_read_csv(content, origin), {})
     sidecar = _sidecar(path)
     names: dict[str, str] = {}
     if sidecar is not None:
         table, metadata, names = _apply(sidecar, table, origin)
     elif _KEY in header:
-        metadata = _read_metadata(header.pop(_KEY), origin)
+        tree = header.pop(_KEY)
+        metadata = read_dataclass(RecordingMetadata, tree, origin, error=RecordingError)
     else:
         importer = recognise(table.columns)
         if importer is None:
@@ -279,11 +264,7 @@ def _apply(
     table = table.with_columns(pl.col(old).alias(new) for new, old in names.items())
     if "row" not in table.columns:
         table = table.with_columns(pl.int_range(pl.len()).alias("row"))
-    return table, _read_metadata(tree, file), names
-
-
-def _read_metadata(tree: object, origin: str) -> RecordingMetadata:
-    return read_dataclass(RecordingMetadata, tree, origin, error=RecordingError)
+    return table, read_dataclass(RecordingMetadata, tree, file, error=RecordingError), names
 
 
 def _cast(table: pl.DataFrame, kinds: Mapping[str, type[pl.DataType]], origin: str) -> pl.DataFrame:

@@ -24,11 +24,7 @@ _SMALL_MOTION = 0.5  # below it, rad, positions may be revolutions
 
 
 def check_table(inspection: Inspection) -> None:
-    """Leave in the inspection's table what can be believed, and warn of what was strange.
-
-    Raises:
-        RecordingError: Naming file, column and row.
-    """
+    """Leave what can be believed in the table, warn of the rest, or raise RecordingError."""
     if inspection.table.height == 0:
         raise RecordingError(f"{inspection.origin} has no rows below its header; record again.")
     if "time_s" not in inspection.table.columns:

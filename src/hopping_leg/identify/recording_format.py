@@ -65,23 +65,16 @@ Pair = tuple[float, float]
 
 @dataclass(frozen=True)
 class Quantisation:
-    """Steps of the sensors; 0 where they are too fine to matter."""
+    """Steps of the sensors, rad, rad/s and N m; 0 where they are too fine to matter."""
 
     position: float = 0.0
-    """rad"""
     velocity: float = 0.0
-    """rad/s"""
     torque: float = 0.0
-    """N m"""
 
 
 @dataclass(frozen=True)
 class RecordingMetadata:
-    """How a recording was made; pairs are (hip, knee).
-
-    Raises:
-        RecordingError: A value is impossible.
-    """
+    """How a recording was made; pairs are (hip, knee). Impossible values raise RecordingError."""
 
     rig: Rig
     """Where the base is: clamped, on the vertical rail, or on a boom."""

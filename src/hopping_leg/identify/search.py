@@ -157,10 +157,7 @@ def second_pass(
     bounds: Mapping[str, tuple[float, float]],
     start: Mapping[str, float],
 ) -> ParameterSet:
-    """Return the parameters of the paper's second pass from those and the end of the first.
-
-    Bounds and starting values, where they differ from usual, are those of the added parameters.
-    """
+    """Return the second pass's parameters; bounds and starts are those of the added ones."""
     names, added = pass_names(rigs)
     starts, every = {**start}, {**bounds}
     for p, value in zip(first.parameters, first.values(found.vector).tolist(), strict=True):

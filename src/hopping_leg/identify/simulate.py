@@ -43,10 +43,8 @@ class WindowGroup:
     rows may lie anywhere between ticks. Row n holds state and torque before command n acts. A
     ``zoh`` PD is computed once per tick from the simulated state; a ``continuous`` one is the
     actuators' own and acts at every physics step, its target, integral and limits renewed at
-    several ticks a period. Arguments are those of ``WindowSimulator``.
-
-    Raises:
-        UsageError: The physics step is longer than the recording's period.
+    several ticks a period. Arguments are those of ``WindowSimulator``. UsageError says that the
+    physics step is longer than the period.
     """
 
     def __init__(
@@ -281,10 +279,8 @@ class WindowSimulator:
     Windows of the same rig, rate and on-board controller share one ``mujoco.batch.Batch``; results
     do not depend on the number of threads, nor on what else is simulated beside a hypothesis.
 
-    The physics step, s, is the training's own by default; 0 threads are one per core.
-
-    Raises:
-        UsageError: There is no window.
+    The physics step, s, is the training's own by default; 0 threads are one per core. No
+    window raises UsageError.
     """
 
     def __init__(
@@ -313,9 +309,7 @@ class WindowSimulator:
     def run(self, hypotheses: Sequence[LegHypothesis]) -> SimulatedWindows:
         """Simulate every window with every hypothesis.
 
-        Raises:
-            RecordingError: A recording and its hypothesis leave a needed gain open.
-            RobotError: A hypothesis's robot is impossible.
+        RecordingError says that a needed gain is open, RobotError that a robot is impossible.
         """
         shape = (len(hypotheses), len(self.windows), self.rows, 2)
         position, velocity, torque = (np.full(shape, np.nan) for _ in range(3))

@@ -41,13 +41,9 @@ def validate(
     timestep: float = TIMESTEP,
     threads: int = 0,
 ) -> Validation:
-    """Judge a hypothesis on recordings, best those that no fit has seen.
+    """Judge a hypothesis on recordings; one that is shorter than a horizon is left out there.
 
-    A recording that is shorter than a horizon is left out there. The timestep is in s; 0 threads
-    are one per core.
-
-    Raises:
-        RecordingError: A recording is too short to judge anything.
+    The timestep is in s. RecordingError says that a recording is too short to judge anything.
     """
     controlled = [r for r in recordings if r.metadata.onboard != "torque"]
     windows = cut(controlled, None, unscored=_unscored(recordings))

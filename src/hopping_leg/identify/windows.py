@@ -95,9 +95,8 @@ def hold_out(
 ) -> tuple[list[Recording], list[Recording]]:
     """Split recordings into what is fitted and what judges the fit.
 
-    Each is cut into stretches of equal length, of which every fourth is held out, so that each
-    part of an excitation stands on both sides; ``rng`` decides where the counting begins. A short
-    recording gives its last quarter. No stretch to fit is shorter than a window, s.
+    Every fourth of equal stretches is held out, counted from a random one; a short recording gives
+    its last quarter. No stretch to fit is shorter than a window, s.
 
     Raises:
         RecordingError: A recording is too short to be split.
@@ -105,10 +104,8 @@ def hold_out(
     fit: list[Recording] = []
     held: list[Recording] = []
     for recording in recordings:
-        whole = duration(recording)
-        least = max(
-            _SHARE * SHORTEST, window * _SHARE / (_SHARE - 1) + 2 * recording.metadata.period
-        )
+        whole, spare = duration(recording), 2 * recording.metadata.period
+        least = max(_SHARE * SHORTEST, window * _SHARE / (_SHARE - 1) + spare)
         if whole < least:
             raise RecordingError(
                 f"{recording.name} is too short: {whole:.3g} s, but {least:.3g} s are needed to"
