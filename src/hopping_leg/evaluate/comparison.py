@@ -25,7 +25,6 @@ class Compared:
     """Runs beside each other."""
 
     runs: tuple[StoredRun, ...]
-    """As named, in that order."""
     evaluation: Evaluation
     """All evaluations as one; empty if there are trainings alone."""
     differences: list[dict[str, str]]
@@ -74,11 +73,11 @@ def set_beside(runs: Sequence[StoredRun]) -> Compared:
 def traces_of(compared: Compared) -> list[Run]:
     """Load the first sequence and staircase of every controller, where traces were kept."""
     found = []
+    others = {run.label: run.evaluation for run in compared.runs if run.evaluation}
     for stored in compared.runs:
         evaluation = stored.evaluation
         if evaluation is None or stored.traces is None:
             continue
-        others = {r.label: r.evaluation for r in compared.runs if r.evaluation}
         name = _name(others, stored.label)
         for kind in ("sequence", "staircase"):
             runs = [load_run(path) for path in sorted(stored.traces.glob(f"*-{kind}-0.parquet"))]
@@ -99,11 +98,7 @@ def training_row(label: str, result: dict[str, Any]) -> dict[str, Any]:
     selected = result["selected"]
     return {
         "label": label,
-        "recipe": result["recipe"],
-        "robot": result["robot"],
-        "seed": result["seed"],
-        "minutes": result["minutes"],
-        "steps": result["steps"],
+        **{name: result[name] for name in ("recipe", "robot", "seed", "minutes", "steps")},
         "selected_steps": selected["steps"],
         "selected_score_m": selected["score_m"],
         "curve": [
@@ -196,6 +191,7 @@ def _notes(runs: Sequence[StoredRun], differences: list[dict[str, str]]) -> list
 def write_comparison(compared: Compared, command: str = "") -> bytes:
     """Return the comparison as HTML, with the command that makes the page again."""
     evaluation = compared.evaluation
+    differing = next(iter(compared.differences), {})
     rows = [training_row(label, training) for label, training in compared.trainings.items()]
     histories = {label: training["history"] for label, training in compared.trainings.items()}
     pictures = pictures_of(evaluation, traces_of(compared)) if evaluation.summary else []
@@ -209,11 +205,7 @@ def write_comparison(compared: Compared, command: str = "") -> bytes:
         learning=svg_uri(draw_learning(histories)) if histories else "",
         trainings=table(_TRAINING, rows),
         differences=table(
-            [
-                column(name.removeprefix("in "), name)
-                for name in next(iter(compared.differences), {})
-            ],
-            compared.differences,
+            [column(name.removeprefix("in "), name) for name in differing], compared.differences
         ),
         commands={run.label: command_of(run) for run in compared.runs},
     )

@@ -18,17 +18,10 @@ from hopping_leg.figure_style import COLOURS, COMMAND_COLOUR, WIDTH, colour, sty
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE, trace_hops
 from hopping_leg.trace import Trace
 
-_PHASE_SPACE_SECONDS = 10.0
-"""Length of the paper's trial, s."""
-
-_ESTIMATE_SECONDS = 3.0
-"""Time in which estimate and truth are drawn, s."""
-
-_ENOUGH = 5
-"""Hops from which on a shape is drawn around the dots."""
-
-_COLUMNS = 4
-"""Panels of robustness beside each other."""
+_PHASE_SPACE_SECONDS = 10.0  # of the paper's trial
+_ESTIMATE_SECONDS = 3.0  # in which estimate and truth are drawn
+_ENOUGH = 5  # hops from which on a shape is drawn around the dots
+_COLUMNS = 4  # panels of robustness beside each other
 
 
 @styled
@@ -67,12 +60,8 @@ def _draw_heights(axes: Axes, trace: Trace, paint: str, *, with_labels: bool) ->
 def draw_phase_space(trace: Trace, title: str = "") -> Figure:
     """Draw the torque the controller asked of the knee at every configuration it met.
 
-    Line: one example phase; circle: its start; diamond: its end.
-
-    Args:
-        trace: A run at a constant command; 10 s after the start are drawn, or what there is of
-            a shorter one.
-        title: Title of the figure.
+    Line: one example phase; circle: its start; diamond: its end. Of a run at a constant command
+    10 s after the start are drawn, or what there is of a shorter one.
     """
     time = trace.column("time_s")
     chosen = (time >= START_SECONDS) & (time < START_SECONDS + _PHASE_SPACE_SECONDS)
@@ -236,11 +225,7 @@ def draw_robustness(result: dict[str, Any]) -> Figure:
 
 @styled
 def draw_learning(histories: Mapping[str, Sequence[Mapping[str, Any]]]) -> Figure:
-    """Draw the snapshots of each training as a line, the best one as a dot.
-
-    Args:
-        histories: Label to the snapshots of a training: ``steps``, ``minutes``, ``score_m``.
-    """
+    """Draw the snapshots of each training, by label, as a line, the best one as a dot."""
     figure = Figure(figsize=(WIDTH, 3.2), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
     shown = (("steps", 1e-6, "experience / million steps"), ("minutes", 1.0, "time / min"))

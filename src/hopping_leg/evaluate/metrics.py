@@ -13,11 +13,8 @@ from hopping_leg.hop_detection import COLUMNS, measure_hops, trace_hops
 from hopping_leg.robot.parameters import JOINTS
 from hopping_leg.trace import Trace
 
-START_SECONDS = 2.0
-"""Hops dropped after the standing start, s."""
-
-SWITCH_SECONDS = 1.0
-"""Hops dropped after a change of command, s."""
+START_SECONDS = 2.0  # in which hops are dropped after the standing start
+SWITCH_SECONDS = 1.0  # in which hops are dropped after a change of command
 
 
 @dataclass(frozen=True)
@@ -26,7 +23,6 @@ class HopWindow:
 
     Apexes, skipped hops and flight are taken after the start (2 s) or switch (1 s) has settled;
     heights, sink, contacts and torques over the whole stretch.
-
     """
 
     command: float
@@ -139,11 +135,7 @@ def has_estimate(trace: Trace) -> bool:
 
 
 def judge_estimator(controller: str, traces: Sequence[Trace]) -> Estimator | None:
-    """Compare estimated with true heights over all runs, the first 2 s left out.
-
-    Returns:
-        None where the controller records no estimate.
-    """
+    """Compare estimated with true heights after the first 2 s; None where there is no estimate."""
     estimating = [trace for trace in traces if has_estimate(trace)]
     if not estimating:
         return None

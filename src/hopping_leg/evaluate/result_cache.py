@@ -22,11 +22,7 @@ class ResultCache:
     ) -> dict[str, Any]:
         """Return the kept result of the same work, or do it and keep its result.
 
-        Args:
-            name: Name of the result's file.
-            words: What the work is, for whoever waits.
-            asked: All that the result depends on, as JSON values.
-            work: Returns JSON values.
+        ``asked`` is all that the result depends on; it and the result are JSON values.
         """
         file = self.folder / f"{name}.json"
         asked = json.loads(json.dumps(asked))

@@ -34,10 +34,7 @@ class StoredRun:
 
 
 def read_runs(names: Sequence[str]) -> list[StoredRun]:
-    """Read runs; each is named by the part of its path that tells it from the others.
-
-    Args:
-        names: Paths, each perhaps as ``LABEL=PATH``.
+    """Read runs, named by what of their paths tells them apart, or by LABEL of LABEL=PATH.
 
     Raises:
         UsageError: A path is no run, or two have the same name.

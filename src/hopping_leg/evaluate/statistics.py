@@ -55,16 +55,8 @@ def median_interval(
 ) -> tuple[float, float]:
     """Return the bootstrap interval of the median over all values.
 
-    Whole runs are resampled, because the hops of one run depend on each other; with a single run
-    its hops are.
-
-    Args:
-        runs: Values of each run, (hops,) each.
-        seed: Seed of the resampling.
-        resamples: How many.
-
-    Returns:
-        The 95 % percentile interval; NaN without values.
+    Whole runs, (hops,) each, are resampled, because the hops of one run depend on each other; with
+    a single run its hops are. Without values the 95 % percentile interval is NaN.
     """
     filled = [known for r in runs if len(known := r[np.isfinite(r)])]
     units = filled if len(filled) > 1 else [np.array([v]) for r in filled for v in r]
@@ -88,12 +80,7 @@ def bootstrap(
 ) -> tuple[float, float]:
     """Return the 95 % percentile interval of a statistic, every sample resampled on its own.
 
-    Args:
-        samples: Each is an argument of the statistic.
-        statistic: Function of the samples; if vectorized, with an argument ``axis``.
-        seed: Seed of the resampling.
-        resamples: How many.
-        vectorized: Whether the statistic takes many resamples at once.
+    Each sample is an argument of the statistic, which if vectorized has an argument ``axis``.
     """
     interval = stats.bootstrap(
         samples,

@@ -1,8 +1,6 @@
 """The paper's trials (Sec. III): what is commanded when, on which floor, and runs of them."""
 
-import itertools
 import math
-import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,30 +17,19 @@ from hopping_leg.trace import Trace
 
 COMMANDS = (0.25, 0.30, 0.35)
 """Apex heights the paper trains and tests, m, for a leg of ``PAPER_HEIGHT``."""
-
 STAIRCASE = (0.25, 0.27, 0.29, 0.31, 0.33, 0.35)
 """Commands of the 30 s trial, m, 5 s each (Fig. 5)."""
-
 LADDER = (0.22, 0.24, 0.26, 0.28, 0.30, 0.32, 0.34, 0.36, 0.38, 0.40)
 """Commands that show how a controller interpolates and where it ends, m."""
-
-PAPER_HEIGHT = 0.30
-"""Straight height of the leg that the paper's commands were made for, m."""
-
+PAPER_HEIGHT = 0.30  # straight, of the leg that the commands were made for, m
 KINDS = ("fixed", "sequence", "staircase", "ladder")
-"""Kinds of trial."""
-
 FIXED_SECONDS = 15.0
 STEP_SECONDS = 5.0
 
 
 @dataclass(frozen=True)
 class Trial(CommandSchedule):
-    """A command schedule, started from standing.
-
-    Attributes:
-        kind: One of ``KINDS``.
-    """
+    """A command schedule, started from standing; ``kind`` is one of ``KINDS``."""
 
     kind: str
 
@@ -59,11 +46,7 @@ def scaled(heights: Sequence[float], robot: Robot) -> tuple[float, ...]:
 
 
 def paper_trials(robot: Robot, commands: Sequence[float] | None = None) -> list[Trial]:
-    """Return all trials of an evaluation.
-
-    Args:
-        robot: The leg; the paper's heights scale with its length.
-        commands: Heights of the fixed trials and the sequence, m; the paper's by default.
+    """Return all trials of an evaluation; ``commands``, m, are those of the fixed ones.
 
     Raises:
         UsageError: A command is out of the leg's reach.
@@ -109,10 +92,9 @@ def check_repeats(repeats: int) -> None:
 
 def within(trial: Trial, bounds: tuple[float, float] | None) -> bool:
     """Tell whether all commands of a trial lie within a controller's range."""
-    slack = 1e-9
-    return bounds is None or all(
-        bounds[0] - slack <= c <= bounds[1] + slack for c, _ in trial.steps
-    )
+    if bounds is None:
+        return True
+    return all(bounds[0] - 1e-9 <= c <= bounds[1] + 1e-9 for c, _ in trial.steps)
 
 
 FLOORS = {"soft": "the robot's own contact", "stiff": "MuJoCo's default contact, solref 0.02 1"}
@@ -124,14 +106,7 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True)
 class Run:
-    """One trial with one realisation of noise and delay.
-
-    Attributes:
-        controller: As named on the command line.
-        trial: What was commanded.
-        repeat: Number of the realisation, from 0.
-        trace: What happened.
-    """
+    """One trial with one realisation of noise and delay, numbered by ``repeat`` from 0."""
 
     controller: str
     trial: Trial
@@ -181,18 +156,10 @@ def run_trials(
 ) -> list[Run]:
     """Record all trials of one controller; those of equal length run as one batch.
 
-    Args:
-        label: The controller's name in tables and traces.
-        controller: Controls all legs of a batch at once.
-        setup: The world.
-        trials: What is commanded.
-        repeats: Realisations of noise and delay per trial.
-        seed: All of them follow from it.
-        on_progress: Called with the share done.
+    Each has so many realisations of noise and delay, which follow from the seed.
     """
-    seconds = operator.attrgetter("seconds")
-    ordered = sorted(trials, key=seconds)
-    batches = [list(group) for _, group in itertools.groupby(ordered, key=seconds)]
+    lengths = sorted({trial.seconds for trial in trials})
+    batches = [[t for t in trials if t.seconds == length] for length in lengths]
     total = sum(len(b) * b[0].seconds for b in batches)
     done = 0.0
     runs: list[Run] = []
@@ -217,10 +184,9 @@ def run_trials(
 
 def save_traces(runs: Sequence[Run], directory: Path) -> list[Path]:
     """Write the trace of every run; return the files."""
-    paths = [directory / run.file_name for run in runs]
-    for run, path in zip(runs, paths, strict=True):
-        run.trace.save(path)
-    return paths
+    for run in runs:
+        run.trace.save(directory / run.file_name)
+    return [directory / run.file_name for run in runs]
 
 
 def load_run(path: Path) -> Run:

@@ -26,22 +26,13 @@ from hopping_leg.robot import Robot, get_spec
 from hopping_leg.trace import Trace
 
 Animation = Literal["webp", "gif"]
-"""Kinds of files that move."""
-
 BACKENDS = ("egl", "osmesa")
 """Ways to OpenGL without a screen, in the order of trying."""
-
 CLIP_SECONDS = 1.2
-FRAME_RATE = 33.3
-"""Frames per second of simulated time."""
-
+FRAME_RATE = 33.3  # frames per second of simulated time
 SLOWDOWN = 2.0
-SIZE = (220, 300)
-"""Width and height of one command's picture, pixels."""
-
-TIMEOUT = 120.0
-"""Given to one backend, s."""
-
+SIZE = (220, 300)  # width and height of one command's picture, pixels
+TIMEOUT = 120.0  # given to one backend, s
 _ENCODING: dict[str, dict[str, Any]] = {
     ".webp": {"quality": 60, "method": 4},
     ".gif": {"optimize": True},
@@ -54,9 +45,7 @@ class Video:
     """An animation, or the reason why there is none."""
 
     content: bytes | None
-    """The file."""
     reason: str = ""
-    """What stood in the way, empty if nothing did."""
 
 
 def fixed_traces(runs: Sequence[Run], controller: str) -> dict[float, Trace]:
@@ -69,13 +58,7 @@ def fixed_traces(runs: Sequence[Run], controller: str) -> dict[float, Trace]:
 
 
 def render_video(robot: Robot, traces: Mapping[float, Trace], kind: Animation = "webp") -> Video:
-    """Render a hop at every command side by side, at half speed.
-
-    Args:
-        robot: The leg.
-        traces: Command in m to a run at it.
-        kind: Kind of file.
-    """
+    """Render a hop at every command side by side, at half speed, given a run at each, m."""
     commands = list(traces)
     poses = np.stack([clip(trace) for trace in traces.values()])
     with tempfile.TemporaryDirectory() as folder:
@@ -95,11 +78,7 @@ def render_video(robot: Robot, traces: Mapping[float, Trace], kind: Animation = 
 
 
 def clip(trace: Trace) -> Array:
-    """Return the poses of a clip that begins at the first apex after the start.
-
-    Returns:
-        Height, hip and knee, m and rad, (frames, 3).
-    """
+    """Return height, hip and knee, m and rad, (frames, 3), from the first apex after the start."""
     time = trace.column("time_s")
     names = ("height_m", "hip_position_rad", "knee_position_rad")
     pose = np.stack([trace.column(name) for name in names], axis=1)

@@ -84,13 +84,8 @@ OVERALL = "overall"
 def share(axes: Sequence[Sequence[Array]], seed: int) -> tuple[float, float, float]:
     """Return the mean over axes of the mean over levels of the share of successes.
 
-    Args:
-        axes: Per axis and level: 1 for every successful trial, 0 for the others, (trials,).
-        seed: Seed of the bootstrap.
-
-    Returns:
-        The share, and its 95 % bootstrap interval, in which trials are resampled within their
-        level; NaN for the interval where a level has one trial alone.
+    Its 95 % bootstrap interval follows, in which trials (1 for a success, 0 else) are resampled
+    within their level; NaN where a level has one trial alone.
     """
     levels = [level for axis in axes for level in axis]
     weights = np.array([1 / len(axis) for axis in axes for _ in axis]) / len(axes)

@@ -73,17 +73,9 @@ def make_trials(
     levels: Sequence[float] | None = None,
     seconds: float = SECONDS,
 ) -> AxisTrials:
-    """Lay down all trials of an axis.
+    """Lay down all trials of an axis, some realisations of each of its levels and commands, m.
 
-    Args:
-        axis: Name of the axis.
-        robot: What controllers believe.
-        commands: Desired apex heights, m.
-        repeats: Realisations of each level and command.
-        seed: All randomness follows from it.
-        rate: Control rate, Hz.
-        levels: Instead of the axis' own.
-        seconds: Duration of each trial, s.
+    Other ``levels`` stand in for the axis' own.
 
     Raises:
         UsageError: There is no such axis.
