@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import mujoco
 import numpy as np
 from hypothesis import strategies as st
 
@@ -40,3 +41,11 @@ def random_state(rng: np.random.Generator, count: int = 1):
         rng.uniform(-3, 3, (count, 2)),
         rng.normal(0, 10, (count, 2)),
     )
+
+
+def posed(model, height, rate, q, qd):
+    """Return the data of a MuJoCo model in the first of some states."""
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = [height[0], *q[0]], [rate[0], *qd[0]]
+    mujoco.mj_forward(model, data)
+    return data

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hopping_leg.robot import build_model, kinematics, load_robot
-from tests.robot.legs import SEEDS, random_robot, random_state
+from tests.robot.legs import SEEDS, posed, random_robot, random_state
 
 angles = st.tuples(st.floats(-3.1, 3.1), st.floats(-3.1, -0.02)).map(np.array)
 
@@ -34,17 +34,6 @@ def test_the_straight_leg_is_within_reach():
     np.testing.assert_allclose(q, 0, atol=1e-6)
 
 
-@given(SEEDS, angles)
-def test_jacobian_equals_the_finite_difference(seed, q):
-    robot, step = random_robot(np.random.default_rng(seed)), 1e-6
-    columns = [
-        (kinematics.foot_position(robot, q + d) - kinematics.foot_position(robot, q - d))
-        / (2 * step)
-        for d in np.eye(2) * step
-    ]
-    np.testing.assert_allclose(kinematics.jacobian(robot, q), np.stack(columns, -1), atol=1e-8)
-
-
 @settings(max_examples=25)
 @given(SEEDS)
 def test_foot_and_clearances_agree_with_mujoco(seed):
@@ -52,10 +41,7 @@ def test_foot_and_clearances_agree_with_mujoco(seed):
     robot = random_robot(rng)
     height, rate, q, qd = random_state(rng)
     model = build_model(robot)
-    data = mujoco.MjData(model)
-    data.qpos[:] = [height[0], *q[0]]
-    data.qvel[:] = [rate[0], *qd[0]]
-    mujoco.mj_forward(model, data)
+    data = posed(model, height, rate, q, qd)
     foot = data.site("foot").xpos
     down, forward = kinematics.foot_position(robot, q)[0]
     np.testing.assert_allclose([height[0] - down, forward], foot[[2, 0]], atol=1e-12)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 
 from hopping_leg.robot import dynamics, load_robot, shipped_robots, to_urdf
-from tests.robot.legs import SEEDS, random_robot, random_state
+from tests.robot.legs import SEEDS, posed, random_robot, random_state
 
 
 @settings(max_examples=25)
@@ -17,10 +17,7 @@ def test_mujoco_reads_the_same_dynamics_from_the_urdf(seed):
     model = mujoco.MjModel.from_xml_string(to_urdf(robot))
     assert [model.joint(i).name for i in range(3)] == ["rail", "hip", "knee"]
     height, rate, q, qd = random_state(rng)
-    data = mujoco.MjData(model)
-    data.qpos[:] = [height[0], *q[0]]
-    data.qvel[:] = [rate[0], *qd[0]]
-    mujoco.mj_forward(model, data)
+    data = posed(model, height, rate, q, qd)
     full = np.zeros((3, 3))
     mujoco.mj_fullM(model, data, full)
     full += np.diag([0, robot.hip.armature, robot.knee.armature])

@@ -4,10 +4,16 @@ import dataclasses
 
 import numpy as np
 
+from hopping_leg.robot import ModelMismatch, load_robot
 from hopping_leg.robot.dynamics import kinetic_energy, potential_energy
 from hopping_leg.sim import MujocoSimulator
 
 POSTURE = np.array([0.7, -1.4])
+
+
+def with_reality(robot=None, **parts):
+    """Return a robot, legv2 unless given, with some effects of ``[reality]``."""
+    return dataclasses.replace(robot or load_robot("legv2"), reality=ModelMismatch(**parts))
 
 
 def without_friction(robot, *, damping=False):

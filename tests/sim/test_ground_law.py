@@ -37,12 +37,8 @@ def test_the_law_is_mujocos_contact(name):
     forces = law.force(states, torques)
     np.testing.assert_allclose(forces[lone], expected[lone], rtol=2e-3, atol=0.05)
     assert np.count_nonzero(forces[lone, 0]) > 50
-
-
-def test_the_foot_in_the_air_feels_nothing():
-    robot = load_robot("legv2-paper")
-    state = np.array([[1.0, 0.7, -1.4, -1.0, 0.0, 0.0]])
-    np.testing.assert_array_equal(GroundLaw(robot).force(state, np.zeros((1, 2))), 0.0)
+    states[:, 0] = 1.0
+    np.testing.assert_array_equal(law.force(states, torques), 0.0)
 
 
 def test_the_spring_is_the_law_at_rest():

@@ -9,21 +9,16 @@ from hopping_leg.robot import (
     GroundMismatch,
     Latency,
     MassScale,
-    ModelMismatch,
     SensorMismatch,
     load_robot,
 )
 from hopping_leg.sim import NO_NOISE, MujocoSimulator, NoiseAndDelay, Plant
 from hopping_leg.sim.mismatch_model import mismatch_model
-from tests.sim.legs import POSTURE
+from tests.sim.legs import POSTURE, with_reality
 
 CAD = load_robot("legv2")
 IDLE = DriveMismatch(stiction_speed=1.0)
 """Differs from the neutral drive in a number without effect, so that the effects' code runs."""
-
-
-def with_reality(robot=CAD, **parts):
-    return dataclasses.replace(robot, reality=ModelMismatch(**parts))
 
 
 def hanging(robot, count=1):
@@ -77,10 +72,17 @@ def test_a_neutral_table_does_not_change_the_digest():
     assert with_reality(hip=DriveMismatch(backlash=1e-3)).digest != CAD.digest
 
 
-def test_same_seed_same_bytes_at_any_thread_count():
-    twin = load_robot("twin")
-    assert tracked(twin, seed=4).tobytes() == tracked(twin, seed=4, threads=3).tobytes()
-    assert tracked(twin, seed=4).tobytes() != tracked(twin, seed=5).tobytes()
+@pytest.mark.parametrize(
+    ("name", "disturbance"), [("twin", NO_NOISE), ("legv2-paper", NoiseAndDelay())]
+)
+def test_same_seed_same_bytes_at_any_thread_count(name, disturbance):
+    robot = load_robot(name)
+    one, other, *more = (
+        tracked(robot, seed=seed, disturbance=disturbance, threads=threads).tobytes()
+        for seed, threads in ((4, 1), (5, 1), (4, 2), (4, 3))
+    )
+    assert more == [one, one]
+    assert one != other
 
 
 @pytest.mark.parametrize("name", ["twin", "legv2"])

@@ -6,16 +6,12 @@ import numpy as np
 import pytest
 
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import DriveMismatch, Latency, ModelMismatch, SensorMismatch, load_robot
+from hopping_leg.robot import DriveMismatch, Latency, SensorMismatch, load_robot
 from hopping_leg.sim import MujocoSimulator
 from hopping_leg.sim.perturbation import Perturbation, Perturber
-from tests.sim.legs import POSTURE, without_friction
+from tests.sim.legs import POSTURE, with_reality, without_friction
 
 LEG = load_robot("legv2")
-
-
-def real(**parts):
-    return dataclasses.replace(LEG, reality=ModelMismatch(**parts))
 
 
 def both(**numbers):
@@ -23,10 +19,10 @@ def both(**numbers):
 
 
 DIFFERENT = (
-    real(latency=Latency(command=0.004, measurement=0.001)),
-    real(**both(torque_gain=0.8, torque_lag=0.003)),
-    real(voltage=0.5),
-    real(**both(sensor=SensorMismatch(position_step=0.01))),
+    with_reality(latency=Latency(command=0.004, measurement=0.001)),
+    with_reality(**both(torque_gain=0.8, torque_lag=0.003)),
+    with_reality(voltage=0.5),
+    with_reality(**both(sensor=SensorMismatch(position_step=0.01))),
     dataclasses.replace(LEG, rail=dataclasses.replace(LEG.rail, friction=3.0)),
 )
 
@@ -57,14 +53,14 @@ def test_legs_with_realities_of_their_own_move_as_each_does_alone():
 
 
 def test_backlash_of_different_width_but_not_beside_none():
-    loose = [real(**both(backlash=width)) for width in (0.01, 0.05)]
+    loose = [with_reality(**both(backlash=width)) for width in (0.01, 0.05)]
     together = moved(standing(LEG, 2, robots=loose))
     for index, robot in enumerate(loose):
         np.testing.assert_array_equal(together[:, index], moved(standing(robot))[:, 0])
     with pytest.raises(UsageError, match="backlash"):
         MujocoSimulator(LEG, 2, robots=[loose[0], LEG])
     with pytest.raises(UsageError, match="stiction"):
-        MujocoSimulator(LEG, 2, robots=[LEG, real(**both(stiction=1.5))])
+        MujocoSimulator(LEG, 2, robots=[LEG, with_reality(**both(stiction=1.5))])
 
 
 @pytest.mark.parametrize("detailed", [False, True])
@@ -82,7 +78,7 @@ def test_becoming_the_same_changes_nothing_and_another_only_what_follows(detaile
 def test_a_delay_that_begins_keeps_the_command_under_way():
     legs = standing(LEG, detailed=True)
     legs.step(np.full((1, 2), 2.0))
-    legs.set_robots([real(latency=Latency(command=0.005))])
+    legs.set_robots([with_reality(latency=Latency(command=0.005))])
     np.testing.assert_allclose(legs.step(np.full((1, 2), -3.0)), 2.0)
     np.testing.assert_allclose(legs.step(np.zeros((1, 2))), -3.0)
     with pytest.raises(UsageError, match="detailed"):

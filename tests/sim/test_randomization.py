@@ -1,7 +1,8 @@
 """Each leg of a batch gets its own numbers; a constant delay is the one that twins have."""
 
 import dataclasses
-from operator import attrgetter
+import functools
+from operator import attrgetter, getitem
 
 import numpy as np
 import pytest
@@ -9,16 +10,18 @@ import pytest
 from hopping_leg.envs import HoppingTask, TaskConfig, paper_reward
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.io import replace_at
-from hopping_leg.robot import Latency, ModelMismatch, load_robot
+from hopping_leg.robot import Latency, load_robot, load_tree, robot_text
 from hopping_leg.sim import MujocoSimulator
 from hopping_leg.sim.randomization import (
     IDENTIFIABLE_RANGES,
+    TWIN_RANGES,
     WIDE_RANGES,
     Range,
+    draw_twin,
     normalized,
     sample,
-)
-from tests.sim.legs import POSTURE, assert_as_alone, states
+)  # fmt: skip
+from tests.sim.legs import POSTURE, assert_as_alone, states, with_reality
 
 LEG = load_robot("legv2")
 
@@ -28,9 +31,7 @@ def drawn(count, seed=0, ranges=IDENTIFIABLE_RANGES):
 
 
 def late(delay, **effects):
-    return dataclasses.replace(
-        LEG, reality=ModelMismatch(latency=Latency(command=delay), **effects)
-    )
+    return with_reality(latency=Latency(command=delay), **effects)
 
 
 def with_each(path, *values):
@@ -153,9 +154,9 @@ def test_what_controllers_believe_may_not_vary():
         MujocoSimulator(LEG, 2, robots=drawn(2), clamped=True)
 
 
-def task(seed, ranges=IDENTIFIABLE_RANGES):
+def task(seed, ranges=IDENTIFIABLE_RANGES, robot=LEG):
     options = TaskConfig(randomised=tuple(ranges), reset_distribution="mixed", episode=0.2)
-    return HoppingTask(LEG, 5, options, paper_reward(LEG), np.random.default_rng(seed), 1)
+    return HoppingTask(robot, 5, options, paper_reward(LEG), np.random.default_rng(seed), 1)
 
 
 def heights(one, ticks=80):
@@ -163,11 +164,16 @@ def heights(one, ticks=80):
     return np.stack([one.step(action).height for action in plan])
 
 
-def test_a_randomised_task_repeats_with_its_seed_and_goes_on_exactly():
+def test_a_randomised_task_repeats_with_its_seed():
     np.testing.assert_array_equal(heights(task(0)), heights(task(0)))
     assert not np.array_equal(heights(task(0)), heights(task(1)))
-    one, other = task(0), task(0)
-    heights(one, 30)
+
+
+@pytest.mark.parametrize("robot", [LEG, late(2e-3), late(7e-3)], ids=["prompt", "2 ms", "7 ms"])
+def test_a_task_goes_on_exactly(robot):
+    ranges = IDENTIFIABLE_RANGES if robot is LEG else ()
+    one, other = (task(0, ranges, robot) for _ in range(2))
+    heights(one, 33)
     other.restore(one.state())
     np.testing.assert_array_equal(heights(one), heights(other))
 
@@ -212,25 +218,6 @@ def test_legs_in_motion_become_later_without_losing_a_command():
     np.testing.assert_allclose(given[:, 1, 0], [0, 0, 0, 1])
 
 
-def test_a_range_with_steps_draws_whole_multiples():
-    delay = Range("reality.latency.command", "s", 0.0, 0.02, "test", step=5e-3)
-    robots = drawn(60, ranges=[delay])
-    ticks = {round(r.reality.latency.command / 5e-3, 6) for r in robots}
-    assert ticks == {0, 1, 2, 3, 4}
-
-
-@pytest.mark.parametrize("delay", [2e-3, 7e-3])
-def test_a_late_task_goes_on_exactly(delay):
-    def begin():
-        rng = np.random.default_rng(0)
-        return HoppingTask(late(delay), 5, TaskConfig(episode=0.2), paper_reward(LEG), rng, 1)
-
-    one, other = begin(), begin()
-    heights(one, 33)
-    other.restore(one.state())
-    np.testing.assert_array_equal(heights(one), heights(other))
-
-
 def test_a_leg_that_begins_anew_has_no_command_under_way():
     legs = MujocoSimulator(late(2e-3), 2, threads=1)
     legs.stand(slice(None), POSTURE, 0.1)
@@ -248,3 +235,63 @@ def test_a_number_is_drawn_by_chance_and_is_the_robots_otherwise():
         own = np.array([number(robot) == number(LEG) for robot in robots])
         assert 0.55 < own.mean() < 0.85
     assert sample(LEG, IDENTIFIABLE_RANGES, 3, rng, probability=0.0) == (LEG,) * 3
+
+
+@pytest.mark.parametrize("seed", [0, 1, 17])
+def test_a_twin_is_the_same_after_its_file(tmp_path, seed):
+    twin, file = draw_twin(seed), tmp_path / "twin.toml"
+    twin.save(file)
+    assert load_robot(file) == twin.robot
+    assert load_robot(file).digest == twin.robot.digest
+    assert draw_twin(seed) == twin
+    assert draw_twin(seed + 1).robot != twin.robot
+
+
+def test_every_number_lies_in_its_range_and_fills_it():
+    twins = [draw_twin(seed) for seed in range(60)]
+    for spread in TWIN_RANGES:
+        values = [
+            functools.reduce(getitem, spread.path.split("."), twin.tree)["value"] for twin in twins
+        ]
+        slack = 1e-5 * abs(spread.high)
+        assert min(values) >= spread.low - slack
+        assert max(values) <= spread.high + slack
+        assert max(values) - min(values) >= 0.7 * (spread.high - spread.low)
+
+
+def test_a_twin_can_extend_a_users_file(tmp_path):
+    mine = tmp_path / "mine.toml"
+    mine.write_text('name = "mine"\nextends = "legv1"\n')
+    twin = draw_twin(3, str(mine))
+    twin.save(tmp_path / "elsewhere" / "twin.toml")
+    assert load_robot(tmp_path / "elsewhere" / "twin.toml").thigh.length == twin.robot.thigh.length
+    assert twin.robot.thigh.length == load_robot("legv1").thigh.length
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_drawn_twins_are_simulated(seed):
+    legs = MujocoSimulator(draw_twin(seed).robot, 1, threads=1)
+    legs.stand(slice(None), POSTURE)
+    for _ in range(20):
+        legs.step(10 * (POSTURE - legs.measured_q) - 0.2 * legs.measured_qd)
+    assert abs(legs.q - POSTURE).max() < 0.5
+    assert legs.height[0] > 0.1
+
+
+def test_what_is_written_reads_back(tmp_path):
+    tree = load_tree("twin")
+    file = tmp_path / "again.toml"
+    file.write_text(robot_text(tree, "a comment\nof two lines"))
+    assert load_tree(file) == tree
+    assert file.read_text().startswith("# a comment\n# of two lines\n")
+
+
+@pytest.mark.parametrize(("low", "high", "scale"), [(2, 1, "uniform"), (0, 1, "logarithmic")])
+def test_an_impossible_range_is_refused(low, high, scale):
+    with pytest.raises(UsageError, match=r"hip\.friction"):
+        Range("hip.friction", "N m", low, high, "[C]", scale)
+
+
+def test_a_negative_seed_is_refused():
+    with pytest.raises(UsageError, match="seed of -1"):
+        draw_twin(-1)

@@ -9,7 +9,8 @@ the links' upper joints, s12 = sin(q1 + q2) and so on:
     forward:             c1 sin q1                 forward:             l sin q1 + c2 sin q12
 
 Armature, the motors' reflected inertia, adds to the diagonal of M: the rotors turn with the joints
-but do not react on the links (as in MuJoCo).
+but do not react on the links (as in MuJoCo). Joint angles, rad, and velocities, rad/s, are
+(..., 2) throughout, base heights, m, (...).
 """
 
 import numpy as np
@@ -20,12 +21,7 @@ from hopping_leg.robot.parameters import Robot
 
 
 def mass_matrix(robot: Robot, q: Array) -> Array:
-    """Return the mass matrix over (rail, hip, knee), (..., 3, 3), kg, kg m and kg m2.
-
-    Args:
-        robot: The leg.
-        q: Hip and knee angle, rad, (..., 2).
-    """
+    """Return the mass matrix over (rail, hip, knee), (..., 3, 3), kg, kg m and kg m2."""
     thigh, shank = robot.thigh, robot.shank
     lever = shank.mass * shank.com
     coupling = lever * thigh.length * np.cos(q[..., 1])
@@ -43,24 +39,13 @@ def mass_matrix(robot: Robot, q: Array) -> Array:
 
 
 def gravity_force(robot: Robot, q: Array) -> Array:
-    """Return the forces that hold the leg against gravity, dV/dp, (..., 3), N and N m.
-
-    Args:
-        robot: The leg.
-        q: Hip and knee angle, rad, (..., 2).
-    """
+    """Return the forces that hold the leg against gravity, dV/dp, (..., 3), N and N m."""
     rail = np.full(q.shape[:-1], robot.mass)
     return GRAVITY * np.stack([rail, *_rail_coupling(robot, q)], axis=-1)
 
 
 def bias_force(robot: Robot, q: Array, qd: Array) -> Array:
-    """Return gravity, Coriolis and centrifugal forces b(p, p'), (..., 3), N and N m.
-
-    Args:
-        robot: The leg.
-        q: Hip and knee angle, rad, (..., 2).
-        qd: Joint velocities, rad/s, (..., 2).
-    """
+    """Return gravity, Coriolis and centrifugal forces b(p, p'), (..., 3), N and N m."""
     thigh, shank = robot.thigh, robot.shank
     q1, q2, q12 = q[..., 0], q[..., 1], q[..., 0] + q[..., 1]
     w1, w2, w12 = qd[..., 0], qd[..., 1], qd[..., 0] + qd[..., 1]
@@ -74,27 +59,14 @@ def bias_force(robot: Robot, q: Array, qd: Array) -> Array:
 
 
 def kinetic_energy(robot: Robot, q: Array, height_rate: Array, qd: Array) -> Array:
-    """Return the kinetic energy with the rotors', (...), J.
-
-    Args:
-        robot: The leg.
-        q: Hip and knee angle, rad, (..., 2).
-        height_rate: Base velocity, m/s, (...).
-        qd: Joint velocities, rad/s, (..., 2).
-    """
+    """Return the kinetic energy with the rotors', (...), J; the base's speed is in m/s, (...)."""
     speed = np.concatenate([np.asarray(height_rate)[..., None], qd], axis=-1)
     energy: Array = 0.5 * np.einsum("...i,...ij,...j->...", speed, mass_matrix(robot, q), speed)
     return energy
 
 
 def potential_energy(robot: Robot, height: Array, q: Array) -> Array:
-    """Return the potential energy, (...), J; zero where all mass lies at ground level.
-
-    Args:
-        robot: The leg.
-        height: Base height, m, (...).
-        q: Hip and knee angle, rad, (..., 2).
-    """
+    """Return the potential energy, (...), J; zero where all mass lies at ground level."""
     thigh, shank = robot.thigh, robot.shank
     q1, q12 = q[..., 0], q[..., 0] + q[..., 1]
     below = thigh.mass * thigh.com * np.cos(q1) + shank.mass * (

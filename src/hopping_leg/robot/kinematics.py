@@ -11,15 +11,7 @@ from hopping_leg.robot.parameters import Robot
 
 
 def foot_position(robot: Robot, q: Array) -> Array:
-    """Map joint angles to the centre of the foot in the hip's frame.
-
-    Args:
-        robot: The leg.
-        q: Hip and knee angle, rad, (..., 2).
-
-    Returns:
-        Distance below the hip and forward offset (x_down, y), m, (..., 2).
-    """
+    """Return the foot's centre in the hip's frame, (x_down, y), m, (..., 2); angles in rad."""
     thigh, shank = robot.thigh.length, robot.shank.length
     q1, q12 = q[..., 0], q[..., 0] + q[..., 1]
     down = thigh * np.cos(q1) + shank * np.cos(q12)
@@ -28,14 +20,9 @@ def foot_position(robot: Robot, q: Array) -> Array:
 
 
 def joint_angles(robot: Robot, foot: Array) -> Array:
-    """Map a foot position to joint angles with the knee bent backwards (q2 <= 0).
+    """Return the angles, rad, (..., 2), for a foot at (x_down, y), m, (..., 2), with q2 <= 0.
 
-    Args:
-        robot: The leg.
-        foot: (x_down, y), m, (..., 2).
-
-    Returns:
-        Hip and knee angle, rad, (..., 2); NaN where the foot is out of reach.
+    They are NaN where the foot is out of reach.
     """
     thigh, shank = robot.thigh.length, robot.shank.length
     square = np.sum(np.square(foot), axis=-1)

@@ -37,12 +37,9 @@ def command_limits(robot: Robot) -> tuple[float, float]:
 class MotorLimit:
     """Torque each joint's motor can give at a speed.
 
-    The driving torque falls on the line from the peak torque at rest to zero at the no-load
-    speed; the software limit caps it; braking is limited by the software limit alone.
-
-    Args:
-        robot: The motors' robot; one per leg where legs differ, all inputs being (n, 2).
-        count: Number of legs n if all inputs are (n, 2), which is faster; any shape if None.
+    The driving torque falls on the line from the peak torque at rest to zero at the no-load speed;
+    the software limit caps it; braking is limited by the software limit alone. A robot per leg is
+    given where legs differ. With a ``count`` of legs n, all inputs are (n, 2), which is faster.
     """
 
     def __init__(self, robot: Robot | Sequence[Robot], count: int | None = None) -> None:
@@ -57,12 +54,7 @@ class MotorLimit:
         self._gain = _per_leg(gain, count) if (gains != 1).any() else None
 
     def give(self, torque: Array, qd: Array) -> Array:
-        """Return the torque the motors give when asked for ``torque`` at speed ``qd``.
-
-        Args:
-            torque: At the joints, N m, (..., 2).
-            qd: Joint velocity, rad/s, (..., 2).
-        """
+        """Return what the motors give, N m, (..., 2), if asked for so much at a speed, rad/s."""
         within = self.clip(torque, qd)
         return within if self._gain is None else self._gain * within
 
@@ -116,10 +108,7 @@ class SoftLimits:
 class SoftLimiter:
     """Applies soft limits to a robot's joint torques.
 
-    Args:
-        robot: The joint limits' robot.
-        soft: The PD.
-        count: Number of legs n if all inputs are (n, 2), which is faster; any shape if None.
+    With a ``count`` of legs n, all inputs are (n, 2), which is faster; any shape if None.
     """
 
     def __init__(self, robot: Robot, soft: SoftLimits, count: int | None = None) -> None:
@@ -128,13 +117,7 @@ class SoftLimiter:
         self._upper = _per_leg(robot.of_joints("upper"), count)
 
     def apply(self, torque: Array, q: Array, qd: Array) -> Array:
-        """Return the torque with the PD in force where a joint is outside its limits.
-
-        Args:
-            torque: Asked for by the controller, N m, (..., 2).
-            q: Joint position, rad, (..., 2).
-            qd: Joint velocity, rad/s, (..., 2).
-        """
+        """Return the torque, N m, (..., 2), with the PD added or put where a joint is outside."""
         back = np.minimum(np.maximum(q, self._lower), self._upper) - q
         if not np.count_nonzero(back):
             return torque

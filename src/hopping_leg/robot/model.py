@@ -19,14 +19,10 @@ _THIN = 1e-9
 
 
 def get_spec(robot: Robot, timestep: float = TIMESTEP) -> mujoco.MjSpec:
-    """Build the editable model of a robot.
+    """Build the editable model of a robot for a physics step, s.
 
-    Controls are motor torques at the gear's output, N m: the belt is the actuator's gear, so
-    the joint sees ``belt_ratio`` times the control and the motor's reflected inertia.
-
-    Args:
-        robot: Parameters of the leg.
-        timestep: Physics step, s.
+    Controls are motor torques at the gear's output, N m: the belt is the actuator's gear, so the
+    joint sees ``belt_ratio`` times the control and the motor's reflected inertia.
     """
     xml = (resources.files("hopping_leg.robot") / "leg.xml").read_text(encoding="utf-8")
     spec = mujoco.MjSpec.from_string(xml)

@@ -25,10 +25,7 @@ def shipped_robots() -> list[str]:
 
 
 def load_robot(name_or_path: str | Path) -> Robot:
-    """Load a robot by shipped name or from a TOML file.
-
-    Args:
-        name_or_path: ``"legv2"``, or the path of a file that ends in ``.toml``.
+    """Load a robot by shipped name, e.g. ``"legv2"``, or from a file that ends in ``.toml``.
 
     Raises:
         RobotError: Naming the file, the field and what was valid.
@@ -38,11 +35,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
 
 
 def robot_from_tree(tree: Tree, origin: str) -> Robot:
-    """Return the robot that a file's tables describe, ``extends`` resolved.
-
-    Args:
-        tree: The tables as in a file.
-        origin: The file's path or another name for it, for messages.
+    """Return the robot that tables describe, ``extends`` resolved; messages name ``origin``.
 
     Raises:
         RobotError: Naming origin, field and what was valid.
@@ -94,7 +87,6 @@ def _extend(tree: Tree, name: str, chain: tuple[str, ...]) -> Tree:
 
 
 def _beside(name: str, parent: str) -> str:
-    """Resolve a parent's path relative to the file that names it."""
     if parent.endswith(".toml") and name.endswith(".toml"):
         return str(Path(name).parent / parent)
     return parent
@@ -131,12 +123,7 @@ def _merge(parent: Tree, child: Tree) -> Tree:
 
 
 def robot_text(tree: Tree, comment: str = "") -> str:
-    """Return robot tables as TOML.
-
-    Args:
-        tree: The tables; numbers are ``{value, unit, source}``.
-        comment: Put above all, line by line.
-    """
+    """Return robot tables as TOML below a comment; numbers are ``{value, unit, source}``."""
     lines = [f"# {line}".rstrip() for line in comment.splitlines()]
     _write_table(tree, "", lines)
     return "\n".join(lines).strip("\n") + "\n"
@@ -161,7 +148,6 @@ def _text(value: Any) -> str:  # noqa: ANN401
 
 
 def _read_quantity(origin: str, entry: object, spec: Field, path: str) -> float:
-    """Return the value of a number that stands with unit and source."""
     unit = spec.metadata["unit"]
     if not isinstance(entry, dict) or set(entry) != {"value", "unit", "source"}:
         is_what = "missing" if entry is None else repr(entry)

@@ -11,11 +11,9 @@ _LOOK_EVERY = 1.0
 
 
 class Board(LiveProgress):
-    """Shows which jobs run and how much is left, as a context manager.
+    """Shows which jobs run and how much of their total weight is left, as a context manager.
 
-    Args:
-        total: Sum of all jobs' weights.
-        own_bars: Jobs draw bars of their own; then there is a line per job instead of a bar.
+    Where jobs draw bars of their own, there is a line per job instead of a bar.
     """
 
     def __init__(self, total: float, *, own_bars: bool = False) -> None:
@@ -37,12 +35,7 @@ class Board(LiveProgress):
         self._bar.update(self._task, completed=self._done)
 
     def show(self, notes: Sequence[str], begun: float = 0.0) -> None:
-        """Show what runs now.
-
-        Args:
-            notes: One per running job.
-            begun: Weight of what is done of them.
-        """
+        """Show a note per running job; ``begun`` is the weight of what is done of them."""
         self._begun = begun
         self._bar.update(self._task, completed=self._done)
         note = " · ".join([*notes, self._time_left()])
@@ -93,12 +86,9 @@ class Job(ABC):
 
 
 def work(jobs: Sequence[Job], at_once: int, board: Board) -> None:
-    """Do every job that is not done.
+    """Do every job that is not done; they are independent of each other.
 
-    Args:
-        jobs: Independent of each other.
-        at_once: How many processes; with one, jobs run in this process and show their own progress.
-        board: Shows how it goes.
+    With one at once, jobs run in this process and show their own progress.
     """
     left = []
     for job in jobs:

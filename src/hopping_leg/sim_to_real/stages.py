@@ -403,27 +403,18 @@ def disturbance_of(robot: Robot) -> NoiseAndDelay:
 
 
 def hop(content: bytes, robot: Robot, study: Study) -> list[dict[str, Any]]:
-    """Let a policy hop and return a row per command.
+    """Let a policy hop at a study's commands on a robot and return a row per command.
 
     Errors are apex minus command. A leg that never leaves the ground at a command counts as
     ``motionless`` with an error as large as the command.
-
-    Args:
-        content: The policy file.
-        robot: The twin.
-        study: Commands and how often each is tried.
     """
     policy = Policy(content, "the trained policy", "policy")
     bounds = (policy.card.command_low, policy.card.command_high)
     setup = RolloutConfig(robot, disturbance_of(robot), threads=study.threads)
     judged = evaluate(
-        [Entry("policy", policy, bounds)],
-        setup,
-        commands=study.commands,
-        repeats=study.repeats,
-        seed=FIRST_SEED,
-        kinds=("fixed",),
-    )
+        [Entry("policy", policy, bounds)], setup, commands=study.commands,
+        repeats=study.repeats, seed=FIRST_SEED, kinds=("fixed",),
+    )  # fmt: skip
     return _rows(judged.evaluation)
 
 

@@ -124,10 +124,8 @@ class Study:
 def find_twins(words: Sequence[str], folder: Path) -> tuple[TwinFile, ...]:
     """Return twins that were asked for; drawn ones are written to a folder.
 
-    Args:
-        words: A single number draws so many twins, with seeds 0, 1, ...; otherwise names of
-            shipped robots or robot files.
-        folder: For drawn twins.
+    A single number draws so many twins, with seeds 0, 1, ...; other words are shipped robots or
+    robot files.
 
     Raises:
         UsageError: The number is not positive, or two twins share a name.

@@ -28,10 +28,6 @@ J = TypeVar("J", bound=Job)
 def transfer(study: Study, at_once: int = 1) -> dict[str, Any]:
     """Run a study, or what is left of it, and return its numbers.
 
-    Args:
-        study: What is compared on which twins.
-        at_once: Jobs that run at the same time, each in a process of its own.
-
     Raises:
         UsageError: The folder holds results of other options, or there is no such recipe.
     """
@@ -111,7 +107,6 @@ def tabulate(
 
 
 def _overall(trials: Sequence[Row], study: Study) -> Row:
-    """Return one row per method over all commands, and how the others compare with the first."""
     first, *others = study.methods
     return {
         "methods": [_whole(method, trials, study) for method in study.methods],
@@ -156,7 +151,6 @@ def about(study: Study) -> Row:
 
 
 def _pooled(method: Method, trials: Sequence[Row]) -> Row:
-    """Return one row over the twins and seeds of a method and command."""
     return {
         "method": method.name,
         "meaning": method.meaning,
@@ -191,7 +185,6 @@ def _by_twin(trials: Sequence[Row], name: str) -> list[Array]:
 
 
 def _whole(method: Method, trials: Sequence[Row], study: Study) -> Row:
-    """Return one row over all commands of a method."""
     mine = [r for r in trials if r["method"] == method.name]
     runs: dict[tuple[str, int], list[Row]] = {}
     for row in mine:
@@ -257,15 +250,8 @@ def _training(training: TrainPolicy) -> Row:
 def compare(first: str, other: str, trials: Sequence[dict[str, Any]], seed: int) -> dict[str, Any]:
     """Return the ratio of two methods' errors, overall and at the command where it is smallest.
 
-    Args:
-        first: Name of the method that the other is compared with.
-        other: Name of the other.
-        trials: One row per method, twin, seed and command.
-        seed: Seed of the bootstrap.
-
-    Returns:
-        Medians over all twins, seeds and commands; the interval resamples whole twins, so that both
-        methods keep meeting the same ones.
+    Trials are one row per method, twin, seed and command. The medians are over all of them; the
+    interval resamples whole twins, so that both methods keep meeting the same ones.
     """
     count = len({row["twin"] for row in trials})
     errors = {
@@ -297,6 +283,5 @@ def compare(first: str, other: str, trials: Sequence[dict[str, Any]], seed: int)
 
 
 def _at(trials: Sequence[dict[str, Any]], method: str, command: float) -> float:
-    """Return the median error of a method at a command, m."""
     rows = [row for row in trials if (row["method"], row["command_m"]) == (method, command)]
     return float(np.median([row["median_abs_error_m"] for row in rows]))
