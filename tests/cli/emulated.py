@@ -3,11 +3,14 @@
 import contextlib
 import functools
 
+import numpy as np
+
 from hopping_leg.cli import deploy, record
 from hopping_leg.deploy import hardware_trials, moteus_link, transport
 from hopping_leg.deploy.motion_sequence import SequenceTiming
 from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.emulator.virtual_time import Lockstep
+from hopping_leg.identify.excitation import Excitation
 
 
 def put_behind(monkeypatch, **start):
@@ -22,3 +25,13 @@ def put_behind(monkeypatch, **start):
     quiet = contextlib.nullcontext(())
     monkeypatch.setattr(hardware_trials, "keeping_time", lambda **_: quiet)
     return lockstep
+
+
+def write_sine(folder, rig, count):
+    """Write an excitation in which hip and knee are bent and stretched; return file and content."""
+    time = np.arange(count) / 200
+    bend = 0.2 * np.sin(2 * np.pi * time / 0.75)
+    position = np.stack([0.8 + bend, -1.6 - 2 * bend], axis=1)
+    excitation = Excitation(time, position, 0 * position, rig, 200.0, "legv2", "a sine")
+    excitation.save(folder / "sine.parquet")
+    return folder / "sine.parquet", excitation

@@ -7,10 +7,9 @@ import pytest
 
 from hopping_leg.cli import main
 from hopping_leg.emulator.faults import Fault
-from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.trace import Trace
-from tests.cli.emulated import put_behind
+from tests.cli.emulated import put_behind, write_sine
 
 RUN = ["deploy", "energy-shaping", "--transport", "/dev/leg", "--seconds", "0.3"]
 
@@ -18,7 +17,6 @@ RUN = ["deploy", "energy-shaping", "--transport", "/dev/leg", "--seconds", "0.3"
 @pytest.fixture
 def emulate(monkeypatch):
     """Return a function that puts emulated drives behind every transport."""
-
     return functools.partial(put_behind, monkeypatch)
 
 
@@ -115,11 +113,8 @@ def test_doctor_says_what_is_wrong_and_puts_it_right(emulate, capsys):
 @pytest.mark.parametrize("rig", ["fixed-base", pytest.param("rail", marks=pytest.mark.slow)])
 def test_a_recording_from_motors_is_one_that_identification_takes(emulate, tmp_path, rig):
     emulate(robot="legv2", faults=(Fault("drop_reply", at=1.0, drive="hip"),))
-    time = np.arange(400) / 200
-    bend = 0.2 * np.sin(2 * np.pi * time / 0.75)
-    position = np.stack([0.8 + bend, -1.6 - 2 * bend], axis=1)
-    file = tmp_path / "sine.parquet"
-    Excitation(time, position, 0 * position, rig, 200.0, "legv2", "a sine").save(file)
+    file, played = write_sine(tmp_path, rig, 400)
+    position = played.position
     words = ["record", str(file), "--transport", "/dev/leg", "--yes", "--out", str(tmp_path / "r")]
     assert main(words) == 0
     recording = load_recording(tmp_path / "r" / "legv2-sine.parquet")

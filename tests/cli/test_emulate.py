@@ -8,18 +8,11 @@ import pytest
 from hopping_leg.cli import main
 
 
-def emulate(*words):
-    return subprocess.Popen(
-        [sys.executable, "-m", "hopping_leg.cli", "emulate", *words],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-
-
 def test_it_names_the_terminal_and_ends_with_ctrl_c(tmp_path):
     link = tmp_path / "leg"
-    process = emulate("--robot", "legv1", "--link", str(link))
+    words = [sys.executable, "-m", "hopping_leg.cli", "emulate", "--robot", "legv1"]
+    pipe = subprocess.PIPE
+    process = subprocess.Popen([*words, "--link", link], stdout=pipe, stderr=pipe, text=True)
     try:
         first = process.stdout.readline()
         assert first == f"Drives 1 and 2 of legv1 behind {link}\n"

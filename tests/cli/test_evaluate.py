@@ -5,6 +5,7 @@ import pytest
 
 from hopping_leg.cli import main
 from hopping_leg.trace import Trace
+from tests.evaluate.test_comparison import TRAINING
 
 
 def test_one_folder_receives_numbers_report_and_traces(spring, tmp_path, capsys, refused):
@@ -53,3 +54,47 @@ def test_one_folder_receives_numbers_report_and_traces(spring, tmp_path, capsys,
 )
 def test_bad_input_is_one_sentence(spring, refused, words, sentence):
     refused(["evaluate", "spring", *words], sentence)
+
+
+def test_an_axis_that_is_none_is_one_sentence(spring, refused):
+    refused(["robustness", "spring", "--axes", "wind"], "There is no axis 'wind'")
+
+
+def test_robustness_leaves_numbers_figure_and_what_goes_on(spring, tmp_path, capsys):
+    out, file = tmp_path / "kept", tmp_path / "robustness.json"
+    words = ["robustness", "spring", "--commands", "0.3", "--seeds", "2", "--axes", "pushes"]
+    words += ["--threads", "1", "--out", str(out)]
+    assert main([*words, "--json", str(file)]) == 0
+    data = json.loads(file.read_text())
+    assert [row["axis"] for row in data["scores"]] == ["pushes", "overall"]
+    assert all(0 <= row["low"] <= row["score"] <= row["high"] <= 1 for row in data["scores"])
+    assert data["command"].startswith("hop robustness spring")
+    assert "--axes pushes" in data["command"]
+    assert (out / "robustness.svg").read_bytes().startswith(b"<?xml")
+    assert "overall" in capsys.readouterr().out
+    kept = {path.name: path.read_bytes() for path in out.glob("spring-*.json")}
+    assert len(kept) == 2
+    assert main(words) == 0
+    assert json.loads((out / "robustness.json").read_text())["scores"] == data["scores"]
+    assert {path.name: path.read_bytes() for path in out.glob("spring-*.json")} == kept
+
+
+def test_trainings_beside_each_other(tmp_path, capsys):
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "result.json").write_text(json.dumps(TRAINING))
+    page, numbers = tmp_path / "page.html", tmp_path / "numbers.json"
+    runs = [str(tmp_path / "one"), str(tmp_path / "two")]
+    assert main(["report", "page", *runs, "--out", str(page), "--json", str(numbers)]) == 0
+    assert "Learning curves" in page.read_text()
+    found = json.loads(numbers.read_text())
+    assert [row["label"] for row in found["trainings"]] == ["one", "two"]
+    assert found["trainings"][0]["curve"][1]["score_m"] == 0.005
+    assert str(page) in capsys.readouterr().out
+
+
+def test_a_page_or_figure_of_nothing_is_refused(tmp_path, refused):
+    trace = str(tmp_path / "none.parquet")
+    pages = ([], ["none", "nothing"], ["a", "b", "--out", str(tmp_path)])
+    for words in (["figures"], ["figures", trace], *(["page", *page] for page in pages)):
+        refused(["report", *words], "")

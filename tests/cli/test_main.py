@@ -1,5 +1,6 @@
 import errno
 import importlib.util
+import shutil
 import subprocess
 import sys
 import time
@@ -36,8 +37,7 @@ def test_help_is_quick_and_loads_no_simulator():
         "sys.exit(bool({'mujoco', 'torch', 'polars', 'onnxruntime'} & set(sys.modules)))"
     )
     start = time.perf_counter()
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True)
-    assert result.returncode == 0
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True).returncode == 0
     assert time.perf_counter() - start < 5
 
 
@@ -80,6 +80,31 @@ def test_a_bug_keeps_its_traceback(monkeypatch):
         failing(monkeypatch, ZeroDivisionError())
     with pytest.raises(ModuleNotFoundError):
         failing(monkeypatch, ModuleNotFoundError("no such thing", name="hopping_leg.nothing"))
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")
+def test_bash_completes_verbs_options_choices_and_subcommands(tmp_path, capsys):
+    assert main(["--tyro-print-completion", "bash"]) == 0
+    file = tmp_path / "hop"
+    file.write_text(capsys.readouterr().out)
+    for words, found in (
+        (("hop", "repr"), ["reproduce"]),
+        (("hop", "train", "--rec"), ["--recipe"]),
+        (("hop", "train", "--log", "tr"), ["trackio"]),
+        (("hop", "robots", "sh"), ["show"]),
+    ):
+        code = f'source {file}; COMP_WORDS=("$@"); COMP_CWORD={len(words) - 1}; _tyro_hop;'
+        code += ' printf "%s\\n" "${COMPREPLY[@]}"'
+        done = subprocess.run(["bash", "-c", code, "-", *words], capture_output=True, text=True)
+        assert done.stdout.split() == found
+
+
+def test_other_shells_know_every_verb_and_another_is_refused(capsys, refused):
+    for shell in ("zsh", "fish"):
+        assert main(["--tyro-print-completion", shell]) == 0
+        text = capsys.readouterr().out
+        assert all(verb in text for verb in (*cli.VERBS, "recipe"))
+    refused(["--tyro-print-completion", "tcsh"], "There is no shell 'tcsh'")
 
 
 @pytest.mark.parametrize("arguments", [["robots", "show"], ["robots", "list", "--colour", "red"]])

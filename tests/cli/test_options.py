@@ -52,17 +52,14 @@ def test_tyro_reads_the_command_back(options):
     assert tyro.cli(Options, args=rest) == options
 
 
-def test_what_changes_no_number_is_left_out():
-    assert command_line("hop", Options(out=Path("there"))) == "hop"
-    assert command_line("hop", Options(out=Path("there")), ()) == "hop --out there"
-
-
 @dataclass(frozen=True)
 class TwoWords(Options):
     pass
 
 
-def test_defaults_are_left_out_and_subcommands_go_by_tyros_names(capsys):
+def test_defaults_and_what_changes_no_number_are_left_out_and_names_are_tyros(capsys):
+    assert command_line("hop", Options(out=Path("there"))) == "hop"
+    assert command_line("hop", Options(out=Path("there")), ()) == "hop --out there"
     assert verb_of(TwoWords()) == "two-words"
     assert command_line("hop two-words", TwoWords(loud=True)) == "hop two-words --loud"
     with pytest.raises(SystemExit):

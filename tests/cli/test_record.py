@@ -3,24 +3,13 @@ import pytest
 
 from hopping_leg.cli import main
 from hopping_leg.controllers.joint_pd import JointGains
-from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.recording import load_recording
-
-TIME = np.arange(300) / 200
-
-
-@pytest.fixture(params=["fixed-base", "rail"])
-def excitation(tmp_path, request):
-    bend = 0.25 * np.sin(2 * np.pi * TIME / 0.75)
-    position = np.stack([0.8 + bend, -1.6 - 2 * bend], axis=1)
-    file = tmp_path / f"{request.param}.parquet"
-    made = Excitation(TIME, position, 0 * position, request.param, 200.0, "legv2", "a sine")
-    made.save(file)
-    return file, made
+from tests.cli.emulated import write_sine
 
 
-def test_a_recording_holds_what_was_played_and_measured(excitation, tmp_path):
-    file, played = excitation
+@pytest.mark.parametrize("rig", ["fixed-base", "rail"])
+def test_a_recording_holds_what_was_played_and_measured(tmp_path, rig):
+    file, played = write_sine(tmp_path, rig, 300)
     out = tmp_path / "out"
     words = ["record", str(file), "--robot", "twin", "--stiffness", "25", "15", "--out"]
     assert main([*words, str(out)]) == 0
@@ -37,7 +26,7 @@ def test_a_recording_holds_what_was_played_and_measured(excitation, tmp_path):
     assert metadata.stiffness == (25.0, 15.0)
     assert metadata.damping == JointGains().damping
     assert metadata.robot == "legv2-paper"
-    assert len(recording) == len(TIME)
+    assert len(recording) == 300
     np.testing.assert_array_equal(recording.array("position_command"), played.position)
     np.testing.assert_array_equal(recording.array("velocity_command"), 0.0)
     position = recording.array("position")
@@ -48,8 +37,8 @@ def test_a_recording_holds_what_was_played_and_measured(excitation, tmp_path):
     assert recording.has_column("height_m") == (played.rig == "rail")
 
 
-def test_wrong_input_is_one_sentence(tmp_path, refused, excitation):
-    file, _ = excitation
+def test_wrong_input_is_one_sentence(tmp_path, refused):
+    file, _ = write_sine(tmp_path, "rail", 300)
     for words, sentence in (
         ([], "No excitation"),
         ([str(tmp_path / "none.parquet")], "none.parquet"),
