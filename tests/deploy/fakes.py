@@ -15,6 +15,7 @@ from hopping_leg.robot import SoftLimiter, SoftLimits, load_robot
 LEG = load_robot("legv2")
 RATE = 200.0
 POSES = Poses(np.array([0.8, -1.6]), np.array([1.0, -2.0]))
+MODES = dict(zip(Action, (DriveMode.STOPPED, DriveMode.POSITION, DriveMode.BRAKE), strict=True))
 SHORT = SequenceTiming(hop=0.5, rise=0.3, settle=0.1, sink=0.3, fade=0.1)
 
 
@@ -49,9 +50,7 @@ class FakeLink:
         self.send(outgoing)
         taken = self.clock.time
         self.clock.time += self.latency
-        replies = tuple(
-            self.alter(self.tick, joint, self._reply(joint, taken)) for joint in range(2)
-        )
+        replies = tuple(self.alter(self.tick, n, self._reply(n, taken)) for n in range(2))
         if None in replies:
             self.clock.time = max(self.clock.time, until)
         return Exchange(replies)
@@ -60,12 +59,7 @@ class FakeLink:
         self._move()
         self.told.append(outgoing)
         self._command = outgoing
-        modes = {
-            Action.STOP: DriveMode.STOPPED,
-            Action.TORQUE: DriveMode.POSITION,
-            Action.BRAKE: DriveMode.BRAKE,
-        }
-        self.mode = [modes[outgoing.action]] * 2
+        self.mode = [MODES[outgoing.action]] * 2
 
     def close(self):
         pass
@@ -108,18 +102,13 @@ class Still:
         return {"calls": np.array([float(self.calls)])}
 
 
-def make_loop(tmp_path, controller=None, *, link=None, timing=SHORT, soft=None, **limits):
+def make_loop(tmp_path, controller=None, *, link=None, timing=SHORT, **limits):
     """Return a loop on a fake link, and both."""
     clock = link.clock if link else FakeClock()
     link = link or FakeLink(clock)
     controller = controller or Still()
-    sequence = MotionSequence(
-        controller,
-        CommandSchedule(((0.3, 100.0),)),
-        POSES,
-        SoftLimiter(LEG, soft or SoftLimits()),
-        timing,
-    )
+    commands, limiter = CommandSchedule(((0.3, 100.0),)), SoftLimiter(LEG, SoftLimits())
+    sequence = MotionSequence(controller, commands, POSES, limiter, timing)
     limits = replace(hopping_limits(LEG, RATE), **limits)
     header = {"robot": LEG.name, "controller": controller.name}
     box = FlightRecorder(tmp_path / "run.blackbox", columns(controller), header)

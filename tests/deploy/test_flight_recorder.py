@@ -73,9 +73,8 @@ def test_damage_ends_the_record_and_is_never_data(path):
 
 def test_a_killed_process_leaves_what_it_recorded(tmp_path):
     path = tmp_path / "killed.blackbox"
-    with subprocess.Popen(
-        [sys.executable, "-c", WRITER, str(path)], stdout=subprocess.DEVNULL
-    ) as process:
+    words = [sys.executable, "-c", WRITER, str(path)]
+    with subprocess.Popen(words, stdout=subprocess.DEVNULL) as process:
         deadline = time.monotonic() + 60
         while not path.exists() or not path.stat().st_size or len(read_recording(path)[1]) < 50:
             assert time.monotonic() < deadline, "rows reach the file only when it is closed"

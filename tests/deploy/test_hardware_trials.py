@@ -92,9 +92,8 @@ def test_configuring_and_homing_make_a_delivered_drive_fit(emulated):
     for joint in (0, 1):
         wrong = {f.setting for f in findings if f.joint == joint and f.setting}
         assert "servo.timeout_mode" in wrong
-        configure(
-            lockstep.link, joint, [s for s in required_settings(LEG, joint) if s.name in wrong]
-        )
+        settings = [s for s in required_settings(LEG, joint) if s.name in wrong]
+        configure(lockstep.link, joint, settings)
     home(lockstep.link, lockstep.robot.leg.q + np.array([0.1, -0.1]))
     facts = inspect(lockstep.link)
     require_fit(check_drives(LEG, LIMITS, facts))
@@ -103,7 +102,7 @@ def test_configuring_and_homing_make_a_delivered_drive_fit(emulated):
     assert lockstep.robot.drives[0].settings["servo.timeout_mode"] == 15
 
 
-def test_a_run_is_a_trace_like_any_other(emulated, tmp_path):
+def test_a_run_is_a_trace_like_any_other_and_the_motors_give_what_was_sent(emulated, tmp_path):
     lockstep = emulated()
     done = run(lockstep, tmp_path / "run.parquet", hop=1.0)
     assert done.outcome.supervisor.stop_cause.reason.name == "FINISHED"
@@ -119,13 +118,7 @@ def test_a_run_is_a_trace_like_any_other(emulated, tmp_path):
     running = trace.column("state") == State.RUNNING
     assert (trace.column("knee_mode")[running][1:] == 10).all()
     assert max(height for _, height, _ in lockstep.truth) > 0.27
-    final = [drive.machine.mode for drive in lockstep.robot.drives]
-    assert final == [0, 0]
-
-
-def test_the_motors_give_what_was_sent(emulated, tmp_path):
-    trace = run(emulated(), tmp_path / "run.parquet").trace
-    hopping = trace.column("part") == Part.HOP
+    assert [drive.machine.mode for drive in lockstep.robot.drives] == [0, 0]
     for joint in ("hip", "knee"):
         sent, given = trace.column(f"{joint}_sent_nm"), trace.column(f"{joint}_torque_nm")
         difference = (given[1:] - sent[:-1])[hopping[1:]]
@@ -145,14 +138,10 @@ OTHERS = [
     (Fault("power_loss", at=0.9, drive="hip"), "DRIVE_LEFT_MODE"),
     (Fault("limit_notice", at=0.9), "FINISHED"),
 ]
+SLOW = [("fast", *case) for case in QUICK + OTHERS] + [("energy-shaping", *c) for c in OTHERS]
 CASES = [
     *(("energy-shaping", *case) for case in QUICK),
-    *(pytest.param("fast", *case, marks=pytest.mark.slow) for case in QUICK),
-    *(
-        pytest.param(controller, *case, marks=pytest.mark.slow)
-        for controller in ("energy-shaping", "fast")
-        for case in OTHERS
-    ),
+    *(pytest.param(*case, marks=pytest.mark.slow) for case in SLOW),
 ]
 
 
@@ -160,8 +149,7 @@ CASES = [
 def test_each_fault_ends_the_run_for_its_reason_and_nothing_starts_again(
     emulated, tmp_path, controller, fault, reason
 ):
-    lockstep = emulated(faults=(fault,))
-    done = run(lockstep, tmp_path / "run.parquet", controller=controller)
+    done = run(emulated(faults=(fault,)), tmp_path / "run.parquet", controller=controller)
     assert done.outcome.supervisor.stop_cause.reason.name == reason
     trace = done.trace
     states = trace.column("state")
@@ -172,23 +160,15 @@ def test_each_fault_ends_the_run_for_its_reason_and_nothing_starts_again(
         assert np.isfinite(sent).all()
         assert np.abs(sent).max() <= limit
         assert not sent[stopped].any()
-    events = [event.get("reason") for event in trace.header["events"]]
-    assert reason.lower() in events
+    assert reason.lower() in [event.get("reason") for event in trace.header["events"]]
 
 
 SCHEDULE = CommandSchedule(((0.3, 1.0), (0.25, 0.5)))
 
 
 def deployed(tmp_path, lockstep, ready=lambda seconds: None):
-    return DeployedRobot(
-        LEG,
-        200.0,
-        tmp_path,
-        lambda: contextlib.nullcontext(lockstep.link),
-        lambda link: {},
-        ready,
-        lockstep,
-    )
+    link = contextlib.nullcontext(lockstep.link)
+    return DeployedRobot(LEG, 200.0, tmp_path, lambda: link, lambda _: {}, ready, lockstep)
 
 
 @pytest.mark.slow
@@ -211,8 +191,7 @@ def test_a_trial_holds_the_hops_alone_and_counts_all_of_its_time(emulated, tmp_p
 @pytest.mark.slow
 @pytest.mark.parametrize("ticks", [10, 230])
 def test_a_stop_by_the_supervisor_comes_back_as_a_complaint(emulated, tmp_path, ticks):
-    lockstep = emulated()
-    robot = deployed(tmp_path, lockstep)
+    robot = deployed(tmp_path, emulated())
     if ticks < 200:
         with pytest.raises(HardwareError, match="before it hopped"):
             robot.hop(Still(fail_after=ticks), SCHEDULE, 1)

@@ -1,4 +1,4 @@
-"""The page's slider changes the height within its range; only its own page may."""
+"""The height that the operator changes, by keys or by the page's slider; only its own page may."""
 
 import json
 import urllib.error
@@ -7,7 +7,7 @@ import urllib.request
 import pytest
 
 from hopping_leg.deploy.height_page import HeightPage
-from hopping_leg.deploy.keyboard import LiveHeight
+from hopping_leg.deploy.keyboard import LiveHeight, handle_key
 from hopping_leg.errors import UsageError
 
 
@@ -79,3 +79,19 @@ def test_a_port_that_is_taken_is_said_before_anything_moves(running):
         HeightPage(height, int(page.address.rsplit(":", 1)[1]))
     with pytest.raises(UsageError, match="give a free one"):
         HeightPage(height, 70000)
+
+
+def test_keys_raise_lower_and_stop():
+    height, stops = LiveHeight(0.30, (0.25, 0.35)), []
+    for _ in range(3):
+        handle_key(b"+", height, lambda: stops.append(1))
+    assert height.at(0) == pytest.approx(0.33)
+    for _ in range(20):
+        handle_key(b"\x1b[B", height, lambda: stops.append(1))
+    assert height.at(0) == 0.25
+    assert handle_key(b"x", height, lambda: stops.append(1)) == ""
+    assert handle_key(b"+", None, lambda: stops.append(1)) == ""
+    assert not stops
+    for key in (b" ", b"q", b"\n"):
+        assert handle_key(key, height, lambda: stops.append(1)) == "stopping"
+    assert len(stops) == 3

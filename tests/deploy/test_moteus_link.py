@@ -124,13 +124,10 @@ def test_a_lost_reply_costs_that_reply_and_nothing_else(link, adapter):
         assert whole(exchange(link))
 
 
-def test_garbage_on_the_line_is_skipped(link, adapter):
+def test_garbage_on_the_line_is_skipped_and_an_error_costs_one_tick_at_most(link, adapter):
     for line in (b"@#!%", b"rcv", b"rcv 100", b"rcv zz 2400 E", b"rcv 100 2 E", b"OK"):
         adapter.say(line)
         assert whole(exchange(link)), line
-
-
-def test_an_error_of_the_adapter_costs_one_tick_at_most(link, adapter):
     adapter.say(b"ERR overrun")
     exchange(link)
     assert whole(exchange(link))
@@ -156,19 +153,17 @@ def test_a_late_reply_is_not_taken_for_a_fresh_one(link, adapter):
     assert all(reply.taken > asked - 0.05 for reply in result.replies if reply is not None)
 
 
-def test_a_pulled_adapter_is_silence_and_another_may_be_opened(adapter):
+def test_a_closed_port_opens_again_and_a_pulled_adapter_is_silence(adapter):
     link = opened(adapter)
+    for _ in range(2):
+        link.close()
+        link = opened(adapter)
     adapter.pull_out()
     for _ in range(3):
         assert exchange(link, wait=0.05).replies == (None, None)
     assert link.transport.devices()[0]._descriptor is None
     link.close()
     opened(Adapter()).close()
-
-
-def test_a_port_may_be_closed_and_opened_again(adapter):
-    for _ in range(3):
-        opened(adapter).close()
 
 
 def test_an_adapter_that_reads_nothing_blocks_no_one(adapter):

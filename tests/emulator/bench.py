@@ -87,8 +87,7 @@ class Bench:
     def cycle(self, *commands):
         return asyncio.run(self.transport.cycle(list(commands)))
 
-    def run(self, coroutine):
-        return asyncio.run(coroutine)
+    run = staticmethod(asyncio.run)
 
     def torque(self, *torques, watchdog=1.0, maximum=20.0, **more):
         """Command pure torques; return the replies."""
@@ -102,10 +101,6 @@ class Bench:
         """Bring both drives into torque mode at zero torque."""
         self.push(0.0, seconds=0.02, **more)
         assert self.modes() == [10, 10]
-
-    def stop(self):
-        self.cycle(*(drive.make_stop(query=True) for drive in self.drives))
-        self.wait(0.001)
 
     def read(self, *registers, drive=0, resolution=moteus.F32):
         query = self.drives[drive].make_custom_query(dict.fromkeys(registers, resolution))

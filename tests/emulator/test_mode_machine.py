@@ -31,11 +31,8 @@ def test_starting_takes_its_time_and_steps():
     machine = ModeMachine()
     machine.command(DriveMode.POSITION, 0.0, math.nan)
     _, modes = run(machine, 0.02)
-    assert list(dict.fromkeys(modes)) == [
-        DriveMode.ENABLING,
-        DriveMode.CALIBRATING,
-        DriveMode.POSITION,
-    ]
+    steps = [DriveMode.ENABLING, DriveMode.CALIBRATING, DriveMode.POSITION]
+    assert list(dict.fromkeys(modes)) == steps
     assert abs(modes.index(DriveMode.POSITION) * STEP - STARTING_TIME) <= STEP
 
 
@@ -50,12 +47,9 @@ def test_silence_leads_to_timeout_and_only_stop_leads_out():
     time, modes = run(machine, 0.01, time)
     assert modes[-1] is DriveMode.STOPPED
     machine.command(DriveMode.POSITION, time, 0.1)
-    assert run(machine, 0.02, time)[1][-1] is DriveMode.POSITION
-
-
-def test_the_watchdog_covers_position_but_not_brake():
-    machine, time = powered(timeout=0.02)
-    machine.command(DriveMode.BRAKE, time, 0.02)
+    time, modes = run(machine, 0.02, time)
+    assert modes[-1] is DriveMode.POSITION
+    machine.command(DriveMode.BRAKE, time, 0.02)  # which no watchdog covers
     assert run(machine, 0.1, time)[1][-1] is DriveMode.BRAKE
 
 
