@@ -25,8 +25,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.figure_style import WIDTH, colour, styled
 from hopping_leg.io import write_atomically, write_json
 from hopping_leg.rl.finetune.config import FinetuneConfig, Method, Task
-from hopping_leg.rl.finetune.finetuning import Row
-from hopping_leg.rl.finetune.running import POLICY, RESULT, finetune
+from hopping_leg.rl.finetune.finetuning import POLICY, RESULT, Row, finetune
 from hopping_leg.rl.finetune.simulated import Guard, SimulatedTrials
 from hopping_leg.rl.finetune.trial_data import score
 from hopping_leg.robot import Robot, load_robot

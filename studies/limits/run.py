@@ -27,7 +27,7 @@ from hopping_leg.evaluate.robustness.axes import times
 from hopping_leg.evaluate.runner import evaluate, software_versions
 from hopping_leg.io import safe_file_name
 from hopping_leg.rl.checkpoint import list_checkpoints, read_checkpoint
-from hopping_leg.rl.distillation.teacher import Teacher
+from hopping_leg.rl.distillation.teacher_student import Teacher
 from hopping_leg.rl.legacy_names import upgrade_config
 from hopping_leg.rl.recipes import recipe_of
 from hopping_leg.rl.resumable import restore_learner

@@ -8,7 +8,7 @@ from tests.rl.learners import ROBOT, learner
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.checkpoint import write_checkpoint
-from hopping_leg.rl.distillation.teacher import Teacher
+from hopping_leg.rl.distillation.teacher_student import Teacher
 from hopping_leg.rl.recipes import change, get_recipe
 from hopping_leg.rl.resumable import learner_state
 from hopping_leg.rl.run_folder import RunFolder

@@ -70,7 +70,7 @@ class Finetune:
 def run(args: Finetune) -> None:
     """Continue the training, say how it went."""
     from hopping_leg.rl.finetune.config import FinetuneConfig, StoppingRules, Task
-    from hopping_leg.rl.finetune.running import POLICY, finetune
+    from hopping_leg.rl.finetune.finetuning import POLICY, finetune
 
     policy, robot = load_policy(args.policy), load_robot(args.robot)
     _refuse(args, policy, robot)

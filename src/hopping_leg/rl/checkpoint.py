@@ -58,11 +58,7 @@ def list_checkpoints(folder: Path) -> list[Path]:
 
 
 def read_checkpoint(path: Path) -> Tree:
-    """Read a checkpoint.
-
-    Raises:
-        UsageError: It is damaged or of another schema.
-    """
+    """Read a checkpoint; raise ``UsageError`` where it is damaged or of another schema."""
     try:
         stored = json.loads((path / "state.json").read_text(encoding="utf-8"))
         with np.load(path / "arrays.npz", allow_pickle=False) as file:

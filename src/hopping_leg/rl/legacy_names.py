@@ -34,11 +34,7 @@ _MEMORY = {"recurrent": "gru", "adaptive": "integrator"}
 
 
 def upgrade_config(stored: dict[str, Any]) -> dict[str, Any]:
-    """Return a run's ``config.json`` with the names of today.
-
-    Raises:
-        UsageError: The run was asked for something that can no longer be had.
-    """
+    """Return a run's ``config.json`` with the names of today; ``UsageError`` for what is gone."""
     old, recipe = stored.get("options", {}), stored.get("recipe")
     if not old or "schedule" in old:
         return stored

@@ -19,11 +19,7 @@ PROJECT = "hopping-leg"
 
 
 def check_log(log: Log) -> None:
-    """Check that what a log needs is installed.
-
-    Raises:
-        UsageError: It is not; the message names the command.
-    """
+    """Raise ``UsageError``, with the command to install it, where what a log needs is missing."""
     if log == "tensorboard":
         return
     try:
@@ -35,12 +31,9 @@ def check_log(log: Log) -> None:
 
 
 def make_logger(folder: Path, log: Log, config: Mapping[str, Any]) -> Logger:
-    """Return the logger of the training in a folder, whose name is the run's.
+    """Return the logger of a folder's training, which shows the configuration beside the curves.
 
-    The configuration is shown beside the curves.
-
-    Raises:
-        UsageError: The package is missing or does not start.
+    Raises ``UsageError`` where the package is missing or does not start.
     """
     check_log(log)
     logger = configure(str(folder / "tensorboard"), ["tensorboard"])

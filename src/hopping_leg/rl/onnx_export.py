@@ -57,11 +57,7 @@ class Graph:
         self.nodes.append(helper.make_node(operator, inputs, outputs, **attributes))
 
     def dense(self, x: str, layers: Layers, activation: str, prefix: str = "") -> str:
-        """Put dense layers behind values, (n, in); return what the last one gives.
-
-        All but the last have the activation, one of ``ACTIVATIONS``; all names begin with the
-        prefix.
-        """
+        """Put dense layers behind values, (n, in), all but the last activated; return theirs."""
         for index, (weight, bias) in enumerate(layers):
             names = [
                 x,
@@ -118,11 +114,7 @@ class RecurrentUnit:
         return int(self.of_memory.shape[1])
 
     def build(self, graph: Graph, x: str, inputs: int) -> str:
-        """Show the dense layers what is remembered.
-
-        ONNX wants a sequence, here of one tick, and the gates in the order update, reset,
-        candidate.
-        """
+        """Show the dense layers what is remembered; ONNX orders gates update, reset, candidate."""
 
         def ordered(weights: Array) -> Array:
             reset, update, candidate = np.split(weights, 3)
@@ -289,11 +281,7 @@ def save_policy(path: Path, network: Network, card: Card) -> None:
 
 
 def read_network(content: bytes) -> Network:
-    """Return the actor in a policy file.
-
-    Raises:
-        PolicyError: The graph was made elsewhere, or remembers.
-    """
+    """Return a policy file's actor; ``PolicyError`` if it was made elsewhere or remembers."""
     graph = onnx.load_from_string(content).graph
     if MEMORY in (given.name for given in graph.input):
         raise PolicyError("The policy remembers; only weights of one that does not can be read.")
@@ -321,14 +309,9 @@ _LEARNT = ("weight_", "bias_", "gru_", "felt_weight_", "felt_bias_")
 def expose_hidden(content: bytes, shuffle: int | None = None) -> bytes:
     """Return a policy's graph with its hidden layers as further outputs, in order.
 
-    Args:
-        content: The policy file.
-        shuffle: Seed with which the entries of weights and biases change places, of every hidden
-            layer and of what fills the memory: a network of the same size and sizes of weights that
-            has learnt nothing.
-
-    Raises:
-        PolicyError: The graph names no hidden layer and remembers nothing.
+    With ``shuffle``, a seed, the entries of weights and biases of every hidden layer and of what
+    fills the memory change places: a network of the same size that has learnt nothing. Raises
+    ``PolicyError`` where the graph names no hidden layer and remembers nothing.
     """
     model = onnx.load_from_string(content)
     graph = model.graph

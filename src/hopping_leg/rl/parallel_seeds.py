@@ -57,15 +57,11 @@ class ParallelSeeds:
     source: Path | None = None
 
     def train(self, *, resume: bool = False) -> Trained:
-        """Begin all of them, finish the best one.
+        """Begin all of them, or with ``resume`` go on with those in ``out``; finish the best one.
 
-        Args:
-            resume: Go on with those in ``out``; without any, begin.
-
-        Raises:
-            UsageError: There is none, or several from one source; ``out`` holds something else,
-                what ``log`` needs is not installed, or one of the trainings ended early.
-            RobotError: The robot has effects that training does not simulate.
+        Raises ``UsageError`` where there is none or several from one source, ``out`` holds
+        something else, ``log`` lacks what it needs or a training ended early, and ``RobotError`` as
+        ``train`` does.
         """
         if self.count < 1:
             raise UsageError(f"--parallel-seeds is {self.count} but must be at least 1.")

@@ -71,15 +71,9 @@ def evaluate_policy(
     rate: float = 200.0,
     threads: int = 1,
 ) -> list[CommandResult]:
-    """Let a controller hop at fixed commands with noise and delay on, physics at 0.5 ms.
+    """Let a controller hop at fixed commands, m, rising, with noise and delay, physics at 0.5 ms.
 
-    Args:
-        controller: The controller.
-        robot: The leg.
-        commands: Desired heights, rising, m.
-        seeds: Seeds of noise and delay; each adds four legs per command.
-        rate: Control rate, Hz.
-        threads: Worker threads, 0 for one per core.
+    Each seed adds four legs per command; ``threads`` of 0 are one per core.
     """
     schedule = np.tile(np.repeat(commands, _LEGS), (round(_SECONDS * rate), 1))
     setup = RolloutConfig(robot, rate=rate, threads=threads)
@@ -91,11 +85,7 @@ def evaluate_policy(
 
 
 def every_centimetre(commands: Sequence[float]) -> tuple[float, ...]:
-    """Return the heights from the lowest to the highest command in steps of about 1 cm, m.
-
-    A policy may hop in one way at low commands and in another at high ones, and fail where it
-    changes.
-    """
+    """Return heights from the lowest to the highest command, about 1 cm apart, m."""
     low, high = min(commands), max(commands)
     return tuple(map(float, np.linspace(low, high, round((high - low) / _SPACING) + 1)))
 

@@ -107,11 +107,7 @@ class RunFolder:
         write_json(self.path / name, content)
 
     def check_same(self) -> None:
-        """Check that the run in the folder was asked for the same as this one.
-
-        Raises:
-            UsageError: It was not; the message names the first difference.
-        """
+        """Raise ``UsageError`` where the run in the folder was asked for something else."""
         stored = upgrade_config(read_json(self.path / "config.json"))
         # A run from before an option existed was asked for what is its default.
         _complete(stored.get("options", {}), self._defaults)
@@ -120,11 +116,7 @@ class RunFolder:
 
 
 def is_new(folder: Path, *, resume: bool) -> bool:
-    """Tell whether a folder holds no run.
-
-    Raises:
-        UsageError: It holds something else, or a run and ``resume`` is off.
-    """
+    """Tell whether a folder holds no run; ``UsageError`` where it must not be used."""
     if not (folder / "config.json").exists():
         if folder.is_dir() and any(folder.iterdir()):
             raise UsageError(f"{folder} is not empty and holds no run; give another --out.")
@@ -137,11 +129,7 @@ def is_new(folder: Path, *, resume: bool) -> bool:
 
 
 def check_same(folder: Path, stored: dict[str, Any], asked: dict[str, Any]) -> None:
-    """Check that a run was asked for the same.
-
-    Raises:
-        UsageError: It was not; the message names the first difference.
-    """
+    """Raise ``UsageError`` that names the first difference where a run was asked for another."""
     for key, value in asked.items():
         if stored.get(key) != value:
             raise UsageError(
@@ -177,11 +165,7 @@ def read_json(file: Path) -> dict[str, Any]:
 
 
 def read_result(path: Path) -> dict[str, Any]:
-    """Return what a finished run left in ``result.json``.
-
-    Raises:
-        UsageError: The folder holds no finished run.
-    """
+    """Return a finished run's ``result.json``; ``UsageError`` where there is none."""
     file = path / "result.json"
     if not file.exists():
         raise UsageError(f"{path} holds no finished run; go on with `hop train --resume`.")

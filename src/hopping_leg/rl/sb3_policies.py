@@ -129,11 +129,7 @@ _NAMES = {nn.ReLU: "relu", nn.Tanh: "tanh", nn.ELU: "elu"}
 
 
 def network_of(model: BaseAlgorithm, observation: Observation) -> Network:
-    """Return the actor of SAC or PPO with the task's normalisation, for the observation's layout.
-
-    Raises:
-        UsageError: The actor is no stack of dense layers.
-    """
+    """Return the actor of SAC or PPO with the task's normalisation; ``UsageError`` if not dense."""
     if isinstance(model, SAC):
         return dense_network([model.actor.latent_pi, model.actor.mu], observation, "tanh")
     policy = model.policy
@@ -141,15 +137,9 @@ def network_of(model: BaseAlgorithm, observation: Observation) -> Network:
 
 
 def dense_network(parts: Sequence[nn.Module], observation: Observation, squash: str) -> Network:
-    """Return dense layers with the task's normalisation, for the observation's layout.
+    """Return dense layers, given in order, with the task's normalisation.
 
-    Args:
-        parts: Layers and activations in order, or modules of such.
-        observation: Observation of the task.
-        squash: How the output is brought to -1..1.
-
-    Raises:
-        UsageError: They are no stack of dense layers.
+    The output is brought to -1..1 by ``squash``; raises ``UsageError`` for other layers.
     """
     modules = [leaf for part in parts for leaf in flatten(part)]
     bound = float("inf")

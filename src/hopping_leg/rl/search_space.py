@@ -65,11 +65,7 @@ SearchSpace = Mapping[str, Real | OneOf]
 
 
 def defaults(recipe: "Recipe", space: SearchSpace) -> dict[str, Any]:
-    """Return a recipe's own values as a study stores them.
-
-    Raises:
-        UsageError: One of them lies outside of the space.
-    """
+    """Return a recipe's own values as a study stores them; ``UsageError`` outside of the space."""
     stored: dict[str, Any] = {}
     for name, dimension in space.items():
         value = recipe.value(name)

@@ -10,7 +10,7 @@ from typing import Any
 import torch
 from rich.progress import TextColumn, TimeRemainingColumn
 
-from hopping_leg.controllers.policy import Card
+from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.io import write_atomically
 from hopping_leg.progress import LiveProgress
@@ -19,9 +19,15 @@ from hopping_leg.rl.checkpoint import write_checkpoint
 from hopping_leg.rl.loggers import Log, check_log, make_logger
 from hopping_leg.rl.model_card import write_card
 from hopping_leg.rl.onnx_export import build_policy
+from hopping_leg.rl.policy_evaluation import (
+    FINAL_SEEDS,
+    FIRST_SEED,
+    as_rows,
+    evaluate_policy,
+    score,
+)
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.run_folder import RunFolder
-from hopping_leg.rl.selection import Selection
 from hopping_leg.robot.parameters import Robot
 
 
@@ -34,15 +40,7 @@ class TrainingProgress(LiveProgress):
         self._first_steps: int | None = None
 
     def update(self, share: float, steps: int, hops: int, error: float, best: str) -> None:
-        """Show the state of the training.
-
-        Args:
-            share: Share of the budget that is used, 0 to 1.
-            steps: Control steps so far.
-            hops: Hops so far.
-            error: Mean |apex - command| of the latest hops, m; NaN before the first.
-            best: About the best snapshot.
-        """
+        """Show the share that is done, 0 to 1, and the latest mean |apex - command|, m."""
         if self._first_steps is None:
             self._first_steps = steps
         note = f"{hops} hops"
@@ -86,13 +84,13 @@ def train(
     on_snapshot: Callable[[int, float], None] = lambda _steps, _score: None,
     on_early_score: Callable[[float, float], None] | None = None,
 ) -> Trained:
-    """Train a controller and leave its policy, card and history in ``out``.
+    """Train a controller, scaled to the robot's size; leave policy, card and history in ``out``.
 
     A run that was killed at any moment continues with ``resume`` as if nothing had happened; with
     ``minutes`` that holds up to the clock, which the learning rate then follows.
 
     Args:
-        recipe: What to train; scaled to the robot's size.
+        recipe: What to train.
         robot: The leg.
         seed: Seed of weights, exploration, task, noise and delay.
         out: The run's folder.
@@ -103,15 +101,12 @@ def train(
         threads: Threads of torch and physics; torch's is set for the whole process.
         quiet: Show no progress.
         log: Who gets the curves besides TensorBoard.
-        on_snapshot: Called with the steps and the score, m, of every snapshot that was tried; what
-            it raises ends the training.
+        on_snapshot: Called with steps and score, m, of every snapshot; may raise to end it.
         on_early_score: Called once, as soon as the recipe can tell how bad the training is likely
-            to end, with that in m and with the minutes so far, a checkpoint being written; what it
-            raises ends the training.
+            to end, with that in m and the minutes so far, after a checkpoint; may raise to end it.
 
     Raises:
-        UsageError: ``out`` holds a run that cannot be continued like this, or what ``log`` needs
-            is not installed.
+        UsageError: ``out`` holds a run that cannot be continued so, or ``log`` lacks a package.
         RobotError: The robot has effects that training does not simulate.
     """
     check(robot, minutes, log)
@@ -129,12 +124,7 @@ def train(
 
 
 def check(robot: Robot, minutes: float | None, log: Log) -> None:
-    """Refuse what cannot be trained before anything is written, see ``train``.
-
-    Raises:
-        UsageError: The time is no time, or what ``log`` needs is not installed.
-        RobotError: The robot has effects that training does not simulate.
-    """
+    """Refuse what cannot be trained before anything is written, raising as ``train`` does."""
     check_log(log)
     if minutes is not None and not 0 < minutes < float("inf"):
         raise UsageError(f"--minutes is {minutes:g} but must be positive.")
@@ -296,3 +286,56 @@ class Trainer:
         self._progress.update(
             min(share, 1.0), steps, self.env.hops, self.env.apex_error, self.selection.describe()
         )
+
+
+FINALISTS = 4
+"""Snapshots that are tried once more at the end."""
+
+
+class Selection:
+    """Tries every snapshot on one seed; the best few again on others, and one of those wins."""
+
+    def __init__(self, recipe: Recipe, robot: Robot, folder: RunFolder) -> None:
+        self._recipe, self._robot, self._folder = recipe, robot, folder
+        self.rows: list[dict[str, Any]] = []
+        """Every snapshot so far: steps, minutes, score and trials, as JSON values."""
+
+    @property
+    def next_at(self) -> int:
+        """Steps after which the next snapshot is due."""
+        every = self._recipe.selection.eval_every
+        return every * (self.rows[-1]["steps"] // every + 1) if self.rows else every
+
+    def add(self, steps: int, minutes: float, content: bytes) -> dict[str, Any]:
+        """Keep and try a policy file; return its row."""
+        write_atomically(self._folder.snapshot(steps), content)
+        row = {"steps": steps, "minutes": minutes, **self._trials(content, (FIRST_SEED,))}
+        self.rows.append(row)
+        return row
+
+    def choose(self) -> tuple[bytes, dict[str, Any]]:
+        """Return the best policy file and its row, with the scores of all finalists."""
+        ranked = sorted(self.rows, key=lambda row: float(row["score_m"]))[:FINALISTS]
+        finals = []
+        for row in ranked:
+            content = self._folder.snapshot(row["steps"]).read_bytes()
+            again = self._trials(content, FINAL_SEEDS)
+            finals.append(({"steps": row["steps"], "minutes": row["minutes"], **again}, content))
+        best, content = min(finals, key=lambda final: float(final[0]["score_m"]))
+        scores = [{"steps": row["steps"], "score_m": row["score_m"]} for row, _ in finals]
+        return content, {**best, "finalists": scores, "seeds": list(FINAL_SEEDS)}
+
+    def describe(self) -> str:
+        """Return what to show of the best snapshot so far, or nothing."""
+        if not self.rows:
+            return ""
+        best = min(self.rows, key=lambda row: float(row["score_m"]))
+        return f" · best snapshot {1000 * best['score_m']:.0f} mm"
+
+    def _trials(self, content: bytes, seeds: tuple[int, ...]) -> dict[str, Any]:
+        recipe = self._recipe
+        policy = Policy(content, "snapshot", recipe.name)
+        results = evaluate_policy(
+            policy, self._robot, recipe.selection.eval_commands, seeds, recipe.task.rate
+        )
+        return {"score_m": score(results), "trials": as_rows(results)}

@@ -75,11 +75,7 @@ _PATIENCE = 60.0
 
 
 def conditions(tuning: Tuning) -> dict[str, Any]:
-    """Return what all trials of a study share, as JSON values.
-
-    Raises:
-        UsageError: The recipe has no search space.
-    """
+    """Return what all trials of a study share, as JSON values; ``UsageError`` without a space."""
     if tuning.recipe not in SPACES:
         raise UsageError(
             f"Recipe '{tuning.recipe}' has no search space; valid: {', '.join(SPACES)}."
@@ -99,15 +95,9 @@ def conditions(tuning: Tuning) -> dict[str, Any]:
 def tune(tuning: Tuning, workers: int | None = None, ray: str | None = None) -> dict[str, Any]:
     """Search until the study has all its trials; return them, see ``record``.
 
-    Args:
-        tuning: What is searched.
-        workers: Processes on this machine, one by default; tasks of the cluster, by default one
-            per CPU.
-        ray: Address of a Ray cluster that works, ``local`` for one on this machine.
-
-    Raises:
-        UsageError: The database cannot be used, or holds a study of something else; there is no
-            such cluster, or some of it cannot reach the database.
+    ``workers`` are processes on this machine, one by default, or tasks of the Ray cluster at
+    ``ray``, ``local`` for one on this machine, one per CPU. Raises ``UsageError`` where the
+    database cannot be used or reached, holds another study, or there is no such cluster.
     """
     cluster = None if ray is None else _reach(tuning, ray, workers)
     if tuning.study is None or "://" not in tuning.study:
@@ -139,11 +129,7 @@ def work(tuning: Tuning, worker: int = 0) -> None:
 
 
 def open_study(tuning: Tuning, worker: int = 0) -> Study:
-    """Return the study, new or as it stands.
-
-    Raises:
-        UsageError: The database cannot be used, or holds a study of something else.
-    """
+    """Return the study, new or as it stands; ``UsageError`` where the database cannot be used."""
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     wanted = conditions(tuning)
     try:

@@ -13,9 +13,8 @@ from hopping_leg.errors import UsageError
 from hopping_leg.rl.finetune import apex_estimate, replay
 from hopping_leg.rl.finetune.apex_estimate import prepare
 from hopping_leg.rl.finetune.config import StoppingRules, Task
-from hopping_leg.rl.finetune.finetuning import Finetuning
-from hopping_leg.rl.finetune.running import POLICY as FILE
-from hopping_leg.rl.finetune.running import finetune
+from hopping_leg.rl.finetune.finetuning import POLICY as FILE
+from hopping_leg.rl.finetune.finetuning import Finetuning, finetune
 from hopping_leg.rl.finetune.simulated import Guard, SimulatedTrials
 from hopping_leg.robot import load_robot
 

@@ -48,12 +48,6 @@ class HopErrors:
         """Return apex minus command of the last hops in the ticks in which it counts, (n,).
 
         It is 0 in all others and where the command has changed since the foot left the ground.
-
-        Args:
-            height: Heights of the bases, any unit.
-            clearance: Gap under the feet, m.
-            command: Desired heights, in the same unit.
-            begun: Whose episode began with this tick.
         """
         self._flying[begun], self._standing[begun] = 0, self.last
         flies = clearance >= FLIGHT_CLEARANCE
@@ -124,18 +118,9 @@ class Places:
 class AdaptiveStudent(nn.Module):
     """Acts on what is measured, with the command that it remembers to correct.
 
-    Attributes:
-        estimate_share: Share of the legs whose correction follows the estimated error; that of the
-            others follows the true one.
-
-    Args:
-        places: Columns of an observation.
-        hidden: Layers of the network that acts.
-        error_hidden: Layers of the one that estimates.
-        room: Ticks from which it learns, the newest.
-        legs: How many legs act at once.
-        period: Control period, s.
-        command_integrator: Numbers of the memory.
+    ``places`` are the observation's columns, ``error_hidden`` the layers that estimate the error;
+    ``room`` ticks are learnt from, the newest. ``estimate_share`` of the legs follow the estimated
+    error, the others the true one.
     """
 
     def __init__(

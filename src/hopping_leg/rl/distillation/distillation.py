@@ -27,11 +27,12 @@ from hopping_leg.rl.distillation.adaptive_student import (
     Places,
 )
 from hopping_leg.rl.distillation.students import RecurrentStudent, WindowStudent
-from hopping_leg.rl.distillation.teacher import Teacher, last_torque
 from hopping_leg.rl.distillation.teacher_student import (
     DaggerConfig,
+    Teacher,
     TeacherStudentPolicy,
     TeacherStudentPPO,
+    last_torque,
 )
 from hopping_leg.rl.onnx_export import Network
 from hopping_leg.rl.policy_evaluation import command_score, evaluate_policy, every_centimetre
@@ -141,11 +142,7 @@ class Distillation:
         )
 
     def make_student(self, env: TaskVecEnv) -> nn.Module:
-        """Build the untrained student.
-
-        Raises:
-            UsageError: It corrects a single command, and the observation shows several.
-        """
+        """Build the untrained student; ``UsageError`` if it corrects one of several commands."""
         (size,) = env.observation_space.shape
         measured, task = env.task.observation.size, env.task.options
         config, room = self.student, self.dagger.buffer_size
@@ -269,10 +266,7 @@ class Distillation:
         return min(before + (learnt >= 1.0), self.teachers)
 
     def _learnt(self, share: float) -> tuple[int, float]:
-        """Return how many teachers have had their time, and the share of it that the next one has.
-
-        Whether one of them was accepted does not count here.
-        """
+        """Return how many teachers have had their time, and the next one's share of it."""
         if share >= self.teacher_share:
             return self.teachers, 1.0
         learnt = self.teachers * share / self.teacher_share

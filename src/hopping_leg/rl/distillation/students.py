@@ -22,12 +22,7 @@ Bools = npt.NDArray[np.bool_]
 
 
 class DaggerBuffer:
-    """The newest observations, each on its own.
-
-    Args:
-        room: How many are kept.
-        size: Entries of an observation.
-    """
+    """The newest observations, ``room`` rows of ``size`` entries."""
 
     def __init__(self, room: int, size: int) -> None:
         self._seen = torch.zeros((room, size), dtype=torch.float16)
@@ -72,11 +67,7 @@ class SequenceBatch(NamedTuple):
 
 
 class SequenceBuffer:
-    """The newest rollouts, each leg's ticks in their order.
-
-    Args:
-        room: Ticks that are kept, rounded down to whole rollouts, but at least one.
-    """
+    """The newest rollouts, whole and at least one: ``room`` ticks, each leg's in their order."""
 
     def __init__(self, room: int) -> None:
         self._room = room
@@ -89,13 +80,9 @@ class SequenceBuffer:
         known: Bools,
         memory: torch.Tensor,
     ) -> None:
-        """Keep a rollout and forget those for which there is no more room.
+        """Keep a rollout, (ticks, n, ...), and forget those for which there is no more room.
 
-        Args:
-            observations: (ticks, n, size).
-            begun: Whose episode began with a tick, (ticks, n).
-            known: For which it is known what to do, (ticks, n).
-            memory: What was remembered before the first tick, (n, k).
+        ``memory`` is what was remembered before the first tick, (n, k).
         """
         seen = torch.from_numpy(observations).half()
         later = begun.copy()
@@ -134,24 +121,13 @@ class Student(Protocol):
     """What a policy's student can do."""
 
     def act(self, observation: torch.Tensor, begun: Bools) -> torch.Tensor:
-        """Return what to do in a tick, unbounded, (n, 2).
-
-        Args:
-            observation: (n, size); only what learns may look beyond what is measured.
-            begun: Whose episode began with this tick, (n,).
-        """
+        """Return what to do in a tick, unbounded, (n, 2); ``begun`` tells new episodes, (n,)."""
         ...
 
     def add_rollout(
         self, observations: npt.NDArray[np.float32], begun: Bools, known: Bools
     ) -> None:
-        """Keep a rollout.
-
-        Args:
-            observations: (ticks, n, size).
-            begun: Whose episode began with a tick, (ticks, n).
-            known: For which it is known what the teacher would do, (ticks, n).
-        """
+        """Keep a rollout, (ticks, n, ...), and where it is known what the teacher would do."""
         ...
 
     def loss(self, count: int, wanted: Wanted) -> torch.Tensor:
@@ -174,12 +150,7 @@ class Student(Protocol):
 class WindowStudent(nn.Module):
     """Dense layers on what is measured; what it has to remember must be in there.
 
-    Args:
-        measured: Entries of an observation that it sees, the first ones.
-        size: Entries of an observation.
-        hidden: Its layers.
-        room: Ticks from which it learns, the newest.
-        activation: Activation of the hidden layers.
+    It sees the first ``measured`` entries of ``size``, and learns from the newest ``room`` ticks.
     """
 
     def __init__(
@@ -224,12 +195,7 @@ class RecurrentStudent(nn.Module):
     """A gated recurrent unit (GRU, Cho et al. 2014), which decides itself what to remember.
 
     Learns by backpropagation through the ticks of whole rollouts, from what it remembered then.
-
-    Args:
-        measured: Entries of an observation that it sees, the first ones.
-        memory: Entries of its memory.
-        room: Ticks from which it learns, the newest.
-        legs: How many legs act at once.
+    Sees the first ``measured`` entries of an observation; ``room`` ticks are kept.
     """
 
     def __init__(self, measured: int, memory: int, room: int, legs: int) -> None:

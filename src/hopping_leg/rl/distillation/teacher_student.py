@@ -5,6 +5,8 @@ has nothing to remember and learns in a few minutes. Then the student hops while
 every tick what it would do (DAgger, Ross et al. 2011), which is regression and bears any memory.
 """
 
+import hashlib
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,11 +16,20 @@ import numpy.typing as npt
 import torch
 
 from hopping_leg.arrays import Array, IntArray
-from hopping_leg.envs.observation import PRIVILEGED_COMMAND
+from hopping_leg.controllers.observation_history import make_observation_history
+from hopping_leg.envs import TaskConfig
+from hopping_leg.envs.observation import (
+    PRIVILEGED,
+    PRIVILEGED_COMMAND,
+    privileged_observation,
+    sample_scaling,
+)
 from hopping_leg.rl.checkpoint import Tree
 from hopping_leg.rl.distillation.students import Student
 from hopping_leg.rl.resumable import ResumablePPO
 from hopping_leg.rl.sb3_policies import AsymmetricPolicy
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim import Measurement, Simulator
 
 _OUTLIER = 0.01
 """Error beyond which a hop counts no more, m: those after a new command miss by far."""
@@ -48,12 +59,9 @@ class CommandCorrection:
     """Correction of the teacher's command, so that the student's hops are as high as desired.
 
     A student sees less than its teacher and hops lower or higher on average; its error at a height
-    is added up there, as an integral controller does.
-
-    Args:
-        offset: Command that an observation shows as 0, m.
-        gain: Its scale, 1/m.
-        knots: Heights at which it is known, from -1 to 1 of an observation; linear in between.
+    is added up there, as an integral controller does. An observation shows the command ``offset``,
+    m, as 0, scaled by ``gain``, 1/m; corrections are known at ``knots`` from -1 to 1 and linear in
+    between.
     """
 
     def __init__(self, offset: float, gain: float, knots: int) -> None:
@@ -95,18 +103,14 @@ def _shares(command: torch.Tensor, knots: torch.Tensor) -> torch.Tensor:
 class TeacherStudentPolicy(AsymmetricPolicy):
     """PPO policy whose actor is the teacher, with a student beside it.
 
-    Observations are what is measured, then the true state, which the critic sees.
+    Observations are the ``measured`` entries that the student sees, then the true state, which the
+    critic sees.
 
     Attributes:
         student_learns: Whether the student acts and learns, rather than the teacher.
         mixing: Chance that the teacher acts for a learning student, leg by leg and tick by
             tick: at first the student would only show how to fall.
         begun: Tells whose episode began with this tick, (n,).
-
-    Args:
-        measured: Entries that the student sees, the first ones.
-        teacher_sees: Entries that the teacher sees.
-        student: Builds it, a module.
     """
 
     def __init__(
@@ -157,13 +161,8 @@ class TeacherStudentPolicy(AsymmetricPolicy):
 class TeacherStudentPPO(ResumablePPO):
     """PPO while the teacher learns; regression on the teacher's actions while the student does.
 
-    Attributes:
-        teacher_scores: What the teachers that have learnt so far scored, m; less is better.
-
-    Args:
-        dagger: How the student learns.
-        evaluate_teacher: Scores the teacher as it stands.
-        pace: Learning rate at a share of the training, 0 to 1, after these scores.
+    ``pace`` is the learning rate at a share of the training, 0 to 1, after the ``teacher_scores``
+    so far, m, of which less is better.
     """
 
     def __init__(
@@ -260,17 +259,9 @@ def shift_to_arrival(
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.bool_]]:
     """Show the teacher the state in which a late leg's action will have its effect.
 
-    Seen in hindsight: what it would do there is what the student has to ask for before.
-
-    Args:
-        observations: Those of a rollout, (ticks, n, size).
-        begun: Whose episode began with a tick, (ticks, n).
-        late: Ticks until an action arrives, (n,).
-        first: Entry with which the true state begins.
-
-    Returns:
-        Observations with later true states, and whether those are known: not at the end of the
-        rollout nor of an episode, (ticks, n).
+    Seen in hindsight: what it would do there is what the student has to ask for before. Returns
+    observations, (ticks, n, size), with true states, from entry ``first`` on, ``late`` ticks later,
+    and whether those are known: not at the end of the rollout nor of an episode, (ticks, n).
     """
     if not late.any():
         return observations, np.ones(begun.shape, np.bool_)
@@ -281,3 +272,79 @@ def shift_to_arrival(
     shown = observations.copy()
     shown[..., first:] = observations[then, rows, first:]
     return shown, known
+
+
+_LASTING = 0.8
+"""Share of an error that is left after a tick: a policy that has misjudged the state goes on to."""
+
+
+class Teacher:
+    """Sees the true state of simulated legs, without noise or delay; its torques are disturbed.
+
+    ``action_noise`` is the standard deviation of what is added to them, of the largest torque:
+    errors as an imitator makes, which last for some ticks.
+    """
+
+    name = "true-state"
+
+    def __init__(
+        self,
+        policy: TeacherStudentPolicy,
+        robot: Robot,
+        options: TaskConfig,
+        action_noise: float = 0.0,
+    ) -> None:
+        self._policy, self._action_noise = policy, action_noise
+        self._last_torque = last_torque(options)
+        self._sample = sample_scaling(robot, options)
+        self._torque = np.array(options.action_torque)
+        self.command_range = options.command_bounds
+        """Heights it was made for, m."""
+
+    @property
+    def digest(self) -> str:
+        """First 16 hex digits of its weights' SHA-256."""
+        weights = hashlib.sha256()
+        for value in self._policy.state_dict().values():
+            weights.update(value.numpy().tobytes())
+        return weights.hexdigest()[:16]
+
+    def watch(self, legs: Simulator) -> None:
+        """Set the legs whose state it sees."""
+        self._legs = legs
+
+    def reset(self, count: int) -> None:
+        """Forget its last action; the errors begin anew, the same ones every time."""
+        self._last, self._error = np.zeros((count, 2)), np.zeros((count, 2))
+        self._rng = np.random.default_rng(0)
+
+    def act(self, measurement: Measurement) -> Array:
+        """Return joint torques, N m, (n, 2)."""
+        count = len(self._last)
+        seen = np.zeros((count, self._policy.features_dim), np.float32)
+        first = self._policy.measured
+        seen[:, self._last_torque] = self._last
+        state = seen[:, first : first + PRIVILEGED]
+        privileged_observation(self._legs, measurement.command[:, 0], self._sample, out=state)
+        with torch.no_grad():
+            self._last = self._policy.teacher_action(torch.from_numpy(seen)).double().numpy()
+        if self._action_noise > 0:
+            spread = self._action_noise * math.sqrt(1 - _LASTING**2)
+            self._error = _LASTING * self._error + spread * self._rng.normal(size=(count, 2))
+            self._last = (self._last + self._error).clip(-1, 1)
+        torque: Array = self._last * self._torque
+        return torque
+
+    def internals(self) -> dict[str, Array]:
+        """Return nothing."""
+        return {}
+
+
+def last_torque(task: TaskConfig) -> list[int]:
+    """Return where the torques of the last control step stand in an observation, if they do."""
+    shapes = make_observation_history(task.observation, 1 / task.rate).shapes
+    if "past_torque" not in shapes:
+        return []
+    before = list(shapes)[: list(shapes).index("past_torque")]
+    first = sum(int(np.prod(shapes[name])) for name in before)
+    return [first, first + 1]

@@ -142,14 +142,7 @@ def doubtful_legs(policy: Policy, robot: Robot, o: ContactConfig) -> Rollout:
 
 
 def prepare(policy: Policy, robot: Robot, options: ContactConfig, folder: Path) -> "ApexEstimator":
-    """Learn to estimate heights in simulation, or take it from an earlier run's folder.
-
-    Args:
-        policy: The one to go on from.
-        robot: The believed leg.
-        options: How contact is learnt.
-        folder: Where the estimator is kept.
-    """
+    """Learn to estimate heights in simulation, or take it from an earlier run's folder."""
     contact = ContactEstimator(options)
     asked = {"policy": policy.digest, "robot": robot.digest, "options": as_stored(asdict(options))}
     found = list_checkpoints(folder)
@@ -192,13 +185,7 @@ _NEAR = 0.06
 
 
 class ApexEstimator:
-    """Estimates heights of a leg; ``drag`` is by what flight time overestimates apexes.
-
-    Args:
-        robot: The believed leg: its lengths.
-        contact: Tells what is flight.
-        drag: Constant and slope over height, m, (2,).
-    """
+    """Estimates a leg's heights; flight time gives ``drag``, m, too much: constant and slope."""
 
     def __init__(self, robot: Robot, contact: ContactEstimator, drag: Array | None = None) -> None:
         self.robot, self.contact = robot, contact

@@ -24,10 +24,7 @@ _NEAR = 1e-3
 def robust_line(x: Array, y: Array, doubt: float = 0.0) -> Array:
     """Return constant and slope of the line of least absolute deviations, (2,).
 
-    Args:
-        x: (n,).
-        y: m, (n,).
-        doubt: Points' worth of evidence that the slope is zero.
+    ``doubt`` is as many points' worth of evidence that the slope is zero.
     """
     columns = np.stack([np.ones_like(x), x], axis=1)
     ridge = np.diag([1e-9, 1e-9 + doubt])
@@ -71,13 +68,7 @@ class LinearCommandCorrection:
     def updated(
         self, command: Array, error: Array, options: CommandCorrectionConfig
     ) -> "LinearCommandCorrection":
-        """Return the correction after hops.
-
-        Args:
-            command: Command of every hop, m, (hops,).
-            error: Apex minus command, m, (hops,).
-            options: How fast.
-        """
+        """Return the correction after hops at commands that missed by errors, m, (hops,)."""
         if not len(error):
             return self
         line = robust_line(self._features(command)[:, 1], error, options.ridge)

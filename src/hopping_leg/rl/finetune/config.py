@@ -50,10 +50,7 @@ class StoppingRules:
         return len(latest) == self.confirm and min(latest) > min(errors) + self.margin
 
     def reason(self, errors: Sequence[float], minutes: float, following: float) -> str:
-        """Return why to stop after errors of checks, m; empty to go on.
-
-        The next trial takes ``following`` minutes of robot time.
-        """
+        """Return why to stop after errors of checks, m; empty for a next trial of minutes."""
         if len(errors) > 1 and max(errors[-2:]) <= self.tolerance:
             return f"The error is within {1e3 * self.tolerance:g} mm."
         if minutes + following > self.minutes + 1e-9:

@@ -122,13 +122,7 @@ class Learner:
         _fill(self.model.replay_buffer, rows)
 
     def learn(self, steps: int, seed: int, *, critics_only: bool = False) -> None:
-        """Make gradient steps.
-
-        Args:
-            steps: How many.
-            seed: Seed of the batches; stable-baselines3 draws them from numpy's global generator.
-            critics_only: Leave the actor as it is.
-        """
+        """Make gradient steps on batches drawn from numpy's global generator, which is seeded."""
         if steps < 1:
             return
         torch.manual_seed(seed)

@@ -31,12 +31,8 @@ EDGE = 0.995
 class ExploringPolicy:
     """Acts as a policy file does, and off it; implements ``Controller``.
 
-    Args:
-        content: The policy file.
-        card: Its card.
-        spread: Standard deviation of the random matrix, (hidden, 2).
-        hold: Ticks for which a matrix is held.
-        rng: Source of randomness.
+    The noise is the hidden layer times a random matrix of standard deviation ``spread``, (hidden,
+    2), held for ``hold`` ticks.
     """
 
     def __init__(
@@ -103,15 +99,7 @@ class Transitions:
 
 
 class TransitionWriter:
-    """Writes transitions.
-
-    Args:
-        card: Card of the policy.
-        network: With the scaling of its inputs.
-        robot: The believed leg.
-        reward: Judges every tick.
-        penalty: Reward lost where a trial is ended early.
-    """
+    """Writes transitions; a trial that is ended early loses ``penalty`` of reward."""
 
     def __init__(
         self, card: Card, network: Network, robot: Robot, reward: Reward, penalty: float
@@ -209,8 +197,7 @@ def believed_rows(
 ) -> Transitions:
     """Return transitions of an exploring policy on the believed robot in simulation.
 
-    Heights are estimated there, too, as they will be on the real one. The time is that of all
-    ``BELIEVED_LEGS`` legs together.
+    Heights are estimated there, too. The time is that of all ``BELIEVED_LEGS`` legs together.
     """
     rng = np.random.default_rng((seed, 1))
     holds = max(1, round(seconds / BELIEVED_LEGS / 2.0))

@@ -45,13 +45,7 @@ class Guard:
 
 
 class SimulatedTrials:
-    """A simulated leg; implements ``TrialRobot``.
-
-    Args:
-        robot: The leg that plays the real one.
-        guard: When to stop; None never does.
-        threads: Threads of the physics.
-    """
+    """A simulated leg that plays the real one, stopped by the guard if any; a ``TrialRobot``."""
 
     def __init__(self, robot: Robot, guard: Guard | None, threads: int = 1) -> None:
         self.name, self._robot, self._guard = robot.name, robot, guard
@@ -111,9 +105,7 @@ def traces_of(run: Rollout) -> list[Trace]:
 class Witness:
     """Records what a controller is shown, and stops a leg where a guard objects.
 
-    Attributes:
-        ended: Tick at which each leg was stopped, -1 for never, (n,).
-        complaints: Why, by leg.
+    ``ended`` is the tick at which each leg was stopped, -1 for never, (n,); ``complaints`` say why.
     """
 
     def __init__(self, controller: Controller, guard: Guard | None) -> None:

@@ -32,11 +32,7 @@ class TrialData:
 
     @staticmethod
     def of(traces: Sequence[Trace]) -> "TrialData":
-        """Return equally long traces of trials as arrays.
-
-        Raises:
-            TraceError: A trace lacks a column, or has no sample at all.
-        """
+        """Return equally long traces as arrays; ``TraceError`` without columns or samples."""
         joints = {
             name: np.stack(
                 [np.stack([t.column(column) for column in columns], axis=1) for t in traces],

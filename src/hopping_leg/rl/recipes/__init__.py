@@ -10,12 +10,11 @@ from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.rl.distillation.distillation import StudentConfig
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes import fast, paper, precise
-from hopping_leg.rl.recipes.adaptive import ADAPTIVE
 from hopping_leg.rl.search_space import SearchSpace
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES, Range
 
 RECIPES: Mapping[str, Recipe] = {
-    recipe.name: recipe for recipe in (fast.FAST, paper.PAPER, precise.PRECISE, ADAPTIVE)
+    recipe.name: recipe for recipe in (fast.FAST, paper.PAPER, precise.PRECISE, precise.ADAPTIVE)
 }
 """Every recipe that ``hop train`` knows."""
 
@@ -52,9 +51,7 @@ _KINDS = {bool: "true or false", int: "a whole number", float: "a number"}
 def get_recipe(name: str) -> Recipe:
     """Return a shipped recipe, or that of ``path/to/file.py:NAME``, a ``Recipe`` or its maker.
 
-    Raises:
-        UsageError: There is no such recipe.
-        ControllerError: The file cannot be read, holds no such name, or fails.
+    Raises ``UsageError`` for an unknown name, ``ControllerError`` for a file that gives none.
     """
     if ":" not in name and not name.endswith(".py"):
         if name not in RECIPES:
@@ -68,11 +65,7 @@ def get_recipe(name: str) -> Recipe:
 
 
 def change(recipe: Recipe, changes: Sequence[str]) -> Recipe:
-    """Return a recipe with options changed, each by ``name=value`` or ``part.name=value``.
-
-    Raises:
-        UsageError: The recipe has no such option, or the value is none.
-    """
+    """Return a recipe with options changed by ``[part.]name=value``; ``UsageError`` for no such."""
     known = settings_of(recipe)
     values: dict[str, Any] = {}
     for entry in changes:
@@ -138,11 +131,7 @@ def words_of(name: str, options: dict[str, Any]) -> list[str]:
 
 
 def recipe_of(name: str, options: dict[str, Any]) -> Recipe:
-    """Return the recipe that a run was asked for, the inverse of ``words_of``.
-
-    Raises:
-        UsageError: There is no such recipe.
-    """
+    """Return the recipe that a run was asked for, the inverse of ``words_of``."""
     usual = get_recipe(options.get("source") or name)
     recipe = change(usual, changes_of(usual, options))
     ranges = _ranges_of(options["task"]["randomised"])
