@@ -6,27 +6,26 @@ from hopping_leg.errors import UsageError
 from hopping_leg.io import replace_at
 from hopping_leg.rl.checkpoint import Tree
 
-_PARTS = {
-    "schedule": "legs=num_envs steps log_every checkpoint_seconds",
-    "selection": "judge_every=eval_every judge_from=eval_start judge_commands=eval_commands",
-    "algorithm": "learning_rate rollout=n_steps batch=batch_size epochs=n_epochs gamma gae_lambda"
-    " noise_hold=sde_sample_freq log_std quiet_from=log_std_until buffer=buffer_size"
-    " warmup=learning_starts returns=n_steps tau gradient_steps target_entropy",
-    "network": "actor critic privileged_critic",
-    "distillation": "teaching=teacher_share teachers passing=teacher_accept_score"
-    " erring=teacher_action_noise guided=dagger_mixing_share alike=nominal_share"
-    " draws=randomizations trusting=estimate_ramp",
-    "distillation.student": "student=hidden memory=size feeling=error_hidden",
-    "task": "task.start=reset_distribution task.stagger=random_episode_start"
-    " task.command_hold=command_resampling_time task.chance=randomize_probability"
-    " task.unchanged=nominal_fraction",
-    "distillation.dagger": "imitation.memory=buffer_size imitation.updates=gradient_steps"
-    " imitation.batch=batch_size imitation.knots=knots imitation.aiming=correction_rate",
-}
+_TABLE = """
+schedule legs=num_envs steps log_every checkpoint_seconds
+selection judge_every=eval_every judge_from=eval_start judge_commands=eval_commands
+algorithm learning_rate rollout=n_steps batch=batch_size epochs=n_epochs gamma gae_lambda log_std
+algorithm noise_hold=sde_sample_freq quiet_from=log_std_until buffer=buffer_size returns=n_steps
+algorithm warmup=learning_starts tau gradient_steps target_entropy
+network actor critic privileged_critic
+distillation teaching=teacher_share teachers passing=teacher_accept_score alike=nominal_share
+distillation erring=teacher_action_noise guided=dagger_mixing_share draws=randomizations
+distillation trusting=estimate_ramp
+distillation.student student=hidden memory=size feeling=error_hidden
+task task.start=reset_distribution task.stagger=random_episode_start task.unchanged=nominal_fraction
+task task.command_hold=command_resampling_time task.chance=randomize_probability
+distillation.dagger imitation.memory=buffer_size imitation.updates=gradient_steps
+distillation.dagger imitation.batch=batch_size imitation.knots=knots imitation.aiming=correction_rate
+"""
 _NAMES = {
     old: f"{part}.{new or old}"
-    for part, entries in _PARTS.items()
-    for old, _, new in (entry.partition("=") for entry in entries.split())
+    for part, *entries in map(str.split, _TABLE.strip().splitlines())
+    for old, _, new in (entry.partition("=") for entry in entries)
 }
 _GONE = {"exam_at": [1.0], "task.idle": 0.0}
 """Options that are gone, with the only values that can still be had."""
@@ -38,9 +37,10 @@ def upgrade_config(stored: dict[str, Any]) -> dict[str, Any]:
     old, recipe = stored.get("options", {}), stored.get("recipe")
     if not old or "schedule" in old:
         return stored
-    parts = {k: v for k, v in old.items() if isinstance(v, dict) and k != "reward"}
-    flat = {k: v for k, v in old.items() if k not in parts}
-    flat |= {f"{part}.{name}": value for part, v in parts.items() for name, value in v.items()}
+    flat: dict[str, Any] = {}
+    for k, v in old.items():
+        nested = isinstance(v, dict) and k != "reward"
+        flat |= {f"{k}.{name}": value for name, value in v.items()} if nested else {k: v}
     names = _NAMES | ({"rollout": "algorithm.train_freq"} if recipe == "paper" else {})
     new: dict[str, Any] = {} if "teaching" in flat else {"distillation": None}
     for name, value in flat.items():
@@ -52,8 +52,8 @@ def upgrade_config(stored: dict[str, Any]) -> dict[str, Any]:
         elif name == "task.alike_at_first":
             new = replace_at(new, "task.randomize_from_start", not value)
         else:
-            path = names.get(name, name.replace("aiming.", "distillation.integrator.", 1))
-            new = replace_at(new, path, value)
+            renamed = name.replace("aiming.", "distillation.integrator.", 1)
+            new = replace_at(new, names.get(name, renamed), value)
     if recipe in _MEMORY:
         new = replace_at(new, "distillation.student.memory", _MEMORY[recipe])
     recipe = "precise" if recipe == "recurrent" else recipe

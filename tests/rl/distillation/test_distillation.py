@@ -18,15 +18,6 @@ RATE = PRECISE.algorithm.learning_rate
 COMMANDS = PRECISE.selection.eval_commands
 
 
-def rate(left):
-    """Return the learning rate where no teacher is accepted before the last one."""
-    return DISTILLATION.pace(1 - left, (), RATE)
-
-
-def evaluate(policy):
-    return DISTILLATION.evaluate_teacher(policy, ROBOT, RECIPE.task, COMMANDS)
-
-
 @pytest.fixture(scope="module")
 def model():
     return learner(RECIPE)
@@ -64,32 +55,14 @@ def test_the_teacher_sees_the_true_state_and_its_own_last_torque(model, seen):
 
 def test_the_teacher_learns_first_and_guides_the_student_ever_less(model):
     policy = model.policy
-    shares = np.linspace(0, 1, 41)
     mixing = []
-    for share in shares:
+    for share in np.linspace(0, 1, 41):
         RECIPE.anneal(model, model.env, share)
         assert policy.student_learns == (share >= DISTILLATION.teacher_share)
-        mixing.append(policy.mixing)
-    student_progress = np.array(mixing)[shares >= DISTILLATION.teacher_share]
-    assert student_progress[0] > 0.8
-    assert (np.diff(student_progress) <= 0).all()
-    assert student_progress[-1] == 0
-
-
-def test_learning_rates_fall_for_the_teacher_and_again_for_the_student():
-    left = 1 - DISTILLATION.teacher_share
-    assert rate(1.0) == RATE
-    assert rate(left + 1e-6) < 0.03 * RATE
-    assert rate(left - 1e-6) > 0.9 * RATE
-    assert rate(0.0) < 0.03 * RATE
-
-
-def test_every_teacher_learns_from_the_start_at_the_full_rate():
-    each = DISTILLATION.teacher_share / DISTILLATION.teachers
-    for number in range(DISTILLATION.teachers):
-        begun = 1 - number * each
-        assert rate(begun - 1e-6) > 0.9 * RATE
-        assert rate(begun - each + 1e-6) < 0.03 * RATE
+        mixing += [policy.mixing] * int(policy.student_learns)
+    assert mixing[0] > 0.8
+    assert mixing == sorted(mixing, reverse=True)
+    assert mixing[-1] == 0
 
 
 def test_the_teacher_with_the_best_score_teaches():
@@ -102,18 +75,16 @@ def test_the_teacher_with_the_best_score_teaches():
 
     chooser = learner(TINY_PRECISE)
     chooser._evaluate_teacher = evaluate_teacher
-    learnt = np.linspace(0, TINY_PRECISE.distillation.teacher_share, 7)
-    for share in learnt:
+    for share in np.linspace(0, TINY_PRECISE.distillation.teacher_share, 7):
         TINY_PRECISE.anneal(chooser, chooser.env, share)
         with torch.no_grad():
             chooser.policy.action_net.bias += 1.0
     with torch.no_grad():
         chooser.policy.action_net.bias -= 1.0
-    assert chooser.teacher_scores == [0.03, 0.01, 0.02]
     assert TINY_PRECISE.extra_results(chooser)["teacher_scores_m"] == [0.03, 0.01, 0.02]
-    weights = [one["mlp_extractor.policy_net.0.weight"] for one in evaluated]
-    assert not torch.equal(weights[0], weights[1])
-    assert not torch.equal(weights[1], weights[2])
+    first, second, third = (one["mlp_extractor.policy_net.0.weight"] for one in evaluated)
+    assert not torch.equal(first, second)
+    assert not torch.equal(second, third)
     now = chooser.policy.state_dict()
     best = {k: v for k, v in evaluated[1].items() if k != "log_std"}
     assert all(torch.equal(now[name], value) for name, value in best.items())
@@ -140,16 +111,13 @@ def test_a_teacher_that_passes_gives_the_time_of_the_next_ones_to_the_policy():
 
 
 def test_the_policys_rate_falls_from_when_its_teacher_passed():
-    teacher_scores = [0.03, DISTILLATION.teacher_accept_score]
-    until = DISTILLATION.student_from(teacher_scores)
+    scores = [0.03, DISTILLATION.teacher_accept_score]
+    until = DISTILLATION.student_from(scores)
     assert until == pytest.approx(DISTILLATION.teacher_share * 2 / DISTILLATION.teachers)
-    assert DISTILLATION.pace(until, teacher_scores, RATE) == pytest.approx(RATE)
-    middle, end = (
-        DISTILLATION.pace(share, teacher_scores, RATE) for share in ((1 + until) / 2, 1.0)
-    )
-    assert RATE > middle > end
-    assert DISTILLATION.student_progress(until, teacher_scores) == 0
-    assert DISTILLATION.student_progress(1.0, teacher_scores) == 1
+    rates = [DISTILLATION.pace(share, scores, RATE) for share in (until, (1 + until) / 2, 1.0)]
+    assert rates[0] == pytest.approx(RATE)
+    assert rates[0] > rates[1] > rates[2]
+    assert [DISTILLATION.student_progress(share, scores) for share in (until, 1.0)] == [0, 1]
 
 
 def test_a_single_teacher_takes_no_exam():
@@ -161,42 +129,23 @@ def test_a_single_teacher_takes_no_exam():
     assert "teacher_scores_m" not in alone.extra_results(model)
 
 
-def test_an_exam_tells_a_teacher_that_does_not_hop():
-    model = learner(TINY_PRECISE)
-    with torch.no_grad():
-        for weight in model.policy.action_net.parameters():
-            weight.zero_()
-    assert evaluate(model.policy) >= 1.0
-
-
-def test_an_exam_counts_the_worst_height_under_errors(monkeypatch):
-    asked = {}
-
+@pytest.mark.parametrize(
+    ("scores", "flight", "worst"),
+    [((0.002, 0.01, 0.003), 0.6, 0.01), ((0.003,), 0.5, 0.003), ((0.003,), 0.42, 0.011)],
+)
+def test_an_exam_counts_the_worst_height_and_time_on_the_ground(
+    model, monkeypatch, scores, flight, worst
+):
     def judged(teacher, robot, commands, rate, threads):
-        asked.update(teacher_action_noise=teacher._action_noise, commands=commands)
-        scores = dict.fromkeys(commands, 0.002) | {commands[1]: 0.01}
-        return [Mock(score=score, flight_fraction=0.6) for score in scores.values()]
+        assert teacher._action_noise == DISTILLATION.teacher_action_noise > 0
+        assert (commands[0], commands[-1]) == (min(COMMANDS), max(COMMANDS))
+        assert np.diff(commands).max() < 0.011
+        return [Mock(score=score, flight_fraction=flight) for score in scores]
 
     monkeypatch.setattr(distillation, "evaluate_policy", judged)
     monkeypatch.setattr(distillation, "command_score", lambda result: result.score)
-    assert evaluate(learner(TINY_PRECISE).policy) == 0.01
-    assert asked["teacher_action_noise"] == DISTILLATION.teacher_action_noise > 0
-    heights = asked["commands"]
-    assert (heights[0], heights[-1]) == (min(COMMANDS), max(COMMANDS))
-    assert np.diff(heights).max() < 0.011
-
-
-def test_an_exam_counts_time_on_the_ground_beyond_half(monkeypatch):
-    flights = iter([0.5, 0.7, 0.42])
-
-    def judged(teacher, robot, commands, rate, threads):
-        return [Mock(score=0.003, flight_fraction=next(flights))]
-
-    monkeypatch.setattr(distillation, "evaluate_policy", judged)
-    monkeypatch.setattr(distillation, "command_score", lambda result: result.score)
-    policy = learner(TINY_PRECISE).policy
-    scores = [evaluate(policy) for _ in range(3)]
-    assert scores == pytest.approx([0.003, 0.003, 0.011])
+    found = DISTILLATION.evaluate_teacher(model.policy, ROBOT, RECIPE.task, COMMANDS)
+    assert found == pytest.approx(worst)
 
 
 def test_imitation_brings_the_student_to_its_teacher_and_leaves_the_teacher_alone():
@@ -275,11 +224,12 @@ def test_the_teacher_is_asked_where_a_late_legs_action_arrives():
     np.testing.assert_array_equal(shown[:, 1, 1][known[:, 1]], [2, 3, 4, 5])
 
 
-def test_the_curriculum_names_who_learns_until_when():
+def test_every_stage_of_the_curriculum_learns_from_the_full_rate_down():
     stages = DISTILLATION.stages
     assert [(s.name, s.until) for s in stages] == [
         ("teacher 1", 0.25), ("teacher 2", 0.5), ("student", 1.0),
     ]  # fmt: skip
     assert stages[0].must_score == DISTILLATION.teacher_accept_score
-    for stage in stages[:2]:
-        assert rate(1 - stage.until + 1e-6) < 0.03 * RATE
+    for begun, stage in zip((0.0, 0.25, 0.5), stages, strict=True):
+        assert DISTILLATION.pace(begun + 1e-6, (), RATE) > 0.9 * RATE
+        assert DISTILLATION.pace(stage.until - 1e-6, (), RATE) < 0.03 * RATE
