@@ -19,8 +19,9 @@ distillation trusting=estimate_ramp
 distillation.student student=hidden memory=size feeling=error_hidden
 task task.start=reset_distribution task.stagger=random_episode_start task.unchanged=nominal_fraction
 task task.command_hold=command_resampling_time task.chance=randomize_probability
-distillation.dagger imitation.memory=buffer_size imitation.updates=gradient_steps
-distillation.dagger imitation.batch=batch_size imitation.knots=knots imitation.aiming=correction_rate
+distillation.dagger imitation.memory=buffer_size imitation.knots=knots
+distillation.dagger imitation.batch=batch_size imitation.aiming=correction_rate
+distillation.dagger imitation.updates=gradient_steps
 """
 _NAMES = {
     old: f"{part}.{new or old}"
