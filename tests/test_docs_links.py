@@ -5,7 +5,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from html.parser import HTMLParser
-from pathlib import Path
 from urllib.parse import unquote, urljoin, urlsplit
 
 import pytest
@@ -84,17 +83,13 @@ def test_every_page_is_two_clicks_from_the_front_page(site):
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_links_elsewhere_are_well_formed(page):
-    for link in _LINKS.findall(PAGES[page].read_text(encoding="utf-8")):
+def test_links_elsewhere_are_well_formed_and_named_files_exist(page):
+    text = PAGES[page].read_text(encoding="utf-8")
+    assert [name for name in _FILES.findall(text) if not (ROOT / name).exists()] == []
+    for link in _LINKS.findall(text):
         target = urlsplit(link)
         if target.scheme:
             assert target.scheme == "https", link
             assert re.fullmatch(r"[a-z0-9-]+(\.[a-z0-9-]+)+", target.netloc), link
         elif page == "README":
             assert (ROOT / target.path).exists(), link
-
-
-@pytest.mark.parametrize("page", PAGES)
-def test_files_that_are_named_exist(page):
-    named = _FILES.findall(PAGES[page].read_text(encoding="utf-8"))
-    assert [name for name in named if not (ROOT / Path(name)).exists()] == []

@@ -7,17 +7,9 @@ from pathlib import Path
 
 import pytest
 
-DOCS = Path(__file__).parent.parent / "docs"
+from tests.evaluate.test_acceptance import GOOD
 
-GOOD = {
-    "controller": "quarter-0",
-    "median_error_m": 0.001,
-    "std_m": 0.003,
-    "skipped_hops": 0,
-    "body_contacts": 0,
-    "hop_rate_hz": 2.0,
-    "flight_fraction": 0.6,
-}
+DOCS = Path(__file__).parent.parent / "docs"
 
 
 @pytest.fixture

@@ -47,8 +47,13 @@ sys.meta_path.insert(0, Block())
 MODULES = sorted(ROOT.rglob("*.py"))
 
 
-def room(dotted):
-    parts = dotted.split(".")
+def dotted(path):
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(("hopping_leg", *parts)).removesuffix(".__init__")
+
+
+def room(name):
+    parts = name.split(".")
     name = parts[1] if len(parts) > 1 else ""
     return "foundation" if name in FOUNDATION else name
 
@@ -65,8 +70,7 @@ def imports(tree):
 @pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(ROOT)))
 def test_no_room_imports_a_later_one_or_a_study(path):
     relative = path.relative_to(ROOT)
-    here = room(".".join(("hopping_leg", *relative.with_suffix("").parts)))
-    here = "foundation" if relative == Path("__init__.py") else here
+    here = room(dotted(path))
     for name in imports(ast.parse(path.read_text(encoding="utf-8"))):
         if name.split(".")[0] == "hopping_leg":
             there = room(name)
@@ -90,13 +94,8 @@ def files_imported(path, names):
 
 
 def test_no_files_import_each_other_in_a_circle():
-    dotted = {
-        ".".join(("hopping_leg", *p.relative_to(ROOT).with_suffix("").parts)).removesuffix(
-            ".__init__"
-        ): p
-        for p in MODULES
-    }
-    graph = {name: set(files_imported(path, dotted.keys())) for name, path in dotted.items()}
+    files = {dotted(path): path for path in MODULES}
+    graph = {name: set(files_imported(path, files.keys())) for name, path in files.items()}
     graphlib.TopologicalSorter(graph).prepare()
 
 
@@ -111,11 +110,8 @@ def run_without_training_extra(code):
 
 
 def test_everything_but_learning_imports_without_the_training_extra():
-    names = []
-    for path in MODULES:
-        parts = path.relative_to(ROOT).with_suffix("").parts
-        if parts[-1] != "__main__" and parts[0] != "rl":
-            names.append(".".join(("hopping_leg", *parts)).removesuffix(".__init__"))
+    names = [dotted(path) for path in MODULES]
+    names = [n for n in names if not n.endswith(".__main__") and room(n) != "rl"]
     code = f"import importlib\nfor name in {names}: importlib.import_module(name)"
     result = run_without_training_extra(code)
     assert result.returncode == 0, result.stderr

@@ -23,12 +23,9 @@ class FakePolicy:
     stranger = Policy.stranger
 
 
-def test_a_name_that_does_not_exist_is_answered_with_those_that_do(robot):
+def test_what_does_not_exist_is_refused(robot, tmp_path):
     with pytest.raises(UsageError, match="energy-shaping"):
         load_entries(["enrgy-shaping"], robot, 200.0)
-
-
-def test_a_pattern_without_a_match_is_an_error(robot, tmp_path):
     with pytest.raises(PolicyError, match="No policy file matches"):
         load_entries([str(tmp_path / "*.onnx")], robot, 200.0)
 
@@ -66,14 +63,10 @@ def test_a_file_can_be_given_a_label(robot, folder):
     assert found.label == "mine"
     assert found.controller.card.seed == 1
     assert found.notes[0].startswith("mine was trained")
-
-
-def test_a_path_may_hold_an_equals_sign(robot, folder):
-    (folder / "a=1").mkdir()
+    (folder / "a=1").mkdir()  # a path may hold an equals sign, too
     path = folder / "a=1" / "2.onnx"
     path.touch()
-    [found] = load_entries([str(path)], robot, 200.0)
-    assert found.label == str(path)
+    assert [found.label for found in load_entries([str(path)], robot, 200.0)] == [str(path)]
 
 
 def test_snapshots_of_one_training_are_no_group(robot, folder):

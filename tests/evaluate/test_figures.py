@@ -130,8 +130,5 @@ def test_every_format_and_the_same_bytes_twice(figure):
     assert b"<svg" in encode(figure, "svg")
     assert encode(figure, "svg") == encode(figure, "svg")
     assert encode(figure, "png").startswith(b"\x89PNG")
-
-
-def test_print_has_300_dots_per_inch(figure):
     image = plt.imread(io.BytesIO(encode(figure, "png", "column")))
     assert image.shape[1] == round(300 * INCHES["column"])

@@ -1,5 +1,6 @@
 """The page in a real browser without a screen; skipped, with the reason, where there is none."""
 
+import contextlib
 import io
 import time
 
@@ -84,11 +85,17 @@ def choose(page, label, option):
     page.get_by_role("option", name=option, exact=True).click()
 
 
-def test_the_slider_changes_how_high_the_leg_hops(page):
-    live = LiveSimulation(("energy-shaping",), ROBOT, 0.26)
+@contextlib.contextmanager
+def simulated(page, controller, height):
+    live = LiveSimulation((controller,), ROBOT, height)
     viewer = Viewer(live, ROBOT, port=0)
     with running(viewer):
         wait_for_leg(page, viewer)
+        yield live, viewer
+
+
+def test_the_slider_changes_how_high_the_leg_hops(page):
+    with simulated(page, "energy-shaping", 0.26) as (live, _):
         until(lambda: live.now > 2.5)
         before = shown_apex(page)
         handle = slider(page, "Height, m")
@@ -105,10 +112,7 @@ def test_the_slider_changes_how_high_the_leg_hops(page):
 
 
 def test_keys_change_height_pause_step_and_push(page):
-    live = LiveSimulation(("fast",), ROBOT, 0.30)
-    viewer = Viewer(live, ROBOT, port=0)
-    with running(viewer):
-        wait_for_leg(page, viewer)
+    with simulated(page, "fast", 0.30) as (live, viewer):
         page.keyboard.press("k")
         until(lambda: live.height == pytest.approx(0.30 + KEY_STEP))
         assert slider(page, "Height, m").get_attribute("aria-valuenow") is not None
@@ -128,10 +132,7 @@ def test_keys_change_height_pause_step_and_push(page):
 
 
 def test_settings_controller_robot_and_a_second_leg_change_while_it_hops(page):
-    live = LiveSimulation(("fast",), ROBOT, 0.30)
-    viewer = Viewer(live, ROBOT, port=0)
-    with running(viewer):
-        wait_for_leg(page, viewer)
+    with simulated(page, "fast", 0.30) as (live, _):
         for label in ("Payload, kg", "Ground, ms", "Delay, ms"):
             slider(page, label).focus()
             page.keyboard.press("ArrowRight")
@@ -148,10 +149,7 @@ def test_settings_controller_robot_and_a_second_leg_change_while_it_hops(page):
 
 
 def test_the_picture_shows_something_and_moves(page):
-    live = LiveSimulation(("fast",), ROBOT, 0.30)
-    viewer = Viewer(live, ROBOT, port=0)
-    with running(viewer):
-        wait_for_leg(page, viewer)
+    with simulated(page, "fast", 0.30) as (live, _):
         until(lambda: live.now > 2.0)
         middle = {"x": 330, "y": 60, "width": 520, "height": 700}
         pictures = []

@@ -1,6 +1,7 @@
 import os
 
 import numpy as np
+import polars as pl
 import pytest
 
 from hopping_leg.controllers.registry import load_controller
@@ -8,7 +9,9 @@ from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorder, FlightRec
 from hopping_leg.deploy.loop import columns
 from hopping_leg.errors import RobotError, TraceError, UsageError
 from hopping_leg.robot import kinematics, load_robot
-from hopping_leg.viewer.data_source import RecorderSource
+from hopping_leg.trace import Trace
+from hopping_leg.viewer.data_source import RecorderSource, ReplaySource
+from hopping_leg.viewer.tracks import FIELDS
 
 COLUMNS = ("time_s", "command_m", "hip_position_rad", "knee_position_rad", "hip_torque_nm")
 
@@ -25,6 +28,12 @@ def write(writer, first, count, hip=0.8):
     writer._thread.join()
     writer._thread = type(writer._thread)(target=writer._write, daemon=True)
     writer._thread.start()
+
+
+def finished(path, count, **header):
+    writer = box(path, **header)
+    write(writer, 0, count)
+    writer.close()
 
 
 def test_a_tail_returns_each_row_once_wherever_the_file_was_cut(tmp_path):
@@ -63,11 +72,14 @@ def test_a_run_is_shown_as_it_grows_until_it_is_over(tmp_path):
     np.testing.assert_allclose(q, [0.9, -1.6])
     assert height == pytest.approx(kinematics.stance_height(load_robot("legv2"), q))
     assert "standing" in track.note
+    write(writer, 7, 3, hip=float("nan"))
+    follow.advance(1 / 60)
+    assert track.moment(follow.now)[1][0] == 0.9, "joints without a reply stay as they were"
     writer.close()
     path.unlink()
     follow.advance(1.0)
     assert follow.notices[-1].startswith("The run is over")
-    assert len(track) == 7
+    assert len(track) == 10
 
 
 def test_what_hop_deploy_records_is_shown_with_the_estimate_of_the_controller(tmp_path):
@@ -94,23 +106,9 @@ def test_what_hop_deploy_records_is_shown_with_the_estimate_of_the_controller(tm
     assert "estimate" in track.note
 
 
-def test_joints_without_a_reply_stay_as_they_were(tmp_path):
-    path = tmp_path / f"fast-1{SUFFIX}"
-    writer = box(path)
-    follow = RecorderSource(path)
-    write(writer, 0, 3)
-    follow.advance(1 / 60)
-    write(writer, 3, 3, hip=float("nan"))
-    follow.advance(1 / 60)
-    assert follow.tracks[0].moment(follow.now)[1][0] == 0.8
-    writer.close()
-
-
 def test_of_boxes_written_in_one_tick_the_last_by_name_is_followed(tmp_path):
     for number in (2, 1):
-        writer = box(tmp_path / f"fast-{number}{SUFFIX}")
-        write(writer, 0, 3)
-        writer.close()
+        finished(tmp_path / f"fast-{number}{SUFFIX}", 3)
     for number in (1, 2):
         os.utime(tmp_path / f"fast-{number}{SUFFIX}", ns=(10**18, 10**18))
     follow = RecorderSource(tmp_path)
@@ -123,9 +121,7 @@ def test_a_folder_waits_for_a_run_and_turns_to_a_newer_one(tmp_path):
     follow.advance(1.0)
     assert "Waiting" in follow.notices[0]
     for number, count in ((1, 3), (2, 5)):
-        writer = box(tmp_path / f"fast-{number}{SUFFIX}")
-        write(writer, 0, count)
-        writer.close()
+        finished(tmp_path / f"fast-{number}{SUFFIX}", count)
         follow.advance(1.0)
         assert len(follow.tracks[0]) == count
     assert follow.notices[-1] == f"Following fast-2{SUFFIX}."
@@ -138,8 +134,62 @@ def test_what_cannot_be_followed_is_refused(tmp_path):
     foreign.write_bytes(b"something else altogether")
     with pytest.raises(TraceError, match="no flight recording"):
         RecorderSource(foreign).advance(1.0)
-    unknown = box(tmp_path / f"unknown{SUFFIX}", robot="mine")
-    write(unknown, 0, 1)
-    unknown.close()
+    unknown = tmp_path / f"unknown{SUFFIX}"
+    finished(unknown, 1, robot="mine")
     with pytest.raises(RobotError, match="--robot"):
-        RecorderSource(unknown.path).advance(1.0)
+        RecorderSource(unknown).advance(1.0)
+
+
+def stored(path, seconds=1.0, start=0.0, **header):
+    ticks = round(seconds * 200) + 1
+    columns = {name: np.zeros(ticks) for name in FIELDS}
+    columns["time_s"] = start + np.arange(ticks) / 200
+    columns["height_m"] = np.linspace(0.2, 0.4, ticks)
+    Trace(pl.DataFrame(columns), {"robot": "legv2", "controller": "fast"} | header).save(path)
+    return path
+
+
+def test_a_replay_plays_and_begins_again(tmp_path):
+    replay = ReplaySource((stored(tmp_path / "a.parquet", start=7.0),))
+    assert replay.length == pytest.approx(1.0)
+    replay.advance(0.5)
+    assert replay.tracks[0].moment(replay.now)[0] == pytest.approx(0.3)
+    replay.advance(0.6)
+    assert replay.now == 0.0
+    for wanted, shown in ((-1.0, 0.0), (0.3, 0.3), (5.0, 1.0)):
+        replay.seek(wanted)
+        assert replay.now == pytest.approx(shown)
+
+
+def test_two_traces_begin_together_and_the_shorter_one_waits(tmp_path):
+    paths = (stored(tmp_path / "a.parquet"), stored(tmp_path / "b.parquet", 2.0, start=3.0))
+    replay = ReplaySource(paths)
+    replay.seek(1.5)
+    heights = [track.moment(replay.now)[0] for track in replay.tracks]
+    assert replay.length == pytest.approx(2.0)
+    np.testing.assert_allclose(heights, [0.4, 0.35])
+
+
+def test_other_parameters_are_told(tmp_path):
+    digest = load_robot("legv2").digest
+    same = stored(tmp_path / "same.parquet", robot_digest=digest)
+    other = stored(tmp_path / "other.parquet", robot_digest="0" * 16)
+    assert ReplaySource((same,)).notices == []
+    assert "other parameters" in ReplaySource((other,)).notices[0]
+
+
+def test_an_unknown_robot_asks_for_its_file(tmp_path):
+    path = stored(tmp_path / "a.parquet", robot="mine")
+    with pytest.raises(RobotError, match="--robot"):
+        ReplaySource((path,))
+    assert ReplaySource((path,), "legv1").tracks[0].robot.name == "legv1"
+
+
+def test_what_cannot_be_replayed_is_refused(tmp_path):
+    path = stored(tmp_path / "a.parquet")
+    with pytest.raises(UsageError, match="one, or two"):
+        ReplaySource((path,) * 3)
+    with pytest.raises(TraceError, match="no trace file"):
+        ReplaySource((tmp_path / "none.parquet",))
+    with pytest.raises(RobotError, match="cannot hop"):
+        ReplaySource((stored(tmp_path / "p.parquet", robot="doublependulum"),))
