@@ -74,9 +74,8 @@ def _torque_speed_line(robot: Robot) -> Array:
     """Return software limit, peak torque and slope of both joints, (3, 2)."""
     joints = (robot.hip, robot.knee)
     peak = np.array([j.motor.peak_torque for j in joints]) * robot.of_joints("belt_ratio")
-    return np.stack(
-        [robot.of_joints("torque_limit"), peak, peak / robot.of_joints("no_load_speed")]
-    )
+    slope = peak / robot.of_joints("no_load_speed")
+    return np.stack([robot.of_joints("torque_limit"), peak, slope])
 
 
 @dataclass(frozen=True)
@@ -98,11 +97,10 @@ class SoftLimits:
 
     def __post_init__(self) -> None:
         for name in ("stiffness", "damping", "inset"):
-            if not 0 <= getattr(self, name) < float("inf"):
-                raise UsageError(
-                    f"'{name}' of the soft limits is {getattr(self, name)}"
-                    " but must be zero or more and finite."
-                )
+            value = getattr(self, name)
+            if not 0 <= value < float("inf"):
+                valid = "must be zero or more and finite"
+                raise UsageError(f"'{name}' of the soft limits is {value} but {valid}.")
 
 
 class SoftLimiter:

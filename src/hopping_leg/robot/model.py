@@ -29,7 +29,10 @@ def get_spec(robot: Robot, timestep: float = TIMESTEP) -> mujoco.MjSpec:
     spec.option.timestep = timestep
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-    _set_base(spec, robot)
+    _set_inertia(spec.body("base"), robot.base.mass, 0.0, _THIN)
+    spec.geom("base").size[0] = robot.base.radius
+    spec.joint("rail").frictionloss = robot.rail.friction
+    _set_damping(spec.joint("rail"), robot.rail.damping)
     _set_link(spec, "thigh", robot.thigh, robot.hip)
     _set_link(spec, "shank", robot.shank, robot.knee)
     spec.body("shank").pos = [0, 0, -robot.thigh.length]
@@ -66,15 +69,6 @@ def compile_spec(spec: mujoco.MjSpec, name: str) -> mujoco.MjModel:
         # MuJoCo 4.0.0 factorises the sparse Hessian wrongly.
         raise RuntimeError("the leg's constraint Jacobian must be dense")
     return model
-
-
-def _set_base(spec: mujoco.MjSpec, robot: Robot) -> None:
-    body = spec.body("base")
-    _set_inertia(body, robot.base.mass, 0.0, _THIN)
-    spec.geom("base").size[0] = robot.base.radius
-    rail = spec.joint("rail")
-    rail.frictionloss = robot.rail.friction
-    _set_damping(rail, robot.rail.damping)
 
 
 def _set_link(spec: mujoco.MjSpec, name: str, link: Link, joint: Joint) -> None:

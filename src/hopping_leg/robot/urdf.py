@@ -92,12 +92,8 @@ def _rail(root: Xml.Element, robot: Robot) -> None:
 def _hinge(root: Xml.Element, name: str, parent: str, child: str, z: float, joint: Joint) -> None:
     hinge = _joint(root, "revolute", name, parent, child, z)
     Xml.SubElement(hinge, "axis", xyz="0 -1 0")
-    limit = {
-        "lower": joint.lower,
-        "upper": joint.upper,
-        "effort": joint.torque_limit,
-        "velocity": joint.no_load_speed,
-    }
+    limit = {"lower": joint.lower, "upper": joint.upper}
+    limit |= {"effort": joint.torque_limit, "velocity": joint.no_load_speed}
     Xml.SubElement(hinge, "limit", {key: _text(value) for key, value in limit.items()})
     Xml.SubElement(hinge, "dynamics", damping=_text(joint.damping), friction=_text(joint.friction))
     hinge.append(Xml.Comment(f" reflected inertia at the joint: {joint.armature!r} kg m2 "))

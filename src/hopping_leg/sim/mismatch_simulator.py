@@ -65,7 +65,7 @@ class MismatchSimulator:
         self._inverse_belt = np.tile(1 / robots[0].of_joints("belt_ratio"), (self.count, 1))
         self._layout = _layout(robots[0])
         self._note(robots)
-        self._set_models(robots, differ=_differ(robots))
+        self._set_models(robots, differ=any(r is not robots[0] for r in robots))
         self.reseed(np.random.default_rng(0))
 
     def set_robots(self, robots: Sequence[Robot]) -> None:
@@ -197,10 +197,6 @@ class MismatchSimulator:
             part.restore({k[len(prefix) :]: v for k, v in memory.items() if k.startswith(prefix)})
         self.rng.bit_generator.state = memory["reality_rng"]
         self._show()
-
-
-def _differ(robots: Sequence[Robot]) -> bool:
-    return any(robot is not robots[0] for robot in robots)
 
 
 def _layout(robot: Robot) -> list[tuple[bool, bool]]:

@@ -56,7 +56,15 @@ class MujocoSimulator(Simulator):
         if self._is_plain(robots) and not clamped and not detailed:
             self._take_model(threads, robots)
         else:
-            self._use_mismatch(robots or [robot] * count, clamped, threads)
+            self.mismatch = MismatchSimulator(
+                robots or [robot] * count,
+                timestep=timestep,
+                substeps=self.substeps,
+                threads=threads,
+                clamped=clamped,
+            )
+            self.batch = self.mismatch.batch
+            self._show(self.mismatch.state)
         sensors = self if self.mismatch is None else self.mismatch.sensors
         self.measured_q, self.measured_qd = sensors.q, sensors.qd
         self._motors = MotorLimit(robots or robot, count)
@@ -97,17 +105,6 @@ class MujocoSimulator(Simulator):
         """Return by how many physics steps robots' commands are late, (n,)."""
         return np.array([round(r.reality.latency.command / self.timestep) for r in robots])
 
-    def _use_mismatch(self, robots: Sequence[Robot], clamped: bool, threads: int) -> None:
-        self.mismatch = MismatchSimulator(
-            robots,
-            timestep=self.timestep,
-            substeps=self.substeps,
-            threads=threads,
-            clamped=clamped,
-        )
-        self.batch = self.mismatch.batch
-        self._show(self.mismatch.state)
-
     @property
     def measured_torque(self) -> Array:
         """What the motors' torque measurement reports now, N m at the joints, (n, 2)."""
@@ -137,18 +134,13 @@ class MujocoSimulator(Simulator):
         late = self._command_delays(robots)
         self._late = int(late[0]) % self.substeps
         """Physics steps by which every command is late, on top of the ticks of each leg."""
-        self._ticks = late // self.substeps
-        """Control periods by which each leg's are, (n,)."""
-        missing = int(self._ticks.max()) + 1 - len(self.pending_torque)
+        self.delay_ticks = late // self.substeps
+        """Whole control periods by which each leg's commands are late, (n,)."""
+        missing = int(self.delay_ticks.max()) + 1 - len(self.pending_torque)
         if missing > 0:
             self.pending_torque = np.concatenate(
                 [self.pending_torque, np.zeros((missing, self.count, 2))]
             )
-
-    @property
-    def delay_ticks(self) -> IntArray:
-        """Whole control periods by which each leg's commands are late, (n,)."""
-        return self._ticks
 
     def push(self, force: Array) -> None:
         """Push the bases upward from now on, N, (n,); not for clamped ones."""
@@ -195,7 +187,7 @@ class MujocoSimulator(Simulator):
         """Go on with the torques of before until later ones arrive; return their mean."""
         before = self.pending_torque[0]
         under_way = np.concatenate([self.pending_torque[1:], np.zeros((1, self.count, 2))])
-        under_way[self._ticks, self._rows] = torque
+        under_way[self.delay_ticks, self._rows] = torque
         if self._late:
             self._give(before, self._late)
         after = self._motors.give(under_way[0], self.qd)

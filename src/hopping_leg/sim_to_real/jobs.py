@@ -37,9 +37,8 @@ class Board(LiveProgress):
     def show(self, notes: Sequence[str], begun: float = 0.0) -> None:
         """Show a note per running job; ``begun`` is the weight of what is done of them."""
         self._begun = begun
-        self._bar.update(self._task, completed=self._done)
         note = " · ".join([*notes, self._time_left()])
-        self._bar.update(self._task, note=note)
+        self._bar.update(self._task, completed=self._done, note=note)
         self._line_if_due(self._told(note))
 
     @property

@@ -419,10 +419,9 @@ def hop(content: bytes, robot: Robot, study: Study) -> list[dict[str, Any]]:
 
 
 def _rows(evaluation: Evaluation) -> list[dict[str, Any]]:
-    summary = evaluation.to_json()["summary"]
     apexes = {d["command_m"]: np.array(d["apexes_m"]) for d in evaluation.distributions}
     rows = []
-    for full in summary:
+    for full in evaluation.to_json()["summary"]:
         row = {name: full[name] for name in _KEPT}
         command = row["command_m"]
         errors = apexes[command] - command
