@@ -17,8 +17,7 @@ from typing import Any, Protocol, TypeVar
 from moteus import Controller, QueryResolution, multiplex
 from moteus.protocol import Register
 
-from hopping_leg.deploy.drive_link import Action, DriveCommand, Exchange
-from hopping_leg.deploy.joint_transform import joint_transforms
+from hopping_leg.deploy.drive_link import Action, DriveCommand, Exchange, joint_transforms
 from hopping_leg.deploy.realtime import Clock, RealClock
 from hopping_leg.deploy.replies import DriveClock, Question
 from hopping_leg.deploy.transport import Opener

@@ -8,8 +8,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from hopping_leg.deploy.drive_link import DriveMode
-from hopping_leg.deploy.joint_transform import joint_transforms
+from hopping_leg.deploy.drive_link import DriveMode, joint_transforms
 from hopping_leg.deploy.safety_limits import SafetyLimits
 from hopping_leg.deploy.stop_reasons import fault_text
 from hopping_leg.errors import HardwareError

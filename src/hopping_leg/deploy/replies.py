@@ -11,8 +11,7 @@ from typing import Any
 
 from moteus.protocol import Register, parse_reply
 
-from hopping_leg.deploy.drive_link import Exchange, Reply
-from hopping_leg.deploy.joint_transform import JointTransform
+from hopping_leg.deploy.drive_link import Exchange, JointTransform, Reply
 
 _WRAP, _HALF = 1 << 32, 1 << 31
 _DRIFT = 2e-4  # Most that two clocks drift apart, s/s: both are quartzes

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.deploy.joint_transform import joint_transforms
+from hopping_leg.deploy.drive_link import joint_transforms
 from hopping_leg.robot.parameters import Joint, Robot
 from hopping_leg.sim import MujocoSimulator
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hopping_leg.deploy.joint_transform import JointTransform, joint_transforms
+from hopping_leg.deploy.drive_link import JointTransform, joint_transforms
 from hopping_leg.deploy.preflight import required_settings
 from hopping_leg.errors import RobotError
 from hopping_leg.robot import Hardware, Servo, load_robot
