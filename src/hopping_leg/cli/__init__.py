@@ -131,7 +131,6 @@ def read_options(
 
 
 def _load_verb(verb: str) -> tuple[types.ModuleType, Any]:
-    """Import a verb; return its module and the type of its options."""
     module = importlib.import_module(f"hopping_leg.cli.{verb}")
     return module, typing.get_type_hints(module.run, include_extras=True)["args"]
 

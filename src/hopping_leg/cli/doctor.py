@@ -108,7 +108,7 @@ def _home(link: "MoteusLink", angles: tuple[float, float], *, yes: bool) -> None
 
 def missing_requirements(requirements: Sequence[str]) -> dict[str, list[str]]:
     """Return what of each extra's requirements is absent or of a version that does not fit."""
-    wanted = [Requirement(line) for line in requirements]
+    wanted = [*map(Requirement, requirements)]
     found: dict[str, list[str]] = {extra: [] for extra in PURPOSES}
     for extra, missing in found.items():
         for r in wanted:
@@ -125,7 +125,6 @@ def _belongs(requirement: Requirement, extra: str) -> bool:
 
 
 def _met(requirement: Requirement) -> bool:
-    """Tell whether a requirement is installed, with the extras that it asks for."""
     try:
         found = version(requirement.name)
     except PackageNotFoundError:

@@ -118,15 +118,13 @@ def run(args: Emulate) -> None:
 
 def _kind_cells(name: str) -> tuple[str, ...]:
     kind = KINDS[name]
-    lasts = "on" if math.isinf(kind.duration) else f"{kind.duration:g} s"
-    if math.isnan(kind.duration):
-        lasts = "so many replies"
+    words = {"inf": "on", "nan": "so many replies"}
+    lasts = words.get(f"{kind.duration:g}", f"{kind.duration:g} s")
     return name, kind.text, f"{kind.value:g}" if kind.unit else "", kind.unit, lasts
 
 
 @contextlib.contextmanager
 def _ending_signals() -> Iterator[list[int]]:
-    """Yield what fills with the signals that ask for the end: that is no error."""
     over: list[int] = []
     numbers = (signal.SIGINT, signal.SIGTERM)
     before = {number: signal.signal(number, lambda n, _: over.append(n)) for number in numbers}
@@ -193,7 +191,6 @@ class _Display:
 
 
 def _mode_text(drive: "EmulatedDrive") -> str:
-    """Return a drive's mode, with its fault or notice."""
     mode, code = drive.machine.mode, drive.machine.fault
     text = mode.name.lower().replace("_", " ")
     return f"{text} {code}" if code else text

@@ -87,12 +87,9 @@ def run(
     """Write an excitation."""
     robot = load_robot(args.robot)
     limits = HardwareRange(args.hip_range, args.knee_range)
+    template, tracked = _template(args, robot, limits), args.track_velocity
     excitation = make_excitation(
-        _template(args, robot, limits),
-        robot,
-        rate=args.rate,
-        limits=limits,
-        track_velocity=args.track_velocity,
+        template, robot, rate=args.rate, limits=limits, track_velocity=tracked
     )
     excitation.save(args.out)
     facts = _facts(excitation, robot)

@@ -28,7 +28,6 @@ def parse_heights(text: str) -> tuple[float, ...]:
 def _one_word(
     metavar: str, read: Callable[[str], tuple[Any, ...]], form: str
 ) -> tyro.constructors.PrimitiveConstructorSpec[Any]:
-    """Return how a tuple is read from one word with commas, and written."""
     return tyro.constructors.PrimitiveConstructorSpec(
         nargs=1,
         metavar=metavar,
@@ -121,7 +120,6 @@ def verb_of(args: object) -> str:
 
 
 def _given(args: Any, leave_out: Collection[str]) -> Iterator[tuple[str, Any, Any]]:  # noqa: ANN401
-    """Yield name, value and annotation of every field that differs from its default."""
     hints = get_type_hints(type(args), include_extras=True)
     for field in dataclasses.fields(args):
         value = getattr(args, field.name)
@@ -132,7 +130,6 @@ def _given(args: Any, leave_out: Collection[str]) -> Iterator[tuple[str, Any, An
 
 
 def _marks(hint: object) -> Iterator[object]:
-    """Yield what an annotation says beside the type, of every type in it."""
     yield from getattr(hint, "__metadata__", ())
     for part in get_args(hint):
         yield from _marks(part)

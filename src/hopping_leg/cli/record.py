@@ -63,9 +63,6 @@ class Record:
     """Physics step, s."""
 
 
-_Excitations = list[tuple[str, Excitation]]
-
-
 def run(args: Record) -> None:
     """Play every excitation and write its recording."""
     if not args.excitations:
@@ -84,18 +81,12 @@ def run(args: Record) -> None:
         raise UsageError(
             f"Two excitations are called '{twice[0]}' and would share a recording; rename one."
         )
-    if args.transport is None:
-        _record_simulated(args, robot, loaded, believed, gains)
-    else:
+    if args.transport is not None:
         _record_motors(args, args.transport, robot, loaded, believed, gains)
-
-
-def _record_simulated(
-    args: Record, robot: Robot, excitations: _Excitations, believed: str, gains: JointGains
-) -> None:
+        return
     with Progress(console=Console(stderr=True)) as bar:
-        for number, (name, excitation) in enumerate(excitations):
-            task = bar.add_task(name, total=len(excitation))
+        for number, (stem, excitation) in enumerate(loaded):
+            task = bar.add_task(stem, total=len(excitation))
             recording = play(
                 excitation,
                 robot,
@@ -105,7 +96,7 @@ def _record_simulated(
                 timestep=args.timestep,
                 on_tick=lambda done, _, task=task: bar.update(task, completed=done),  # type: ignore[misc]
             )
-            file = args.out / f"{robot.name}-{name}.parquet"
+            file = args.out / f"{robot.name}-{stem}.parquet"
             recording.save(file)
             say_written(file)
             say(*(f"  {warning}" for warning in recording.warnings))
@@ -115,7 +106,7 @@ def _record_motors(
     args: Record,
     transport: str,
     robot: Robot,
-    excitations: _Excitations,
+    excitations: list[tuple[str, Excitation]],
     believed: str,
     gains: JointGains,
 ) -> None:

@@ -56,22 +56,19 @@ def run(args: List | Show | Check) -> None:
         for robot in robots:
             print(f"{robot.name:<12}  {robot.description}\n{'':<12}  {_summary(robot)}")
     elif isinstance(args, Show):
-        _show(args)
+        robot, tree = load_robot(args.robot), load_tree(args.robot)
+        if args.json:
+            write_json(args.json, {**asdict(robot), "derived": derived(robot)})
+        rows = [(p, f"{e['value']:g}", e["unit"], e["source"]) for p, e in numbers(tree)]
+        for path, value in derived(robot).items():
+            shown = f"{value:g}" if isinstance(value, float) else value
+            rows.append((path, shown, "", "computed"))
+        title = f"{robot.name}: {robot.description}"
+        show_table(("number", "value", "unit", "source"), rows, title)
     else:
         robot = load_robot(args.robot)
         build_model(robot)
         print(f"{args.robot} is a valid robot: {robot.name} ({_summary(robot)}).")
-
-
-def _show(args: Show) -> None:
-    robot, tree = load_robot(args.robot), load_tree(args.robot)
-    if args.json:
-        write_json(args.json, {**asdict(robot), "derived": derived(robot)})
-    rows = [(p, f"{e['value']:g}", e["unit"], e["source"]) for p, e in numbers(tree)]
-    for path, value in derived(robot).items():
-        rows.append((path, f"{value:g}" if isinstance(value, float) else value, "", "computed"))
-    title = f"{robot.name}: {robot.description}"
-    show_table(("number", "value", "unit", "source"), rows, title)
 
 
 def numbers(tree: Tree, prefix: str = "") -> list[tuple[str, Tree]]:

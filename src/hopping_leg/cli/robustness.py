@@ -38,9 +38,8 @@ class Robustness(Conditions):
 def run(args: Robustness) -> None:
     """Run the benchmark, print the scores, write everything."""
     entries, setup = args.load()
-    suite = make_suite(
-        setup, axes=args.axes, commands=args.commands, repeats=args.seeds, seed=args.seed
-    )
+    heights, seeds = args.commands, args.seeds
+    suite = make_suite(setup, axes=args.axes, commands=heights, repeats=seeds, seed=args.seed)
     with ShareProgress() as bar:
         found = run_suite(entries, suite, ResultCache(args.out), bar.show)
     result = {"command": command_line("hop robustness", args), **found}
