@@ -12,19 +12,38 @@ STANDING = record(LEG, swing(1.0, "rail"), "rail")
 TORQUES = record(LEG, swing(1.0), onboard="torque")
 
 
-def test_a_fixed_base_says_nothing_about_rail_and_contact():
-    names = make_plan([FIXED], LEG).parameters.names
-    assert not [n for n in names if n.startswith(("rail.", "contact."))]
-    moving = make_plan([FIXED, STANDING], LEG).parameters.names
-    assert {"rail.friction", "contact.time_constant"} <= set(moving)
+def on(rig="fixed-base", onboard="continuous", **gains):
+    return FIXED.with_metadata(rig=rig, onboard=onboard, **gains)
 
 
-def test_known_gains_are_kept_and_unknown_ones_are_fitted():
-    assert "drive.knee.stiffness" not in make_plan([FIXED], LEG).parameters.names
-    unknown = FIXED.with_metadata(stiffness=None)
-    assert "drive.knee.stiffness" in make_plan([unknown], LEG).parameters.names
-    doubtful = FIXED.with_metadata(gains_exact=False)
-    plan = make_plan([doubtful], LEG)
+STRONG = {"stiffness": (800.0, 800.0), "damping": (0.0, 0.0)}
+
+
+@pytest.mark.parametrize(
+    ("recordings", "fitted", "kept"),
+    [
+        ([FIXED], "knee.torque_gain", "rail.friction"),
+        ([FIXED], "thigh.inertia", "contact.time_constant"),
+        ([FIXED, STANDING], "rail.friction", "drive.knee.stiffness"),
+        ([FIXED, STANDING], "contact.time_constant", "hip.armature"),
+        ([on(onboard="zoh", stiffness=None)], "drive.knee.stiffness", "drive.knee.damping"),
+        ([on(gains_exact=False)], "drive.knee.stiffness", "hip.motor.peak_torque"),
+        ([on(gains_exact=False, **STRONG)], "hip.motor.peak_torque", "knee.load_friction"),
+        ([on(gains_exact=False, **STRONG)], "knee.motor.no_load_speed", "rail.friction"),
+        ([TORQUES], "knee.load_friction", "knee.torque_gain"),
+        ([FIXED, on("rail", "zoh")], "knee.load_friction", "drive.hip.damping"),
+        ([FIXED], "hip.friction", "knee.load_friction"),
+        ([on("rail")], "rail.friction", "knee.load_friction"),
+    ],
+)
+def test_what_recordings_can_tell_is_fitted_and_what_is_known_is_kept(recordings, fitted, kept):
+    names = make_plan(recordings, LEG).parameters.names
+    assert fitted in names
+    assert kept not in names
+
+
+def test_doubtful_gains_are_where_the_search_begins():
+    plan = make_plan([FIXED.with_metadata(gains_exact=False)], LEG)
     assert plan.start.get("drive.knee.stiffness") == FIXED.metadata.stiffness[1]
 
 
@@ -52,14 +71,6 @@ def test_held_commands_are_simulated_with_the_step_of_training():
     assert make_plan([TORQUES], LEG).timestep > TIMESTEP
 
 
-def test_a_drive_at_its_limit_has_its_torque_speed_line_fitted():
-    weak = FIXED.with_metadata(onboard="continuous", gains_exact=False)
-    strong = weak.with_metadata(stiffness=(800.0, 800.0), damping=(0.0, 0.0))
-    lines = {"hip.motor.peak_torque", "knee.motor.no_load_speed"}
-    assert not lines & set(make_plan([weak], LEG).parameters.names)
-    assert lines <= set(make_plan([strong], LEG).parameters.names)
-
-
 def test_a_motor_is_not_believed_slower_than_its_joint_was_seen():
     name = "knee.motor.no_load_speed"
 
@@ -73,21 +84,3 @@ def test_a_motor_is_not_believed_slower_than_its_joint_was_seen():
     assert low(0.0) == known / 4
     assert low(15 / seen) == pytest.approx(0.8 * 15 * LEG.knee.belt_ratio)
     assert low(100 / seen) == known
-
-
-def test_friction_that_grows_with_load_shows_where_torques_are_known_and_carry_weight():
-    def fitted(*recordings):
-        return "knee.load_friction" in make_plan(recordings, LEG).parameters.names
-
-    def on(rig, onboard):
-        return FIXED.with_metadata(rig=rig, onboard=onboard)
-
-    assert fitted(TORQUES)
-    assert not fitted(FIXED)
-    assert fitted(FIXED, on("rail", "zoh"))
-    assert not fitted(on("rail", "continuous"))
-
-
-def test_a_motors_gain_shows_where_its_torque_is_both_computed_and_measured():
-    assert "knee.torque_gain" in make_plan([FIXED], LEG).parameters.names
-    assert "knee.torque_gain" not in make_plan([TORQUES], LEG).parameters.names

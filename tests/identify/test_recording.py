@@ -110,12 +110,6 @@ def test_folders_and_truncated_files_get_a_sentence(tmp_path):
         load_recording(cut)
 
 
-def test_quantities_that_do_not_exist_are_named():
-    recording = make_recording(swinging(), METADATA, "made up")
-    with pytest.raises(UsageError, match="Did you mean 'position'"):
-        recording.array("positon")
-
-
 def test_segments_end_where_rows_are_missing():
     table = swinging().filter(~pl.int_range(pl.len()).is_in([100, 101, 102, 300]))
     recording = make_recording(table, METADATA, "made up")
@@ -127,6 +121,8 @@ def test_a_log_that_keeps_every_fourth_row_has_no_stalls():
     recording = make_recording(swinging(2400)[::4], METADATA, "made up")
     assert recording.segments() == [slice(0, 600)]
     assert recording.warnings == ()
+    with pytest.raises(UsageError, match="Did you mean 'position'"):
+        recording.array("positon")
 
 
 KNOWN = sorted({n for i in IMPORTERS.values() for n in (*i.columns, *i.names)} | set(COLUMNS))

@@ -7,37 +7,32 @@ TICK = 0.004
 LONG, SHORT = np.array([0.0, 0.0053, 0.01, 0.0149]), np.array([0.0, 0.004])
 
 
-def at_ticks(places, function):
+def at_ticks(function):
     """Return a function of time at the ticks of one hypothesis's two windows, both joints."""
-    time = TICK * np.arange(places.ticks)
-    return np.broadcast_to(function(time)[:, None, None, None], (places.ticks, 1, 2, 2))
+    values = function(TICK * np.arange(PLACES.ticks))
+    return np.broadcast_to(values[:, None, None, None], (PLACES.ticks, 1, 2, 2))
 
 
-def test_the_ticks_reach_past_the_last_row():
-    places = RowResampling([LONG, SHORT], TICK)
-    assert TICK * (places.ticks - 1) >= LONG[-1]
+PLACES = RowResampling([LONG, SHORT], TICK)
 
 
 def test_a_cubic_motion_is_met_at_every_row():
-    places = RowResampling([LONG, SHORT], TICK)
-    q = at_ticks(places, lambda t: 1 - 3 * t + 40 * t**2 - 900 * t**3)
-    qd = at_ticks(places, lambda t: -3 + 80 * t - 2700 * t**2)
-    position, velocity = places.cubic(q, qd)
+    q = at_ticks(lambda t: 1 - 3 * t + 40 * t**2 - 900 * t**3)
+    qd = at_ticks(lambda t: -3 + 80 * t - 2700 * t**2)
+    position, velocity = PLACES.cubic(q, qd)
     expected = 1 - 3 * LONG + 40 * LONG**2 - 900 * LONG**3
     np.testing.assert_allclose(position[0, 0, :, 0], expected, atol=1e-12)
     np.testing.assert_allclose(velocity[0, 0, :, 1], -3 + 80 * LONG - 2700 * LONG**2, atol=1e-10)
 
 
 def test_a_straight_line_is_met_at_every_row():
-    places = RowResampling([LONG, SHORT], TICK)
-    got = places.linear(at_ticks(places, lambda t: 2 - 5 * t))
+    got = PLACES.linear(at_ticks(lambda t: 2 - 5 * t))
     np.testing.assert_allclose(got[0, 0, :, 0], 2 - 5 * LONG, atol=1e-12)
 
 
 def test_a_shorter_window_is_padded_with_its_last_row():
-    places = RowResampling([LONG, SHORT], TICK)
-    np.testing.assert_array_equal(places.padding, [[False] * 4, [False, False, True, True]])
-    got = places.linear(at_ticks(places, lambda t: t))[0, 1, :, 0]
+    np.testing.assert_array_equal(PLACES.padding, [[False] * 4, [False, False, True, True]])
+    got = PLACES.linear(at_ticks(lambda t: t))[0, 1, :, 0]
     assert got == pytest.approx([0.0, 0.004, 0.004, 0.004])
 
 

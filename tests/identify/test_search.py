@@ -16,12 +16,6 @@ from tests.identify.twin import LEG, noisy
 VECTORS = np.random.default_rng(0).uniform(0, 1, (5, 2))
 
 
-def test_a_population_in_parts_gets_the_same_costs():
-    whole = objective()(VECTORS)
-    parts = [objective()(part) for part in np.array_split(VECTORS, 3)]
-    np.testing.assert_array_equal(np.concatenate(parts), whole)
-
-
 def test_an_objective_that_was_used_can_be_sent():
     here = objective()
     costs = here(VECTORS)
