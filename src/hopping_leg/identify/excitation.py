@@ -44,16 +44,13 @@ class Multisine:
     """
 
     centre: Pair = (0.7, -1.4)
-    """Posture of hip and knee, rad."""
     amplitude: Pair = (0.3, 0.4)
     """Largest excursion of hip and knee, rad."""
     lowest: float = 0.1
     """Lowest frequency and spacing of the others, Hz."""
     highest: float = 4.0
-    """Highest frequency, Hz."""
     duration: float = 60.0
     """Duration of the trajectory, s."""
-
     rig: ClassVar[Rig] = "fixed-base"
 
     def __post_init__(self) -> None:

@@ -18,10 +18,8 @@ from hopping_leg.io import write_atomically
 
 Evaluate = Callable[[Array], Array]
 """Search vectors (n, k) to costs (n,) or residuals (n, m), row by row independent."""
-
 Progress = Callable[[float, float], None]
 """Called with the share done (0 to 1) and the lowest cost so far."""
-
 _NOTHING = 1e-3  # a cost that is nothing, as residuals are in units of errors that matter
 _MARGIN = 1.0  # scales that a start keeps from bounds, near which the trust region barely moves it
 

@@ -31,7 +31,7 @@ Bend = Literal["backward", "forward"]
 
 @dataclass(frozen=True)
 class Stroke:
-    """A stretch of the paper's template with one amplitude and its periods.
+    """A stretch of the paper's template: amplitude A, m, period T1, swing T2 and duration, s.
 
     The foot's distance from the hip is r = A cos(2 pi t / T1) + epsilon with
     epsilon = L1 + L2 - A - margin; its direction is theta = -(pi/2) cos(2 pi t / T2), or straight
@@ -42,15 +42,10 @@ class Stroke:
     """
 
     amplitude: float
-    """A, m."""
     period: float
-    """T1, s."""
     swing: float | None
-    """T2, s; none keeps the foot below the hip."""
     duration: float
-    """s."""
     margin: float = 0.0
-    """From the straight leg, m."""
     bend: Bend = "backward"
     """Side of the knee: negative angles are backward."""
     rig: Rig = "fixed-base"

@@ -39,7 +39,6 @@ class IdentifyOptions:
     scoring: Scoring | None = None
     """What errors count; None lets the plan decide."""
     effort: SearchOptions = field(default_factory=SearchOptions)
-    """How hard to search."""
     threads: int = 0
     """Worker threads, 0 for one per core; they change no bit of the result."""
     ray: str | None = None

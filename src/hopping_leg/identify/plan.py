@@ -79,7 +79,6 @@ class FitPlan:
     """All decisions of an identification."""
 
     start: LegHypothesis
-    """Robot and drives before the fit."""
     parameters: ParameterSet
     scoring: Scoring
     window: float
@@ -89,7 +88,6 @@ class FitPlan:
     timestep: float
     """Physics step, s."""
     search: str
-    """One of ``SEARCHES``."""
 
 
 def make_plan(

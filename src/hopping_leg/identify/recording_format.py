@@ -93,11 +93,9 @@ class RecordingMetadata:
     for a period and computes its torque once per row (``zoh``), or one at many kHz
     (``continuous``)."""
     stiffness: Pair | None = None
-    """Stiffness of the on-board PD, N m/rad at the joint; none where unknown."""
     damping: Pair | None = None
-    """Damping of the on-board PD, N m s/rad at the joint; none where unknown."""
     integral: Pair | None = None
-    """Integral gain of the on-board PID, N m/(rad s) at the joint; none where unknown or absent."""
+    """Gains of the on-board PID, N m/rad, N m s/rad, N m/(rad s) at the joint; none if unknown."""
     gains_exact: bool = True
     """False where the gains are estimates that a fit should refine."""
     zeroed: bool = False

@@ -17,6 +17,7 @@ from hopping_leg.identify.validation import Validation
 from hopping_leg.io import plain, replace_at, versions, write_atomically
 from hopping_leg.robot import Robot, load_tree, robot_from_tree, robot_text
 
+_LATENCY = "reality.latency.command"
 _LIBRARIES = ("hopping-leg", "mujoco", "numpy", "scipy", "cma", "polars")
 
 
@@ -25,7 +26,6 @@ class Identified:
     """What came out."""
 
     hypothesis: LegHypothesis
-    """Robot and drives with the identified values."""
     start: LegHypothesis
     """Robot and drives before the fit."""
     plan: FitPlan
@@ -33,7 +33,6 @@ class Identified:
     """Searches in order; the last one's end is the result."""
     identifiability: Identifiability
     fit: tuple[Recording, ...]
-    """Recordings, or parts of them, that were fitted."""
     held: tuple[Recording, ...]
     """Recordings, or parts of them, that judge; the fit has not seen them."""
     split: str
@@ -168,9 +167,6 @@ def _recording_json(recording: Recording, use: str) -> dict[str, Any]:
         "source": recording.metadata.source,
         "warnings": list(recording.warnings),
     }
-
-
-_LATENCY = "reality.latency.command"
 
 
 def save_robot(identified: Identified, path: Path, origin: str | Path) -> None:

@@ -39,7 +39,6 @@ class SearchOptions:
     starts: int = 1
     """Searches, the first from the robot's own values and the others from random ones."""
     cma: CmaOptions = field(default_factory=CmaOptions)
-    """Options of CMA-ES, in each pass."""
     least_squares: LeastSquaresOptions = field(default_factory=LeastSquaresOptions)
 
     def __post_init__(self) -> None:
@@ -61,7 +60,6 @@ class Pass:
     name: str
     parameters: ParameterSet
     found: Found
-    """Where it ended, from the best of its starts."""
     others: tuple[float, ...] = ()
     """Costs where the other starts ended, best first."""
 
@@ -76,7 +74,6 @@ class Searcher:
     options: SearchOptions
     seed: int = 0
     folder: Path | None = None
-    """Folder for checkpoints; None keeps none."""
     report: Report = lambda stage, share, cost: None
     ray: str | None = None
     """Address of a Ray cluster that simulates, ``local`` for one on this machine; None simulates

@@ -143,7 +143,6 @@ class Overlay:
 
     recording: Recording
     restarted: bool
-    """Whether the simulation was started anew every ``RESTART``."""
     measured: dict[str, Array]
     """What was measured and counts, (rows, 2), else NaN."""
     simulated: dict[str, Array]
