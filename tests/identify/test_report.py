@@ -33,14 +33,11 @@ def test_the_same_result_gives_the_same_page(page):
     assert write_fit_report(identified(), "hop identify") == page
 
 
-def test_parameters_stand_beside_the_paper_where_it_names_them():
-    text = str(parameter_table(identified()))
+def test_only_the_papers_leg_is_held_against_the_paper():
+    found = identified()
+    text = str(parameter_table(found))
     assert "0.4364" in text
     assert "0.1441" in text
-
-
-def test_another_leg_is_not_held_against_the_paper():
-    found = identified()
     start = dataclasses.replace(found.start, robot=load_robot("legv1"))
     text = str(parameter_table(dataclasses.replace(found, start=start)))
     assert "Table I" not in text

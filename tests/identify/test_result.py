@@ -51,11 +51,9 @@ def test_what_does_not_exist_is_null():
 
 def test_without_a_closed_loop_its_pairs_are_null_and_nobody_tells_of_it():
     nothing = dict.fromkeys(("closed_loop_position", "closed_loop_torque"), (np.nan, np.nan))
-    known = {
-        when: dataclasses.replace(getattr(identified(), when), **nothing)
-        for when in ("validation", "start_validation")
-    }
-    tree = as_json(dataclasses.replace(identified(), **known))
+    found, names = identified(), ("validation", "start_validation")
+    known = {when: dataclasses.replace(getattr(found, when), **nothing) for when in names}
+    tree = as_json(dataclasses.replace(found, **known))
     assert tree["validation"]["closed_loop_position_rms_rad"] == [None, None]
     assert tree["validation"]["closed_loop_torque_rms_nm"] == [None, None]
     assert [row["error"] for row in tree["quality"]] == [
@@ -70,13 +68,9 @@ def saved(tmp_path):
     return tmp_path / "mine.toml"
 
 
-def test_the_file_is_the_robot_that_was_identified(saved):
-    robot = load_robot(saved)
-    assert robot.name == "mine"
-    assert robot.digest == identified().robot.digest
-
-
 def test_every_identified_number_says_so_and_all_others_stay(saved):
+    robot = load_robot(saved)
+    assert (robot.name, robot.digest) == ("mine", identified().robot.digest)
     tree, before = load_tree(saved), load_tree("legv2")
     assert tree["hip"]["friction"]["source"].startswith("identified: 95 % ")
     assert "start 0.0412" in tree["hip"]["friction"]["source"]

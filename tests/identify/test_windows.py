@@ -12,14 +12,8 @@ def test_windows_tile_a_recording():
     windows = cut([RUN], 0.5)
     rows = [r for w in windows for r in range(w.start, w.start + w.length)]
     assert rows == list(range(len(RUN)))
-
-
-def test_without_a_duration_a_recording_is_one_window():
     (window,) = cut([RUN], unscored=0.1)
     assert (window.start, window.length, window.unscored) == (0, 600, 20)
-
-
-def test_a_short_recording_gets_a_sentence():
     with pytest.raises(RecordingError, match="too short for windows of 5 s"):
         cut([RUN], 5.0)
 
@@ -31,9 +25,6 @@ def test_dealt_windows_are_all_there_and_every_share_is_spread_over_them():
     for share in shares:
         assert [w.start // 80 for w in share] == list(range(len(share)))
         assert len({w.start % 80 for w in share}) > 1
-
-
-def test_no_share_is_empty():
     assert [len(share) for share in deal(cut([RUN], 1.0), 9, np.random.default_rng(0))] == [1, 1, 1]
 
 
@@ -55,9 +46,6 @@ def test_a_short_recording_gives_its_last_quarter():
     (fit,), (held,) = hold_out([run], 4.0, np.random.default_rng(0))
     assert len(fit) == 3 * len(held)
     assert fit.time[-1] < held.time[0]
-
-
-def test_what_cannot_be_split_gets_a_sentence():
     with pytest.raises(RecordingError, match=r"5 s, but 5\.34 s are needed.*--validate"):
         hold_out([record(LEG, swing(5.0))], 4.0, np.random.default_rng(0))
 
