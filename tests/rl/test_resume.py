@@ -36,15 +36,7 @@ def disturb_all_generators():
 
 @pytest.mark.parametrize(
     "recipe",
-    [
-        TINY,
-        TINY_PPO,
-        TINY_FAST,
-        TINY_PRECISE,
-        SURPRISED,
-        TINY_GRU,
-        TINY_ADAPTIVE,
-    ],
+    [TINY, TINY_PPO, TINY_FAST, TINY_PRECISE, SURPRISED, TINY_GRU, TINY_ADAPTIVE],
     ids=["sac", "ppo", "fast", "precise", "surprised", "recurrent", "adaptive"],
 )
 def test_resuming_equals_never_having_stopped(recipe, tmp_path):
@@ -107,12 +99,9 @@ def test_a_run_is_never_overwritten_or_mixed(tmp_path, monkeypatch):
     recipe = TINY.replace(steps=64, eval_every=32, learning_starts=32)
     done = module.train(recipe, ROBOT, 0, out, quiet=True)
     content = done.policy.read_bytes()
-    with pytest.raises(UsageError, match="--resume"):
-        module.train(recipe, ROBOT, 0, out, quiet=True)
-    with pytest.raises(UsageError, match="finished"):
-        module.train(recipe, ROBOT, 0, out, resume=True, quiet=True)
-    with pytest.raises(UsageError, match="another seed"):
-        module.train(recipe, ROBOT, 1, out, resume=True, quiet=True)
+    for seed, resume, says in ((0, 0, "--resume"), (0, 1, "finished"), (1, 1, "another seed")):
+        with pytest.raises(UsageError, match=says):
+            module.train(recipe, ROBOT, seed, out, resume=bool(resume), quiet=True)
     assert done.policy.read_bytes() == content
 
 
