@@ -2,11 +2,7 @@ import math
 
 import pytest
 
-from hopping_leg.controllers.command_schedule import (
-    CommandSchedule,
-    check_schedule,
-    command_range,
-)
+from hopping_leg.controllers.command_schedule import CommandSchedule, check_schedule, command_range
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import command_limits, load_robot

@@ -16,13 +16,12 @@ def test_torque_is_the_law_and_the_end_is_held():
     position = np.array([[0.1, -0.2], [0.3, -0.4]])
     velocity = np.array([[1.0, 2.0], [3.0, 4.0]])
     pd = JointPD(position, velocity, JointGains((10.0, 20.0), (0.5, 0.25)))
-    pd.reset(1)
-    np.testing.assert_allclose(pd.act(seen([0, 0], [0, 0])), [[1.5, -3.5]])
-    for _ in range(3):
-        np.testing.assert_allclose(pd.act(seen([0.3, -0.4], [2.0, 0.0])), [[0.5, 1.0]])
-        assert pd.internals()["knee_position_command_rad"][0] == -0.4
-    pd.reset(1)
-    np.testing.assert_allclose(pd.act(seen([0, 0], [0, 0])), [[1.5, -3.5]])
+    for _ in range(2):
+        pd.reset(1)
+        np.testing.assert_allclose(pd.act(seen([0, 0], [0, 0])), [[1.5, -3.5]])
+        for _ in range(3):
+            np.testing.assert_allclose(pd.act(seen([0.3, -0.4], [2.0, 0.0])), [[0.5, 1.0]])
+            assert pd.internals()["knee_position_command_rad"][0] == -0.4
 
 
 @pytest.mark.parametrize("name", ["legv2", "legv2-paper", "twin"])
@@ -41,18 +40,14 @@ def test_every_leg_follows_with_the_default_gains(name):
 
 
 @pytest.mark.parametrize(
-    ("position", "velocity", "sentence"),
+    ("wrong", "sentence"),
     [
-        (np.zeros((0, 2)), None, "must be"),
-        (np.zeros((5, 3)), None, "must be"),
-        (np.zeros((5, 2)), np.zeros((4, 2)), r"\(4, 2\)"),
+        (lambda: JointPD(np.zeros((0, 2))), "must be"),
+        (lambda: JointPD(np.zeros((5, 3))), "must be"),
+        (lambda: JointPD(np.zeros((5, 2)), np.zeros((4, 2))), r"\(4, 2\)"),
+        (lambda: JointGains(damping=(-1.0, 0.0)), "damping"),
     ],
 )
-def test_other_shapes_are_refused(position, velocity, sentence):
+def test_other_shapes_and_negative_gains_are_refused(wrong, sentence):
     with pytest.raises(UsageError, match=sentence):
-        JointPD(position, velocity)
-
-
-def test_negative_gains_are_refused():
-    with pytest.raises(UsageError, match="damping"):
-        JointGains(damping=(-1.0, 0.0))
+        wrong()

@@ -12,23 +12,19 @@ from hopping_leg.robot import GRAVITY, load_robot
 ROBOT = load_robot("legv2-paper")
 
 
-def test_feedforward_force_does_the_work_of_the_climb():
-    command, start, end = np.array([0.3]), np.array([0.15]), np.array([0.25])
-    force = equations.feedforward_force(ROBOT, command, start, end)
-    climb = command - start - ROBOT.foot.radius
-    assert force * (end - start) == pytest.approx(ROBOT.mass * GRAVITY * climb)
-
-
-def test_feedforward_force_stays_bounded_for_an_extended_leg():
-    force = equations.feedforward_force(ROBOT, np.array([0.35]), np.array([0.26]), np.array([0.25]))
-    assert 0 < force < 200
+def test_feedforward_force_does_the_work_of_the_climb_and_is_bounded_for_an_extended_leg():
+    command, start, end = np.array([0.3, 0.35]), np.array([0.15, 0.26]), np.full(2, 0.25)
+    force, extended = equations.feedforward_force(ROBOT, command, start, end)
+    climb = 0.3 - 0.15 - ROBOT.foot.radius
+    assert force * (0.25 - 0.15) == pytest.approx(ROBOT.mass * GRAVITY * climb)
+    assert 0 < extended < 200
 
 
 @pytest.mark.parametrize("exponent", [0.5, 1.0, 2.0])
 def test_gain_rests_at_the_desired_height_and_moves_towards_it(exponent):
-    one, desired = np.ones(3), np.full(3, 0.3)
-    gain = equations.updated_gain(one, desired, np.array([0.27, 0.30, 0.33]), exponent)
-    np.testing.assert_allclose(gain, (0.30 / np.array([0.27, 0.30, 0.33])) ** exponent)
+    reached = np.array([0.27, 0.30, 0.33])
+    gain = equations.updated_gain(np.ones(3), np.full(3, 0.3), reached, exponent)
+    np.testing.assert_allclose(gain, (0.30 / reached) ** exponent)
     assert gain[1] == 1
 
 
@@ -39,19 +35,16 @@ def test_absurd_estimates_move_the_gain_a_bounded_step(reached):
 
 
 def test_share_of_period_ends_the_push_where_it_should():
-    share = equations.share_of_period(
-        np.array([0.245, 0.2, 0.26]), np.full(3, 2.0), np.full(3, 0.25), 0.005
-    )
+    length = np.array([0.245, 0.2, 0.26])
+    share = equations.share_of_period(length, np.full(3, 2.0), np.full(3, 0.25), 0.005)
     np.testing.assert_allclose(share, [0.5, 1.0, 0.0])
 
 
 def test_both_apex_estimates_agree_on_a_parabola():
-    height, speed = np.array([0.25]), np.array([1.2])
-    airborne = np.array([0.3])
+    height, speed, airborne = np.array([0.25]), np.array([1.2]), np.array([0.3])
     touchdown = equations.ballistic_height(height, speed, airborne)
     apex = equations.ballistic_apex(height, speed)
-    timed = equations.flight_time_apex(height, touchdown, airborne)
-    np.testing.assert_allclose(timed, apex)
+    np.testing.assert_allclose(equations.flight_time_apex(height, touchdown, airborne), apex)
     peak = equations.ballistic_height(height, speed, speed / GRAVITY)
     np.testing.assert_allclose(peak, apex)
 

@@ -68,37 +68,25 @@ def test_every_term_is_as_printed(height, rate, q, qd, command, action, last):
     ("barrier", "expected"),
     [("step", math.exp(0.05)), ("printed", 1 - math.exp(0.05))],
 )
-def test_readings_of_the_height_barrier(barrier, expected):
+def test_the_height_barrier_as_printed_rewards_overshoot_and_the_step_does_not(barrier, expected):
     config = PaperRewardConfig(barrier=barrier)
     assert terms_of(config, height=0.35)[1]["height"] == pytest.approx(expected)
-    assert terms_of(config, height=0.29)[1]["height"] == 0.0
-
-
-def test_barrier_as_printed_rewards_overshoot_and_the_step_does_not():
-    printed, step = PaperRewardConfig(barrier="printed"), PaperRewardConfig()
-    assert terms_of(printed, height=0.40)[0] > terms_of(printed, height=0.30)[0]
-    assert terms_of(step, height=0.40)[0] < terms_of(step, height=0.29)[0]
+    below, above = (terms_of(config, height=height) for height in (0.29, 0.40))
+    assert below[1]["height"] == 0.0
+    assert (above[0] > below[0]) == (barrier == "printed")
 
 
 def test_every_leg_is_judged_by_itself():
     rng = np.random.default_rng(0)
-    rows = [
-        {
-            "height": rng.uniform(0.1, 0.5),
-            "rate": rng.normal(),
-            "q": rng.uniform(-2, 1, 2),
-            "qd": rng.normal(0, 30, 2),
-            "command": 0.3,
-        }
+    many = [
+        transition(rng.uniform(0.1, 0.5), rng.normal(), rng.uniform(-2, 1, 2), rng.normal(0, 30, 2))
         for _ in range(20)
     ]
-    singles = [terms_of(**row)[0] for row in rows]
-    many = [transition(**row) for row in rows]
-    arrays = [
-        np.concatenate(values)
-        for values in zip(*(list(vars(t).values())[:6] for t in many), strict=True)
-    ]
-    together, _ = paper_reward(ROBOT)(Transition(*arrays, lambda: np.zeros(20)))
+    paper = paper_reward(ROBOT)
+    singles = [paper(one)[0].item() for one in many]
+    columns = zip(*([*vars(one).values()][:6] for one in many), strict=True)
+    arrays = [np.concatenate(values) for values in columns]
+    together, _ = paper(Transition(*arrays, lambda: np.zeros(20)))
     np.testing.assert_allclose(together, singles, rtol=1e-12)
 
 
