@@ -4,9 +4,10 @@ import torch
 from stable_baselines3.common.logger import configure
 
 from hopping_leg.rl.recipe import Recipe
+from hopping_leg.rl.recipes.adaptive import ADAPTIVE
 from hopping_leg.rl.recipes.fast import FAST
 from hopping_leg.rl.recipes.paper import PAPER
-from hopping_leg.rl.recipes.precise import ADAPTIVE, GRU, PRECISE
+from hopping_leg.rl.recipes.precise import GRU, PRECISE
 from hopping_leg.rl.resumable import ResumablePPO
 from hopping_leg.robot import load_robot
 

@@ -3,19 +3,16 @@
 The teacher's reward is calmer than that of ``fast``: the calmer it is, the better it can be
 imitated. Its energy gain ends where hops are too high: otherwise it learns one high hop for all
 commands, from which some never come back to the low ones.
-
-``adaptive`` is the same on legs that differ, with a memory of where to aim.
 """
 
 from dataclasses import replace
 
 from hopping_leg.envs import ApexRewardConfig
 from hopping_leg.rl.algorithms import PPOConfig
-from hopping_leg.rl.distillation.distillation import Distillation, StudentConfig
+from hopping_leg.rl.distillation.distillation import Distillation
 from hopping_leg.rl.recipe import Recipe, Schedule, SelectionConfig
 from hopping_leg.rl.recipes.fast import FAST
 from hopping_leg.rl.search_space import LAYERS, OneOf, Real, SearchSpace
-from hopping_leg.sim.randomization import WIDE_RANGES
 
 PRECISE = Recipe(
     name="precise",
@@ -39,34 +36,6 @@ PRECISE = Recipe(
         eval_commands=(0.225, 0.26, 0.295, 0.33, 0.365, 0.40, 0.435),
     ),
     distillation=Distillation(),
-)
-
-ADAPTIVE = Recipe(
-    name="adaptive",
-    task=replace(
-        PRECISE.task,
-        command_range=(0.20, 0.42),
-        command_skew=1.0,
-        randomised=WIDE_RANGES,
-        randomize_probability=0.5,
-        nominal_fraction=0.5,
-    ),
-    reward=PRECISE.reward,
-    algorithm=FAST.algorithm,
-    network=FAST.network,
-    schedule=Schedule(num_envs=512, steps=12_000_000, log_every=4),
-    selection=SelectionConfig(
-        eval_every=500_000,
-        eval_start=0.7,
-        eval_commands=(0.22, 0.25, 0.28, 0.31, 0.34, 0.37, 0.40),
-    ),
-    distillation=Distillation(
-        teacher_share=0.4,
-        teachers=1,
-        student=StudentConfig(memory="integrator"),
-        nominal_share=0.35,
-        randomizations=40,
-    ),
 )
 
 SEARCH_SPACE: SearchSpace = {
