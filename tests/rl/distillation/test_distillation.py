@@ -120,7 +120,7 @@ def test_the_policys_rate_falls_from_when_its_teacher_passed():
     assert [DISTILLATION.student_progress(share, scores) for share in (until, 1.0)] == [0, 1]
 
 
-def test_a_single_teacher_takes_no_exam():
+def test_a_single_teacher_is_not_evaluated():
     alone = TINY_PRECISE.replace(teachers=1)
     model = learner(alone)
     for share in (0.0, alone.distillation.teacher_share, 1.0):
@@ -129,11 +129,19 @@ def test_a_single_teacher_takes_no_exam():
     assert "teacher_scores_m" not in alone.extra_results(model)
 
 
+def test_the_evaluation_tells_a_teacher_that_does_not_hop():
+    policy = learner(RECIPE).policy
+    with torch.no_grad():
+        for weight in policy.action_net.parameters():
+            weight.zero_()
+    assert DISTILLATION.evaluate_teacher(policy, ROBOT, RECIPE.task, COMMANDS[:1]) >= 1.0
+
+
 @pytest.mark.parametrize(
     ("scores", "flight", "worst"),
     [((0.002, 0.01, 0.003), 0.6, 0.01), ((0.003,), 0.5, 0.003), ((0.003,), 0.42, 0.011)],
 )
-def test_an_exam_counts_the_worst_height_and_time_on_the_ground(
+def test_the_evaluation_counts_the_worst_height_and_time_on_the_ground(
     model, monkeypatch, scores, flight, worst
 ):
     def judged(teacher, robot, commands, rate, threads):
