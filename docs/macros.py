@@ -9,10 +9,13 @@ or a figure of the study. mkdocs puts this folder on the path while it loads thi
 import contextlib
 import io
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
 import jinja2
+
+sys.path.insert(0, str(Path(__file__).parent.parent))  # for the studies, which are not installed
 import macros_package
 import macros_results
 from mkdocs.exceptions import PluginError

@@ -161,7 +161,7 @@ def _killed_run() -> None:
 
 
 def _stored_runs() -> None:
-    for name, source in (("first", "evaluation"), ("second", "precise")):
+    for name, source in (("first", "evaluation"), ("second", "evaluation")):
         Path(f"runs/{name}").mkdir()
         shutil.copy(
             ROOT / f"studies/evaluation/results/{source}.json", f"runs/{name}/evaluation.json"
