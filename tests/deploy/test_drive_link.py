@@ -58,7 +58,7 @@ def test_the_wiring_is_no_part_of_the_physics(tmp_path):
         (f"[hardware.knee]\nid = {entry(1, '1')}", "both 1"),
         (f"[hardware.hip]\nid = {entry(1.5, '1')}", "whole number"),
         (f"[hardware.hip]\nsign = {entry(0.5, '1')}", "1 or -1"),
-        (f"[hardware.hip]\nlower = {entry(4.0, 'rad')}", "must lie below"),
+        (f"[hardware.hip]\nlower = {entry(-2.0, 'rad')}", "write it as 'hip.stop_lower'"),
         (f"[hardware]\nvoltage_low = {entry(50, 'V')}", "voltage_high"),
         (f"[hardware]\nwatchdog = {entry(0, 's')}", "more than zero"),
         (f"[hardware]\nwatchdg = {entry(1, 's')}", "Did you mean 'watchdog'"),
@@ -71,8 +71,8 @@ def test_mistakes_get_a_sentence(tmp_path, text, sentence):
 
 def test_limits_of_a_reversed_motor_stay_in_order():
     robot = load_robot("legv2")
-    reversed_hip = Servo(sign=-1.0, lower=-0.5, upper=1.5)
-    robot = replace(robot, hardware=Hardware(hip=reversed_hip))
+    hip = replace(robot.hip, stop_lower=-0.5, stop_upper=1.5)
+    robot = replace(robot, hip=hip, hardware=Hardware(hip=Servo(sign=-1.0)))
     found = {setting.name: setting for setting in required_settings(robot, 0)}
     low, high = found["servopos.position_min"], found["servopos.position_max"]
     assert low.value == pytest.approx(-1.5 / math.tau)

@@ -51,7 +51,7 @@ def test_each_mistake_has_its_sentence(changes, words):
 
 
 def test_a_swapped_drive_is_noticed():
-    hardware = replace(LEG.hardware, knee=Servo(id=2, serial="f" * 24, lower=-2.7, upper=2.7))
+    hardware = replace(LEG.hardware, knee=Servo(id=2, serial="f" * 24))
     (sentence,) = complaints(healthy(1), replace(LEG, hardware=hardware))
     assert "swapped" in sentence
 

@@ -26,7 +26,7 @@ def test_who_hops_as_trained_is_not_stopped_for_it(name):
 
 def test_no_leg_may_go_where_its_mechanism_ends():
     limits = hopping_limits(LEG, 200.0)
-    stops = [(servo.lower, servo.upper) for servo in LEG.hardware.servos]
+    stops = [(joint.stop_lower, joint.stop_upper) for joint in (LEG.hip, LEG.knee)]
     for (low, high), lower, upper in zip(stops, limits.lower, limits.upper, strict=True):
         assert low <= lower < upper <= high
     recording = recording_limits(LEG, 200.0)

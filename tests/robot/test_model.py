@@ -2,7 +2,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from hopping_leg.robot import GRAVITY, build_model, load_robot, shipped_robots
+from hopping_leg.robot import GRAVITY, build_model, get_spec, load_robot, shipped_robots
 
 
 @pytest.mark.parametrize("name", shipped_robots())
@@ -39,3 +39,60 @@ def test_base_knee_and_foot_touch_the_ground(part):
     mujoco.mj_forward(model, data)
     touching = {model.geom(g).name for contact in data.contact[: data.ncon] for g in contact.geom}
     assert touching == {"floor", part}
+
+
+def fixed_base(name, gravity=GRAVITY):
+    """Return the model and data of a leg whose base is fixed, knee bent, at rest."""
+    robot = load_robot(name)
+    spec = get_spec(robot, fixed_base=True)
+    spec.option.gravity = [0, 0, -gravity]
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    data.qpos[:] = [0.3, -1.2]
+    return robot, model, data
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+@pytest.mark.parametrize("name", shipped_robots())
+def test_dry_friction_holds_a_joint_up_to_its_size(name, joint):
+    for share, holds in ((0.9, True), (1.1, False)):
+        robot, model, data = fixed_base(name, gravity=1e-9)
+        data.qfrc_applied[joint] = share * robot.of_joints("friction")[joint]
+        speeds = []
+        for _ in range(1000):
+            mujoco.mj_step(model, data)
+            speeds.append(abs(data.qvel[joint]))
+        assert (max(speeds) < 1e-4) == holds
+        assert holds or speeds[-1] > 1e-3
+
+
+@pytest.mark.parametrize("name", shipped_robots())
+def test_dry_friction_holds_the_rail(name):
+    robot = load_robot(name)
+    for share in (0.9, 1.1) if robot.rail.friction else ():
+        model = build_model(robot)
+        data = mujoco.MjData(model)
+        data.qpos[:] = [1.0, 0.0, 0.0]
+        data.qfrc_applied[0] = robot.mass * GRAVITY + share * robot.rail.friction
+        mujoco.mj_step(model, data, 1000)
+        assert (data.qvel[0] < 1e-4) == (share < 1)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize("joint", [0, 1])
+@pytest.mark.parametrize("name", shipped_robots())
+def test_a_leg_driven_into_a_stop_stays_within_milliradians_of_it(name, joint, side):
+    robot, model, data = fixed_base(name, gravity=1e-9)
+    stop = robot.of_joints("stop_lower" if side < 0 else "stop_upper")[joint]
+    data.qpos[joint] = stop - side * 0.05
+    data.ctrl[joint] = side * 1.0
+    mujoco.mj_step(model, data, 2000)
+    assert abs(data.qpos[joint] - stop) < 5e-3
+    assert abs(data.qvel[joint]) < 1e-2
+
+
+def test_a_leg_on_a_fixed_base_touches_nothing():
+    _, model, data = fixed_base("legv2-paper")
+    mujoco.mj_step(model, data, 100)
+    assert model.nv == 2
+    assert data.ncon == 0

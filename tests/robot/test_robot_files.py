@@ -2,6 +2,7 @@ import copy
 import dataclasses
 import math
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -11,6 +12,7 @@ from hopping_leg.envs import HoppingEnv
 from hopping_leg.errors import RobotError
 from hopping_leg.robot import build_model, load_robot, load_tree, shipped_robots
 
+SIGNED = ("lower", "upper", "stop_lower", "stop_upper")
 EXAMPLE = "examples/my_leg.toml"
 
 
@@ -94,10 +96,35 @@ def test_armature_follows_from_rotor_gear_and_belt():
     assert load_robot("legv2-paper").knee.armature == 0.0001
 
 
+def test_a_leg_that_states_no_stops_has_leg_v2s_and_a_pendulum_none_within_a_turn():
+    for name in shipped_robots():
+        robot = load_robot(name)
+        free = {
+            joint: dataclasses.replace(
+                getattr(robot, joint), stop_lower=math.nan, stop_upper=math.nan
+            )
+            for joint in ("hip", "knee")
+        }
+        bare = dataclasses.replace(robot, **free)
+        for key in ("stop_lower", "stop_upper"):
+            np.testing.assert_allclose(bare.of_joints(key), robot.of_joints(key), atol=0.02)
+
+
+def test_a_stop_is_physics_but_digests_that_leave_it_out_are_known():
+    robot = load_robot("legv2-paper")
+    assert robot.has_digest(robot.digest)
+    assert robot.has_digest("9634a0cc2dd452ea")  # of policies' files
+    other = dataclasses.replace(robot, hip=dataclasses.replace(robot.hip, stop_upper=3.0))
+    assert other.digest != robot.digest
+    assert not other.has_digest(robot.digest)
+
+
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(path=st.sampled_from(PATHS), mistake=st.sampled_from(sorted(MISTAKES)))
 def test_every_mistake_gets_a_sentence_that_names_the_field(tmp_path, path, mistake):
-    if mistake == "negative" and path[-1] in ("lower", "upper"):
+    if mistake == "negative" and path[-1] in SIGNED:
+        return
+    if mistake == "missing" and path[-1].startswith("stop_"):  # may be left out
         return
     file = tmp_path / "leg.toml"
     write_toml(changed(path, MISTAKES[mistake]), file)
@@ -114,6 +141,8 @@ def test_every_mistake_gets_a_sentence_that_names_the_field(tmp_path, path, mist
     [
         ("hip.lower", 3.0, "hip.upper"),
         ("knee.upper", 0.5, "knee.upper.*pendulum"),
+        ("hip.upper", 68.0, "beyond the mechanical stop 'hip.stop_upper'"),
+        ("knee.stop_lower", -2.0, "'knee.lower'.*'knee.stop_lower'"),
         ("thigh.com", 0.4, "thigh.length"),
         ("hip.motor.torque_limit", 40.0, "hip.motor.peak_torque"),
         ("knee.motor.rated_torque", 17.0, "knee.motor.peak_torque"),
@@ -164,4 +193,3 @@ def test_what_a_drive_may_leave_out_changes_a_robot_only_where_it_is_stated(name
     for stated, same in ((neutral, True), (value, False)):
         hip = dataclasses.replace(robot.hip, **{name: stated})
         assert (dataclasses.replace(robot, hip=hip).digest == robot.digest) == same
-    assert load_robot("legv2-paper").digest == "9634a0cc2dd452ea"

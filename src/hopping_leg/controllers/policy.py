@@ -161,7 +161,7 @@ class Policy:
     def stranger(self, robot: Robot, name: str) -> str:
         """Return a sentence that names the policy if a robot is not that of its training, or ""."""
         card = self.card
-        if robot.digest == card.robot_digest:
+        if robot.has_digest(card.robot_digest):
             return ""
         return (
             f"{name} was trained on robot '{card.robot}' ({card.robot_digest}), not on"

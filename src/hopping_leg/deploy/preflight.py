@@ -36,10 +36,11 @@ class Setting:
 def required_settings(robot: Robot, joint: int) -> tuple[Setting, ...]:
     """Return the configuration of one joint's drive: 0 for the hip, 1 for the knee."""
     servo, transform = robot.hardware.servos[joint], joint_transforms(robot)[joint]
-    motor = getattr(robot, JOINTS[joint]).motor
-    ends = sorted(transform.motor_position(angle) for angle in (servo.lower, servo.upper))
+    axis = (robot.hip, robot.knee)[joint]
+    stops = (axis.stop_lower, axis.stop_upper)
+    ends = sorted(transform.motor_position(angle) for angle in stops)
     return (
-        Setting("motor_position.rotor_to_output_ratio", 1 / motor.gear_ratio, "gear ratio"),
+        Setting("motor_position.rotor_to_output_ratio", 1 / axis.motor.gear_ratio, "gear ratio"),
         Setting("servopos.position_min", ends[0], "mechanical stop"),
         Setting("servopos.position_max", ends[1], "mechanical stop"),
         Setting("servo.max_current_A", servo.max_current, "motor current"),

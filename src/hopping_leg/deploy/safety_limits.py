@@ -60,8 +60,8 @@ def hopping_limits(robot: Robot, rate: float) -> SafetyLimits:
 def recording_limits(robot: Robot, rate: float) -> SafetyLimits:
     """Return the limits for excitations at a rate, Hz: the whole mechanical range and a margin."""
     ranges = [
-        (servo.lower - RECORDING_MARGIN, servo.upper + RECORDING_MARGIN)
-        for servo in robot.hardware.servos
+        (joint.stop_lower - RECORDING_MARGIN, joint.stop_upper + RECORDING_MARGIN)
+        for joint in (robot.hip, robot.knee)
     ]
     return _limits(robot, rate, ranges)
 

@@ -34,15 +34,13 @@ def build_rig_model(
     The timestep is in s, gravity is the acceleration of the base in free flight, m/s2. RobotError
     says that MuJoCo refuses the parameters.
     """
-    spec = get_spec(robot, timestep)
+    fixed = rig == "fixed-base"
+    spec = get_spec(robot, timestep, fixed_base=fixed)
     spec.option.gravity = [0, 0, -gravity]
     # A simulation that breaks down must not go on from a default state unnoticed.
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     # One leg is one island; to look for others takes a tenth of a step.
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
-    fixed = rig == "fixed-base"
-    if fixed:
-        spec.delete(spec.joint("rail"))
     for geom in list(spec.geoms):
         geom.material = ""
         if fixed or not (geom.contype or geom.conaffinity):

@@ -7,7 +7,6 @@ left out; the defaults are leg V2's: mjbots qdd100 at 24 V, hip 1, knee 2.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from hopping_leg.io import quantity
 
@@ -25,11 +24,6 @@ class Servo:
     """1 where the motor turns with the joint, -1 where it turns against it."""
     zero_offset: float = quantity("rad", 0.0, signed=True)
     """Joint angle at which the motor reads zero."""
-    lower: float = quantity("rad", math.nan, signed=True)
-    """Mechanical stop of the joint; by default what recordings of leg V2 show: half a turn of the
-    hip, 2.7 rad of the knee, to either side."""
-    upper: float = quantity("rad", math.nan, signed=True)
-    """See ``lower``."""
     max_current: float = quantity("A", 100.0)
     """Phase current that the drive is configured for (``servo.max_current_A``)."""
     serial: str = ""
@@ -52,13 +46,10 @@ class Hardware:
     """Highest temperature of the drives' electronics; they derate from 50 and trip at 75."""
 
     def __post_init__(self) -> None:
-        for name, default_id, reach in (("hip", 1.0, math.pi), ("knee", 2.0, 2.7)):
+        for name, default_id in (("hip", 1.0), ("knee", 2.0)):
             servo: Servo = getattr(self, name)
-            defaults = {"id": default_id, "lower": -reach, "upper": reach}
-            left_out: dict[str, Any] = {
-                k: v for k, v in defaults.items() if math.isnan(getattr(servo, k))
-            }
-            object.__setattr__(self, name, replace(servo, **left_out))
+            if math.isnan(servo.id):
+                object.__setattr__(self, name, replace(servo, id=default_id))
 
     @property
     def servos(self) -> tuple[Servo, Servo]:
@@ -74,8 +65,6 @@ def contradictions(hardware: Hardware) -> Iterator[str]:
             yield f"{at}.id' is {servo.id:g} but must be a whole number, 1 to 126."
         if abs(servo.sign) != 1:
             yield f"{at}.sign' is {servo.sign:g} but must be 1 or -1."
-        if servo.lower >= servo.upper:
-            yield f"{at}.lower' ({servo.lower:g} rad) must lie below {at}.upper' ({servo.upper:g})."
     if hardware.hip.id == hardware.knee.id:
         yield f"'hardware.hip.id' and 'hardware.knee.id' are both {hardware.hip.id:g}."
     low, high = hardware.voltage_low, hardware.voltage_high

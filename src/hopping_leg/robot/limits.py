@@ -21,10 +21,10 @@ def hopping_ranges(robot: Robot) -> list[tuple[float, float]]:
 
     Beyond them the supervisor of the real leg stops it.
     """
-    joints = zip((robot.hip, robot.knee), robot.hardware.servos, HOPPING_MARGINS, strict=True)
+    joints = zip((robot.hip, robot.knee), HOPPING_MARGINS, strict=True)
     return [
-        (max(joint.lower - margin, servo.lower), min(joint.upper + margin, servo.upper))
-        for joint, servo, margin in joints
+        (max(j.lower - margin, j.stop_lower), min(j.upper + margin, j.stop_upper))
+        for j, margin in joints
     ]
 
 

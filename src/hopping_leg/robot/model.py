@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from hopping_leg.errors import RobotError
-from hopping_leg.robot.parameters import Joint, Link, Robot
+from hopping_leg.robot.parameters import Joint, Link, Rail, Robot
 
 GRAVITY = 9.81
 """Standard gravity, m/s2; leg.xml states the same."""
@@ -14,13 +14,28 @@ GRAVITY = 9.81
 TIMESTEP = 5e-4
 """Default physics step, s: a compromise whose price ``python -m studies.physics_step`` measures."""
 
+STOP_TIME_CONSTANT = 0.005
+"""Time constant with which a mechanical stop pushes a joint back, critically damped, s."""
+
+STOP_IMPEDANCE = (0.9, 0.95, 0.001, 0.5, 2.0)
+"""MuJoCo's default ``solimp``, that of the stops."""
+
+FRICTION_TIME_CONSTANT = 0.001
+"""Time constant with which dry friction takes a joint's speed, s."""
+
+FRICTION_IMPEDANCE = (0.999, 0.999, 0.001, 0.5, 2.0)
+"""``solimp`` of dry friction that holds: by MuJoCo's default a joint creeps at 10 mrad/s."""
+
 _THIN = 1e-9
 """Inertia around the axes a planar link cannot turn about only has to be valid."""
 
 
-def get_spec(robot: Robot, timestep: float = TIMESTEP) -> mujoco.MjSpec:
+def get_spec(
+    robot: Robot, timestep: float = TIMESTEP, *, fixed_base: bool = False
+) -> mujoco.MjSpec:
     """Build the editable model of a robot for a physics step, s.
 
+    A fixed base has no rail joint and the floor touches nothing.
     Controls are motor torques at the gear's output, N m: the belt is the actuator's gear, so the
     joint sees ``belt_ratio`` times the control and the motor's reflected inertia.
     """
@@ -31,8 +46,7 @@ def get_spec(robot: Robot, timestep: float = TIMESTEP) -> mujoco.MjSpec:
     spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     _set_inertia(spec.body("base"), robot.base.mass, 0.0, _THIN)
     spec.geom("base").size[0] = robot.base.radius
-    spec.joint("rail").frictionloss = robot.rail.friction
-    _set_damping(spec.joint("rail"), robot.rail.damping)
+    _set_friction(spec.joint("rail"), robot.rail)
     _set_link(spec, "thigh", robot.thigh, robot.hip)
     _set_link(spec, "shank", robot.shank, robot.knee)
     spec.body("shank").pos = [0, 0, -robot.thigh.length]
@@ -42,6 +56,9 @@ def get_spec(robot: Robot, timestep: float = TIMESTEP) -> mujoco.MjSpec:
     _set_contact(spec, robot)
     for name, joint in (("hip", robot.hip), ("knee", robot.knee)):
         _add_motor(spec, name, joint)
+    if fixed_base:
+        spec.delete(spec.joint("rail"))
+        spec.geom("floor").contype = 0
     return spec
 
 
@@ -77,14 +94,20 @@ def _set_link(spec: mujoco.MjSpec, name: str, link: Link, joint: Joint) -> None:
     geom.fromto = [0, 0, 0, 0, 0, -link.length]
     geom.size[0] = 0.012
     axis = spec.joint("hip" if name == "thigh" else "knee")
-    axis.frictionloss = joint.friction
-    _set_damping(axis, joint.damping)
+    _set_friction(axis, joint)
     axis.armature = joint.armature
+    axis.limited = mujoco.mjtLimited.mjLIMITED_TRUE
+    axis.range = [joint.stop_lower, joint.stop_upper]
+    axis.solref_limit = [STOP_TIME_CONSTANT, 1.0]
+    axis.solimp_limit = STOP_IMPEDANCE
 
 
-def _set_damping(joint: mujoco.MjsJoint, linear: float) -> None:
-    """Set linear damping only; the other entries are the polynomial's higher terms."""
-    joint.damping = np.array([linear, 0.0, 0.0])
+def _set_friction(axis: mujoco.MjsJoint, parameters: Rail | Joint) -> None:
+    """Set dry friction and linear damping; the latter's other entries are higher terms."""
+    axis.frictionloss = parameters.friction
+    axis.solref_friction = [FRICTION_TIME_CONSTANT, 1.0]
+    axis.solimp_friction = FRICTION_IMPEDANCE
+    axis.damping = np.array([parameters.damping, 0.0, 0.0])
 
 
 def _set_inertia(body: mujoco.MjsBody, mass: float, com_z: float, inertia: float) -> None:

@@ -21,6 +21,11 @@ KINDS = ("leg", "pendulum")
 """What a robot may be."""
 
 
+DEFAULT_STOPS = {"hip": float(np.pi), "knee": 2.7}
+"""Where the joints of a leg whose file states no mechanical stops end, rad to either side: what
+recordings of leg V2 show."""
+
+
 def reflected_inertia(rotor_inertia: float, gear_ratio: float) -> float:
     """Return a rotor's inertia as felt behind a reduction, ``I n^2``, in kg m2."""
     return rotor_inertia * gear_ratio**2
@@ -108,6 +113,11 @@ class Joint:
     """Gear loss: further Coulomb friction per torque that the motor gives."""
     torque_gain: float = quantity("1", 1.0)
     """Torque that the motor gives per torque asked for, within its limits."""
+    stop_lower: float = quantity("rad", float("nan"), signed=True)
+    """Lower mechanical stop; a leg's file without it gets leg V2's, a pendulum's none within a
+    turn of its soft limits."""
+    stop_upper: float = quantity("rad", float("nan"), signed=True)
+    """Upper mechanical stop, see ``stop_lower``."""
 
     def __post_init__(self) -> None:
         if np.isnan(self.armature):
@@ -148,6 +158,17 @@ class Robot:
     hardware: Hardware = field(default_factory=Hardware)
     """How the drives are wired; used by ``hopping_leg.deploy`` alone."""
 
+    def __post_init__(self) -> None:
+        for name, reach in DEFAULT_STOPS.items():
+            joint: Joint = getattr(self, name)
+            lower, upper = -reach, reach
+            if self.kind == "pendulum":
+                lower, upper = joint.lower - 2 * np.pi, joint.upper + 2 * np.pi
+            lower = lower if np.isnan(joint.stop_lower) else joint.stop_lower
+            upper = upper if np.isnan(joint.stop_upper) else joint.stop_upper
+            complete = dataclasses.replace(joint, stop_lower=lower, stop_upper=upper)
+            object.__setattr__(self, name, complete)
+
     @property
     def mass(self) -> float:
         """Everything that moves on the rail, kg."""
@@ -177,6 +198,13 @@ class Robot:
     @property
     def digest(self) -> str:
         """Hash of every parameter that the physics depends on: 16 hex digits."""
+        return self._digest()
+
+    def has_digest(self, digest: str) -> bool:
+        """Tell whether a stored digest is this leg's; it may leave the mechanical stops out."""
+        return digest in (self.digest, self._digest("stop_lower", "stop_upper"))
+
+    def _digest(self, *without: str) -> str:
         values = dataclasses.asdict(self)
         del values["name"], values["description"], values["kind"], values["hardware"]
         if self.reality.neutral:
@@ -184,5 +212,7 @@ class Robot:
         for joint, name in itertools.product(JOINTS, ("load_friction", "torque_gain")):
             if values[joint][name] == Joint.__dataclass_fields__[name].default:
                 del values[joint][name]
+        for joint, name in itertools.product(JOINTS, without):
+            del values[joint][name]
         text = json.dumps(values, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]

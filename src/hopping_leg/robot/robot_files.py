@@ -1,5 +1,6 @@
 """Robot files: one TOML per leg, every number with its unit and source."""
 
+import itertools
 import json
 import math
 import tomllib
@@ -13,7 +14,7 @@ from hopping_leg.errors import RobotError, unknown_name
 from hopping_leg.io import Field, Tree, is_number, read_dataclass
 from hopping_leg.robot.hardware import contradictions
 from hopping_leg.robot.model import TIMESTEP
-from hopping_leg.robot.parameters import KINDS, Robot
+from hopping_leg.robot.parameters import JOINTS, KINDS, Robot
 
 _SHIPPED = resources.files("hopping_leg.robot") / "robots"
 
@@ -41,12 +42,25 @@ def robot_from_tree(tree: Tree, origin: str) -> Robot:
         RobotError: Naming origin, field and what was valid.
     """
     resolved = _extend(tree, origin, ())
+    _refuse_moved(resolved, origin)
     read_quantity = partial(_read_quantity, origin)
     robot = read_dataclass(Robot, resolved, origin, error=RobotError, read_quantity=read_quantity)
     if not robot.name.strip():
         raise RobotError(f"{origin}: 'name' is empty; give the robot a name.")
     check_physics(robot, origin)
     return robot
+
+
+def _refuse_moved(tree: Tree, origin: str) -> None:
+    """Name the new place of the mechanical stops to who has them in ``[hardware]``."""
+    for joint, key in itertools.product(JOINTS, ("lower", "upper")):
+        table = tree.get("hardware", {})
+        table = table.get(joint, {}) if isinstance(table, dict) else {}
+        if isinstance(table, dict) and key in table:
+            raise RobotError(
+                f"{origin}: 'hardware.{joint}.{key}' is a mechanical stop, which belongs to the"
+                f" joint; write it as '{joint}.stop_{key}'."
+            )
 
 
 def parent_robot(name_or_path: str | Path) -> str | None:
@@ -186,6 +200,15 @@ def _contradictions(robot: Robot) -> Iterator[str]:
                 f"'{name}.lower' ({joint.lower:g} rad) must lie below '{name}.upper'"
                 f" ({joint.upper:g})."
             )
+        for key, inner, outer in (
+            ("lower", joint.stop_lower, joint.lower),
+            ("upper", joint.upper, joint.stop_upper),
+        ):
+            if inner > outer:
+                yield (
+                    f"'{name}.{key}' ({getattr(joint, key):g} rad) lies beyond the mechanical stop"
+                    f" '{name}.stop_{key}' ({getattr(joint, f'stop_{key}'):g}); state both."
+                )
         for smaller in ("torque_limit", "rated_torque"):
             limit = getattr(joint.motor, smaller)
             yield from _above(

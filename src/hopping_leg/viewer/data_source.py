@@ -66,7 +66,7 @@ class ReplaySource:
         else:
             found = _load_shipped(str(header.get("robot", "")), f"{path} was recorded from")
         found.require_leg()
-        if header.get("robot_digest", found.digest) != found.digest:
+        if not found.has_digest(header.get("robot_digest", found.digest)):
             self.notices.append(
                 f"{path.name} was recorded from other parameters than those of {found.name}."
             )
