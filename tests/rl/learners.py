@@ -3,6 +3,8 @@
 import torch
 from stable_baselines3.common.logger import configure
 
+from hopping_leg.controllers.policy import Card, Policy
+from hopping_leg.rl.onnx_export import build_policy
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes.adaptive import ADAPTIVE
 from hopping_leg.rl.recipes.fast import FAST
@@ -47,3 +49,11 @@ def learner(recipe, seed=3):
     model = recipe.make_model(env, seed)
     model.set_logger(configure(None, []))
     return model
+
+
+def policy_file(recipe, model):
+    """Return the policy that a recipe exports of a model."""
+    task = recipe.task
+    about = task.observation, *task.command_bounds, task.action_torque
+    card = Card("test", *about, ROBOT.name, ROBOT.digest, task.rate)
+    return Policy(build_policy(recipe.actor(model, model.env), card), "memory", "test")

@@ -35,6 +35,8 @@ def test_values_depend_on_the_true_state_alone(learner):
     blind[:, :size] += 1
     value = model.policy.predict_values(observation)
     torch.testing.assert_close(model.policy.predict_values(blind), value)
+    blind[:, size:] += 1
+    assert not torch.allclose(model.policy.predict_values(blind), value)
 
 
 def test_annealing_depends_on_progress_alone(learner):

@@ -21,8 +21,12 @@ from hopping_leg.rl.recipes import (
     recipe_of,
 )
 from hopping_leg.rl.run_folder import RunFolder
-from hopping_leg.robot import load_robot
+from hopping_leg.robot import load_robot, shipped_robots
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES, Range
+
+LEGS = [load_robot(name) for name in shipped_robots()]
+LEGS = [robot for robot in LEGS if robot.kind == "leg" and robot.reality.neutral]
+every_leg = pytest.mark.parametrize("robot", LEGS, ids=lambda robot: robot.name)
 
 
 @given(
@@ -63,8 +67,15 @@ def test_numbers_of_a_part_are_changed_by_its_name():
 def test_changes_without_meaning_get_a_sentence(entry, named):
     with pytest.raises(UsageError, match=named):
         change(get_recipe("fast"), [entry])
+
+
+def test_a_memory_is_chosen_by_its_name():
+    usual = get_recipe("precise")
+    gru = change(usual, ["student.memory=gru"])
+    assert gru.distillation.student.memory == "gru"
+    assert changes_of(usual, dataclasses.asdict(gru)) == ["student.memory=gru"]
     with pytest.raises(UsageError, match="window"):
-        change(get_recipe("precise"), ["student.memory=lstm"])
+        change(gru, ["student.memory=lstm"])
 
 
 def test_a_randomised_recipe_trains_legs_that_differ():
@@ -153,3 +164,30 @@ def test_a_recipe_of_ones_own_is_named_by_its_file(tmp_path):
     RunFolder(tmp_path, get_recipe(f"{file}:QUIET"), robot, 0, None).check_same()
     with pytest.raises(UsageError, match="is no recipe"):
         get_recipe(f"{file}:Path")
+
+
+def test_the_papers_leg_keeps_the_recipe():
+    assert get_recipe("paper").fit(load_robot("legv2-paper")) == get_recipe("paper")
+
+
+@pytest.mark.parametrize("name", ["paper", "fast", "precise"])
+@every_leg
+def test_every_shipped_leg_can_stand_and_reach_its_commands(robot, name):
+    fitted = get_recipe(name).fit(robot)
+    low, high = fitted.task.command_bounds
+    assert 0.55 * robot.straight_height < low < high < 1.55 * robot.straight_height
+    assert low <= min(fitted.selection.eval_commands) <= max(fitted.selection.eval_commands) <= high
+    assert (fitted.task.action_torque <= robot.of_joints("torque_limit")).all()
+    env = fitted.make_env(robot, 0)
+    assert (env.task.legs.height > 0.3 * robot.straight_height).all()
+
+
+@pytest.mark.parametrize("name", ["paper", "precise"])
+@every_leg
+def test_heights_that_are_asked_for_are_those_of_any_leg(robot, name):
+    recipe = get_recipe(name)
+    fitted = recipe.replace(heights=(0.21, 0.47)).fit(robot)
+    assert fitted.task.command_bounds == (0.21, 0.47)
+    assert len(fitted.selection.eval_commands) == len(recipe.selection.eval_commands)
+    assert 0.21 < min(fitted.selection.eval_commands) < max(fitted.selection.eval_commands) < 0.47
+    assert fitted.task.action_torque == recipe.fit(robot).task.action_torque

@@ -1,12 +1,8 @@
 import numpy as np
 import pytest
-import torch
 
 from hopping_leg.envs import HoppingTask, TaskConfig
-from hopping_leg.envs.observation import PRIVILEGED, SIZE
-from hopping_leg.rl.resumable import ResumablePPO
 from hopping_leg.rl.sb3_env import TaskVecEnv
-from hopping_leg.rl.sb3_policies import AsymmetricPolicy
 from tests.rl.learners import ROBOT, TINY
 
 
@@ -60,19 +56,3 @@ def test_state_continues_exactly():
         action = rng.uniform(-1, 1, (3, 2))
         for a, b in zip(env.step(action)[:3], other.step(action)[:3], strict=True):
             np.testing.assert_array_equal(a, b)
-
-
-def test_asymmetric_actor_ignores_the_true_state_and_the_critic_uses_it():
-    model = ResumablePPO(
-        AsymmetricPolicy, make(True), n_steps=8, batch_size=8, device="cpu",
-        policy_kwargs={"net_arch": {"pi": [8], "vf": [8]}, "actor_size": SIZE},
-    )  # fmt: skip
-    seen = torch.randn(5, SIZE)
-    a, b = (torch.cat([seen, torch.randn(5, PRIVILEGED)], dim=1) for _ in range(2))
-    policy = model.policy
-    assert torch.equal(
-        policy._predict(a, deterministic=True), policy._predict(b, deterministic=True)
-    )
-    assert not torch.allclose(policy.predict_values(a), policy.predict_values(b))
-    network = TINY.actor(model, model.env)
-    assert network.layers[0][0].shape == (8, SIZE)

@@ -1,12 +1,22 @@
+from functools import partial
+
 import numpy as np
 import pytest
 import torch
 
-from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.envs.observation import PaperObservation, sample_scaling
-from hopping_leg.rl.onnx_export import build_policy
 from hopping_leg.sim.channel import Measurement
-from tests.rl.learners import ROBOT, TINY, TINY_FAST, TINY_PPO, learner
+from tests.rl.learners import (
+    ROBOT,
+    TINY,
+    TINY_ADAPTIVE,
+    TINY_FAST,
+    TINY_GRU,
+    TINY_PPO,
+    TINY_PRECISE,
+    learner,
+    policy_file,
+)
 
 
 def measurement(count):
@@ -26,31 +36,41 @@ def test_policy_file_gives_the_actors_torques(recipe):
     with torch.no_grad():
         for parameter in model.policy.parameters():
             parameter.mul_(40.0 if recipe is not TINY else 4.0)
-    env = model.env
-    scale = recipe.task.action_torque
-    card = Card("test", recipe.task.observation, 0.25, 0.35, scale, ROBOT.name, ROBOT.digest, 200.0)
-    policy = Policy(build_policy(recipe.actor(model, env), card), "memory", "test")
+    policy = policy_file(recipe, model)
     policy.reset(50)
     m = measurement(50)
     samples = np.concatenate([m.q, m.qd, m.command[..., None]], axis=-1)
     seen = PaperObservation(sample_scaling(ROBOT, recipe.task), 50).view(samples)
     expected, _ = model.predict(seen, deterministic=True)
-    action = policy.act(m) / scale
+    action = policy.act(m) / recipe.task.action_torque
     np.testing.assert_allclose(action, expected, atol=1e-5)
     assert np.abs(action).max() > 0.2
 
 
-def test_a_dated_policy_file_sees_what_its_task_shows():
-    """Run beside the task on the same measurements, the file gives the actor's torques."""
-    recipe = TINY_FAST.replace({"task.episode": 100.0})
+@pytest.mark.parametrize("recipe", [TINY_FAST, TINY_PRECISE, TINY_GRU, TINY_ADAPTIVE])
+def test_a_policy_file_acts_beside_the_task_as_the_actor_and_remembers_the_same(recipe):
+    """In two episodes on the same measurements; adaptive aims as its student does."""
+    changes = {"task.reset_distribution": "standing", "task.random_episode_start": False}
+    if recipe is TINY_ADAPTIVE:
+        changes |= {"integrator.start": 0.0, "integrator.share": 5.0}
+    recipe = recipe.replace(changes)
     model = learner(recipe)
-    task, scale = model.env.task, recipe.task.action_torque
-    card = Card("test", "dated", 0.22, 0.4, scale, ROBOT.name, ROBOT.digest, 200.0)
-    policy = Policy(build_policy(recipe.actor(model, model.env), card), "memory", "test")
-    seen = model.env.reset()
-    policy.reset(task.count)
-    for _ in range(30):
-        expected, _ = model.predict(seen, deterministic=True)
-        np.testing.assert_allclose(policy.act(task.measurement) / scale, expected, atol=1e-5)
-        model.env.step_async(expected)
-        seen, *_ = model.env.step_wait()
+    task, actor, file = model.env.task, model.policy, policy_file(recipe, model)
+    student = getattr(actor, "student", None)
+    if student:
+        student.estimate_share = 1.0
+    act = actor.student_action if student else partial(actor._predict, deterministic=True)
+    for _ in range(2):
+        file.reset(task.count)
+        seen, begun = model.env.reset(), np.ones(task.count, bool)
+        for _ in range(40):
+            model._last_episode_starts = begun
+            with torch.no_grad():
+                action = act(torch.from_numpy(seen)).clamp(-1, 1).numpy()
+            torque = file.act(task.measurement)
+            np.testing.assert_allclose(torque, action * recipe.task.action_torque, atol=1e-4)
+            if file.remembers:
+                np.testing.assert_allclose(file._memory, student._memory.numpy(), atol=1e-5)
+            model.env.step_async(action)
+            seen, begun = model.env.step_wait()[0], np.zeros(task.count, bool)
+        assert not file.remembers or np.abs(file._memory).min() > 1e-4

@@ -6,50 +6,11 @@ import numpy as np
 import pytest
 import torch
 
-from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.distillation.adaptive_student import HopErrors
-from hopping_leg.rl.onnx_export import build_policy
 from hopping_leg.robot.model_mismatch import Latency, ModelMismatch
 from hopping_leg.sim.randomization import WIDE_RANGES
 from tests.rl.learners import ROBOT, TINY_ADAPTIVE, learner
-
-
-def policy_of(recipe, model):
-    card = Card(
-        "adaptive", recipe.task.observation, *recipe.task.command_bounds,
-        recipe.task.action_torque, ROBOT.name, ROBOT.digest, recipe.task.rate,
-    )  # fmt: skip
-    return Policy(build_policy(recipe.actor(model, model.env), card), "a test", "adaptive")
-
-
-def test_the_policy_file_acts_as_the_student_and_aims_as_it_does():
-    recipe = TINY_ADAPTIVE.replace(
-        {
-            "integrator.start": 0.0, "integrator.share": 5.0,
-            "task.reset_distribution": "standing", "task.random_episode_start": False,
-        }
-    )  # fmt: skip
-    model = learner(recipe)
-    model.policy.student.estimate_share = 1.0
-    task, student = model.env.task, model.policy.student
-    policy = policy_of(recipe, model)
-    for _ in range(2):
-        policy.reset(task.count)
-        seen = model.env.reset()
-        model._last_episode_starts = np.ones(task.count, bool)
-        for _ in range(40):
-            with torch.no_grad():
-                action = model.policy.student_action(torch.from_numpy(seen)).clamp(-1, 1)
-            torque = policy.act(task.measurement)
-            np.testing.assert_allclose(
-                torque, action.numpy() * recipe.task.action_torque, atol=1e-4
-            )
-            np.testing.assert_allclose(policy._memory, student._memory.numpy(), atol=1e-5)
-            model.env.step_async(action.numpy())
-            seen = model.env.step_wait()[0]
-            model._last_episode_starts = np.zeros(task.count, bool)
-        assert np.abs(policy._memory).min() > 1e-4
 
 
 @pytest.mark.parametrize("command", [-1.0, -0.4, 1.0])
@@ -215,10 +176,3 @@ def test_a_new_episode_knows_of_no_hop():
     for tick in range(FLIGHT):
         step(one, 0.3, 0.1, 0.25, begun=tick == FLIGHT - 1)
     assert not any(step(one, 0.2, 0.0, 0.25) for _ in range(40))
-
-
-def test_it_goes_on_from_its_state():
-    first, second = HopErrors(1, 0.005), HopErrors(1, 0.005)
-    watch([0.31], one=first)
-    second.restore(first.state())
-    np.testing.assert_array_equal(watch([0.28], one=first), watch([0.28], one=second))

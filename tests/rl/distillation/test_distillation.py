@@ -177,23 +177,6 @@ def test_imitation_brings_the_student_to_its_teacher_and_leaves_the_teacher_alon
     assert all(torch.equal(v, before[k]) for k, v in policy.state_dict().items() if k in before)
 
 
-def test_the_exported_network_is_the_student(model, seen):
-    network = RECIPE.actor(model, model.env)
-    x = seen[:, : model.env.task.observation.size].double().numpy()
-    for weight, bias in network.layers[:-1]:
-        x = np.tanh(x @ weight.T + bias)
-    weight, bias = network.layers[-1]
-    with torch.no_grad():
-        wanted = model.policy.student_action(seen).numpy()
-    np.testing.assert_allclose(x @ weight.T + bias, wanted, atol=1e-5)
-
-
-def test_its_range_lies_within_what_the_leg_reaches():
-    low, high = RECIPE.task.command_bounds
-    assert low < min(COMMANDS) < max(COMMANDS) < high
-    assert ROBOT.straight_height > low
-
-
 def test_the_papers_observation_can_be_taught_too():
     model = learner(TINY_PRECISE.replace({"task.observation": "three-samples"}))
     model.on_boundary = lambda: setattr(model.policy, "student_learns", True)

@@ -4,16 +4,12 @@ import numpy as np
 import torch
 from torch import nn
 
-from hopping_leg.controllers.policy import Card, Policy
-from hopping_leg.envs.task import HoppingTask
 from hopping_leg.rl.distillation.students import (
     DaggerBuffer,
     RecurrentStudent,
     SequenceBuffer,
     WindowStudent,
 )
-from hopping_leg.rl.onnx_export import build_policy
-from tests.rl.learners import ROBOT, TINY_GRU, learner
 
 LEGS, SIZE = 5, 3
 
@@ -113,17 +109,6 @@ def test_only_the_newest_observations_with_a_known_answer_are_drawn():
     assert 1.0 not in buffer.sample(500)
 
 
-def test_a_buffer_goes_on_from_their_state():
-    first, second = DaggerBuffer(8, 1), DaggerBuffer(8, 1)
-    add(first, np.arange(5, dtype=np.float32)[:, None, None])
-    second.restore(first.state())
-    more = np.arange(10, 16, dtype=np.float32)[:, None, None]
-    for buffer in (first, second):
-        add(buffer, more)
-    np.testing.assert_array_equal(first.state()["seen"], second.state()["seen"])
-    assert sorted(first.state()["seen"][:, 0]) == [3, 4, 10, 11, 12, 13, 14, 15]
-
-
 def rollout(number, ticks=4, num_envs=3):
     seen = np.full((ticks, num_envs, 2), number, np.float32)
     seen[..., 1] = np.arange(num_envs)
@@ -152,44 +137,3 @@ def test_a_sequence_counts_up_to_a_new_episode_with_its_own_legs_memory():
     counts = {leg: c.tolist() for leg, c in zip(legs, drawn.counts.T, strict=True)}
     assert counts == {0: [1, 1, 1, 0], 1: [1, 1, 0, 0], 2: [1, 1, 1, 1]}
     assert dict(zip(legs, drawn.memory[:, 0].tolist(), strict=True)) == {0: 1, 1: 0, 2: 3}
-
-
-def test_sequences_go_on_from_their_state():
-    first, second = SequenceBuffer(30), SequenceBuffer(30)
-    for number in range(2):
-        first.add(*rollout(number))
-    second.restore(first.state())
-    drawn = []
-    for buffer in (first, second):
-        torch.manual_seed(0)
-        drawn.append(buffer.sample(8))
-    assert all(torch.equal(a, b) for a, b in zip(*drawn, strict=True))
-
-
-def test_the_policy_file_acts_as_the_student():
-    recipe = TINY_GRU.replace(
-        {"task.reset_distribution": "standing", "task.random_episode_start": False}
-    )
-    model = learner(recipe)
-    task: HoppingTask = model.env.task
-    network = recipe.actor(model, model.env)
-    card = Card(
-        "recurrent", recipe.task.observation, *recipe.task.command_bounds,
-        recipe.task.action_torque, ROBOT.name, ROBOT.digest, recipe.task.rate,
-    )  # fmt: skip
-    policy = Policy(build_policy(network, card), "a test", "recurrent")
-    for _ in range(2):
-        policy.reset(task.count)
-        seen = model.env.reset()
-        begun = np.ones(task.count, bool)
-        model._last_episode_starts = begun
-        for _ in range(20):
-            with torch.no_grad():
-                action = model.policy.student_action(torch.from_numpy(seen)).clamp(-1, 1)
-            torque = policy.act(task.measurement)
-            np.testing.assert_allclose(
-                torque, action.numpy() * recipe.task.action_torque, atol=1e-4
-            )
-            model.env.step_async(action.numpy())
-            seen = model.env.step_wait()[0]
-            model._last_episode_starts = ~begun

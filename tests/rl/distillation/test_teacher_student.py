@@ -39,12 +39,3 @@ def test_a_height_where_nobody_hopped_is_left_alone():
     corrected.correct(np.full(50, 0.20), np.full(50, 0.01), 0.5)
     assert corrected.values[0] < 0
     assert not corrected.values[1:].any()
-
-
-def test_an_aim_goes_on_from_its_state():
-    first, second = aim(), aim()
-    first.correct(np.array([0.3]), np.array([0.004]), 0.5)
-    second.restore(first.state())
-    command = torch.linspace(-1, 1, 9)
-    assert not torch.equal(first(command), command)
-    torch.testing.assert_close(first(command), second(command))

@@ -57,13 +57,8 @@ class Imagined:
         return HardwareTrial(trace, len(command) * PERIOD, complaint, truth)
 
 
-def flying_leg(hops, noise=0.0):
-    """Return joints of a leg that stands still between flights, its height, and who flies.
-
-    Args:
-        hops: Apex heights, m.
-        noise: Of nothing; the posture is constant.
-    """
+def flying_leg(hops):
+    """Return joints of a leg that stands still between flights to apexes, m, height and flight."""
     posture = np.array([0.6, -1.25])
     stand = float(kinematics.stance_height(ROBOT, posture))
     height, flying = [np.full(100, stand)], [np.zeros(100, bool)]
@@ -75,8 +70,7 @@ def flying_leg(hops, noise=0.0):
         height.append(np.full(60, stand))
         flying.append(np.zeros(60, bool))
     height, flying = np.concatenate(height), np.concatenate(flying)
-    q = np.tile(posture, (len(height), 1, 1)).reshape(len(height), 1, 2)
-    return q, height, flying
+    return np.tile(posture, (len(height), 1, 1)), height, flying
 
 
 class Known(ContactEstimator):
