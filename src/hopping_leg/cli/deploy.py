@@ -26,18 +26,11 @@ from rich.console import Console
 
 from hopping_leg.cli.motors import ask, check, connect
 from hopping_leg.cli.options import say, say_written
-from hopping_leg.controllers.command_schedule import CommandSchedule, check_schedule, command_range
-from hopping_leg.controllers.joint_pd import JointPD
+from hopping_leg.controllers import command_schedule, joint_pd, protocol, registry
 from hopping_leg.controllers.policy import Policy
-from hopping_leg.controllers.protocol import Controller
-from hopping_leg.controllers.registry import load_controller
-from hopping_leg.deploy.hardware_trials import Performance, header_of, new_path, perform
-from hopping_leg.deploy.height_page import HeightPage
-from hopping_leg.deploy.keyboard import LiveHeight, keys
+from hopping_leg.deploy import hardware_trials, height_page, keyboard, safety_limits, stop_reasons
 from hopping_leg.deploy.loop import ControlLoop
 from hopping_leg.deploy.motion_sequence import MotionSequence, SequenceTiming, hopping_poses
-from hopping_leg.deploy.safety_limits import hopping_limits
-from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.identify.excitation import load_excitation
 from hopping_leg.robot import Robot, SoftLimiter, SoftLimits, load_robot
@@ -84,34 +77,36 @@ def run(args: Deploy) -> None:
     cause = done.outcome.supervisor.stop_cause
     say(*done.notices, f"{cause} {done.outcome.ticks} ticks, {done.outcome.skipped} left out.")
     say_written(done.path)
-    if cause.reason not in (Reason.FINISHED, Reason.OPERATOR_STOP):
+    if cause.reason not in (stop_reasons.Reason.FINISHED, stop_reasons.Reason.OPERATOR_STOP):
         errors = [event.get("controller_error", "") for event in done.trace.header["events"]]
         raise HardwareError(" ".join([f"The leg was stopped: {cause}", *filter(None, errors)]))
 
 
-def _plan(args: Deploy, robot: Robot) -> tuple[Controller, float, CommandSchedule, float]:
+def _plan(
+    args: Deploy, robot: Robot
+) -> tuple[protocol.Controller, float, command_schedule.CommandSchedule, float]:
     """Return controller, rate, schedule and seconds; whatever is wrong with them is found here."""
     if args.schedule is not None and args.command is not None:
         raise UsageError("--command and --schedule exclude each other; give one of them.")
-    controller: Controller
+    controller: protocol.Controller
     if args.controller.endswith(".parquet"):
         excitation = load_excitation(Path(args.controller))
-        controller = JointPD(excitation.position, excitation.velocity)
+        controller = joint_pd.JointPD(excitation.position, excitation.velocity)
         rate, seconds = excitation.rate, len(excitation) / excitation.rate
     else:
-        controller = load_controller(
+        controller = registry.load_controller(
             args.controller, robot, other="warn" if args.other_robot else "refuse"
         )
         rate, seconds = CONTROL_RATE, _SECONDS
-    valid = command_range(controller, robot)
+    valid = command_schedule.command_range(controller, robot)
     if args.schedule is not None:
-        schedule = CommandSchedule.parse(args.schedule)
+        schedule = command_schedule.CommandSchedule.parse(args.schedule)
         seconds = schedule.seconds
     else:
         middle = sum(valid) / 2 if isinstance(controller, Policy) else 0.30
         height = middle if args.command is None else args.command
-        schedule = CommandSchedule(((height, _SECONDS),))
-    check_schedule(schedule, valid, controller.name)
+        schedule = command_schedule.CommandSchedule(((height, _SECONDS),))
+    command_schedule.check_schedule(schedule, valid, controller.name)
     seconds = args.seconds or seconds
     if not 0 < seconds <= 3600:
         raise UsageError(f"--seconds is {seconds:g} but must lie between 0 and 3600.")
@@ -121,27 +116,29 @@ def _plan(args: Deploy, robot: Robot) -> tuple[Controller, float, CommandSchedul
 def _perform(
     args: Deploy,
     robot: Robot,
-    controller: Controller,
+    controller: protocol.Controller,
     rate: float,
-    schedule: CommandSchedule,
+    schedule: command_schedule.CommandSchedule,
     seconds: float,
-) -> Performance:
+) -> hardware_trials.Performance:
     height = None
     if args.live or args.web is not None:
-        height = LiveHeight(schedule.at(0.0), command_range(controller, robot))
-    page = None if args.web is None or height is None else HeightPage(height, args.web)
+        height = keyboard.LiveHeight(
+            schedule.at(0.0), command_schedule.command_range(controller, robot)
+        )
+    page = None if args.web is None or height is None else height_page.HeightPage(height, args.web)
     poses = hopping_poses(robot)
-    if isinstance(controller, JointPD):
+    if isinstance(controller, joint_pd.JointPD):
         poses = replace(poses, start=controller.position[0])
     limiter = SoftLimiter(robot, SoftLimits()) if args.soft_limits else None
     timing = SequenceTiming(hop=seconds)
     sequence = MotionSequence(controller, height or schedule, poses, limiter, timing)
-    limits = hopping_limits(robot, rate)
+    limits = safety_limits.hopping_limits(robot, rate)
 
     @contextlib.contextmanager
     def beside(loop: ControlLoop) -> Iterator[None]:
         with contextlib.ExitStack() as operator:
-            operator.enter_context(keys(height, loop.stop, Console().print))
+            operator.enter_context(keyboard.keys(height, loop.stop, Console().print))
             if page is not None:
                 operator.enter_context(page.serve(loop.stop))
             yield
@@ -155,5 +152,9 @@ def _perform(
             " keep a hand on the switch.",
             yes=args.yes,
         )
-        header = header_of(robot, controller, rate, transport=args.transport, drives=drives)
-        return perform(link, sequence, limits, new_path(args.out, name), header, beside=beside)
+        header = hardware_trials.header_of(
+            robot, controller, rate, transport=args.transport, drives=drives
+        )
+        return hardware_trials.perform(
+            link, sequence, limits, hardware_trials.new_path(args.out, name), header, beside=beside
+        )

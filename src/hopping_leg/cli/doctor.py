@@ -18,8 +18,7 @@ from packaging.requirements import Requirement
 
 from hopping_leg.cli.motors import ask, connect, find, show
 from hopping_leg.cli.options import say
-from hopping_leg.deploy.preflight import Finding, required_settings
-from hopping_leg.deploy.safety_limits import hopping_limits
+from hopping_leg.deploy import preflight, safety_limits
 from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.robot import JOINTS, Robot, load_robot
 from hopping_leg.sim import CONTROL_RATE
@@ -71,7 +70,7 @@ def run(args: Doctor) -> None:
                 say(f"  pip install 'hopping-leg[{extra}]'")
         return
     robot = load_robot(args.robot)
-    limits = hopping_limits(robot, CONTROL_RATE)
+    limits = safety_limits.hopping_limits(robot, CONTROL_RATE)
     with connect(robot, args.transport) as link:
         findings = find(link, robot, limits)
         if args.write:
@@ -86,12 +85,14 @@ def run(args: Doctor) -> None:
     say("The leg may be armed.")
 
 
-def _write(link: "MoteusLink", robot: Robot, findings: list[Finding], *, yes: bool) -> None:
+def _write(
+    link: "MoteusLink", robot: Robot, findings: list[preflight.Finding], *, yes: bool
+) -> None:
     from hopping_leg.deploy.drive_info import configure
 
     for joint, name in enumerate(JOINTS):
         wrong = {f.setting for f in findings if f.joint == joint and f.setting}
-        settings = [s for s in required_settings(robot, joint) if s.name in wrong]
+        settings = [s for s in preflight.required_settings(robot, joint) if s.name in wrong]
         if settings:
             say(*(f"{name}: {s.name} = {s.text} ({s.why})" for s in settings))
             ask(f"These settings of the {name}'s drive will be written for good.", yes=yes)

@@ -21,6 +21,7 @@ from typing import Literal
 import tyro
 from rich.console import Console
 
+from hopping_leg import io, progress
 from hopping_leg.cli.options import (
     Heights,
     JsonFile,
@@ -31,13 +32,9 @@ from hopping_leg.cli.options import (
     say_written,
 )
 from hopping_leg.controllers import RolloutConfig
-from hopping_leg.evaluate import Entry, EvaluationRun, evaluate
+from hopping_leg.evaluate import Entry, EvaluationRun, evaluate, tables, trials
 from hopping_leg.evaluate.entries import load_entries
 from hopping_leg.evaluate.report import render_videos, write_report
-from hopping_leg.evaluate.tables import print_evaluation
-from hopping_leg.evaluate.trials import KINDS, save_traces
-from hopping_leg.io import write_atomically
-from hopping_leg.progress import ShareProgress
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, Engine, NoiseAndDelay
 
@@ -115,19 +112,19 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
     notes = [*notes, *judged.evaluation.notes]
     judged = replace(judged, evaluation=replace(judged.evaluation, command=command, notes=notes))
     if args.json:
-        write_atomically(args.json, judged.evaluation.dumps())
-    print_evaluation(Console(), judged.evaluation)
+        io.write_atomically(args.json, judged.evaluation.dumps())
+    tables.print_evaluation(Console(), judged.evaluation)
     if args.traces:
-        save_traces(judged.runs, args.traces)
+        trials.save_traces(judged.runs, args.traces)
     if args.report:
         videos = render_videos(judged, setup.robot) if args.video else None
-        write_atomically(args.report, write_report(judged, videos))
+        io.write_atomically(args.report, write_report(judged, videos))
     say_written(args.json, args.report, args.traces)
 
 
 def _judge(entries: list[Entry], setup: RolloutConfig, args: Evaluate) -> EvaluationRun:
     floors = ("soft", "stiff") if args.floor == "both" else (args.floor,)
-    with ShareProgress() as bar:
+    with progress.ShareProgress() as bar:
         judged = [
             evaluate(
                 entries,
@@ -136,7 +133,7 @@ def _judge(entries: list[Entry], setup: RolloutConfig, args: Evaluate) -> Evalua
                 repeats=args.seeds,
                 seed=args.seed,
                 floor=floor,
-                kinds=KINDS if floor == "soft" or args.floor != "both" else ("fixed",),
+                kinds=trials.KINDS if floor == "soft" or args.floor != "both" else ("fixed",),
                 on_progress=functools.partial(bar.show, about=f", {floor} floor"),
             )
             for floor in floors

@@ -18,10 +18,9 @@ import numpy as np
 import tyro
 
 from hopping_leg.cli.options import JsonFile, RobotFile, say, show_table
+from hopping_leg.identify import feasibility, recording_format
 from hopping_leg.identify import paper_excitation as paper
 from hopping_leg.identify.excitation import RATE, Excitation, Multisine, Template, make_excitation
-from hopping_leg.identify.feasibility import HardwareRange, demand
-from hopping_leg.identify.recording_format import Pair
 from hopping_leg.io import write_json
 from hopping_leg.robot import Robot, load_robot
 
@@ -38,9 +37,9 @@ class Common:
     """Targets per second, Hz."""
     track_velocity: bool = False
     """Velocity targets are the positions' derivative, as in the lab's recordings, not zero."""
-    hip_range: Pair = HardwareRange().hip
+    hip_range: recording_format.Pair = feasibility.HardwareRange().hip
     """Range of the real hip, rad."""
-    knee_range: Pair = HardwareRange().knee
+    knee_range: recording_format.Pair = feasibility.HardwareRange().knee
     """Range of the real knee, rad."""
 
 
@@ -86,7 +85,7 @@ def run(
 ) -> None:
     """Write an excitation."""
     robot = load_robot(args.robot)
-    limits = HardwareRange(args.hip_range, args.knee_range)
+    limits = feasibility.HardwareRange(args.hip_range, args.knee_range)
     template, tracked = _template(args, robot, limits), args.track_velocity
     excitation = make_excitation(
         template, robot, rate=args.rate, limits=limits, track_velocity=tracked
@@ -103,7 +102,9 @@ def run(
     say(*excitation.description.split("; "))
 
 
-def _template(args: MovingBase | MultisineCommand, robot: Robot, limits: HardwareRange) -> Template:
+def _template(
+    args: MovingBase | MultisineCommand, robot: Robot, limits: feasibility.HardwareRange
+) -> Template:
     if isinstance(args, MultisineCommand):
         return args.signal
     make = paper.moving_base
@@ -121,7 +122,7 @@ def _template(args: MovingBase | MultisineCommand, robot: Robot, limits: Hardwar
 
 
 def _facts(excitation: Excitation, robot: Robot) -> dict[str, Any]:
-    asked = demand(robot, excitation.rig, excitation.position, excitation.rate)
+    asked = feasibility.demand(robot, excitation.rig, excitation.position, excitation.rate)
     return {
         "robot": robot.name,
         "rig": excitation.rig,

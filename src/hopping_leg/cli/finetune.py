@@ -19,13 +19,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
+from hopping_leg import errors, io
 from hopping_leg.cli.motors import ask, check, connect
 from hopping_leg.cli.options import Heights, JsonFile, at_least, say
 from hopping_leg.controllers.registry import load_policy
-from hopping_leg.deploy.hardware_trials import DeployedRobot
-from hopping_leg.deploy.safety_limits import hopping_limits
-from hopping_leg.errors import RobotError, UsageError
-from hopping_leg.io import write_json
+from hopping_leg.deploy import hardware_trials, safety_limits
 from hopping_leg.robot import Robot, load_robot
 
 if TYPE_CHECKING:
@@ -90,7 +88,7 @@ def run(args: Finetune) -> None:
         on_trial=lambda row: say(line(row)),
     )
     if args.json is not None:
-        write_json(args.json, result)
+        io.write_json(args.json, result)
     say(f"{result['why_it_ended']} Policy: {args.out / POLICY}")
 
 
@@ -111,7 +109,7 @@ def guard_of(robot: Robot, rate: float) -> "Guard":
 
     from hopping_leg.rl.finetune.simulated import Guard
 
-    limits = hopping_limits(robot, rate)
+    limits = safety_limits.hopping_limits(robot, rate)
     return Guard(*(np.array(pair) for pair in (limits.lower, limits.upper, limits.speed)))
 
 
@@ -123,24 +121,26 @@ def _refuse(args: Finetune, policy: "Policy", robot: Robot) -> None:
         RobotError: The believed robot is a twin.
     """
     if (args.on is None) == (args.transport is None):
-        raise UsageError("Give either --on, a twin that plays the leg, or --transport, its drives.")
+        raise errors.UsageError(
+            "Give either --on, a twin that plays the leg, or --transport, its drives."
+        )
     at_least(0, seed=args.seed)
     robot.require_leg()
     if not robot.reality.only_delays:
-        raise RobotError(
+        raise errors.RobotError(
             f"{robot.name} has effects in [reality] that nobody can believe in; name what plays the"
             " leg with --on, and the robot that its file extends with --robot."
         )
     policy.check_robot(robot)
     if policy.remembers:
-        raise UsageError(
+        raise errors.UsageError(
             f"{policy.name} carries a memory from tick to tick, which is not learnt further here;"
             " name a policy without one, e.g. precise."
         )
     low, high = policy.card.command_low, policy.card.command_high
     for command in args.commands:
         if not low <= command <= high:
-            raise UsageError(
+            raise errors.UsageError(
                 f"A command of {command:g} m is outside of the policy's training; give heights from"
                 f" {low:g} to {high:g} m."
             )
@@ -151,13 +151,13 @@ def _trial_robot(args: Finetune, robot: Robot, rate: float) -> "TrialRobot":
         from hopping_leg.rl.finetune.simulated import SimulatedTrials
 
         return SimulatedTrials(load_robot(str(args.on)), guard_of(robot, rate))
-    limits, transport = hopping_limits(robot, rate), args.transport
+    limits, transport = safety_limits.hopping_limits(robot, rate), args.transport
 
     def ready(seconds: float) -> None:
         what = f"{robot.name} will move and hop for {seconds:g} s; keep a hand on the switch."
         ask(what, yes=args.yes)
 
-    return DeployedRobot(
+    return hardware_trials.DeployedRobot(
         robot,
         rate,
         args.out / "traces",

@@ -20,16 +20,12 @@ from pathlib import Path
 import tyro
 from rich.table import Column
 
+from hopping_leg import errors, io
 from hopping_leg.cli.options import JsonFile, Names, command_line, say, show_table
-from hopping_leg.errors import UsageError
-from hopping_leg.identify import result
-from hopping_leg.identify.optimizers import CmaOptions
+from hopping_leg.identify import optimizers, plan, recording, result
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
-from hopping_leg.identify.plan import robot_of
-from hopping_leg.identify.recording import load_recording, sidecar_path
 from hopping_leg.identify.report import write_fit_report
 from hopping_leg.identify.search import SearchOptions
-from hopping_leg.io import write_atomically, write_json
 from hopping_leg.progress import LiveProgress, minutes
 from hopping_leg.robot import JOINTS, load_robot
 
@@ -62,9 +58,9 @@ class Identify:
     """Bounds in SI units, e.g. `--bounds hip.friction=0,0.5 drive.delay=0,0.01`."""
     starts: int = 1
     """Searches from different starts; the best one counts."""
-    generations: int = CmaOptions().generations
+    generations: int = optimizers.CmaOptions().generations
     """Generations of CMA-ES, in each pass."""
-    population: int = CmaOptions().population
+    population: int = optimizers.CmaOptions().population
     """Candidates in a generation of CMA-ES."""
     threads: int = 0
     """Threads of the physics; 0 takes every core. They change no bit of the result."""
@@ -94,7 +90,7 @@ class FitProgress(LiveProgress):
 
 def run(args: Identify) -> None:
     """Identify a leg."""
-    cma = CmaOptions(generations=args.generations, population=args.population)
+    cma = optimizers.CmaOptions(generations=args.generations, population=args.population)
     options = IdentifyOptions(
         parameters=args.parameters,
         bounds=dict(_bounds(text) for text in args.bounds),
@@ -103,9 +99,9 @@ def run(args: Identify) -> None:
         threads=args.threads,
         ray=args.ray,
     )
-    recordings = [load_recording(path) for path in args.recordings]
-    judges = [load_recording(path) for path in args.validate]
-    origin = args.robot or robot_of([*recordings, *judges])
+    recordings = [recording.load_recording(path) for path in args.recordings]
+    judges = [recording.load_recording(path) for path in args.validate]
+    origin = args.robot or plan.robot_of([*recordings, *judges])
     outputs = [(name, path) for name in _FILES if (path := getattr(args, name)) is not None]
     _check_outputs(args, origin, outputs)
     robot = load_robot(origin)
@@ -135,9 +131,9 @@ def run(args: Identify) -> None:
     result.save_robot(identified, args.out, origin)
     command = command_line("hop identify", args, ("folder", "resume", "threads", "ray"))
     if args.json:
-        write_json(args.json, {"command": command, **result.as_json(identified)})
+        io.write_json(args.json, {"command": command, **result.as_json(identified)})
     if args.report:
-        write_atomically(args.report, write_fit_report(identified, command, args.threads))
+        io.write_atomically(args.report, write_fit_report(identified, command, args.threads))
     _show(identified)
     say(*(f"{_FILES[name]}: {path}" for name, path in outputs))
 
@@ -147,7 +143,7 @@ def _bounds(text: str) -> tuple[str, tuple[float, float]]:
     try:
         low, high = map(float, pair.split(","))
     except ValueError as error:
-        raise UsageError(
+        raise errors.UsageError(
             f"'{text}' gives no bounds; write e.g. hip.friction=0,0.5 in SI units."
         ) from error
     return name.strip(), (low, high)
@@ -156,17 +152,19 @@ def _bounds(text: str) -> tuple[str, tuple[float, float]]:
 def _check_outputs(args: Identify, origin: str, outputs: list[tuple[str, Path]]) -> None:
     """Refuse an output that would replace an input, before any time is spent."""
     if args.out.suffix != ".toml":
-        raise UsageError(f"--out {args.out} must end in .toml, as robot files do.")
+        raise errors.UsageError(f"--out {args.out} must end in .toml, as robot files do.")
     recordings = (*args.recordings, *args.validate)
-    inputs = {p.resolve() for p in (Path(origin), *recordings, *map(sidecar_path, recordings))}
+    inputs = {
+        p.resolve() for p in (Path(origin), *recordings, *map(recording.sidecar_path, recordings))
+    }
     for name, path in outputs:
         if path.resolve() in inputs:
-            raise UsageError(f"--{name} {path} would replace an input; give another file.")
+            raise errors.UsageError(f"--{name} {path} would replace an input; give another file.")
         if path.is_dir():
-            raise UsageError(f"--{name} {path} is a folder; give a file.")
+            raise errors.UsageError(f"--{name} {path} is a folder; give a file.")
         parent = next(p for p in path.resolve().parents if p.exists())
         if not (parent.is_dir() and os.access(parent, os.W_OK)):
-            raise UsageError(f"--{name} {path} cannot be written there; give another place.")
+            raise errors.UsageError(f"--{name} {path} cannot be written there; give another place.")
 
 
 def _show(identified: result.Identified) -> None:

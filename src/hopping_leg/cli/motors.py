@@ -9,8 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from hopping_leg.cli.options import say
-from hopping_leg.deploy.preflight import Finding, check_drives, require_fit
-from hopping_leg.deploy.safety_limits import SafetyLimits
+from hopping_leg.deploy import preflight, safety_limits
 from hopping_leg.errors import UsageError
 from hopping_leg.robot.parameters import JOINTS, Robot
 
@@ -26,17 +25,21 @@ def connect(robot: Robot, transport: str) -> "contextlib.closing[MoteusLink]":
     return contextlib.closing(MoteusLink(robot, opener(transport)))
 
 
-def find(link: "MoteusLink", robot: Robot, limits: SafetyLimits) -> list[Finding]:
+def find(
+    link: "MoteusLink", robot: Robot, limits: safety_limits.SafetyLimits
+) -> list[preflight.Finding]:
     """Return all checks of both drives."""
     from hopping_leg.deploy.drive_info import inspect
 
-    return check_drives(robot, limits, inspect(link))
+    return preflight.check_drives(robot, limits, inspect(link))
 
 
-def check(link: "MoteusLink", robot: Robot, limits: SafetyLimits) -> dict[str, dict[str, str]]:
+def check(
+    link: "MoteusLink", robot: Robot, limits: safety_limits.SafetyLimits
+) -> dict[str, dict[str, str]]:
     """Refuse unfit drives with a HardwareError; return what was found, for the trace."""
     findings = find(link, robot, limits)
-    require_fit(findings)
+    preflight.require_fit(findings)
     return {
         name: {f.check: f.found for f in findings if f.joint == joint}
         for joint, name in enumerate(JOINTS)
@@ -53,7 +56,7 @@ def ask(question: str, *, yes: bool) -> None:
         raise UsageError("You did not agree; nothing was done.")
 
 
-def show(findings: Sequence[Finding]) -> None:
+def show(findings: Sequence[preflight.Finding]) -> None:
     """Print checks as a table and complaints as sentences."""
     table = Table("check", *JOINTS)
     found = {(f.check, f.joint): f for f in findings}

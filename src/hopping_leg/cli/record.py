@@ -22,17 +22,12 @@ from rich.progress import Progress
 
 from hopping_leg.cli.motors import ask, check, connect
 from hopping_leg.cli.options import at_least, say, say_written
-from hopping_leg.controllers.command_schedule import CommandSchedule
-from hopping_leg.controllers.joint_pd import JointGains, JointPD
-from hopping_leg.deploy.hardware_trials import header_of, new_path, perform
-from hopping_leg.deploy.keyboard import keys
+from hopping_leg.controllers import command_schedule, joint_pd
+from hopping_leg.deploy import hardware_trials, keyboard, safety_limits, stop_reasons
 from hopping_leg.deploy.motion_sequence import MotionSequence, Poses, SequenceTiming, hopping_poses
-from hopping_leg.deploy.safety_limits import recording_limits
-from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.errors import HardwareError, UsageError
+from hopping_leg.identify import play_excitation, recording_format
 from hopping_leg.identify.excitation import Excitation, load_excitation
-from hopping_leg.identify.play_excitation import play, recording_of
-from hopping_leg.identify.recording_format import Pair
 from hopping_leg.robot import TIMESTEP, Robot, load_robot, parent_robot
 
 
@@ -55,9 +50,9 @@ class Record:
     that --robot extends, or --robot itself if it extends none or the motors are real."""
     seed: int = 0
     """Seed of jitter and sensor noise."""
-    stiffness: Pair = JointGains().stiffness
+    stiffness: recording_format.Pair = joint_pd.JointGains().stiffness
     """Stiffness of the joint PD, hip and knee, N m/rad."""
-    damping: Pair = JointGains().damping
+    damping: recording_format.Pair = joint_pd.JointGains().damping
     """Damping of the joint PD, hip and knee, N m s/rad."""
     timestep: float = TIMESTEP
     """Physics step, s."""
@@ -73,7 +68,7 @@ def run(args: Record) -> None:
     parent = parent_robot(name) if args.transport is None else None
     believed = args.believed or parent or name
     load_robot(believed)
-    gains = JointGains(args.stiffness, args.damping)
+    gains = joint_pd.JointGains(args.stiffness, args.damping)
     loaded = [(path.stem, load_excitation(path)) for path in args.excitations]
     names = [name for name, _ in loaded]
     twice = sorted({name for name in names if names.count(name) > 1})
@@ -87,7 +82,7 @@ def run(args: Record) -> None:
     with Progress(console=Console(stderr=True)) as bar:
         for number, (stem, excitation) in enumerate(loaded):
             task = bar.add_task(stem, total=len(excitation))
-            recording = play(
+            recording = play_excitation.play(
                 excitation,
                 robot,
                 believed=believed,
@@ -108,13 +103,13 @@ def _record_motors(
     robot: Robot,
     excitations: list[tuple[str, Excitation]],
     believed: str,
-    gains: JointGains,
+    gains: joint_pd.JointGains,
 ) -> None:
     rates = {excitation.rate for _, excitation in excitations}
     if len(rates) > 1:
         raise UsageError("The excitations have different rates; record them one by one.")
     rate = rates.pop()
-    limits = recording_limits(robot, rate)
+    limits = safety_limits.recording_limits(robot, rate)
     with connect(robot, transport) as link:
         drives = check(link, robot, limits)
         for name, excitation in excitations:
@@ -124,29 +119,31 @@ def _record_motors(
                 " hand on the switch.",
                 yes=args.yes,
             )
-            controller = JointPD(excitation.position, excitation.velocity, gains)
-            header = header_of(robot, controller, rate, transport=transport, drives=drives)
+            controller = joint_pd.JointPD(excitation.position, excitation.velocity, gains)
+            header = hardware_trials.header_of(
+                robot, controller, rate, transport=transport, drives=drives
+            )
             rest = np.zeros(2) if excitation.rig == "fixed-base" else hopping_poses(robot).rest
-            done = perform(
+            done = hardware_trials.perform(
                 link,
                 MotionSequence(
                     controller,
-                    CommandSchedule(((float("nan"), 1.0),)),
+                    command_schedule.CommandSchedule(((float("nan"), 1.0),)),
                     Poses(excitation.position[0], rest),
                     None,
                     SequenceTiming(hop=seconds),
                     gains,
                 ),
                 limits,
-                new_path(args.out / "traces", name),
+                hardware_trials.new_path(args.out / "traces", name),
                 header,
-                beside=lambda loop: keys(None, loop.stop, Console().print),
+                beside=lambda loop: keyboard.keys(None, loop.stop, Console().print),
             )
             cause = done.outcome.supervisor.stop_cause
-            if cause.reason is not Reason.FINISHED:
+            if cause.reason is not stop_reasons.Reason.FINISHED:
                 raise HardwareError(f"{name} was stopped: {cause} Its trace is {done.path}.")
             file = args.out / f"{robot.name}-{name}.parquet"
-            recording = recording_of(
+            recording = play_excitation.recording_of(
                 done.trace, excitation, believed=believed, gains=gains, name=file.name
             )
             recording.save(file)

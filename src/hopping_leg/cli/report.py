@@ -20,18 +20,18 @@ from pathlib import Path
 
 import tyro
 
+from hopping_leg import errors, figure_style, io
 from hopping_leg.cli.options import JsonFile, check_file, say, say_written
 from hopping_leg.deploy.flight_recorder import SUFFIX, recover
-from hopping_leg.errors import UsageError
-from hopping_leg.evaluate import EvaluationRun
-from hopping_leg.evaluate.aggregation import tabulate
-from hopping_leg.evaluate.comparison import set_beside, write_comparison
-from hopping_leg.evaluate.report import draw_report_figures, write_report
-from hopping_leg.evaluate.result_files import read_runs
-from hopping_leg.evaluate.trials import Run, load_run
+from hopping_leg.evaluate import (
+    EvaluationRun,
+    aggregation,
+    comparison,
+    report,
+    result_files,
+    trials,
+)
 from hopping_leg.evaluate.video import Animation, fixed_traces, render_video
-from hopping_leg.figure_style import Format, Width, encode
-from hopping_leg.io import safe_file_name, write_atomically, write_json
 from hopping_leg.robot import load_robot
 
 
@@ -44,9 +44,9 @@ class Figures:
     killed `hop deploy` leaves, whose trace is then written beside it."""
     out: Path = Path("figures")
     """Folder for the figures."""
-    format: Format = "svg"
+    format: figure_style.Format = "svg"
     """Kind of file."""
-    width: Width = "screen"
+    width: figure_style.Width = "screen"
     """Width of the figures: a screen, or a column (3.5 in) or page (7.16 in) of a paper."""
     animation: Animation | None = None
     """Also render a hop at each command, side by side at half speed, one file per controller; needs
@@ -76,50 +76,56 @@ def run(args: Figures | Page) -> None:
 def _write(args: Page) -> None:
     check_file(args.out)
     check_file(args.json)
-    runs = read_runs(args.runs)
+    runs = result_files.read_runs(args.runs)
     if len(runs) == 1 and (evaluation := runs[0].evaluation):
         traces = sorted(runs[0].traces.glob("*.parquet")) if runs[0].traces else []
-        page = write_report(EvaluationRun(evaluation, [load_run(path) for path in traces]))
+        page = report.write_report(
+            EvaluationRun(evaluation, [trials.load_run(path) for path in traces])
+        )
         numbers = evaluation.to_json()
     else:
-        compared = set_beside(runs)
+        compared = comparison.set_beside(runs)
         command = shlex.join(["hop", "report", "page", *args.runs, "--out", str(args.out)])
-        page = write_comparison(compared, command)
+        page = comparison.write_comparison(compared, command)
         numbers = {"command": command, **compared.to_json()}
         say(*compared.notes)
-    write_atomically(args.out, page)
+    io.write_atomically(args.out, page)
     if args.json:
-        write_json(args.json, numbers)
+        io.write_json(args.json, numbers)
     say_written(args.out, args.json)
 
 
 def _draw(args: Figures) -> None:
     if not args.traces:
-        raise UsageError("No trace was named; record some with `hop evaluate ... --traces DIR`.")
-    runs = [load_run(_trace(path)) for path in args.traces]
+        raise errors.UsageError(
+            "No trace was named; record some with `hop evaluate ... --traces DIR`."
+        )
+    runs = [trials.load_run(_trace(path)) for path in args.traces]
     controllers = list(dict.fromkeys(run.controller for run in runs))
-    for picture in draw_report_figures(tabulate(runs, controllers, seed=0), runs):
+    for picture in report.draw_report_figures(
+        aggregation.tabulate(runs, controllers, seed=0), runs
+    ):
         path = args.out / f"{picture.name}.{args.format}"
-        write_atomically(path, encode(picture.figure, args.format, args.width))
+        io.write_atomically(path, figure_style.encode(picture.figure, args.format, args.width))
         say(f"{picture.title}: {path}")
     if args.animation is not None:
         for name in controllers:
-            path = args.out / f"hops-{safe_file_name(name)}.{args.animation}"
-            write_atomically(path, _animation(runs, name, args.animation))
+            path = args.out / f"hops-{io.safe_file_name(name)}.{args.animation}"
+            io.write_atomically(path, _animation(runs, name, args.animation))
             say(f"Hops of {name}: {path}")
 
 
-def _animation(runs: Sequence[Run], controller: str, kind: Animation) -> bytes:
+def _animation(runs: Sequence[trials.Run], controller: str, kind: Animation) -> bytes:
     traces = fixed_traces(runs, controller)
     if not traces:
-        raise UsageError(
+        raise errors.UsageError(
             f"No trace of {controller} holds one command throughout, which an animation needs; name"
             " some of its 'fixed' ones."
         )
     robot = load_robot(str(next(iter(traces.values())).header.get("robot", "")))
     video = render_video(robot, traces, kind)
     if video.content is None:
-        raise UsageError(f"The hops of {controller} cannot be rendered: {video.reason}.")
+        raise errors.UsageError(f"The hops of {controller} cannot be rendered: {video.reason}.")
     return video.content
 
 

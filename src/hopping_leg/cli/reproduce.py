@@ -18,12 +18,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from hopping_leg import errors, io
 from hopping_leg.cli import evaluate
 from hopping_leg.cli.options import at_least, say, show_table
 from hopping_leg.controllers.registry import ENERGY_SHAPING, shipped_policies
-from hopping_leg.errors import UsageError
 from hopping_leg.identify.optimizers import LeastSquaresOptions
-from hopping_leg.io import write_atomically, write_json
 from hopping_leg.sim_to_real.methods import DEFAULT, choose_methods
 from hopping_leg.sim_to_real.study import SHORTEST, USUAL_FIT, Study, find_twins
 
@@ -80,9 +79,9 @@ def run(args: Reproduce) -> None:
 
     folder, notes = args.folder, [NOTHING_MEANT] if args.quick else []
     study = make_study(args)
-    write_atomically(folder / _MARK, f"{args.size}\n".encode())
+    io.write_atomically(folder / _MARK, f"{args.size}\n".encode())
     result = transfer(study, args.jobs)
-    write_json(folder / "transfer.json", {**result, "notes": notes})
+    io.write_json(folder / "transfer.json", {**result, "notes": notes})
     twin, method = study.twins[0], study.methods[0]
     policy = study.training(twin, method, args.seed) / "policy.onnx"
     robot = study.fitted(twin, method)
@@ -131,11 +130,11 @@ def _check(args: Reproduce) -> None:
     at_least(0, seed=args.seed)
     at_least(1, jobs=args.jobs, steps=args.steps)
     if args.quick and args.full:
-        raise UsageError("--quick and --full exclude each other; give one of them.")
+        raise errors.UsageError("--quick and --full exclude each other; give one of them.")
     mark = args.folder / _MARK
     size = mark.read_text(encoding="utf-8", errors="replace").strip() if mark.exists() else ""
     if size not in ("", args.size):
-        raise UsageError(
+        raise errors.UsageError(
             f"{args.folder} holds a run of the {size} size, not of the {args.size} one; give"
             " another --out."
         )

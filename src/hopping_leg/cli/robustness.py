@@ -14,15 +14,11 @@ from pathlib import Path
 
 from rich.console import Console
 
+from hopping_leg import figure_style, io, progress
 from hopping_leg.cli.evaluate import Conditions
 from hopping_leg.cli.options import command_line, say_written
-from hopping_leg.evaluate.figures import draw_robustness
-from hopping_leg.evaluate.result_cache import ResultCache
+from hopping_leg.evaluate import figures, result_cache, tables
 from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
-from hopping_leg.evaluate.tables import print_robustness
-from hopping_leg.figure_style import to_svg
-from hopping_leg.io import write_atomically, write_json
-from hopping_leg.progress import ShareProgress
 
 
 @dataclass(frozen=True)
@@ -40,11 +36,11 @@ def run(args: Robustness) -> None:
     entries, setup = args.load()
     heights, seeds = args.commands, args.seeds
     suite = make_suite(setup, axes=args.axes, commands=heights, repeats=seeds, seed=args.seed)
-    with ShareProgress() as bar:
-        found = run_suite(entries, suite, ResultCache(args.out), bar.show)
+    with progress.ShareProgress() as bar:
+        found = run_suite(entries, suite, result_cache.ResultCache(args.out), bar.show)
     result = {"command": command_line("hop robustness", args), **found}
     file, figure = args.json or args.out / "robustness.json", args.out / "robustness.svg"
-    write_json(file, result)
-    write_atomically(figure, to_svg(draw_robustness(result)))
-    print_robustness(Console(), result)
+    io.write_json(file, result)
+    io.write_atomically(figure, figure_style.to_svg(figures.draw_robustness(result)))
+    tables.print_robustness(Console(), result)
     say_written(file, figure)

@@ -10,12 +10,11 @@ from typing import Literal
 
 from rich.console import Console
 
+from hopping_leg import io, progress
 from hopping_leg.cli.evaluate import Conditions
 from hopping_leg.cli.options import command_line, say_written
 from hopping_leg.evaluate.skills.suite import run_skills
 from hopping_leg.evaluate.tables import print_skills
-from hopping_leg.io import write_json
-from hopping_leg.progress import ShareProgress
 
 
 @dataclass(frozen=True)
@@ -29,7 +28,7 @@ class Skills(Conditions):
 def run(args: Skills) -> None:
     """Run all skills, print their tables, write what was asked for."""
     entries, setup = args.load()
-    with ShareProgress() as bar:
+    with progress.ShareProgress() as bar:
         found = run_skills(
             entries,
             setup,
@@ -42,5 +41,5 @@ def run(args: Skills) -> None:
     result = {"command": command_line("hop skills", args), **found}
     print_skills(Console(), result)
     if args.json:
-        write_json(args.json, result)
+        io.write_json(args.json, result)
         say_written(args.json)

@@ -10,8 +10,7 @@ from typing import Protocol
 import polars as pl
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.command_schedule import CommandSchedule
-from hopping_leg.controllers.protocol import Controller
+from hopping_leg.controllers import command_schedule, protocol
 from hopping_leg.trace import Trace
 
 
@@ -43,7 +42,9 @@ class TrialRobot(Protocol):
         """Name of the robot."""
         ...
 
-    def hop(self, controller: Controller, schedule: CommandSchedule, seed: int) -> HardwareTrial:
+    def hop(
+        self, controller: protocol.Controller, schedule: command_schedule.CommandSchedule, seed: int
+    ) -> HardwareTrial:
         """Let a controller hop from standing; ``seed`` is that of the trial's own randomness."""
         ...
 

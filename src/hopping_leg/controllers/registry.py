@@ -5,10 +5,8 @@ from functools import partial
 from importlib import resources
 from pathlib import Path
 
-from hopping_leg.controllers.energy_shaping import paper_energy_shaping, tuned_energy_shaping
+from hopping_leg.controllers import energy_shaping, protocol, user_controllers
 from hopping_leg.controllers.policy import OtherRobot, Policy
-from hopping_leg.controllers.protocol import Controller
-from hopping_leg.controllers.user_controllers import is_user_controller, load_user_controller
 from hopping_leg.errors import PolicyError, UsageError, unknown_name
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import CONTROL_RATE
@@ -22,10 +20,12 @@ ENERGY_SHAPING_FLYING = "energy-shaping-flying"
 ENERGY_SHAPING_LITERAL = "energy-shaping-literal"
 """The paper's law and gains as printed."""
 
-_FACTORIES: dict[str, Callable[..., Controller]] = {
-    ENERGY_SHAPING: tuned_energy_shaping,
-    ENERGY_SHAPING_FLYING: partial(tuned_energy_shaping, gains=ENERGY_SHAPING_FLYING),
-    ENERGY_SHAPING_LITERAL: paper_energy_shaping,
+_FACTORIES: dict[str, Callable[..., protocol.Controller]] = {
+    ENERGY_SHAPING: energy_shaping.tuned_energy_shaping,
+    ENERGY_SHAPING_FLYING: partial(
+        energy_shaping.tuned_energy_shaping, gains=ENERGY_SHAPING_FLYING
+    ),
+    ENERGY_SHAPING_LITERAL: energy_shaping.paper_energy_shaping,
 }
 _SHIPPED = resources.files("hopping_leg") / "policies"
 
@@ -68,7 +68,7 @@ def load_controller(
     *,
     rate: float = CONTROL_RATE,
     other: OtherRobot = "warn",
-) -> Controller:
+) -> protocol.Controller:
     """Load a controller for a robot.
 
     Args:
@@ -87,9 +87,9 @@ def load_controller(
     if name in _FACTORIES:
         return _FACTORIES[name](robot, rate=rate)
     if name.endswith(".toml"):
-        return tuned_energy_shaping(robot, rate=rate, gains=name)
-    if is_user_controller(name):
-        return load_user_controller(name, robot, rate)
+        return energy_shaping.tuned_energy_shaping(robot, rate=rate, gains=name)
+    if user_controllers.is_user_controller(name):
+        return user_controllers.load_user_controller(name, robot, rate)
     policy = load_policy(name_or_path)
     policy.check_robot(robot, rate, other=other)
     return policy

@@ -8,20 +8,10 @@ from enum import IntEnum
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.controllers import joint_pd, protocol, sample_history
+from hopping_leg.controllers.energy_shaping import phases, virtual_leg
 from hopping_leg.controllers.energy_shaping.gains import load_gains, scale_gains
-from hopping_leg.controllers.energy_shaping.phases import FLIGHT_LIMIT, Phases, TouchdownDetector
-from hopping_leg.controllers.energy_shaping.virtual_leg import (
-    LegView,
-    flight_torque,
-    foot_force_torque,
-    leg_force,
-    retraction,
-    view_leg,
-)
-from hopping_leg.controllers.joint_pd import JointGains
-from hopping_leg.controllers.protocol import Controller, Measurement
 from hopping_leg.controllers.rollout import RolloutConfig
-from hopping_leg.controllers.sample_history import DatedObserver
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import GRAVITY, Robot, kinematics, load_robot
 from hopping_leg.sim import CONTROL_RATE
@@ -46,27 +36,27 @@ class Landing:
         self._stiffness = _LANDING_STIFFNESS * self._weight / reach
         self._damping = _LANDING_DAMPING * self._weight / np.sqrt(reach * GRAVITY)
         self._waiting = landing_posture(robot)
-        self._detector = TouchdownDetector(robot, count, debounced=True)
+        self._detector = phases.TouchdownDetector(robot, count, debounced=True)
         self._from = np.tile(self._waiting, (count, 1))
 
     def begin(self, who: BoolArray, q: Array) -> None:
         """Let some legs begin to move to the landing posture from where they are, rad, (n, 2)."""
         self._from = np.where(who[:, None], q, self._from)
 
-    def wait(self, leg: LegView, clock: Array) -> tuple[Array, BoolArray]:
+    def wait(self, leg: virtual_leg.LegView, clock: Array) -> tuple[Array, BoolArray]:
         """Return flight torques, N m, (n, 2), and who met the ground; clock of flight in s."""
         gains = self._shared
-        target, rate = retraction(self._from, self._waiting, clock, gains.retract_time)
-        torque = flight_torque(gains, leg, target, rate)
+        target, rate = virtual_leg.retraction(self._from, self._waiting, clock, gains.retract_time)
+        torque = virtual_leg.flight_torque(gains, leg, target, rate)
         met = self._detector.update(leg, rate, torque, gains)
-        return torque, (met & (clock >= gains.flight_min)) | (clock > FLIGHT_LIMIT)
+        return torque, (met & (clock >= gains.flight_min)) | (clock > phases.FLIGHT_LIMIT)
 
-    def brake(self, leg: LegView) -> Array:
+    def brake(self, leg: virtual_leg.LegView) -> Array:
         """Return the torques of spring and damper, N m, (n, 2); they never pull the ground."""
         spring = self._stiffness * (self._standing - leg.length)
         push = np.maximum(self._weight + spring - self._damping * leg.rate, 0.0)
         side = -self._shared.kp_y * leg.y - self._shared.kd_y * leg.y_rate
-        return foot_force_torque(self.robot, leg.q, push, side)
+        return virtual_leg.foot_force_torque(self.robot, leg.q, push, side)
 
     @property
     def blind(self) -> float:
@@ -103,7 +93,7 @@ class LiftoffDetector:
         self._pushing = np.zeros(count, np.bool_)
         self._blind, self._slowing = np.zeros(count), np.zeros(count)
 
-    def update(self, leg: LegView, force: Array) -> BoolArray:
+    def update(self, leg: virtual_leg.LegView, force: Array) -> BoolArray:
         """Return which legs, pressing with a force along them, N, just left the ground, (n,)."""
         bounded = np.clip(force, -4 * self._weight, 8 * self._weight)
         self._press += _SMOOTHING * (bounded - self._press)
@@ -158,7 +148,7 @@ class StandHopLand:
 
     def __init__(
         self,
-        controller: Controller | None,
+        controller: protocol.Controller | None,
         robot: Robot,
         hops: int,
         *,
@@ -172,15 +162,17 @@ class StandHopLand:
         self._dropped = dropped
         setup = RolloutConfig(robot)
         self._standing, self._posture = setup.standing_length, setup.start_posture
-        self._stiffness, self._damping = (np.array(g) for g in vars(JointGains()).values())
-        self._observer = DatedObserver(self._period, load_gains().gains.position_pull)
+        self._stiffness, self._damping = (np.array(g) for g in vars(joint_pd.JointGains()).values())
+        self._observer = sample_history.DatedObserver(
+            self._period, load_gains().gains.position_pull
+        )
 
     def reset(self, count: int) -> None:
         """Forget everything; the legs stand, or fall."""
         self._observer.reset(count)
         self._liftoff = LiftoffDetector(self.robot, self._period, count)
         self._landing = Landing(self.robot, count, self._standing)
-        self._modes = Phases(count)
+        self._modes = phases.Phases(count)
         if self._dropped:
             self._modes.enter(np.ones(count, np.bool_), Mode.FLY, self._landing.blind)
         self._made = np.zeros(count, np.int64)
@@ -189,9 +181,9 @@ class StandHopLand:
         if self._controller is not None:
             self._controller.reset(count)
 
-    def act(self, measurement: Measurement) -> Array:
+    def act(self, measurement: protocol.Measurement) -> Array:
         """Return joint torques, N m, (n, 2)."""
-        leg = view_leg(self.robot, *self._observer.update(measurement))
+        leg = virtual_leg.view_leg(self.robot, *self._observer.update(measurement))
         modes = self._modes
         modes.tick(self._period)
         ready = modes.are(Mode.STAND) & (modes.clock > STAND_SECONDS)
@@ -220,15 +212,17 @@ class StandHopLand:
             "counted_hops": self._made.astype(float),
         }
 
-    def _count_hops(self, leg: LegView, hopping: BoolArray) -> None:
-        left = self._liftoff.update(leg, leg_force(self.robot, leg.q, self._torque))
+    def _count_hops(self, leg: virtual_leg.LegView, hopping: BoolArray) -> None:
+        left = self._liftoff.update(leg, virtual_leg.leg_force(self.robot, leg.q, self._torque))
         self._made += left & hopping
         enough = hopping & (self._made >= self.hops)
         self._landing.begin(enough, leg.q)
         self._modes.enter(enough, Mode.FLY)
 
-    def _stand(self, leg: LegView) -> Array:
-        target, _ = retraction(self._from, self._posture, self._modes.clock, _RISE_SECONDS)
+    def _stand(self, leg: virtual_leg.LegView) -> Array:
+        target, _ = virtual_leg.retraction(
+            self._from, self._posture, self._modes.clock, _RISE_SECONDS
+        )
         weight = np.full(len(leg.q), self.robot.mass * GRAVITY)
         held: Array = self._stiffness * (target - leg.q) - self._damping * leg.qd
-        return held + foot_force_torque(self.robot, leg.q, weight, 0 * weight)
+        return held + virtual_leg.foot_force_torque(self.robot, leg.q, weight, 0 * weight)

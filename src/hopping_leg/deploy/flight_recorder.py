@@ -20,8 +20,7 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
-from hopping_leg.errors import TraceError
-from hopping_leg.trace import Trace
+from hopping_leg import errors, trace
 
 _HEADER, _ROW, _EVENT = range(3)  # Kinds of frames
 
@@ -55,7 +54,7 @@ class FlightRecorder:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
         except OSError as error:
-            raise TraceError(f"Cannot create {path}: {error.strerror}.") from error
+            raise errors.TraceError(f"Cannot create {path}: {error.strerror}.") from error
         first = json.dumps({"columns": self.columns, "header": header}).encode()
         os.write(self._file, _MAGIC + _frame(_HEADER, first))
         self._queue: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
@@ -126,7 +125,7 @@ class FlightRecorderTail:
         try:
             self._file = path.open("rb", buffering=0)
         except OSError as error:
-            raise TraceError(f"Cannot read {path}: {error.strerror}.") from error
+            raise errors.TraceError(f"Cannot read {path}: {error.strerror}.") from error
 
     @property
     def over(self) -> bool:
@@ -148,7 +147,7 @@ class FlightRecorderTail:
         at = 0
         if not self._begun:
             if not content.startswith(_MAGIC[: len(content)]):
-                raise TraceError(f"{self.path} is no flight recording of `hop deploy`.")
+                raise errors.TraceError(f"{self.path} is no flight recording of `hop deploy`.")
             if len(content) < len(_MAGIC):
                 self._rest = content
                 return np.empty((0, 0))
@@ -180,11 +179,11 @@ def read_recording(path: Path) -> tuple[FlightRecorderTail, npt.NDArray[np.float
     with contextlib.closing(FlightRecorderTail(path)) as box:
         rows = box.rows()
     if not box.columns:
-        raise TraceError(f"{path} ends before its header; the run had not begun.")
+        raise errors.TraceError(f"{path} ends before its header; the run had not begun.")
     return box, rows
 
 
-def recover(path: Path) -> Trace:
+def recover(path: Path) -> trace.Trace:
     """Return the common trace of a run from its flight recording.
 
     Columns of the true height, which hardware does not know, hold NaN.
@@ -194,14 +193,14 @@ def recover(path: Path) -> Trace:
     """
     box, rows = read_recording(path)
     if not len(rows):
-        raise TraceError(f"{path} holds no tick; the run had not begun.")
+        raise errors.TraceError(f"{path} holds no tick; the run had not begun.")
     unknown = ("height_m", "height_rate_m_s")
     clearances = tuple(f"{part}_clearance_m" for part in ("foot", "knee", "base"))
     missing = [name for name in (*unknown, *clearances) if name not in box.columns]
     table = pl.DataFrame(dict(zip(box.columns, rows.T, strict=True))).with_columns(
         pl.lit(float("nan")).alias(name) for name in missing
     )
-    return Trace(table, {**box.header, "events": box.events})
+    return trace.Trace(table, {**box.header, "events": box.events})
 
 
 def _frame(kind: int, content: bytes) -> bytes:

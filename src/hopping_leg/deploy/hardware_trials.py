@@ -13,18 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from hopping_leg.controllers.command_schedule import CommandSchedule
-from hopping_leg.controllers.hardware_trial import HardwareTrial
+from hopping_leg.controllers import command_schedule, hardware_trial, protocol
 from hopping_leg.controllers.policy import Policy
-from hopping_leg.controllers.protocol import Controller
-from hopping_leg.deploy.drive_link import Action
-from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorder, recover
+from hopping_leg.deploy import drive_link, flight_recorder, safety_limits, stop_reasons, supervisor
 from hopping_leg.deploy.loop import ControlLoop, LoopOutcome, columns
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
 from hopping_leg.deploy.realtime import Clock, RealClock, keeping_time
-from hopping_leg.deploy.safety_limits import SafetyLimits, hopping_limits
-from hopping_leg.deploy.stop_reasons import Reason
-from hopping_leg.deploy.supervisor import State
 from hopping_leg.errors import HardwareError
 from hopping_leg.io import safe_file_name, versions
 from hopping_leg.robot import Robot, SoftLimiter, SoftLimits
@@ -34,7 +28,12 @@ if TYPE_CHECKING:
     from hopping_leg.deploy.moteus_link import MoteusLink
 
 _PACKAGES = ("hopping-leg", "numpy", "onnxruntime", "moteus", "python-can")
-_CODES: dict[str, type[Enum]] = {"state": State, "part": Part, "action": Action, "reason": Reason}
+_CODES: dict[str, type[Enum]] = {
+    "state": supervisor.State,
+    "part": Part,
+    "action": drive_link.Action,
+    "reason": stop_reasons.Reason,
+}
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,7 @@ class Performance:
 def perform(
     link: "MoteusLink",
     sequence: MotionSequence,
-    limits: SafetyLimits,
+    limits: safety_limits.SafetyLimits,
     path: Path,
     header: dict[str, Any],
     *,
@@ -74,8 +73,8 @@ def perform(
     Raises:
         TraceError: The flight recording cannot be written.
     """
-    recording = path.with_suffix(SUFFIX)
-    recorder = FlightRecorder(recording, columns(sequence.controller), header)
+    recording = path.with_suffix(flight_recorder.SUFFIX)
+    recorder = flight_recorder.FlightRecorder(recording, columns(sequence.controller), header)
     loop = ControlLoop(link, sequence, limits, recorder, clock or RealClock())
     notices: tuple[str, ...] = ()
     try:
@@ -91,13 +90,18 @@ def perform(
         if link.trouble:
             recorder.event(link_trouble=link.trouble)
         recorder.close()
-    trace = recover(recording)
+    trace = flight_recorder.recover(recording)
     trace.save(path)
     recording.unlink()
     return Performance(outcome, trace, path, notices)
 
 
-def header_of(robot: Robot, controller: Controller, rate: float, **facts: Any) -> dict[str, Any]:  # noqa: ANN401
+def header_of(
+    robot: Robot,
+    controller: protocol.Controller,
+    rate: float,
+    **facts: Any,  # noqa: ANN401
+) -> dict[str, Any]:
     """Return a trace's header: what ran on what, and what its codes mean."""
     policy = {"policy_digest": controller.digest} if isinstance(controller, Policy) else {}
     return {
@@ -121,7 +125,7 @@ def new_path(folder: Path, name: str) -> Path:
     safe = safe_file_name(name)
     stamp = datetime.datetime.now(datetime.UTC).strftime("%Y%m%d-%H%M%S")
     path, count = folder / f"{safe}-{stamp}.parquet", 1
-    while path.exists() or path.with_suffix(SUFFIX).exists():
+    while path.exists() or path.with_suffix(flight_recorder.SUFFIX).exists():
         count += 1
         path = folder / f"{safe}-{stamp}-{count}.parquet"
     return path
@@ -170,7 +174,9 @@ class DeployedRobot:
         """Name of the robot."""
         return self.robot.name
 
-    def hop(self, controller: Controller, schedule: CommandSchedule, seed: int) -> HardwareTrial:
+    def hop(
+        self, controller: protocol.Controller, schedule: command_schedule.CommandSchedule, seed: int
+    ) -> hardware_trial.HardwareTrial:
         """Let a controller hop from standing.
 
         Raises:
@@ -189,18 +195,22 @@ class DeployedRobot:
             done = perform(
                 link,
                 sequence,
-                hopping_limits(self.robot, self.rate),
+                safety_limits.hopping_limits(self.robot, self.rate),
                 new_path(self.folder, controller.name),
                 header_of(self.robot, controller, self.rate, drives=found, outing_seed=seed),
                 clock=self.clock,
                 realtime=self.clock is None,
             )
         cause = done.outcome.supervisor.stop_cause
-        if cause.reason is Reason.OPERATOR_STOP:
+        if cause.reason is stop_reasons.Reason.OPERATOR_STOP:
             raise HardwareError("You stopped the leg; the same command with --resume goes on.")
         table = done.trace.table
-        hopped = table.filter(pl.col("part") == Part.HOP, pl.col("state") == State.RUNNING)
+        hopped = table.filter(
+            pl.col("part") == Part.HOP, pl.col("state") == supervisor.State.RUNNING
+        )
         if hopped.height < self.rate:
             raise HardwareError(f"The leg was stopped before it hopped: {cause}")
-        complaint = "" if cause.reason is Reason.FINISHED else str(cause)
-        return HardwareTrial(Trace(hopped, done.trace.header), table.height / self.rate, complaint)
+        complaint = "" if cause.reason is stop_reasons.Reason.FINISHED else str(cause)
+        return hardware_trial.HardwareTrial(
+            Trace(hopped, done.trace.header), table.height / self.rate, complaint
+        )

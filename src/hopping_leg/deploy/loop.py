@@ -12,12 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.controllers.protocol import SAMPLES, Controller, Measurement
+from hopping_leg.deploy import flight_recorder, realtime, safety_limits, stop_reasons
 from hopping_leg.deploy.drive_link import BRAKE, STOP, DriveCommand, DriveLink, Exchange, Reply
-from hopping_leg.deploy.flight_recorder import FlightRecorder
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceStep
-from hopping_leg.deploy.realtime import Clock
-from hopping_leg.deploy.safety_limits import SafetyLimits
-from hopping_leg.deploy.stop_reasons import Operator, SupervisorInput
 from hopping_leg.deploy.supervisor import State, SupervisorState, supervise
 from hopping_leg.robot.parameters import JOINTS
 
@@ -110,9 +107,9 @@ class ControlLoop:
         self,
         link: DriveLink,
         sequence: MotionSequence,
-        limits: SafetyLimits,
-        recorder: FlightRecorder,
-        clock: Clock,
+        limits: safety_limits.SafetyLimits,
+        recorder: flight_recorder.FlightRecorder,
+        clock: realtime.Clock,
     ) -> None:
         self._link, self._sequence, self._limits = link, sequence, limits
         self._recorder, self._clock = recorder, clock
@@ -155,13 +152,13 @@ class ControlLoop:
         self._remember(tick, deadline, exchange)
         step = self._step(tick, deadline)
         arms = state.state is State.DISARMED and tick >= _WARM_TICKS
-        operator = Operator.ARM if arms else Operator.NOTHING
-        seen = SupervisorInput(
+        operator = stop_reasons.Operator.ARM if arms else stop_reasons.Operator.NOTHING
+        seen = stop_reasons.SupervisorInput(
             deadline,
             woke - deadline + skipped * period,
             exchange.replies,
             None if self._complaint else step.torque,
-            Operator.STOP if self._stop.is_set() else operator,
+            stop_reasons.Operator.STOP if self._stop.is_set() else operator,
             self._sequence.finished,
         )
         after, outgoing = supervise(self._limits, state, seen)

@@ -17,10 +17,9 @@ from typing import Any, Protocol, TypeVar
 from moteus import Controller, QueryResolution, multiplex
 from moteus.protocol import Register
 
+from hopping_leg.deploy import replies, transport
 from hopping_leg.deploy.drive_link import Action, DriveCommand, Exchange, joint_transforms
 from hopping_leg.deploy.realtime import Clock, RealClock
-from hopping_leg.deploy.replies import DriveClock, Question
-from hopping_leg.deploy.transport import Opener
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot.parameters import Robot
 
@@ -109,7 +108,7 @@ class MoteusLink:
     def __init__(
         self,
         robot: Robot,
-        open_transport: Opener,
+        open_transport: transport.Opener,
         clock: Clock | None = None,
         client: Callable[[Callable[[str], None]], Client] = ClientThread,
     ) -> None:
@@ -117,7 +116,7 @@ class MoteusLink:
         self.robot, self.transforms = robot, joint_transforms(robot)
         self.trouble = ""
         self._limits = [joint.motor.torque_limit for joint in (robot.hip, robot.knee)]
-        self._clocks = (DriveClock(), DriveClock())
+        self._clocks = (replies.DriveClock(), replies.DriveClock())
         self._client = client(self._note)
         try:
             self.transport = self._client.call(self._open(open_transport), _OPENING_SECONDS)
@@ -131,7 +130,7 @@ class MoteusLink:
 
     def exchange(self, outgoing: DriveCommand, until: float) -> Exchange:
         """Tell both drives what to do and ask for their state in the same frames."""
-        question = Question(self.transforms, self._clocks, self._clock.now())
+        question = replies.Question(self.transforms, self._clocks, self._clock.now())
         commands = self._commands(outgoing, query=True)
         for joint, command in enumerate(commands):
             command.reply_filter = functools.partial(self._judge, question, joint)
@@ -158,7 +157,7 @@ class MoteusLink:
             self._note(str(error))
         self._client.close()
 
-    async def _ask(self, question: Question, commands: list[Any], until: float) -> None:
+    async def _ask(self, question: replies.Question, commands: list[Any], until: float) -> None:
         await self._cycle(commands, until)
         question.done.set()
 
@@ -195,10 +194,10 @@ class MoteusLink:
             case Action.STOP:
                 return [controller.make_stop(query=query) for controller in self.controllers]
 
-    def _judge(self, question: Question, joint: int, frame: Any) -> bool:  # noqa: ANN401
+    def _judge(self, question: replies.Question, joint: int, frame: Any) -> bool:  # noqa: ANN401
         return question.take(joint, frame, self._clock.now())
 
-    async def _open(self, open_transport: Opener) -> Any:  # noqa: ANN401
+    async def _open(self, open_transport: transport.Opener) -> Any:  # noqa: ANN401
         try:
             return open_transport()
         except HardwareError:

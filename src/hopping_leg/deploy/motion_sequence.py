@@ -11,9 +11,7 @@ from enum import IntEnum
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.command_schedule import Commands
-from hopping_leg.controllers.joint_pd import JointGains
-from hopping_leg.controllers.protocol import Controller, Measurement
+from hopping_leg.controllers import command_schedule, joint_pd, protocol
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.deploy.drive_link import Pair
 from hopping_leg.robot import Robot, SoftLimiter, kinematics
@@ -97,12 +95,12 @@ class MotionSequence:
         gains: Joint PD of rising and sinking.
     """
 
-    controller: Controller
-    commands: Commands
+    controller: protocol.Controller
+    commands: command_schedule.Commands
     poses: Poses
     limiter: SoftLimiter | None
     timing: SequenceTiming = field(default_factory=SequenceTiming)
-    gains: JointGains = field(default_factory=JointGains)
+    gains: joint_pd.JointGains = field(default_factory=joint_pd.JointGains)
 
     def __post_init__(self) -> None:
         self._began: float | None = None
@@ -118,7 +116,7 @@ class MotionSequence:
         """Start to rise at a time, s, from measured joint angles, rad, (2,)."""
         self._began, self._from = time, q.copy()
 
-    def step(self, time: float, measurement: Measurement | None) -> SequenceStep:
+    def step(self, time: float, measurement: protocol.Measurement | None) -> SequenceStep:
         """Return what to do at a tick; ``measurement`` is None as long as there is none."""
         if self._began is None or measurement is None:
             return SequenceStep((0.0, 0.0), self.commands.at(0.0), Part.WAIT)

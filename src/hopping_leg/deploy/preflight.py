@@ -8,9 +8,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from hopping_leg.deploy.drive_link import DriveMode, joint_transforms
-from hopping_leg.deploy.safety_limits import SafetyLimits
-from hopping_leg.deploy.stop_reasons import fault_text
+from hopping_leg.deploy import drive_link, safety_limits, stop_reasons
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot import JOINTS, REGISTER_MAP, Robot
 
@@ -35,7 +33,7 @@ class Setting:
 
 def required_settings(robot: Robot, joint: int) -> tuple[Setting, ...]:
     """Return the configuration of one joint's drive: 0 for the hip, 1 for the knee."""
-    servo, transform = robot.hardware.servos[joint], joint_transforms(robot)[joint]
+    servo, transform = robot.hardware.servos[joint], drive_link.joint_transforms(robot)[joint]
     axis = (robot.hip, robot.knee)[joint]
     stops = (axis.stop_lower, axis.stop_upper)
     ends = sorted(transform.motor_position(angle) for angle in stops)
@@ -45,7 +43,9 @@ def required_settings(robot: Robot, joint: int) -> tuple[Setting, ...]:
         Setting("servopos.position_max", ends[1], "mechanical stop"),
         Setting("servo.max_current_A", servo.max_current, "motor current"),
         # The firmware's default is limp.
-        Setting("servo.timeout_mode", int(DriveMode.BRAKE), "brakes when the host is silent"),
+        Setting(
+            "servo.timeout_mode", int(drive_link.DriveMode.BRAKE), "brakes when the host is silent"
+        ),
         Setting("servo.default_timeout_s", robot.hardware.watchdog, "watchdog"),
     )
 
@@ -103,7 +103,9 @@ class Finding:
     setting: str = ""
 
 
-def check_drives(robot: Robot, limits: SafetyLimits, drives: Sequence[DriveInfo]) -> list[Finding]:
+def check_drives(
+    robot: Robot, limits: safety_limits.SafetyLimits, drives: Sequence[DriveInfo]
+) -> list[Finding]:
     """Return all checks of both drives, hip and knee; ``limits`` say where the leg may start."""
     return [f for joint, facts in enumerate(drives) for f in _check(robot, limits, joint, facts)]
 
@@ -120,8 +122,10 @@ def require_fit(findings: Sequence[Finding]) -> None:
         raise HardwareError(f"Not armed: {complaints[0]}{more}")
 
 
-def _check(robot: Robot, limits: SafetyLimits, joint: int, facts: DriveInfo) -> list[Finding]:
-    name, address = JOINTS[joint], joint_transforms(robot)[joint].id
+def _check(
+    robot: Robot, limits: safety_limits.SafetyLimits, joint: int, facts: DriveInfo
+) -> list[Finding]:
+    name, address = JOINTS[joint], drive_link.joint_transforms(robot)[joint].id
 
     def finding(check: str, found: str, good: bool, complaint: str, setting: str = "") -> Finding:
         return Finding(joint, check, found, *(("", "") if good else (complaint, setting)))
@@ -136,8 +140,8 @@ def _check(robot: Robot, limits: SafetyLimits, joint: int, facts: DriveInfo) -> 
     if not facts.answers:
         return [answers]
     serial, fault = robot.hardware.servos[joint].serial, "none"
-    if facts.mode == DriveMode.FAULT:
-        fault = fault_text(facts.fault)
+    if facts.mode == drive_link.DriveMode.FAULT:
+        fault = stop_reasons.fault_text(facts.fault)
     voltage_low, voltage_high = limits.voltage_low, limits.voltage_high
     lower, upper = limits.lower[joint], limits.upper[joint]
     return [

@@ -13,9 +13,8 @@ from moteus import multiplex
 from moteus.multiplex import FlowStreamSubframe, RegisterSubframe, StreamSubframe, SubframeType
 from moteus.protocol import Register, Writer, scale_register
 
-from hopping_leg.emulator.diagnostic import CHANNEL
+from hopping_leg.emulator import diagnostic, frames
 from hopping_leg.emulator.drive import UNKNOWN_REGISTER, EmulatedDrive
-from hopping_leg.emulator.frames import BROADCAST, Frame
 
 _UUID_MASKS = range(Register.UUID_MASK1, Register.UUID_MASK4 + 1)
 _WORDS_ONLY = range(Register.MODEL_NUMBER, Register.UUID_MASK_CAPABLE)
@@ -91,11 +90,11 @@ class Message:
         subframes: Up to the first that makes no sense.
     """
 
-    frame: Frame
+    frame: frames.Frame
     subframes: Subframes
 
     @staticmethod
-    def read(frame: Frame) -> "Message":
+    def read(frame: frames.Frame) -> "Message":
         """Return the message of a frame."""
         subframes: list[multiplex.Subframe] = []
         with contextlib.suppress(Exception):  # the parser raises whatever a short buffer leads to
@@ -104,7 +103,7 @@ class Message:
 
     def subframes_for(self, drive: EmulatedDrive) -> Subframes:
         """Return what is meant for a drive: nothing if another is addressed."""
-        if self.frame.destination not in (drive.id, BROADCAST):
+        if self.frame.destination not in (drive.id, frames.BROADCAST):
             return ()
         return self.subframes if _addressed(self.subframes, drive) else ()
 
@@ -121,7 +120,9 @@ def act(message: Message, drive: EmulatedDrive, time: float) -> Errors:
     return errors
 
 
-def answer(message: Message, drive: EmulatedDrive, time: float, errors: Errors) -> Frame | None:
+def answer(
+    message: Message, drive: EmulatedDrive, time: float, errors: Errors
+) -> frames.Frame | None:
     """Return a drive's answer, which tells its failed writes; None if none is wanted of it."""
     subframes = message.subframes_for(drive)
     if not subframes:
@@ -146,7 +147,10 @@ def _addressed(subframes: Subframes, drive: EmulatedDrive) -> bool:
 
 def _stream(subframes: Subframes, drive: EmulatedDrive, reply: ReplyWriter, time: float) -> None:
     for s in subframes:
-        if not isinstance(s, StreamSubframe | FlowStreamSubframe) or s.channel != CHANNEL:
+        if (
+            not isinstance(s, StreamSubframe | FlowStreamSubframe)
+            or s.channel != diagnostic.CHANNEL
+        ):
             continue
         if s.type is SubframeType.STREAM_CLIENT_TO_SERVER:
             drive.diagnostic.write(s.data, time)

@@ -11,17 +11,8 @@ from moteus.multiplex import F32
 from moteus.protocol import Register, scale_register
 
 from hopping_leg.deploy.drive_link import DriveMode, FaultCode
-from hopping_leg.emulator.diagnostic import Diagnostic
-from hopping_leg.emulator.mode_machine import CONTROLLING, MODES, ModeMachine, Notice
-from hopping_leg.emulator.rotor_encoder import RotorEncoder
+from hopping_leg.emulator import diagnostic, mode_machine, rotor_encoder, torque_law
 from hopping_leg.emulator.settings import Settings
-from hopping_leg.emulator.torque_law import (
-    COMMAND_FIELDS,
-    TORQUE_CONSTANT,
-    WITH_BOUNDS,
-    Command,
-    TorqueLaw,
-)
 
 _AMBIENT = 30.0  # Temperature of an idle drive, degrees C
 _HEATING = 0.008  # Rise at rest over the square of the phase current, K/A2
@@ -67,11 +58,11 @@ class EmulatedDrive:
         voltage: float,
     ) -> None:
         self.identity, self.settings = identity, settings
-        self.encoder = RotorEncoder(settings, gear_ratio)
-        self.machine = ModeMachine()
-        self.law = TorqueLaw(settings)
-        self.command = Command()
-        self.diagnostic = Diagnostic(settings, self.encoder, self.stop)
+        self.encoder = rotor_encoder.RotorEncoder(settings, gear_ratio)
+        self.machine = mode_machine.ModeMachine()
+        self.law = torque_law.TorqueLaw(settings)
+        self.command = torque_law.Command()
+        self.diagnostic = diagnostic.Diagnostic(settings, self.encoder, self.stop)
         self.disturbances = Disturbances()
         self.uptime = 0.0
         self._brake, self.nominal_voltage = brake * 2 * math.pi, voltage
@@ -96,26 +87,30 @@ class EmulatedDrive:
     @property
     def active(self) -> bool:
         """Whether the output stage is powered."""
-        return self.machine.mode in CONTROLLING
+        return self.machine.mode in mode_machine.CONTROLLING
 
     @property
     def _amperes(self) -> float:
         """Phase current, A."""
-        return self._torque / (self.encoder.gear_ratio * TORQUE_CONSTANT)
+        return self._torque / (self.encoder.gear_ratio * torque_law.TORQUE_CONSTANT)
 
     def boot(self, output: float) -> None:
         """Power up with the output at a true position, revolutions."""
         self.settings.load()
         self.encoder.boot(output)
-        self.machine, self.command, self.uptime = ModeMachine(), Command(), 0.0
+        self.machine, self.command, self.uptime = (
+            mode_machine.ModeMachine(),
+            torque_law.Command(),
+            0.0,
+        )
 
     def write(self, register: int, resolution: int, value: float) -> int:
         """Take one register from the host; return 0 or an error code."""
         scaled = value if resolution == F32 else scale_register(register, resolution, value)
         if register == Register.MODE:
             return self._write_mode(int(scaled))
-        if register in COMMAND_FIELDS:
-            setattr(self.command, COMMAND_FIELDS[register], float(scaled))
+        if register in torque_law.COMMAND_FIELDS:
+            setattr(self.command, torque_law.COMMAND_FIELDS[register], float(scaled))
         elif register == Register.SET_OUTPUT_NEAREST:
             self.encoder.set_nearest(float(scaled))
         elif register == Register.SET_OUTPUT_EXACT:
@@ -126,9 +121,9 @@ class EmulatedDrive:
         return 0
 
     def _write_mode(self, mode: int) -> int:
-        if mode not in MODES:
+        if mode not in mode_machine.MODES:
             return INVALID_VALUE
-        self.command = Command(DriveMode(mode))
+        self.command = torque_law.Command(DriveMode(mode))
         self._commanded = True
         return 0
 
@@ -165,7 +160,7 @@ class EmulatedDrive:
         if self.active:
             self.machine.fault = self.disturbances.notice or self.law.notice
         if math.isnan(wanted):
-            self.machine.fault = Notice.MAX_VOLTAGE
+            self.machine.fault = mode_machine.Notice.MAX_VOLTAGE
             return 0.0
         return self.encoder.torque_to_output(wanted)
 
@@ -174,7 +169,7 @@ class EmulatedDrive:
         position, velocity = self.encoder.position, self._velocity
         if mode is DriveMode.TIMEOUT:
             mode = DriveMode(int(self.settings["servo.timeout_mode"]))
-            command = Command(mode, position=math.nan, kd_scale=command.kd_scale)
+            command = torque_law.Command(mode, position=math.nan, kd_scale=command.kd_scale)
         if mode is DriveMode.POSITION:
             torque = law.position(command, position, velocity, dt)
         elif mode is DriveMode.ZERO_VELOCITY:
@@ -185,7 +180,7 @@ class EmulatedDrive:
             return -self._brake * velocity
         else:
             return 0.0
-        bounds = mode in WITH_BOUNDS and not command.ignore_bounds
+        bounds = mode in torque_law.WITH_BOUNDS and not command.ignore_bounds
         return law.limited(torque, position, velocity, self.temperature, bounds=bounds)
 
     def _check(self) -> None:
@@ -202,8 +197,8 @@ class EmulatedDrive:
 
     def stored(self, register: int) -> float | None:
         """Return a command or identity register, None if it is neither."""
-        if register in COMMAND_FIELDS:
-            return float(getattr(self.command, COMMAND_FIELDS[register]))
+        if register in torque_law.COMMAND_FIELDS:
+            return float(getattr(self.command, torque_law.COMMAND_FIELDS[register]))
         return self.identity.get(register)
 
     def state(self) -> dict[int, float]:

@@ -20,8 +20,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
-from hopping_leg.emulator.frames import QueuedReply, TimedQueue
-from hopping_leg.emulator.settings import DEFAULTS
+from hopping_leg.emulator import frames, settings
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.io import read_dataclass
 from hopping_leg.robot.parameters import JOINTS
@@ -104,7 +103,7 @@ class FaultyRobot(Protocol):
     plugged: bool
     """Whether the adapter is plugged in."""
     leg: "EmulatedLeg"
-    reply_queue: TimedQueue[QueuedReply]
+    reply_queue: frames.TimedQueue[frames.QueuedReply]
 
     @property
     def drives(self) -> "tuple[EmulatedDrive, ...]":
@@ -223,7 +222,7 @@ class _GarbageLine(FaultKind, kind="garbage_line"):
     def begin(self) -> None:
         self.replies_left = 0
         for _ in range(self.fault.count):
-            self.robot.reply_queue.put(self.robot.time, QueuedReply(noise=_NOISE))
+            self.robot.reply_queue.put(self.robot.time, frames.QueuedReply(noise=_NOISE))
 
 
 class _EncoderJump(FaultKind, kind="encoder_jump"):
@@ -322,8 +321,8 @@ class _Configuration(FaultKind, kind="configuration"):
 
     @classmethod
     def check(cls, fault: Fault) -> None:
-        if fault.name not in DEFAULTS:
-            raise UsageError(unknown_name("drive setting", fault.name, DEFAULTS))
+        if fault.name not in settings.DEFAULTS:
+            raise UsageError(unknown_name("drive setting", fault.name, settings.DEFAULTS))
 
     def begin(self) -> None:
         for drive in self.drives:

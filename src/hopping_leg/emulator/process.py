@@ -11,11 +11,10 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
+from hopping_leg.emulator import ports, wire_log
 from hopping_leg.emulator.faults import Fault
-from hopping_leg.emulator.ports import PtyPort
 from hopping_leg.emulator.robot import EmulatedRobot
 from hopping_leg.emulator.server import EmulatorConfig, Server
-from hopping_leg.emulator.wire_log import WireLog
 from hopping_leg.errors import UsageError
 
 _PATIENCE = 60.0
@@ -38,7 +37,7 @@ class EmulatorState:
 class EmulatorRecord:
     """What happened since the start."""
 
-    log: WireLog
+    log: wire_log.WireLog
     """Commands and answers on the wire."""
     faults: tuple[tuple[float, Fault], ...]
     """Those that began, with when, s."""
@@ -112,7 +111,7 @@ def _serve(start: EmulatorConfig, pipe: Connection) -> None:
         pipe.send(str(error))
         return
     server = Server(robot, port)
-    pipe.send(port.path if isinstance(port, PtyPort) else Path())
+    pipe.send(port.path if isinstance(port, ports.PtyPort) else Path())
     prefer_this_thread()
     with uninterrupted():
         server.run(lambda: not _answer_parent(pipe, robot))

@@ -14,13 +14,9 @@ from moteus.protocol import Register
 
 from hopping_leg.arrays import Array
 from hopping_leg.deploy.preflight import required_settings
-from hopping_leg.emulator import bus
+from hopping_leg.emulator import bus, frames, leg, settings, wire_log
 from hopping_leg.emulator.drive import EmulatedDrive
 from hopping_leg.emulator.faults import KINDS, Delivery, Fault, FaultKind
-from hopping_leg.emulator.frames import Frame, QueuedReply, TimedQueue
-from hopping_leg.emulator.leg import TIMESTEP, EmulatedLeg
-from hopping_leg.emulator.settings import Settings
-from hopping_leg.emulator.wire_log import WireLog
 from hopping_leg.robot import JOINTS, REGISTER_MAP, Robot
 
 _MODEL = 0x0000  # Board r4
@@ -50,29 +46,29 @@ class EmulatedRobot:
         faults: Sequence[Fault] = (),
     ) -> None:
         self.robot, self.time, self.held = robot, 0.0, held
-        self.leg = EmulatedLeg(robot, q, seed)
+        self.leg = leg.EmulatedLeg(robot, q, seed)
         self.drives = tuple(_drive(robot, joint, configured) for joint in range(len(JOINTS)))
         self._latency, self._rng = robot.reality.latency, np.random.default_rng(seed)
-        self._late_messages = TimedQueue[bus.Message]()
+        self._late_messages = frames.TimedQueue[bus.Message]()
         self._last_delivery = 0.0
         for joint, drive in enumerate(self.drives):
             position, *_ = self.leg.sensed(joint)
             drive.boot(position)
             if homed:
                 drive.encoder.set_nearest(position)
-        self.reply_queue = TimedQueue[QueuedReply]()  # What is on its way to the host
+        self.reply_queue = frames.TimedQueue[frames.QueuedReply]()  # What is on its way to the host
         self.wire_time = 0.0  # What a reply takes at least, s
         self.plugged = True  # Whether the adapter is plugged in
-        self.log = WireLog()  # What went over the wire
+        self.log = wire_log.WireLog()  # What went over the wire
         self._sense()
         self.fault_injector = FaultInjector(self, faults, self._rng)
 
     def advance(self, until: float) -> None:
         """Simulate whole steps up to a time, s."""
-        while self.time + TIMESTEP <= until + 1e-9:
+        while self.time + leg.TIMESTEP <= until + 1e-9:
             self._step()
 
-    def receive(self, frame: Frame) -> None:
+    def receive(self, frame: frames.Frame) -> None:
         """Take a frame from the host now; the drives' answers go to the reply_queue.
 
         Where the robot's ``reality`` has a latency of commands, the frame acts later but is
@@ -96,12 +92,12 @@ class EmulatedRobot:
         for message in self._late_messages.take(self.time):
             for drive in self.drives:
                 bus.act(message, drive, self.time)
-        hip, knee = (drive.step(self.time, TIMESTEP) for drive in self.drives)
+        hip, knee = (drive.step(self.time, leg.TIMESTEP) for drive in self.drives)
         if self.held and all(drive.active for drive in self.drives):
             self.held = False
         if not self.held:
             self.leg.step((hip, knee))
-        self.time += TIMESTEP
+        self.time += leg.TIMESTEP
         self._sense()
 
     def _sense(self) -> None:
@@ -135,7 +131,7 @@ def _drive(robot: Robot, joint: int, configured: bool) -> EmulatedDrive:
         changes |= {setting.name: setting.value for setting in required_settings(robot, joint)}
     return EmulatedDrive(
         _identity(f"{robot.name} {JOINTS[joint]}"),
-        Settings(**changes),
+        settings.Settings(**changes),
         gear_ratio=motor.gear_ratio,
         brake=motor.peak_torque / motor.no_load_speed,
         voltage=_NOMINAL_VOLTAGE * robot.reality.voltage,
@@ -182,7 +178,7 @@ class FaultInjector:
             else:
                 running.update()
 
-    def send(self, frame: Frame, joint: int) -> None:
+    def send(self, frame: frames.Frame, joint: int) -> None:
         """Queue a drive's reply (0 hip, 1 knee), or what becomes of it."""
         delivery = Delivery(self._robot.time + self._robot.wire_time)
         for running in self._running:
@@ -190,7 +186,7 @@ class FaultInjector:
                 running.replies_left -= 1
                 running.on_reply(delivery)
         for _ in range(delivery.copies):
-            self._robot.reply_queue.put(delivery.due, QueuedReply(frame, flip=delivery.flip))
+            self._robot.reply_queue.put(delivery.due, frames.QueuedReply(frame, flip=delivery.flip))
 
     def _phases(self) -> set[str]:
         """Return the phases of this moment; record power and the first lift-off."""

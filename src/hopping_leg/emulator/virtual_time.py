@@ -14,10 +14,9 @@ from moteus import Transport
 
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.transport import TolerantFdcanusb
+from hopping_leg.emulator import ports, server
 from hopping_leg.emulator.leg import TIMESTEP
-from hopping_leg.emulator.ports import Port, PtyPort
 from hopping_leg.emulator.robot import EmulatedRobot
-from hopping_leg.emulator.server import serve
 from hopping_leg.errors import HardwareError
 
 Result = TypeVar("Result")
@@ -32,7 +31,7 @@ _FOREVER = 60.0  # Virtual time after which nobody waits for anything any more, 
 class VirtualTime(asyncio.SelectorEventLoop):
     """An event loop whose time is the emulated robot's."""
 
-    def __init__(self, robot: EmulatedRobot, port: Port) -> None:
+    def __init__(self, robot: EmulatedRobot, port: ports.Port) -> None:
         super().__init__(_Waiting(robot, port))
         self._robot = robot
 
@@ -44,7 +43,7 @@ class VirtualTime(asyncio.SelectorEventLoop):
 class _Waiting(selectors.SelectSelector):
     """Lets the robot move instead of waiting."""
 
-    def __init__(self, robot: EmulatedRobot, port: Port) -> None:
+    def __init__(self, robot: EmulatedRobot, port: ports.Port) -> None:
         super().__init__()
         self._robot, self._port, self._busy = robot, port, 0
 
@@ -56,11 +55,11 @@ class _Waiting(selectors.SelectSelector):
         self._busy = 0
         robot = self._robot
         until = robot.time + (_FOREVER if timeout is None else timeout)
-        serve(robot, self._port, ready=True)
+        server.serve(robot, self._port, ready=True)
         ready = super().select(0)
         while not ready and robot.time < until - 1e-9:
             robot.advance(robot.time + TIMESTEP)
-            if serve(robot, self._port, ready=False):
+            if server.serve(robot, self._port, ready=False):
                 ready = super().select(0)
         return ready
 
@@ -78,7 +77,7 @@ class Lockstep:
     def __init__(self, robot: EmulatedRobot, *, checksums: bool = True) -> None:
         self.robot, robot.wire_time = robot, _WIRE_TIME
         self.truth: list[tuple[float, float, float]] = []
-        self._port, self._checksums = PtyPort(), checksums
+        self._port, self._checksums = ports.PtyPort(), checksums
         self.loop = VirtualTime(robot, self._port)
         self.link = MoteusLink(robot.robot, self._open, self, self._as_client)
 

@@ -11,10 +11,8 @@ from moteus.multiplex import RegisterSubframe, SubframeType
 from moteus.protocol import Register, parse_reply
 
 from hopping_leg.deploy.drive_link import DriveMode
-from hopping_leg.emulator.bus import Message
+from hopping_leg.emulator import bus, frames, mode_machine
 from hopping_leg.emulator.drive import EmulatedDrive
-from hopping_leg.emulator.frames import Frame
-from hopping_leg.emulator.mode_machine import MODES
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +62,7 @@ class WireLog:
         self._modes = [DriveMode.STOPPED, DriveMode.STOPPED]
 
     def record_command(
-        self, time: float, joint: int, message: Message, drive: EmulatedDrive
+        self, time: float, joint: int, message: bus.Message, drive: EmulatedDrive
     ) -> None:
         """Note what a message commands a drive, if it does."""
         written = {
@@ -72,13 +70,13 @@ class WireLog:
             for s in message.subframes_for(drive)
             if isinstance(s, RegisterSubframe) and s.type is SubframeType.WRITE
         }
-        if written.get(Register.MODE) in MODES:
+        if written.get(Register.MODE) in mode_machine.MODES:
             mode = DriveMode(int(written[Register.MODE]))
             torque = float(written.get(Register.COMMAND_FEEDFORWARD_TORQUE, 0.0))
             most = float(written.get(Register.COMMAND_POSITION_MAX_TORQUE, 0.0))
             self.commands.append(CommandEvent(time, joint, mode, torque, most))
 
-    def record_reply(self, time: float, joint: int, answer: Frame) -> None:
+    def record_reply(self, time: float, joint: int, answer: frames.Frame) -> None:
         """Note a drive's answer, if it tells the drive's state."""
         values = parse_reply(answer.data)
         if values.keys() >= set(_TOLD):

@@ -15,11 +15,10 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.envs import rewards, task_config
 from hopping_leg.envs.observation import Array32
 from hopping_leg.envs.paper_reward import paper_reward
-from hopping_leg.envs.rewards import Reward
 from hopping_leg.envs.task import HoppingTask, Step
-from hopping_leg.envs.task_config import TaskConfig
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import Robot, build_model, load_robot
 from hopping_leg.sim import MujocoSimulator
@@ -68,8 +67,8 @@ class Camera:
 def _make_task(
     robot: Robot | str,
     num_envs: int,
-    options: TaskConfig,
-    reward: Reward | None,
+    options: task_config.TaskConfig,
+    reward: rewards.Reward | None,
     threads: int,
     *,
     autoreset: bool,
@@ -99,8 +98,8 @@ class HoppingEnv(gymnasium.Env[Array32, npt.NDArray[np.float32]]):
     def __init__(
         self,
         robot: Robot | str = "legv2-paper",
-        options: TaskConfig = TaskConfig(),  # noqa: B008
-        reward: Reward | None = None,
+        options: task_config.TaskConfig = task_config.TaskConfig(),  # noqa: B008
+        reward: rewards.Reward | None = None,
         render_mode: str | None = None,
     ) -> None:
         self.render_mode = render_mode
@@ -161,8 +160,8 @@ class HoppingVectorEnv(gymnasium.vector.VectorEnv[Array32, npt.NDArray[np.float3
         self,
         num_envs: int = 1,
         robot: Robot | str = "legv2-paper",
-        options: TaskConfig = TaskConfig(),  # noqa: B008
-        reward: Reward | None = None,
+        options: task_config.TaskConfig = task_config.TaskConfig(),  # noqa: B008
+        reward: rewards.Reward | None = None,
         threads: int = 0,
         render_mode: str | None = None,
     ) -> None:

@@ -14,11 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hopping_leg.arrays import Array, IntArray
-from hopping_leg.controllers.observation_history import (
-    ObservationHistory,
-    ThreeSamples,
-    make_observation_history,
-)
+from hopping_leg.controllers import observation_history
 from hopping_leg.envs.task_config import TaskConfig
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import SAMPLES, Channel, Simulator
@@ -90,7 +86,7 @@ class Observation(ABC):
 class PaperObservation(Observation):
     """The paper's three samples; made straight from the channel's, because it is the fast path."""
 
-    layout = ThreeSamples.name
+    layout = observation_history.ThreeSamples.name
     size = SIZE
 
     def __init__(self, sample: Scaling, count: int) -> None:
@@ -112,7 +108,11 @@ class HistoryObservation(Observation):
     """The inputs of any policy layout, made by the very code that makes them on the robot."""
 
     def __init__(
-        self, layout: ObservationHistory, scaling: Scaling, torque: Array, count: int
+        self,
+        layout: observation_history.ObservationHistory,
+        scaling: Scaling,
+        torque: Array,
+        count: int,
     ) -> None:
         self._layout, self.layout = layout, layout.name
         self.scaling, self._torque = scaling, torque
@@ -157,9 +157,9 @@ def sample_scaling(robot: Robot, config: TaskConfig) -> Scaling:
 def make_observation(robot: Robot, config: TaskConfig, count: int) -> Observation:
     """Return the observation that a task asks for."""
     sample = sample_scaling(robot, config)
-    if config.observation == ThreeSamples.name:
+    if config.observation == observation_history.ThreeSamples.name:
         return PaperObservation(sample, count)
-    layout = make_observation_history(config.observation, 1 / config.rate)
+    layout = observation_history.make_observation_history(config.observation, 1 / config.rate)
     torque = np.array(config.action_torque)
     parts = {
         "q": (sample.offset[0:2], sample.gain[0:2]),

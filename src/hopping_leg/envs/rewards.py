@@ -7,9 +7,8 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
+from hopping_leg import errors, hop_detection
 from hopping_leg.arrays import Array, BoolArray, IntArray
-from hopping_leg.errors import UsageError
-from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 
 
 @dataclass
@@ -62,7 +61,7 @@ class Transition:
     @cached_property
     def flying(self) -> BoolArray:
         """Whether the foot is off the ground, (n,)."""
-        return self.foot_clearance >= FLIGHT_CLEARANCE
+        return self.foot_clearance >= hop_detection.FLIGHT_CLEARANCE
 
 
 def sum_of_joints(values: Array) -> Array:
@@ -123,7 +122,7 @@ class Reward:
         self.terms, self.scale = tuple(terms), scale
         self.names = tuple(term.name for term in terms)
         if len(set(self.names)) < len(self.names):
-            raise UsageError(f"Terms of a reward need names of their own, not {self.names}.")
+            raise errors.UsageError(f"Terms of a reward need names of their own, not {self.names}.")
         self._functions = tuple(term.function for term in terms)
         self._stateful = {
             term.name: term.function for term in terms if isinstance(term.function, StatefulTerm)

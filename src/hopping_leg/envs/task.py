@@ -4,7 +4,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hopping_leg import errors, hop_detection
 from hopping_leg.arrays import Array, BoolArray, IntArray
+from hopping_leg.envs import rewards, task_config
 from hopping_leg.envs.observation import (
     PRIVILEGED,
     Array32,
@@ -12,10 +14,6 @@ from hopping_leg.envs.observation import (
     privileged_observation,
     sample_scaling,
 )
-from hopping_leg.envs.rewards import Reward, Transition
-from hopping_leg.envs.task_config import TaskConfig
-from hopping_leg.errors import UsageError
-from hopping_leg.hop_detection import at_apex
 from hopping_leg.robot import Robot, kinematics
 from hopping_leg.sim import Measurement, MujocoSimulator, Plant, randomization
 
@@ -33,14 +31,14 @@ class ResetSampler:
         UsageError: A start asks for a leg length that the robot does not reach.
     """
 
-    def __init__(self, robot: Robot, config: TaskConfig) -> None:
+    def __init__(self, robot: Robot, config: task_config.TaskConfig) -> None:
         robot.require_leg()
         self.robot, self.config = robot, config
         lengths = (config.start_length, *config.drop_length)
         self._standing = kinematics.joint_angles(robot, np.array([lengths[0], 0.0]))
         reach = robot.thigh.length + robot.shank.length
         if np.isnan(self._standing).any() or not all(0 < length < reach for length in lengths):
-            raise UsageError(
+            raise errors.UsageError(
                 f"The starting leg lengths {lengths} m do not all lie within reach of {robot.name};"
                 f" take lengths below {reach:g} m."
             )
@@ -107,8 +105,8 @@ class HoppingTask:
         self,
         robot: Robot,
         count: int,
-        options: TaskConfig,
-        reward: Reward,
+        options: task_config.TaskConfig,
+        reward: rewards.Reward,
         rng: np.random.Generator,
         threads: int = 0,
         *,
@@ -185,7 +183,7 @@ class HoppingTask:
         self.plant.drive(taken * self._torque)
         apex, apex_height, apex_error = self._apexes(height_before)
         reward, terms = self.reward(
-            Transition(
+            rewards.Transition(
                 legs.state, self.command, taken, self._last,
                 apex, apex_height, legs.foot_clearance,
             )
@@ -198,7 +196,7 @@ class HoppingTask:
         rose, self._rises = self._rises, legs.height_rate > 0
         if not np.count_nonzero(rose > self._rises):
             return self._never, self._nan, self._nan
-        apex = at_apex(rose, self._rises, legs.foot_clearance())
+        apex = hop_detection.at_apex(rose, self._rises, legs.foot_clearance())
         height = np.where(apex, np.maximum(height_before, legs.height), np.nan)
         return apex, height, height - self.command
 

@@ -6,19 +6,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.evaluate.metrics import (
-    HopWindow,
-    judge_estimator,
-    measure,
-    pooled_apexes,
-    skipped_in_run,
-)
+from hopping_leg.evaluate import metrics, trials
 from hopping_leg.evaluate.result import Comparison, Evaluation, Group, Staircase, Summary
 from hopping_leg.evaluate.statistics import Neighbours, compare, median_interval, of
-from hopping_leg.evaluate.trials import Run
 
 
-def tabulate(runs: Sequence[Run], controllers: Sequence[str], seed: int) -> Evaluation:
+def tabulate(runs: Sequence[trials.Run], controllers: Sequence[str], seed: int) -> Evaluation:
     """Measure runs and arrange the numbers; conditions, versions and notes stay empty.
 
     Args:
@@ -29,10 +22,10 @@ def tabulate(runs: Sequence[Run], controllers: Sequence[str], seed: int) -> Eval
     own = {name: [run for run in runs if run.controller == name] for name in controllers}
     robot = str(runs[0].trace.header.get("robot", "")) if runs else ""
 
-    def windows(name: str, *kinds: str) -> dict[float, list[HopWindow]]:
+    def windows(name: str, *kinds: str) -> dict[float, list[metrics.HopWindow]]:
         """Return a controller's windows in trials of some kinds, by rising command."""
         chosen = [run for kind in kinds for run in own[name] if run.trial.kind == kind]
-        found = [window for run in chosen for window in measure(run.trace)]
+        found = [window for run in chosen for window in metrics.measure(run.trace)]
         commands = sorted({w.command for w in found})
         return {c: [w for w in found if w.command == c] for c in commands}
 
@@ -44,7 +37,7 @@ def tabulate(runs: Sequence[Run], controllers: Sequence[str], seed: int) -> Eval
         ]
 
     apexes = {
-        name: {c: pooled_apexes(g) for c, g in windows(name, "fixed", "sequence").items()}
+        name: {c: metrics.pooled_apexes(g) for c, g in windows(name, "fixed", "sequence").items()}
         for name in controllers
     }
     stairs = {n: [run for run in own[n] if run.trial.kind == "staircase"] for n in controllers}
@@ -62,7 +55,7 @@ def tabulate(runs: Sequence[Run], controllers: Sequence[str], seed: int) -> Eval
         estimators=[
             found
             for name in controllers
-            if (found := judge_estimator(name, [run.trace for run in own[name]]))
+            if (found := metrics.judge_estimator(name, [run.trace for run in own[name]]))
         ],
     )
 
@@ -73,10 +66,10 @@ def _compare(apexes: dict[float, Array]) -> list[Neighbours]:
     ]
 
 
-def _staircase(label: str, runs: Sequence[Run]) -> Staircase:
-    measured = [measure(run.trace) for run in runs]
+def _staircase(label: str, runs: Sequence[trials.Run]) -> Staircase:
+    measured = [metrics.measure(run.trace) for run in runs]
     steps = [list(group) for group in zip(*measured, strict=True)]
-    medians = np.array([of(np.median, pooled_apexes(step)) for step in steps])
+    medians = np.array([of(np.median, metrics.pooled_apexes(step)) for step in steps])
     per_run = np.array([[of(np.median, w.apex) for w in run] for run in measured])
     return Staircase(
         controller=label,
@@ -85,15 +78,15 @@ def _staircase(label: str, runs: Sequence[Run]) -> Staircase:
         monotone=bool((np.diff(medians) > 0).all()),
         monotone_runs=int((np.diff(per_run, axis=1) > 0).all(axis=1).sum()),
         runs=len(runs),
-        skipped_hops=sum(skipped_in_run(run.trace) for run in runs),
+        skipped_hops=sum(metrics.skipped_in_run(run.trace) for run in runs),
     )
 
 
 def summarise(
-    controller: str, robot: str, command: float, windows: Sequence[HopWindow], seed: int
+    controller: str, robot: str, command: float, windows: Sequence[metrics.HopWindow], seed: int
 ) -> Summary:
     """Pool all windows of one controller at one command; the seed is of the bootstrap."""
-    apex = pooled_apexes(windows)
+    apex = metrics.pooled_apexes(windows)
     low, high = median_interval([w.error for w in windows], seed)
     settled = sum(w.settled for w in windows)
     per_second = 1 / settled if settled else float("nan")

@@ -8,12 +8,9 @@ from typing import Any
 from markupsafe import Markup
 
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.figures import draw_learning
-from hopping_leg.evaluate.report import pictures_of
+from hopping_leg.evaluate import figures, report, result_files, trials
 from hopping_leg.evaluate.result import Evaluation, flat_conditions
-from hopping_leg.evaluate.result_files import StoredRun
 from hopping_leg.evaluate.tables import SUMMARY, column, millimetres
-from hopping_leg.evaluate.trials import Run, load_run
 from hopping_leg.html_page import Column, page_template, svg_uri, table
 
 _OF_CONTROLLERS = ("summary", "sequence", "ladder", "staircase", "neighbours", "estimators")
@@ -24,7 +21,7 @@ _OF_CONTROLLERS = ("summary", "sequence", "ladder", "staircase", "neighbours", "
 class Compared:
     """Runs beside each other."""
 
-    runs: tuple[StoredRun, ...]
+    runs: tuple[result_files.StoredRun, ...]
     evaluation: Evaluation
     """All evaluations as one; empty if there are trainings alone."""
     differences: list[dict[str, str]]
@@ -48,7 +45,7 @@ class Compared:
         }
 
 
-def set_beside(runs: Sequence[StoredRun]) -> Compared:
+def set_beside(runs: Sequence[result_files.StoredRun]) -> Compared:
     """Compare two runs or more.
 
     Raises:
@@ -70,7 +67,7 @@ def set_beside(runs: Sequence[StoredRun]) -> Compared:
     return Compared(tuple(runs), _merge(evaluations), differences, trainings, notes)
 
 
-def traces_of(compared: Compared) -> list[Run]:
+def traces_of(compared: Compared) -> list[trials.Run]:
     """Load the first sequence and staircase of every controller, where traces were kept."""
     found = []
     others = {run.label: run.evaluation for run in compared.runs if run.evaluation}
@@ -80,13 +77,15 @@ def traces_of(compared: Compared) -> list[Run]:
             continue
         name = _name(others, stored.label)
         for kind in ("sequence", "staircase"):
-            runs = [load_run(path) for path in sorted(stored.traces.glob(f"*-{kind}-0.parquet"))]
+            runs = [
+                trials.load_run(path) for path in sorted(stored.traces.glob(f"*-{kind}-0.parquet"))
+            ]
             known = [run for run in runs if run.controller in evaluation.controllers]
             found += [dataclasses.replace(r, controller=name(r.controller)) for r in known]
     return found
 
 
-def command_of(run: StoredRun) -> str:
+def command_of(run: result_files.StoredRun) -> str:
     """Return the commands that make a run again."""
     evaluated = run.evaluation.command if run.evaluation else ""
     trained = str((run.training or {}).get("command", ""))
@@ -159,7 +158,7 @@ def _differences(conditions: dict[str, dict[str, Any]]) -> list[dict[str, str]]:
     return rows
 
 
-def _notes(runs: Sequence[StoredRun], differences: list[dict[str, str]]) -> list[str]:
+def _notes(runs: Sequence[result_files.StoredRun], differences: list[dict[str, str]]) -> list[str]:
     """Return what makes a comparison less than fair."""
     robots: dict[tuple[str, str], list[str]] = {}
     for run in runs:
@@ -194,7 +193,7 @@ def write_comparison(compared: Compared, command: str = "") -> bytes:
     differing = next(iter(compared.differences), {})
     rows = [training_row(label, training) for label, training in compared.trainings.items()]
     histories = {label: training["history"] for label, training in compared.trainings.items()}
-    pictures = pictures_of(evaluation, traces_of(compared)) if evaluation.summary else []
+    pictures = report.pictures_of(evaluation, traces_of(compared)) if evaluation.summary else []
     page = page_template("hopping_leg.evaluate", "compare.html.j2").render(
         title=f"Compared: {', '.join(run.label for run in compared.runs)}",
         command=command,
@@ -202,7 +201,7 @@ def write_comparison(compared: Compared, command: str = "") -> bytes:
         beside=_beside_table(evaluation),
         summary=table(SUMMARY, evaluation.summary),
         pictures=pictures,
-        learning=svg_uri(draw_learning(histories)) if histories else "",
+        learning=svg_uri(figures.draw_learning(histories)) if histories else "",
         trainings=table(_TRAINING, rows),
         differences=table(
             [column(name.removeprefix("in "), name) for name in differing], compared.differences

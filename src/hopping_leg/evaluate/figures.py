@@ -10,12 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from hopping_leg import figure_style
+from hopping_leg import figure_style, hop_detection
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.evaluate.metrics import ESTIMATED_HEIGHT, START_SECONDS, SWITCH_SECONDS, stretches
 from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.figure_style import COLOURS, COMMAND_COLOUR, WIDTH, colour, styled
-from hopping_leg.hop_detection import FLIGHT_CLEARANCE, trace_hops
 from hopping_leg.trace import Trace
 
 _PHASE_SPACE_SECONDS = 10.0  # of the paper's trial
@@ -39,7 +38,7 @@ def draw_heights(traces: Mapping[str, Trace]) -> Figure:
 
 def _draw_heights(axes: Axes, trace: Trace, paint: str, *, with_labels: bool) -> None:
     time, command = trace.column("time_s"), trace.column("command_m")
-    height, hops = trace.column("height_m"), trace_hops(trace)
+    height, hops = trace.column("height_m"), hop_detection.trace_hops(trace)
     names = ("base height", "command", "apex in flight", "median apex")
     line, ask, dots, median = names if with_labels else ("_",) * 4
     axes.plot(time, height, color=paint, linewidth=0.8, alpha=0.8, label=line)
@@ -69,7 +68,7 @@ def draw_phase_space(trace: Trace, title: str = "") -> Figure:
         chosen = time < _PHASE_SPACE_SECONDS
     names = ("knee_position_rad", "knee_velocity_rad_s", "knee_command_nm")
     angle, speed, torque = (trace.column(name)[chosen] for name in names)
-    flight = trace.column("foot_clearance_m")[chosen] >= FLIGHT_CLEARANCE
+    flight = trace.column("foot_clearance_m")[chosen] >= hop_detection.FLIGHT_CLEARANCE
     figure = Figure(figsize=(WIDTH, 3.6), layout="constrained")
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
     limit = float(np.nanmax(np.abs(torque), initial=0.0)) or 1.0

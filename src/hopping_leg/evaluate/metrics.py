@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.evaluate.result import Estimator
-from hopping_leg.evaluate.statistics import of
+from hopping_leg.evaluate import result, statistics
 from hopping_leg.hop_detection import COLUMNS, measure_hops, trace_hops
 from hopping_leg.robot.parameters import JOINTS
 from hopping_leg.trace import Trace
@@ -134,7 +133,7 @@ def has_estimate(trace: Trace) -> bool:
     return bool(np.isfinite(both).any())
 
 
-def judge_estimator(controller: str, traces: Sequence[Trace]) -> Estimator | None:
+def judge_estimator(controller: str, traces: Sequence[Trace]) -> result.Estimator | None:
     """Compare estimated with true heights after the first 2 s; None where there is no estimate."""
     estimating = [trace for trace in traces if has_estimate(trace)]
     if not estimating:
@@ -142,14 +141,14 @@ def judge_estimator(controller: str, traces: Sequence[Trace]) -> Estimator | Non
     flight = np.concatenate([_errors(trace, flying=True) for trace in estimating])
     stance = np.concatenate([_errors(trace, flying=False) for trace in estimating])
     apex = np.concatenate([apex_errors(trace) for trace in estimating])
-    return Estimator(
+    return result.Estimator(
         controller=controller,
-        flight_bias_m=of(np.mean, flight),
-        flight_std_m=of(np.std, flight),
-        stance_bias_m=of(np.mean, stance),
-        stance_std_m=of(np.std, stance),
-        apex_bias_m=of(np.mean, apex),
-        apex_std_m=of(np.std, apex),
+        flight_bias_m=statistics.of(np.mean, flight),
+        flight_std_m=statistics.of(np.std, flight),
+        stance_bias_m=statistics.of(np.mean, stance),
+        stance_std_m=statistics.of(np.std, stance),
+        apex_bias_m=statistics.of(np.mean, apex),
+        apex_std_m=statistics.of(np.std, apex),
         hops=len(apex),
     )
 

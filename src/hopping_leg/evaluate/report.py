@@ -8,11 +8,7 @@ from typing import Any
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from hopping_leg.evaluate import figures, tables
-from hopping_leg.evaluate.acceptance import acceptance_lines
-from hopping_leg.evaluate.metrics import has_estimate
-from hopping_leg.evaluate.result import Evaluation, flat_conditions
-from hopping_leg.evaluate.runner import EvaluationRun
+from hopping_leg.evaluate import acceptance, figures, metrics, result, runner, tables
 from hopping_leg.evaluate.trials import Run
 from hopping_leg.evaluate.video import Video, fixed_traces, render_video
 from hopping_leg.html_page import data_uri, page_template, svg_uri, table
@@ -50,12 +46,12 @@ _HEIGHTS = {
 }
 
 
-def draw_report_figures(evaluation: Evaluation, runs: Sequence[Run]) -> list[Picture]:
+def draw_report_figures(evaluation: result.Evaluation, runs: Sequence[Run]) -> list[Picture]:
     """Draw every figure that the runs allow."""
     return list(_figures(evaluation, runs))
 
 
-def _figures(evaluation: Evaluation, runs: Sequence[Run]) -> Iterator[Picture]:
+def _figures(evaluation: result.Evaluation, runs: Sequence[Run]) -> Iterator[Picture]:
     def files(*kinds: str) -> tuple[str, ...]:
         return tuple(run.file_name for run in runs if run.trial.kind in kinds)
 
@@ -92,7 +88,7 @@ def _figures(evaluation: Evaluation, runs: Sequence[Run]) -> Iterator[Picture]:
             figures.draw_phase_space(run.trace, about),
             (run.file_name,),
         )
-        if has_estimate(run.trace):
+        if metrics.has_estimate(run.trace):
             yield Picture(
                 f"estimate-{safe}",
                 f"Estimated height: {run.controller}",
@@ -124,7 +120,7 @@ def _first_of_each(runs: Iterable[Run]) -> list[Run]:
     return list(first.values())
 
 
-def write_report(judged: EvaluationRun, videos: dict[str, Video] | None = None) -> bytes:
+def write_report(judged: runner.EvaluationRun, videos: dict[str, Video] | None = None) -> bytes:
     """Return the report as HTML, with the video of each controller if there are some."""
     evaluation, secondary = judged.evaluation, judged.evaluation.secondary
     page = page_template("hopping_leg.evaluate", "report.html.j2").render(
@@ -137,7 +133,7 @@ def write_report(judged: EvaluationRun, videos: dict[str, Video] | None = None) 
             "secondary": table(tables.SUMMARY, secondary.summary if secondary else []),
             "estimators": tables.estimator_table(evaluation.estimators),
         },
-        acceptance=acceptance_lines(map(dataclasses.asdict, evaluation.summary)),
+        acceptance=acceptance.acceptance_lines(map(dataclasses.asdict, evaluation.summary)),
         pictures=pictures_of(evaluation, judged.runs),
         videos=[
             {
@@ -147,12 +143,12 @@ def write_report(judged: EvaluationRun, videos: dict[str, Video] | None = None) 
             }
             for name, video in (videos or {}).items()
         ],
-        conditions=flat_conditions({**evaluation.conditions, **evaluation.versions}),
+        conditions=result.flat_conditions({**evaluation.conditions, **evaluation.versions}),
     )
     return page.encode()
 
 
-def render_videos(judged: EvaluationRun, robot: Robot) -> dict[str, Video]:
+def render_videos(judged: runner.EvaluationRun, robot: Robot) -> dict[str, Video]:
     """Render one video per controller; after a first failure the rest are not tried."""
     videos: dict[str, Video] = {}
     none = Video(None, "it was not asked for")
@@ -172,7 +168,7 @@ def _subtitle(c: dict[str, Any]) -> str:
     )
 
 
-def pictures_of(evaluation: Evaluation, runs: Sequence[Run]) -> list[dict[str, Any]]:
+def pictures_of(evaluation: result.Evaluation, runs: Sequence[Run]) -> list[dict[str, Any]]:
     """Return what a page shows of every figure: its texts, source, command and table."""
     beside = {
         "distributions": lambda: tables.neighbour_table(evaluation.neighbours),

@@ -6,9 +6,8 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from hopping_leg.controllers import RolloutConfig
-from hopping_leg.evaluate.aggregation import pool_group, tabulate
+from hopping_leg.evaluate import aggregation, result
 from hopping_leg.evaluate.entries import Entry, check_labels, check_range
-from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.evaluate.trials import (
     FLOORS,
     KINDS,
@@ -29,7 +28,7 @@ from hopping_leg.sim import NO_NOISE, Engine
 class EvaluationRun:
     """An evaluation with the runs behind it."""
 
-    evaluation: Evaluation
+    evaluation: result.Evaluation
     runs: list[Run]
 
 
@@ -82,7 +81,7 @@ def evaluate(
         )
         notes += _note_stopped(entry.label, own, setup)
         runs += own
-    measured = tabulate(runs, [c.label for c in entries], seed)
+    measured = aggregation.tabulate(runs, [c.label for c in entries], seed)
     members: dict[str, list[str]] = {}
     for entry in entries:
         members.setdefault(entry.group or "", []).append(entry.label)
@@ -94,7 +93,9 @@ def evaluate(
     return EvaluationRun(
         replace(
             measured,
-            groups=[row for name in groups for row in pool_group(name, groups[name], seed)],
+            groups=[
+                row for name in groups for row in aggregation.pool_group(name, groups[name], seed)
+            ],
             conditions={
                 **setup_conditions(setup),
                 "floor": floor,

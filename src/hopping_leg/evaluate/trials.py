@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from hopping_leg import errors, io
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.controllers.command_schedule import CommandSchedule
-from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.evaluate.metrics import stretches
-from hopping_leg.io import safe_file_name
 from hopping_leg.robot import Contact, GroundMismatch, Robot, command_limits
 from hopping_leg.trace import Trace
 
@@ -70,10 +69,12 @@ def choose_commands(robot: Robot, commands: Sequence[float] | None) -> tuple[flo
         return scaled(COMMANDS, robot)
     low, high = command_limits(robot)
     if not commands:
-        raise UsageError("No commands were given; give heights in m, e.g. --commands 0.25,0.30.")
+        raise errors.UsageError(
+            "No commands were given; give heights in m, e.g. --commands 0.25,0.30."
+        )
     for height in commands:
         if not math.isfinite(height) or not low <= height <= high:
-            raise UsageError(
+            raise errors.UsageError(
                 f"A command of {height:g} m is out of reach of {robot.name}; give heights of the"
                 f" hip axis from {low:.2f} to {high:.2f} m."
             )
@@ -87,7 +88,7 @@ def check_repeats(repeats: int) -> None:
         UsageError: There is no realisation of noise and delay.
     """
     if repeats < 1:
-        raise UsageError(f"{repeats} seeds are too few; give --seeds 1 or more.")
+        raise errors.UsageError(f"{repeats} seeds are too few; give --seeds 1 or more.")
 
 
 def within(trial: Trial, bounds: tuple[float, float] | None) -> bool:
@@ -116,7 +117,7 @@ class Run:
     @property
     def file_name(self) -> str:
         """Name of the run's trace file, unique within an evaluation."""
-        return f"{safe_file_name(self.controller)}-{self.trial.name}-{self.repeat}.parquet"
+        return f"{io.safe_file_name(self.controller)}-{self.trial.name}-{self.repeat}.parquet"
 
 
 def floor_robot(robot: Robot, floor: str) -> Robot:
@@ -126,7 +127,7 @@ def floor_robot(robot: Robot, floor: str) -> Robot:
         UsageError: There is no such floor.
     """
     if floor not in FLOORS:
-        raise UsageError(unknown_name("floor", floor, FLOORS))
+        raise errors.UsageError(errors.unknown_name("floor", floor, FLOORS))
     if floor == "soft":
         return robot
     reality = replace(robot.reality, ground=GroundMismatch())

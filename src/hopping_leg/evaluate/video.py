@@ -19,8 +19,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from hopping_leg.arrays import Array
-from hopping_leg.evaluate.metrics import START_SECONDS
-from hopping_leg.evaluate.trials import Run
+from hopping_leg.evaluate import metrics, trials
 from hopping_leg.hop_detection import trace_hops
 from hopping_leg.robot import Robot, get_spec
 from hopping_leg.trace import Trace
@@ -48,7 +47,7 @@ class Video:
     reason: str = ""
 
 
-def fixed_traces(runs: Sequence[Run], controller: str) -> dict[float, Trace]:
+def fixed_traces(runs: Sequence[trials.Run], controller: str) -> dict[float, Trace]:
     """Return a controller's first run at each command, m."""
     return {
         run.trial.steps[0][0]: run.trace
@@ -83,8 +82,8 @@ def clip(trace: Trace) -> Array:
     names = ("height_m", "hip_position_rad", "knee_position_rad")
     pose = np.stack([trace.column(name) for name in names], axis=1)
     hops = trace_hops(trace)
-    settled = time[hops.tick][time[hops.tick] >= START_SECONDS]
-    start = settled[0] if len(settled) else min(START_SECONDS, time[-1])
+    settled = time[hops.tick][time[hops.tick] >= metrics.START_SECONDS]
+    start = settled[0] if len(settled) else min(metrics.START_SECONDS, time[-1])
     moments = start + np.arange(round(CLIP_SECONDS * FRAME_RATE)) / FRAME_RATE
     return np.stack([np.interp(moments, time, column) for column in pose.T], axis=1)
 

@@ -7,9 +7,8 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RobotError
-from hopping_leg.identify.parameters import LegHypothesis
+from hopping_leg.identify import parameters, recording_format
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.recording_format import Rig
 from hopping_leg.robot import GRAVITY, Robot, get_spec
 
 _PARTS = {
@@ -23,7 +22,7 @@ FIELDS = [f"{part}_{name}" for part, names in _PARTS.items() for name in names] 
 
 
 def build_rig_model(
-    robot: Robot, rig: Rig, timestep: float, gravity: float = GRAVITY
+    robot: Robot, rig: recording_format.Rig, timestep: float, gravity: float = GRAVITY
 ) -> mujoco.MjModel:
     """Compile a robot on its rig; a fixed base has no rail joint and touches nothing.
 
@@ -60,7 +59,7 @@ def build_rig_model(
         raise RobotError(f"MuJoCo cannot build robot '{robot.name}': {reason}.") from error
 
 
-def drive_values(hypotheses: Sequence[LegHypothesis], name: str) -> Array:
+def drive_values(hypotheses: Sequence[parameters.LegHypothesis], name: str) -> Array:
     """Return an attribute of both drives, (hypotheses, 2)."""
     return np.array([[getattr(h.drive.hip, name), getattr(h.drive.knee, name)] for h in hypotheses])
 
@@ -81,7 +80,7 @@ class MotorBounds:
     """
 
     def __init__(
-        self, hypotheses: Sequence[LegHypothesis], recordings: Sequence[Recording]
+        self, hypotheses: Sequence[parameters.LegHypothesis], recordings: Sequence[Recording]
     ) -> None:
         robots = [h.robot for h in hypotheses]
         belt = np.array([r.of_joints("belt_ratio") for r in robots])

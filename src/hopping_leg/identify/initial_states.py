@@ -18,9 +18,8 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RecordingError
-from hopping_leg.identify.parameters import LegHypothesis
+from hopping_leg.identify import parameters, recording_format
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.recording_format import RecordingMetadata
 from hopping_leg.robot import GRAVITY, Robot, dynamics, kinematics
 
 _REACH = 0.02  # time to either side of a row that its cubic spans, s
@@ -144,7 +143,7 @@ _LEAST = 0.02  # error of torques that is always there, N m
 _ITERATIONS = 3
 
 
-def has_encoder_offsets(metadata: RecordingMetadata) -> bool:
+def has_encoder_offsets(metadata: recording_format.RecordingMetadata) -> bool:
     """Return whether the offsets of a recording have to be found from it."""
     return metadata.zeroed and metadata.rig == "fixed-base" and metadata.onboard == "torque"
 
@@ -164,7 +163,7 @@ class OffsetFinder:
         )
         self._gravity = recording.metadata.effective_gravity / GRAVITY
 
-    def find(self, hypothesis: LegHypothesis) -> Array:
+    def find(self, hypothesis: parameters.LegHypothesis) -> Array:
         """Return the offsets of hip and knee if the leg is as the hypothesis, rad, (2,)."""
         offsets = np.zeros(2)
         if len(self._grid) <= 2 * _ROWS:
@@ -183,13 +182,15 @@ class OffsetFinder:
             offsets = offsets - np.linalg.solve(design.T @ design + np.eye(2) / _LIKELY**2, pull)
         return offsets
 
-    def _torque(self, hypothesis: LegHypothesis) -> Array:
+    def _torque(self, hypothesis: parameters.LegHypothesis) -> Array:
         """Return what the joints felt on the grid, N m, (n, 2)."""
         late = self._grid - hypothesis.drive.delay
         row = np.searchsorted(self._time, late, side="right") - 1
         return hypothesis.robot.of_joints("torque_gain") * self._command[np.maximum(row, 0)]
 
-    def _imbalance(self, hypothesis: LegHypothesis, offsets: Array, torque: Array) -> Array:
+    def _imbalance(
+        self, hypothesis: parameters.LegHypothesis, offsets: Array, torque: Array
+    ) -> Array:
         """Return the mean torque over each span that momentum misses, N m, (n, 2)."""
         robot, q, qd = hypothesis.robot, self._q - offsets, self._qd
         momentum = np.einsum("nij,nj->ni", dynamics.mass_matrix(robot, q)[:, 1:, 1:], qd)

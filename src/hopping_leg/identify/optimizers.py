@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 from scipy import optimize
 
+from hopping_leg import cma_strategy, errors, io
 from hopping_leg.arrays import Array, IntArray
-from hopping_leg.cma_strategy import seeded_strategy
-from hopping_leg.errors import UsageError
 from hopping_leg.identify.cost import RobustLoss, total_costs
 from hopping_leg.identify.parameters import ParameterSet
-from hopping_leg.io import write_atomically
 
 Evaluate = Callable[[Array], Array]
 """Search vectors (n, k) to costs (n,) or residuals (n, m), row by row independent."""
@@ -257,7 +255,7 @@ def cma_es(
     saved = _load_state(checkpoint, identity) or {"costs": []}
     costs: list[list[float]] = saved["costs"]
     bounds = [low.tolist(), high.tolist()]
-    strategy = seeded_strategy(first, options.spread, bounds, options.population, seed)
+    strategy = cma_strategy.seeded_strategy(first, options.spread, bounds, options.population, seed)
     judges = [*shares] or [values]
     bests: list[Array] = []
     means: list[Array] = []
@@ -303,7 +301,7 @@ def _identity(
 def _save_state(path: Path | None, identity: dict[str, Any], state: dict[str, Any]) -> None:
     """Write what a search needs to go on, floats with every bit; nothing without a path."""
     if path is not None:
-        write_atomically(path, json.dumps({"identity": identity, "state": state}).encode())
+        io.write_atomically(path, json.dumps({"identity": identity, "state": state}).encode())
 
 
 def _load_state(path: Path | None, identity: dict[str, Any]) -> dict[str, Any] | None:
@@ -314,9 +312,9 @@ def _load_state(path: Path | None, identity: dict[str, Any]) -> dict[str, Any] |
         known, state = saved["identity"], saved["state"]
     except (ValueError, KeyError, TypeError, OSError) as error:
         sentence = f"{path} is no checkpoint of a search; remove it to start anew."
-        raise UsageError(sentence) from error
+        raise errors.UsageError(sentence) from error
     if known != json.loads(json.dumps(identity)):
-        raise UsageError(
+        raise errors.UsageError(
             f"{path} belongs to a search with other parameters, data or options;"
             " repeat those, or remove it to start anew."
         )

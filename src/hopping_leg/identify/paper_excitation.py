@@ -12,9 +12,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
-from hopping_leg.identify.excitation import RATE, require_positive
-from hopping_leg.identify.feasibility import HardwareRange, check_demand, demand
-from hopping_leg.identify.recording_format import Rig
+from hopping_leg.identify import excitation, feasibility, recording_format
 from hopping_leg.robot import Robot, kinematics
 
 DURATION = 240.0
@@ -48,11 +46,11 @@ class Stroke:
     margin: float = 0.0
     bend: Bend = "backward"
     """Side of the knee: negative angles are backward."""
-    rig: Rig = "fixed-base"
+    rig: recording_format.Rig = "fixed-base"
 
     def __post_init__(self) -> None:
-        require_positive(amplitude=self.amplitude, period=self.period)
-        require_positive(duration=self.duration, swing=self.swing)
+        excitation.require_positive(amplitude=self.amplitude, period=self.period)
+        excitation.require_positive(duration=self.duration, swing=self.swing)
         if not 0 <= self.margin < math.inf:
             raise UsageError(f"'margin' is {self.margin:g} m but must be zero or more.")
 
@@ -90,7 +88,7 @@ class Strokes:
         return "; ".join(map(str, self.parts))
 
     @property
-    def rig(self) -> Rig:
+    def rig(self) -> recording_format.Rig:
         """What the base is on."""
         return self.parts[0].rig
 
@@ -117,7 +115,7 @@ def fixed_base(
     margin: float = 0.0,
     bend: Bend = "backward",
     every_pair: bool = False,
-    rig: Rig = "fixed-base",
+    rig: recording_format.Rig = "fixed-base",
 ) -> Strokes:
     """Return the paper's fixed-base trajectory: the foot strokes while the leg swings.
 
@@ -155,7 +153,11 @@ moving_base = partial(fixed_base, swings=(None,), rig="rail")
 
 
 def adapt(
-    strokes: Strokes, robot: Robot, *, rate: float = RATE, limits: HardwareRange | None = None
+    strokes: Strokes,
+    robot: Robot,
+    *,
+    rate: float = excitation.RATE,
+    limits: feasibility.HardwareRange | None = None,
 ) -> Strokes:
     """Return the strokes as large as the leg can follow: the paper's grid does not fit every leg.
 
@@ -165,17 +167,19 @@ def adapt(
     Raises:
         UsageError: A stroke is beyond the leg at any amplitude.
     """
-    limits = limits or HardwareRange()
+    limits = limits or feasibility.HardwareRange()
     return Strokes(tuple(_adapt_stroke(s, robot, rate, limits) for s in strokes.parts))
 
 
-def _adapt_stroke(stroke: Stroke, robot: Robot, rate: float, limits: HardwareRange) -> Stroke:
+def _adapt_stroke(
+    stroke: Stroke, robot: Robot, rate: float, limits: feasibility.HardwareRange
+) -> Stroke:
     time = np.arange(round(stroke.duration * rate)) / rate
     stroke = dataclasses.replace(stroke, margin=max(stroke.margin, LAB_MARGIN))
     while True:
         try:
-            wanted = demand(robot, stroke.rig, stroke.joints(robot, time), rate)
-            check_demand(robot, wanted, rate, limits)
+            wanted = feasibility.demand(robot, stroke.rig, stroke.joints(robot, time), rate)
+            feasibility.check_demand(robot, wanted, rate, limits)
         except UsageError:
             stroke = dataclasses.replace(stroke, amplitude=stroke.amplitude * _SHRINK)
             if stroke.amplitude < _SMALLEST:

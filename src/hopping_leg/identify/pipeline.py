@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.errors import PhysicsError, RecordingError, RobotError, UsageError, unknown_name
-from hopping_leg.identify import validation
+from hopping_leg.identify import optimizers, validation
 from hopping_leg.identify.cost import Objective, Scoring
 from hopping_leg.identify.identifiability import Identifiability, identifiability
-from hopping_leg.identify.optimizers import jacobian
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import FitPlan, check_recordings, make_plan
 from hopping_leg.identify.recording import Recording
@@ -178,7 +177,7 @@ def _conclude(
         )
     step, bounds = options.effort.least_squares.step, last.parameters.bounds
     residuals = objective.residuals(vector[None])[0]
-    slopes = jacobian(objective.residuals, vector, bounds, step, objective.jumping)
+    slopes = optimizers.jacobian(objective.residuals, vector, bounds, step, objective.jumping)
     if objective.loss is not None:
         weights = objective.loss.weights(residuals)
         residuals, slopes = weights * residuals, weights[:, None] * slopes

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.errors import RecordingError, RobotError, UsageError, unknown_name
-from hopping_leg.identify.cost import Scoring
-from hopping_leg.identify.initial_states import full_states
+from hopping_leg.identify import cost, initial_states, recording_format
 from hopping_leg.identify.parameters import LegHypothesis, ParameterSet, choose
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.recording_format import PAIRS, Rig
 from hopping_leg.robot import JOINTS, TIMESTEP, Robot, load_robot
 
 _TOLERANCE = 0.2  # share by which link lengths may differ between files of one leg
@@ -37,8 +35,8 @@ def check_recordings(recordings: Sequence[Recording], robot: Robot) -> None:
             wanted, what = "torque_command", "commanded torques"
         if not recording.has(wanted):
             raise RecordingError(
-                f"{recording.name} has no {what} ({', '.join(PAIRS[wanted])}), so that nothing says"
-                " what moved the leg; record them."
+                f"{recording.name} has no {what} ({', '.join(recording_format.PAIRS[wanted])}),"
+                " so that nothing says what moved the leg; record them."
             )
         try:
             own = load_robot(recording.metadata.robot)
@@ -80,7 +78,7 @@ class FitPlan:
 
     start: LegHypothesis
     parameters: ParameterSet
-    scoring: Scoring
+    scoring: cost.Scoring
     window: float
     """Duration that is simulated from one measured state, s."""
     unscored: float
@@ -97,7 +95,7 @@ def make_plan(
     parameters: tuple[str, ...] | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     search: str | None = None,
-    scoring: Scoring | None = None,
+    scoring: cost.Scoring | None = None,
 ) -> FitPlan:
     """Decide how to identify a robot from recordings, on whatever rigs, as far as it is not said.
 
@@ -119,14 +117,14 @@ def make_plan(
     return FitPlan(
         start,
         choose(start, names, bounds=limits),
-        scoring or (Scoring() if paper else _scoring(recordings)),
+        scoring or (cost.Scoring() if paper else _scoring(recordings)),
         *_window(recordings),
         _timestep(recordings),
         search,
     )
 
 
-def pass_names(rigs: Sequence[Rig]) -> tuple[list[str], list[str]]:
+def pass_names(rigs: Sequence[recording_format.Rig]) -> tuple[list[str], list[str]]:
     """Return the parameters of the paper's first pass and those that the second one adds.
 
     Without a moving base among the rigs nothing is known of rail and contact.
@@ -189,7 +187,7 @@ def _limits(recordings: Sequence[Recording]) -> list[str]:
             continue
         if not np.isfinite(torque).any(axis=0).all():
             continue
-        q, qd = full_states(recording)
+        q, qd = initial_states.full_states(recording)
         spring = np.array(metadata.stiffness) * (recording.array("position_command") - q)
         damper = np.array(metadata.damping) * (recording.array("velocity_command") - qd)
         wanted = np.minimum(np.abs(spring), np.abs(spring + damper))
@@ -223,15 +221,15 @@ def _start(recordings: Sequence[Recording], robot: Robot) -> LegHypothesis:
     return LegHypothesis(robot).replace(values)
 
 
-def _scoring(recordings: Sequence[Recording]) -> Scoring:
+def _scoring(recordings: Sequence[Recording]) -> cost.Scoring:
     if all(r.metadata.onboard == "torque" for r in recordings):
-        return Scoring(position=0.02, robust=2.0, unexplained=0.4)
+        return cost.Scoring(position=0.02, robust=2.0, unexplained=0.4)
     torque = 0.2 if any(r.has("torque") for r in recordings) else None
     if torque is not None and _open_gains(recordings):
-        return Scoring(position=0.003, torque=0.5, robust=1.0, unexplained=0.4)
+        return cost.Scoring(position=0.003, torque=0.5, robust=1.0, unexplained=0.4)
     rails = [r for r in recordings if r.metadata.rig == "rail"]
     height = 0.002 if any(r.has_column("height_m") for r in rails) else None
-    return Scoring(position=0.005, torque=torque, height=height, robust=3.0, unexplained=0.4)
+    return cost.Scoring(position=0.005, torque=torque, height=height, robust=3.0, unexplained=0.4)
 
 
 def _timestep(recordings: Sequence[Recording]) -> float:

@@ -22,10 +22,8 @@ import polars as pl
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.errors import RecordingError, UsageError, unknown_name
-from hopping_leg.identify.importers import IMPORTERS, recognise
-from hopping_leg.identify.recording_checks import check_table
+from hopping_leg.identify import importers, recording_checks, unit_checks
 from hopping_leg.identify.recording_format import COLUMNS, PAIRS, RecordingMetadata, float_column
-from hopping_leg.identify.unit_checks import STALL, Inspection, row_period
 from hopping_leg.io import read_dataclass
 from hopping_leg.trace import Trace
 
@@ -141,7 +139,7 @@ class Recording:
 
     def segments(self) -> list[slice]:
         """Return the stretches of rows without a stall, in order."""
-        longest = STALL * row_period(self.time, self.metadata.period)
+        longest = unit_checks.STALL * unit_checks.row_period(self.time, self.metadata.period)
         stalls = np.flatnonzero(np.diff(self.time) > longest) + 1
         edges = [0, *stalls.tolist(), len(self)]
         return [slice(a, b) for a, b in pairwise(edges)]
@@ -172,8 +170,8 @@ def make_recording(
     RecordingError says that the table cannot be believed.
     """
     table = _cast(table, COLUMNS, name).with_columns(pl.selectors.float().fill_nan(None))
-    inspection = Inspection(table, metadata, name, names or {})
-    check_table(inspection)
+    inspection = unit_checks.Inspection(table, metadata, name, names or {})
+    recording_checks.check_table(inspection)
     trace, warnings = Trace(inspection.table, header or {}), tuple(inspection.warnings)
     return Recording(trace, metadata, Path(name).name, digest, warnings)
 
@@ -205,11 +203,11 @@ def load_recording(path: str | Path) -> Recording:
         tree = header.pop(_KEY)
         metadata = read_dataclass(RecordingMetadata, tree, origin, error=RecordingError)
     else:
-        importer = recognise(table.columns)
+        importer = importers.recognise(table.columns)
         if importer is None:
             raise RecordingError(
-                f"{origin} is of no known rig ({', '.join(IMPORTERS)}) and there is no sidecar"
-                f" {sidecar_path(path).name} beside it; its columns are:"
+                f"{origin} is of no known rig ({', '.join(importers.IMPORTERS)}) and there is no"
+                f" sidecar {sidecar_path(path).name} beside it; its columns are:"
                 f" {', '.join(table.columns[:12])}."
             )
         table, metadata = importer.read(table)

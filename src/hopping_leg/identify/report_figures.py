@@ -9,8 +9,7 @@ from scipy.signal import lombscargle
 
 from hopping_leg.arrays import Array
 from hopping_leg.figure_style import TORQUE_MAP, WIDTH, colour, styled
-from hopping_leg.identify.search import Pass
-from hopping_leg.identify.validation import Overlay
+from hopping_leg.identify import search, validation
 from hopping_leg.robot.parameters import JOINTS
 
 _LABELS = {"position": "position / rad", "torque": "torque / N m"}
@@ -20,7 +19,7 @@ _FREQUENCIES = 500  # frequencies of a spectrum, from slow to half the rate
 
 
 @styled
-def draw_overlay(overlay: Overlay) -> Figure:
+def draw_overlay(overlay: validation.Overlay) -> Figure:
     """Draw measured and simulated positions and torques of the stretch that fits worst."""
     rows = worst_stretch(overlay)
     time = overlay.recording.time[rows]
@@ -54,7 +53,7 @@ def _panels(x_label: str) -> tuple[Figure, dict[tuple[str, int], Axes]]:
     return figure, panels
 
 
-def worst_stretch(overlay: Overlay) -> slice:
+def worst_stretch(overlay: validation.Overlay) -> slice:
     """Return the rows of the stretch with the largest position errors after the fit."""
     time = overlay.recording.time
     if time[-1] - time[0] <= _SHOWN:
@@ -68,7 +67,7 @@ def worst_stretch(overlay: Overlay) -> slice:
 
 
 @styled
-def draw_spectra(overlays: Sequence[Overlay]) -> Figure:
+def draw_spectra(overlays: Sequence[validation.Overlay]) -> Figure:
     """Draw the residuals' amplitude over frequency, before and after the fit."""
     figure, panels = _panels("frequency / Hz")
     for (quantity, joint), axes in panels.items():
@@ -80,7 +79,7 @@ def draw_spectra(overlays: Sequence[Overlay]) -> Figure:
 
 
 def residual_spectrum(
-    overlays: Sequence[Overlay], quantity: str, joint: int, hypothesis: int
+    overlays: Sequence[validation.Overlay], quantity: str, joint: int, hypothesis: int
 ) -> tuple[Array, Array]:
     """Return frequencies, Hz, and rms amplitudes of residuals over recordings.
 
@@ -103,7 +102,7 @@ def residual_spectrum(
 
 
 @styled
-def draw_course(passes: Sequence[Pass]) -> Figure:
+def draw_course(passes: Sequence[search.Pass]) -> Figure:
     """Draw the lowest cost after each round or generation."""
     figure = Figure(figsize=(WIDTH, 2.8), layout="constrained")
     for axes, one in zip(figure.subplots(1, len(passes), squeeze=False)[0], passes, strict=True):

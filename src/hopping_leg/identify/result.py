@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from hopping_leg.identify import recording_format, search
 from hopping_leg.identify.identifiability import Identifiability
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import FitPlan
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.recording_format import Rig
-from hopping_leg.identify.search import Pass
 from hopping_leg.identify.validation import Validation
 from hopping_leg.io import plain, replace_at, versions, write_atomically
 from hopping_leg.robot import Robot, load_tree, robot_from_tree, robot_text
@@ -29,7 +28,7 @@ class Identified:
     start: LegHypothesis
     """Robot and drives before the fit."""
     plan: FitPlan
-    passes: tuple[Pass, ...]
+    passes: tuple[search.Pass, ...]
     """Searches in order; the last one's end is the result."""
     identifiability: Identifiability
     fit: tuple[Recording, ...]
@@ -40,7 +39,7 @@ class Identified:
     validation: Validation
     """Errors of the result on what was held."""
     start_validation: Validation
-    by_rig: Mapping[Rig, Validation]
+    by_rig: Mapping[recording_format.Rig, Validation]
     """Errors of the result on each rig, if there are several."""
     seed: int
 

@@ -17,13 +17,11 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
-from hopping_leg.identify import optimizers
+from hopping_leg.identify import optimizers, recording_format, windows
 from hopping_leg.identify.cost import Objective
 from hopping_leg.identify.optimizers import CmaOptions, Evaluate, Found, LeastSquaresOptions
 from hopping_leg.identify.parameters import ParameterSet, choose
 from hopping_leg.identify.plan import FitPlan, pass_names
-from hopping_leg.identify.recording_format import Rig
-from hopping_leg.identify.windows import deal
 from hopping_leg.workers import RayWorkers, map_rows
 
 _FACTOR = 2.0  # the paper's second pass keeps the first one's parameters within this factor
@@ -81,7 +79,7 @@ class Searcher:
     about: Mapping[str, object] = field(default_factory=dict)
     """What else makes this run this run."""
 
-    def run(self, rigs: Sequence[Rig]) -> list[Pass]:
+    def run(self, rigs: Sequence[recording_format.Rig]) -> list[Pass]:
         """Return the passes for recordings on rigs, in order; the last one's end is the result."""
         plan = self.plan
         if plan.search != "two-pass":
@@ -131,7 +129,7 @@ class Searcher:
         rates = [r.metadata.rate_hz for r in objective.recordings]
         simulated = sum(w.length / rates[w.recording] for w in objective.windows)
         count = max(1, round(simulated / self.options.cma.seconds))
-        hands = deal(objective.windows, count, np.random.default_rng(self.seed))
+        hands = windows.deal(objective.windows, count, np.random.default_rng(self.seed))
         hands = hands if len(hands) > 1 else []  # all windows can judge each generation
         return partial(
             optimizers.cma_es,
@@ -150,7 +148,7 @@ class Searcher:
 def second_pass(
     first: ParameterSet,
     found: Found,
-    rigs: Sequence[Rig],
+    rigs: Sequence[recording_format.Rig],
     bounds: Mapping[str, tuple[float, float]],
     start: Mapping[str, float],
 ) -> ParameterSet:

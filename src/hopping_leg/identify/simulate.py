@@ -9,24 +9,8 @@ from mujoco import batch
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RecordingError, UsageError
-from hopping_leg.identify.actuator_model import (
-    FIELDS,
-    DelayLine,
-    MotorBounds,
-    VelocityWindow,
-    build_rig_model,
-    drive_values,
-    recorded_gains,
-)
-from hopping_leg.identify.initial_states import (
-    OffsetFinder,
-    base_rate,
-    has_encoder_offsets,
-    start_states,
-)
-from hopping_leg.identify.parameters import LegHypothesis
+from hopping_leg.identify import actuator_model, initial_states, parameters, resampling
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.resampling import HeldSignal, RowResampling
 from hopping_leg.identify.windows import Window
 from hopping_leg.robot import TIMESTEP, Robot, kinematics
 
@@ -74,12 +58,17 @@ class WindowGroup:
         self._prepare_rows(recordings, windows)
         self._prepare_commands()
         self._offsets = [
-            OffsetFinder(r) if has_encoder_offsets(r.metadata) else None for r in self._distinct
+            initial_states.OffsetFinder(r)
+            if initial_states.has_encoder_offsets(r.metadata)
+            else None
+            for r in self._distinct
         ]
         self._base_rates: dict[tuple[float, ...], Array] = {}
         self._batches: dict[int, batch.Batch] = {}
 
-    def run(self, hypotheses: Sequence[LegHypothesis]) -> tuple[Array, Array, Array, Array]:
+    def run(
+        self, hypotheses: Sequence[parameters.LegHypothesis]
+    ) -> tuple[Array, Array, Array, Array]:
         """Return the arrays of ``SimulatedWindows``."""
         found = [
             [np.zeros(2) if f is None else f.find(h) for f in self._offsets] for h in hypotheses
@@ -92,8 +81,8 @@ class WindowGroup:
         height = self._rows.linear(heights.reshape(*shape[:3], 1))[..., 0]
         position, velocity = self._rows.cubic(q, qd)
         position += offsets[:, :, None]
-        gain = drive_values(hypotheses, "sensor_gain")[:, None, None]
-        offset = drive_values(hypotheses, "torque_offset")[:, None, None]
+        gain = actuator_model.drive_values(hypotheses, "sensor_gain")[:, None, None]
+        offset = actuator_model.drive_values(hypotheses, "torque_offset")[:, None, None]
         measured = gain * self._rows.linear(torque) + offset
         for values in (position, velocity, measured, height):
             values[:, self._rows.padding] = np.nan
@@ -102,7 +91,7 @@ class WindowGroup:
     def _prepare_rows(self, recordings: Sequence[Recording], windows: Sequence[Window]) -> None:
         times = []
         self._begin = np.empty(len(windows))
-        states = {n: start_states(recordings[n]) for n in self._numbers}
+        states = {n: initial_states.start_states(recordings[n]) for n in self._numbers}
         self._q0, self._qd0 = np.empty((len(windows), 2)), np.empty((len(windows), 2))
         self._height0 = np.full(len(windows), np.nan)
         for i, w in enumerate(windows):
@@ -114,29 +103,31 @@ class WindowGroup:
             self._q0[i], self._qd0[i] = (values[w.start] for values in states[w.recording])
             if recording.has_column("height_m"):
                 self._height0[i] = recording.trace.column("height_m")[w.start]
-        self._rows = RowResampling(times, self._tick)
+        self._rows = resampling.RowResampling(times, self._tick)
 
     def _prepare_commands(self) -> None:
         self._held, self._ramps, self._gains = [], [], []
         for recording in self._distinct:
             time, names = recording.time, ("position", "velocity", "torque")
             columns = [np.nan_to_num(recording.array(f"{name}_command")) for name in names]
-            self._held.append(HeldSignal(time, np.concatenate(columns, axis=1)))
-            self._ramps.append(HeldSignal(time, np.zeros_like(columns[1]), columns[1]))
-            rows = [recorded_gains(recording, name) for name in _GAINS]
-            self._gains.append(HeldSignal(time, np.concatenate(rows, axis=1)))
+            self._held.append(resampling.HeldSignal(time, np.concatenate(columns, axis=1)))
+            self._ramps.append(resampling.HeldSignal(time, np.zeros_like(columns[1]), columns[1]))
+            rows = [actuator_model.recorded_gains(recording, name) for name in _GAINS]
+            self._gains.append(resampling.HeldSignal(time, np.concatenate(rows, axis=1)))
 
-    def _start(self, hypotheses: Sequence[LegHypothesis], offsets: Array) -> batch.Batch:
+    def _start(self, hypotheses: Sequence[parameters.LegHypothesis], offsets: Array) -> batch.Batch:
         metadata, windows = self._metadata, len(self._begin)
         models = [
-            build_rig_model(h.robot, metadata.rig, self._timestep, metadata.effective_gravity)
+            actuator_model.build_rig_model(
+                h.robot, metadata.rig, self._timestep, metadata.effective_gravity
+            )
             for h in hypotheses
         ]
         count = len(hypotheses) * windows
         if count not in self._batches:
             self._batches[count] = batch.Batch(models[0], count, self._threads)
         simulation = self._batches[count]
-        for name in FIELDS:
+        for name in actuator_model.FIELDS:
             values = np.stack([attrgetter(name)(m) for m in models])
             simulation.expand(name)[...] = np.repeat(values, windows, axis=0)
         simulation.reset(stage=0)
@@ -158,11 +149,11 @@ class WindowGroup:
             for n, recording in enumerate(self._distinct):
                 if recording.has_column("height_m"):
                     mine = self._of_window == n
-                    rates[mine] = base_rate(recording, robot)[self._start_rows[mine]]
+                    rates[mine] = initial_states.base_rate(recording, robot)[self._start_rows[mine]]
         return self._base_rates[lengths]
 
     def _advance(
-        self, simulation: batch.Batch, hypotheses: Sequence[LegHypothesis]
+        self, simulation: batch.Batch, hypotheses: Sequence[parameters.LegHypothesis]
     ) -> tuple[Array, Array, Array, Array]:
         """Run all ticks; return q, qd and torque, (ticks, n, 2), and base height, (ticks, n)."""
         windows, count = len(self._begin), simulation.nsim
@@ -176,17 +167,17 @@ class WindowGroup:
         force = simulation.expand("actuator_forcerange")
         friction = simulation.expand("dof_frictionloss")[:, -2:]
         still = friction.copy()
-        bounds = MotorBounds(hypotheses, self._recordings)
+        bounds = actuator_model.MotorBounds(hypotheses, self._recordings)
         gain, load = (
             np.repeat([h.robot.of_joints(name) for h in hypotheses], windows, axis=0)
             for name in ("torque_gain", "load_friction")
         )
         delay = np.repeat([h.drive.delay for h in hypotheses], windows)
-        line = DelayLine(delay / self._tick)
+        line = actuator_model.DelayLine(delay / self._tick)
         window = np.repeat([h.drive.velocity_window for h in hypotheses], windows)
         lagging = (window > 0)[:, None]
         windowed = bool(lagging.any()) and not self._zoh
-        seen = VelocityWindow(window, self._tick, q, qd)
+        seen = actuator_model.VelocityWindow(window, self._tick, q, qd)
         integral, last = np.zeros((count, 2)), np.zeros((count, 2))
         alive = np.arange(count)
         for tick in range(self._rows.ticks):
@@ -226,7 +217,7 @@ class WindowGroup:
         return positions, velocities, torques, heights
 
     def _block(
-        self, tick: int, delay: Array, hypotheses: Sequence[LegHypothesis]
+        self, tick: int, delay: Array, hypotheses: Sequence[parameters.LegHypothesis]
     ) -> tuple[Array, Array]:
         """Return a block of ticks' commands, (ticks, n, 6), and gains, (ticks, 3, n, 2)."""
         windows, number = len(self._begin), len(hypotheses)
@@ -236,7 +227,9 @@ class WindowGroup:
         ramp = np.array([[h.drive.ramp] for h in hypotheses])
         commands = np.empty((len(ticks), number, windows, 6))
         gains = np.empty((len(ticks), 3, number, windows, 2))
-        fitted = np.array([drive_values(hypotheses, name) for name in _GAINS])[:, :, None]
+        fitted = np.array([actuator_model.drive_values(hypotheses, name) for name in _GAINS])[
+            :, :, None
+        ]
         for n in range(len(self._numbers)):
             mine = self._of_window == n
             start = self._begin[mine] + ticks - late[:, None]
@@ -306,7 +299,7 @@ class WindowSimulator:
             for ids in kinds.values()
         ]
 
-    def run(self, hypotheses: Sequence[LegHypothesis]) -> SimulatedWindows:
+    def run(self, hypotheses: Sequence[parameters.LegHypothesis]) -> SimulatedWindows:
         """Simulate every window with every hypothesis.
 
         RecordingError says that a needed gain is open, RobotError that a robot is impossible.

@@ -8,12 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
+from hopping_leg.identify import initial_states, parameters, simulate
 from hopping_leg.identify.cost import measured
-from hopping_leg.identify.initial_states import SETTLING, has_encoder_offsets
-from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.recording_format import PAIRS, Pair
-from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import Window, cut, duration
 from hopping_leg.robot.model import TIMESTEP
 
@@ -37,7 +35,7 @@ class Validation:
 
 def validate(
     recordings: Sequence[Recording],
-    hypothesis: LegHypothesis,
+    hypothesis: parameters.LegHypothesis,
     timestep: float = TIMESTEP,
     threads: int = 0,
 ) -> Validation:
@@ -60,7 +58,7 @@ def validate(
 
 def open_loop(
     recordings: Sequence[Recording],
-    hypothesis: LegHypothesis,
+    hypothesis: parameters.LegHypothesis,
     horizon: float,
     timestep: float = TIMESTEP,
     threads: int = 0,
@@ -77,14 +75,14 @@ def open_loop(
 def _errors(
     recordings: Sequence[Recording],
     windows: Sequence[Window],
-    hypothesis: LegHypothesis,
+    hypothesis: parameters.LegHypothesis,
     timestep: float,
     threads: int,
     *quantities: str,
 ) -> list[Pair]:
     if not windows:
         return [(math.nan, math.nan)] * len(quantities)
-    simulator = WindowSimulator(recordings, windows, timestep=timestep, threads=threads)
+    simulator = simulate.WindowSimulator(recordings, windows, timestep=timestep, threads=threads)
     simulated = simulator.run([hypothesis])
     return [rms(getattr(simulated, q)[0] - measured(simulator, q)) for q in quantities]
 
@@ -112,7 +110,7 @@ def _starts_known(recordings: Sequence[Recording], window: Window) -> bool:
     """Return whether a window starts in or next to measured rows, after those that tell offsets."""
     recording = recordings[window.recording]
     since = recording.time[window.start] - recording.time[0]
-    if has_encoder_offsets(recording.metadata) and since < SETTLING:
+    if initial_states.has_encoder_offsets(recording.metadata) and since < initial_states.SETTLING:
         return False
     state = recording.array("position")[window.start], recording.array("velocity")[window.start]
     return bool(np.isfinite(state).all()) or recording.has("position_estimate")
@@ -155,7 +153,7 @@ class Overlay:
 
 def overlays(
     recordings: Sequence[Recording],
-    hypotheses: Sequence[LegHypothesis],
+    hypotheses: Sequence[parameters.LegHypothesis],
     timestep: float,
     threads: int = 0,
 ) -> list[Overlay]:
@@ -165,7 +163,9 @@ def overlays(
         restarted = recording.metadata.onboard == "torque"
         length, unscored = (RESTART, 0.0) if restarted else (None, skip)
         windows = cut([recording], length, unscored=unscored)
-        simulator = WindowSimulator([recording], windows, timestep=timestep, threads=threads)
+        simulator = simulate.WindowSimulator(
+            [recording], windows, timestep=timestep, threads=threads
+        )
         found, known, simulated = simulator.run(hypotheses), {}, {}
         for name in ("position", "torque"):
             values = measured(simulator, name)[None]

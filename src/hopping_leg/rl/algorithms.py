@@ -7,9 +7,7 @@ from typing import Any
 import torch
 from torch import nn
 
-from hopping_leg.rl.resumable import ResumablePPO, ResumableSAC
-from hopping_leg.rl.sb3_env import TaskVecEnv
-from hopping_leg.rl.sb3_policies import AsymmetricPolicy, AsymmetricSACPolicy
+from hopping_leg.rl import resumable, sb3_env, sb3_policies
 
 
 @dataclass(frozen=True)
@@ -49,11 +47,13 @@ class PPOConfig:
     log_std_until: float = 0.6
     """Share of the training after which exploration quietens no more."""
 
-    def make_model(self, env: TaskVecEnv, network: NetworkConfig, seed: int) -> ResumablePPO:
+    def make_model(
+        self, env: sb3_env.TaskVecEnv, network: NetworkConfig, seed: int
+    ) -> resumable.ResumablePPO:
         """Build PPO, with an asymmetric critic if it is privileged."""
         seen = {"actor_size": env.task.observation.size} if network.privileged_critic else {}
-        return ResumablePPO(
-            AsymmetricPolicy if network.privileged_critic else "MlpPolicy",
+        return resumable.ResumablePPO(
+            sb3_policies.AsymmetricPolicy if network.privileged_critic else "MlpPolicy",
             env,
             learning_rate=self.rate,
             **self.options(seed),
@@ -125,12 +125,14 @@ class SACConfig:
     log_std: float = -2.0
     """Initial log standard deviation of gSDE's weights."""
 
-    def make_model(self, env: TaskVecEnv, network: NetworkConfig, seed: int) -> ResumableSAC:
+    def make_model(
+        self, env: sb3_env.TaskVecEnv, network: NetworkConfig, seed: int
+    ) -> resumable.ResumableSAC:
         """Build SAC, with asymmetric critics if they are privileged."""
         rate = self.learning_rate
         seen = {"actor_size": env.task.observation.size} if network.privileged_critic else {}
-        return ResumableSAC(
-            AsymmetricSACPolicy if network.privileged_critic else "MlpPolicy",
+        return resumable.ResumableSAC(
+            sb3_policies.AsymmetricSACPolicy if network.privileged_critic else "MlpPolicy",
             env,
             learning_rate=lambda remaining: rate * (0.1 + 0.9 * remaining),
             buffer_size=self.buffer_size,

@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from hopping_leg.errors import UsageError
-from hopping_leg.io import replace_at
+from hopping_leg import errors, io
 from hopping_leg.rl.checkpoint import Tree
 
 _TABLE = """
@@ -47,16 +46,18 @@ def upgrade_config(stored: dict[str, Any]) -> dict[str, Any]:
     for name, value in flat.items():
         if name in _GONE:
             if value != _GONE[name]:
-                raise UsageError(f"The run has {name} = {value}, which can no longer be trained.")
+                raise errors.UsageError(
+                    f"The run has {name} = {value}, which can no longer be trained."
+                )
         elif name == "hidden":
             new["network"] = {**new.get("network", {}), "actor": value, "critic": value}
         elif name == "task.alike_at_first":
-            new = replace_at(new, "task.randomize_from_start", not value)
+            new = io.replace_at(new, "task.randomize_from_start", not value)
         else:
             renamed = name.replace("aiming.", "distillation.integrator.", 1)
-            new = replace_at(new, names.get(name, renamed), value)
+            new = io.replace_at(new, names.get(name, renamed), value)
     if recipe in _MEMORY:
-        new = replace_at(new, "distillation.student.memory", _MEMORY[recipe])
+        new = io.replace_at(new, "distillation.student.memory", _MEMORY[recipe])
     recipe = "precise" if recipe == "recurrent" else recipe
     seeds = stored.get("number_of_starts", 1)
     return {**stored, "recipe": recipe, "options": new, "parallel_seeds": seeds}

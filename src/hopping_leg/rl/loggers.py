@@ -9,8 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from stable_baselines3.common.logger import KVWriter, Logger, configure
 
-from hopping_leg.errors import UsageError
-from hopping_leg.io import write_atomically
+from hopping_leg import errors, io
 
 Log = Literal["tensorboard", "wandb", "trackio"]
 
@@ -25,7 +24,7 @@ def check_log(log: Log) -> None:
     try:
         importlib.import_module(log)
     except ImportError as error:
-        raise UsageError(
+        raise errors.UsageError(
             f"--log {log} needs the package {log}, which is not installed: pip install {log}."
         ) from error
 
@@ -59,7 +58,7 @@ class Dashboard(KVWriter):  # type: ignore[misc]
             )
         except Exception as error:
             reason = (str(error) or type(error).__name__).splitlines()[0]
-            raise UsageError(
+            raise errors.UsageError(
                 f"{package} did not start: {reason}; set it up or leave --log out."
             ) from error
 
@@ -83,5 +82,5 @@ def _identity(folder: Path) -> str:
     """Return the run's identity, the same after every resumption."""
     file = folder / "wandb-id"
     if not file.exists():
-        write_atomically(file, uuid.uuid4().hex[:8].encode())
+        io.write_atomically(file, uuid.uuid4().hex[:8].encode())
     return file.read_text(encoding="utf-8")

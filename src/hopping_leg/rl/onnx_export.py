@@ -14,11 +14,10 @@ import numpy.typing as npt
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
+from hopping_leg import errors, io
 from hopping_leg.arrays import Array
 from hopping_leg.controllers.observation_history import make_observation_history
 from hopping_leg.controllers.policy import MEMORY, METADATA_KEY, NEXT_MEMORY, Card
-from hopping_leg.errors import PolicyError, UsageError
-from hopping_leg.io import write_atomically
 
 ACTIVATIONS = {"relu": "Relu", "tanh": "Tanh", "elu": "Elu"}
 """Activation of hidden layers, to its ONNX operator."""
@@ -229,7 +228,7 @@ class Network:
 
     def __post_init__(self) -> None:
         if self.activation not in ACTIVATIONS or self.squash not in SQUASHES:
-            raise UsageError(
+            raise errors.UsageError(
                 f"Activation '{self.activation}' with squash '{self.squash}' cannot be exported;"
                 f" valid: {', '.join(ACTIVATIONS)} with {' or '.join(SQUASHES)}."
             )
@@ -277,20 +276,24 @@ def build_policy(network: Network, card: Card) -> bytes:
 
 def save_policy(path: Path, network: Network, card: Card) -> None:
     """Write a policy file; an existing one is replaced only once the new one is complete."""
-    write_atomically(path, build_policy(network, card))
+    io.write_atomically(path, build_policy(network, card))
 
 
 def read_network(content: bytes) -> Network:
     """Return a policy file's actor; ``PolicyError`` if it was made elsewhere or remembers."""
     graph = onnx.load_from_string(content).graph
     if MEMORY in (given.name for given in graph.input):
-        raise PolicyError("The policy remembers; only weights of one that does not can be read.")
+        raise errors.PolicyError(
+            "The policy remembers; only weights of one that does not can be read."
+        )
     stored = {w.name: numpy_helper.to_array(w).astype(np.float64) for w in graph.initializer}
     hidden = {node.op_type for node in graph.node if node.output[0].startswith("hidden_")}
     names = {operator: name for name, operator in ACTIVATIONS.items()}
     count = sum(name.startswith("weight_") for name in stored)
     if not {"offset", "gain", "weight_0"} <= stored.keys() or len(hidden & names.keys()) != 1:
-        raise PolicyError("The policy's graph has no dense layers as `hop train` writes them.")
+        raise errors.PolicyError(
+            "The policy's graph has no dense layers as `hop train` writes them."
+        )
     layers: list[tuple[Array, Array]] = [
         (stored[f"weight_{i}"].T.copy(), stored[f"bias_{i}"]) for i in range(count)
     ]
@@ -318,7 +321,9 @@ def expose_hidden(content: bytes, shuffle: int | None = None) -> bytes:
     names = [name for node in graph.node for name in node.output if name.startswith(PREFIX)]
     inside = [*names, *(given.name for given in graph.output if given.name == NEXT_MEMORY)]
     if not inside:
-        raise PolicyError("The policy's graph names no hidden layer; export it with `hop train`.")
+        raise errors.PolicyError(
+            "The policy's graph names no hidden layer; export it with `hop train`."
+        )
     if shuffle is not None:
         rng = np.random.default_rng(shuffle)
         last = max(i for i, node in enumerate(graph.node) if set(inside) & set(node.output))

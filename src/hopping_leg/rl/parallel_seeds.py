@@ -12,11 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from hopping_leg import errors, io
 from hopping_leg.controllers.policy import Policy
-from hopping_leg.errors import UsageError
-from hopping_leg.io import write_atomically, write_json
-from hopping_leg.rl.loggers import Log
-from hopping_leg.rl.model_card import write_card
+from hopping_leg.rl import loggers, model_card, run_folder
 from hopping_leg.rl.policy_evaluation import (
     DECIDING_SEEDS,
     as_rows,
@@ -25,7 +23,6 @@ from hopping_leg.rl.policy_evaluation import (
     score,
 )
 from hopping_leg.rl.recipe import Recipe
-from hopping_leg.rl.run_folder import RunFolder, read_result
 from hopping_leg.rl.train import Trained, check, train
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.workers import ProcessWorkers
@@ -53,7 +50,7 @@ class ParallelSeeds:
     threads: int = 1
     """Threads of each."""
     quiet: bool = False
-    log: Log = "tensorboard"
+    log: loggers.Log = "tensorboard"
     source: Path | None = None
 
     def train(self, *, resume: bool = False) -> Trained:
@@ -64,21 +61,21 @@ class ParallelSeeds:
         ``train`` does.
         """
         if self.count < 1:
-            raise UsageError(f"--parallel-seeds is {self.count} but must be at least 1.")
+            raise errors.UsageError(f"--parallel-seeds is {self.count} but must be at least 1.")
         if self.count == 1:
             return self._train(0, self.threads, resume=resume, quiet=self.quiet)
         if self.source is not None:
-            raise UsageError(
+            raise errors.UsageError(
                 "--source begins from one run's checkpoint; leave --parallel-seeds out."
             )
         if self.recipe.source is not None:
-            raise UsageError(
+            raise errors.UsageError(
                 f"Recipe {self.recipe.source} is known to this process alone; leave"
                 " --parallel-seeds out and train one --seed after the other."
             )
         check(self.robot, self.minutes, self.log)
         recipe = self.recipe.fit(self.robot)
-        folder = RunFolder(
+        folder = run_folder.RunFolder(
             self.out, recipe, self.robot, self.seed, self.minutes, parallel_seeds=self.count
         )
         folder.begin(resume=resume)
@@ -106,7 +103,7 @@ class ParallelSeeds:
             decision = self._try(folder)
         except _ComparableError as early_score:
             decision = dict(zip(("score_m", "minutes"), early_score.args, strict=True))
-        write_json(folder / _DECISION, {"seed": self._seed(number), **decision})
+        io.write_json(folder / _DECISION, {"seed": self._seed(number), **decision})
 
     def _train(
         self,
@@ -141,7 +138,7 @@ class ParallelSeeds:
         commands = every_centimetre(self.recipe.fit(self.robot).selection.eval_commands)
         rate = self.recipe.task.rate
         results = evaluate_policy(policy, self.robot, commands, DECIDING_SEEDS, rate, self.threads)
-        minutes = read_result(folder)["minutes"] + (time.monotonic() - began) / 60
+        minutes = run_folder.read_result(folder)["minutes"] + (time.monotonic() - began) / 60
         return {"score_m": score(results), "minutes": minutes, "trials": as_rows(results)}
 
     def _decision(self, number: int) -> dict[str, Any] | None:
@@ -149,7 +146,7 @@ class ParallelSeeds:
         file = self.folder(number) / _DECISION
         return json.loads(file.read_text(encoding="utf-8")) if file.exists() else None
 
-    def _finish(self, folder: RunFolder) -> Trained:
+    def _finish(self, folder: run_folder.RunFolder) -> Trained:
         """Go on with the best of them where it is not finished, and keep its policy."""
         decisions = [d for number in range(self.count) if (d := self._decision(number))]
         chosen = min(range(self.count), key=lambda number: float(decisions[number]["score_m"]))
@@ -158,7 +155,7 @@ class ParallelSeeds:
             self._train(chosen, self.count * self.threads, quiet=self.quiet)
         # The last of them to be comparable is waited for.
         slowest = max(decision["minutes"] for decision in decisions)
-        own = read_result(best)
+        own = run_folder.read_result(best)
         result = {
             **own,
             **folder.config,
@@ -168,8 +165,8 @@ class ParallelSeeds:
             "chosen_seed": chosen,
         }
         folder.write("result.json", result)
-        write_card(folder.path)
-        write_atomically(folder.policy, (best / "policy.onnx").read_bytes())
+        model_card.write_card(folder.path)
+        io.write_atomically(folder.policy, (best / "policy.onnx").read_bytes())
         return Trained(folder.policy, result["minutes"], own["steps"])
 
 

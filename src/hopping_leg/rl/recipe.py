@@ -18,11 +18,8 @@ from hopping_leg.envs import (
     paper_reward,
 )
 from hopping_leg.io import replace_at
-from hopping_leg.rl.algorithms import NetworkConfig, PPOConfig, SACConfig
+from hopping_leg.rl import algorithms, onnx_export, sb3_env, sb3_policies
 from hopping_leg.rl.distillation.distillation import Distillation
-from hopping_leg.rl.onnx_export import Network
-from hopping_leg.rl.sb3_env import TaskVecEnv
-from hopping_leg.rl.sb3_policies import network_of
 from hopping_leg.robot.parameters import Robot
 
 HEIGHT = 0.30
@@ -71,9 +68,9 @@ class Recipe:
     """The learning problem."""
     reward: ApexRewardConfig | PaperRewardConfig
     """Weights of the reward's terms."""
-    algorithm: PPOConfig | SACConfig
+    algorithm: algorithms.PPOConfig | algorithms.SACConfig
     """What learns, with its hyper-parameters; the teacher's where there is a distillation."""
-    network: NetworkConfig
+    network: algorithms.NetworkConfig
     """Sizes of its networks."""
     schedule: Schedule
     """How much of what."""
@@ -121,11 +118,11 @@ class Recipe:
             found = getattr(found, part)
         return found
 
-    def make_env(self, robot: Robot, seed: int, threads: int = 1) -> TaskVecEnv:
+    def make_env(self, robot: Robot, seed: int, threads: int = 1) -> sb3_env.TaskVecEnv:
         """Build the training environment."""
         rng, count = np.random.default_rng(seed), self.schedule.num_envs
         task = HoppingTask(robot, count, self.task, self.make_reward(robot), rng, threads)
-        return TaskVecEnv(task, privileged=self.network.privileged_critic)
+        return sb3_env.TaskVecEnv(task, privileged=self.network.privileged_critic)
 
     def make_reward(self, robot: Robot) -> Reward:
         """Build the reward."""
@@ -136,14 +133,14 @@ class Recipe:
             reward = apex_reward(robot, self.reward, self.task.rate)
         return reward.with_terms(*self.reward_terms) if self.reward_terms else reward
 
-    def make_model(self, env: TaskVecEnv, seed: int) -> Any:  # noqa: ANN401
+    def make_model(self, env: sb3_env.TaskVecEnv, seed: int) -> Any:  # noqa: ANN401
         """Build the untrained stable-baselines3 model, a subclass of ``AtBoundary``."""
         if self.distillation is None:
             return self.algorithm.make_model(env, self.network, seed)
         commands = self.selection.eval_commands
         return self.distillation.make_model(env, self._ppo, self.network, commands, seed)
 
-    def anneal(self, model: Any, env: TaskVecEnv, share: float) -> None:  # noqa: ANN401
+    def anneal(self, model: Any, env: sb3_env.TaskVecEnv, share: float) -> None:  # noqa: ANN401
         """Adapt to the share of the training that is done, 0 to 1.
 
         Called before every rollout, also of a resumed training: depends on ``share`` alone.
@@ -162,15 +159,15 @@ class Recipe:
         """Return what else the result of a finished training tells, as JSON values."""
         return self.distillation.extra_results(model) if self.distillation else {}
 
-    def actor(self, model: Any, env: TaskVecEnv) -> Network:  # noqa: ANN401
+    def actor(self, model: Any, env: sb3_env.TaskVecEnv) -> onnx_export.Network:  # noqa: ANN401
         """Return the deterministic actor as it stands."""
         if self.distillation is not None:
             return self.distillation.network(model, env)
-        return network_of(model, env.task.observation)
+        return sb3_policies.network_of(model, env.task.observation)
 
     @property
-    def _ppo(self) -> PPOConfig:
-        assert isinstance(self.algorithm, PPOConfig), "a teacher learns by PPO"
+    def _ppo(self) -> algorithms.PPOConfig:
+        assert isinstance(self.algorithm, algorithms.PPOConfig), "a teacher learns by PPO"
         return self.algorithm
 
     def fit(self, robot: Robot) -> Self:

@@ -7,10 +7,8 @@ from typing import Any
 
 from hopping_leg.errors import UsageError
 from hopping_leg.io import versions, write_json
-from hopping_leg.rl.checkpoint import Tree, list_checkpoints, read_checkpoint
-from hopping_leg.rl.legacy_names import upgrade_checkpoint, upgrade_config
+from hopping_leg.rl import checkpoint, legacy_names, recipes
 from hopping_leg.rl.recipe import Recipe
-from hopping_leg.rl.recipes import RECIPES, words_of
 from hopping_leg.robot.parameters import Robot
 
 _LIBRARIES = ("hopping-leg", "mujoco", "numpy", "onnxruntime", "stable-baselines3", "torch")
@@ -33,7 +31,7 @@ class RunFolder:
         parallel_seeds: int = 1,
     ) -> None:
         self.path, self._source = path, source
-        self._defaults = as_stored(asdict(RECIPES.get(recipe.name, recipe)))
+        self._defaults = as_stored(asdict(recipes.RECIPES.get(recipe.name, recipe)))
         self.config = as_stored(
             {
                 "recipe": recipe.name,
@@ -72,35 +70,42 @@ class RunFolder:
             words += ["--minutes", f"{config['minutes_budget']:g}"]
         if config["parallel_seeds"] > 1:
             words += ["--parallel-seeds", str(config["parallel_seeds"])]
-        return " ".join([*words, *words_of(config["recipe"], config["options"])])
+        return " ".join([*words, *recipes.words_of(config["recipe"], config["options"])])
 
     def snapshot(self, steps: int) -> Path:
         """Return the file of the policy as it was after so many steps."""
         return self.path / "snapshots" / f"{steps:012d}.onnx"
 
-    def begin(self, *, resume: bool) -> Tree | None:
+    def begin(self, *, resume: bool) -> checkpoint.Tree | None:
         """Prepare the folder; return the newest checkpoint if there is one to resume from.
 
         Raises:
             UsageError: The folder holds a run and ``resume`` is off, or another or finished run.
         """
         new = is_new(self.path, resume=resume)
-        found = [] if new else list_checkpoints(self.checkpoints)
+        found = [] if new else checkpoint.list_checkpoints(self.checkpoints)
         if not new:
             self.check_same()
             refuse_finished(self.policy)
-        tree = upgrade_checkpoint(read_checkpoint(found[-1])) if found else self._from_source()
+        tree = (
+            legacy_names.upgrade_checkpoint(checkpoint.read_checkpoint(found[-1]))
+            if found
+            else self._from_source()
+        )
         if new:
             self.write("config.json", self.config)
         return tree
 
-    def _from_source(self) -> Tree | None:
+    def _from_source(self) -> checkpoint.Tree | None:
         if self._source is None:
             return None
-        found = list_checkpoints(self._source / "checkpoints")
+        found = checkpoint.list_checkpoints(self._source / "checkpoints")
         if not found:
             raise UsageError(f"{self._source} holds no checkpoint to begin from.")
-        return {**upgrade_checkpoint(read_checkpoint(found[-1])), "history": []}
+        return {
+            **legacy_names.upgrade_checkpoint(checkpoint.read_checkpoint(found[-1])),
+            "history": [],
+        }
 
     def write(self, name: str, content: Any) -> None:  # noqa: ANN401
         """Write a JSON file of the folder, whole or not at all."""
@@ -108,7 +113,7 @@ class RunFolder:
 
     def check_same(self) -> None:
         """Raise ``UsageError`` where the run in the folder was asked for something else."""
-        stored = upgrade_config(read_json(self.path / "config.json"))
+        stored = legacy_names.upgrade_config(read_json(self.path / "config.json"))
         # A run from before an option existed was asked for what is its default.
         _complete(stored.get("options", {}), self._defaults)
         stored.setdefault("parallel_seeds", 1)

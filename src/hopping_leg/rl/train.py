@@ -10,15 +10,11 @@ from typing import Any
 import torch
 from rich.progress import TextColumn, TimeRemainingColumn
 
+from hopping_leg import errors, io
 from hopping_leg.controllers.policy import Card, Policy
-from hopping_leg.errors import RobotError, UsageError
-from hopping_leg.io import write_atomically
 from hopping_leg.progress import LiveProgress
-from hopping_leg.rl import resumable
+from hopping_leg.rl import loggers, model_card, onnx_export, resumable, run_folder
 from hopping_leg.rl.checkpoint import write_checkpoint
-from hopping_leg.rl.loggers import Log, check_log, make_logger
-from hopping_leg.rl.model_card import write_card
-from hopping_leg.rl.onnx_export import build_policy
 from hopping_leg.rl.policy_evaluation import (
     FINAL_SEEDS,
     FIRST_SEED,
@@ -27,7 +23,6 @@ from hopping_leg.rl.policy_evaluation import (
     score,
 )
 from hopping_leg.rl.recipe import Recipe
-from hopping_leg.rl.run_folder import RunFolder
 from hopping_leg.robot.parameters import Robot
 
 
@@ -80,7 +75,7 @@ def train(
     minutes: float | None = None,
     threads: int = 1,
     quiet: bool = False,
-    log: Log = "tensorboard",
+    log: loggers.Log = "tensorboard",
     on_snapshot: Callable[[int, float], None] = lambda _steps, _score: None,
     on_early_score: Callable[[float, float], None] | None = None,
 ) -> Trained:
@@ -112,10 +107,10 @@ def train(
     check(robot, minutes, log)
     torch.set_num_threads(max(threads, 1))
     recipe = recipe.fit(robot)
-    folder = RunFolder(out, recipe, robot, seed, minutes, source)
+    folder = run_folder.RunFolder(out, recipe, robot, seed, minutes, source)
     tree = folder.begin(resume=resume)
     trainer = Trainer(recipe, robot, seed, folder, minutes, threads)
-    trainer.model.set_logger(make_logger(folder.path, log, folder.config))
+    trainer.model.set_logger(loggers.make_logger(folder.path, log, folder.config))
     trainer.on_snapshot, trainer.on_early_score = on_snapshot, on_early_score
     if tree is not None:
         trainer.restore(tree)
@@ -123,13 +118,13 @@ def train(
         return trainer.run(progress)
 
 
-def check(robot: Robot, minutes: float | None, log: Log) -> None:
+def check(robot: Robot, minutes: float | None, log: loggers.Log) -> None:
     """Refuse what cannot be trained before anything is written, raising as ``train`` does."""
-    check_log(log)
+    loggers.check_log(log)
     if minutes is not None and not 0 < minutes < float("inf"):
-        raise UsageError(f"--minutes is {minutes:g} but must be positive.")
+        raise errors.UsageError(f"--minutes is {minutes:g} but must be positive.")
     if not robot.reality.only_delays:
-        raise RobotError(
+        raise errors.RobotError(
             f"{robot.name} has effects in [reality] that training does not know; train on what is"
             " believed of it, the robot that its file extends or one from `hop identify`, and"
             " judge the policy on it with `hop evaluate`."
@@ -144,7 +139,7 @@ class Trainer:
         recipe: Recipe,
         robot: Robot,
         seed: int,
-        folder: RunFolder,
+        folder: run_folder.RunFolder,
         minutes: float | None,
         threads: int,
     ) -> None:
@@ -204,8 +199,8 @@ class Trainer:
             **recipe.extra_results(model),
         }
         self.folder.write("result.json", {**self.folder.config, **result})
-        write_card(self.folder.path)
-        write_atomically(self.folder.policy, content)
+        model_card.write_card(self.folder.path)
+        io.write_atomically(self.folder.policy, content)
         return Trained(self.folder.policy, minutes, steps)
 
     def tick(self) -> bool:
@@ -260,7 +255,7 @@ class Trainer:
             steps=int(self.model.num_timesteps),
             versions=self.folder.config["versions"],
         )
-        return build_policy(recipe.actor(self.model, self.env), card)
+        return onnx_export.build_policy(recipe.actor(self.model, self.env), card)
 
     def _evaluate(self) -> None:
         steps = int(self.model.num_timesteps)
@@ -295,7 +290,7 @@ FINALISTS = 4
 class Selection:
     """Tries every snapshot on one seed; the best few again on others, and one of those wins."""
 
-    def __init__(self, recipe: Recipe, robot: Robot, folder: RunFolder) -> None:
+    def __init__(self, recipe: Recipe, robot: Robot, folder: run_folder.RunFolder) -> None:
         self._recipe, self._robot, self._folder = recipe, robot, folder
         self.rows: list[dict[str, Any]] = []
         """Every snapshot so far: steps, minutes, score and trials, as JSON values."""
@@ -308,7 +303,7 @@ class Selection:
 
     def add(self, steps: int, minutes: float, content: bytes) -> dict[str, Any]:
         """Keep and try a policy file; return its row."""
-        write_atomically(self._folder.snapshot(steps), content)
+        io.write_atomically(self._folder.snapshot(steps), content)
         row = {"steps": steps, "minutes": minutes, **self._trials(content, (FIRST_SEED,))}
         self.rows.append(row)
         return row

@@ -24,10 +24,8 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.io import plain, versions
-from hopping_leg.rl.policy_evaluation import FINAL_SEEDS, FIRST_SEED
+from hopping_leg.rl import policy_evaluation, recipes, run_folder
 from hopping_leg.rl.recipe import Recipe
-from hopping_leg.rl.recipes import SPACES, change, get_recipe
-from hopping_leg.rl.run_folder import read_result
 from hopping_leg.rl.search_space import Tuning, defaults
 from hopping_leg.rl.train import train
 from hopping_leg.robot import load_robot
@@ -76,9 +74,9 @@ _PATIENCE = 60.0
 
 def conditions(tuning: Tuning) -> dict[str, Any]:
     """Return what all trials of a study share, as JSON values; ``UsageError`` without a space."""
-    if tuning.recipe not in SPACES:
+    if tuning.recipe not in recipes.SPACES:
         raise UsageError(
-            f"Recipe '{tuning.recipe}' has no search space; valid: {', '.join(SPACES)}."
+            f"Recipe '{tuning.recipe}' has no search space; valid: {', '.join(recipes.SPACES)}."
         )
     return {
         "recipe": tuning.recipe,
@@ -86,9 +84,9 @@ def conditions(tuning: Tuning) -> dict[str, Any]:
         "steps": tuning.steps,
         "snapshots": tuning.snapshots,
         "training_seed": tuning.seed,
-        "selection_seeds": [FIRST_SEED, *FINAL_SEEDS],
+        "selection_seeds": [policy_evaluation.FIRST_SEED, *policy_evaluation.FINAL_SEEDS],
         "fixed": list(tuning.set),
-        "space": {n: dataclasses.asdict(d) for n, d in SPACES[tuning.recipe].items()},
+        "space": {n: dataclasses.asdict(d) for n, d in recipes.SPACES[tuning.recipe].items()},
     }
 
 
@@ -164,7 +162,9 @@ def open_study(tuning: Tuning, worker: int = 0) -> Study:
         seed=10_007 * begun + 97 * worker + tuning.seed,
     )
     if not begun:
-        study.enqueue_trial(defaults(_recipe(tuning), SPACES[tuning.recipe]), skip_if_exists=True)
+        study.enqueue_trial(
+            defaults(_recipe(tuning), recipes.SPACES[tuning.recipe]), skip_if_exists=True
+        )
     return study
 
 
@@ -202,12 +202,12 @@ def _lock_before_reading(engine: Engine) -> None:
 
 def _run_trial(trial: Trial, tuning: Tuning) -> float:
     """Train with a trial's numbers; return the score of the policy it selects, m."""
-    space = SPACES[tuning.recipe]
+    space = recipes.SPACES[tuning.recipe]
     values = {name: found.suggest(trial, name) for name, found in space.items()}
     recipe = _recipe(tuning).replace(values)
     folder = tuning.folder / f"trial-{trial.user_attrs.get(FOLDER, trial.number):04d}"
     if (folder / "policy.onnx").exists():
-        return float(read_result(folder)["selected"]["score_m"])
+        return float(run_folder.read_result(folder)["selected"]["score_m"])
 
     def watch(steps: int, score: float) -> None:
         trial.report(score, steps * tuning.snapshots // tuning.steps)
@@ -226,7 +226,7 @@ def _run_trial(trial: Trial, tuning: Tuning) -> float:
     except _FAILURES as error:
         trial.set_user_attr(ERROR, f"{type(error).__name__}: {error}")
         raise
-    return float(read_result(folder)["selected"]["score_m"])
+    return float(run_folder.read_result(folder)["selected"]["score_m"])
 
 
 def _reach(tuning: Tuning, address: str, workers: int | None) -> RayWorkers:
@@ -256,7 +256,7 @@ def _over(study: Study, tuning: Tuning) -> bool:
 
 def _recipe(tuning: Tuning) -> Recipe:
     """Return the recipe with what all trials share."""
-    recipe = get_recipe(tuning.recipe).replace(
+    recipe = recipes.get_recipe(tuning.recipe).replace(
         steps=tuning.steps, eval_every=max(tuning.steps // tuning.snapshots, 1)
     )
-    return change(recipe, tuning.set)
+    return recipes.change(recipe, tuning.set)

@@ -14,31 +14,25 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from hopping_leg import io, trace
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.entries import Entry
 from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.evaluate.runner import evaluate
-from hopping_leg.identify.cost import Scoring
-from hopping_leg.identify.excitation import make_excitation
-from hopping_leg.identify.optimizers import CmaOptions
+from hopping_leg.identify import cost, excitation, optimizers, parameters, plan, play_excitation
 from hopping_leg.identify.paper_excitation import Strokes, adapt, fixed_base, moving_base
-from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
-from hopping_leg.identify.plan import make_plan
-from hopping_leg.identify.play_excitation import play
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.identify.recording_format import Rig
 from hopping_leg.identify.result import Identified, as_json, save_robot
 from hopping_leg.identify.search import SearchOptions
-from hopping_leg.io import write_json
 from hopping_leg.robot import Robot, load_robot
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 from hopping_leg.sim_to_real.jobs import Job
 from hopping_leg.sim_to_real.methods import Fit, Method
 from hopping_leg.sim_to_real.study import USUAL_FIT, Study, TwinFile
-from hopping_leg.trace import Trace
 
 if TYPE_CHECKING:
     from hopping_leg.rl.recipe import Recipe
@@ -116,15 +110,15 @@ class RecordTwin(StoredJob):
     @property
     def stored(self) -> dict[str, Any]:
         """The same entries of the recording's header."""
-        header = Trace.load(self.file).header
+        header = trace.Trace.load(self.file).header
         return {name: header[name] for name in ("robot_digest", "seconds")}
 
     def run(self, *, quiet: bool) -> None:
         """Play the paper's trajectory and write the recording."""
         believed = load_robot(self.twin.believed)
         template = adapt(self._template(), believed)
-        recording = play(
-            make_excitation(template, believed),
+        recording = play_excitation.play(
+            excitation.make_excitation(template, believed),
             self.twin.robot,
             believed=self.twin.believed,
             seed=0 if self.rig == "fixed-base" else 1,
@@ -189,19 +183,20 @@ class IdentifyTwin(StoredJob):
         study, search = self.study, self.fit.search
         believed = load_robot(self.twin.believed)
         effort = SearchOptions(
-            cma=CmaOptions(generations=study.generations), least_squares=study.least_squares
+            cma=optimizers.CmaOptions(generations=study.generations),
+            least_squares=study.least_squares,
         )
         recordings = [load_recording(path) for path in self._recordings]
         options = IdentifyOptions(search=search, bounds=_bounds(believed), effort=effort)
         if search == "one-pass":
-            names = make_plan(recordings, believed, search="two-pass").parameters.names
+            names = plan.make_plan(recordings, believed, search="two-pass").parameters.names
             options = dataclasses.replace(
-                options, search="cma", parameters=tuple(names), scoring=Scoring()
+                options, search="cma", parameters=tuple(names), scoring=cost.Scoring()
             )
         folder = self.file.with_suffix("")
         identified = identify(recordings, believed, options=options, folder=folder, resume=True)
         content = {"asked": self.asked, **as_json(identified), "truth": self._truth(identified)}
-        write_json(self.file.with_suffix(".json"), content)
+        io.write_json(self.file.with_suffix(".json"), content)
         save_robot(identified, self.file, self.twin.believed)
 
     @property
@@ -210,7 +205,7 @@ class IdentifyTwin(StoredJob):
 
     def _truth(self, identified: Identified) -> dict[str, float]:
         """Return the twin's own values of what was fitted, where it has them."""
-        truth = LegHypothesis(self.twin.without_surprises)
+        truth = parameters.LegHypothesis(self.twin.without_surprises)
         names = identified.passes[-1].parameters.names
         values = {name: truth.get(name) for name in names if not name.startswith("drive.")}
         if "drive.delay" in names:
@@ -360,7 +355,7 @@ class HopTrial(StoredJob):
     def run(self, *, quiet: bool) -> None:
         """Try the policy at every command and write what was measured."""
         rows = hop(self.policy, self.leg, self.study)
-        write_json(self.file, {"asked": self.asked, "rows": rows})
+        io.write_json(self.file, {"asked": self.asked, "rows": rows})
 
     def measured(self) -> list[dict[str, Any]]:
         """Return what was measured, one row per command."""

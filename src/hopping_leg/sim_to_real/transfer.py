@@ -8,8 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from hopping_leg.arrays import Array, IntArray
-from hopping_leg.evaluate.runner import software_versions
-from hopping_leg.evaluate.statistics import bootstrap, median_interval
+from hopping_leg.evaluate import runner, statistics
 from hopping_leg.sim_to_real.jobs import Board, Job, work
 from hopping_leg.sim_to_real.methods import Method
 from hopping_leg.sim_to_real.stages import (
@@ -146,7 +145,7 @@ def about(study: Study) -> Row:
         "recording_seconds": study.seconds,
         "evaluation_seed": FIRST_SEED,
         "evaluation_seeds": study.repeats,
-        "versions": software_versions(),
+        "versions": runner.software_versions(),
     }
 
 
@@ -167,7 +166,7 @@ def _pooled(method: Method, trials: Sequence[Row]) -> Row:
 def _median(trials: Sequence[Row], name: str) -> Row:
     """Return the median of a number and its interval over the twins."""
     numbers = _by_twin(trials, name)
-    low, high = median_interval(numbers, _SEED)
+    low, high = statistics.median_interval(numbers, _SEED)
     start = name.removesuffix("_m")
     median = float(np.median(np.concatenate(numbers)))
     return {name: median, f"{start}_low_m": low, f"{start}_high_m": high}
@@ -268,7 +267,7 @@ def compare(first: str, other: str, trials: Sequence[dict[str, Any]], seed: int)
 
     low = high = whole = ratio(np.arange(count))
     if count > 1:
-        low, high = bootstrap((np.arange(count),), ratio, seed)
+        low, high = statistics.bootstrap((np.arange(count),), ratio, seed)
     return {
         "method": other,
         "over": first,

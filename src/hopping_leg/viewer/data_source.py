@@ -5,11 +5,10 @@ from typing import Protocol
 
 import polars as pl
 
+from hopping_leg import errors, trace
 from hopping_leg.deploy.flight_recorder import SUFFIX, FlightRecorderTail
-from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.robot import Robot, load_robot
 from hopping_leg.sim import CONTROL_RATE
-from hopping_leg.trace import Trace
 from hopping_leg.viewer.live_leg import MOST
 from hopping_leg.viewer.tracks import Track, load_track, trace_rows
 
@@ -41,7 +40,9 @@ class ReplaySource:
 
     def __init__(self, paths: tuple[Path, ...], robot: str | None = None) -> None:
         if not 1 <= len(paths) <= MOST:
-            raise UsageError(f"{len(paths)} traces were given; give one, or two side by side.")
+            raise errors.UsageError(
+                f"{len(paths)} traces were given; give one, or two side by side."
+            )
         self.notices: list[str] = []
         self.now = 0.0
         self.tracks = [load_track(path, self._robot(path, robot)) for path in paths]
@@ -60,7 +61,7 @@ class ReplaySource:
         self.now = min(max(time, 0.0), self.length)
 
     def _robot(self, path: Path, robot: str | None) -> Robot:
-        header = Trace.load(path).header
+        header = trace.Trace.load(path).header
         if robot:
             found = load_robot(robot)
         else:
@@ -76,8 +77,8 @@ class ReplaySource:
 def _load_shipped(name: str, origin: str) -> Robot:
     try:
         return load_robot(name)
-    except RobotError as error:
-        raise RobotError(
+    except errors.RobotError as error:
+        raise errors.RobotError(
             f"{origin} '{name}', which is no shipped robot; give its file with --robot."
         ) from error
 
@@ -102,7 +103,7 @@ class RecorderSource:
 
     def __init__(self, path: Path, robot: str | None = None) -> None:
         if not path.exists():
-            raise UsageError(
+            raise errors.UsageError(
                 f"There is no {path}; give a {SUFFIX} file or the folder of `hop deploy --out`."
             )
         self.tracks: list[Track] = []
@@ -140,7 +141,7 @@ class RecorderSource:
         track = self.tracks[0]
         table = pl.DataFrame(dict(zip(self._tail.columns, rows.T, strict=True)))
         last = tuple(track.moment(self.now)[1]) if len(track) else None
-        time, values, track.note = trace_rows(Trace(table), track.robot, last)
+        time, values, track.note = trace_rows(trace.Trace(table), track.robot, last)
         track.extend(time, values)
         self.now = float(time[-1])
 

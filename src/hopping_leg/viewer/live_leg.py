@@ -4,9 +4,7 @@ import numpy as np
 from mujoco import batch
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.command_schedule import Range, command_range
-from hopping_leg.controllers.protocol import Controller
-from hopping_leg.controllers.registry import load_controller
+from hopping_leg.controllers import command_schedule, protocol, registry
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.robot import Robot, SoftLimits, load_robot
@@ -52,7 +50,7 @@ class LiveSimulation:
         self._begin(controllers, self.robot)
 
     @property
-    def valid(self) -> Range:
+    def valid(self) -> command_schedule.Range:
         """Heights that every controller can be asked for, m."""
         return _shared_range(self._controllers, self.robot)
 
@@ -137,7 +135,7 @@ class LiveSimulation:
             self.settings = default_settings(robot)
         self.robot = robot
         self.names = names
-        self._controllers: list[Controller] = loaded
+        self._controllers: list[protocol.Controller] = loaded
         self.set_height(self.height)
         self._legs: list[LiveLeg] = [
             LiveLeg(c, robot, self.settings, self.height, self._seed) for c in loaded
@@ -146,14 +144,14 @@ class LiveSimulation:
         self.tracks: list[Track] = [Track(c.name, robot, depth=depth) for c in loaded]
 
 
-def _load(names: tuple[str, ...], robot: Robot) -> list[Controller]:
+def _load(names: tuple[str, ...], robot: Robot) -> list[protocol.Controller]:
     if not 1 <= len(names) <= MOST:
         raise UsageError(f"{len(names)} controllers were given; give one, or two side by side.")
-    return [load_controller(name, robot) for name in names]
+    return [registry.load_controller(name, robot) for name in names]
 
 
-def _shared_range(controllers: list[Controller], robot: Robot) -> Range:
-    ranges = [command_range(controller, robot) for controller in controllers]
+def _shared_range(controllers: list[protocol.Controller], robot: Robot) -> command_schedule.Range:
+    ranges = [command_schedule.command_range(controller, robot) for controller in controllers]
     low, high = max(low for low, _ in ranges), min(high for _, high in ranges)
     if not low < high:
         names = " and ".join(controller.name for controller in controllers)
@@ -170,7 +168,12 @@ class LiveLeg:
     """A leg that hops under a controller that believes it to be as its file has it."""
 
     def __init__(
-        self, controller: Controller, robot: Robot, settings: LiveSettings, height: float, seed: int
+        self,
+        controller: protocol.Controller,
+        robot: Robot,
+        settings: LiveSettings,
+        height: float,
+        seed: int,
     ) -> None:
         self.controller, self.robot, self.settings = controller, robot, settings
         self._rng = np.random.default_rng(seed)
@@ -185,7 +188,7 @@ class LiveLeg:
         self._force = 0.0
         self.set_controller(self.controller, height)
 
-    def set_controller(self, controller: Controller, height: float) -> None:
+    def set_controller(self, controller: protocol.Controller, height: float) -> None:
         """Go on with another controller, or the same one anew, in the present state."""
         self.controller = controller
         controller.reset(1)

@@ -9,10 +9,8 @@ import viser
 from hopping_leg.controllers.registry import controller_names
 from hopping_leg.errors import HoppingLegError
 from hopping_leg.robot import load_robot, shipped_robots
+from hopping_leg.viewer import data_source, live_leg, playback_clock
 from hopping_leg.viewer import live_settings as ranges
-from hopping_leg.viewer.data_source import ReplaySource
-from hopping_leg.viewer.live_leg import LiveSimulation
-from hopping_leg.viewer.playback_clock import SPEEDS, PlaybackClock
 
 Action = Callable[[], None]
 
@@ -73,7 +71,7 @@ class LivePanel:
     """Puts what the page asks for to a live simulation, started with a robot's name or file."""
 
     def __init__(
-        self, server: viser.ViserServer, queue: GuiQueue, live: LiveSimulation, robot: str
+        self, server: viser.ViserServer, queue: GuiQueue, live: live_leg.LiveSimulation, robot: str
     ) -> None:
         self._live = live
         gui = server.gui
@@ -193,7 +191,9 @@ def _thousandfold(bounds: ranges.Range) -> ranges.Range:
 class ReplayPanel:
     """A slider for the time, which follows the replay as it plays."""
 
-    def __init__(self, server: viser.ViserServer, queue: GuiQueue, replay: ReplaySource) -> None:
+    def __init__(
+        self, server: viser.ViserServer, queue: GuiQueue, replay: data_source.ReplaySource
+    ) -> None:
         self._replay = replay
         self._time = server.gui.add_slider(
             "Time, s", min=0.0, max=replay.length, step=0.01, initial_value=0.0
@@ -215,12 +215,14 @@ class ReplayPanel:
 class TimeControls:
     """Pause, step and speed, by buttons and keys."""
 
-    def __init__(self, server: viser.ViserServer, queue: GuiQueue, clock: PlaybackClock) -> None:
+    def __init__(
+        self, server: viser.ViserServer, queue: GuiQueue, clock: playback_clock.PlaybackClock
+    ) -> None:
         self._clock = clock
         gui = server.gui
         self._pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE, hint="Space")
         step = gui.add_button("Single step", icon=viser.Icon.PLAYER_SKIP_FORWARD, hint="Key S")
-        names = tuple(f"{speed:g}" for speed in SPEEDS)
+        names = tuple(f"{speed:g}" for speed in playback_clock.SPEEDS)
         speed = gui.add_dropdown("Speed", names, initial_value="1", hint="1 is real time")
         self._pause.on_click(queue.from_page(self._toggle))
         step.on_click(queue.from_page(self._step))

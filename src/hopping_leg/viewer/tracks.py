@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from hopping_leg import errors, hop_detection
 from hopping_leg.arrays import Array
-from hopping_leg.errors import TraceError
-from hopping_leg.hop_detection import FLIGHT_CLEARANCE, find_hops
 from hopping_leg.robot import Robot, kinematics
 from hopping_leg.trace import Trace
 
@@ -87,7 +86,7 @@ class Track:
             TraceError: There is no row.
         """
         if not self._count:
-            raise TraceError(f"{self.name} has no rows yet.")
+            raise errors.TraceError(f"{self.name} has no rows yet.")
         names = ("height_m", "hip_position_rad", "knee_position_rad")
         height, hip, knee = (float(np.interp(time, self.time, self.field(n))) for n in names)
         return height, np.array([hip, knee])
@@ -116,7 +115,7 @@ class Track:
         height, rate, clearance = (self.field(name)[part] for name in names)
         if len(height) < 2:
             return np.zeros(0), np.zeros(0)
-        hops = find_hops(height, rate, clearance)
+        hops = hop_detection.find_hops(height, rate, clearance)
         return self.time[part][hops.tick], hops.apex
 
 
@@ -156,7 +155,7 @@ def load_track(path: Path, robot: Robot) -> Track:
     """
     trace = Trace.load(path)
     if not len(trace.table):
-        raise TraceError(f"{path} holds no tick; there is nothing to show.")
+        raise errors.TraceError(f"{path} holds no tick; there is nothing to show.")
     time, values, note = trace_rows(trace, robot)
     track = Track(str(trace.header.get("controller", path.stem)), robot, note=note)
     track.extend(time, values)
@@ -166,7 +165,9 @@ def load_track(path: Path, robot: Robot) -> Track:
 def in_flight(clearance: Array) -> Array:
     """Return 1 where the foot is in the air, 0 where it is not, NaN where that is unknown."""
     return np.where(
-        np.isfinite(clearance), (clearance >= FLIGHT_CLEARANCE).astype(np.float64), np.nan
+        np.isfinite(clearance),
+        (clearance >= hop_detection.FLIGHT_CLEARANCE).astype(np.float64),
+        np.nan,
     )
 
 

@@ -11,12 +11,7 @@ import viser
 
 from hopping_leg.errors import UsageError
 from hopping_leg.sim import CONTROL_RATE
-from hopping_leg.viewer.charts import Charts, css
-from hopping_leg.viewer.data_source import DataSource, RecorderSource, ReplaySource
-from hopping_leg.viewer.live_leg import LiveSimulation
-from hopping_leg.viewer.panels import GuiQueue, LivePanel, ReplayPanel, TimeControls
-from hopping_leg.viewer.playback_clock import PlaybackClock
-from hopping_leg.viewer.scene import COLOURS, Scene
+from hopping_leg.viewer import charts, data_source, live_leg, panels, playback_clock, scene
 
 FRAME_RATE = 60.0
 _SLOW = 6
@@ -42,7 +37,7 @@ class Viewer:
 
     def __init__(
         self,
-        source: DataSource,
+        source: data_source.DataSource,
         robot: str = "",
         *,
         host: str = "127.0.0.1",
@@ -55,26 +50,26 @@ class Viewer:
         self.address = f"http://{reached_at}:{self._server.get_port()}"
         if detail is not None:
             self.address += f"/?fixedDpr={detail:g}"
-        self.clock = PlaybackClock(1 / CONTROL_RATE)
-        self._queue = GuiQueue()
+        self.clock = playback_clock.PlaybackClock(1 / CONTROL_RATE)
+        self._queue = panels.GuiQueue()
         gui = self._server.gui
-        gui.configure_theme(show_logo=False, show_share_button=False, brand_color=COLOURS[0])
+        gui.configure_theme(show_logo=False, show_share_button=False, brand_color=scene.COLOURS[0])
         gui.set_panel_label("Hopping leg")
         gui.main_panel.dock_left()
         gui.main_panel.set_width(290)
         self._status = gui.add_html("")
-        self._replay_panel: ReplayPanel | None = None
-        if isinstance(source, LiveSimulation):
-            LivePanel(self._server, self._queue, source, robot)
-        if isinstance(source, ReplaySource):
-            self._replay_panel = ReplayPanel(self._server, self._queue, source)
-        if not isinstance(source, RecorderSource):
-            TimeControls(self._server, self._queue, self.clock)
+        self._replay_panel: panels.ReplayPanel | None = None
+        if isinstance(source, live_leg.LiveSimulation):
+            panels.LivePanel(self._server, self._queue, source, robot)
+        if isinstance(source, data_source.ReplaySource):
+            self._replay_panel = panels.ReplayPanel(self._server, self._queue, source)
+        if not isinstance(source, data_source.RecorderSource):
+            panels.TimeControls(self._server, self._queue, self.clock)
         panel = gui.add_panel()
-        self._charts = Charts(self._server, panel.add_tab("Last seconds"))
+        self._charts = charts.Charts(self._server, panel.add_tab("Last seconds"))
         panel.dock_right()
         panel.set_width(390)
-        self._scene = Scene(self._server)
+        self._scene = scene.Scene(self._server)
         self.frames = 0
         self._stopped = False
 
@@ -126,12 +121,12 @@ class Viewer:
             _, apexes = track.apexes(source.now, _APEX_SECONDS)
             apex = f"{apexes[-1]:.3f} m" if len(apexes) else "none yet"
             lines.append(
-                f'<b style="color:{css(COLOURS[number])}">{html.escape(track.name)}</b>: last apex'
-                f' <span class="apex">{apex}</span>'
+                f'<b style="color:{charts.css(scene.COLOURS[number])}">'
+                f'{html.escape(track.name)}</b>: last apex <span class="apex">{apex}</span>'
             )
             if track.note:
                 lines.append(html.escape(track.note))
-        if isinstance(source, LiveSimulation):
+        if isinstance(source, live_leg.LiveSimulation):
             lines.insert(0, f'Commanded: <b><span id="command">{source.height:.3f}</span> m</b>')
         real_time = self.clock.real_time
         keeps = "" if math.isnan(real_time) else f", real time {real_time:.2f}"

@@ -8,23 +8,8 @@ from typing import Protocol
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.controllers.energy_shaping import equations
+from hopping_leg.controllers.energy_shaping import equations, phases, virtual_leg
 from hopping_leg.controllers.energy_shaping.gains import Gain, ShapingGains, ShapingOptions
-from hopping_leg.controllers.energy_shaping.phases import (
-    BRAKE_LIMIT,
-    FLIGHT_LIMIT,
-    PUSH_LIMIT,
-    Phase,
-    Phases,
-    TouchdownDetector,
-)
-from hopping_leg.controllers.energy_shaping.virtual_leg import (
-    LegView,
-    flight_torque,
-    foot_force_torque,
-    retraction,
-    view_leg,
-)
 from hopping_leg.controllers.sample_history import DatedObserver
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import Robot, kinematics
@@ -80,8 +65,8 @@ class EnergyShaping:
         self._observer = DatedObserver(self.period, self.gains.position_pull)
         self._observer.reset(count)
         debounced = self.options.contact == "debounced"
-        self._detector = TouchdownDetector(self.robot, count, debounced=debounced)
-        self._phases = Phases(count)
+        self._detector = phases.TouchdownDetector(self.robot, count, debounced=debounced)
+        self._phases = phases.Phases(count)
         self._k_ratio = np.ones(count)
         self._length_0 = np.full(count, np.nan)
         self._pushed = np.full(count, np.nan)
@@ -99,7 +84,7 @@ class EnergyShaping:
         joints = measurement.q[:, 0], measurement.qd[:, 0]
         if self.options.state == "dated":
             joints = self._observer.update(measurement)
-        leg = view_leg(self.robot, *joints)
+        leg = virtual_leg.view_leg(self.robot, *joints)
         self._length_0 = np.where(np.isnan(self._length_0), leg.length, self._length_0)
         self._pushed = np.where(np.isnan(self._pushed), command, self._pushed)
         self._phases.tick(self.period)
@@ -109,15 +94,15 @@ class EnergyShaping:
         self._end_touchdown(leg, command)
         self._end_push(leg, liftoff)
         target = kinematics.joint_angles(self.robot, np.stack([landing, 0 * landing], axis=-1))
-        posture, posture_rate = retraction(
+        posture, posture_rate = virtual_leg.retraction(
             self._liftoff_q, target, self._phases.clock, gains.retract_time
         )
-        flying = flight_torque(gains, leg, posture, posture_rate)
+        flying = virtual_leg.flight_torque(gains, leg, posture, posture_rate)
         self._end_flight(leg, posture_rate, flying, command)
         self._estimate_height(leg)
         push = self._force(leg, command, liftoff, landing)
         side = -gains.kp_y * leg.y - gains.kd_y * leg.y_rate
-        pressing = foot_force_torque(self.robot, leg.q, push, side)
+        pressing = virtual_leg.foot_force_torque(self.robot, leg.q, push, side)
         self._share, self._rate = self._pressing_share(leg, liftoff), leg.rate
         return flying + self._share[:, None] * (pressing - flying)
 
@@ -140,7 +125,9 @@ class EnergyShaping:
         gains = self.gains
         return (gains.k0 + gains.k0_slope * (command - gains.reference)) * self._k_ratio
 
-    def _force(self, leg: LegView, command: Array, liftoff: Array, landing: Array) -> Array:
+    def _force(
+        self, leg: virtual_leg.LegView, command: Array, liftoff: Array, landing: Array
+    ) -> Array:
         gains = self.gains
         final = gains.push_rate + gains.push_rate_slope * (command - gains.reference)
         intended = equations.intended_rate(leg.length, self._length_0, liftoff, final)
@@ -148,16 +135,16 @@ class EnergyShaping:
         thrust = self._gain(command) * forward + gains.push_damping * (intended - leg.rate)
         brake = gains.touchdown_stiffness * (landing - leg.length)
         brake = brake - gains.touchdown_damping * leg.rate
-        return np.where(self._phases.are(Phase.LIFTOFF), thrust, brake)
+        return np.where(self._phases.are(phases.Phase.LIFTOFF), thrust, brake)
 
-    def _pressing_share(self, leg: LegView, liftoff: Array) -> Array:
-        share = np.where(self._phases.are(Phase.FLIGHT), 0.0, 1.0)
+    def _pressing_share(self, leg: virtual_leg.LegView, liftoff: Array) -> Array:
+        share = np.where(self._phases.are(phases.Phase.FLIGHT), 0.0, 1.0)
         if self.options.liftoff == "timed":
             until = equations.share_of_period(leg.length, leg.rate, liftoff, self.period)
-            share = np.where(self._phases.are(Phase.LIFTOFF), until, share)
+            share = np.where(self._phases.are(phases.Phase.LIFTOFF), until, share)
         return share
 
-    def _end_push(self, leg: LegView, liftoff: Array) -> None:
+    def _end_push(self, leg: virtual_leg.LegView, liftoff: Array) -> None:
         clock, rate, since = self._phases.clock, leg.rate, np.zeros_like(leg.rate)
         match self.options.liftoff:
             case "true":
@@ -166,27 +153,31 @@ class EnergyShaping:
                 done = leg.length >= liftoff
             case "timed":
                 done, rate, since = self._share < 1, self._rate, (1 - self._share) * self.period
-        who = self._phases.are(Phase.LIFTOFF) & (done | (clock > PUSH_LIMIT))
+        who = self._phases.are(phases.Phase.LIFTOFF) & (done | (clock > phases.PUSH_LIMIT))
         self._liftoff_height = np.where(who, leg.stand, self._liftoff_height)
         self._liftoff_rate = np.where(who, rate, self._liftoff_rate)
         self._liftoff_q = np.where(who[:, None], leg.q, self._liftoff_q)
         self._highest = np.where(who, 0.0, self._highest)
-        self._phases.enter(who, Phase.FLIGHT, since)
+        self._phases.enter(who, phases.Phase.FLIGHT, since)
 
-    def _end_flight(self, leg: LegView, posture_rate: Array, flying: Array, command: Array) -> None:
+    def _end_flight(
+        self, leg: virtual_leg.LegView, posture_rate: Array, flying: Array, command: Array
+    ) -> None:
         gains, clock = self.gains, self._phases.clock
         pushed = self._detector.update(leg, posture_rate, flying, gains)
         shortest = gains.flight_min + gains.flight_min_slope * (command - gains.reference)
         touched = pushed & (clock > shortest)
         if self.options.contact == "true":
             touched = (self._true().foot_clearance() <= 0) & (clock > _BLIND_TICKS * self.period)
-        who = self._phases.are(Phase.FLIGHT) & (touched | (clock > FLIGHT_LIMIT))
+        who = self._phases.are(phases.Phase.FLIGHT) & (touched | (clock > phases.FLIGHT_LIMIT))
         if who.any():  # a touchdown that nobody noticed came before contact was believed
             too_short = np.minimum(clock, shortest)
             self._judge_hop(who, leg, command, np.where(touched, clock, too_short))
-        self._phases.enter(who, Phase.TOUCHDOWN)
+        self._phases.enter(who, phases.Phase.TOUCHDOWN)
 
-    def _judge_hop(self, who: BoolArray, leg: LegView, command: Array, airborne: Array) -> None:
+    def _judge_hop(
+        self, who: BoolArray, leg: virtual_leg.LegView, command: Array, airborne: Array
+    ) -> None:
         gains, options = self.gains, self.options
         airborne = np.maximum(airborne, self.period)
         ballistic = equations.ballistic_apex(self._liftoff_height, self._liftoff_rate)
@@ -199,20 +190,20 @@ class EnergyShaping:
         gain = equations.updated_gain(self._k_ratio, desired, apex, gains.exponent)
         self._k_ratio = np.where(who, gain, self._k_ratio)
 
-    def _end_touchdown(self, leg: LegView, command: Array) -> None:
+    def _end_touchdown(self, leg: virtual_leg.LegView, command: Array) -> None:
         clock = self._phases.clock
         rate = self._true().height_rate if self.options.contact == "true" else leg.rate
         turned = (rate >= 0) & (clock > 2 * self.period)
-        who = self._phases.are(Phase.TOUCHDOWN) & (turned | (clock > BRAKE_LIMIT))
+        who = self._phases.are(phases.Phase.TOUCHDOWN) & (turned | (clock > phases.BRAKE_LIMIT))
         self._length_0 = np.where(who, leg.length, self._length_0)
         self._pushed = np.where(who, command, self._pushed)
-        self._phases.enter(who, Phase.LIFTOFF)
+        self._phases.enter(who, phases.Phase.LIFTOFF)
 
-    def _estimate_height(self, leg: LegView) -> None:
+    def _estimate_height(self, leg: virtual_leg.LegView) -> None:
         flying = equations.ballistic_height(
             self._liftoff_height, self._liftoff_rate, self._phases.clock
         )
-        self._height = np.where(self._phases.are(Phase.FLIGHT), flying, leg.stand)
+        self._height = np.where(self._phases.are(phases.Phase.FLIGHT), flying, leg.stand)
         if self.truth is not None:
             self._highest = np.maximum(self._highest, self.truth.height)
 

@@ -13,9 +13,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from hopping_leg import errors, io
 from hopping_leg.arrays import Array
-from hopping_leg.errors import UsageError
-from hopping_leg.io import read_dataclass, write_atomically
 from hopping_leg.robot.parameters import JOINTS, Robot
 
 Gain = float | Array
@@ -180,10 +179,12 @@ def load_gains(name_or_path: str | Path = TUNED) -> GainFile:
     try:
         tree = tomllib.loads(source.read_text(encoding="utf-8"))
     except OSError as error:
-        raise UsageError(f"There is no gain file {source}; write one with `hop tune`.") from error
+        raise errors.UsageError(
+            f"There is no gain file {source}; write one with `hop tune`."
+        ) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"{source} is not valid TOML: {error}.") from error
-    return read_dataclass(GainFile, tree, name)
+        raise errors.UsageError(f"{source} is not valid TOML: {error}.") from error
+    return io.read_dataclass(GainFile, tree, name)
 
 
 def save_gains(path: Path, found: GainFile) -> None:
@@ -191,4 +192,4 @@ def save_gains(path: Path, found: GainFile) -> None:
     # A JSON string is a TOML one.
     lines = [f"robot = {json.dumps(found.robot)}", f"source = {json.dumps(found.source)}", ""]
     lines += ["[gains]", *(f"{name} = {float(v)!r}" for name, v in vars(found.gains).items())]
-    write_atomically(path, ("\n".join(lines) + "\n").encode())
+    io.write_atomically(path, ("\n".join(lines) + "\n").encode())

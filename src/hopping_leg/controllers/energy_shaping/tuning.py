@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from hopping_leg import cma_strategy, errors, hop_detection, io
 from hopping_leg.arrays import Array
-from hopping_leg.cma_strategy import seeded_strategy
 from hopping_leg.controllers import Rollout, RolloutConfig, rollout
 from hopping_leg.controllers.energy_shaping.controller import EnergyShaping
 from hopping_leg.controllers.energy_shaping.gains import (
@@ -26,9 +26,6 @@ from hopping_leg.controllers.energy_shaping.gains import (
     save_gains,
     scale_gains,
 )
-from hopping_leg.errors import UsageError
-from hopping_leg.hop_detection import measure_hops
-from hopping_leg.io import write_atomically
 from hopping_leg.robot import Robot, load_robot
 
 SETTLED = 2.0  # hops before this do not count, s
@@ -63,7 +60,9 @@ def score(rollout: Rollout, command: float, legs: slice) -> CommandScore:
     period = rollout.time[1] - rollout.time[0]
     names = ("height_m", "height_rate_m_s", "foot_clearance_m")
     columns = (data[name][kept, legs].T for name in names)
-    hops = [measure_hops(h, v, c, 1 / period) for h, v, c in zip(*columns, strict=True)]
+    hops = [
+        hop_detection.measure_hops(h, v, c, 1 / period) for h, v, c in zip(*columns, strict=True)
+    ]
     apex = np.concatenate([h.apex for h in hops])
     settled = len(hops) * kept.sum() * period
     return CommandScore(
@@ -186,11 +185,13 @@ class Search:
 
     def __post_init__(self) -> None:
         if self.generations < 1 or self.population < 4:
-            raise UsageError("A search needs --generations of 1 and a --population of 4 or more.")
+            raise errors.UsageError(
+                "A search needs --generations of 1 and a --population of 4 or more."
+            )
         if not 3 <= self.seconds <= 600 or not 0 < self.step <= 1:
-            raise UsageError("--seconds must lie between 3 and 600, --step between 0 and 1.")
+            raise errors.UsageError("--seconds must lie between 3 and 600, --step between 0 and 1.")
         if not 0 <= self.flight < 1:
-            raise UsageError("--flight is a share of the time, from 0 to below 1, e.g. 0.5.")
+            raise errors.UsageError("--flight is a share of the time, from 0 to below 1, e.g. 0.5.")
 
 
 def evaluate(
@@ -233,7 +234,9 @@ def search(
         log: One JSON line per generation; an interrupted search goes on from it.
         report: Called with (generations done, lowest cost so far).
     """
-    strategy = seeded_strategy(to_unit(start), options.step, [0.0, 1.0], options.population, seed)
+    strategy = cma_strategy.seeded_strategy(
+        to_unit(start), options.step, [0.0, 1.0], options.population, seed
+    )
     known = _read_log(log, options, seed)
     log.parent.mkdir(parents=True, exist_ok=True)
     lowest = np.inf
@@ -312,10 +315,10 @@ def _read_log(log: Path, options: Search, seed: int) -> list[list[float]]:
     for entry in map(json.loads, whole):
         found = entry["seed"], len(entry["costs"]), entry.get("flight", 0.0)
         if found != (seed, options.population, options.flight):
-            raise UsageError(
+            raise errors.UsageError(
                 f"{log} belongs to a search with seed {found[0]}, population {found[1]} and flight"
                 f" {found[2]:g}; repeat with those or choose another --out."
             )
         known.append(entry["costs"])
-    write_atomically(log, "".join(whole).encode())
+    io.write_atomically(log, "".join(whole).encode())
     return known

@@ -9,8 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from operator import attrgetter
 
-from hopping_leg.errors import UsageError, unknown_name
-from hopping_leg.io import replace_at
+from hopping_leg import errors, io
 from hopping_leg.robot.parameters import JOINTS, Robot
 
 
@@ -33,7 +32,7 @@ class Case:
 def with_numbers(robot: Robot, numbers: Mapping[str, float]) -> Robot:
     """Return a robot with other numbers, each at a dotted path, e.g. ``"rail.friction"``."""
     for path, value in numbers.items():
-        robot = replace_at(robot, path, value)
+        robot = io.replace_at(robot, path, value)
     return robot
 
 
@@ -172,4 +171,4 @@ def axis_named(name: str) -> Axis:
     for axis in AXES:
         if axis.name == name:
             return axis
-    raise UsageError(unknown_name("axis", name, axis_names()))
+    raise errors.UsageError(errors.unknown_name("axis", name, axis_names()))

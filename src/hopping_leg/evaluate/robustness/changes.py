@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from hopping_leg import hop_detection, io
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.evaluate.metrics import START_SECONDS
 from hopping_leg.evaluate.robustness.axes import Case, axis_named, times
-from hopping_leg.hop_detection import trace_hops
-from hopping_leg.io import replace_at
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.perturbation import Perturbation
 from hopping_leg.trace import Trace
@@ -40,7 +39,9 @@ def _on_axis(name: str, level: float) -> Callable[[Robot], Robot]:
 CHANGES: dict[str, Callable[[Robot], Robot]] = {
     "payload +20 %": _on_axis("payload", 0.2),
     "payload -20 %": _on_axis("payload", -0.2),
-    "ground time constant 0.02 s": lambda robot: replace_at(robot, "contact.time_constant", 0.02),
+    "ground time constant 0.02 s": lambda robot: io.replace_at(
+        robot, "contact.time_constant", 0.02
+    ),
     "ground time constant x2": lambda robot: times(robot, 2.0, "contact.time_constant"),
     "delay +5 ms": _on_axis("delay", 0.005),
     "rail friction x3": lambda robot: times(robot, 3.0, "rail.friction"),
@@ -109,14 +110,14 @@ def study_changes(
 
 def hops_after(trace: Trace, tick: int) -> Array:
     """Return the apexes whose flight began after a tick, in order, m, (hops,)."""
-    hops = trace_hops(trace)
+    hops = hop_detection.trace_hops(trace)
     grounded = np.flatnonzero(~hops.in_flight[tick:])
     return hops.apex[hops.tick > tick + grounded[0]] if len(grounded) else np.empty(0)
 
 
 def _recovery(run: _Run, traces: Sequence[Trace], change: int) -> dict[str, Any]:
     start = round(START_SECONDS * change / AT)
-    found = [trace_hops(trace) for trace in traces]
+    found = [hop_detection.trace_hops(trace) for trace in traces]
     before = [h.apex[(h.tick >= start) & (h.tick < change)] for h in found]
     after = [hops_after(trace, change) - run.after for trace in traces]
     sizes = [_median(np.abs(_kth(after, hop))) for hop in range(HOPS)]

@@ -8,9 +8,8 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
-from hopping_leg.evaluate.metrics import HopWindow, measure, pooled_apexes
+from hopping_leg.evaluate import metrics, statistics
 from hopping_leg.evaluate.robustness.trials import AxisTrials
-from hopping_leg.evaluate.statistics import bootstrap
 
 TOLERANCE = 0.02
 """Largest magnitude of the median apex minus the command in a successful trial, m."""
@@ -52,7 +51,7 @@ def run_axis(
     )
     outcomes = []
     for leg, trial in enumerate(plan.trials):
-        windows = measure(run.trace(leg))
+        windows = metrics.measure(run.trace(leg))
         outcomes.append(
             Outcome(
                 trial.level,
@@ -66,11 +65,11 @@ def run_axis(
     return outcomes
 
 
-def _worst_error(windows: list[HopWindow]) -> float | None:
+def _worst_error(windows: list[metrics.HopWindow]) -> float | None:
     """Return the median error of the command that is missed most; None if one has no hop."""
     errors = []
     for command in {w.command for w in windows}:
-        apex = pooled_apexes([w for w in windows if w.command == command])
+        apex = metrics.pooled_apexes([w for w in windows if w.command == command])
         if not len(apex):
             return None
         errors.append(float(np.median(apex)) - command)
@@ -96,7 +95,7 @@ def share(axes: Sequence[Sequence[Array]], seed: int) -> tuple[float, float, flo
     score = float(weights @ [level.mean() for level in levels])
     if any(len(level) < 2 for level in levels):
         return score, float("nan"), float("nan")
-    return score, *bootstrap(levels, statistic, seed, vectorized=True)
+    return score, *statistics.bootstrap(levels, statistic, seed, vectorized=True)
 
 
 def by_level(outcomes: Sequence[Outcome]) -> dict[float, list[Outcome]]:

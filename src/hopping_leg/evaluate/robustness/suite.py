@@ -6,21 +6,12 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from hopping_leg.controllers import Controller, RolloutConfig
+from hopping_leg.evaluate import result_cache, runner, trials
 from hopping_leg.evaluate.entries import Entry, check_labels, check_range, fingerprint
-from hopping_leg.evaluate.result_cache import ResultCache
 from hopping_leg.evaluate.robustness import axes as all_axes
-from hopping_leg.evaluate.robustness import changes
+from hopping_leg.evaluate.robustness import changes, outcome
 from hopping_leg.evaluate.robustness.axes import AXES, JOINT, JOINT_LEVELS, NOMINAL
-from hopping_leg.evaluate.robustness.outcome import (
-    TOLERANCE,
-    Outcome,
-    level_rows,
-    run_axis,
-    score_rows,
-)
 from hopping_leg.evaluate.robustness.trials import JOINT_POINTS, SECONDS, make_trials
-from hopping_leg.evaluate.runner import setup_conditions, software_versions
-from hopping_leg.evaluate.trials import check_repeats, choose_commands
 from hopping_leg.io import safe_file_name
 
 RECOVERY = "recovery"
@@ -54,7 +45,7 @@ class Suite:
     def conditions(self) -> dict[str, Any]:
         """What all results depend on, as JSON values."""
         return {
-            **setup_conditions(self.setup),
+            **runner.setup_conditions(self.setup),
             "commands_m": self.commands,
             "seeds": self.repeats,
             "seed": self.seed,
@@ -69,7 +60,7 @@ class Suite:
             "controller": fingerprint(controller),
             "levels": _levels(axis),
             "soft_limits": asdict(limits) if limits else None,
-            "versions": software_versions(),
+            "versions": runner.software_versions(),
         }
 
 
@@ -92,8 +83,8 @@ def make_suite(
     for name in axes:
         if name != JOINT:
             all_axes.axis_named(name)
-    check_repeats(repeats)
-    chosen = choose_commands(setup.robot, commands)
+    trials.check_repeats(repeats)
+    chosen = trials.choose_commands(setup.robot, commands)
     names = tuple(name for name in all_axes.axis_names() if not axes or name in axes)
     return Suite(setup, names, chosen, repeats, seed, recovery=not axes, seconds=seconds)
 
@@ -101,7 +92,7 @@ def make_suite(
 def run_suite(
     entries: Sequence[Entry],
     suite: Suite,
-    cache: ResultCache,
+    cache: result_cache.ResultCache,
     on_progress: Callable[[str, float], None] = lambda label, share: None,
 ) -> dict[str, Any]:
     """Let every controller meet every axis; the cache keeps the result of each pair.
@@ -120,7 +111,7 @@ def run_suite(
     result |= {"recovery": [], "steps": []}
     parts = [NOMINAL, *suite.axes, *([RECOVERY] if suite.recovery else [])]
     for entry in entries:
-        outcomes: dict[str, list[Outcome]] = {}
+        outcomes: dict[str, list[outcome.Outcome]] = {}
         for number, part in enumerate(parts):
 
             def tick(done: int, ticks: int, label: str = entry.label, number: int = number) -> None:
@@ -136,25 +127,25 @@ def run_suite(
                 for name in ("recovery", "steps"):
                     result[name] += [{"controller": entry.label, **r} for r in kept[name]]
             else:
-                outcomes[part] = [Outcome(**row) for row in kept["outcomes"]]
+                outcomes[part] = [outcome.Outcome(**row) for row in kept["outcomes"]]
             on_progress(entry.label, (number + 1) / len(parts))
         for part, found in outcomes.items():
-            result["levels"] += level_rows(entry.label, part, found)
+            result["levels"] += outcome.level_rows(entry.label, part, found)
         del outcomes[NOMINAL]
-        result["scores"] += score_rows(entry.label, outcomes, suite.seed)
+        result["scores"] += outcome.score_rows(entry.label, outcomes, suite.seed)
     return {
         **result,
         "axes": _axes(suite),
         "conditions": {
             **suite.conditions,
             "joint_points": JOINT_POINTS,
-            "tolerance_m": TOLERANCE,
+            "tolerance_m": outcome.TOLERANCE,
             "back_m": changes.BACK,
             "change_at_s": changes.AT,
             "changes": list(changes.CHANGES),
             "runs_per_change": changes.RUNS * suite.repeats,
         },
-        "versions": software_versions(),
+        "versions": runner.software_versions(),
         "notes": [note for entry in entries for note in entry.notes],
     }
 
@@ -168,7 +159,7 @@ def _run_part(
         return changes.study_changes(controller, setup, commands, runs, seed, on_tick)
     robot, rate, seconds = setup.robot, setup.rate, suite.seconds
     plan = make_trials(part, robot, commands, repeats, seed, rate=rate, seconds=seconds)
-    return {"outcomes": [asdict(one) for one in run_axis(controller, setup, plan, on_tick)]}
+    return {"outcomes": [asdict(one) for one in outcome.run_axis(controller, setup, plan, on_tick)]}
 
 
 def _axes(suite: Suite) -> list[dict[str, Any]]:

@@ -8,14 +8,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from hopping_leg.arrays import Array
-from hopping_leg.evaluate.robustness.axes import (
-    AXES,
-    JOINT,
-    JOINT_LEVELS,
-    NOMINAL,
-    Case,
-    axis_named,
-)
+from hopping_leg.evaluate.robustness import axes
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.perturbation import Perturbation
 
@@ -44,7 +37,7 @@ class RobustnessTrial:
     """Number of the realisation, from 0."""
     point: int
     """Number of the hypercube's point, 0 elsewhere."""
-    case: Case
+    case: axes.Case
     """What is simulated."""
 
 
@@ -82,20 +75,24 @@ def make_trials(
     """
     entropy = [seed, zlib.crc32(axis.encode())]
     pairs = [(command, repeat) for command in commands for repeat in range(repeats)]
-    if axis == JOINT:
+    if axis == axes.JOINT:
         # the hypercube is drawn once; a level is a share of the way from neutral to its points
         each = [(*pair, point) for pair in pairs for point in range(JOINT_POINTS)]
-        cube = qmc.LatinHypercube(len(AXES), rng=np.random.default_rng(entropy)).random(len(each))
+        cube = qmc.LatinHypercube(len(axes.AXES), rng=np.random.default_rng(entropy)).random(
+            len(each)
+        )
         trials = [
             RobustnessTrial(level, *one, _joint_case(robot, row, level))
-            for level in levels or JOINT_LEVELS
+            for level in levels or axes.JOINT_LEVELS
             for one, row in zip(each, cube, strict=True)
         ]
     else:
-        cases = {0.0: Case(robot)}
-        if axis != NOMINAL:
-            found = axis_named(axis)
-            cases = {level: found.alter(Case(robot), level) for level in levels or found.levels}
+        cases = {0.0: axes.Case(robot)}
+        if axis != axes.NOMINAL:
+            found = axes.axis_named(axis)
+            cases = {
+                level: found.alter(axes.Case(robot), level) for level in levels or found.levels
+            }
         trials = [
             RobustnessTrial(lv, *pair, 0, case) for lv, case in cases.items() for pair in pairs
         ]
@@ -111,9 +108,9 @@ def make_trials(
     )
 
 
-def _joint_case(robot: Robot, row: Array, share: float) -> Case:
-    case = Case(robot)
-    for axis, place in zip(AXES, row, strict=True):
+def _joint_case(robot: Robot, row: Array, share: float) -> axes.Case:
+    case = axes.Case(robot)
+    for axis, place in zip(axes.AXES, row, strict=True):
         low, high = axis.moderate
         value = low + place * (high - low)
         case = axis.alter(case, float(axis.neutral + share * (value - axis.neutral)))

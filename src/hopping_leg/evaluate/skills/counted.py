@@ -7,9 +7,8 @@ import numpy as np
 
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.controllers.stand_hop_land import STAND_SECONDS, StandHopLand
-from hopping_leg.evaluate.metrics import measure
+from hopping_leg.evaluate import metrics, statistics
 from hopping_leg.evaluate.skills.landings import last_touchdown, peak_force
-from hopping_leg.evaluate.statistics import of
 from hopping_leg.hop_detection import trace_hops
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.trace import Trace
@@ -73,7 +72,7 @@ def _row(command: float, asked: int, traces: Sequence[Trace], robot: Robot) -> C
     apexes = [trace_hops(trace).apex for trace in traces]
     made = [len(apex) for apex in apexes]
     errors = np.concatenate(apexes) - command
-    windows = [window for trace in traces for window in measure(trace)]
+    windows = [window for trace in traces for window in metrics.measure(trace)]
     return Counted(
         command_m=command,
         asked=asked,
@@ -81,8 +80,8 @@ def _row(command: float, asked: int, traces: Sequence[Trace], robot: Robot) -> C
         fewest=min(made),
         most=max(made),
         at_rest=float(np.mean([_rests(trace) for trace in traces])),
-        median_error_m=of(np.median, errors),
-        worst_abs_error_m=of(np.max, np.abs(errors)),
+        median_error_m=statistics.of(np.median, errors),
+        worst_abs_error_m=statistics.of(np.max, np.abs(errors)),
         landing_force=float(np.median([_landing_force(robot, trace) for trace in traces])),
         body_contacts=sum(w.body_contacts for w in windows),
         runs=len(traces),

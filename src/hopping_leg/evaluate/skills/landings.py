@@ -5,9 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers import Controller, RolloutConfig, rollout
-from hopping_leg.controllers.joint_pd import JointPD
-from hopping_leg.controllers.stand_hop_land import StandHopLand, landing_posture
+from hopping_leg.controllers import Controller, RolloutConfig, joint_pd, rollout, stand_hop_land
 from hopping_leg.evaluate.metrics import measure
 from hopping_leg.robot import GRAVITY, JOINTS, Robot, kinematics
 from hopping_leg.robot.dynamics import potential_energy
@@ -86,11 +84,11 @@ class Landed:
 def land(setup: RolloutConfig, *, drop: float, repeats: int, seed: int) -> list[Landed]:
     """Drop legs in the landing posture, the foot ``drop`` m above the ground."""
     robot = setup.robot
-    posture = landing_posture(robot)
+    posture = stand_hop_land.landing_posture(robot)
     length = float(kinematics.foot_position(robot, posture)[0])
     height = float(kinematics.stance_height(robot, posture)) + drop
-    landing = StandHopLand(None, robot, 0, rate=setup.rate, dropped=True)
-    ways: list[Controller] = [landing, JointPD(posture[None])]
+    landing = stand_hop_land.StandHopLand(None, robot, 0, rate=setup.rate, dropped=True)
+    ways: list[Controller] = [landing, joint_pd.JointPD(posture[None])]
     rows = []
     for way in ways:
         run = rollout(

@@ -7,8 +7,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
-from hopping_leg.evaluate.metrics import START_SECONDS, measure, skipped_in_run
-from hopping_leg.evaluate.statistics import of
+from hopping_leg.evaluate import metrics, statistics
 from hopping_leg.hop_detection import trace_hops
 from hopping_leg.sim.perturbation import Perturbation
 from hopping_leg.trace import Trace
@@ -81,12 +80,12 @@ def climb(
     for k, command in enumerate(commands):
         own = traces[k * repeats : (k + 1) * repeats]
         for step, level in enumerate(stairs):
-            begin = step * ticks if step else round(START_SECONDS * setup.rate)
+            begin = step * ticks if step else round(metrics.START_SECONDS * setup.rate)
             rise = level - stairs[step - 1] if step else 0.0
             errors = [_errors(trace, range(begin, (step + 1) * ticks), rise) for trace in own]
             first = np.array([e[0] for e in errors if len(e)])
             later = np.concatenate([e[1:] for e in errors])
-            medians = (of(np.median, first), of(np.median, later))
+            medians = (statistics.of(np.median, first), statistics.of(np.median, later))
             rows.append(Stair(command, step, level, *medians, sum(map(len, errors)), len(own)))
         steps = rows[-len(stairs) :]
         wholes.append(
@@ -94,8 +93,8 @@ def climb(
                 command_m=command,
                 worst_first_error_m=_worst([step.first_error_m for step in steps]),
                 worst_error_m=_worst([step.median_error_m for step in steps]),
-                skipped_hops=sum(map(skipped_in_run, own)),
-                body_contacts=sum(w.body_contacts for trace in own for w in measure(trace)),
+                skipped_hops=sum(map(metrics.skipped_in_run, own)),
+                body_contacts=sum(w.body_contacts for trace in own for w in metrics.measure(trace)),
                 runs=len(own),
             )
         )

@@ -5,12 +5,10 @@ from typing import Any
 
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.errors import UsageError
+from hopping_leg.evaluate import runner, trials
 from hopping_leg.evaluate.entries import Entry, check_labels, check_range
-from hopping_leg.evaluate.runner import setup_conditions, software_versions
-from hopping_leg.evaluate.skills.counted import COUNTS, count_hops
-from hopping_leg.evaluate.skills.landings import DROP, land
+from hopping_leg.evaluate.skills import counted, landings
 from hopping_leg.evaluate.skills.stairs import STAIRS, climb
-from hopping_leg.evaluate.trials import PAPER_HEIGHT, check_repeats, choose_commands, on_floor
 
 SCHEMA = 1
 """Version of the JSON, raised when a name changes its meaning."""
@@ -39,13 +37,13 @@ def run_skills(
     """
     if setup.engine != "mujoco":
         raise UsageError("Stairs and drops need the engine mujoco; leave --engine out.")
-    check_repeats(repeats)
-    chosen = choose_commands(setup.robot, commands)
+    trials.check_repeats(repeats)
+    chosen = trials.choose_commands(setup.robot, commands)
     check_labels(entries)
     for entry in entries:
         check_range(entry, chosen)
-    size = setup.robot.straight_height / PAPER_HEIGHT
-    stairs, drop = [size * level for level in STAIRS], size * DROP
+    size = setup.robot.straight_height / trials.PAPER_HEIGHT
+    stairs, drop = [size * level for level in STAIRS], size * landings.DROP
     tables: dict[str, list[dict[str, Any]]] = {}
 
     def add(name: str, found: Iterable[Any], **where: str) -> None:
@@ -53,30 +51,30 @@ def run_skills(
 
     for entry in entries:
         for number, floor in enumerate(floors):
-            what = (entry.controller, on_floor(setup, floor), chosen)
+            what = (entry.controller, trials.on_floor(setup, floor), chosen)
             where = {"controller": entry.label, "floor": floor}
-            add("counted", count_hops(*what, repeats=repeats, seed=seed), **where)
+            add("counted", counted.count_hops(*what, repeats=repeats, seed=seed), **where)
             on_progress(entry.label, (number + 0.5) / len(floors))
             steps, wholes = climb(*what, stairs=stairs, repeats=repeats, seed=seed)
             add("stairs", steps, **where)
             add("climbs", wholes, **where)
             on_progress(entry.label, (number + 1) / len(floors))
     for floor in floors:
-        landed = land(on_floor(setup, floor), drop=drop, repeats=repeats, seed=seed)
+        landed = landings.land(trials.on_floor(setup, floor), drop=drop, repeats=repeats, seed=seed)
         add("landings", landed, floor=floor)
     return {
         "schema": SCHEMA,
         **tables,
         "conditions": {
-            **setup_conditions(setup),
+            **runner.setup_conditions(setup),
             "commands_m": chosen,
-            "counts": COUNTS,
+            "counts": counted.COUNTS,
             "stairs_m": stairs,
             "drop_m": drop,
             "floors": list(floors),
             "seeds": repeats,
             "seed": seed,
         },
-        "versions": software_versions(),
+        "versions": runner.software_versions(),
         "notes": [note for entry in entries for note in entry.notes],
     }

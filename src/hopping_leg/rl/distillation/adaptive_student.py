@@ -19,10 +19,8 @@ from torch.nn import functional
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.envs.observation import CLEARANCE_GAIN, Observation
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
-from hopping_leg.rl.checkpoint import Tree
+from hopping_leg.rl import checkpoint, onnx_export, sb3_policies
 from hopping_leg.rl.distillation.students import Bools, DaggerBuffer, Wanted
-from hopping_leg.rl.onnx_export import CommandIntegrator, Network
-from hopping_leg.rl.sb3_policies import dense, dense_network, flatten, layer_weights
 
 FROM, UNTIL = 0.03, 0.11
 """Time after touchdown in which a hop's error counts, s: its last samples have arrived, and the
@@ -62,12 +60,12 @@ class HopErrors:
         counts &= self._command == command
         return np.where(counts, self._error, 0.0)
 
-    def state(self) -> Tree:
+    def state(self) -> checkpoint.Tree:
         """Return everything needed to go on."""
         arrays = {n: value for n, value in vars(self).items() if isinstance(value, np.ndarray)}
         return {name: value.copy() for name, value in arrays.items()}
 
-    def restore(self, state: Tree) -> None:
+    def restore(self, state: checkpoint.Tree) -> None:
         """Go on from a ``state``."""
         for name, value in state.items():
             setattr(self, name, np.array(value))
@@ -135,9 +133,9 @@ class AdaptiveStudent(nn.Module):
     ) -> None:
         super().__init__()
         self.command_integrator, self._places = command_integrator, places
-        self.layers = dense(places.measured, hidden, nn.Tanh)
+        self.layers = sb3_policies.dense(places.measured, hidden, nn.Tanh)
         self.layers.append(nn.Linear(hidden[-1], 2))
-        self.feeling = dense(places.measured + 1, error_hidden, nn.Tanh)
+        self.feeling = sb3_policies.dense(places.measured + 1, error_hidden, nn.Tanh)
         self.feeling.append(nn.Linear(error_hidden[-1], 1))
         self._watch = HopErrors(legs, period)
         self.rate = command_integrator.share / (self._watch.last - self._watch.first)
@@ -211,14 +209,18 @@ class AdaptiveStudent(nn.Module):
         loss = functional.mse_loss(action, wanted(observation))
         return loss + functional.mse_loss(estimated, error.clamp(-most, most))
 
-    def network(self, observation: Observation) -> Network:
+    def network(self, observation: Observation) -> onnx_export.Network:
         """Return both networks and the memory."""
-        network = dense_network([self.layers], observation, "clip")
-        layers = [layer_weights(m) for m in flatten(self.feeling) if isinstance(m, nn.Linear)]
+        network = sb3_policies.dense_network([self.layers], observation, "clip")
+        layers = [
+            sb3_policies.layer_weights(m)
+            for m in sb3_policies.flatten(self.feeling)
+            if isinstance(m, nn.Linear)
+        ]
         order = np.append(observation.order, observation.size)
         layers[0] = (layers[0][0][:, order], layers[0][1])
         config = self.command_integrator
-        memory = CommandIntegrator(
+        memory = onnx_export.CommandIntegrator(
             layers,
             rate=self.rate * config.scale,
             most=config.most,
@@ -228,7 +230,7 @@ class AdaptiveStudent(nn.Module):
         )
         return dataclasses.replace(network, memory=memory)
 
-    def state(self) -> Tree:
+    def state(self) -> checkpoint.Tree:
         """Return the buffer, the memory and the last hops."""
         return {
             "lessons": self._buffer.state(),
@@ -236,7 +238,7 @@ class AdaptiveStudent(nn.Module):
             "watch": self._watch.state(),
         }
 
-    def restore(self, state: Tree) -> None:
+    def restore(self, state: checkpoint.Tree) -> None:
         """Go on from a ``state``."""
         self._buffer.restore(state["lessons"])
         self._memory = torch.from_numpy(state["memory"].copy())

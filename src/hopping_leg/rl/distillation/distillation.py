@@ -12,28 +12,10 @@ from typing import Any, Literal, NamedTuple
 from torch import nn
 
 from hopping_leg.controllers.observation_history import make_observation_history
-from hopping_leg.envs import TaskConfig
-from hopping_leg.envs.observation import (
-    PRIVILEGED,
-    PRIVILEGED_CLEARANCE,
-    PRIVILEGED_COMMAND,
-    PRIVILEGED_HEIGHT,
-)
+from hopping_leg.envs import TaskConfig, observation
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.algorithms import NetworkConfig, PPOConfig, cosine
-from hopping_leg.rl.distillation.adaptive_student import (
-    AdaptiveStudent,
-    CommandIntegratorConfig,
-    Places,
-)
-from hopping_leg.rl.distillation.students import RecurrentStudent, WindowStudent
-from hopping_leg.rl.distillation.teacher_student import (
-    DaggerConfig,
-    Teacher,
-    TeacherStudentPolicy,
-    TeacherStudentPPO,
-    last_torque,
-)
+from hopping_leg.rl.distillation import adaptive_student, students, teacher_student
 from hopping_leg.rl.onnx_export import Network
 from hopping_leg.rl.policy_evaluation import command_score, evaluate_policy, every_centimetre
 from hopping_leg.rl.sb3_env import TaskVecEnv
@@ -83,9 +65,11 @@ class Distillation:
     """Errors of the torques in its evaluation, of the largest: about those of the student."""
     student: StudentConfig = field(default_factory=StudentConfig)
     """The policy's network; ``network.actor`` is the teacher's."""
-    dagger: DaggerConfig = field(default_factory=DaggerConfig)
+    dagger: teacher_student.DaggerConfig = field(default_factory=teacher_student.DaggerConfig)
     """How the student learns from the teacher."""
-    integrator: CommandIntegratorConfig = field(default_factory=CommandIntegratorConfig)
+    integrator: adaptive_student.CommandIntegratorConfig = field(
+        default_factory=adaptive_student.CommandIntegratorConfig
+    )
     """The memory of the command's correction."""
     dagger_mixing_share: float = 0.15
     """Share of the student's learning over which the teacher acts ever less in its stead."""
@@ -116,16 +100,16 @@ class Distillation:
         network: NetworkConfig,
         commands: Sequence[float],
         seed: int,
-    ) -> TeacherStudentPPO:
+    ) -> teacher_student.TeacherStudentPPO:
         """Build the teacher's PPO with the student beside it.
 
         Teachers are evaluated between the lowest and the highest of the commands, m.
         """
         task = env.task
         measured = task.observation.size
-        state = range(measured, measured + PRIVILEGED)
-        return TeacherStudentPPO(
-            TeacherStudentPolicy,
+        state = range(measured, measured + observation.PRIVILEGED)
+        return teacher_student.TeacherStudentPPO(
+            teacher_student.TeacherStudentPolicy,
             env,
             dagger=self.dagger,
             evaluate_teacher=lambda policy: self.evaluate_teacher(
@@ -136,7 +120,7 @@ class Distillation:
             policy_kwargs={
                 **ppo.policy_options(network),
                 "measured": measured,
-                "teacher_sees": [*state, *last_torque(task.options)],
+                "teacher_sees": [*state, *teacher_student.last_torque(task.options)],
                 "student": lambda: self.make_student(env),
             },
         )
@@ -147,30 +131,30 @@ class Distillation:
         measured, task = env.task.observation.size, env.task.options
         config, room = self.student, self.dagger.buffer_size
         if config.memory == "gru":
-            return RecurrentStudent(measured, config.size, room, env.num_envs)
+            return students.RecurrentStudent(measured, config.size, room, env.num_envs)
         if config.memory == "window":
-            return WindowStudent(measured, size, list(config.hidden), room, nn.Tanh)
+            return students.WindowStudent(measured, size, list(config.hidden), room, nn.Tanh)
         if make_observation_history(task.observation, 1 / task.rate).shapes["command"] != (1,):
             raise UsageError(
                 "A student with an integrator corrects its command and needs an observation with a"
                 f" single one, not '{task.observation}'; choose --observation dated-long."
             )
-        places = Places(
+        places = adaptive_student.Places(
             measured=measured,
             size=size,
             command=measured - 1,
-            true_height=measured + PRIVILEGED_HEIGHT,
-            true_command=measured + PRIVILEGED_COMMAND,
-            true_clearance=measured + PRIVILEGED_CLEARANCE,
+            true_height=measured + observation.PRIVILEGED_HEIGHT,
+            true_command=measured + observation.PRIVILEGED_COMMAND,
+            true_clearance=measured + observation.PRIVILEGED_CLEARANCE,
         )
-        return AdaptiveStudent(
+        return adaptive_student.AdaptiveStudent(
             places, list(config.hidden), list(config.error_hidden), room, env.num_envs,
             1 / task.rate, self.integrator,
         )  # fmt: skip
 
     def evaluate_teacher(
         self,
-        policy: TeacherStudentPolicy,
+        policy: teacher_student.TeacherStudentPolicy,
         robot: Robot,
         task: TaskConfig,
         commands: Sequence[float],
@@ -183,7 +167,7 @@ class Distillation:
         One that is on the ground for more than half of the time is marked down, too: next to
         standing, the student may fall into it.
         """
-        teacher = Teacher(policy, robot, task, self.teacher_action_noise)
+        teacher = teacher_student.Teacher(policy, robot, task, self.teacher_action_noise)
         heights = every_centimetre(commands)
         results = evaluate_policy(teacher, robot, heights, rate=task.rate, threads=threads)
         return max(command_score(v) + _FLIGHT * max(0.0, 0.5 - v.flight_fraction) for v in results)

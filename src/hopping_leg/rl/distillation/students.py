@@ -14,9 +14,8 @@ from torch import nn
 from torch.nn import functional
 
 from hopping_leg.envs.observation import Observation
+from hopping_leg.rl import onnx_export, sb3_policies
 from hopping_leg.rl.checkpoint import Tree
-from hopping_leg.rl.onnx_export import Network, RecurrentUnit
-from hopping_leg.rl.sb3_policies import dense, dense_network, layer_weights
 
 Bools = npt.NDArray[np.bool_]
 
@@ -134,7 +133,7 @@ class Student(Protocol):
         """Return the mean squared difference to the teacher over about so many kept ticks."""
         ...
 
-    def network(self, observation: Observation) -> Network:
+    def network(self, observation: Observation) -> onnx_export.Network:
         """Return it as it stands with the task's normalisation, for the observation's layout."""
         ...
 
@@ -158,7 +157,7 @@ class WindowStudent(nn.Module):
     ) -> None:
         super().__init__()
         self._measured = measured
-        self.layers = dense(measured, hidden, activation)
+        self.layers = sb3_policies.dense(measured, hidden, activation)
         self.layers.append(nn.Linear(hidden[-1], 2))
         self._buffer = DaggerBuffer(room, size)
 
@@ -178,9 +177,9 @@ class WindowStudent(nn.Module):
         seen = self._buffer.sample(count)
         return functional.mse_loss(self.layers(seen[:, : self._measured]), wanted(seen))
 
-    def network(self, observation: Observation) -> Network:
+    def network(self, observation: Observation) -> onnx_export.Network:
         """Return its dense layers."""
-        return dense_network([self.layers], observation, "clip")
+        return sb3_policies.dense_network([self.layers], observation, "clip")
 
     def state(self) -> Tree:
         """Return the buffer."""
@@ -230,14 +229,16 @@ class RecurrentStudent(nn.Module):
         acted = self.readout(remembered[counts])
         return functional.mse_loss(acted, wanted(seen[counts]))
 
-    def network(self, observation: Observation) -> Network:
+    def network(self, observation: Observation) -> onnx_export.Network:
         """Return its recurrent unit and readout."""
         with torch.no_grad():
             weights = [w.double().numpy().copy() for w in self.unit.all_weights[0]]
         weights[0] = weights[0][:, observation.order]
-        scaling, memory = observation.scaling, RecurrentUnit(*weights)
-        layers = [layer_weights(self.readout)]
-        return Network(scaling.offset, scaling.gain, layers, "tanh", "clip", memory=memory)
+        scaling, memory = observation.scaling, onnx_export.RecurrentUnit(*weights)
+        layers = [sb3_policies.layer_weights(self.readout)]
+        return onnx_export.Network(
+            scaling.offset, scaling.gain, layers, "tanh", "clip", memory=memory
+        )
 
     def state(self) -> Tree:
         """Return memory and buffer."""

@@ -24,10 +24,8 @@ from hopping_leg.envs.observation import (
     privileged_observation,
     sample_scaling,
 )
-from hopping_leg.rl.checkpoint import Tree
+from hopping_leg.rl import checkpoint, resumable, sb3_policies
 from hopping_leg.rl.distillation.students import Student
-from hopping_leg.rl.resumable import ResumablePPO
-from hopping_leg.rl.sb3_policies import AsymmetricPolicy
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import Measurement, Simulator
 
@@ -84,11 +82,11 @@ class CommandCorrection:
         """Return the teacher's commands instead of those that are observed, (n,)."""
         return command + _shares(command, self._knots) @ self.values
 
-    def state(self) -> Tree:
+    def state(self) -> checkpoint.Tree:
         """Return the corrections."""
         return {"values": self.values.numpy().copy()}
 
-    def restore(self, state: Tree) -> None:
+    def restore(self, state: checkpoint.Tree) -> None:
         """Go on from a ``state``."""
         self.values = torch.from_numpy(state["values"].copy())
 
@@ -100,7 +98,7 @@ def _shares(command: torch.Tensor, knots: torch.Tensor) -> torch.Tensor:
     return (1 - distance / spacing).clamp(min=0.0)
 
 
-class TeacherStudentPolicy(AsymmetricPolicy):
+class TeacherStudentPolicy(sb3_policies.AsymmetricPolicy):
     """PPO policy whose actor is the teacher, with a student beside it.
 
     Observations are the ``measured`` entries that the student sees, then the true state, which the
@@ -158,7 +156,7 @@ class TeacherStudentPolicy(AsymmetricPolicy):
         return action.clamp(-1.0, 1.0), nothing, nothing[:, 0]
 
 
-class TeacherStudentPPO(ResumablePPO):
+class TeacherStudentPPO(resumable.ResumablePPO):
     """PPO while the teacher learns; regression on the teacher's actions while the student does.
 
     ``pace`` is the learning rate at a share of the training, 0 to 1, after the ``teacher_scores``
@@ -235,7 +233,7 @@ class TeacherStudentPPO(ResumablePPO):
         with torch.no_grad():
             return policy.teacher_action(shown)
 
-    def own_state(self) -> Tree:
+    def own_state(self) -> checkpoint.Tree:
         """Return what the student learns from, the teacher's correction, and the scores so far."""
         policy: TeacherStudentPolicy = self.policy
         return {
@@ -245,7 +243,7 @@ class TeacherStudentPPO(ResumablePPO):
             "aim": self._correction.state(),
         }
 
-    def restore_own(self, state: Tree) -> None:
+    def restore_own(self, state: checkpoint.Tree) -> None:
         """Go on from an ``own_state``."""
         policy: TeacherStudentPolicy = self.policy
         self.teacher_scores = list(state["teacher_scores"])

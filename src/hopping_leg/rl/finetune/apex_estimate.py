@@ -23,11 +23,8 @@ from hopping_leg.controllers.energy_shaping.equations import flight_time_apex
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.rollout import Rollout
 from hopping_leg.hop_detection import find_hops
-from hopping_leg.rl.checkpoint import Tree, list_checkpoints, read_checkpoint, write_checkpoint
-from hopping_leg.rl.finetune.command_correction import robust_line
-from hopping_leg.rl.finetune.simulated import hop_many, traces_of
-from hopping_leg.rl.finetune.trial_data import ApexEstimate, TrialData
-from hopping_leg.rl.run_folder import as_stored
+from hopping_leg.rl import checkpoint, run_folder
+from hopping_leg.rl.finetune import command_correction, simulated, trial_data
 from hopping_leg.robot import JOINTS, Robot, kinematics
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, TWIN_RANGES, Range, sample
 
@@ -83,7 +80,7 @@ class ContactEstimator:
             layers += [nn.Linear(size, following), nn.ELU()]
         self._net = nn.Sequential(*layers, nn.Linear(sizes[-1], 1))
 
-    def airborne(self, data: TrialData) -> Array:
+    def airborne(self, data: trial_data.TrialData) -> Array:
         """Return how surely the foot was in the air, (ticks, n)."""
         seen = _normalised(data.filled())
         rows = torch.arange(data.ticks)
@@ -91,7 +88,7 @@ class ContactEstimator:
             legs = [self._judge(seen[:, leg], rows) for leg in range(seen.shape[1])]
         return torch.stack(legs, dim=1).double().numpy()
 
-    def learn(self, data: TrialData, flying: Array, seed: int) -> None:
+    def learn(self, data: trial_data.TrialData, flying: Array, seed: int) -> None:
         """Learn from legs of which it is known whether the foot was in the air, (ticks, n)."""
         o, rng = self._options, np.random.default_rng(seed)
         noise = rng.standard_normal((*data.q.shape[:2], 6)) * _sensor_noise()
@@ -114,11 +111,11 @@ class ContactEstimator:
                 optimizer.step()
                 schedule.step()
 
-    def state(self) -> Tree:
+    def state(self) -> checkpoint.Tree:
         """Return its weights."""
         return {name: w.numpy().copy() for name, w in self._net.state_dict().items()}
 
-    def restore(self, state: Tree) -> None:
+    def restore(self, state: checkpoint.Tree) -> None:
         """Take weights from a ``state``."""
         self._net.load_state_dict({name: torch.from_numpy(w) for name, w in state.items()})
 
@@ -138,26 +135,32 @@ def doubtful_legs(policy: Policy, robot: Robot, o: ContactConfig) -> Rollout:
     robots = sample(robot, DOUBTS, o.num_envs, rng)
     span = (policy.card.command_low, policy.card.command_high)
     steps = rng.uniform(*span, (round(o.seconds / o.hold), o.num_envs))
-    return hop_many(policy, robot, robots, np.repeat(steps, round(o.hold * 200), axis=0), o.seed)
+    return simulated.hop_many(
+        policy, robot, robots, np.repeat(steps, round(o.hold * 200), axis=0), o.seed
+    )
 
 
 def prepare(policy: Policy, robot: Robot, options: ContactConfig, folder: Path) -> "ApexEstimator":
     """Learn to estimate heights in simulation, or take it from an earlier run's folder."""
     contact = ContactEstimator(options)
-    asked = {"policy": policy.digest, "robot": robot.digest, "options": as_stored(asdict(options))}
-    found = list_checkpoints(folder)
+    asked = {
+        "policy": policy.digest,
+        "robot": robot.digest,
+        "options": run_folder.as_stored(asdict(options)),
+    }
+    found = checkpoint.list_checkpoints(folder)
     for path in found:
-        tree = read_checkpoint(path)
+        tree = checkpoint.read_checkpoint(path)
         if tree["asked"] == asked:
             contact.restore(tree["contact"])
             return ApexEstimator(robot, contact, tree["drag"])
     run = doubtful_legs(policy, robot, options)
     flying = (run.data["foot_clearance_m"] > 0).astype(np.float64)
-    contact.learn(TrialData.of(traces_of(run)), flying, options.seed)
+    contact.learn(trial_data.TrialData.of(simulated.traces_of(run)), flying, options.seed)
     estimator = ApexEstimator(robot, contact)
     estimator.calibrate(run)
     tree = {"asked": asked, "contact": contact.state(), "drag": estimator.drag}
-    write_checkpoint(folder, len(found), tree)
+    checkpoint.write_checkpoint(folder, len(found), tree)
     return estimator
 
 
@@ -191,7 +194,7 @@ class ApexEstimator:
         self.robot, self.contact = robot, contact
         self.drag = np.zeros(2) if drag is None else drag
 
-    def __call__(self, data: TrialData) -> ApexEstimate:
+    def __call__(self, data: trial_data.TrialData) -> trial_data.ApexEstimate:
         """Return the heights of trials."""
         air = self.contact.airborne(data)
         filled = data.filled()
@@ -206,11 +209,11 @@ class ApexEstimator:
                 for begin, end in _flights(air[:, leg], data.period)
             ]
             apexes.append(np.array(found).reshape(-1, 2))
-        return ApexEstimate(height, rate, flying, apexes)
+        return trial_data.ApexEstimate(height, rate, flying, apexes)
 
     def calibrate(self, run: Rollout) -> None:
         """Learn the drag from legs of which the truth is known: a witnessed run of many."""
-        estimated = self(TrialData.of(traces_of(run)))
+        estimated = self(trial_data.TrialData.of(simulated.traces_of(run)))
         near = round(_NEAR / (run.time[1] - run.time[0]))
         pairs = []
         for leg, found in enumerate(estimated.apexes):
@@ -222,7 +225,7 @@ class ApexEstimator:
             same = np.abs(found[nearest, 0] - hops.tick) <= near
             pairs.append(np.stack([found[nearest, 1], hops.apex], axis=1)[same])
         reckoned, true = np.concatenate(pairs).T
-        self.drag = self.drag + robust_line(reckoned, reckoned - true)
+        self.drag = self.drag + command_correction.robust_line(reckoned, reckoned - true)
 
     def _fly(
         self, height: Array, rate: Array, flying: BoolArray, begin: float, end: float, period: float

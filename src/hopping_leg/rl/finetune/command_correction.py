@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.observation_history import make_observation_history
-from hopping_leg.controllers.policy import Card
+from hopping_leg.controllers import observation_history, policy
 from hopping_leg.rl.onnx_export import Network
 
 _ROUNDS = 30
@@ -78,7 +77,7 @@ class LinearCommandCorrection:
         room = most - abs(a)
         return dataclasses.replace(self, shift=(a, float(np.clip(b, -room, room))))
 
-    def applied(self, network: Network, card: Card) -> Network:
+    def applied(self, network: Network, card: policy.Card) -> Network:
         """Return a network that computes with the corrected command."""
         a, b = self.shift
         middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
@@ -94,9 +93,9 @@ class LinearCommandCorrection:
         return np.stack([np.ones_like(command), (command - middle) / half], axis=-1)
 
 
-def _command_columns(card: Card) -> slice:
+def _command_columns(card: policy.Card) -> slice:
     """Return where commands stand among a policy's joined inputs."""
-    shapes = make_observation_history(card.layout, 1 / card.rate).shapes
+    shapes = observation_history.make_observation_history(card.layout, 1 / card.rate).shapes
     sizes = {name: int(np.prod(shape)) for name, shape in shapes.items()}
     first = sum(sizes[name] for name in list(sizes)[: list(sizes).index("command")])
     return slice(first, first + sizes["command"])

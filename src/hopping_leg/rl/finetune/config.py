@@ -7,8 +7,7 @@ from typing import Literal, get_args
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.envs import ApexRewardConfig
 from hopping_leg.errors import UsageError
-from hopping_leg.rl.finetune.apex_estimate import ContactConfig
-from hopping_leg.rl.finetune.command_correction import CommandCorrectionConfig
+from hopping_leg.rl.finetune import apex_estimate, command_correction
 from hopping_leg.rl.finetune.learner import SacConfig
 from hopping_leg.robot.parameters import Robot
 
@@ -95,11 +94,13 @@ class FinetuneConfig:
     """Reward lost where a trial is ended early."""
     stopping_rules: StoppingRules = field(default_factory=StoppingRules)
     """When it ends."""
-    correction: CommandCorrectionConfig = field(default_factory=CommandCorrectionConfig)
+    correction: command_correction.CommandCorrectionConfig = field(
+        default_factory=command_correction.CommandCorrectionConfig
+    )
     """How the command's correction follows the errors."""
     learner: SacConfig = field(default_factory=SacConfig)
     """Numbers of SAC."""
-    contact: ContactConfig = field(default_factory=ContactConfig)
+    contact: apex_estimate.ContactConfig = field(default_factory=apex_estimate.ContactConfig)
     """How contact is learnt in simulation."""
     reward: ApexRewardConfig = field(
         default_factory=lambda: ApexRewardConfig(width=(0.03, 0.015), sharp_from=1e-6, tail=0.5)

@@ -13,28 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.controllers.command_schedule import CommandSchedule
-from hopping_leg.controllers.hardware_trial import HardwareTrial, TrialRobot
+from hopping_leg.controllers import command_schedule, hardware_trial, protocol
 from hopping_leg.controllers.policy import Policy
-from hopping_leg.controllers.protocol import Controller
 from hopping_leg.envs import apex_reward
 from hopping_leg.io import write_atomically, write_json
-from hopping_leg.rl.checkpoint import Tree, list_checkpoints, read_checkpoint, write_checkpoint
+from hopping_leg.rl import checkpoint, onnx_export, run_folder
+from hopping_leg.rl.finetune import command_correction, config, learner, replay
 from hopping_leg.rl.finetune.apex_estimate import prepare
-from hopping_leg.rl.finetune.command_correction import LinearCommandCorrection
-from hopping_leg.rl.finetune.config import FinetuneConfig, Task
-from hopping_leg.rl.finetune.learner import Learner
-from hopping_leg.rl.finetune.replay import ExploringPolicy, TransitionWriter, believed_rows
 from hopping_leg.rl.finetune.trial_data import Score, TrialData, estimated, score, settled
-from hopping_leg.rl.onnx_export import Network, build_policy, read_network
-from hopping_leg.rl.run_folder import (
-    as_stored,
-    check_same,
-    is_new,
-    library_versions,
-    read_json,
-    refuse_finished,
-)
 from hopping_leg.trace import Trace
 
 RESULT = "finetune.json"
@@ -49,9 +35,9 @@ class Finetuning:
 
     def __init__(
         self,
-        task: Task,
-        robot: TrialRobot,
-        options: FinetuneConfig,
+        task: config.Task,
+        robot: hardware_trial.TrialRobot,
+        options: config.FinetuneConfig,
         folder: Path,
         pretraining: Path | None = None,
         on_trial: Callable[[Row], None] = lambda _: None,
@@ -61,9 +47,9 @@ class Finetuning:
         self._estimator = prepare(
             task.policy, task.robot, options.contact, pretraining or folder / "pretraining"
         )
-        self._network = read_network(task.policy.content)
-        self._correction = LinearCommandCorrection(*task.commands)
-        self._learner: Learner | None = None
+        self._network = onnx_export.read_network(task.policy.content)
+        self._correction = command_correction.LinearCommandCorrection(*task.commands)
+        self._learner: learner.Learner | None = None
         self._best = self._origin = (self._network, self._correction)
         self._explored = 0
         self.rows: list[Row] = []
@@ -111,26 +97,36 @@ class Finetuning:
         latest = [row["kind"] for row in self.rows[-self._options.explorations :]]
         return not self._learns_weights() or "check" not in latest
 
-    def _schedule(self, number: int, *, check: bool) -> CommandSchedule:
+    def _schedule(self, number: int, *, check: bool) -> command_schedule.CommandSchedule:
         o, rng = self._options, np.random.default_rng((self._task.seed, number, 1))
         if check:
             each = o.trial_seconds / len(o.commands)
-            return CommandSchedule(tuple((command, each) for command in o.commands))
+            return command_schedule.CommandSchedule(
+                tuple((command, each) for command in o.commands)
+            )
         sampled = rng.uniform(*self._task.commands, round(o.trial_seconds / o.hold))
-        return CommandSchedule(tuple((float(command), o.hold) for command in sampled))
+        return command_schedule.CommandSchedule(
+            tuple((float(command), o.hold) for command in sampled)
+        )
 
-    def _controller(self, number: int, *, check: bool) -> Controller:
+    def _controller(self, number: int, *, check: bool) -> protocol.Controller:
         content = self._content(self._network, self._correction)
         if check:
             return Policy(content, "the policy in training", self._task.policy.name)
         assert self._learner is not None
         rng = np.random.default_rng((self._task.seed, number, 2))
         card = self._task.policy.card
-        return ExploringPolicy(
+        return replay.ExploringPolicy(
             content, card, self._learner.spread, self._options.sde_sample_freq, rng
         )
 
-    def _evaluate(self, trial: HardwareTrial, schedule: CommandSchedule, *, check: bool) -> None:
+    def _evaluate(
+        self,
+        trial: hardware_trial.HardwareTrial,
+        schedule: command_schedule.CommandSchedule,
+        *,
+        check: bool,
+    ) -> None:
         """Score and record a trial, and learn from it."""
         data = TrialData.of([trial.trace])
         estimate = self._estimator(data)
@@ -167,7 +163,7 @@ class Finetuning:
             if self._learner is not None:
                 self._learner.set_actor(self._network)
 
-    def _learn(self, trial: HardwareTrial, ticks: int, *, explored: bool) -> None:
+    def _learn(self, trial: hardware_trial.HardwareTrial, ticks: int, *, explored: bool) -> None:
         if self._learner is None:
             self._network, self._correction = self._best
             self._begin_learning()
@@ -196,23 +192,25 @@ class Finetuning:
         spread = np.full((hidden, 2), np.exp(o.learner.log_std))
         rng = np.random.default_rng((task.seed, 4))
         content = self._content(self._network, self._correction)
-        explorer = ExploringPolicy(content, task.policy.card, spread, o.sde_sample_freq, rng)
-        rows = believed_rows(
+        explorer = replay.ExploringPolicy(content, task.policy.card, spread, o.sde_sample_freq, rng)
+        rows = replay.believed_rows(
             task.robot, task.commands, task.seed,
             explorer, self._estimator, self._writer(), o.believed_seconds,
         )  # fmt: skip
-        self._learner = Learner(self._network, rows, o.learner, task.seed)
+        self._learner = learner.Learner(self._network, rows, o.learner, task.seed)
         for row in self.rows:
             self._keep(Trace.load(self._trace(row["outing"])), bool(row["complaint"]))
 
-    def _writer(self) -> TransitionWriter:
+    def _writer(self) -> replay.TransitionWriter:
         o, card = self._options, self._task.policy.card
         reward = apex_reward(self._task.robot, o.reward, card.rate)
         reward.anneal(1.0)
         scaled = self._correction.applied(self._network, card)
-        return TransitionWriter(card, scaled, self._task.robot, reward, o.penalty)
+        return replay.TransitionWriter(card, scaled, self._task.robot, reward, o.penalty)
 
-    def _content(self, network: Network, correction: LinearCommandCorrection) -> bytes:
+    def _content(
+        self, network: onnx_export.Network, correction: command_correction.LinearCommandCorrection
+    ) -> bytes:
         policy = self._task.policy
         card = replace(
             policy.card,
@@ -220,7 +218,7 @@ class Finetuning:
             seed=self._task.seed,
             steps=policy.card.steps + round(60 * self.minutes * policy.card.rate),
         )
-        return build_policy(correction.applied(network, card), card)
+        return onnx_export.build_policy(correction.applied(network, card), card)
 
     def _seed(self, number: int, purpose: int) -> int:
         sequence = np.random.SeedSequence((self._task.seed, number, purpose))
@@ -230,7 +228,7 @@ class Finetuning:
         return self._folder / "outings" / f"{number:04d}.parquet"
 
     def _checkpoint(self) -> None:
-        tree: Tree = {
+        tree: checkpoint.Tree = {
             "rows": self.rows,
             "explored": self._explored,
             "now": _as_tree(self._network, self._correction),
@@ -238,14 +236,14 @@ class Finetuning:
             "origin": _as_tree(*self._origin),
             "learner": None if self._learner is None else self._learner.state(),
         }
-        write_checkpoint(self._folder / "checkpoints", len(self.rows), tree)
+        checkpoint.write_checkpoint(self._folder / "checkpoints", len(self.rows), tree)
 
     def _restore(self) -> None:
         """Go on from the newest checkpoint, if there is one."""
-        found = list_checkpoints(self._folder / "checkpoints")
+        found = checkpoint.list_checkpoints(self._folder / "checkpoints")
         if not found:
             return
-        tree = read_checkpoint(found[-1])
+        tree = checkpoint.read_checkpoint(found[-1])
         self.rows, self._explored = tree["rows"], tree["explored"]
         if tree["learner"] is not None:
             self._network, self._correction = self._from_tree(tree["origin"])
@@ -255,13 +253,17 @@ class Finetuning:
         self._network, self._correction = self._from_tree(tree["now"])
         self._best = self._from_tree(tree["best"])
 
-    def _from_tree(self, tree: Tree) -> tuple[Network, LinearCommandCorrection]:
+    def _from_tree(
+        self, tree: checkpoint.Tree
+    ) -> tuple[onnx_export.Network, command_correction.LinearCommandCorrection]:
         layers = [(np.array(weight), np.array(bias)) for weight, bias in tree["layers"]]
         a, b = tree["shift"]
         return replace(self._network, layers=layers), replace(self._correction, shift=(a, b))
 
 
-def _as_tree(network: Network, correction: LinearCommandCorrection) -> Tree:
+def _as_tree(
+    network: onnx_export.Network, correction: command_correction.LinearCommandCorrection
+) -> checkpoint.Tree:
     return {"layers": [list(layer) for layer in network.layers], "shift": list(correction.shift)}
 
 
@@ -282,9 +284,9 @@ def _numbers(judged: Score, prefix: str) -> Row:
 
 
 def finetune(
-    task: Task,
-    robot: TrialRobot,
-    options: FinetuneConfig,
+    task: config.Task,
+    robot: hardware_trial.TrialRobot,
+    options: config.FinetuneConfig,
     out: Path,
     *,
     resume: bool = False,
@@ -297,7 +299,7 @@ def finetune(
     content of ``finetune.json``; raises ``UsageError`` where ``out`` holds a run that cannot be
     continued so.
     """
-    asked = as_stored(
+    asked = run_folder.as_stored(
         {
             "policy": task.policy.name,
             "policy_digest": task.policy.digest,
@@ -308,14 +310,18 @@ def finetune(
             "options": asdict(options),
         }
     )
-    if is_new(out, resume=resume):
+    if run_folder.is_new(out, resume=resume):
         write_json(out / "config.json", asked)
     else:
-        check_same(out, read_json(out / "config.json"), asked)
-        refuse_finished(out / POLICY)
+        run_folder.check_same(out, run_folder.read_json(out / "config.json"), asked)
+        run_folder.refuse_finished(out / POLICY)
     finetuning = Finetuning(task, robot, options, out, pretraining, on_trial)
     content, reason = finetuning.run()
-    result = {**asked, **summary(finetuning.rows, reason), "versions": library_versions()}
+    result = {
+        **asked,
+        **summary(finetuning.rows, reason),
+        "versions": run_folder.library_versions(),
+    }
     write_json(out / RESULT, result)
     write_atomically(out / "model_card.md", card(result).encode())
     write_atomically(out / POLICY, content)

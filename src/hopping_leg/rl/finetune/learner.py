@@ -19,11 +19,8 @@ from stable_baselines3.common.type_aliases import ReplayBufferSamples
 from torch import nn
 
 from hopping_leg.arrays import Array
-from hopping_leg.rl.checkpoint import Tree
+from hopping_leg.rl import checkpoint, onnx_export, resumable, sb3_policies
 from hopping_leg.rl.finetune.replay import CRITIC_SIZE, EDGE, Transitions
-from hopping_leg.rl.onnx_export import Network
-from hopping_leg.rl.resumable import learner_state, restore_learner
-from hopping_leg.rl.sb3_policies import AsymmetricSACPolicy
 
 _LOOKED_AT = 3000
 """Ticks on which it is told how much actions have changed, the newest, 15 s."""
@@ -72,14 +69,14 @@ class Learner:
     """
 
     def __init__(
-        self, network: Network, believed: Transitions, options: SacConfig, seed: int
+        self, network: onnx_export.Network, believed: Transitions, options: SacConfig, seed: int
     ) -> None:
         self.options, self._network = options, network
         size = believed.observation.shape[1]
         sizes = [len(bias) for _, bias in network.layers[:-1]]
         torch.manual_seed(seed)
         self.model = _Offline(
-            AsymmetricSACPolicy,
+            sb3_policies.AsymmetricSACPolicy,
             None,
             learning_rate=options.learning_rate,
             buffer_size=options.buffer_size,
@@ -159,7 +156,7 @@ class Learner:
         for weight, value in zip(self.model.actor.parameters(), weights, strict=True):
             weight.copy_(value)
 
-    def network(self) -> Network:
+    def network(self) -> onnx_export.Network:
         """Return the deterministic actor as it stands."""
         actor = self.model.actor
         layers = [m for m in [*actor.latent_pi, actor.mu[0]] if isinstance(m, nn.Linear)]
@@ -168,15 +165,15 @@ class Learner:
                        for m in layers]  # fmt: skip
         return replace(self._network, layers=weights)
 
-    def state(self) -> Tree:
+    def state(self) -> checkpoint.Tree:
         """Return networks and optimisers; transitions are others' to keep."""
-        return learner_state(self.model)
+        return resumable.learner_state(self.model)
 
-    def restore(self, state: Tree) -> None:
+    def restore(self, state: checkpoint.Tree) -> None:
         """Go on from a ``state``."""
-        restore_learner(self.model, state)
+        resumable.restore_learner(self.model, state)
 
-    def set_actor(self, network: Network) -> None:
+    def set_actor(self, network: onnx_export.Network) -> None:
         """Let the actor go on from another network; the critics stay."""
         actor = self.model.actor
         linear = actor.mu[0] if isinstance(actor.mu, nn.Sequential) else actor.mu

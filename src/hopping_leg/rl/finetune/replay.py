@@ -12,14 +12,11 @@ import numpy as np
 import onnxruntime
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.observation_history import make_observation_history
-from hopping_leg.controllers.policy import Card
-from hopping_leg.controllers.protocol import Measurement
+from hopping_leg.controllers import observation_history, policy, protocol
 from hopping_leg.envs import Reward
 from hopping_leg.envs.observation import Array32
 from hopping_leg.envs.rewards import Transition
-from hopping_leg.rl.finetune.apex_estimate import ApexEstimator
-from hopping_leg.rl.finetune.simulated import hop_many, traces_of
+from hopping_leg.rl.finetune import apex_estimate, simulated
 from hopping_leg.rl.finetune.trial_data import ApexEstimate, TrialData
 from hopping_leg.rl.onnx_export import PREFIX, Network, expose_hidden
 from hopping_leg.robot import Robot, kinematics
@@ -36,10 +33,10 @@ class ExploringPolicy:
     """
 
     def __init__(
-        self, content: bytes, card: Card, spread: Array, hold: int, rng: np.random.Generator
+        self, content: bytes, card: policy.Card, spread: Array, hold: int, rng: np.random.Generator
     ) -> None:
         self.name = f"exploring {card.recipe}"
-        self._layout = make_observation_history(card.layout, 1 / card.rate)
+        self._layout = observation_history.make_observation_history(card.layout, 1 / card.rate)
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = options.inter_op_num_threads = 1
         self._session = onnxruntime.InferenceSession(
@@ -56,7 +53,7 @@ class ExploringPolicy:
         self._torque = np.zeros((count, 2))
         self._left = 0
 
-    def act(self, measurement: Measurement) -> Array:
+    def act(self, measurement: protocol.Measurement) -> Array:
         """Return joint torques, N m, (n, 2)."""
         self._layout.update(measurement, self._torque)
         torque, hidden = self._session.run(self._wanted, self._layout.inputs())
@@ -102,7 +99,7 @@ class TransitionWriter:
     """Writes transitions; a trial that is ended early loses ``penalty`` of reward."""
 
     def __init__(
-        self, card: Card, network: Network, robot: Robot, reward: Reward, penalty: float
+        self, card: policy.Card, network: Network, robot: Robot, reward: Reward, penalty: float
     ) -> None:
         self._card, self._network, self._robot = card, network, robot
         self._reward, self._penalty, self._untouched = reward, penalty, reward.state()
@@ -130,7 +127,7 @@ class TransitionWriter:
     def _actor_inputs(self, data: TrialData) -> Array:
         """Return what the network computes with at every tick, normalised, (ticks, n, size)."""
         card, network = self._card, self._network
-        layout = make_observation_history(card.layout, 1 / card.rate)
+        layout = observation_history.make_observation_history(card.layout, 1 / card.rate)
         layout.reset(data.command.shape[1])
         last = np.zeros(data.asked.shape[1:])
         rows = []
@@ -191,7 +188,7 @@ def believed_rows(
     commands: tuple[float, float],
     seed: int,
     controller: ExploringPolicy,
-    estimator: ApexEstimator,
+    estimator: apex_estimate.ApexEstimator,
     writer: TransitionWriter,
     seconds: float,
 ) -> Transitions:
@@ -202,6 +199,6 @@ def believed_rows(
     rng = np.random.default_rng((seed, 1))
     holds = max(1, round(seconds / BELIEVED_LEGS / 2.0))
     steps = np.repeat(rng.uniform(*commands, (holds, BELIEVED_LEGS)), 400, axis=0)
-    run = hop_many(controller, robot, [robot] * BELIEVED_LEGS, steps, seed)
-    data = TrialData.of(traces_of(run))
+    run = simulated.hop_many(controller, robot, [robot] * BELIEVED_LEGS, steps, seed)
+    data = TrialData.of(simulated.traces_of(run))
     return writer(data, estimator(data))

@@ -10,9 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.command_schedule import CommandSchedule
-from hopping_leg.controllers.hardware_trial import MEASURED, HardwareTrial, measured_table
-from hopping_leg.controllers.protocol import Controller, Measurement
+from hopping_leg.controllers import command_schedule, hardware_trial, protocol
 from hopping_leg.controllers.rollout import Rollout, RolloutConfig, rollout
 from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot.parameters import Robot
@@ -51,7 +49,9 @@ class SimulatedTrials:
         self.name, self._robot, self._guard = robot.name, robot, guard
         self._setup = RolloutConfig(robot, NO_NOISE, threads=threads)
 
-    def hop(self, controller: Controller, schedule: CommandSchedule, seed: int) -> HardwareTrial:
+    def hop(
+        self, controller: protocol.Controller, schedule: command_schedule.CommandSchedule, seed: int
+    ) -> hardware_trial.HardwareTrial:
         """Let a controller hop from standing."""
         commands = schedule.commands(self._setup.rate)[:, None]
         witness = Witness(controller, self._guard)
@@ -59,7 +59,7 @@ class SimulatedTrials:
         ended = int(witness.ended[0])
         trace = traces_of(run)[0]
         table = trace.table[: ended + 1] if ended >= 0 else trace.table
-        return HardwareTrial(
+        return hardware_trial.HardwareTrial(
             Trace(table, trace.header),
             table.height / self._setup.rate,
             witness.complaints[0],
@@ -68,7 +68,7 @@ class SimulatedTrials:
 
 
 def hop_many(
-    controller: Controller,
+    controller: protocol.Controller,
     robot: Robot,
     robots: Sequence[Robot],
     commands: Array,
@@ -88,12 +88,12 @@ def traces_of(run: Rollout) -> list[Trace]:
     """Return what each leg of a witnessed run measured, without anything true."""
     return [
         Trace(
-            measured_table(
+            hardware_trial.measured_table(
                 run.time,
                 run.data["command_m"][:, leg],
                 {
                     name: np.stack([run.data[_own(column)][:, leg] for column in columns], axis=1)
-                    for name, columns in MEASURED.items()
+                    for name, columns in hardware_trial.MEASURED.items()
                 },
             ),
             {**run.header, "simulated": True},
@@ -108,7 +108,7 @@ class Witness:
     ``ended`` is the tick at which each leg was stopped, -1 for never, (n,); ``complaints`` say why.
     """
 
-    def __init__(self, controller: Controller, guard: Guard | None) -> None:
+    def __init__(self, controller: protocol.Controller, guard: Guard | None) -> None:
         self.name, self._controller, self._guard = controller.name, controller, guard
 
     def watch(self, legs: Simulator) -> None:
@@ -122,7 +122,7 @@ class Witness:
         self.complaints = [""] * count
         self._tick = -1
 
-    def act(self, measurement: Measurement) -> Array:
+    def act(self, measurement: protocol.Measurement) -> Array:
         """Return joint torques, N m, (n, 2)."""
         self._tick += 1
         q, qd = measurement.q[:, 0], measurement.qd[:, 0]
@@ -139,7 +139,7 @@ class Witness:
         """Return what was seen at the last tick."""
         return {
             _own(column): self._seen[name][:, joint]
-            for name, columns in MEASURED.items()
+            for name, columns in hardware_trial.MEASURED.items()
             for joint, column in enumerate(columns)
         }
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray, IntArray
-from hopping_leg.controllers.command_schedule import CommandSchedule
-from hopping_leg.controllers.hardware_trial import MEASURED, HardwareTrial
+from hopping_leg.controllers import command_schedule, hardware_trial
 from hopping_leg.errors import TraceError
 from hopping_leg.sim.channel import SAMPLES, Measurement
 from hopping_leg.trace import Trace
@@ -38,7 +37,7 @@ class TrialData:
                 [np.stack([t.column(column) for column in columns], axis=1) for t in traces],
                 axis=1,
             )
-            for name, columns in MEASURED.items()
+            for name, columns in hardware_trial.MEASURED.items()
         }
         if np.isnan(joints["q"]).all(axis=(0, 2)).any():
             raise TraceError("A trace of a trial holds no sample of the joints; it tells nothing.")
@@ -117,7 +116,7 @@ class Score:
     """Mean of ``by_command``, or one metre where the trial was ended early."""
 
 
-def estimated(trial: HardwareTrial, estimate: ApexEstimate) -> Array:
+def estimated(trial: hardware_trial.HardwareTrial, estimate: ApexEstimate) -> Array:
     """Return time, command and estimated height of a trial's apexes, s, m, m, (hops, 3)."""
     tick, height = estimate.apexes[0].T
     rows = tick.astype(np.int64)
@@ -125,14 +124,14 @@ def estimated(trial: HardwareTrial, estimate: ApexEstimate) -> Array:
     return np.stack([time[rows] - time[0], command[rows], height], axis=1)
 
 
-def settled(apexes: Array, schedule: CommandSchedule) -> Array:
+def settled(apexes: Array, schedule: command_schedule.CommandSchedule) -> Array:
     """Return the apexes that no change of the command disturbed, (hops, 3)."""
     since = apexes[:, :1] - np.cumsum([0.0, *(seconds for _, seconds in schedule.steps)])
     calm: Array = apexes[np.where(since >= 0, since, np.inf).min(axis=1) >= SETTLING]
     return calm
 
 
-def score(apexes: Array, schedule: CommandSchedule, complaint: str) -> Score:
+def score(apexes: Array, schedule: command_schedule.CommandSchedule, complaint: str) -> Score:
     """Return how well commands were met by apexes of time, command and height, (hops, 3).
 
     A complaint says why the trial was ended early, if it was.

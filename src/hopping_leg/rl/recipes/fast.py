@@ -6,11 +6,10 @@ they were taken, episodes that begin on the hop they should end in.
 """
 
 from hopping_leg.envs import ApexRewardConfig, TaskConfig
-from hopping_leg.rl.algorithms import NetworkConfig, PPOConfig
-from hopping_leg.rl.recipe import Recipe, Schedule, SelectionConfig
+from hopping_leg.rl import algorithms, recipe
 from hopping_leg.rl.search_space import LAYERS, OneOf, Real, SearchSpace
 
-FAST = Recipe(
+FAST = recipe.Recipe(
     name="fast",
     task=TaskConfig(
         observation="dated",
@@ -21,10 +20,10 @@ FAST = Recipe(
         timestep=1e-3,
     ),
     reward=ApexRewardConfig(),
-    algorithm=PPOConfig(),
-    network=NetworkConfig(actor=(128, 64), critic=(256, 128)),
-    schedule=Schedule(num_envs=512, steps=6_000_000, log_every=4),
-    selection=SelectionConfig(eval_every=600_000),
+    algorithm=algorithms.PPOConfig(),
+    network=algorithms.NetworkConfig(actor=(128, 64), critic=(256, 128)),
+    schedule=recipe.Schedule(num_envs=512, steps=6_000_000, log_every=4),
+    selection=recipe.SelectionConfig(eval_every=600_000),
 )
 
 SEARCH_SPACE: SearchSpace = {

@@ -5,13 +5,12 @@ episode and what the critics see are chosen here.
 """
 
 from hopping_leg.envs import PaperRewardConfig, TaskConfig
-from hopping_leg.rl.algorithms import NetworkConfig, SACConfig
-from hopping_leg.rl.recipe import Recipe, Schedule, SelectionConfig
+from hopping_leg.rl import algorithms, recipe
 from hopping_leg.rl.search_space import OneOf, Real, SearchSpace
 
 _LAYERS = OneOf(((128, 128), (256, 256), (256, 256, 128, 128)))
 
-PAPER = Recipe(
+PAPER = recipe.Recipe(
     name="paper",
     task=TaskConfig(
         reset_distribution="mixed",
@@ -20,10 +19,10 @@ PAPER = Recipe(
         fall_penalty=20.0,
     ),
     reward=PaperRewardConfig(),
-    algorithm=SACConfig(),
-    network=NetworkConfig(actor=(256, 256, 128, 128), critic=(256, 256, 128, 128)),
-    schedule=Schedule(num_envs=16, steps=240_000, log_every=32),
-    selection=SelectionConfig(eval_every=8_000),
+    algorithm=algorithms.SACConfig(),
+    network=algorithms.NetworkConfig(actor=(256, 256, 128, 128), critic=(256, 256, 128, 128)),
+    schedule=recipe.Schedule(num_envs=16, steps=240_000, log_every=32),
+    selection=recipe.SelectionConfig(eval_every=8_000),
 )
 
 SEARCH_SPACE: SearchSpace = {

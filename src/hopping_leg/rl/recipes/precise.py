@@ -8,13 +8,12 @@ commands, from which some never come back to the low ones.
 from dataclasses import replace
 
 from hopping_leg.envs import ApexRewardConfig
-from hopping_leg.rl.algorithms import PPOConfig
+from hopping_leg.rl import algorithms, recipe
 from hopping_leg.rl.distillation.distillation import Distillation
-from hopping_leg.rl.recipe import Recipe, Schedule, SelectionConfig
 from hopping_leg.rl.recipes.fast import FAST
 from hopping_leg.rl.search_space import LAYERS, OneOf, Real, SearchSpace
 
-PRECISE = Recipe(
+PRECISE = recipe.Recipe(
     name="precise",
     task=replace(
         FAST.task,
@@ -27,10 +26,10 @@ PRECISE = Recipe(
     reward=ApexRewardConfig(
         width=(0.030, 0.006), energy=0.8, energy_beyond=0.05, jerk=0.5, effort=0.2
     ),
-    algorithm=PPOConfig(n_epochs=8),
+    algorithm=algorithms.PPOConfig(n_epochs=8),
     network=FAST.network,
-    schedule=Schedule(num_envs=512, steps=10_000_000, log_every=4),
-    selection=SelectionConfig(
+    schedule=recipe.Schedule(num_envs=512, steps=10_000_000, log_every=4),
+    selection=recipe.SelectionConfig(
         eval_every=500_000,
         eval_start=0.7,
         eval_commands=(0.225, 0.26, 0.295, 0.33, 0.365, 0.40, 0.435),
