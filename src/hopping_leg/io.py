@@ -7,11 +7,10 @@ import math
 import os
 import platform
 import types
-import typing
 from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 from hopping_leg.errors import HoppingLegError, TraceError, UsageError, unknown_name
 
@@ -95,7 +94,7 @@ def replace_at(tree: Kind, path: str, value: object) -> Kind:
     name, _, rest = path.partition(".")
     if isinstance(tree, dict):
         inner = replace_at(tree.get(name, {}), rest, value) if rest else value
-        return typing.cast(Kind, {**tree, name: inner})
+        return cast(Kind, {**tree, name: inner})
     inner = replace_at(getattr(tree, name), rest, value) if rest else value
     return dataclasses.replace(tree, **{name: inner})  # type: ignore[type-var]
 
@@ -137,7 +136,7 @@ def read_dataclass(
     if not isinstance(tree, dict):
         raise error(f"{origin}: '{path or origin}' must be a table, not {tree!r}.")
     specs: dict[str, Field] = {f.name: f for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
-    hints = typing.get_type_hints(kind)
+    hints = get_type_hints(kind)
     for key in tree:
         if key not in specs:
             where = f"field in [{path}]" if path else "field"
@@ -152,7 +151,7 @@ def read_dataclass(
             values[name] = read_quantity(tree.get(name), spec, at)
         elif dataclasses.is_dataclass(inner := hints[name]) and not missing:
             values[name] = read_dataclass(
-                typing.cast("type[Any]", inner),
+                cast("type[Any]", inner),
                 tree[name],
                 origin,
                 error=error,
@@ -180,21 +179,21 @@ def _read(
     error: type[HoppingLegError],
 ) -> object:
     """Return a value as its field's type, or say what was valid."""
-    args = typing.get_args(kind)
+    args = get_args(kind)
     if _is_optional(kind):
         return None if value is None else _read(value, args[0], choices, subject, error)
-    if typing.get_origin(kind) is Literal or choices:
+    if get_origin(kind) is Literal or choices:
         valid = choices or args
         if value not in valid:
             raise error(f"{subject}: {unknown_name('value', str(value), map(str, valid))}")
         return value
-    if typing.get_origin(kind) is tuple and isinstance(value, list | tuple):
+    if get_origin(kind) is tuple and isinstance(value, list | tuple):
         kinds = [args[0]] * len(value) if args[-1] is Ellipsis else list(args)
         if len(kinds) == len(value):
             pairs = zip(value, kinds, strict=True)
             return tuple(_read(v, k, (), subject, error) for v, k in pairs)
     elif kind is float and is_number(value):
-        return float(typing.cast(float, value))
+        return float(cast(float, value))
     elif kind in _FORMS and isinstance(value, kind) and (kind is bool) == isinstance(value, bool):
         return value
     raise error(f"{subject} is {value!r} but must be {_form(kind, choices)}.")
@@ -203,17 +202,17 @@ def _read(
 def is_number(value: object) -> bool:
     """Tell whether a value is a finite number and no truth value."""
     number = isinstance(value, int | float) and not isinstance(value, bool)
-    return number and math.isfinite(typing.cast(float, value))
+    return number and math.isfinite(cast(float, value))
 
 
 def _form(kind: Any, choices: tuple[str, ...]) -> str:  # noqa: ANN401
     """Return what a field may hold."""
-    args = typing.get_args(kind)
+    args = get_args(kind)
     if _is_optional(kind):
         return _form(args[0], choices)
-    if typing.get_origin(kind) is Literal or choices:
+    if get_origin(kind) is Literal or choices:
         return f"one of {', '.join(map(str, choices or args))}"
-    if typing.get_origin(kind) is tuple:
+    if get_origin(kind) is tuple:
         pair = args == (float, float)
         return "a pair [hip, knee] of numbers" if pair else f"a list of {len(args)}"
     if dataclasses.is_dataclass(kind):
@@ -222,4 +221,4 @@ def _form(kind: Any, choices: tuple[str, ...]) -> str:  # noqa: ANN401
 
 
 def _is_optional(kind: Any) -> bool:  # noqa: ANN401
-    return isinstance(kind, types.UnionType) or typing.get_origin(kind) is typing.Union
+    return isinstance(kind, types.UnionType) or get_origin(kind) is Union

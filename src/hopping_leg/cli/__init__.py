@@ -14,10 +14,9 @@ import inspect
 import io
 import sys
 import types
-import typing
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
-from typing import Annotated, Any, Union
+from typing import Annotated, Any, Union, get_type_hints
 
 import tyro
 
@@ -132,7 +131,7 @@ def read_options(
 
 def _load_verb(verb: str) -> tuple[types.ModuleType, Any]:
     module = importlib.import_module(f"hopping_leg.cli.{verb}")
-    return module, typing.get_type_hints(module.run, include_extras=True)["args"]
+    return module, get_type_hints(module.run, include_extras=True)["args"]
 
 
 def _print_completion(shell: str = "") -> int:

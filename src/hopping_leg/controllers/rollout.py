@@ -1,6 +1,5 @@
 """Run a controller on many legs at once and record what happened."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
@@ -59,7 +58,7 @@ class RolloutConfig:
         check_ground(self.engine, self.ground)
         for name in ("rate", "timestep"):
             value = getattr(self, name)
-            if not 0 < value < math.inf:
+            if not 0 < value < np.inf:
                 raise UsageError(f"'{name}' is {value:g} but must be positive and finite.")
         if self.threads < 0:
             raise UsageError(f"'threads' is {self.threads} but must be 0 (all cores) or more.")

@@ -4,7 +4,6 @@ Rising and sinking are minimum-jerk paths under the joint PD; the rise begins wh
 the gains fade out before its end. The paper's soft limits stay in force throughout.
 """
 
-import math
 from dataclasses import dataclass, field
 from enum import IntEnum
 
@@ -78,7 +77,7 @@ class SequenceStep:
     torque: Pair
     command: float
     phase: Part
-    controller: Pair = (math.nan, math.nan)
+    controller: Pair = (np.nan, np.nan)
     """What the controller alone asked for, N m; NaN outside of the hop."""
 
 
@@ -133,7 +132,7 @@ class MotionSequence:
         else:
             asked = self._hold(phase, lasted, q, qd)
         torque = asked if self.limiter is None else self.limiter.apply(asked, q, qd)
-        own = _pair(asked) if phase is Part.HOP else (math.nan, math.nan)
+        own = _pair(asked) if phase is Part.HOP else (np.nan, np.nan)
         return SequenceStep(_pair(torque), command, phase, own)
 
     def command(self, time: float) -> float:

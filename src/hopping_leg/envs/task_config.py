@@ -1,6 +1,5 @@
 """What the learning problem leaves open, as options; the default is argued in the docs."""
 
-import math
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
@@ -72,13 +71,13 @@ class TaskConfig:
     """PD at the joint limits, added to the action's torque."""
 
     def __post_init__(self) -> None:
-        if not self.commands or not all(0 < c < math.inf for c in self.commands):
+        if not self.commands or not all(0 < c < np.inf for c in self.commands):
             raise UsageError(
                 f"Commands must be positive heights in m, not {self.commands}; e.g. 0.25 0.30 0.35."
             )
         for name in ("command_range", "command_resampling_time", "drop_length"):
             pair = getattr(self, name)
-            if pair is not None and not 0 < pair[0] <= pair[1] < math.inf:
+            if pair is not None and not 0 < pair[0] <= pair[1] < np.inf:
                 raise UsageError(
                     f"'{name}' is {pair} but must be two positive numbers, the smaller first."
                 )
@@ -87,7 +86,7 @@ class TaskConfig:
             "timestep",
         ):  # fmt: skip
             value = getattr(self, name)
-            if not all(0 < v < math.inf for v in np.atleast_1d(value)):
+            if not all(0 < v < np.inf for v in np.atleast_1d(value)):
                 raise UsageError(f"'{name}' is {value} but must be positive and finite.")
         for name in ("randomize_probability", "nominal_fraction"):
             if not 0 <= getattr(self, name) <= 1:

@@ -1,8 +1,7 @@
 """Several stored runs beside each other: one evaluation of all, where they differ, and its page."""
 
-import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from markupsafe import Markup
@@ -81,7 +80,7 @@ def traces_of(compared: Compared) -> list[trials.Run]:
                 trials.load_run(path) for path in sorted(stored.traces.glob(f"*-{kind}-0.parquet"))
             ]
             known = [run for run in runs if run.controller in evaluation.controllers]
-            found += [dataclasses.replace(r, controller=name(r.controller)) for r in known]
+            found += [replace(r, controller=name(r.controller)) for r in known]
     return found
 
 
@@ -131,8 +130,7 @@ def _merge(evaluations: dict[str, Evaluation]) -> Evaluation:
         name = _name(evaluations, label)
         for field in _OF_CONTROLLERS:
             fields[field] += [
-                dataclasses.replace(row, controller=name(row.controller))
-                for row in getattr(evaluation, field)
+                replace(row, controller=name(row.controller)) for row in getattr(evaluation, field)
             ]
         fields["distributions"] += [
             {**entry, "controller": name(entry["controller"])} for entry in evaluation.distributions

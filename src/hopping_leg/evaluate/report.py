@@ -1,8 +1,7 @@
 """The report: figures of an evaluation, and one HTML page that holds all and needs nothing."""
 
-import dataclasses
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from markupsafe import Markup
@@ -133,7 +132,7 @@ def write_report(judged: runner.EvaluationRun, videos: dict[str, Video] | None =
             "secondary": table(tables.SUMMARY, secondary.summary if secondary else []),
             "estimators": tables.estimator_table(evaluation.estimators),
         },
-        acceptance=acceptance.acceptance_lines(map(dataclasses.asdict, evaluation.summary)),
+        acceptance=acceptance.acceptance_lines(map(asdict, evaluation.summary)),
         pictures=pictures_of(evaluation, judged.runs),
         videos=[
             {

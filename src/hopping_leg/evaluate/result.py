@@ -1,7 +1,6 @@
 """The numbers of an evaluation, as typed records and as JSON."""
 
-import dataclasses
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from hopping_leg.evaluate.statistics import Neighbours
@@ -148,7 +147,7 @@ class Evaluation:
 
     def to_json(self) -> dict[str, Any]:
         """Return plain values; numbers that do not exist are None."""
-        return {"schema": SCHEMA, **plain(_rounded(dataclasses.asdict(self)))}
+        return {"schema": SCHEMA, **plain(_rounded(asdict(self)))}
 
     def dumps(self) -> bytes:
         """Return readable JSON."""

@@ -1,12 +1,10 @@
 """Runs read back from what `hop evaluate` and `hop train` have left on the disk."""
 
-import dataclasses
 import json
-import typing
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_origin, get_type_hints
 
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.result import SCHEMA, Evaluation
@@ -127,9 +125,9 @@ def evaluation_from(content: dict[str, Any]) -> Evaluation:
 
 def _filled(kind: Any, value: Any) -> Any:  # noqa: ANN401
     """Return a value of JSON as a type, dataclasses in lists included."""
-    if dataclasses.is_dataclass(kind) and isinstance(value, dict):
-        hints = typing.get_type_hints(kind)
+    if is_dataclass(kind) and isinstance(value, dict):
+        hints = get_type_hints(kind)
         return kind(**{name: _filled(hints[name], entry) for name, entry in value.items()})  # type: ignore[operator]
-    if typing.get_origin(kind) is list and isinstance(value, list):
-        return [_filled(typing.get_args(kind)[0], entry) for entry in value]
+    if get_origin(kind) is list and isinstance(value, list):
+        return [_filled(get_args(kind)[0], entry) for entry in value]
     return float("nan") if kind is float and value is None else value

@@ -1,6 +1,5 @@
 """Whether a leg can follow a trajectory: reach, joint range, speed, torque; before it is played."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +19,7 @@ class HardwareRange:
     The knee's default is what recordings of the leg show it can do, to either side.
     """
 
-    hip: Pair = (-math.pi, math.pi)
+    hip: Pair = (-np.pi, np.pi)
     """rad; the hip turns freely, half a turn keeps cables from winding up."""
     knee: Pair = (-2.7, 2.7)
     """rad"""

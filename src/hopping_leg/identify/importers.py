@@ -1,8 +1,7 @@
 """Recordings of other loggers, recognised by their columns."""
 
-import dataclasses
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import polars as pl
@@ -64,7 +63,7 @@ class LogFormat:
             steps = np.diff(time[np.isfinite(time)])
             step = float(np.median(steps)) if len(steps) else 0.0
             rate = float(f"{1 / step:.3g}") if 0 < step < np.inf else 1.0
-            metadata = dataclasses.replace(metadata, rate_hz=rate)
+            metadata = replace(metadata, rate_hz=rate)
         return renamed.with_columns(self.derived(table)), metadata
 
 

@@ -1,10 +1,9 @@
 """The paper's excitation trajectories: the foot strokes along the leg, the leg may swing."""
 
-import dataclasses
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
 
@@ -175,13 +174,13 @@ def _adapt_stroke(
     stroke: Stroke, robot: Robot, rate: float, limits: feasibility.HardwareRange
 ) -> Stroke:
     time = np.arange(round(stroke.duration * rate)) / rate
-    stroke = dataclasses.replace(stroke, margin=max(stroke.margin, LAB_MARGIN))
+    stroke = replace(stroke, margin=max(stroke.margin, LAB_MARGIN))
     while True:
         try:
             wanted = feasibility.demand(robot, stroke.rig, stroke.joints(robot, time), rate)
             feasibility.check_demand(robot, wanted, rate, limits)
         except UsageError:
-            stroke = dataclasses.replace(stroke, amplitude=stroke.amplitude * _SHRINK)
+            stroke = replace(stroke, amplitude=stroke.amplitude * _SHRINK)
             if stroke.amplitude < _SMALLEST:
                 raise
         else:

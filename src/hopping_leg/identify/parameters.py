@@ -1,9 +1,8 @@
 """What a fit may change, the robot and its actuators, and the named numbers that it searches."""
 
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cached_property
 from operator import attrgetter
 from typing import Any
@@ -76,9 +75,9 @@ def parameter_units(hypothesis: LegHypothesis) -> dict[str, str]:
 
 def _units(owner: Any, prefix: str = "") -> dict[str, str]:  # noqa: ANN401
     found: dict[str, str] = {}
-    for spec in dataclasses.fields(owner):
+    for spec in fields(owner):
         value = getattr(owner, spec.name)
-        if dataclasses.is_dataclass(value):
+        if is_dataclass(value):
             found |= _units(value, f"{prefix}{spec.name}.")
         elif "unit" in spec.metadata:
             found[prefix + spec.name] = spec.metadata["unit"]

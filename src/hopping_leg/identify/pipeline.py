@@ -1,9 +1,8 @@
 """From recordings to identified parameters, judged on data that the fit has not seen."""
 
-import dataclasses
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +69,7 @@ def identify(
     options = options or IdentifyOptions()
     if seed < 0 or options.threads < 0:
         raise UsageError("The seed and the number of threads must not be negative.")
-    robot = dataclasses.replace(robot, reality=NO_MISMATCH)
+    robot = replace(robot, reality=NO_MISMATCH)
     check_recordings([*recordings, *validate], robot)
     bounds = {**_file_bounds(robot), **options.bounds}
     plan = make_plan(
@@ -157,7 +156,7 @@ def _conclude(
     objective: Objective, last: Pass, options: IdentifyOptions
 ) -> tuple[LegHypothesis, Identifiability]:
     """Return the best hypothesis and what is known of it, unless it breaks down in simulation."""
-    objective = dataclasses.replace(objective, parameters=last.parameters)
+    objective = replace(objective, parameters=last.parameters)
     vector = last.found.vector
     (hypothesis,) = last.parameters.hypotheses(vector[None])
     simulated = objective.simulator.run([hypothesis]).position[0]
@@ -192,10 +191,10 @@ def _config(
         "recordings": [[r.name, r.digest] for r in objective.recordings],
         "recordings_to_judge_by": [[r.name, r.digest] for r in held],
         "robot": objective.parameters.base.robot.digest,
-        "parameters": [dataclasses.asdict(p) for p in objective.parameters.parameters],
-        "scoring": dataclasses.asdict(objective.scoring),
+        "parameters": [asdict(p) for p in objective.parameters.parameters],
+        "scoring": asdict(objective.scoring),
         "windows": len(objective.windows),
-        "search": [options.search, dataclasses.asdict(options.effort)],
+        "search": [options.search, asdict(options.effort)],
         "seed": seed,
         "software": software_versions(),
     }

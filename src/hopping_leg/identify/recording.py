@@ -5,14 +5,13 @@ need a sidecar, or come from one of the known rigs.
 """
 
 import csv
-import dataclasses
 import gzip
 import hashlib
 import io
 import tomllib
 import zlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -146,11 +145,11 @@ class Recording:
 
     def with_metadata(self, **changes: Any) -> "Recording":  # noqa: ANN401
         """Return the recording with other facts in its metadata, e.g. gains known elsewhere."""
-        return dataclasses.replace(self, metadata=dataclasses.replace(self.metadata, **changes))
+        return replace(self, metadata=replace(self.metadata, **changes))
 
     def save(self, path: Path) -> None:
         """Write the native form, or raise TraceError if that fails."""
-        tree = dataclasses.asdict(self.metadata).items()
+        tree = asdict(self.metadata).items()
         header = {**self.trace.header, _KEY: {k: v for k, v in tree if v is not None}}
         Trace(self.trace.table, header).save(path)
 

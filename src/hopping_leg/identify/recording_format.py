@@ -1,6 +1,5 @@
 """What a recording holds: its columns, and the metadata that its rows do not say."""
 
-import math
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -110,13 +109,13 @@ class RecordingMetadata:
     def __post_init__(self) -> None:
         for name in ("rate_hz", "effective_gravity"):
             value = getattr(self, name)
-            if not 0 < value < math.inf:
+            if not 0 < value < np.inf:
                 raise RecordingError(f"'{name}' is {value} but must be positive and finite.")
         if self.startup_rows < 0:
             raise RecordingError(f"'startup_rows' is {self.startup_rows} but must be 0 or more.")
         for name in ("stiffness", "damping", "integral", "torque_limit"):
             pair = getattr(self, name)
-            if pair is not None and not all(0 <= value < math.inf for value in pair):
+            if pair is not None and not all(0 <= value < np.inf for value in pair):
                 raise RecordingError(f"'{name}' is {pair} but must hold zero or more, finite.")
 
     @property

@@ -1,9 +1,8 @@
 """What an identification found: as JSON, and as a robot file."""
 
-import dataclasses
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -65,7 +64,7 @@ def as_json(identified: Identified) -> dict[str, Any]:
         "cannot_tell": known.statements,
         "search": {
             "method": plan.search,
-            "scoring": dataclasses.asdict(plan.scoring),
+            "scoring": asdict(plan.scoring),
             "window_s": plan.window,
             "stride_s": plan.window,
             "unscored_s": plan.unscored,

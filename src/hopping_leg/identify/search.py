@@ -7,9 +7,8 @@ optimize all dynamic and solver parameters while placing bounds on the friction,
 armature parameters derived from the first pass."
 """
 
-import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -97,7 +96,7 @@ class Searcher:
     def _pass(self, name: str, parameters: ParameterSet, begin: float, share: float) -> Pass:
         """Search from every start and report within a share of the whole."""
         threads = self.objective.threads if self.ray is None else 1
-        objective = dataclasses.replace(self.objective, parameters=parameters, threads=threads)
+        objective = replace(self.objective, parameters=parameters, threads=threads)
         searched = self._search_of(objective, {**objective.about(), **self.about})
         starts = self.options.starts
 
@@ -137,7 +136,7 @@ class Searcher:
             objective.parameters,
             self.options.cma,
             seed=self.seed,
-            shares=[self._spread(dataclasses.replace(objective, windows=hand)) for hand in hands],
+            shares=[self._spread(replace(objective, windows=hand)) for hand in hands],
             about=about,
         )
 

@@ -1,9 +1,7 @@
 """Judging a hypothesis on recordings: in closed loop, and predicting open-loop from torques."""
 
-import dataclasses
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -81,7 +79,7 @@ def _errors(
     *quantities: str,
 ) -> list[Pair]:
     if not windows:
-        return [(math.nan, math.nan)] * len(quantities)
+        return [(np.nan, np.nan)] * len(quantities)
     simulator = simulate.WindowSimulator(recordings, windows, timestep=timestep, threads=threads)
     simulated = simulator.run([hypothesis])
     return [rms(getattr(simulated, q)[0] - measured(simulator, q)) for q in quantities]
@@ -102,8 +100,8 @@ def as_torque_driven(recording: Recording) -> Recording:
             now = table[torque].interpolate().fill_null(strategy="backward")
             later = now.shift(-1).fill_null(strategy="forward")
             table = table.with_columns(((1 - share) * now + share * later).alias(command))
-    trace = dataclasses.replace(recording.trace, table=table)
-    return dataclasses.replace(recording, trace=trace).with_metadata(onboard="torque")
+    trace = replace(recording.trace, table=table)
+    return replace(recording, trace=trace).with_metadata(onboard="torque")
 
 
 def _starts_known(recordings: Sequence[Recording], window: Window) -> bool:

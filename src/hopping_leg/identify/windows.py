@@ -1,8 +1,7 @@
 """Windows to simulate from a measured state, and stretches of recordings that no fit sees."""
 
-import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -128,5 +127,5 @@ def part(recording: Recording, start: int, stop: int) -> Recording:
     table = recording.trace.table[int(start) : int(stop)]
     first, last = (float(recording.time[row]) - recording.time[0] for row in (start, stop - 1))
     name = f"{recording.name}, {first:.1f}-{last:.1f} s"
-    trace = dataclasses.replace(recording.trace, table=table)
-    return dataclasses.replace(recording, trace=trace, name=name)
+    trace = replace(recording.trace, table=table)
+    return replace(recording, trace=trace, name=name)

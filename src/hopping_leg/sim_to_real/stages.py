@@ -4,11 +4,10 @@ A twin brings latency, noise and losses of its own; the paper's disturbance stay
 would come on top. A twin without [reality] is met with the paper's disturbance.
 """
 
-import dataclasses
 import hashlib
 import json
 from abc import abstractmethod
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -175,7 +174,7 @@ class IdentifyTwin(StoredJob):
             "recordings": [load_recording(path).digest for path in self._recordings],
             "search": search,
             "generations": None if search == "least-squares" else self.study.generations,
-            **({} if effort == USUAL_FIT else {"least_squares": dataclasses.asdict(effort)}),
+            **({} if effort == USUAL_FIT else {"least_squares": asdict(effort)}),
         }
 
     def run(self, *, quiet: bool) -> None:
@@ -190,7 +189,7 @@ class IdentifyTwin(StoredJob):
         options = IdentifyOptions(search=search, bounds=_bounds(believed), effort=effort)
         if search == "one-pass":
             names = plan.make_plan(recordings, believed, search="two-pass").parameters.names
-            options = dataclasses.replace(
+            options = replace(
                 options, search="cma", parameters=tuple(names), scoring=cost.Scoring()
             )
         folder = self.file.with_suffix("")

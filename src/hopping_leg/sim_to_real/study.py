@@ -1,8 +1,7 @@
 """What a transfer study was asked for, and where it keeps its files."""
 
-import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hopping_leg.errors import UsageError
@@ -42,8 +41,8 @@ class TwinFile:
         """The twin as the simulator for training could know it at best."""
         robot = self.robot
         latency = Latency(command=robot.reality.latency.command)
-        known = dataclasses.replace(NO_MISMATCH, latency=latency)
-        return dataclasses.replace(robot, name=f"{self.name}-truth", reality=known)
+        known = replace(NO_MISMATCH, latency=latency)
+        return replace(robot, name=f"{self.name}-truth", reality=known)
 
 
 @dataclass(frozen=True)
@@ -101,7 +100,7 @@ class Study:
             return twin.without_surprises
         if method.fit is not None:
             return load_robot(self.fitted(twin, method))
-        return dataclasses.replace(load_robot(method.robot or twin.believed), reality=NO_MISMATCH)
+        return replace(load_robot(method.robot or twin.believed), reality=NO_MISMATCH)
 
     def fitted(self, twin: TwinFile, method: Method) -> Path:
         """Return the robot file that a method fits; beside it, as .json, stands the fit."""

@@ -1,7 +1,6 @@
 """Settings of a live simulation that change while the leg hops; its controller is not told."""
 
-import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from hopping_leg.errors import UsageError
 from hopping_leg.robot.parameters import Robot
@@ -51,15 +50,15 @@ class LiveSettings:
         reality = robot.reality
         latency, ground = reality.latency, reality.ground
         if ground.time_constant is not None:
-            ground = dataclasses.replace(ground, time_constant=self.time_constant)
-        return dataclasses.replace(
+            ground = replace(ground, time_constant=self.time_constant)
+        return replace(
             robot,
-            base=dataclasses.replace(robot.base, mass=robot.base.mass + self.payload),
-            contact=dataclasses.replace(robot.contact, time_constant=self.time_constant),
-            reality=dataclasses.replace(
+            base=replace(robot.base, mass=robot.base.mass + self.payload),
+            contact=replace(robot.contact, time_constant=self.time_constant),
+            reality=replace(
                 reality,
                 ground=ground,
-                latency=dataclasses.replace(latency, command=latency.command + self.delay),
+                latency=replace(latency, command=latency.command + self.delay),
             ),
         )
 

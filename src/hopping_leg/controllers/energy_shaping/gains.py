@@ -3,10 +3,9 @@
 A gain file is one TOML per tuned set, beside the leg it was found on.
 """
 
-import dataclasses
 import json
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
@@ -142,7 +141,7 @@ def scale_gains(gains: ShapingGains, origin: Robot, robot: Robot) -> ShapingGain
         scaled[f"{joint}_damping"] = np.maximum(
             damped * factor - getattr(robot, joint).damping, 0.0
         )
-    return dataclasses.replace(gains, **scaled)
+    return replace(gains, **scaled)
 
 
 def _joint_inertia(robot: Robot) -> Array:

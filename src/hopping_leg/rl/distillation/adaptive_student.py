@@ -6,9 +6,8 @@ correction integrates a share of that. The estimate is learnt from the true heig
 a teacher whose command is corrected alike.
 """
 
-import dataclasses
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -228,7 +227,7 @@ class AdaptiveStudent(nn.Module):
             beyond=config.beyond,
             follow=self.follow,
         )
-        return dataclasses.replace(network, memory=memory)
+        return replace(network, memory=memory)
 
     def state(self) -> checkpoint.Tree:
         """Return the buffer, the memory and the last hops."""

@@ -6,8 +6,7 @@ integral controller does. The two numbers vanish in the scaling of the network's
 is an ordinary policy.
 """
 
-import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -75,7 +74,7 @@ class LinearCommandCorrection:
         most = options.farthest
         a = float(np.clip(a, -most, most))
         room = most - abs(a)
-        return dataclasses.replace(self, shift=(a, float(np.clip(b, -room, room))))
+        return replace(self, shift=(a, float(np.clip(b, -room, room))))
 
     def applied(self, network: Network, card: policy.Card) -> Network:
         """Return a network that computes with the corrected command."""
@@ -86,7 +85,7 @@ class LinearCommandCorrection:
         offset, gain = network.offset.copy(), network.gain.copy()
         offset[at] = (offset[at] - a + b / half * middle) / slope
         gain[at] = gain[at] * slope
-        return dataclasses.replace(network, offset=offset, gain=gain)
+        return replace(network, offset=offset, gain=gain)
 
     def _features(self, command: Array) -> Array:
         middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
