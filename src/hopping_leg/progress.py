@@ -4,15 +4,8 @@ import time
 from types import TracebackType
 from typing import Self
 
+from rich import progress
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    Progress,
-    ProgressColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 
 _LINE_SECONDS = 60.0
 
@@ -34,20 +27,20 @@ class LiveProgress:
         title: str,
         total: float = 1.0,
         *,
-        columns: tuple[ProgressColumn, ...] = (),
+        columns: tuple[progress.ProgressColumn, ...] = (),
         quiet: bool = False,
         lines: bool | None = None,
         first_line: float = 0.0,
     ) -> None:
         self._console = Console(stderr=True, quiet=quiet)
         self._lines = not self._console.is_terminal if lines is None else lines
-        self._bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(bar_width=20),
-            TextColumn("{task.percentage:>3.0f} %"),
-            TimeElapsedColumn(),
+        self._bar = progress.Progress(
+            progress.TextColumn("{task.description}"),
+            progress.BarColumn(bar_width=20),
+            progress.TextColumn("{task.percentage:>3.0f} %"),
+            progress.TimeElapsedColumn(),
             *columns,
-            TextColumn("{task.fields[note]}"),
+            progress.TextColumn("{task.fields[note]}"),
             console=self._console,
             disable=self._lines,
         )
@@ -86,16 +79,16 @@ class LiveProgress:
         self._bar.stop()
 
 
-class ShareProgress(Progress):
+class ShareProgress(progress.Progress):
     """A bar per label that shows the share done, elapsed and remaining time."""
 
     def __init__(self) -> None:
         super().__init__(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.percentage:>3.0f}%"),
-            TimeElapsedColumn(),
-            TimeRemainingColumn(),
+            progress.TextColumn("{task.description}"),
+            progress.BarColumn(),
+            progress.TextColumn("{task.percentage:>3.0f}%"),
+            progress.TimeElapsedColumn(),
+            progress.TimeRemainingColumn(),
             console=Console(stderr=True),
         )
 

@@ -24,10 +24,8 @@ from pathlib import Path
 import tyro
 from rich.console import Console
 
-from hopping_leg.cli.motors import ask, check, connect
-from hopping_leg.cli.options import say, say_written
-from hopping_leg.controllers import command_schedule, joint_pd, protocol, registry
-from hopping_leg.controllers.policy import Policy
+from hopping_leg.cli import motors, options
+from hopping_leg.controllers import command_schedule, joint_pd, policy, protocol, registry
 from hopping_leg.deploy import hardware_trials, height_page, keyboard, safety_limits, stop_reasons
 from hopping_leg.deploy.loop import ControlLoop
 from hopping_leg.deploy.motion_sequence import MotionSequence, SequenceTiming, hopping_poses
@@ -75,8 +73,10 @@ def run(args: Deploy) -> None:
     robot.require_leg()
     done = _perform(args, robot, *_plan(args, robot))
     cause = done.outcome.supervisor.stop_cause
-    say(*done.notices, f"{cause} {done.outcome.ticks} ticks, {done.outcome.skipped} left out.")
-    say_written(done.path)
+    options.say(
+        *done.notices, f"{cause} {done.outcome.ticks} ticks, {done.outcome.skipped} left out."
+    )
+    options.say_written(done.path)
     if cause.reason not in (stop_reasons.Reason.FINISHED, stop_reasons.Reason.OPERATOR_STOP):
         errors = [event.get("controller_error", "") for event in done.trace.header["events"]]
         raise HardwareError(" ".join([f"The leg was stopped: {cause}", *filter(None, errors)]))
@@ -103,7 +103,7 @@ def _plan(
         schedule = command_schedule.CommandSchedule.parse(args.schedule)
         seconds = schedule.seconds
     else:
-        middle = sum(valid) / 2 if isinstance(controller, Policy) else 0.30
+        middle = sum(valid) / 2 if isinstance(controller, policy.Policy) else 0.30
         height = middle if args.command is None else args.command
         schedule = command_schedule.CommandSchedule(((height, _SECONDS),))
     command_schedule.check_schedule(schedule, valid, controller.name)
@@ -144,10 +144,10 @@ def _perform(
             yield
 
     if page is not None:
-        say(f"Height and stop: {page.address}")
-    with connect(robot, args.transport) as link:
-        drives, name = check(link, robot, limits), controller.name
-        ask(
+        options.say(f"Height and stop: {page.address}")
+    with motors.connect(robot, args.transport) as link:
+        drives, name = motors.check(link, robot, limits), controller.name
+        motors.ask(
             f"All checks passed. {robot.name} will move and hop for {seconds:g} s with {name};"
             " keep a hand on the switch.",
             yes=args.yes,

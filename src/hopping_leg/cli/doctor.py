@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING
 
 from packaging.requirements import Requirement
 
-from hopping_leg.cli.motors import ask, connect, find, show
-from hopping_leg.cli.options import say
+from hopping_leg.cli import motors, options
 from hopping_leg.deploy import preflight, safety_limits
 from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.robot import JOINTS, Robot, load_robot
@@ -65,24 +64,24 @@ def run(args: Doctor) -> None:
             raise UsageError("--write and --home need the drives; name their --transport.")
         for extra, missing in missing_requirements(requires("hopping-leg") or []).items():
             state = f"missing {', '.join(missing)}" if missing else "installed"
-            say(f"{extra}: {state}; {PURPOSES[extra]}")
+            options.say(f"{extra}: {state}; {PURPOSES[extra]}")
             if missing:
-                say(f"  pip install 'hopping-leg[{extra}]'")
+                options.say(f"  pip install 'hopping-leg[{extra}]'")
         return
     robot = load_robot(args.robot)
     limits = safety_limits.hopping_limits(robot, CONTROL_RATE)
-    with connect(robot, args.transport) as link:
-        findings = find(link, robot, limits)
+    with motors.connect(robot, args.transport) as link:
+        findings = motors.find(link, robot, limits)
         if args.write:
             _write(link, robot, findings, yes=args.yes)
         if args.home is not None:
             _home(link, args.home, yes=args.yes)
         if changes:
-            findings = find(link, robot, limits)
-    show(findings)
+            findings = motors.find(link, robot, limits)
+    motors.show(findings)
     if any(finding.complaint for finding in findings):
         raise HardwareError("The leg may not be armed; the sentences above say why.")
-    say("The leg may be armed.")
+    options.say("The leg may be armed.")
 
 
 def _write(
@@ -94,8 +93,8 @@ def _write(
         wrong = {f.setting for f in findings if f.joint == joint and f.setting}
         settings = [s for s in preflight.required_settings(robot, joint) if s.name in wrong]
         if settings:
-            say(*(f"{name}: {s.name} = {s.text} ({s.why})" for s in settings))
-            ask(f"These settings of the {name}'s drive will be written for good.", yes=yes)
+            options.say(*(f"{name}: {s.name} = {s.text} ({s.why})" for s in settings))
+            motors.ask(f"These settings of the {name}'s drive will be written for good.", yes=yes)
             configure(link, joint, settings)
 
 
@@ -103,7 +102,7 @@ def _home(link: "MoteusLink", angles: tuple[float, float], *, yes: bool) -> None
     from hopping_leg.deploy.drive_info import home
 
     hip, knee = angles
-    ask(f"The drives will take the hip for {hip:g} and the knee for {knee:g} rad.", yes=yes)
+    motors.ask(f"The drives will take the hip for {hip:g} and the knee for {knee:g} rad.", yes=yes)
     home(link, angles)
 
 

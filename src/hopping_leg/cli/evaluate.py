@@ -22,15 +22,7 @@ import tyro
 from rich.console import Console
 
 from hopping_leg import io, progress
-from hopping_leg.cli.options import (
-    Heights,
-    JsonFile,
-    RobotFile,
-    at_least,
-    check_file,
-    command_line,
-    say_written,
-)
+from hopping_leg.cli import options
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.evaluate import Entry, EvaluationRun, evaluate, tables, trials
 from hopping_leg.evaluate.entries import load_entries
@@ -46,14 +38,14 @@ class Conditions:
     controllers: tyro.conf.Positional[tuple[str, ...]]
     """Names (energy-shaping, paper, fast, ...), .onnx files, a quoted pattern of them, or Python
     classes as FILE.py:CLASS; LABEL=FILE chooses the name in all tables."""
-    robot: RobotFile = "legv2-paper"
-    commands: Heights | None = None
+    robot: options.RobotFile = "legv2-paper"
+    commands: options.Heights | None = None
     """Apex heights, m; default 0.25,0.30,0.35, scaled to the leg's length."""
     seeds: int = 5
     """Realisations of noise and delay per trial."""
     seed: int = 1000
     """Seed of noise and delay; choose one that selected no policy."""
-    json: JsonFile = None
+    json: options.JsonFile = None
     noise: bool = True
     """The paper's sensor noise, torque noise and delay."""
     timestep: float = 5e-4
@@ -65,8 +57,8 @@ class Conditions:
 
     def load(self) -> tuple[list[Entry], RolloutConfig]:
         """Return the controllers and how they are rolled out; a wrong option is a UsageError."""
-        at_least(0, seed=self.seed)
-        check_file(self.json)
+        options.at_least(0, seed=self.seed)
+        options.check_file(self.json)
         robot = load_robot(self.robot)
         noise = NoiseAndDelay() if self.noise else NO_NOISE
         setup = RolloutConfig(
@@ -96,7 +88,7 @@ class Evaluate(Conditions):
 
 def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
     """Evaluate controllers, print the table, write what was asked for; notes come first there."""
-    command = command_line("hop evaluate", args)
+    command = options.command_line("hop evaluate", args)
     if args.out is not None:
         args = replace(
             args,
@@ -104,7 +96,7 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
             report=args.report or args.out / "report.html",
             traces=args.traces or args.out / "traces",
         )
-    check_file(args.report)
+    options.check_file(args.report)
     if args.traces:
         args.traces.mkdir(parents=True, exist_ok=True)
     entries, setup = args.load()
@@ -119,7 +111,7 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
     if args.report:
         videos = render_videos(judged, setup.robot) if args.video else None
         io.write_atomically(args.report, write_report(judged, videos))
-    say_written(args.json, args.report, args.traces)
+    options.say_written(args.json, args.report, args.traces)
 
 
 def _judge(entries: list[Entry], setup: RolloutConfig, args: Evaluate) -> EvaluationRun:

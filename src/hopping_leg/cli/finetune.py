@@ -20,8 +20,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import tyro
 
 from hopping_leg import errors, io
-from hopping_leg.cli.motors import ask, check, connect
-from hopping_leg.cli.options import Heights, JsonFile, at_least, say
+from hopping_leg.cli import motors, options
 from hopping_leg.controllers.registry import load_policy
 from hopping_leg.deploy import hardware_trials, safety_limits
 from hopping_leg.robot import Robot, load_robot
@@ -48,7 +47,7 @@ class Finetune:
     """Method: correct the command, train the weights, or one after the other."""
     minutes: float = 10.0
     """Longest time on the robot."""
-    commands: Heights = (0.25, 0.30, 0.35)
+    commands: options.Heights = (0.25, 0.30, 0.35)
     """Heights of the checks, m; explorations hop between the lowest and the highest."""
     trial_seconds: float = 15.0
     """Length of a trial, s."""
@@ -62,7 +61,7 @@ class Finetune:
     """Continue the run in the folder; start one if there is none."""
     yes: bool = False
     """Arm the drives without asking before every trial."""
-    json: JsonFile = None
+    json: options.JsonFile = None
 
 
 def run(args: Finetune) -> None:
@@ -72,7 +71,7 @@ def run(args: Finetune) -> None:
 
     policy, robot = load_policy(args.policy), load_robot(args.robot)
     _refuse(args, policy, robot)
-    options = FinetuneConfig(
+    config = FinetuneConfig(
         method=args.method,
         commands=tuple(sorted(args.commands)),
         trial_seconds=args.trial_seconds,
@@ -82,14 +81,14 @@ def run(args: Finetune) -> None:
     result = finetune(
         Task(policy, robot, span, args.seed),
         _trial_robot(args, robot, policy.card.rate),
-        options,
+        config,
         args.out,
         resume=args.resume,
-        on_trial=lambda row: say(line(row)),
+        on_trial=lambda row: options.say(line(row)),
     )
     if args.json is not None:
         io.write_json(args.json, result)
-    say(f"{result['why_it_ended']} Policy: {args.out / POLICY}")
+    options.say(f"{result['why_it_ended']} Policy: {args.out / POLICY}")
 
 
 def line(row: dict[str, Any]) -> str:
@@ -124,7 +123,7 @@ def _refuse(args: Finetune, policy: "Policy", robot: Robot) -> None:
         raise errors.UsageError(
             "Give either --on, a twin that plays the leg, or --transport, its drives."
         )
-    at_least(0, seed=args.seed)
+    options.at_least(0, seed=args.seed)
     robot.require_leg()
     if not robot.reality.only_delays:
         raise errors.RobotError(
@@ -155,13 +154,13 @@ def _trial_robot(args: Finetune, robot: Robot, rate: float) -> "TrialRobot":
 
     def ready(seconds: float) -> None:
         what = f"{robot.name} will move and hop for {seconds:g} s; keep a hand on the switch."
-        ask(what, yes=args.yes)
+        motors.ask(what, yes=args.yes)
 
     return hardware_trials.DeployedRobot(
         robot,
         rate,
         args.out / "traces",
-        lambda: connect(robot, transport),
-        lambda link: check(link, robot, limits),
+        lambda: motors.connect(robot, transport),
+        lambda link: motors.check(link, robot, limits),
         ready,
     )

@@ -20,8 +20,7 @@ import tyro
 from rich.console import Console
 from rich.progress import Progress
 
-from hopping_leg.cli.motors import ask, check, connect
-from hopping_leg.cli.options import at_least, say, say_written
+from hopping_leg.cli import motors, options
 from hopping_leg.controllers import command_schedule, joint_pd
 from hopping_leg.deploy import hardware_trials, keyboard, safety_limits, stop_reasons
 from hopping_leg.deploy.motion_sequence import MotionSequence, Poses, SequenceTiming, hopping_poses
@@ -62,7 +61,7 @@ def run(args: Record) -> None:
     """Play every excitation and write its recording."""
     if not args.excitations:
         raise UsageError("No excitation was given; write one with `hop excite`.")
-    at_least(0, seed=args.seed)
+    options.at_least(0, seed=args.seed)
     name = args.robot or ("twin" if args.transport is None else "legv2")
     robot = load_robot(name)
     parent = parent_robot(name) if args.transport is None else None
@@ -93,8 +92,8 @@ def run(args: Record) -> None:
             )
             file = args.out / f"{robot.name}-{stem}.parquet"
             recording.save(file)
-            say_written(file)
-            say(*(f"  {warning}" for warning in recording.warnings))
+            options.say_written(file)
+            options.say(*(f"  {warning}" for warning in recording.warnings))
 
 
 def _record_motors(
@@ -110,11 +109,11 @@ def _record_motors(
         raise UsageError("The excitations have different rates; record them one by one.")
     rate = rates.pop()
     limits = safety_limits.recording_limits(robot, rate)
-    with connect(robot, transport) as link:
-        drives = check(link, robot, limits)
+    with motors.connect(robot, transport) as link:
+        drives = motors.check(link, robot, limits)
         for name, excitation in excitations:
             seconds = len(excitation) / rate
-            ask(
+            motors.ask(
                 f"{robot.name} on the {excitation.rig} will play {name} for {seconds:.0f} s; keep a"
                 " hand on the switch.",
                 yes=args.yes,
@@ -147,5 +146,5 @@ def _record_motors(
                 done.trace, excitation, believed=believed, gains=gains, name=file.name
             )
             recording.save(file)
-            say(*(f"  {notice}" for notice in (*done.notices, *recording.warnings)))
-            say_written(file)
+            options.say(*(f"  {notice}" for notice in (*done.notices, *recording.warnings)))
+            options.say_written(file)

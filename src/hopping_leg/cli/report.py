@@ -23,14 +23,7 @@ import tyro
 from hopping_leg import errors, figure_style, io
 from hopping_leg.cli.options import JsonFile, check_file, say, say_written
 from hopping_leg.deploy.flight_recorder import SUFFIX, recover
-from hopping_leg.evaluate import (
-    EvaluationRun,
-    aggregation,
-    comparison,
-    report,
-    result_files,
-    trials,
-)
+from hopping_leg.evaluate import aggregation, comparison, report, result_files, runner, trials
 from hopping_leg.evaluate.video import Animation, fixed_traces, render_video
 from hopping_leg.robot import load_robot
 
@@ -80,7 +73,7 @@ def _write(args: Page) -> None:
     if len(runs) == 1 and (evaluation := runs[0].evaluation):
         traces = sorted(runs[0].traces.glob("*.parquet")) if runs[0].traces else []
         page = report.write_report(
-            EvaluationRun(evaluation, [trials.load_run(path) for path in traces])
+            runner.EvaluationRun(evaluation, [trials.load_run(path) for path in traces])
         )
         numbers = evaluation.to_json()
     else:

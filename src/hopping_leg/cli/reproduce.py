@@ -19,8 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from hopping_leg import errors, io
-from hopping_leg.cli import evaluate
-from hopping_leg.cli.options import at_least, say, show_table
+from hopping_leg.cli import evaluate, options
 from hopping_leg.controllers.registry import ENERGY_SHAPING, shipped_policies
 from hopping_leg.identify.optimizers import LeastSquaresOptions
 from hopping_leg.sim_to_real.methods import DEFAULT, choose_methods
@@ -99,7 +98,7 @@ def run(args: Reproduce) -> None:
         notes,
     )
     show_transfer(result)
-    say(
+    options.say(
         *notes,
         f"Done in {(time.monotonic() - start) / 60:.1f} minutes.",
         f"Report: {(folder / 'report.html').resolve()}",
@@ -127,8 +126,8 @@ def make_study(args: Reproduce) -> Study:
 
 
 def _check(args: Reproduce) -> None:
-    at_least(0, seed=args.seed)
-    at_least(1, jobs=args.jobs, steps=args.steps)
+    options.at_least(0, seed=args.seed)
+    options.at_least(1, jobs=args.jobs, steps=args.steps)
     if args.quick and args.full:
         raise errors.UsageError("--quick and --full exclude each other; give one of them.")
     mark = args.folder / _MARK
@@ -149,21 +148,23 @@ def show_transfer(result: dict[str, Any]) -> None:
         hops = f"{skipped}/{row['hops'] + skipped}"
         command, signed = _mm(row["command_m"]), _mm(row["median_error_m"])
         rows.append((row["method"], command, error, f"{low}-{high}", signed, hops))
-    show_table(("trained on", "command, mm", "|error|, mm", "95 %", "error, mm", "skipped"), rows)
+    options.show_table(
+        ("trained on", "command, mm", "|error|, mm", "95 %", "error, mm", "skipped"), rows
+    )
     _show_overall(result)
     if "best_in_own_simulation" in result:
-        say("\nOf several trainings, those alone that hop best in their own simulation:")
+        options.say("\nOf several trainings, those alone that hop best in their own simulation:")
         _show_overall(result["best_in_own_simulation"])
 
 
 def _show_overall(result: dict[str, Any]) -> None:
     for row in result["methods"]:
-        say(
+        options.say(
             f"{row['method']}: {_mm(row['median_abs_error_m'])} mm over all commands,"
             f" {row['ordered']} of {row['policies']} policies in order"
         )
     for row in result["comparison"]:
-        say(
+        options.say(
             f"{row['method']} errs {row['ratio']:.1f} times as much as {row['over']}"
             f" ({row['ratio_low']:.1f} to {row['ratio_high']:.1f})"
         )

@@ -15,14 +15,13 @@ from pathlib import Path
 from rich.console import Console
 
 from hopping_leg import figure_style, io, progress
-from hopping_leg.cli.evaluate import Conditions
-from hopping_leg.cli.options import command_line, say_written
+from hopping_leg.cli import evaluate, options
 from hopping_leg.evaluate import figures, result_cache, tables
 from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
 
 
 @dataclass(frozen=True)
-class Robustness(Conditions):
+class Robustness(evaluate.Conditions):
     """Which controllers meet which axes."""
 
     axes: tuple[str, ...] = ()
@@ -38,9 +37,9 @@ def run(args: Robustness) -> None:
     suite = make_suite(setup, axes=args.axes, commands=heights, repeats=seeds, seed=args.seed)
     with progress.ShareProgress() as bar:
         found = run_suite(entries, suite, result_cache.ResultCache(args.out), bar.show)
-    result = {"command": command_line("hop robustness", args), **found}
+    result = {"command": options.command_line("hop robustness", args), **found}
     file, figure = args.json or args.out / "robustness.json", args.out / "robustness.svg"
     io.write_json(file, result)
     io.write_atomically(figure, figure_style.to_svg(figures.draw_robustness(result)))
     tables.print_robustness(Console(), result)
-    say_written(file, figure)
+    options.say_written(file, figure)

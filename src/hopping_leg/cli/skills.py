@@ -11,14 +11,13 @@ from typing import Literal
 from rich.console import Console
 
 from hopping_leg import io, progress
-from hopping_leg.cli.evaluate import Conditions
-from hopping_leg.cli.options import command_line, say_written
+from hopping_leg.cli import evaluate, options
 from hopping_leg.evaluate.skills.suite import run_skills
 from hopping_leg.evaluate.tables import print_skills
 
 
 @dataclass(frozen=True)
-class Skills(Conditions):
+class Skills(evaluate.Conditions):
     """Which controllers, and where they hop."""
 
     floor: Literal["soft", "stiff", "both"] = "both"
@@ -38,8 +37,8 @@ def run(args: Skills) -> None:
             seed=args.seed,
             on_progress=bar.show,
         )
-    result = {"command": command_line("hop skills", args), **found}
+    result = {"command": options.command_line("hop skills", args), **found}
     print_skills(Console(), result)
     if args.json:
         io.write_json(args.json, result)
-        say_written(args.json)
+        options.say_written(args.json)

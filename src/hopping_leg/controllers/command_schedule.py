@@ -7,8 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.policy import Policy
-from hopping_leg.controllers.protocol import Controller
+from hopping_leg.controllers import policy, protocol
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import Robot, command_limits
 
@@ -73,12 +72,12 @@ class CommandSchedule:
         return np.concatenate([np.full(round(s * rate), height) for height, s in self.steps])
 
 
-def command_range(controller: Controller, robot: Robot) -> Range:
+def command_range(controller: protocol.Controller, robot: Robot) -> Range:
     """Return the heights that a controller can be asked for, m.
 
     A policy's are those of its training; others go from folded standing to twice the leg's length.
     """
-    if isinstance(controller, Policy):
+    if isinstance(controller, policy.Policy):
         return controller.card.command_low, controller.card.command_high
     return command_limits(robot)
 

@@ -17,9 +17,7 @@ from typing import Any, Protocol, TypeVar
 from moteus import Controller, QueryResolution, multiplex
 from moteus.protocol import Register
 
-from hopping_leg.deploy import replies, transport
-from hopping_leg.deploy.drive_link import Action, DriveCommand, Exchange, joint_transforms
-from hopping_leg.deploy.realtime import Clock, RealClock
+from hopping_leg.deploy import drive_link, realtime, replies, transport
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot.parameters import Robot
 
@@ -109,11 +107,11 @@ class MoteusLink:
         self,
         robot: Robot,
         open_transport: transport.Opener,
-        clock: Clock | None = None,
+        clock: realtime.Clock | None = None,
         client: Callable[[Callable[[str], None]], Client] = ClientThread,
     ) -> None:
-        self._clock = clock or RealClock()
-        self.robot, self.transforms = robot, joint_transforms(robot)
+        self._clock = clock or realtime.RealClock()
+        self.robot, self.transforms = robot, drive_link.joint_transforms(robot)
         self.trouble = ""
         self._limits = [joint.motor.torque_limit for joint in (robot.hip, robot.knee)]
         self._clocks = (replies.DriveClock(), replies.DriveClock())
@@ -128,7 +126,7 @@ class MoteusLink:
             for wire in self.transforms
         ]
 
-    def exchange(self, outgoing: DriveCommand, until: float) -> Exchange:
+    def exchange(self, outgoing: drive_link.DriveCommand, until: float) -> drive_link.Exchange:
         """Tell both drives what to do and ask for their state in the same frames."""
         question = replies.Question(self.transforms, self._clocks, self._clock.now())
         commands = self._commands(outgoing, query=True)
@@ -139,7 +137,7 @@ class MoteusLink:
         question.done.wait(self._clock.patience(until))
         return question.result()
 
-    def send(self, outgoing: DriveCommand) -> None:
+    def send(self, outgoing: drive_link.DriveCommand) -> None:
         """Tell both drives what to do; returns at once."""
         commands = self._commands(outgoing, query=False)
         until = self._clock.now() + _SEND_SECONDS
@@ -175,10 +173,10 @@ class MoteusLink:
             # The client and the serial port raise many types when the adapter is gone.
             self._note(str(error))
 
-    def _commands(self, outgoing: DriveCommand, *, query: bool) -> list[Any]:
+    def _commands(self, outgoing: drive_link.DriveCommand, *, query: bool) -> list[Any]:
         pairs = zip(self.controllers, self.transforms, outgoing.torque, self._limits, strict=True)
         match outgoing.action:
-            case Action.TORQUE:
+            case drive_link.Action.TORQUE:
                 return [
                     controller.make_position(
                         **_NO_POSITION_CONTROL,
@@ -189,9 +187,9 @@ class MoteusLink:
                     )
                     for controller, transform, torque, limit in pairs
                 ]
-            case Action.BRAKE:
+            case drive_link.Action.BRAKE:
                 return [controller.make_brake(query=query) for controller in self.controllers]
-            case Action.STOP:
+            case drive_link.Action.STOP:
                 return [controller.make_stop(query=query) for controller in self.controllers]
 
     def _judge(self, question: replies.Question, joint: int, frame: Any) -> bool:  # noqa: ANN401

@@ -12,8 +12,7 @@ latched.
 from dataclasses import dataclass
 from enum import IntEnum
 
-from hopping_leg.deploy import safety_limits, stop_reasons
-from hopping_leg.deploy.drive_link import BRAKE, LIMP, STOP, Action, DriveCommand, DriveMode
+from hopping_leg.deploy import drive_link, safety_limits, stop_reasons
 
 
 class State(IntEnum):
@@ -51,7 +50,7 @@ class SupervisorState:
 
 def supervise(
     limits: safety_limits.SafetyLimits, before: SupervisorState, seen: stop_reasons.SupervisorInput
-) -> tuple[SupervisorState, DriveCommand]:
+) -> tuple[SupervisorState, drive_link.DriveCommand]:
     """Decide a tick.
 
     Returns:
@@ -99,7 +98,9 @@ def _next(
 def _arm(
     limits: safety_limits.SafetyLimits, before: SupervisorState, seen: stop_reasons.SupervisorInput
 ) -> tuple[State, stop_reasons.Cause]:
-    if all(reply is not None and reply.mode == DriveMode.POSITION for reply in seen.replies):
+    if all(
+        reply is not None and reply.mode == drive_link.DriveMode.POSITION for reply in seen.replies
+    ):
         return State.RUNNING, stop_reasons.Cause(stop_reasons.Reason.DRIVES_READY)
     if not seen.time - before.since <= limits.arming_time:
         return State.DAMPING, stop_reasons.Cause(stop_reasons.Reason.ARMING_TOOK_TOO_LONG)
@@ -122,14 +123,14 @@ def _calm_down(
 
 def _outgoing(
     limits: safety_limits.SafetyLimits, state: State, seen: stop_reasons.SupervisorInput
-) -> DriveCommand:
+) -> drive_link.DriveCommand:
     match state:
         case State.ARMING:
-            return LIMP
+            return drive_link.LIMP
         case State.RUNNING if seen.wanted is not None:
             pairs = zip(seen.wanted, limits.torque, strict=True)
             hip, knee = (max(-most, min(most, value)) for value, most in pairs)
-            return DriveCommand(Action.TORQUE, (hip, knee))
+            return drive_link.DriveCommand(drive_link.Action.TORQUE, (hip, knee))
         case State.DAMPING:
-            return BRAKE
-    return STOP
+            return drive_link.BRAKE
+    return drive_link.STOP

@@ -7,8 +7,7 @@ from typing import Any
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from hopping_leg.evaluate import acceptance, figures, metrics, result, runner, tables
-from hopping_leg.evaluate.trials import Run
+from hopping_leg.evaluate import acceptance, figures, metrics, result, runner, tables, trials
 from hopping_leg.evaluate.video import Video, fixed_traces, render_video
 from hopping_leg.html_page import data_uri, page_template, svg_uri, table
 from hopping_leg.robot.parameters import Robot
@@ -45,12 +44,12 @@ _HEIGHTS = {
 }
 
 
-def draw_report_figures(evaluation: result.Evaluation, runs: Sequence[Run]) -> list[Picture]:
+def draw_report_figures(evaluation: result.Evaluation, runs: Sequence[trials.Run]) -> list[Picture]:
     """Draw every figure that the runs allow."""
     return list(_figures(evaluation, runs))
 
 
-def _figures(evaluation: result.Evaluation, runs: Sequence[Run]) -> Iterator[Picture]:
+def _figures(evaluation: result.Evaluation, runs: Sequence[trials.Run]) -> Iterator[Picture]:
     def files(*kinds: str) -> tuple[str, ...]:
         return tuple(run.file_name for run in runs if run.trial.kind in kinds)
 
@@ -97,7 +96,7 @@ def _figures(evaluation: result.Evaluation, runs: Sequence[Run]) -> Iterator[Pic
             )
 
 
-def _examples(runs: Sequence[Run]) -> list[Run]:
+def _examples(runs: Sequence[trials.Run]) -> list[trials.Run]:
     """Return one fixed run per controller: the middle command, the first repeat."""
     fixed = [run for run in runs if len(run.trial.steps) == 1]
     examples = []
@@ -110,9 +109,9 @@ def _examples(runs: Sequence[Run]) -> list[Run]:
     return examples
 
 
-def _first_of_each(runs: Iterable[Run]) -> list[Run]:
+def _first_of_each(runs: Iterable[trials.Run]) -> list[trials.Run]:
     """Return the first repeat of every controller."""
-    first: dict[str, Run] = {}
+    first: dict[str, trials.Run] = {}
     for run in runs:
         if run.repeat < first.setdefault(run.controller, run).repeat:
             first[run.controller] = run
@@ -167,7 +166,7 @@ def _subtitle(c: dict[str, Any]) -> str:
     )
 
 
-def pictures_of(evaluation: result.Evaluation, runs: Sequence[Run]) -> list[dict[str, Any]]:
+def pictures_of(evaluation: result.Evaluation, runs: Sequence[trials.Run]) -> list[dict[str, Any]]:
     """Return what a page shows of every figure: its texts, source, command and table."""
     beside = {
         "distributions": lambda: tables.neighbour_table(evaluation.neighbours),

@@ -6,19 +6,8 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from hopping_leg.controllers import RolloutConfig
-from hopping_leg.evaluate import aggregation, result
+from hopping_leg.evaluate import aggregation, result, trials
 from hopping_leg.evaluate.entries import Entry, check_labels, check_range
-from hopping_leg.evaluate.trials import (
-    FLOORS,
-    KINDS,
-    Run,
-    Trial,
-    check_repeats,
-    on_floor,
-    paper_trials,
-    run_trials,
-    within,
-)
 from hopping_leg.io import versions
 from hopping_leg.robot import JOINTS, TIMESTEP, hopping_ranges
 from hopping_leg.sim import NO_NOISE, Engine
@@ -29,7 +18,7 @@ class EvaluationRun:
     """An evaluation with the runs behind it."""
 
     evaluation: result.Evaluation
-    runs: list[Run]
+    runs: list[trials.Run]
 
 
 def evaluate(
@@ -40,7 +29,7 @@ def evaluate(
     repeats: int = 5,
     seed: int = 1000,
     floor: str = "soft",
-    kinds: Collection[str] = KINDS,
+    kinds: Collection[str] = trials.KINDS,
     on_progress: Callable[[str, float], None] = lambda _label, _share: None,
 ) -> EvaluationRun:
     """Run all trials of all entries and measure them.
@@ -59,18 +48,18 @@ def evaluate(
         UsageError: A command is out of reach or out of an entry's range, a name is taken twice,
             or there is nothing to do.
     """
-    check_repeats(repeats)
-    trials = paper_trials(setup.robot, commands)
-    _check(entries, trials, asked=commands is not None)
-    trials = [trial for trial in trials if trial.kind in kinds]
-    world = on_floor(setup, floor)
+    trials.check_repeats(repeats)
+    planned = trials.paper_trials(setup.robot, commands)
+    _check(entries, planned, asked=commands is not None)
+    planned = [trial for trial in planned if trial.kind in kinds]
+    world = trials.on_floor(setup, floor)
     notes = _note_setup(setup)
-    runs: list[Run] = []
+    runs: list[trials.Run] = []
     for entry in entries:
-        fitting = [t for t in trials if within(t, entry.command_range)]
+        fitting = [t for t in planned if trials.within(t, entry.command_range)]
         notes += entry.notes
-        notes += _note_left_out(entry, trials, fitting)
-        own = run_trials(
+        notes += _note_left_out(entry, planned, fitting)
+        own = trials.run_trials(
             entry.label,
             entry.controller,
             world,
@@ -99,7 +88,7 @@ def evaluate(
             conditions={
                 **setup_conditions(setup),
                 "floor": floor,
-                "floor_meaning": _FLOOR_MEANINGS.get(world.ground, FLOORS[floor]),
+                "floor_meaning": _FLOOR_MEANINGS.get(world.ground, trials.FLOORS[floor]),
                 "engine": world.engine,
                 "ground": world.ground,
                 "contact_time_constant_s": world.robot.contact.time_constant,
@@ -114,12 +103,12 @@ def evaluate(
     )
 
 
-def _check(entries: Sequence[Entry], trials: Sequence[Trial], *, asked: bool) -> None:
+def _check(entries: Sequence[Entry], planned: Sequence[trials.Trial], *, asked: bool) -> None:
     """Refuse commands that were asked for by name, or ranges that leave none of the fixed ones."""
     check_labels(entries)
-    fixed = [trial for trial in trials if trial.kind == "fixed"]
+    fixed = [trial for trial in planned if trial.kind == "fixed"]
     for entry in entries:
-        outside = [trial for trial in fixed if not within(trial, entry.command_range)]
+        outside = [trial for trial in fixed if not trials.within(trial, entry.command_range)]
         if asked or len(outside) == len(fixed):
             check_range(entry, [height for trial in outside for height, _ in trial.steps])
 
@@ -140,8 +129,10 @@ def _note_setup(setup: RolloutConfig) -> list[str]:
     return notes
 
 
-def _note_left_out(entry: Entry, trials: Sequence[Trial], fitting: Sequence[Trial]) -> list[str]:
-    left_out = [t for t in trials if t not in fitting]
+def _note_left_out(
+    entry: Entry, planned: Sequence[trials.Trial], fitting: Sequence[trials.Trial]
+) -> list[str]:
+    left_out = [t for t in planned if t not in fitting]
     if not left_out or entry.command_range is None:
         return []
     low, high = entry.command_range
@@ -151,7 +142,7 @@ def _note_left_out(entry: Entry, trials: Sequence[Trial], fitting: Sequence[Tria
     return [f"{entry.label} was made for {low:g} to {high:g} m; left out: {names}."]
 
 
-def _note_stopped(label: str, runs: Sequence[Run], setup: RolloutConfig) -> list[str]:
+def _note_stopped(label: str, runs: Sequence[trials.Run], setup: RolloutConfig) -> list[str]:
     """Say so where the supervisor of the real leg would not let a controller hop on."""
     stopped = 0
     for run in runs:

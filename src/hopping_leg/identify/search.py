@@ -14,14 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
+from hopping_leg import errors, workers
 from hopping_leg.arrays import Array
-from hopping_leg.errors import UsageError
 from hopping_leg.identify import optimizers, recording_format, windows
 from hopping_leg.identify.cost import Objective
 from hopping_leg.identify.optimizers import CmaOptions, Evaluate, Found, LeastSquaresOptions
 from hopping_leg.identify.parameters import ParameterSet, choose
 from hopping_leg.identify.plan import FitPlan, pass_names
-from hopping_leg.workers import RayWorkers, map_rows
 
 _FACTOR = 2.0  # the paper's second pass keeps the first one's parameters within this factor
 
@@ -40,11 +39,11 @@ class SearchOptions:
 
     def __post_init__(self) -> None:
         if self.starts < 1 or self.cma.generations < 1 or self.cma.population < 4:
-            raise UsageError(
+            raise errors.UsageError(
                 "A search needs at least one start, one generation and four candidates in each."
             )
         if not self.cma.seconds > 0:
-            raise UsageError(
+            raise errors.UsageError(
                 f"A generation is judged by {self.cma.seconds} s of windows but needs more than 0;"
                 " infinity takes all."
             )
@@ -141,7 +140,11 @@ class Searcher:
         )
 
     def _spread(self, evaluate: Evaluate) -> Evaluate:
-        return evaluate if self.ray is None else partial(map_rows, RayWorkers(self.ray), evaluate)
+        return (
+            evaluate
+            if self.ray is None
+            else partial(workers.map_rows, workers.RayWorkers(self.ray), evaluate)
+        )
 
 
 def second_pass(

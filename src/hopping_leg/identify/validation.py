@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.identify import initial_states, parameters, simulate
+from hopping_leg.identify import initial_states, parameters, recording_format, simulate
 from hopping_leg.identify.cost import measured
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.recording_format import PAIRS, Pair
 from hopping_leg.identify.windows import Window, cut, duration
 from hopping_leg.robot.model import TIMESTEP
 
@@ -22,12 +21,12 @@ _UNSCORED = 1.0  # beginning that does not count in closed loop, s, or a quarter
 class Validation:
     """Root mean square errors, (hip, knee), on exact samples only; NaN where nothing counts."""
 
-    closed_loop_position: Pair
+    closed_loop_position: recording_format.Pair
     """Under the recording's own controller from its first row on, rad; recordings that command
     torques have none and do not count."""
-    closed_loop_torque: Pair
+    closed_loop_torque: recording_format.Pair
     """Likewise, N m."""
-    open_loop_position: dict[float, Pair]
+    open_loop_position: dict[float, recording_format.Pair]
     """By horizon in s: driven by the recorded torques alone, rad."""
 
 
@@ -60,7 +59,7 @@ def open_loop(
     horizon: float,
     timestep: float = TIMESTEP,
     threads: int = 0,
-) -> Pair:
+) -> recording_format.Pair:
     """Return the rms position error of predictions restarted every half horizon, rad.
 
     The motors get the measured torque, or the commanded one where the rig drives torques itself.
@@ -77,7 +76,7 @@ def _errors(
     timestep: float,
     threads: int,
     *quantities: str,
-) -> list[Pair]:
+) -> list[recording_format.Pair]:
     if not windows:
         return [(np.nan, np.nan)] * len(quantities)
     simulator = simulate.WindowSimulator(recordings, windows, timestep=timestep, threads=threads)
@@ -95,7 +94,9 @@ def as_torque_driven(recording: Recording) -> Recording:
         return recording
     table = recording.trace.table
     share = 1.0 if recording.metadata.onboard == "zoh" else 0.5
-    for command, torque in zip(PAIRS["torque_command"], PAIRS["torque"], strict=True):
+    for command, torque in zip(
+        recording_format.PAIRS["torque_command"], recording_format.PAIRS["torque"], strict=True
+    ):
         if torque in table.columns:
             now = table[torque].interpolate().fill_null(strategy="backward")
             later = now.shift(-1).fill_null(strategy="forward")
@@ -114,7 +115,7 @@ def _starts_known(recordings: Sequence[Recording], window: Window) -> bool:
     return bool(np.isfinite(state).all()) or recording.has("position_estimate")
 
 
-def rms(errors: Array) -> Pair:
+def rms(errors: Array) -> recording_format.Pair:
     """Return the root mean square over everything but the joint, the last axis, ignoring NaN."""
     flat = errors.reshape(-1, 2)
     counts = np.count_nonzero(~np.isnan(flat), axis=0)

@@ -14,14 +14,7 @@ from typing import Any
 
 from hopping_leg import errors, io
 from hopping_leg.controllers.policy import Policy
-from hopping_leg.rl import loggers, model_card, run_folder
-from hopping_leg.rl.policy_evaluation import (
-    DECIDING_SEEDS,
-    as_rows,
-    evaluate_policy,
-    every_centimetre,
-    score,
-)
+from hopping_leg.rl import loggers, model_card, policy_evaluation, run_folder
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.train import Trained, check, train
 from hopping_leg.robot.parameters import Robot
@@ -135,11 +128,19 @@ class ParallelSeeds:
         """Try the policy of a finished training at every centimetre."""
         began = time.monotonic()
         policy = Policy((folder / "policy.onnx").read_bytes(), folder.name, self.recipe.name)
-        commands = every_centimetre(self.recipe.fit(self.robot).selection.eval_commands)
+        commands = policy_evaluation.every_centimetre(
+            self.recipe.fit(self.robot).selection.eval_commands
+        )
         rate = self.recipe.task.rate
-        results = evaluate_policy(policy, self.robot, commands, DECIDING_SEEDS, rate, self.threads)
+        results = policy_evaluation.evaluate_policy(
+            policy, self.robot, commands, policy_evaluation.DECIDING_SEEDS, rate, self.threads
+        )
         minutes = run_folder.read_result(folder)["minutes"] + (time.monotonic() - began) / 60
-        return {"score_m": score(results), "minutes": minutes, "trials": as_rows(results)}
+        return {
+            "score_m": policy_evaluation.score(results),
+            "minutes": minutes,
+            "trials": policy_evaluation.as_rows(results),
+        }
 
     def _decision(self, number: int) -> dict[str, Any] | None:
         """Return what decides about one of them: seed, score in m, and minutes until then."""

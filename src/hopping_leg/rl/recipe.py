@@ -7,17 +7,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from hopping_leg.envs import (
-    ApexRewardConfig,
-    HoppingTask,
-    PaperRewardConfig,
-    Reward,
-    RewardTerm,
-    TaskConfig,
-    apex_reward,
-    paper_reward,
-)
-from hopping_leg.io import replace_at
+from hopping_leg import envs, io
 from hopping_leg.rl import algorithms, onnx_export, sb3_env, sb3_policies
 from hopping_leg.rl.distillation.distillation import Distillation
 from hopping_leg.robot.parameters import Robot
@@ -64,9 +54,9 @@ class Recipe:
 
     name: str
     """As in policy files."""
-    task: TaskConfig
+    task: envs.TaskConfig
     """The learning problem."""
-    reward: ApexRewardConfig | PaperRewardConfig
+    reward: envs.ApexRewardConfig | envs.PaperRewardConfig
     """Weights of the reward's terms."""
     algorithm: algorithms.PPOConfig | algorithms.SACConfig
     """What learns, with its hyper-parameters; the teacher's where there is a distillation."""
@@ -81,7 +71,7 @@ class Recipe:
     heights: tuple[float, float] | None = None
     """Lowest and highest desired height, m, on whatever leg; none takes the task's, which grow with
     the leg."""
-    reward_terms: tuple[RewardTerm, ...] = ()
+    reward_terms: tuple[envs.RewardTerm, ...] = ()
     """Terms of one's own, beside the reward's."""
     source: str | None = None
     """``FILE.py:NAME`` of a recipe of one's own."""
@@ -90,7 +80,7 @@ class Recipe:
         """Return the recipe with options changed, by the names of ``paths`` or of whole parts."""
         paths, changed = dict(self.paths()), self
         for name, value in {**(changes or {}), **more}.items():
-            changed = replace_at(changed, paths.get(name, name), value)
+            changed = io.replace_at(changed, paths.get(name, name), value)
         return changed
 
     def paths(self) -> Iterator[tuple[str, str]]:
@@ -121,16 +111,16 @@ class Recipe:
     def make_env(self, robot: Robot, seed: int, threads: int = 1) -> sb3_env.TaskVecEnv:
         """Build the training environment."""
         rng, count = np.random.default_rng(seed), self.schedule.num_envs
-        task = HoppingTask(robot, count, self.task, self.make_reward(robot), rng, threads)
+        task = envs.HoppingTask(robot, count, self.task, self.make_reward(robot), rng, threads)
         return sb3_env.TaskVecEnv(task, privileged=self.network.privileged_critic)
 
-    def make_reward(self, robot: Robot) -> Reward:
+    def make_reward(self, robot: Robot) -> envs.Reward:
         """Build the reward."""
-        if isinstance(self.reward, PaperRewardConfig):
+        if isinstance(self.reward, envs.PaperRewardConfig):
             length = self.task.start_length
-            reward = paper_reward(robot, dataclasses.replace(self.reward, rest_length=length))
+            reward = envs.paper_reward(robot, dataclasses.replace(self.reward, rest_length=length))
         else:
-            reward = apex_reward(robot, self.reward, self.task.rate)
+            reward = envs.apex_reward(robot, self.reward, self.task.rate)
         return reward.with_terms(*self.reward_terms) if self.reward_terms else reward
 
     def make_model(self, env: sb3_env.TaskVecEnv, seed: int) -> Any:  # noqa: ANN401

@@ -17,9 +17,8 @@ from hopping_leg import io, trace
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.entries import Entry
+from hopping_leg.evaluate import entries, runner
 from hopping_leg.evaluate.result import Evaluation
-from hopping_leg.evaluate.runner import evaluate
 from hopping_leg.identify import cost, excitation, optimizers, parameters, plan, play_excitation
 from hopping_leg.identify.paper_excitation import Strokes, adapt, fixed_base, moving_base
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
@@ -29,8 +28,7 @@ from hopping_leg.identify.result import Identified, as_json, save_robot
 from hopping_leg.identify.search import SearchOptions
 from hopping_leg.robot import Robot, load_robot
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
-from hopping_leg.sim_to_real.jobs import Job
-from hopping_leg.sim_to_real.methods import Fit, Method
+from hopping_leg.sim_to_real import jobs, methods
 from hopping_leg.sim_to_real.study import USUAL_FIT, Study, TwinFile
 
 if TYPE_CHECKING:
@@ -42,7 +40,7 @@ _BOTH_SWINGS = 120.0
 """Recordings of so many seconds have room for both swing periods of the paper."""
 
 
-class StoredJob(Job):
+class StoredJob(jobs.Job):
     """A job whose result is a file, stored with the options that it depends on."""
 
     @property
@@ -143,7 +141,7 @@ class IdentifyTwin(StoredJob):
 
     study: Study
     twin: TwinFile
-    method: Method
+    method: methods.Method
 
     @property
     def weight(self) -> float:
@@ -156,7 +154,7 @@ class IdentifyTwin(StoredJob):
         return f"identify {self.twin.name}, {self.fit.name}"
 
     @property
-    def fit(self) -> Fit:
+    def fit(self) -> methods.Fit:
         """How the method identifies."""
         assert self.method.fit is not None
         return self.method.fit
@@ -218,12 +216,12 @@ def _bounds(believed: Robot) -> dict[str, tuple[float, float]]:
 
 
 @dataclass(frozen=True)
-class TrainPolicy(Job):
+class TrainPolicy(jobs.Job):
     """Training of a policy in the simulation of a method."""
 
     study: Study
     twin: TwinFile
-    method: Method
+    method: methods.Method
     seed: int
 
     @property
@@ -366,7 +364,7 @@ class HopTrial(StoredJob):
 class HopOnTwin(HopTrial):
     """A trained policy tried on a twin."""
 
-    method: Method
+    method: methods.Method
     seed: int
 
     @property
@@ -405,8 +403,8 @@ def hop(content: bytes, robot: Robot, study: Study) -> list[dict[str, Any]]:
     policy = Policy(content, "the trained policy", "policy")
     bounds = (policy.card.command_low, policy.card.command_high)
     setup = RolloutConfig(robot, disturbance_of(robot), threads=study.threads)
-    judged = evaluate(
-        [Entry("policy", policy, bounds)], setup, commands=study.commands,
+    judged = runner.evaluate(
+        [entries.Entry("policy", policy, bounds)], setup, commands=study.commands,
         repeats=study.repeats, seed=FIRST_SEED, kinds=("fixed",),
     )  # fmt: skip
     return _rows(judged.evaluation)

@@ -9,19 +9,10 @@ import numpy as np
 
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.evaluate import runner, statistics
-from hopping_leg.sim_to_real.jobs import Board, Job, work
-from hopping_leg.sim_to_real.methods import Method
-from hopping_leg.sim_to_real.stages import (
-    FIRST_SEED,
-    HopOnTwin,
-    IdentifyTwin,
-    RecordTwin,
-    TrainPolicy,
-    disturbance_of,
-)
+from hopping_leg.sim_to_real import jobs, methods, stages
 from hopping_leg.sim_to_real.study import Study, TwinFile
 
-J = TypeVar("J", bound=Job)
+J = TypeVar("J", bound=jobs.Job)
 
 
 def transfer(study: Study, at_once: int = 1) -> dict[str, Any]:
@@ -36,38 +27,38 @@ def transfer(study: Study, at_once: int = 1) -> dict[str, Any]:
     return tabulate(study, fits(study), trainings(study), hops(study))
 
 
-def work_through(stages: Sequence[Sequence[Job]], at_once: int) -> None:
+def work_through(rounds: Sequence[Sequence[jobs.Job]], at_once: int) -> None:
     """Do what is not done of some stages, one stage after the other."""
-    total = sum(job.weight for stage in stages for job in stage)
-    with Board(total, own_bars=at_once == 1) as board:
-        for stage in stages:
-            work(stage, at_once, board)
+    total = sum(job.weight for stage in rounds for job in stage)
+    with jobs.Board(total, own_bars=at_once == 1) as board:
+        for stage in rounds:
+            jobs.work(stage, at_once, board)
 
 
-def records(study: Study) -> list[RecordTwin]:
+def records(study: Study) -> list[stages.RecordTwin]:
     """Return the recordings that the methods need."""
     rigs = {rig for method in study.methods if method.fit for rig in method.fit.rigs}
-    return [RecordTwin(study, twin, rig) for twin in study.twins for rig in sorted(rigs)]
+    return [stages.RecordTwin(study, twin, rig) for twin in study.twins for rig in sorted(rigs)]
 
 
-def fits(study: Study) -> list[IdentifyTwin]:
+def fits(study: Study) -> list[stages.IdentifyTwin]:
     """Return all identifications, those of the first method first; several may share one."""
-    every = (IdentifyTwin(study, t, m) for m in study.methods if m.fit for t in study.twins)
+    every = (stages.IdentifyTwin(study, t, m) for m in study.methods if m.fit for t in study.twins)
     return list({study.fitted(fit.twin, fit.method): fit for fit in every}.values())
 
 
-def trainings(study: Study) -> list[TrainPolicy]:
+def trainings(study: Study) -> list[stages.TrainPolicy]:
     """Return all trainings; several twins may share one."""
-    every = (TrainPolicy(study, t, m, s) for s, m, t in _all(study))
+    every = (stages.TrainPolicy(study, t, m, s) for s, m, t in _all(study))
     return list({train.path: train for train in every}.values())
 
 
-def hops(study: Study) -> list[HopOnTwin]:
+def hops(study: Study) -> list[stages.HopOnTwin]:
     """Return all trials."""
-    return [HopOnTwin(study, t, m, s) for s, m, t in _all(study)]
+    return [stages.HopOnTwin(study, t, m, s) for s, m, t in _all(study)]
 
 
-def _all(study: Study) -> Iterable[tuple[int, Method, TwinFile]]:
+def _all(study: Study) -> Iterable[tuple[int, methods.Method, TwinFile]]:
     return ((s, m, t) for s in study.seeds for m in study.methods for t in study.twins)
 
 
@@ -79,9 +70,9 @@ _SEED = 0
 
 def tabulate(
     study: Study,
-    fits: Sequence[IdentifyTwin],
-    trainings: Sequence[TrainPolicy],
-    hops: Sequence[HopOnTwin],
+    fits: Sequence[stages.IdentifyTwin],
+    trainings: Sequence[stages.TrainPolicy],
+    hops: Sequence[stages.HopOnTwin],
 ) -> dict[str, Any]:
     """Return everything that was measured, as JSON values; all jobs must be done."""
     trials = [row for hop in hops for row in hop.rows()]
@@ -124,7 +115,7 @@ def _best_in_own_simulation(trials: Sequence[Row], study: Study) -> Row:
         return {}
     best = {}
     for method, twin in itertools.product(study.methods, study.twins):
-        runs = [TrainPolicy(study, twin, method, seed) for seed in study.seeds]
+        runs = [stages.TrainPolicy(study, twin, method, seed) for seed in study.seeds]
         best[method.name, twin.name] = min(runs, key=lambda run: run.own_score).seed
     chosen = [row for row in trials if row["seed"] == best[row["method"], row["twin"]]]
     return {"best_in_own_simulation": _overall(chosen, study)}
@@ -138,18 +129,18 @@ def about(study: Study) -> Row:
                 "name": twin.name,
                 "robot_digest": twin.robot.digest,
                 "believed": twin.believed,
-                "paper_disturbance": disturbance_of(twin.robot).delay_probability > 0,
+                "paper_disturbance": stages.disturbance_of(twin.robot).delay_probability > 0,
             }
             for twin in study.twins
         ],
         "recording_seconds": study.seconds,
-        "evaluation_seed": FIRST_SEED,
+        "evaluation_seed": stages.FIRST_SEED,
         "evaluation_seeds": study.repeats,
         "versions": runner.software_versions(),
     }
 
 
-def _pooled(method: Method, trials: Sequence[Row]) -> Row:
+def _pooled(method: methods.Method, trials: Sequence[Row]) -> Row:
     return {
         "method": method.name,
         "meaning": method.meaning,
@@ -183,7 +174,7 @@ def _by_twin(trials: Sequence[Row], name: str) -> list[Array]:
     return [np.array([r[name] for r in trials if r["twin"] == twin]) for twin in twins]
 
 
-def _whole(method: Method, trials: Sequence[Row], study: Study) -> Row:
+def _whole(method: methods.Method, trials: Sequence[Row], study: Study) -> Row:
     mine = [r for r in trials if r["method"] == method.name]
     runs: dict[tuple[str, int], list[Row]] = {}
     for row in mine:
@@ -210,7 +201,7 @@ def _ordered(run: Sequence[Row]) -> bool:
     return moves and all(low < high for low, high in itertools.pairwise(apexes))
 
 
-def fit_row(fit: IdentifyTwin) -> Row:
+def fit_row(fit: stages.IdentifyTwin) -> Row:
     """Return how well a fit went: errors on data it has not seen, and its parameters."""
     file = fit.study.fitted(fit.twin, fit.method).with_suffix(".json")
     found = json.loads(file.read_text(encoding="utf-8"))
@@ -230,7 +221,7 @@ def fit_row(fit: IdentifyTwin) -> Row:
     }  # fmt: skip
 
 
-def _training(training: TrainPolicy) -> Row:
+def _training(training: stages.TrainPolicy) -> Row:
     """Return how a policy hops in the simulation that it was trained in."""
     result = training.result
     errors = [trial["median_error_m"] for trial in result["selected"]["trials"]]

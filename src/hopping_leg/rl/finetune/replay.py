@@ -16,8 +16,7 @@ from hopping_leg.controllers import observation_history, policy, protocol
 from hopping_leg.envs import Reward
 from hopping_leg.envs.observation import Array32
 from hopping_leg.envs.rewards import Transition
-from hopping_leg.rl.finetune import apex_estimate, simulated
-from hopping_leg.rl.finetune.trial_data import ApexEstimate, TrialData
+from hopping_leg.rl.finetune import apex_estimate, simulated, trial_data
 from hopping_leg.rl.onnx_export import PREFIX, Network, expose_hidden
 from hopping_leg.robot import Robot, kinematics
 
@@ -106,7 +105,7 @@ class TransitionWriter:
         self._scale = np.array(card.torque_scale)
 
     def __call__(
-        self, data: TrialData, estimate: ApexEstimate, *, ended: bool = False
+        self, data: trial_data.TrialData, estimate: trial_data.ApexEstimate, *, ended: bool = False
     ) -> Transitions:
         """Return the transitions of trials, which may have ``ended`` early."""
         action = np.clip(data.asked / self._scale, -EDGE, EDGE)
@@ -124,7 +123,7 @@ class TransitionWriter:
             before, after, taken.astype(np.float32), reward.ravel().astype(np.float32), done.ravel()
         )
 
-    def _actor_inputs(self, data: TrialData) -> Array:
+    def _actor_inputs(self, data: trial_data.TrialData) -> Array:
         """Return what the network computes with at every tick, normalised, (ticks, n, size)."""
         card, network = self._card, self._network
         layout = observation_history.make_observation_history(card.layout, 1 / card.rate)
@@ -139,7 +138,9 @@ class TransitionWriter:
             last = data.asked[tick]
         return np.stack(rows)
 
-    def _critic_inputs(self, data: TrialData, estimate: ApexEstimate, action: Array) -> Array:
+    def _critic_inputs(
+        self, data: trial_data.TrialData, estimate: trial_data.ApexEstimate, action: Array
+    ) -> Array:
         filled = data.filled()
         middle = (self._card.command_low + self._card.command_high) / 2
         last = np.concatenate([np.zeros_like(action[:1]), action[:-1]])
@@ -156,7 +157,9 @@ class TransitionWriter:
             axis=-1,
         )
 
-    def _rewards(self, data: TrialData, estimate: ApexEstimate, action: Array) -> Array:
+    def _rewards(
+        self, data: trial_data.TrialData, estimate: trial_data.ApexEstimate, action: Array
+    ) -> Array:
         """Return the reward of every tick but the last, (ticks - 1, n)."""
         filled = data.filled()
         joints = [filled[..., 0:2], estimate.rate[..., None], filled[..., 2:4]]
@@ -200,5 +203,5 @@ def believed_rows(
     holds = max(1, round(seconds / BELIEVED_LEGS / 2.0))
     steps = np.repeat(rng.uniform(*commands, (holds, BELIEVED_LEGS)), 400, axis=0)
     run = simulated.hop_many(controller, robot, [robot] * BELIEVED_LEGS, steps, seed)
-    data = TrialData.of(simulated.traces_of(run))
+    data = trial_data.TrialData.of(simulated.traces_of(run))
     return writer(data, estimator(data))

@@ -8,10 +8,9 @@ commands, from which some never come back to the low ones.
 from dataclasses import replace
 
 from hopping_leg.envs import ApexRewardConfig
-from hopping_leg.rl import algorithms, recipe
+from hopping_leg.rl import algorithms, recipe, search_space
 from hopping_leg.rl.distillation.distillation import Distillation
 from hopping_leg.rl.recipes.fast import FAST
-from hopping_leg.rl.search_space import LAYERS, OneOf, Real, SearchSpace
 
 PRECISE = recipe.Recipe(
     name="precise",
@@ -37,13 +36,13 @@ PRECISE = recipe.Recipe(
     distillation=Distillation(),
 )
 
-SEARCH_SPACE: SearchSpace = {
-    "learning_rate": Real(2e-4, 4e-3, log=True),
-    "student.hidden": OneOf((*LAYERS, (512, 256))),
-    "gamma": Real(0.97, 0.997),
-    "gae_lambda": Real(0.90, 0.99),
-    "teacher_share": Real(0.2, 0.7),
-    "dagger_mixing_share": Real(0.0, 0.5),
+SEARCH_SPACE: search_space.SearchSpace = {
+    "learning_rate": search_space.Real(2e-4, 4e-3, log=True),
+    "student.hidden": search_space.OneOf((*search_space.LAYERS, (512, 256))),
+    "gamma": search_space.Real(0.97, 0.997),
+    "gae_lambda": search_space.Real(0.90, 0.99),
+    "teacher_share": search_space.Real(0.2, 0.7),
+    "dagger_mixing_share": search_space.Real(0.0, 0.5),
 }
 
 GRU = {
