@@ -6,5 +6,8 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 """Floats; docstrings give shape and unit."""
 
+Array32 = npt.NDArray[np.float32]
+"""Single precision: what policies see and answer."""
+
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.int64]

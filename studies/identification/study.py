@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-from hopping_leg.evaluate import result_cache
+from hopping_leg.evaluate import result_files
 from hopping_leg.identify.result import software_versions
 from hopping_leg.identify.search import Report
 from hopping_leg.io import write_json
@@ -54,7 +54,7 @@ class Study:
 
 
 @dataclass(frozen=True)
-class FitCache(result_cache.ResultCache):
+class FitCache(result_files.ResultCache):
     """Also keeps the checkpoints of a fit that was killed.
 
     Attributes:

@@ -22,7 +22,7 @@ from hopping_leg.controllers import RolloutConfig
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.entries import Entry, check_labels, check_range, fingerprint
 from hopping_leg.evaluate.result import Summary
-from hopping_leg.evaluate.result_cache import ResultCache
+from hopping_leg.evaluate.result_files import ResultCache
 from hopping_leg.evaluate.robustness.axes import times
 from hopping_leg.evaluate.runner import evaluate, software_versions
 from hopping_leg.io import safe_file_name
@@ -212,7 +212,7 @@ class Limits:
     def measure(self) -> dict[str, Any]:
         """Run it, print a table, return every number."""
         from hopping_leg.evaluate.entries import Entry, load_entries
-        from hopping_leg.evaluate.result_cache import ResultCache
+        from hopping_leg.evaluate.result_files import ResultCache
         from hopping_leg.sim import CONTROL_RATE
 
         at_least(1, seeds=self.seeds)

@@ -22,7 +22,7 @@ from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.cli.options import at_least
 from hopping_leg.cma_strategy import seeded_strategy
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.result_cache import ResultCache
+from hopping_leg.evaluate.result_files import ResultCache
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.robot import JOINTS, Robot, load_robot
 from hopping_leg.robot.kinematics import foot_position, joint_angles
@@ -289,7 +289,7 @@ class Reach:
 
     def measure(self) -> dict[str, Any]:
         """Run it, print a table, return every number."""
-        from hopping_leg.evaluate.result_cache import ResultCache
+        from hopping_leg.evaluate.result_files import ResultCache
 
         at_least(1, generations=self.generations)
         at_least(4, population=self.population)

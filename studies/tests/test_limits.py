@@ -6,7 +6,7 @@ import pytest
 
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Entry
-from hopping_leg.evaluate.result_cache import ResultCache
+from hopping_leg.evaluate.result_files import ResultCache
 from hopping_leg.sim import NO_NOISE, NoiseAndDelay
 from studies.limits import run as module
 from studies.limits.run import CONDITIONS, LimitsStudy, condense, measure_limits

@@ -1,6 +1,6 @@
 import numpy as np
 
-from hopping_leg.evaluate.result_cache import ResultCache
+from hopping_leg.evaluate.result_files import ResultCache
 from hopping_leg.robot import load_robot
 from studies.max_height.run import KNOTS, ReachStudy, _interpolate, flight_tops, measure_reach
 

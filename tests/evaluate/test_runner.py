@@ -9,7 +9,7 @@ import pytest
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Entry, evaluate
-from hopping_leg.evaluate.result_cache import ResultCache
+from hopping_leg.evaluate.result_files import ResultCache
 from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
 from hopping_leg.evaluate.runner import _note_stopped
 from hopping_leg.evaluate.skills.suite import run_skills

@@ -16,7 +16,7 @@ from rich.console import Console
 
 from hopping_leg import figure_style, io, progress
 from hopping_leg.cli import evaluate, options
-from hopping_leg.evaluate import figures, result_cache, tables
+from hopping_leg.evaluate import figures, result_files, tables
 from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
 
 
@@ -36,7 +36,7 @@ def run(args: Robustness) -> None:
     heights, seeds = args.commands, args.seeds
     suite = make_suite(setup, axes=args.axes, commands=heights, repeats=seeds, seed=args.seed)
     with progress.ShareProgress() as bar:
-        found = run_suite(entries, suite, result_cache.ResultCache(args.out), bar.show)
+        found = run_suite(entries, suite, result_files.ResultCache(args.out), bar.show)
     result = {"command": options.command_line("hop robustness", args), **found}
     file, figure = args.json or args.out / "robustness.json", args.out / "robustness.svg"
     io.write_json(file, result)

@@ -8,14 +8,13 @@ from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
-from hopping_leg.arrays import Array, IntArray
+from hopping_leg.arrays import Array, Array32, IntArray
 from hopping_leg.controllers.sample_history import RingBuffer, SampleHistory
 from hopping_leg.errors import PolicyError, unknown_name
 from hopping_leg.sim.channel import DELAY_DEPTH, SAMPLES, Measurement
 
-Inputs = dict[str, npt.NDArray[np.float32]]
+Inputs = dict[str, Array32]
 """Graph input to its array, (n, ...)."""
 
 

@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import polars as pl
 
 from hopping_leg import errors, trace
+from hopping_leg.arrays import Array
 
 _HEADER, _ROW, _EVENT = range(3)  # Kinds of frames
 
@@ -137,7 +137,7 @@ class FlightRecorderTail:
         """Whether what was read ends with a whole frame."""
         return not self._rest
 
-    def rows(self) -> npt.NDArray[np.float64]:
+    def rows(self) -> Array:
         """Return the rows that were written since the last call, (ticks, columns).
 
         Raises:
@@ -170,7 +170,7 @@ class FlightRecorderTail:
         self._file.close()
 
 
-def read_recording(path: Path) -> tuple[FlightRecorderTail, npt.NDArray[np.float64]]:
+def read_recording(path: Path) -> tuple[FlightRecorderTail, Array]:
     """Return a flight recording and its rows, (ticks, columns), also of a process that was killed.
 
     Raises:

@@ -14,9 +14,8 @@ import numpy.typing as npt
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.arrays import Array, Array32, BoolArray
 from hopping_leg.envs import rewards, task_config
-from hopping_leg.envs.observation import Array32
 from hopping_leg.envs.paper_reward import paper_reward
 from hopping_leg.envs.task import HoppingTask, Step
 from hopping_leg.errors import UsageError
@@ -82,7 +81,7 @@ def _observation_space(task: HoppingTask) -> "gymnasium.spaces.Box[np.float32]":
     return gymnasium.spaces.Box(-_LARGEST, _LARGEST, (task.observation.size,), np.float32)
 
 
-class HoppingEnv(gymnasium.Env[Array32, npt.NDArray[np.float32]]):
+class HoppingEnv(gymnasium.Env[Array32, Array32]):
     """One leg hopping to commanded heights.
 
     ``info`` holds ``base_height`` and ``command``, m, ``reward_terms``, the reward's unweighted
@@ -119,9 +118,7 @@ class HoppingEnv(gymnasium.Env[Array32, npt.NDArray[np.float32]]):
         info = {"base_height": task.legs.height.item(), "command": task.command.item()}
         return observation[0], info
 
-    def step(
-        self, action: npt.NDArray[np.float32]
-    ) -> tuple[Array32, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Array32) -> tuple[Array32, float, bool, bool, dict[str, Any]]:
         """Act for one control period."""
         step = self.task.step(action[None])
         info: dict[str, Any] = {
@@ -143,7 +140,7 @@ class HoppingEnv(gymnasium.Env[Array32, npt.NDArray[np.float32]]):
         self._camera.close()
 
 
-class HoppingVectorEnv(gymnasium.vector.VectorEnv[Array32, npt.NDArray[np.float32], Any]):
+class HoppingVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
     """Legs hopping to commanded heights, on the batched simulation.
 
     Episodes restart in the step that ends them (``AutoresetMode.SAME_STEP``):
@@ -184,9 +181,7 @@ class HoppingVectorEnv(gymnasium.vector.VectorEnv[Array32, npt.NDArray[np.float3
         observation = self.task.reset() if again else self.task.reseed(self.np_random)
         return observation, self._masked(self._standing(), self._all)
 
-    def step(
-        self, actions: npt.NDArray[np.float32]
-    ) -> tuple[Array32, Array, BoolArray, BoolArray, dict[str, Any]]:
+    def step(self, actions: Array32) -> tuple[Array32, Array, BoolArray, BoolArray, dict[str, Any]]:
         """Act for one control period in every leg; actions are (n, 2)."""
         step = self.task.step(actions)
         return step.observation, step.reward, step.terminated, step.truncated, self._info(step)

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from hopping_leg.arrays import Array, IntArray
+from hopping_leg.arrays import Array, Array32, IntArray
 from hopping_leg.controllers import observation_history
 from hopping_leg.envs.task_config import TaskConfig
 from hopping_leg.robot.parameters import Robot
@@ -22,7 +21,6 @@ from hopping_leg.sim import SAMPLES, Channel, Simulator
 SIZE = 15
 """Entries of the paper's observation."""
 
-Array32 = npt.NDArray[np.float32]
 
 _LEAST_SPAN = 0.05
 """Half the command range of an observation at least, m, so that a single command has a scale."""

@@ -5,11 +5,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hopping_leg import errors, hop_detection
-from hopping_leg.arrays import Array, BoolArray, IntArray
+from hopping_leg.arrays import Array, Array32, BoolArray, IntArray
 from hopping_leg.envs import rewards, task_config
 from hopping_leg.envs.observation import (
     PRIVILEGED,
-    Array32,
     make_observation,
     privileged_observation,
     sample_scaling,

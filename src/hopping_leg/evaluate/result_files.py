@@ -1,13 +1,14 @@
-"""Runs read back from what `hop evaluate` and `hop train` have left on the disk."""
+"""Results on the disk: runs of `hop evaluate` and `hop train`, and what a killed benchmark kept."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, is_dataclass
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.result import SCHEMA, Evaluation
+from hopping_leg.io import write_json
 
 _EVALUATION, _TRAINING = "evaluation.json", "result.json"
 _WHAT = (
@@ -131,3 +132,34 @@ def _filled(kind: Any, value: Any) -> Any:  # noqa: ANN401
     if get_origin(kind) is list and isinstance(value, list):
         return [_filled(get_args(kind)[0], entry) for entry in value]
     return float("nan") if kind is float and value is None else value
+
+
+@dataclass(frozen=True)
+class ResultCache:
+    """Runs work once: its result lies in a folder and is taken from there the next time."""
+
+    folder: Path
+    on_begin: Callable[[str], None] = lambda words: None
+    """Told, in words, what begins."""
+
+    def load_or_run(
+        self, name: str, words: str, asked: dict[str, Any], work: Callable[[], dict[str, Any]]
+    ) -> dict[str, Any]:
+        """Return the kept result of the same work, or do it and keep its result.
+
+        ``asked`` is all that the result depends on; it and the result are JSON values.
+        """
+        file = self.folder / f"{name}.json"
+        asked = json.loads(json.dumps(asked))
+        if file.exists():
+            kept: dict[str, Any] = json.loads(file.read_bytes())
+            if kept["asked"] == asked:
+                return dict(kept["result"])
+        self._begin(name, asked)
+        self.on_begin(words)
+        result = work()
+        write_json(file, {"asked": asked, "result": result})
+        return dict(json.loads(file.read_bytes())["result"])
+
+    def _begin(self, name: str, asked: dict[str, Any]) -> None:
+        """Prepare for work that is not kept yet."""

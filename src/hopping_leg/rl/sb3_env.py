@@ -8,8 +8,7 @@ import gymnasium
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 
-from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.envs.observation import Array32
+from hopping_leg.arrays import Array, Array32, BoolArray
 from hopping_leg.envs.task import HoppingTask, Step
 
 _RECENT_HOPS = 500

@@ -13,15 +13,9 @@ from rich.progress import TextColumn, TimeRemainingColumn
 from hopping_leg import errors, io
 from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.progress import LiveProgress
-from hopping_leg.rl import loggers, model_card, onnx_export, resumable, run_folder
+from hopping_leg.rl import loggers, onnx_export, policy_evaluation, resumable, run_folder
 from hopping_leg.rl.checkpoint import write_checkpoint
-from hopping_leg.rl.policy_evaluation import (
-    FINAL_SEEDS,
-    FIRST_SEED,
-    as_rows,
-    evaluate_policy,
-    score,
-)
+from hopping_leg.rl.model_card import write_card
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.robot.parameters import Robot
 
@@ -199,7 +193,7 @@ class Trainer:
             **recipe.extra_results(model),
         }
         self.folder.write("result.json", {**self.folder.config, **result})
-        model_card.write_card(self.folder.path)
+        write_card(self.folder.path)
         io.write_atomically(self.folder.policy, content)
         return Trained(self.folder.policy, minutes, steps)
 
@@ -304,7 +298,11 @@ class Selection:
     def add(self, steps: int, minutes: float, content: bytes) -> dict[str, Any]:
         """Keep and try a policy file; return its row."""
         io.write_atomically(self._folder.snapshot(steps), content)
-        row = {"steps": steps, "minutes": minutes, **self._trials(content, (FIRST_SEED,))}
+        row = {
+            "steps": steps,
+            "minutes": minutes,
+            **self._trials(content, (policy_evaluation.FIRST_SEED,)),
+        }
         self.rows.append(row)
         return row
 
@@ -314,11 +312,11 @@ class Selection:
         finals = []
         for row in ranked:
             content = self._folder.snapshot(row["steps"]).read_bytes()
-            again = self._trials(content, FINAL_SEEDS)
+            again = self._trials(content, policy_evaluation.FINAL_SEEDS)
             finals.append(({"steps": row["steps"], "minutes": row["minutes"], **again}, content))
         best, content = min(finals, key=lambda final: float(final[0]["score_m"]))
         scores = [{"steps": row["steps"], "score_m": row["score_m"]} for row, _ in finals]
-        return content, {**best, "finalists": scores, "seeds": list(FINAL_SEEDS)}
+        return content, {**best, "finalists": scores, "seeds": list(policy_evaluation.FINAL_SEEDS)}
 
     def describe(self) -> str:
         """Return what to show of the best snapshot so far, or nothing."""
@@ -330,7 +328,10 @@ class Selection:
     def _trials(self, content: bytes, seeds: tuple[int, ...]) -> dict[str, Any]:
         recipe = self._recipe
         policy = Policy(content, "snapshot", recipe.name)
-        results = evaluate_policy(
+        results = policy_evaluation.evaluate_policy(
             policy, self._robot, recipe.selection.eval_commands, seeds, recipe.task.rate
         )
-        return {"score_m": score(results), "trials": as_rows(results)}
+        return {
+            "score_m": policy_evaluation.score(results),
+            "trials": policy_evaluation.as_rows(results),
+        }

@@ -9,7 +9,7 @@ from hopping_leg.controllers.registry import load_controller
 from hopping_leg.evaluate import Entry
 from hopping_leg.evaluate.entries import fingerprint
 from hopping_leg.evaluate.figures import draw_robustness
-from hopping_leg.evaluate.result_cache import ResultCache
+from hopping_leg.evaluate.result_files import ResultCache
 from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
 from hopping_leg.figure_style import to_svg
 

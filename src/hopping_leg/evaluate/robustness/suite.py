@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from hopping_leg.controllers import Controller, RolloutConfig
-from hopping_leg.evaluate import result_cache, runner, trials
+from hopping_leg.evaluate import result_files, runner, trials
 from hopping_leg.evaluate.entries import Entry, check_labels, check_range, fingerprint
 from hopping_leg.evaluate.robustness import axes as all_axes
 from hopping_leg.evaluate.robustness import changes, outcome
@@ -92,7 +92,7 @@ def make_suite(
 def run_suite(
     entries: Sequence[Entry],
     suite: Suite,
-    cache: result_cache.ResultCache,
+    cache: result_files.ResultCache,
     on_progress: Callable[[str, float], None] = lambda label, share: None,
 ) -> dict[str, Any]:
     """Let every controller meet every axis; the cache keeps the result of each pair.

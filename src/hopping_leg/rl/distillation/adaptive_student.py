@@ -10,16 +10,15 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from torch import nn
 from torch.nn import functional
 
-from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.arrays import Array, Array32, BoolArray
 from hopping_leg.envs.observation import CLEARANCE_GAIN, Observation
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.rl import checkpoint, onnx_export, sb3_policies
-from hopping_leg.rl.distillation.students import Bools, DaggerBuffer, Wanted
+from hopping_leg.rl.distillation.students import DaggerBuffer, Wanted
 
 FROM, UNTIL = 0.03, 0.11
 """Time after touchdown in which a hop's error counts, s: its last samples have arrived, and the
@@ -146,7 +145,7 @@ class AdaptiveStudent(nn.Module):
         self._notes: list[torch.Tensor] = []
         self._buffer = DaggerBuffer(room, places.size + _NOTES)
 
-    def act(self, observation: torch.Tensor, begun: Bools) -> torch.Tensor:
+    def act(self, observation: torch.Tensor, begun: BoolArray) -> torch.Tensor:
         """Return what to do in a tick, and update the correction."""
         seen, memory = observation[:, : self._places.measured], self._memory
         o = self.command_integrator
@@ -169,7 +168,7 @@ class AdaptiveStudent(nn.Module):
         self._memory = torch.cat([ends, delayed[:, None]], dim=1)
         return action
 
-    def _true_error(self, observation: torch.Tensor, begun: Bools) -> torch.Tensor:
+    def _true_error(self, observation: torch.Tensor, begun: BoolArray) -> torch.Tensor:
         """Return the errors of the last hops, in the ticks in which they count, (n,)."""
         p = self._places
         columns = [p.true_height, p.true_clearance, p.true_command]
@@ -187,9 +186,7 @@ class AdaptiveStudent(nn.Module):
         shown[:, self._places.command] += correction
         return shown
 
-    def add_rollout(
-        self, observations: npt.NDArray[np.float32], begun: Bools, known: Bools
-    ) -> None:
+    def add_rollout(self, observations: Array32, begun: BoolArray, known: BoolArray) -> None:
         """Keep a rollout with correction, delayed command and error of its ticks."""
         notes = torch.stack(self._notes).numpy()
         self._notes = []

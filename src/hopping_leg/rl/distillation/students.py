@@ -8,16 +8,14 @@ from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from torch import nn
 from torch.nn import functional
 
+from hopping_leg.arrays import Array32, BoolArray
 from hopping_leg.envs.observation import Observation
 from hopping_leg.rl import onnx_export, sb3_policies
 from hopping_leg.rl.checkpoint import Tree
-
-Bools = npt.NDArray[np.bool_]
 
 
 class DaggerBuffer:
@@ -27,7 +25,7 @@ class DaggerBuffer:
         self._seen = torch.zeros((room, size), dtype=torch.float16)
         self._next = self._count = 0
 
-    def add(self, observations: npt.NDArray[np.float32], known: Bools) -> None:
+    def add(self, observations: Array32, known: BoolArray) -> None:
         """Keep a rollout's observations, (ticks, n, size), in the place of the oldest.
 
         Only those are kept for which it is known what to do, (ticks, n).
@@ -74,9 +72,9 @@ class SequenceBuffer:
 
     def add(
         self,
-        observations: npt.NDArray[np.float32],
-        begun: Bools,
-        known: Bools,
+        observations: Array32,
+        begun: BoolArray,
+        known: BoolArray,
         memory: torch.Tensor,
     ) -> None:
         """Keep a rollout, (ticks, n, ...), and forget those for which there is no more room.
@@ -119,13 +117,11 @@ Wanted = Callable[[torch.Tensor], torch.Tensor]
 class Student(Protocol):
     """What a policy's student can do."""
 
-    def act(self, observation: torch.Tensor, begun: Bools) -> torch.Tensor:
+    def act(self, observation: torch.Tensor, begun: BoolArray) -> torch.Tensor:
         """Return what to do in a tick, unbounded, (n, 2); ``begun`` tells new episodes, (n,)."""
         ...
 
-    def add_rollout(
-        self, observations: npt.NDArray[np.float32], begun: Bools, known: Bools
-    ) -> None:
+    def add_rollout(self, observations: Array32, begun: BoolArray, known: BoolArray) -> None:
         """Keep a rollout, (ticks, n, ...), and where it is known what the teacher would do."""
         ...
 
@@ -161,14 +157,12 @@ class WindowStudent(nn.Module):
         self.layers.append(nn.Linear(hidden[-1], 2))
         self._buffer = DaggerBuffer(room, size)
 
-    def act(self, observation: torch.Tensor, begun: Bools) -> torch.Tensor:
+    def act(self, observation: torch.Tensor, begun: BoolArray) -> torch.Tensor:
         """Return what to do in a tick; no tick depends on another."""
         action: torch.Tensor = self.layers(observation[:, : self._measured])
         return action
 
-    def add_rollout(
-        self, observations: npt.NDArray[np.float32], begun: Bools, known: Bools
-    ) -> None:
+    def add_rollout(self, observations: Array32, begun: BoolArray, known: BoolArray) -> None:
         """Keep a rollout, tick by tick."""
         self._buffer.add(observations, known)
 
@@ -206,7 +200,7 @@ class RecurrentStudent(nn.Module):
         self._before = self._memory.clone()
         self._buffer = SequenceBuffer(room)
 
-    def act(self, observation: torch.Tensor, begun: Bools) -> torch.Tensor:
+    def act(self, observation: torch.Tensor, begun: BoolArray) -> torch.Tensor:
         """Return what to do in a tick and remember it."""
         self._memory[torch.as_tensor(begun, dtype=torch.bool)] = 0.0
         with torch.no_grad():
@@ -215,9 +209,7 @@ class RecurrentStudent(nn.Module):
         action: torch.Tensor = self.readout(self._memory)
         return action
 
-    def add_rollout(
-        self, observations: npt.NDArray[np.float32], begun: Bools, known: Bools
-    ) -> None:
+    def add_rollout(self, observations: Array32, begun: BoolArray, known: BoolArray) -> None:
         """Keep a rollout with what was remembered when it began."""
         self._buffer.add(observations, begun, known, self._before)
         self._before = self._memory.clone()

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import torch
 
-from hopping_leg.arrays import Array, IntArray
+from hopping_leg.arrays import Array, Array32, BoolArray, IntArray
 from hopping_leg.controllers.observation_history import make_observation_history
 from hopping_leg.envs import TaskConfig
 from hopping_leg.envs.observation import (
@@ -121,7 +120,7 @@ class TeacherStudentPolicy(sb3_policies.AsymmetricPolicy):
     ) -> None:
         self.student_learns, self.mixing = False, 0.0
         self.measured, self._make_student = measured, student
-        self.begun: Callable[[], npt.NDArray[np.bool_]] = lambda: np.ones((), np.bool_)
+        self.begun: Callable[[], BoolArray] = lambda: np.ones((), np.bool_)
         super().__init__(*args, actor_size=measured, actor_sees=list(teacher_sees), **kwargs)
 
     def _build_mlp_extractor(self) -> None:
@@ -253,8 +252,8 @@ class TeacherStudentPPO(resumable.ResumablePPO):
 
 
 def shift_to_arrival(
-    observations: npt.NDArray[np.float32], begun: npt.NDArray[np.bool_], late: IntArray, first: int
-) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.bool_]]:
+    observations: Array32, begun: BoolArray, late: IntArray, first: int
+) -> tuple[Array32, BoolArray]:
     """Show the teacher the state in which a late leg's action will have its effect.
 
     Seen in hindsight: what it would do there is what the student has to ask for before. Returns

@@ -11,10 +11,9 @@ from functools import partial
 import numpy as np
 import onnxruntime
 
-from hopping_leg.arrays import Array
+from hopping_leg.arrays import Array, Array32
 from hopping_leg.controllers import observation_history, policy, protocol
 from hopping_leg.envs import Reward
-from hopping_leg.envs.observation import Array32
 from hopping_leg.envs.rewards import Transition
 from hopping_leg.rl.finetune import apex_estimate, simulated, trial_data
 from hopping_leg.rl.onnx_export import PREFIX, Network, expose_hidden
