@@ -28,7 +28,7 @@ STUDENT = {
 }  # fmt: skip
 TINY_FAST = FAST.replace(SMALL)
 TINY_PRECISE = PRECISE.replace(SMALL | STUDENT, eval_commands=(0.3,), teachers=3)
-TINY_GRU = PRECISE.replace(GRU | SMALL | STUDENT)
+TINY_GRU = PRECISE.replace(GRU | SMALL | STUDENT | {"dagger.buffer_size": 400})
 TINY_ADAPTIVE = ADAPTIVE.replace(SMALL | STUDENT)
 
 

@@ -44,7 +44,7 @@ def test_resuming_equals_never_having_stopped(recipe, tmp_path):
     trees = []
 
     def keep():
-        if straight.num_timesteps >= recipe.schedule.steps // 2 and not trees:
+        if straight.num_timesteps >= recipe.schedule.steps * 2 // 3 and not trees:
             trees.append(write_checkpoint(tmp_path, straight.num_timesteps, state_of(straight)))
 
     def boundary(model):
