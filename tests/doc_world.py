@@ -15,18 +15,15 @@ from hopping_leg.robot import load_robot
 from hopping_leg.sim.randomization import draw_twin
 from hopping_leg.trace import Trace
 from tests.doc_pages import ROOT, blocks
+from tests.evaluate.test_comparison import TRAINING
 
 SHORTER = {
     "hop deploy": {"--seconds": "0.3", "--yes": None},
     "hop doctor --home": {"--yes": None},
     "hop doctor --write": {"--yes": None},
     "hop emulate": {"--seconds": "0.3", "--no-realtime": None},
-    "hop evaluate": {
-        "--seeds": "1", "--commands": "0.3", "--floor": "soft", "--no-video": None,
-    },
-    "hop robustness": {
-        "--seeds": "1", "--commands": "0.3", "--axes": "payload",
-    },
+    "hop evaluate": {"--seeds": "1", "--commands": "0.3", "--floor": "soft", "--no-video": None},
+    "hop robustness": {"--seeds": "1", "--commands": "0.3", "--axes": "payload"},
     "hop skills": {"--seeds": "1", "--commands": "0.3", "--floor": "soft"},
     "hop excite fixed-base": {
         "--amplitudes": "0.05", "--periods": "0.5", "--swings": "10", "--duration": "10",
@@ -59,9 +56,7 @@ ELSEWHERE = {
 INTERRUPTED = {"hop train --recipe paper --seed 0 --out runs/mine": cli.INTERRUPTED}
 """Commands that are interrupted here, as their page goes on with them, and their exit code."""
 
-REFUSED = {
-    "hop doctor --transport /dev/fdcanusb --robot my_leg.toml --home 0.0 0.0": cli.FAILED,
-}
+REFUSED = {"hop doctor --transport /dev/fdcanusb --robot my_leg.toml --home 0.0 0.0": cli.FAILED}
 """Commands that do their work and then refuse, as their page says: a straight leg is not armed."""
 
 BEFORE = {
@@ -75,16 +70,6 @@ BEFORE = {
 
 TRIAL = "runs/deploy/Bouncer-20260101-120000.parquet"
 KILLED = "runs/deploy/fast-20260501-101500.blackbox"
-TRAINED = {
-    "recipe": "fast",
-    "robot": "legv2-paper",
-    "robot_digest": "abc",
-    "minutes": 5.0,
-    "steps": 200,
-    "selected": {"steps": 200, "score_m": 0.004},
-    "history": [{"steps": n, "minutes": n / 40, "score_m": 1 / n} for n in (100, 200)],
-    "command": "hop train --recipe fast",
-}
 
 
 def shorten(words: list[str]) -> list[str]:
@@ -167,4 +152,4 @@ def _stored_runs() -> None:
         assert cli.main(words) == 0
     for seed in (0, 1):
         Path(f"runs/fast-seed{seed}").mkdir()
-        Path(f"runs/fast-seed{seed}/result.json").write_text(json.dumps({**TRAINED, "seed": seed}))
+        Path(f"runs/fast-seed{seed}/result.json").write_text(json.dumps({**TRAINING, "seed": seed}))

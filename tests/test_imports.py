@@ -11,21 +11,8 @@ import pytest
 import hopping_leg
 
 ROOT = Path(hopping_leg.__file__).parent
-ORDER = [
-    "foundation",
-    "robot",
-    "sim",
-    "controllers",
-    "identify",
-    "envs",
-    "rl",
-    "deploy",
-    "emulator",
-    "evaluate",
-    "sim_to_real",
-    "viewer",
-    "cli",
-]
+ORDER = ["foundation", "robot", "sim", "controllers", "identify", "envs", "rl"]
+ORDER += ["deploy", "emulator", "evaluate", "sim_to_real", "viewer", "cli"]
 FOUNDATION = {"", "arrays", "cma_strategy", "errors", "figure_style", "hop_detection"}
 FOUNDATION |= {"html_page", "io", "progress", "trace", "workers"}
 TRAINING = {"torch", "stable_baselines3", "onnx", "tensorboard"}

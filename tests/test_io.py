@@ -10,16 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hopping_leg import io
 from hopping_leg.errors import RobotError, TraceError, UsageError
-from hopping_leg.io import (
-    json_text,
-    plain,
-    read_dataclass,
-    replace_at,
-    safe_file_name,
-    versions,
-    write_json,
-)
 
 VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False)
@@ -30,19 +22,19 @@ VALUES = st.recursive(
 
 def test_json_has_null_where_there_is_no_number(tmp_path):
     file = tmp_path / "deep" / "x.json"
-    write_json(file, {"a": [math.nan, 1.5, (math.inf,)], "b": None})
+    io.write_json(file, {"a": [math.nan, 1.5, (math.inf,)], "b": None})
     assert json.loads(file.read_text()) == {"a": [None, 1.5, [None]], "b": None}
 
 
 @given(VALUES)
 def test_what_json_knows_comes_back(value):
-    assert plain(value) == value
-    assert json.loads(json_text(value)) == value
+    assert io.plain(value) == value
+    assert json.loads(io.json_text(value)) == value
 
 
 def test_a_folder_is_no_file(tmp_path):
     with pytest.raises(TraceError):
-        write_json(tmp_path, {})
+        io.write_json(tmp_path, {})
 
 
 @dataclass(frozen=True)
@@ -70,9 +62,9 @@ WHOLE = {"name": "x", "inner": {}}
 
 def test_a_dataclass_comes_back_from_its_table():
     outer = Outer("x", Inner("high", 2.5), 3, True, (1.0, 2.0), "b")
-    tree = json.loads(json_text(dataclasses.asdict(outer)))
-    assert read_dataclass(Outer, tree, "f") == outer
-    assert read_dataclass(Outer, {**WHOLE, "pair": [1, 2]}, "f").pair == (1.0, 2.0)
+    tree = json.loads(io.json_text(dataclasses.asdict(outer)))
+    assert io.read_dataclass(Outer, tree, "f") == outer
+    assert io.read_dataclass(Outer, {**WHOLE, "pair": [1, 2]}, "f").pair == (1.0, 2.0)
 
 
 @pytest.mark.parametrize(
@@ -95,21 +87,21 @@ def test_a_dataclass_comes_back_from_its_table():
 )
 def test_mistakes_in_a_table_are_one_sentence_with_the_field(change, sentence):
     with pytest.raises(UsageError) as caught:
-        read_dataclass(Outer, WHOLE | change, "f")
+        io.read_dataclass(Outer, WHOLE | change, "f")
     assert str(caught.value).startswith(sentence)
     with pytest.raises(RobotError, match="'inner' is missing; it needs a table \\[inner\\]"):
-        read_dataclass(Outer, {"name": "x"}, "f", error=RobotError)
+        io.read_dataclass(Outer, {"name": "x"}, "f", error=RobotError)
 
 
 def test_one_entry_is_replaced_and_the_rest_stays():
     outer = Outer("x", Inner())
-    assert replace_at(outer, "inner.gain", 2.0) == Outer("x", Inner(gain=2.0))
+    assert io.replace_at(outer, "inner.gain", 2.0) == Outer("x", Inner(gain=2.0))
     tree = {"a": {"b": 1, "c": 2}, "d": 3}
-    assert replace_at(tree, "a.b", 4) == {"a": {"b": 4, "c": 2}, "d": 3}
-    assert replace_at(tree, "e.f.g", 5)["e"] == {"f": {"g": 5}}
+    assert io.replace_at(tree, "a.b", 4) == {"a": {"b": 4, "c": 2}, "d": 3}
+    assert io.replace_at(tree, "e.f.g", 5)["e"] == {"f": {"g": 5}}
     assert tree == {"a": {"b": 1, "c": 2}, "d": 3}
 
 
 def test_versions_leave_out_what_is_not_installed():
-    assert set(versions("numpy", "no-such-package")) == {"python", "numpy"}
-    assert safe_file_name("my leg/v2.1") == "my_leg_v2.1"
+    assert set(io.versions("numpy", "no-such-package")) == {"python", "numpy"}
+    assert io.safe_file_name("my leg/v2.1") == "my_leg_v2.1"

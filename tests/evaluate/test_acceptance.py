@@ -5,14 +5,9 @@ import pytest
 from hopping_leg.evaluate.acceptance import acceptance_lines, accuracies
 
 GOOD = {
-    "controller": "good",
-    "median_error_m": 0.001,
-    "std_m": 0.003,
-    "skipped_hops": 0,
-    "body_contacts": 0,
-    "hop_rate_hz": 2.0,
-    "flight_fraction": 0.6,
-}
+    "controller": "good", "median_error_m": 0.001, "std_m": 0.003, "skipped_hops": 0,
+    "body_contacts": 0, "hop_rate_hz": 2.0, "flight_fraction": 0.6,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(

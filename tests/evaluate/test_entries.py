@@ -11,14 +11,8 @@ from hopping_leg.evaluate.entries import load_entries
 
 class FakePolicy:
     def __init__(self, seed):
-        self.card = SimpleNamespace(
-            command_low=0.2,
-            command_high=0.4,
-            recipe="fast",
-            robot="other",
-            robot_digest="0" * 16,
-            seed=seed,
-        )
+        made = {"recipe": "fast", "robot": "other", "robot_digest": "0" * 16, "seed": seed}
+        self.card = SimpleNamespace(command_low=0.2, command_high=0.4, **made)
 
     stranger = Policy.stranger
 

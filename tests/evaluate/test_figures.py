@@ -6,17 +6,12 @@ import polars as pl
 import pytest
 from matplotlib.figure import Figure
 
+from hopping_leg.evaluate import metrics
 from hopping_leg.evaluate.figures import (
     draw_distributions,
     draw_estimate,
     draw_heights,
     draw_phase_space,
-)
-from hopping_leg.evaluate.metrics import (
-    ESTIMATED_APEX,
-    ESTIMATED_HEIGHT,
-    START_SECONDS,
-    judge_estimator,
 )
 from hopping_leg.evaluate.report import draw_report_figures
 from hopping_leg.evaluate.trials import load_run
@@ -32,7 +27,10 @@ def with_estimate(trace, offset=0.01):
     apex = np.full(len(height), np.nan)
     for tick, value in zip(hops.tick, hops.apex, strict=True):
         apex[tick + 5 :] = value + offset
-    columns = [pl.Series(ESTIMATED_HEIGHT, height + offset), pl.Series(ESTIMATED_APEX, apex)]
+    columns = [
+        pl.Series(metrics.ESTIMATED_HEIGHT, height + offset),
+        pl.Series(metrics.ESTIMATED_APEX, apex),
+    ]
     return Trace(trace.table.with_columns(columns), trace.header)
 
 
@@ -57,7 +55,7 @@ def test_phase_space_shows_flight_and_stance_of_ten_seconds(fixed):
     flight, stance = draw_phase_space(fixed).axes[:2]
     points = [len(axes.collections[0].get_offsets()) for axes in (flight, stance)]
     time = fixed.column("time_s")
-    shown = (time >= START_SECONDS) & (time < START_SECONDS + 10)
+    shown = (time >= metrics.START_SECONDS) & (time < metrics.START_SECONDS + 10)
     in_flight = int((fixed.column("foot_clearance_m")[shown] >= FLIGHT_CLEARANCE).sum())
     assert points == [in_flight, int(shown.sum()) - in_flight]
 
@@ -89,14 +87,14 @@ def test_a_trace_from_elsewhere_can_be_drawn(fixed, tmp_path):
 
 
 def test_an_estimators_bias_is_measured(fixed):
-    found = judge_estimator("spring", [with_estimate(fixed, 0.01)])
+    found = metrics.judge_estimator("spring", [with_estimate(fixed, 0.01)])
     assert found.flight_bias_m == pytest.approx(0.01)
     assert found.stance_bias_m == pytest.approx(0.01)
     assert found.apex_bias_m == pytest.approx(0.01, abs=1e-4)
     assert found.flight_std_m == pytest.approx(0.0, abs=1e-9)
     assert found.apex_std_m == pytest.approx(0.0, abs=1e-4)
     assert found.hops > 10
-    assert judge_estimator("spring", [fixed]) is None
+    assert metrics.judge_estimator("spring", [fixed]) is None
 
 
 @pytest.fixture

@@ -83,28 +83,6 @@ def test_a_killed_cma_es_resumes_exactly(tmp_path, shares):
         cma_es(sum_of_shares, TWO, options, seed=2, checkpoint=file)
 
 
-def test_least_squares_finds_the_twin():
-    parameters = choose(CAD, list(TRUTH))
-    found = least_squares(objective(parameters).residuals, parameters)
-    values = parameters.values(found.vector)
-    np.testing.assert_allclose(values, list(TRUTH.values()), rtol=2e-3)
-
-
-def test_a_killed_least_squares_resumes_exactly(tmp_path):
-    def curved(vectors):
-        return np.concatenate([bowl(vectors), 0.5 * np.sin(3 * vectors)], axis=1)
-
-    options = optimizers.LeastSquaresOptions(rounds=5, evaluations=2, tolerance=-1.0)
-    whole = least_squares(curved, TWO, options)
-    file = tmp_path / "state.json"
-    with pytest.raises(KeyboardInterrupt):
-        least_squares(killed(curved, 7), TWO, options, checkpoint=file)
-    assert file.exists()
-    resumed = least_squares(curved, TWO, options, checkpoint=file)
-    np.testing.assert_array_equal(resumed.vector, whole.vector)
-    assert resumed.history == whole.history
-
-
 def test_a_foreign_checkpoint_is_refused(tmp_path):
     file = tmp_path / "state.json"
     file.write_text("[]")

@@ -60,6 +60,12 @@ def test_the_reality_of_a_twin_is_no_part_of_what_is_identified():
     assert found.robot.reality.neutral
 
 
+def interrupt(stage, share, cost):
+    """Interrupt a search half-way."""
+    if share >= 0.5:
+        raise KeyboardInterrupt
+
+
 @pytest.mark.parametrize("search", ["least-squares", "cma", "two-pass"])
 def test_an_interrupted_run_resumes_to_the_same_bits(tmp_path, search):
     chosen = options(search=search)
@@ -67,10 +73,6 @@ def test_an_interrupted_run_resumes_to_the_same_bits(tmp_path, search):
         few = dataclasses.replace(EFFORT.cma, generations=2)
         chosen = options(search=search, effort=dataclasses.replace(EFFORT, cma=few))
     whole = identify([run()], LEG, options=chosen, seed=3)
-
-    def interrupt(stage, share, cost):
-        if share >= 0.5:
-            raise KeyboardInterrupt
 
     folder = tmp_path / "run"
     with pytest.raises(KeyboardInterrupt):
@@ -85,13 +87,7 @@ def test_an_interrupted_run_resumes_to_the_same_bits(tmp_path, search):
 
 
 def test_a_folder_keeps_its_run(tmp_path):
-    folder = tmp_path / "run"
-
-    def interrupt(stage, share, cost):
-        if share > 0.3:
-            raise KeyboardInterrupt
-
-    chosen = options(search="cma")
+    folder, chosen = tmp_path / "run", options(search="cma")
     with pytest.raises(KeyboardInterrupt):
         identify([run()], LEG, options=chosen, folder=folder, report=interrupt)
     for resume in (False, True):

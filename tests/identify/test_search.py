@@ -8,8 +8,6 @@ from hopping_leg.identify.optimizers import CmaOptions, Found
 from hopping_leg.identify.parameters import choose
 from hopping_leg.identify.plan import make_plan, pass_names
 from hopping_leg.identify.search import Searcher, SearchOptions, second_pass
-from hopping_leg.workers import RayWorkers, map_rows
-from tests.clusters import two_machines
 from tests.identify.searches import CAD, RUN, TRUTH, objective
 from tests.identify.twin import LEG, noisy
 
@@ -21,17 +19,6 @@ def test_an_objective_that_was_used_can_be_sent():
     costs = here(VECTORS)
     there = pickle.loads(pickle.dumps(here))
     np.testing.assert_array_equal(there(VECTORS), costs)
-
-
-@pytest.mark.slow
-def test_machines_of_a_cluster_give_the_same_bits():
-    pytest.importorskip("ray", reason="Ray is not installed (extra 'cluster')")
-    goal = objective()
-    with two_machines() as address:
-        workers = RayWorkers(address)
-        for function in (goal, goal.residuals):
-            there = map_rows(workers, function, VECTORS)
-            np.testing.assert_array_equal(there, function(VECTORS))
 
 
 def test_the_second_pass_stays_near_the_first():

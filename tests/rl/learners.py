@@ -12,6 +12,7 @@ from hopping_leg.rl.recipes.paper import PAPER
 from hopping_leg.rl.recipes.precise import GRU, PRECISE
 from hopping_leg.rl.resumable import ResumablePPO
 from hopping_leg.robot import load_robot
+from hopping_leg.sim.randomization import WIDE_RANGES
 
 ROBOT = load_robot("legv2-paper")
 TINY = PAPER.replace(
@@ -41,6 +42,11 @@ class TinyPPO(Recipe):
 
 
 TINY_PPO = TinyPPO(**vars(PAPER.replace(steps=640, privileged_critic=False, num_envs=2)))
+EVERY = {
+    "sac": TINY, "ppo": TINY_PPO, "fast": TINY_FAST, "precise": TINY_PRECISE,
+    "recurrent": TINY_GRU, "adaptive": TINY_ADAPTIVE,
+    "surprised": TINY_PRECISE.replace({"task.randomised": WIDE_RANGES}),
+}  # fmt: skip
 
 
 def learner(recipe, seed=3):

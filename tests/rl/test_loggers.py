@@ -26,9 +26,9 @@ class Fake(SimpleNamespace):
 
 @pytest.fixture
 def fake(monkeypatch, request):
-    module = Fake()
-    monkeypatch.setitem(sys.modules, request.param, module)
-    return request.param, module
+    name, module = getattr(request, "param", "wandb"), Fake()
+    monkeypatch.setitem(sys.modules, name, module)
+    return name, module
 
 
 @pytest.mark.parametrize("fake", ["wandb", "trackio"], indirect=True)
@@ -46,7 +46,6 @@ def test_numbers_reach_the_package_and_texts_do_not(fake, tmp_path):
     assert list((tmp_path / "run" / "tensorboard").iterdir())
 
 
-@pytest.mark.parametrize("fake", ["wandb"], indirect=True)
 def test_a_resumed_run_goes_on_under_its_identity(fake, tmp_path):
     name, module = fake
     for folder in ("one", "one", "two"):
@@ -55,7 +54,6 @@ def test_a_resumed_run_goes_on_under_its_identity(fake, tmp_path):
     assert first == again != other
 
 
-@pytest.mark.parametrize("fake", ["wandb"], indirect=True)
 def test_a_package_that_does_not_start_is_a_sentence(fake, tmp_path):
     name, module = fake
 

@@ -18,12 +18,6 @@ from hopping_leg.rl import policy_evaluation
 from hopping_leg.rl.checkpoint import list_checkpoints
 from hopping_leg.rl.distillation.distillation import Distillation
 from hopping_leg.rl.parallel_seeds import ParallelSeeds
-from hopping_leg.rl.policy_evaluation import (
-    DECIDING_SEEDS,
-    FINAL_SEEDS,
-    FIRST_SEED,
-    every_centimetre,
-)
 from hopping_leg.rl.run_folder import RunFolder
 from hopping_leg.rl.train import train
 from tests.rl.learners import ROBOT, TINY, TINY_PRECISE
@@ -108,16 +102,17 @@ def test_no_two_seeds_share_a_start(tmp_path, monkeypatch):
 
 
 def test_starts_are_compared_on_seeds_that_chose_none_of_their_snapshots():
-    assert not set(DECIDING_SEEDS) & {FIRST_SEED, *FINAL_SEEDS}
-    assert max(DECIDING_SEEDS) < 1000
+    others = {policy_evaluation.FIRST_SEED, *policy_evaluation.FINAL_SEEDS}
+    assert not set(policy_evaluation.DECIDING_SEEDS) & others
+    assert max(policy_evaluation.DECIDING_SEEDS) < 1000
 
 
 def test_no_height_between_two_commands_is_missed():
-    heights = every_centimetre((0.435, 0.225, 0.3))
+    heights = policy_evaluation.every_centimetre((0.435, 0.225, 0.3))
     assert (heights[0], heights[-1]) == (0.225, 0.435)
     steps = [high - low for low, high in itertools.pairwise(heights)]
     assert steps == pytest.approx([0.01] * 21)
-    assert every_centimetre((0.3,)) == (0.3,)
+    assert policy_evaluation.every_centimetre((0.3,)) == (0.3,)
 
 
 def test_a_single_start_is_a_training_in_the_folder_itself(tmp_path, monkeypatch):

@@ -6,20 +6,11 @@ import pytest
 
 from hopping_leg.rl.policy_evaluation import CommandResult, command_score, score
 
-CALM = [
-    CommandResult(
-        command_m=command,
-        median_error_m=0.001,
-        std_m=0.003,
-        hops=300,
-        hops_per_s=2.3,
-        flight_fraction=0.6,
-        skipped_hops=0,
-        body_contact_ticks=0,
-        min_height_m=0.1,
-    )
-    for command in (0.25, 0.30, 0.35)
-]
+USUAL = {
+    "median_error_m": 0.001, "std_m": 0.003, "hops": 300, "hops_per_s": 2.3, "flight_fraction": 0.6,
+    "skipped_hops": 0, "body_contact_ticks": 0, "min_height_m": 0.1,
+}  # fmt: skip
+CALM = [CommandResult(command_m=command, **USUAL) for command in (0.25, 0.30, 0.35)]
 
 
 def changed(**values):

@@ -14,19 +14,7 @@ from hopping_leg.rl import policy_evaluation
 from hopping_leg.rl import train as module
 from hopping_leg.rl.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
 from hopping_leg.rl.resumable import restore, state_of
-from hopping_leg.sim.randomization import WIDE_RANGES
-from tests.rl.learners import (
-    ROBOT,
-    TINY,
-    TINY_ADAPTIVE,
-    TINY_FAST,
-    TINY_GRU,
-    TINY_PPO,
-    TINY_PRECISE,
-    learner,
-)  # fmt: skip
-
-SURPRISED = TINY_PRECISE.replace({"task.randomised": WIDE_RANGES})
+from tests.rl.learners import EVERY, ROBOT, TINY, learner
 
 
 def disturb_all_generators():
@@ -34,11 +22,7 @@ def disturb_all_generators():
     np.random.rand(100)  # noqa: NPY002
 
 
-@pytest.mark.parametrize(
-    "recipe",
-    [TINY, TINY_PPO, TINY_FAST, TINY_PRECISE, SURPRISED, TINY_GRU, TINY_ADAPTIVE],
-    ids=["sac", "ppo", "fast", "precise", "surprised", "recurrent", "adaptive"],
-)
+@pytest.mark.parametrize("recipe", EVERY.values(), ids=EVERY)
 def test_resuming_equals_never_having_stopped(recipe, tmp_path):
     straight = learner(recipe)
     trees = []

@@ -6,17 +6,7 @@ import torch
 
 from hopping_leg.envs.observation import PaperObservation, sample_scaling
 from hopping_leg.sim.channel import Measurement
-from tests.rl.learners import (
-    ROBOT,
-    TINY,
-    TINY_ADAPTIVE,
-    TINY_FAST,
-    TINY_GRU,
-    TINY_PPO,
-    TINY_PRECISE,
-    learner,
-    policy_file,
-)
+from tests.rl.learners import EVERY, ROBOT, learner, policy_file
 
 
 def measurement(count):
@@ -29,13 +19,13 @@ def measurement(count):
     )
 
 
-@pytest.mark.parametrize("recipe", [TINY, TINY_PPO], ids=["sac", "ppo"])
-def test_policy_file_gives_the_actors_torques(recipe):
-    recipe = recipe.replace(actor=(32, 32), critic=(32, 32), privileged_critic=False)
+@pytest.mark.parametrize(("name", "factor"), [("sac", 4.0), ("ppo", 40.0)])
+def test_policy_file_gives_the_actors_torques(name, factor):
+    recipe = EVERY[name].replace(actor=(32, 32), critic=(32, 32), privileged_critic=False)
     model = learner(recipe)
     with torch.no_grad():
         for parameter in model.policy.parameters():
-            parameter.mul_(40.0 if recipe is not TINY else 4.0)
+            parameter.mul_(factor)
     policy = policy_file(recipe, model)
     policy.reset(50)
     m = measurement(50)
@@ -47,13 +37,13 @@ def test_policy_file_gives_the_actors_torques(recipe):
     assert np.abs(action).max() > 0.2
 
 
-@pytest.mark.parametrize("recipe", [TINY_FAST, TINY_PRECISE, TINY_GRU, TINY_ADAPTIVE])
-def test_a_policy_file_acts_beside_the_task_as_the_actor_and_remembers_the_same(recipe):
+@pytest.mark.parametrize("name", ["fast", "precise", "recurrent", "adaptive"])
+def test_a_policy_file_acts_beside_the_task_as_the_actor_and_remembers_the_same(name):
     """In two episodes on the same measurements; adaptive aims as its student does."""
     changes = {"task.reset_distribution": "standing", "task.random_episode_start": False}
-    if recipe is TINY_ADAPTIVE:
+    if name == "adaptive":
         changes |= {"integrator.start": 0.0, "integrator.share": 5.0}
-    recipe = recipe.replace(changes)
+    recipe = EVERY[name].replace(changes)
     model = learner(recipe)
     task, actor, file = model.env.task, model.policy, policy_file(recipe, model)
     student = getattr(actor, "student", None)

@@ -12,14 +12,8 @@ from hopping_leg.evaluate.robustness.outcome import run_axis
 from hopping_leg.evaluate.robustness.trials import PUSH_SECONDS, make_trials
 
 COMMANDS = (0.25, 0.35)
-LEADERBOARD = {
-    "model error",
-    "velocity noise",
-    "torque noise",
-    "torque response",
-    "delay",
-    "perturbation",
-}
+LEADERBOARD = {"model error", "velocity noise", "torque noise", "torque response"}
+LEADERBOARD |= {"delay", "perturbation"}
 
 
 def plan(robot, axis, **options):

@@ -4,19 +4,14 @@ import numpy as np
 import torch
 from torch import nn
 
-from hopping_leg.rl.distillation.students import (
-    DaggerBuffer,
-    RecurrentStudent,
-    SequenceBuffer,
-    WindowStudent,
-)
+from hopping_leg.rl.distillation import students
 
 LEGS, SIZE = 5, 3
 
 
 def recurrent(room=10_000):
     torch.manual_seed(0)
-    return RecurrentStudent(measured=2, memory=8, room=room, legs=LEGS)
+    return students.RecurrentStudent(measured=2, memory=8, room=room, legs=LEGS)
 
 
 def nobody():
@@ -73,7 +68,7 @@ def test_a_recurrent_student_learns_to_repeat_what_is_no_longer_seen():
 
 def test_a_window_student_learns_what_it_is_shown_and_sees_measurements_alone():
     torch.manual_seed(0)
-    student = WindowStudent(2, SIZE, [16], 1000, nn.Tanh)
+    student = students.WindowStudent(2, SIZE, [16], 1000, nn.Tanh)
     optimizer = torch.optim.Adam(student.parameters(), lr=1e-2)
     student.add_rollout(
         np.random.default_rng(0).uniform(-1, 1, (10, 100, SIZE)).astype(np.float32),
@@ -97,7 +92,7 @@ def add(buffer, rows):
 
 
 def test_only_the_newest_observations_with_a_known_answer_are_drawn():
-    buffer = DaggerBuffer(room=10, size=2)
+    buffer = students.DaggerBuffer(room=10, size=2)
     for number in range(1, 6):
         add(buffer, np.full((2, 2, 2), number, np.float32))
         assert 0 not in buffer.sample(50)
@@ -117,7 +112,7 @@ def rollout(number, ticks=4, num_envs=3):
 
 
 def test_sequences_forget_the_oldest_rollouts():
-    buffer = SequenceBuffer(room=30)
+    buffer = students.SequenceBuffer(room=30)
     for number in range(5):
         buffer.add(*rollout(number))
     drawn = torch.cat([buffer.sample(12).seen[0, :, 0] for _ in range(50)])
@@ -126,7 +121,7 @@ def test_sequences_forget_the_oldest_rollouts():
 
 def test_a_sequence_counts_up_to_a_new_episode_with_its_own_legs_memory():
     """An episode that begins with the sequence remembers nothing; unknown answers do not count."""
-    buffer = SequenceBuffer(room=30)
+    buffer = students.SequenceBuffer(room=30)
     seen, begun, known, memory = rollout(0)
     begun[0, 1] = begun[2, 1] = True
     known[3, 0] = False

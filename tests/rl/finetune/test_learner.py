@@ -29,12 +29,16 @@ def learner(name, reward=None, options=TINY):
     return Learner(network, rows(len(network.offset), reward=reward), options, 0), network
 
 
+def act(made, seen):
+    with torch.no_grad():
+        return made.model.actor(seen, deterministic=True)
+
+
 @pytest.mark.parametrize("name", ["fast", "paper"])
 def test_the_actor_gives_the_policys_torques(name):
     made, network = learner(name)
     seen = rows(len(network.offset)).observation
-    with torch.no_grad():
-        action = made.model.actor(torch.from_numpy(seen), deterministic=True).numpy()
+    action = act(made, torch.from_numpy(seen)).numpy()
     policy = load_policy(name)
     session = policy._session
     shapes, at, feeds = policy.inputs, 0, {}
@@ -58,13 +62,9 @@ def test_actions_move_to_where_the_reward_is():
     made, network = learner("fast", lambda action: -np.abs(action - 0.5).sum(axis=1))
     seen = torch.from_numpy(rows(len(network.offset)).observation)
 
-    def off():
-        with torch.no_grad():
-            return float((made.model.actor(seen, deterministic=True) - 0.5).abs().mean())
-
-    before = off()
+    before = (act(made, seen) - 0.5).abs().mean()
     made.learn(300, 1)
-    assert off() < 0.8 * before
+    assert (act(made, seen) - 0.5).abs().mean() < 0.8 * before
 
 
 def test_a_round_changes_actions_no_more_than_it_may():
@@ -73,14 +73,10 @@ def test_a_round_changes_actions_no_more_than_it_may():
     real = rows(len(network.offset), 50)
     seen = torch.from_numpy(real.observation)
 
-    def act():
-        with torch.no_grad():
-            return made.model.actor(seen, deterministic=True)
-
     for data in (False, True):
-        before = act()
+        before = act(made, seen)
         made.learn(100, 1)
-        moved = (act() - before).square().mean().sqrt()
+        moved = (act(made, seen) - before).square().mean().sqrt()
         assert moved > 1e-4
         if data:
             assert moved <= 0.02

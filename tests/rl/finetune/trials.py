@@ -17,20 +17,11 @@ POLICY = load_policy("fast")
 PERIOD = 0.005
 CONTACT = ContactConfig(num_envs=4, seconds=3.0, steps=20, batch_size=64, hidden=(8,))
 OPTIONS = FinetuneConfig(
-    method="both",
-    commands=(0.25, 0.35),
-    trial_seconds=4.0,
-    hold=2.0,
-    explorations=1,
-    correction_minutes=0.1,
-    believed_seconds=32.0,
-    first_steps=2,
-    steps_per_tick=0.004,
-    critics_first=0,
-    stopping_rules=StoppingRules(minutes=0.4, patience=50, margin=10.0),
-    learner=SacConfig(critic=(8,), batch_size=16, buffer_size=4000),
-    contact=CONTACT,
-)
+    method="both", commands=(0.25, 0.35), trial_seconds=4.0, hold=2.0, explorations=1,
+    correction_minutes=0.1, believed_seconds=32.0, first_steps=2, steps_per_tick=0.004,
+    critics_first=0, stopping_rules=StoppingRules(minutes=0.4, patience=50, margin=10.0),
+    learner=SacConfig(critic=(8,), batch_size=16, buffer_size=4000), contact=CONTACT,
+)  # fmt: skip
 
 
 class Imagined:
