@@ -26,22 +26,16 @@ def console(bench, *lines, **options):
 
 @pytest.mark.parametrize("flow", [True, False, None])
 def test_settings_are_read_set_and_kept(bench, flow):
-    answers = console(
-        bench,
-        "conf get servo.timeout_mode",
-        "conf set servo.timeout_mode 12",
-        "conf get servo.timeout_mode",
-        "conf set servopos.position_min nan",
-        "conf enumerate servopos",
-        use_flow_control=flow,
-    )
+    read, write = "conf get servo.timeout_mode", "conf set servo.timeout_mode 12"
+    limits = "conf set servopos.position_min nan", "conf enumerate servopos"
+    answers = console(bench, read, write, read, *limits, use_flow_control=flow)
     assert answers[0] == "15"
     assert answers[2] == "12"
     assert answers[4].startswith("servopos.position_min nan\nservopos.position_max 0.5")
     drive = bench.robot.drives[0]
     drive.boot(0.0)
     assert drive.settings["servo.timeout_mode"] == 15
-    console(bench, "conf set servo.timeout_mode 12", "conf write")
+    console(bench, write, "conf write")
     drive.boot(0.0)
     assert drive.settings["servo.timeout_mode"] == 12
 

@@ -23,13 +23,11 @@ def emulator():
         yield running
 
 
-def talk(emulator, conversation, *, checksums):
+def talk(emulator, conversation):
     """Run a conversation with the client library as it is installed."""
 
     async def run():
         device = FdcanusbDevice(str(emulator.path))
-        if not checksums:
-            device._is_fdcanusb, device._checksum_active = True, False
         transport = moteus.Transport([device])
         try:
             drives = [moteus.Controller(id=n, transport=transport) for n in (1, 2)]
@@ -55,7 +53,7 @@ def test_the_client_drives_the_leg_with_checksums(emulator):
         return seen
 
     before = emulator.state()
-    seen = talk(emulator, push, checksums=True)
+    seen = talk(emulator, push)
     assert [values[moteus.Register.MODE] for values in seen[-1]] == [10, 10]
     torques = [[round(values[moteus.Register.TORQUE], 6) for values in pair] for pair in seen]
     assert [0.3, -0.3] in torques
@@ -64,16 +62,6 @@ def test_the_client_drives_the_leg_with_checksums(emulator):
     assert after.time > before.time
     assert after.modes == (0, 0)
     assert after.q != before.q
-
-
-def test_a_client_without_checksums_learns_that_they_are_wanted(emulator):
-    async def ask(transport, drives):
-        assert (await drives[0].query()).id == 1
-        return transport.devices()[0]._checksum_active
-
-    assert talk(emulator, ask, checksums=True)
-    emulator_wants_them = talk(emulator, ask, checksums=False)
-    assert emulator_wants_them
 
 
 def test_a_wrong_start_is_told_to_the_parent():
@@ -88,7 +76,7 @@ def test_a_plug_comes_back_under_the_same_name(tmp_path):
     link = tmp_path / "leg"
     with EmulatorProcess(EmulatorConfig(link=link)) as emulator:
         assert emulator.path == link
-        assert talk(emulator, ask, checksums=True) == 1
+        assert talk(emulator, ask) == 1
         emulator.inject(Fault("unplug", duration=0.3))
         until = time.monotonic() + 10
         while link.exists() and time.monotonic() < until:
@@ -96,6 +84,6 @@ def test_a_plug_comes_back_under_the_same_name(tmp_path):
         assert not link.exists()
         while not link.exists() and time.monotonic() < until:
             time.sleep(0.01)
-        assert talk(emulator, ask, checksums=True) == 1
+        assert talk(emulator, ask) == 1
         assert [fault.kind for _, fault in emulator.record().faults] == ["unplug"]
     assert not link.is_symlink()

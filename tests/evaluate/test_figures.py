@@ -6,13 +6,8 @@ import polars as pl
 import pytest
 from matplotlib.figure import Figure
 
+from hopping_leg.evaluate import figures as drawing
 from hopping_leg.evaluate import metrics
-from hopping_leg.evaluate.figures import (
-    draw_distributions,
-    draw_estimate,
-    draw_heights,
-    draw_phase_space,
-)
 from hopping_leg.evaluate.report import draw_report_figures
 from hopping_leg.evaluate.trials import load_run
 from hopping_leg.figure_style import INCHES, encode, fit_width, to_svg
@@ -41,10 +36,10 @@ def fixed(judged):
 
 def test_every_figure_names_its_axes_with_units(judged, fixed):
     figures = [
-        draw_heights({"spring": fixed}),
-        draw_distributions(judged.evaluation),
-        draw_phase_space(fixed),
-        draw_estimate(with_estimate(fixed)),
+        drawing.draw_heights({"spring": fixed}),
+        drawing.draw_distributions(judged.evaluation),
+        drawing.draw_phase_space(fixed),
+        drawing.draw_estimate(with_estimate(fixed)),
     ]
     for figure in figures:
         labels = [axes.get_xlabel() + axes.get_ylabel() for axes in figure.axes]
@@ -52,7 +47,7 @@ def test_every_figure_names_its_axes_with_units(judged, fixed):
 
 
 def test_phase_space_shows_flight_and_stance_of_ten_seconds(fixed):
-    flight, stance = draw_phase_space(fixed).axes[:2]
+    flight, stance = drawing.draw_phase_space(fixed).axes[:2]
     points = [len(axes.collections[0].get_offsets()) for axes in (flight, stance)]
     time = fixed.column("time_s")
     shown = (time >= metrics.START_SECONDS) & (time < metrics.START_SECONDS + 10)

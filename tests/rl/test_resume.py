@@ -1,9 +1,4 @@
 import json
-import os
-import subprocess
-import sys
-import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -87,44 +82,6 @@ def test_a_run_is_never_overwritten_or_mixed(tmp_path, monkeypatch):
         with pytest.raises(UsageError, match=says):
             module.train(recipe, ROBOT, seed, out, resume=bool(resume), quiet=True)
     assert done.policy.read_bytes() == content
-
-
-_KILLED = """
-import sys
-from pathlib import Path
-from tests.rl.learners import ROBOT, TINY
-from hopping_leg.rl import policy_evaluation
-from hopping_leg.rl.train import train
-policy_evaluation._SECONDS = 0.5
-recipe = TINY.replace(steps=1600, checkpoint_seconds=0.0, eval_every=800)
-train(recipe, ROBOT, 0, Path(sys.argv[1]), resume=True, quiet=True)
-"""
-
-
-def checkpoint_names(run):
-    return {path.name for path in list_checkpoints(run / "checkpoints")}
-
-
-@pytest.mark.slow
-def test_killed_runs_end_like_the_run_that_was_left_alone(tmp_path):
-    alone, killed = tmp_path / "alone", tmp_path / "killed"
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
-    command = [sys.executable, "-c", _KILLED]
-    subprocess.run([*command, str(alone)], check=True, env=environment)
-    kills = 0
-    for delay in (0.0, 0.05, 0.1):
-        begun = checkpoint_names(killed)
-        process = subprocess.Popen([*command, str(killed)], env=environment)
-        while process.poll() is None and checkpoint_names(killed) <= begun:
-            time.sleep(0.01)
-        time.sleep(delay)
-        kills += process.poll() is None
-        process.kill()
-        process.wait()
-    assert kills > 0
-    if not (killed / "policy.onnx").exists():
-        subprocess.run([*command, str(killed)], check=True, env=environment)
-    assert (killed / "policy.onnx").read_bytes() == (alone / "policy.onnx").read_bytes()
 
 
 def test_a_run_can_begin_where_another_stopped(tmp_path, monkeypatch):
