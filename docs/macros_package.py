@@ -11,11 +11,10 @@ from typing import Any
 from macros_results import grid, number
 from studies.fault_campaign.families import FAMILIES
 
-from hopping_leg.cli.robots import derived, numbers
+from hopping_leg.cli.robots import derived
 from hopping_leg.emulator.faults import KINDS
 from hopping_leg.evaluate.robustness.axes import AXES
-from hopping_leg.robot import load_robot
-from hopping_leg.robot.robot_files import load_tree
+from hopping_leg.robot import load_robot, load_tree, numbers
 from hopping_leg.sim.randomization import TWIN_RANGES
 from hopping_leg.trace import COLUMNS
 

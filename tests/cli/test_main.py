@@ -11,9 +11,8 @@ import pytest
 
 from hopping_leg import cli
 from hopping_leg.cli import main
-from hopping_leg.cli.robots import numbers
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import load_robot, load_tree, shipped_robots
+from hopping_leg.robot import load_robot, load_tree, numbers, shipped_robots
 
 
 def failing(monkeypatch, error):

@@ -67,8 +67,8 @@ def test_effects_without_effect_leave_every_byte(name):
 
 
 def test_a_neutral_table_does_not_change_the_digest():
-    assert load_robot("legv2-paper").digest == "9634a0cc2dd452ea"
-    assert load_robot("legv2").digest == "a599bb119353a5f1"
+    assert load_robot("legv2-paper").has_digest("9634a0cc2dd452ea")
+    assert load_robot("legv2").has_digest("a599bb119353a5f1")
     assert with_reality(hip=DriveMismatch(backlash=1e-3)).digest != CAD.digest
 
 

@@ -25,8 +25,8 @@ def make(request):
 def test_energy_is_conserved_without_friction(make, timestep):
     legs = make(FRICTIONLESS, 4, timestep=timestep)
     rng = np.random.default_rng(0)
-    legs.place(slice(None), 3.0, rng.uniform(-2, 2, (4, 2)))
-    legs.qd[:] = rng.normal(0, 5, (4, 2))
+    legs.place(slice(None), 3.0, rng.uniform(-1, 1, (4, 2)))  # far from the stops
+    legs.qd[:] = rng.normal(0, 3, (4, 2))
     before, posture = energy(legs), legs.q.copy()
     for _ in range(60):
         legs.step(np.zeros((4, 2)))

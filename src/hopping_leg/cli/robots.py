@@ -14,9 +14,18 @@ from typing import Any
 
 import tyro
 
-from hopping_leg.cli.options import show_table
-from hopping_leg.io import Tree, write_json
-from hopping_leg.robot import Robot, build_model, load_robot, load_tree, shipped_robots
+from hopping_leg.cli.options import say, show_table
+from hopping_leg.io import write_json
+from hopping_leg.robot import (
+    Robot,
+    build_model,
+    doubts,
+    load_robot,
+    load_tree,
+    numbers,
+    robot_from_tree,
+    shipped_robots,
+)
 
 Target = tyro.conf.Positional[str]
 
@@ -56,29 +65,23 @@ def run(args: List | Show | Check) -> None:
         for robot in robots:
             print(f"{robot.name:<12}  {robot.description}\n{'':<12}  {_summary(robot)}")
     elif isinstance(args, Show):
-        robot, tree = load_robot(args.robot), load_tree(args.robot)
+        tree = load_tree(args.robot)
+        robot, doubted = robot_from_tree(tree, args.robot), doubts(args.robot)
         if args.json:
-            write_json(args.json, {**asdict(robot), "derived": derived(robot)})
+            facts = {**asdict(robot), "derived": derived(robot), "doubts": doubted}
+            write_json(args.json, facts)
         rows = [(p, f"{e['value']:g}", e["unit"], e["source"]) for p, e in numbers(tree)]
         for path, value in derived(robot).items():
             shown = f"{value:g}" if isinstance(value, float) else value
             rows.append((path, shown, "", "computed"))
         title = f"{robot.name}: {robot.description}"
         show_table(("number", "value", "unit", "source"), rows, title)
+        say(*doubted)
     else:
-        robot = load_robot(args.robot)
+        robot, doubted = robot_from_tree(load_tree(args.robot), args.robot), doubts(args.robot)
         build_model(robot)
         print(f"{args.robot} is a valid robot: {robot.name} ({_summary(robot)}).")
-
-
-def numbers(tree: Tree, prefix: str = "") -> list[tuple[str, Tree]]:
-    """Return (path, entry) of every number in a robot's tables, in the file's order."""
-    found: list[tuple[str, Tree]] = []
-    for key, value in tree.items():
-        if isinstance(value, dict):
-            path = f"{prefix}{key}"
-            found += [(path, value)] if "value" in value else numbers(value, f"{path}.")
-    return found
+        say(*(f"But {doubt}" for doubt in doubted))
 
 
 def derived(robot: Robot) -> dict[str, Any]:

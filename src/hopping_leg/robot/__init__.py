@@ -19,8 +19,9 @@ from hopping_leg.robot.model_mismatch import (
     SensorMismatch,
 )
 from hopping_leg.robot.parameters import JOINTS, Contact, Joint, Link, Robot
+from hopping_leg.robot.robot_checks import check_physics, numbers
 from hopping_leg.robot.robot_files import (
-    check_physics,
+    doubts,
     load_robot,
     load_tree,
     parent_robot,
@@ -55,10 +56,12 @@ __all__ = [
     "check_physics",
     "command_limits",
     "compile_spec",
+    "doubts",
     "get_spec",
     "hopping_ranges",
     "load_robot",
     "load_tree",
+    "numbers",
     "parent_robot",
     "robot_from_tree",
     "robot_text",

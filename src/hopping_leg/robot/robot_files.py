@@ -1,22 +1,29 @@
 """Robot files: one TOML per leg, every number with its unit and source."""
 
-import itertools
 import json
-import math
+import logging
 import tomllib
-from collections.abc import Iterator
 from functools import partial
 from importlib import resources
+from multiprocessing import parent_process
 from pathlib import Path
 from typing import Any
 
 from hopping_leg.errors import RobotError, unknown_name
 from hopping_leg.io import Field, Tree, is_number, read_dataclass
-from hopping_leg.robot.hardware import contradictions
-from hopping_leg.robot.model import TIMESTEP
-from hopping_leg.robot.parameters import JOINTS, KINDS, Robot
+from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot.robot_checks import (
+    check_physics,
+    doubts_of_inheritance,
+    doubts_of_values,
+    numbers,
+    unfit_numbers,
+)
 
 _SHIPPED = resources.files("hopping_leg.robot") / "robots"
+
+_log = logging.getLogger(__name__)
+_told: set[str] = set()
 
 
 def shipped_robots() -> list[str]:
@@ -28,11 +35,18 @@ def shipped_robots() -> list[str]:
 def load_robot(name_or_path: str | Path) -> Robot:
     """Load a robot by shipped name, e.g. ``"legv2"``, or from a file that ends in ``.toml``.
 
+    Doubts about a file's numbers (``doubts``) are logged as warnings, once.
+
     Raises:
         RobotError: Naming the file, the field and what was valid.
     """
     origin = str(name_or_path)
-    return robot_from_tree(_read(origin), origin)
+    robot = robot_from_tree(_read(origin), origin)
+    for doubt in doubts(origin):
+        if doubt not in _told and parent_process() is None:
+            _told.add(doubt)
+            _log.warning(doubt)
+    return robot
 
 
 def robot_from_tree(tree: Tree, origin: str) -> Robot:
@@ -41,26 +55,20 @@ def robot_from_tree(tree: Tree, origin: str) -> Robot:
     Raises:
         RobotError: Naming origin, field and what was valid.
     """
-    resolved = _extend(tree, origin, ())
-    _refuse_moved(resolved, origin)
+    resolved = _resolve(_chain(tree, origin))[-1]
+    for path in (path for path, _ in numbers(resolved) if path.startswith("hardware.")):
+        if path.endswith((".lower", ".upper")):
+            new = path.removeprefix("hardware.").replace(".", ".stop_")
+            raise RobotError(
+                f"{origin}: '{path}' is a mechanical stop, which belongs to the joint; write it as"
+                f" '{new}'."
+            )
     read_quantity = partial(_read_quantity, origin)
     robot = read_dataclass(Robot, resolved, origin, error=RobotError, read_quantity=read_quantity)
     if not robot.name.strip():
         raise RobotError(f"{origin}: 'name' is empty; give the robot a name.")
     check_physics(robot, origin)
     return robot
-
-
-def _refuse_moved(tree: Tree, origin: str) -> None:
-    """Name the new place of the mechanical stops to who has them in ``[hardware]``."""
-    for joint, key in itertools.product(JOINTS, ("lower", "upper")):
-        table = tree.get("hardware", {})
-        table = table.get(joint, {}) if isinstance(table, dict) else {}
-        if isinstance(table, dict) and key in table:
-            raise RobotError(
-                f"{origin}: 'hardware.{joint}.{key}' is a mechanical stop, which belongs to the"
-                f" joint; write it as '{joint}.stop_{key}'."
-            )
 
 
 def parent_robot(name_or_path: str | Path) -> str | None:
@@ -80,24 +88,54 @@ def load_tree(name_or_path: str | Path) -> Tree:
     Raises:
         RobotError: The file, or one that it extends, is missing or not TOML.
     """
-    return _resolve(str(name_or_path), ())
+    origin = str(name_or_path)
+    return _resolve(_chain(_read(origin), origin))[-1]
 
 
-def _resolve(name: str, chain: tuple[str, ...]) -> Tree:
-    if name in chain:
-        circle = " -> ".join((*chain, name))
-        raise RobotError(f"{name}: robots extend each other in a circle ({circle}).")
-    return _extend(_read(name), name, chain)
+def doubts(name_or_path: str | Path) -> list[str]:
+    """Return sentences about a valid robot file's numbers that may not fit each other.
+
+    Raises:
+        RobotError: As ``load_robot``.
+    """
+    origin = str(name_or_path)
+    chain = _chain(_read(origin), origin)
+    resolved = _resolve(chain)
+    robot = robot_from_tree(resolved[-1], origin)
+    found = doubts_of_inheritance(chain, resolved)
+    return [*found, *doubts_of_values(robot, resolved[-1], origin)]
 
 
-def _extend(tree: Tree, name: str, chain: tuple[str, ...]) -> Tree:
-    parent = tree.get("extends")
-    if "extends" not in tree:
-        return tree
-    tree = {key: value for key, value in tree.items() if key != "extends"}
-    if not isinstance(parent, str):
-        raise RobotError(f"{name}: 'extends' must be a robot's name or file, not {parent!r}.")
-    return _merge(_resolve(_beside(name, parent), (*chain, name)), tree)
+def _chain(tree: Tree, name: str) -> list[tuple[str, Tree]]:
+    """Return the files that a robot consists of, each with its own tables, the root first."""
+    chain = [(name, tree)]
+    while "extends" in tree:
+        parent = tree["extends"]
+        if not isinstance(parent, str):
+            raise RobotError(f"{name}: 'extends' must be a robot's name or file, not {parent!r}.")
+        name = _beside(name, parent)
+        names = [file for file, _ in reversed(chain)]
+        if name in names:
+            circle = " -> ".join((*names, name))
+            raise RobotError(f"{name}: robots extend each other in a circle ({circle}).")
+        tree = _read(name)
+        chain.insert(0, (name, tree))
+    return chain
+
+
+def _resolve(chain: list[tuple[str, Tree]]) -> list[Tree]:
+    """Return all tables of each file of a chain; a stated armature holds for its own gear."""
+    resolved: list[Tree] = []
+    for _, tree in chain:
+        own = {key: value for key, value in tree.items() if key != "extends"}
+        parent = resolved[-1] if resolved else {}
+        merged = _merge(parent, own)
+        for path in unfit_numbers(parent, own):
+            joint, _, number = path.partition(".")
+            if number == "armature":
+                merged[joint] = {k: v for k, v in merged[joint].items() if k != number}
+        resolved.append(merged)
+    return resolved
 
 
 def _beside(name: str, parent: str) -> str:
@@ -179,81 +217,3 @@ def _read_quantity(origin: str, entry: object, spec: Field, path: str) -> float:
         least = "zero or more" if zero_is_valid else "more than zero"
         raise RobotError(f"{origin}: '{path}' is {value} {unit} but must be {least}.")
     return float(value)
-
-
-def check_physics(robot: Robot, origin: str) -> None:
-    """Check that fields do not contradict each other.
-
-    Raises:
-        RobotError: Naming the fields that contradict each other.
-    """
-    for sentence in _contradictions(robot):
-        raise RobotError(f"{origin}: {sentence}")
-
-
-def _contradictions(robot: Robot) -> Iterator[str]:
-    joints = (("hip", robot.hip), ("knee", robot.knee))
-    for name, joint in joints:
-        peak = joint.motor.peak_torque
-        if joint.lower >= joint.upper:
-            yield (
-                f"'{name}.lower' ({joint.lower:g} rad) must lie below '{name}.upper'"
-                f" ({joint.upper:g})."
-            )
-        for key, inner, outer in (
-            ("lower", joint.stop_lower, joint.lower),
-            ("upper", joint.upper, joint.stop_upper),
-        ):
-            if inner > outer:
-                yield (
-                    f"'{name}.{key}' ({getattr(joint, key):g} rad) lies beyond the mechanical stop"
-                    f" '{name}.stop_{key}' ({getattr(joint, f'stop_{key}'):g}); state both."
-                )
-        for smaller in ("torque_limit", "rated_torque"):
-            limit = getattr(joint.motor, smaller)
-            yield from _above(
-                f"{name}.motor.{smaller}", limit, f"{name}.motor.peak_torque", peak, "N m"
-            )
-        if joint.load_friction >= 1:
-            yield (
-                f"'{name}.load_friction' is {joint.load_friction:g} but a gear that takes all that"
-                " it gets never turns; give less than 1."
-            )
-    for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
-        yield from _above(f"{name}.com", link.com, f"{name}.length", link.length, "m")
-    if robot.kind not in KINDS:
-        yield f"'kind': {unknown_name('kind of robot', robot.kind, KINDS)}"
-    if robot.kind == "leg" and (robot.knee.lower < -math.pi or robot.knee.upper > 0):
-        yield (
-            "'knee.lower' and 'knee.upper' must lie between -pi and 0 rad, because a leg's knee"
-            " bends to the negative side; for a robot that only swings write kind = 'pendulum'."
-        )
-    reality = robot.reality
-    for (name, joint), drive in zip(joints, (reality.hip, reality.knee), strict=True):
-        if drive.efficiency > 1:
-            yield (
-                f"'reality.{name}.efficiency' is {drive.efficiency:g} but no gear gives more than"
-                " it gets; give at most 1."
-            )
-        if drive.stiction < 1:
-            yield (
-                f"'reality.{name}.stiction' is {drive.stiction:g} but friction at rest is not below"
-                " Coulomb friction; give 1 or more."
-            )
-        if drive.torque_limit is not None:
-            peak = joint.motor.peak_torque * joint.belt_ratio
-            high = f"{name}.motor.peak_torque x belt_ratio"
-            yield from _above(f"reality.{name}.torque_limit", drive.torque_limit, high, peak, "N m")
-    least, ground = 2 * TIMESTEP, reality.ground.time_constant
-    for name, softest in (("reality.ground", ground), ("contact", robot.contact.time_constant)):
-        if softest is not None and softest < least:
-            yield (
-                f"'{name}.time_constant' is {softest:g} s but must be at least {least:g} s, two"
-                " physics steps; MuJoCo would silently take that instead."
-            )
-    yield from contradictions(robot.hardware)
-
-
-def _above(low_name: str, low: float, high_name: str, high: float, unit: str) -> Iterator[str]:
-    if low > high:
-        yield f"'{low_name}' ({low:g} {unit}) must not exceed '{high_name}' ({high:g})."

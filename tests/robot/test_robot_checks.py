@@ -1,0 +1,109 @@
+import logging
+
+import pytest
+
+from hopping_leg import cli
+from hopping_leg.robot import doubts, load_robot, load_tree, numbers, robot_text, shipped_robots
+
+EXAMPLE = "examples/my_leg.toml"
+
+
+def written(path, text, extends="legv2-paper"):
+    """Write numbers ``{path: (value, unit)}`` as a robot file that extends another."""
+    lines = [f'name = "mine"\nextends = "{extends}"']
+    for number, (value, unit) in text.items():
+        lines.append(f'{number} = {{ value = {value}, unit = "{unit}", source = "test" }}')
+    path.write_text("\n".join(lines))
+    return str(path)
+
+
+@pytest.mark.parametrize("name", [*shipped_robots(), EXAMPLE])
+def test_nobody_doubts_what_is_shipped(name):
+    assert doubts(name) == []
+
+
+GEAR = ("knee.motor.gear_ratio", (9.0, "1"))
+
+
+@pytest.mark.parametrize(
+    ("change", "computed"),
+    [
+        (GEAR, True),
+        (("knee.belt_ratio", (3.0, "1")), True),
+        (("knee.motor.rotor_inertia", (1e-4, "kg m2")), True),
+        (("knee.motor.gear_ratio", (6.0, "1")), False),  # as it was
+        (("knee.friction", (0.1, "N m")), False),
+        (("hip.motor.gear_ratio", (9.0, "1")), False),
+    ],
+)
+def test_an_inherited_armature_holds_for_its_own_gear_alone(tmp_path, change, computed):
+    file = written(tmp_path / "leg.toml", dict([change]))
+    knee = load_robot(file).knee
+    follows = knee.motor.rotor_inertia * (knee.motor.gear_ratio * knee.belt_ratio) ** 2
+    assert knee.armature == pytest.approx(follows if computed else 0.0001)
+    assert any("knee.armature" in doubt for doubt in doubts(file)) == computed
+
+
+def test_an_armature_that_the_file_states_for_its_gear_holds(tmp_path):
+    file = written(tmp_path / "leg.toml", dict([GEAR, ("knee.armature", (0.02, "kg m2"))]))
+    assert load_robot(file).knee.armature == 0.02
+    grandchild = written(tmp_path / "other.toml", {"base.mass": (1.0, "kg")}, "leg.toml")
+    assert load_robot(grandchild).knee.armature == 0.02
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "belong"),
+    [
+        ("thigh.length", (0.2, "m"), ("thigh.com", "thigh.inertia", "knee.lower", "knee.stop_up")),
+        ("shank.mass", (0.2, "kg"), ("shank.com", "shank.inertia")),
+        ("knee.motor.gear_ratio", (9.0, "1"), ("knee.motor.no_load_speed", "knee.friction")),
+    ],
+)
+def test_numbers_that_belong_to_a_changed_one_are_named_until_stated(tmp_path, path, value, belong):
+    file = written(tmp_path / "leg.toml", {path: value})
+    (sentence,) = doubts(file)
+    assert all(word in sentence for word in (file, path, "legv2-paper", *belong))
+    child = written(tmp_path / "child.toml", {"base.mass": (1.0, "kg")}, "leg.toml")
+    assert doubts(child) == [sentence]
+    entries = dict(numbers(load_tree(child)))
+    named = sentence.split(" but not ")[1].split(", inherited")[0].split(", ")
+    restated = {
+        path: (entries[path]["value"], entries[path]["unit"]) for path in named if path in entries
+    }
+    restated.setdefault("knee.armature", (0.01, "kg m2"))
+    assert doubts(written(tmp_path / "last.toml", restated, "leg.toml")) == []
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("shank.inertia", (0.098349, "kg m2")),
+        ("shank.mass", (117.94, "kg")),
+        ("thigh.length", (150, "m")),
+        ("knee.motor.rotor_inertia", (6.07e-2, "kg m2")),
+    ],
+)
+def test_another_unit_is_doubted(tmp_path, path, value):
+    found = doubts(written(tmp_path / "leg.toml", {path: value}, "legv2"))
+    assert any(f"'{path}'" in doubt for doubt in found)
+
+
+def test_a_leg_without_stops_is_told_whose_it_gets(tmp_path):
+    tree = load_tree("legv2")
+    for joint in ("hip", "knee"):
+        del tree[joint]["stop_lower"], tree[joint]["stop_upper"]
+    file = tmp_path / "leg.toml"
+    file.write_text(robot_text(tree))
+    (sentence,) = doubts(str(file))
+    assert "hip.stop_lower, hip.stop_upper, knee.stop_lower, knee.stop_upper" in sentence
+
+
+def test_a_command_says_doubts_once_on_stderr_and_check_says_them_all(tmp_path, caplog, capsys):
+    file = written(tmp_path / "leg.toml", {"shank.mass": (0.2, "kg")})
+    with caplog.at_level(logging.WARNING):
+        load_robot(file)
+        load_robot(file)
+    assert [record.message for record in caplog.records] == doubts(file)
+    for verb in ("check", "show"):
+        assert cli.main(["robots", verb, file]) == 0
+        assert doubts(file)[0] in capsys.readouterr().out
