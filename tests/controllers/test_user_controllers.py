@@ -1,12 +1,10 @@
 """A Python class enters wherever a controller is named; what is wrong with it is one sentence."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from hopping_leg.cli import main
 from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.controllers.user_controllers import is_user_controller
@@ -177,19 +175,3 @@ def test_an_edited_file_is_another_controller(tmp_path):
 def test_other_names_are_no_classes():
     others = ("fast", "a/b.onnx", "my.toml", "energy-shaping", "a b:c")
     assert not any(map(is_user_controller, others))
-
-
-@pytest.mark.slow
-def test_command_line_judges_a_class_and_names_a_broken_one(tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    file = tmp_path / "robustness.json"
-    words = ["--axes", "pushes", "--seeds", "1", "--commands", "0.3"]
-    words += ["--threads", "1", "--json", str(file)]
-    assert main(["robustness", f"mine={BOUNCER}:Bouncer", *words]) == 0
-    assert {row["controller"] for row in json.loads(file.read_text())["scores"]} == {"mine"}
-    path = written(tmp_path / "bad.py", BATCHED, answer="np.full((self.count, 2), np.nan)")
-    capsys.readouterr()
-    assert main(["robustness", f"{path}:Held", *words]) == 2
-    error = capsys.readouterr().err
-    assert "bad.py:Held" in error
-    assert "Traceback" not in error

@@ -12,18 +12,22 @@ from tests.identify.searches import BOTTOM, CAD, RUN, SCORING, TRUTH, TWO, bowl,
 from tests.identify.twin import record, swing
 
 
-def test_cma_es_finds_the_bottom_of_a_bowl():
-    found = cma_es(lambda v: np.square(bowl(v)).sum(1), TWO, CmaOptions(60), seed=3)
-    np.testing.assert_allclose(found.vector, [1.0, -0.5], atol=1e-4)
+def squares(vectors):
+    return np.square(bowl(vectors)).sum(1)
+
+
+def test_cma_es_finds_the_bottom_of_a_bowl_and_by_shares_ends_where_they_agree():
+    found = cma_es(squares, TWO, CmaOptions(60), seed=3)
+    np.testing.assert_allclose(found.vector, BOTTOM, atol=1e-4)
     assert found.history == sorted(found.history, reverse=True)
+    shared = cma_es(squares, TWO, CmaOptions(500), seed=3, shares=[lambda v: squares(v) / 2] * 2)
+    assert len(shared.history) < 100
+    np.testing.assert_allclose(shared.vector, BOTTOM, atol=3e-3)
 
 
 SHIFTS = 0.3 * np.random.default_rng(0).normal(size=(5, 2))
 SHIFTS -= SHIFTS.mean(axis=0)
-SHARES = [
-    lambda vectors, shift=shift: np.square(bowl(vectors - shift)).sum(1) / len(SHIFTS)
-    for shift in SHIFTS
-]
+SHARES = [lambda vectors, shift=shift: squares(vectors - shift) / len(SHIFTS) for shift in SHIFTS]
 """Bowls with different bottoms, that of their sum at (1, -0.5)."""
 
 
@@ -53,13 +57,6 @@ def test_a_share_judges_a_generation_and_the_whole_only_the_last_ones():
     cma_es(count("whole", sum_of_shares), TWO, CmaOptions(20), seed=0, shares=shares)
     assert counted["share"] == 20 * 16
     assert 0 < counted["whole"] < 16
-
-
-def test_a_search_by_shares_ends_where_they_agree():
-    share = [lambda vectors: np.square(bowl(vectors)).sum(1) / 2] * 2
-    found = cma_es(lambda v: np.square(bowl(v)).sum(1), TWO, CmaOptions(500), seed=3, shares=share)
-    assert len(found.history) < 100
-    np.testing.assert_allclose(found.vector, [1.0, -0.5], atol=3e-3)
 
 
 @pytest.mark.parametrize("shares", [(), SHARES], ids=["whole", "shares"])

@@ -31,15 +31,14 @@ def test_the_result_says_what_it_was_made_from():
 
 
 def test_intervals_hold_their_values():
-    rows = {r["name"]: r for r in as_json(identified())["parameters"]}
+    tree = as_json(identified())
+    rows = {r["name"]: r for r in tree["parameters"]}
     assert set(rows) == set(TRUTH)
     for row in rows.values():
         assert row["bound_low"] <= row["value"] <= row["bound_high"]
         assert row["interval_low"] <= row["value"] <= row["interval_high"]
-    names = as_json(identified())["correlations"]["names"]
-    matrix = np.array(as_json(identified())["correlations"]["matrix"])
-    assert names == list(TRUTH)
-    np.testing.assert_allclose(np.diag(matrix), 1.0)
+    assert tree["correlations"]["names"] == list(TRUTH)
+    np.testing.assert_allclose(np.diag(tree["correlations"]["matrix"]), 1.0)
 
 
 def test_what_does_not_exist_is_null():

@@ -17,6 +17,12 @@ def quiet(*controllers, robot=ROBOT, height=0.3):
     return live
 
 
+def advance(seconds, *lives):
+    for live in lives:
+        live.advance(seconds)
+    return lives
+
+
 def heights(live, leg=0):
     return live.tracks[leg].field("height_m")
 
@@ -53,16 +59,13 @@ def test_heights_are_brought_into_what_every_controller_can_be_asked_for():
 
 def test_the_same_seed_gives_the_same_hops():
     first, second = (LiveSimulation(("fast",), ROBOT, 0.3, seed=3) for _ in range(2))
-    for live in (first, second):
-        live.advance(0.3)
+    advance(0.3, first, second)
     np.testing.assert_array_equal(heights(first), heights(second))
 
 
 @pytest.mark.parametrize("robot", [ROBOT, "twin"])
 def test_changed_settings_keeps_the_state_of_the_leg(robot):
-    live, other = quiet(robot=robot), quiet(robot=robot)
-    for one in (live, other):
-        one.advance(0.5)
+    live, other = advance(0.5, quiet(robot=robot), quiet(robot=robot))
     live.set_settings(dataclasses.replace(live.settings, payload=0.5, delay=0.004))
     for one in (live, other):
         one.tick()
@@ -80,18 +83,14 @@ def test_every_setting_changes_the_motion(change):
     live, same = quiet(), quiet()
     live.set_settings(dataclasses.replace(live.settings, **change))
     same.set_settings(same.settings)
-    for one in (live, same):
-        one.advance(1.0)
+    advance(1.0, live, same)
     assert np.abs(heights(live) - heights(same)).max() > 1e-3
 
 
 def test_a_push_moves_the_base_and_ends():
-    pushed, left = quiet(), quiet()
-    for live in (pushed, left):
-        live.advance(0.6)
+    pushed, left = advance(0.6, quiet(), quiet())
     pushed.push(40.0)
-    for live in (pushed, left):
-        live.advance(0.08)
+    advance(0.08, pushed, left)
     assert heights(pushed)[-1] > heights(left)[-1] + 0.005
     assert pushed._legs[0]._force == 0.0
 

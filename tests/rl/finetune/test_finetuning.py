@@ -88,7 +88,6 @@ def test_trials_that_were_ended_early_never_win_and_are_counted(tmp_path, ready)
     result = finetune(TASK, robot, options, tmp_path, pretraining=ready)
     assert result["safety"]["ended_early"] == len(result["outings"]) - 1
     assert result["best_check"]["outing"] == 0
-    assert result["safety"]["rolled_back"] > 0 or options.stopping_rules.margin > 1
     strict = dataclasses.replace(
         options, stopping_rules=StoppingRules(minutes=0.4, margin=0.01, patience=50)
     )
