@@ -181,21 +181,21 @@ def _row(world: World, row: Summary) -> dict[str, Any]:
 
 
 def _judge(world: World, name: str, summary: Sequence[Summary]) -> dict[str, Any]:
-    """Condense a controller's commands; one without hops has no error and no order."""
+    """Condense a controller's commands; one without hops has no order."""
     errors = np.array([row.median_error_m for row in summary], np.float64)
     apexes = errors + [row.command_m for row in summary]
-    hopped = bool(np.isfinite(errors).all())
-    largest = float(np.abs(errors).max()) if hopped else None
+    hopped = all(row.hops for row in summary)
+    largest = float(np.abs(errors).max())
     ordered = hopped and all(a < b for a, b in itertools.pairwise(apexes))
     return {
         "world": world.name,
         "controller": name,
         "largest_median_error_m": largest,
-        "mean_median_error_m": float(np.abs(errors).mean()) if hopped else None,
+        "mean_median_error_m": float(np.abs(errors).mean()),
         "mean_std_m": float(np.mean([row.std_m for row in summary])) if hopped else None,
         "skipped_hops": sum(row.skipped_hops for row in summary),
         "ordered": ordered,
-        "within_bar": largest is not None and largest <= BAR and ordered,
+        "within_bar": largest <= BAR and ordered,
     }
 
 

@@ -10,11 +10,14 @@ import numpy as np
 import tyro
 from rich.console import Console
 
+from hopping_leg.arrays import Array
 from hopping_leg.cli.options import Heights, at_least
 from hopping_leg.cli.reproduce import show_transfer
-from hopping_leg.controllers.registry import load_policy
+from hopping_leg.controllers import Controller
+from hopping_leg.controllers.registry import ENERGY_SHAPING, load_controller
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.statistics import median_interval
+from hopping_leg.evaluate.statistics import LEAST_TWINS, median_interval, twins_note
+from hopping_leg.evaluate.tables import millimetres
 from hopping_leg.robot import (
     DriveMismatch,
     GroundMismatch,
@@ -22,6 +25,7 @@ from hopping_leg.robot import (
     MassScale,
     ModelMismatch,
     Robot,
+    load_robot,
 )
 from hopping_leg.sim_to_real.methods import DEFAULT, FORETOLD, Method, choose_methods
 from hopping_leg.sim_to_real.stages import HopOnTwin, HopTrial
@@ -94,25 +98,28 @@ class HopWithout(HopOnTwin):
 
 
 def effect_rows(hops: Sequence[HopOnTwin], without: Sequence[HopWithout]) -> list[dict[str, Any]]:
-    """Return the errors with every effect and with each taken away, one row each.
+    """Return the errors with every effect and with each taken away, one row each, by method.
 
     Args:
         hops: On the twins as they are.
         without: On the twins with one effect less.
     """
-    kinds = {"all effects": list(hops)}
-    for job in without:
-        kinds.setdefault(f"without {job.effect}", []).append(job)
-    return [_row(kind, jobs) for kind, jobs in kinds.items()]
+    kinds: dict[tuple[str, str], list[HopOnTwin]] = {}
+    for job in hops:
+        kinds.setdefault((job.method.name, "all effects"), []).append(job)
+    for less in without:
+        kinds.setdefault((less.method.name, f"without {less.effect}"), []).append(less)
+    return [_row(method, kind, jobs) for (method, kind), jobs in kinds.items()]
 
 
-def _row(kind: str, jobs: Sequence[HopOnTwin]) -> dict[str, Any]:
+def _row(method: str, kind: str, jobs: Sequence[HopOnTwin]) -> dict[str, Any]:
     rows = [row for job in jobs for row in job.rows()]
     twins = dict.fromkeys(row["twin"] for row in rows)
     errors = [np.array([r["median_abs_error_m"] for r in rows if r["twin"] == t]) for t in twins]
-    low, high = median_interval(errors, _SEED)
+    low, high = median_interval(errors, _SEED, LEAST_TWINS)
     stds = [row["std_m"] for row in rows if row["hops"]]
     return {
+        "method": method,
         "twin": kind,
         "median_abs_error_m": float(np.median(np.concatenate(errors))),
         "median_abs_error_low_m": low,
@@ -120,43 +127,47 @@ def _row(kind: str, jobs: Sequence[HopOnTwin]) -> dict[str, Any]:
         "worst_abs_error_m": float(np.max(np.concatenate(errors))),
         "median_std_m": float(np.median(stds)) if stds else None,
         "skipped_hops": sum(row["skipped_hops"] for row in rows),
+        "missed_runs": sum(row["missed_runs"] for row in rows),
     }
 
 
-POLICY = "fast"
-"""It corrects itself least, so that its apexes tell most of the leg, and hops on all of them."""
+HOPPERS = ("fast", ENERGY_SHAPING)
+"""What hops are foretold of: the policy that corrects itself least, so that its apexes tell most of
+the leg, and energy shaping, which no simulation has trained."""
 
 
 @dataclass(frozen=True)
 class Meet(HopTrial):
-    """The shipped policy on a twin."""
+    """A shipped controller on a twin."""
+
+    hopper: str
 
     @property
     def name(self) -> str:
         """What is done."""
-        return f"hop on {self.twin.name}, shipped {POLICY}"
+        return f"hop on {self.twin.name}, shipped {self.hopper}"
 
     @property
     def file(self) -> Path:
         """File of the result."""
-        return self.study.folder / "predictions" / f"{self.twin.name}.json"
+        return self.study.folder / "predictions" / f"{self.twin.name}-{self.hopper}.json"
 
     @property
-    def policy(self) -> bytes:
-        """The shipped policy."""
-        return load_policy(POLICY).content
+    def controller(self) -> Controller:
+        """The shipped controller, of the believed leg."""
+        return load_controller(self.hopper, load_robot(self.twin.believed), other="accept")
 
 
 @dataclass(frozen=True)
 class Foretell(Meet):
-    """The shipped policy in what a method believes a twin to be."""
+    """A shipped controller in what a method believes a twin to be."""
 
     method: Method
 
     @property
     def name(self) -> str:
         """What is done."""
-        return f"foretell {self.twin.name}, {self.method.name}"
+        return f"foretell {self.twin.name}, {self.method.name}, {self.hopper}"
 
     @property
     def leg(self) -> Robot:
@@ -166,13 +177,14 @@ class Foretell(Meet):
     @property
     def file(self) -> Path:
         """File of the result."""
-        return self.study.folder / "predictions" / f"{self.twin.name}-{self.method.name}.json"
+        name = f"{self.twin.name}-{self.hopper}-{self.method.name}.json"
+        return self.study.folder / "predictions" / name
 
 
 def prediction_rows(foretold: Sequence[Foretell], met: Sequence[Meet]) -> list[dict[str, Any]]:
-    """Return how far each method's predicted apexes are off, one row per method.
+    """Return how far each method's predicted apexes are off, one row per controller and method.
 
-    A leg that does not hop counts with an apex of zero.
+    A leg that does not hop counts with the height in which it stands.
 
     Args:
         foretold: In each method's simulation of every twin, done.
@@ -182,17 +194,17 @@ def prediction_rows(foretold: Sequence[Foretell], met: Sequence[Meet]) -> list[d
         Medians over twins and commands, intervals over twins; ``errors_m`` are predicted minus
         measured apexes by twin and command, m.
     """
-    true = {job.twin.name: _apexes(job) for job in met}
+    true = {(job.hopper, job.twin.name): _apexes(job) for job in met}
+    kinds: dict[tuple[str, Method], dict[str, Array]] = {}
+    for job in foretold:
+        error = _apexes(job) - true[job.hopper, job.twin.name]
+        kinds.setdefault((job.hopper, job.method), {})[job.twin.name] = error
     rows = []
-    for method in dict.fromkeys(job.method for job in foretold):
-        errors = {
-            job.twin.name: _apexes(job) - true[job.twin.name]
-            for job in foretold
-            if job.method == method
-        }
+    for (hopper, method), errors in kinds.items():
         absolute = [np.abs(error) for error in errors.values()]
-        low, high = median_interval(absolute, _SEED)
+        low, high = median_interval(absolute, _SEED, LEAST_TWINS)
         rows.append({
+            "controller": hopper,
             "method": method.name,
             "meaning": method.meaning,
             "median_abs_error_m": float(np.median(np.concatenate(absolute))),
@@ -205,7 +217,7 @@ def prediction_rows(foretold: Sequence[Foretell], met: Sequence[Meet]) -> list[d
     return rows
 
 
-def _apexes(job: Meet) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _apexes(job: Meet) -> Array:
     """Return the median apex at every command, m."""
     return np.array([row["command_m"] + row["median_error_m"] for row in job.measured()])
 
@@ -215,8 +227,8 @@ def transfer_and_effects(study: Study, at_once: int) -> dict[str, Any]:
     result = transfer(study, at_once)
     if study.effects:
         work_through([without(study)], at_once)
-        first = [job for job in hops(study) if job.method == study.methods[0]]
-        result["effects"] = effect_rows(first, without(study))
+        shown = [job for job in hops(study) if job.method in _dissected(study)]
+        result["effects"] = effect_rows(shown, without(study))
     return result
 
 
@@ -232,38 +244,49 @@ def predict(study: Study, at_once: int = 1) -> dict[str, Any]:
             options.
     """
     for method in study.methods:
-        if method.randomised:
+        if method.randomised or method.controller:
+            reason = "trains on many simulations" if method.randomised else "has no simulation"
             raise UsageError(
-                f"The method '{method.name}' trains on many simulations, so that none foretells;"
-                f" name others, e.g. {', '.join(FORETOLD)}."
+                f"The method '{method.name}' {reason}, so that none foretells; name"
+                f" others, e.g. {', '.join(FORETOLD)}."
             )
     work_through((records(study), fits(study), [*foretold(study), *met(study)]), at_once)
     return {
         **about(study),
-        "policy": POLICY,
         "methods": prediction_rows(foretold(study), met(study)),
         "identification": [fit_row(fit) for fit in fits(study)],
+        "notes": twins_note(len(study.twins)),
     }
 
 
 def without(study: Study) -> list[HopWithout]:
     """Return the trials on twins that lack one effect, if they were asked for."""
     return [
-        HopWithout(study, twin, study.methods[0], seed, effect)
+        HopWithout(study, hop.twin, hop.method, hop.seed, effect)
         for effect in (EFFECTS if study.effects else ())
-        for seed in study.seeds
+        for hop in hops(study)
+        if hop.method in _dissected(study)
+    ]
+
+
+def _dissected(study: Study) -> list[Method]:
+    """Return the methods whose losses by each effect are told: the first, and energy shaping."""
+    return [m for m in study.methods if m == study.methods[0] or m.controller]
+
+
+def foretold(study: Study) -> list[Foretell]:
+    """Return what each method's simulation says of the shipped controllers' hops."""
+    return [
+        Foretell(study, twin, hopper, method)
+        for hopper in HOPPERS
+        for method in study.methods
         for twin in study.twins
     ]
 
 
-def foretold(study: Study) -> list[Foretell]:
-    """Return what each method's simulation says of the shipped policy's hops."""
-    return [Foretell(study, twin, method) for method in study.methods for twin in study.twins]
-
-
 def met(study: Study) -> list[Meet]:
-    """Return the same policy's hops on the twins."""
-    return [Meet(study, twin) for twin in study.twins]
+    """Return the same controllers' hops on the twins."""
+    return [Meet(study, twin, hopper) for hopper in HOPPERS for twin in study.twins]
 
 
 @dataclass(frozen=True)
@@ -272,8 +295,9 @@ class Experiment:
 
     experiment: tyro.conf.Positional[Literal["transfer", "prediction"]] = "transfer"
     """Train and hop on the twins, or foretell hops."""
-    twins: tuple[str, ...] = ("5",)
-    """How many twins to draw, or robot files that extend what is believed of them."""
+    twins: tuple[str, ...] = (str(LEAST_TWINS),)
+    """How many twins to draw, or robot files that extend what is believed of them; intervals over
+    twins need 20."""
     methods: tuple[str, ...] | None = None
     """What policies are trained on, the others being compared with the first; or what foretells.
     Valid: identified, cad, table-1, randomised, identified-surprises, cad-surprises (these three
@@ -313,11 +337,10 @@ class Experiment:
         at_least(1, jobs=self.jobs)
 
         foretell = self.experiment == "prediction"
-        usual = FORETOLD if foretell else DEFAULT
         study = Study(
             self.folder,
             find_twins(self.twins, self.folder / "twins"),
-            tuple(choose_methods(self.methods or usual)),
+            tuple(choose_methods(self._methods())),
             seeds=self.seeds,
             recipe=self.recipe,
             changes=self.set,
@@ -333,17 +356,23 @@ class Experiment:
         (show_predictions if foretell else show_transfer)(result)
         return result
 
+    def _methods(self) -> tuple[str, ...]:
+        if self.experiment == "prediction":
+            return self.methods or FORETOLD
+        asked = DEFAULT if self.methods is None else self.methods
+        return asked if not asked or ENERGY_SHAPING in asked else (*asked, ENERGY_SHAPING)
+
 
 def show_predictions(result: dict[str, Any]) -> None:
     """Print how far off each method's predictions are."""
     console = Console()
     for row in result["methods"]:
         console.print(
-            f"{row['method']} foretells apexes to {_mm(row['median_abs_error_m'])} mm"
-            f" ({_mm(row['median_abs_error_low_m'])} to {_mm(row['median_abs_error_high_m'])})",
+            f"{row['method']} foretells apexes of {row['controller']} to"
+            f" {millimetres(row['median_abs_error_m'])} mm"
+            f" ({millimetres(row['median_abs_error_low_m'])} to"
+            f" {millimetres(row['median_abs_error_high_m'])})",
             highlight=False,
         )
-
-
-def _mm(metres: float) -> str:
-    return f"{1e3 * metres:.0f}"
+    for note in result["notes"]:
+        console.print(f"Note: {note}", highlight=False)

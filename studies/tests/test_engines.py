@@ -21,8 +21,10 @@ from studies.engines.run import (
 ROBOT = load_robot("legv2-paper")
 
 
-def summary(command, error):
-    return SimpleNamespace(command_m=command, median_error_m=error, std_m=0.001, skipped_hops=1)
+def summary(command, error, hops=9):
+    return SimpleNamespace(
+        command_m=command, median_error_m=error, std_m=0.001, skipped_hops=1, hops=hops
+    )
 
 
 def test_a_controller_passes_if_all_errors_are_small_and_heights_rise():
@@ -35,13 +37,11 @@ def test_a_controller_passes_if_all_errors_are_small_and_heights_rise():
     assert (far["ordered"], far["within_bar"]) == (True, False)
 
 
-def test_without_hops_there_is_neither_error_nor_order():
-    row = _judge(WORLDS[0], "x", [summary(0.25, float("nan")), summary(0.3, 0.0)])
-    assert (row["largest_median_error_m"], row["ordered"], row["within_bar"]) == (
-        None,
-        False,
-        False,
-    )
+def test_without_hops_there_is_no_order_and_the_miss_counts():
+    row = _judge(WORLDS[0], "x", [summary(0.25, -0.04, hops=0), summary(0.3, 0.0)])
+    assert (row["largest_median_error_m"], row["mean_std_m"]) == (0.04, None)
+    assert not row["ordered"]
+    assert not row["within_bar"]
 
 
 def test_the_stiff_floor_is_the_engines_own():

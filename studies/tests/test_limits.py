@@ -65,12 +65,12 @@ def test_a_leg_that_nothing_disturbs_repeats_its_hops(robot, spring, tmp_path):
     assert len(begun) == 4
 
 
-def test_a_command_without_hops_leaves_no_error(robot, judged):
+def test_a_command_without_hops_counts_as_missed(robot, judged):
     summary = judged.evaluation.summary
     found = condense(summary)
     assert found["worst_std_m"] >= found["mean_std_m"] > 0
-    missing = condense([summary[0], replace(summary[1], median_error_m=float("nan"))])
-    assert missing["worst_abs_median_error_m"] is None
+    missing = condense([summary[0], replace(summary[1], median_error_m=-0.14, hops=0)])
+    assert missing["worst_abs_median_error_m"] == 0.14
     assert missing["mean_std_m"] is None
     assert missing["skipped_hops"] == found["skipped_hops"]
 

@@ -6,7 +6,7 @@ import pytest
 from tests.sim_to_real.studies import study
 
 from hopping_leg.sim_to_real import stages
-from studies.sim_to_real.run import Foretell, Meet, foretold, met, prediction_rows
+from studies.sim_to_real.run import HOPPERS, Foretell, Meet, foretold, met, prediction_rows
 
 
 def write(job, *apexes):
@@ -24,15 +24,17 @@ def test_errors_are_predicted_minus_measured_apexes_of_the_same_twin(tmp_path):
         (a, truth, (0.25, 0.35)), (b, truth, (0.26, 0.36)),
         (a, cad, (0.27, 0.37)), (b, cad, (0.22, 0.42)),
     ):  # fmt: skip
-        write(Foretell(one, twin, method) if method else Meet(one, twin), *apexes)
-    perfect, other = prediction_rows(foretold(one), met(one))
+        for hopper in HOPPERS:
+            job = Foretell(one, twin, hopper, method) if method else Meet(one, twin, hopper)
+            write(job, *apexes)
+    perfect, other, *_ = prediction_rows(foretold(one), met(one))
     assert perfect["median_abs_error_m"] == pytest.approx(0.0)
     assert other["median_abs_error_m"] == pytest.approx(0.03)
     assert other["worst_abs_error_m"] == pytest.approx(0.06)
     assert other["errors_m"]["twin-1"] == pytest.approx([-0.04, 0.06])
 
 
-def test_the_policy_hops_in_the_methods_simulation(tmp_path, monkeypatch):
+def test_the_controllers_hop_in_the_methods_simulation(tmp_path, monkeypatch):
     one = study(tmp_path, ("truth",))
     legs = []
     monkeypatch.setattr(stages, "hop", lambda content, leg, study: legs.append(leg) or [])
@@ -42,4 +44,5 @@ def test_the_policy_hops_in_the_methods_simulation(tmp_path, monkeypatch):
         job.run(quiet=True)
         assert job.done
     twins = one.twins
-    assert legs == [*(t.without_surprises for t in twins), *(t.robot for t in twins)]
+    believed, real = [t.without_surprises for t in twins], [t.robot for t in twins]
+    assert legs == [*believed, *believed, *real, *real], "once for each controller"

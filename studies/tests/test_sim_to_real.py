@@ -52,10 +52,13 @@ def test_a_study_is_finished_once_and_grows(tmp_path, capsys):
     assert policy.stat().st_mtime_ns == made
     assert second["trials"][0] == first["trials"][0]
     assert {(r["method"], r["twin"]) for r in second["trials"]} == {
-        (method, twin) for method in ("truth", "cad") for twin in ("twin-0", "twin-1")
+        (method, twin)
+        for method in ("truth", "cad", "energy-shaping")
+        for twin in ("twin-0", "twin-1")
     }
     assert len(list((folder / "training").iterdir())) == 3
-    assert [row["method"] for row in second["comparison"]] == ["cad"]
+    assert [row["method"] for row in second["comparison"]] == ["cad", "energy-shaping"]
+    assert "too few for intervals over twins" in second["notes"][0]
     assert not second["twins"][0]["paper_disturbance"]
     assert "truth" in capsys.readouterr().out
     words[words.index("--steps") + 1] = "40000"
@@ -71,7 +74,7 @@ def test_simulations_foretell_without_a_training(tmp_path, capsys):
     assert main([*words, "--methods", "truth", "cad"]) == 0
     found = json.loads(file.read_text())
     assert found["command"].startswith("python -m studies.sim_to_real prediction --twins 2")
-    told = {row["method"]: row for row in found["methods"]}
+    told = {row["method"]: row for row in found["methods"] if row["controller"] == "fast"}
     assert told["truth"]["median_abs_error_m"] < told["cad"]["median_abs_error_m"]
     assert set(told["truth"]["errors_m"]) == {"twin-0", "twin-1"}
     assert not (folder / "training").exists()

@@ -8,6 +8,7 @@ import polars as pl
 import pytest
 from studies.sim_to_real.run import EFFECTS, HopWithout
 
+from hopping_leg.controllers import RolloutConfig
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
@@ -17,7 +18,7 @@ from hopping_leg.sim import NO_NOISE
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES
 from hopping_leg.sim_to_real import stages
 from hopping_leg.sim_to_real.stages import HopOnTwin, IdentifyTwin, RecordTwin, TrainPolicy
-from hopping_leg.sim_to_real.transfer import fit_row, fits
+from hopping_leg.sim_to_real.transfer import fit_row, fits, hops, trainings
 from hopping_leg.trace import Trace
 from tests.identify.twin import record, swing
 from tests.sim_to_real.studies import study
@@ -148,17 +149,32 @@ def test_a_twin_is_met_with_its_own_effects_alone():
     assert stages.disturbance_of(load_robot("legv2")).torque_noise > 0
 
 
-def test_a_leg_that_never_hops_errs_by_the_command(tmp_path, monkeypatch):
-    rows = [dict.fromkeys(stages._KEPT, 0.0) | {"command_m": 0.3, "median_error_m": None}]
+def test_a_leg_that_never_hops_errs_by_the_distance_from_standing(tmp_path):
+    class Limp:
+        name = "limp"
 
-    class Judged:
-        distributions = ({"command_m": 0.3, "apexes_m": []},)
+        def reset(self, count):
+            self.count = count
 
-        def to_json(self):
-            return {"summary": rows}
+        def act(self, measurement):
+            return np.zeros((self.count, 2))
 
-    (row,) = stages._rows(Judged())
+        def internals(self):
+            return {}
+
+    one = study(tmp_path, commands=(0.3,), repeats=1)
+    (row,) = stages.hop(Limp(), load_robot("legv2-paper"), one)
+    standing = RolloutConfig(load_robot("legv2-paper")).standing_length + 0.01
     assert row["motionless"]
-    assert (row["median_error_m"], row["median_abs_error_m"]) == (-0.3, 0.3)
+    assert row["median_error_m"] == pytest.approx(standing - 0.3, abs=1e-3)
+    assert row["median_abs_error_m"] == -row["median_error_m"]
     assert json.dumps(row)
-    assert np.isfinite(row["median_abs_error_m"])
+
+
+def test_energy_shaping_hops_without_a_training_once_per_twin(tmp_path):
+    one = study(tmp_path, ("identified", "energy-shaping"), seeds=(0, 1))
+    assert {job.method.name for job in trainings(one)} == {"identified"}
+    seeds = [(job.twin.name, job.seed) for job in hops(one) if job.method.controller]
+    assert seeds == [("twin-0", 0), ("twin-1", 0)]
+    job = next(job for job in hops(one) if job.method.controller)
+    assert job.controller.robot == load_robot("legv2"), "it knows the believed leg alone"

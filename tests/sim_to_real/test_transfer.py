@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from hopping_leg.sim_to_real import transfer
@@ -17,7 +18,7 @@ def trials(errors, commands=(0.25, 0.35), **more):
             "method": method, "twin": twin, "seed": 0, "command_m": command,
             "median_error_m": float(error), "median_abs_error_m": abs(float(error)),
             "std_m": 0.001, "hops": 10, "skipped_hops": 1, "body_contacts": 0,
-            "motionless": False, **more,
+            "missed_runs": 0, "motionless": False, **more,
         }
         for method, twins in errors.items()
         for twin, of_commands in twins.items()
@@ -37,12 +38,23 @@ def test_rows_are_medians_over_twins_with_intervals_around_them():
     assert row["median_abs_error_m"] == pytest.approx(0.03)
     assert row["median_error_m"] == pytest.approx(0.03)
     assert row["worst_abs_error_m"] == pytest.approx(0.04)
-    assert 0.02 <= row["median_abs_error_low_m"] < 0.03 < row["median_abs_error_high_m"] <= 0.04
+    assert np.isnan(row["median_abs_error_low_m"]), "three twins are too few for an interval"
     assert (row["hops"], row["skipped_hops"], row["policies"]) == (30, 3, 3)
 
 
+def test_twenty_twins_have_intervals():
+    errors = {"identified": {f"twin-{k}": (0.001 * (k + 1), 0.02) for k in range(20)}}
+    rows = [r for r in trials(errors) if r["command_m"] == 0.25]
+    row = transfer._pooled(METHODS["identified"], rows)
+    assert 0.004 < row["median_abs_error_low_m"] < 0.0105 < row["median_abs_error_high_m"] < 0.017
+
+
 def test_the_ratio_meets_the_same_twins():
-    found = compare("identified", "cad", trials(ERRORS), 0)
+    errors = {"identified": {}, "cad": {}}
+    for k in range(20):
+        errors["identified"][f"twin-{k}"] = (0.001 * (k + 1), 0.002 * (k + 1))
+        errors["cad"][f"twin-{k}"] = (0.003 * (k + 1), -0.006 * (k + 1))
+    found = compare("identified", "cad", trials(errors), 0)
     assert found["ratio"] == pytest.approx(3.0)
     assert found["ratio_low"] == pytest.approx(3.0)
     assert found["ratio_high"] == pytest.approx(3.0)

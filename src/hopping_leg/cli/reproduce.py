@@ -25,7 +25,7 @@ from hopping_leg.identify.optimizers import LeastSquaresOptions
 from hopping_leg.sim_to_real.methods import DEFAULT, choose_methods
 from hopping_leg.sim_to_real.study import SHORTEST, USUAL_FIT, Study, find_twins
 
-_MINIATURE = ("identified", "cad")
+_MINIATURE = ("identified", "cad", ENERGY_SHAPING)
 _PAPER = (*DEFAULT, "rail-only", "fixed-base-only", "two-pass", "one-pass")
 _GLANCE = LeastSquaresOptions(rounds=1, evaluations=2)
 _MARK = "size.txt"
@@ -80,7 +80,7 @@ def run(args: Reproduce) -> None:
     study = make_study(args)
     io.write_atomically(folder / _MARK, f"{args.size}\n".encode())
     result = transfer(study, args.jobs)
-    io.write_json(folder / "transfer.json", {**result, "notes": notes})
+    io.write_json(folder / "transfer.json", {**result, "notes": [*notes, *result["notes"]]})
     twin, method = study.twins[0], study.methods[0]
     policy = study.training(twin, method, args.seed) / "policy.onnx"
     robot = study.fitted(twin, method)
@@ -152,6 +152,7 @@ def show_transfer(result: dict[str, Any]) -> None:
         ("trained on", "command, mm", "|error|, mm", "95 %", "error, mm", "skipped"), rows
     )
     _show_overall(result)
+    options.say(*(f"Note: {note}" for note in result["notes"]))
     if "best_in_own_simulation" in result:
         options.say("\nOf several trainings, those alone that hop best in their own simulation:")
         _show_overall(result["best_in_own_simulation"])
@@ -171,4 +172,4 @@ def _show_overall(result: dict[str, Any]) -> None:
 
 
 def _mm(metres: float) -> str:
-    return f"{1e3 * metres:.0f}"
+    return f"{1e3 * metres:.0f}" if metres == metres else "-"

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.evaluate import metrics, trials
+from hopping_leg.evaluate import metrics, statistics, trials
 from hopping_leg.evaluate.result import Comparison, Evaluation, Group, Staircase, Summary
-from hopping_leg.evaluate.statistics import Neighbours, compare, median_interval, of
 
 
 def tabulate(runs: Sequence[trials.Run], controllers: Sequence[str], seed: int) -> Evaluation:
@@ -21,11 +20,14 @@ def tabulate(runs: Sequence[trials.Run], controllers: Sequence[str], seed: int) 
     """
     own = {name: [run for run in runs if run.controller == name] for name in controllers}
     robot = str(runs[0].trace.header.get("robot", "")) if runs else ""
+    measured = {
+        name: [(run, window) for run in own[name] for window in metrics.measure(run.trace)]
+        for name in controllers
+    }
 
     def windows(name: str, *kinds: str) -> dict[float, list[metrics.HopWindow]]:
         """Return a controller's windows in trials of some kinds, by rising command."""
-        chosen = [run for kind in kinds for run in own[name] if run.trial.kind == kind]
-        found = [window for run in chosen for window in metrics.measure(run.trace)]
+        found = [w for kind in kinds for run, w in measured[name] if run.trial.kind == kind]
         commands = sorted({w.command for w in found})
         return {c: [w for w in found if w.command == c] for c in commands}
 
@@ -36,21 +38,21 @@ def tabulate(runs: Sequence[trials.Run], controllers: Sequence[str], seed: int) 
             for command, group in windows(name, *kinds).items()
         ]
 
-    apexes = {
-        name: {c: metrics.pooled_apexes(g) for c, g in windows(name, "fixed", "sequence").items()}
-        for name in controllers
-    }
     stairs = {n: [run for run in own[n] if run.trial.kind == "staircase"] for n in controllers}
     return Evaluation(
         summary=rows("fixed", "sequence"),
         sequence=rows("sequence"),
         ladder=rows("ladder"),
         staircase=[_staircase(name, found) for name, found in stairs.items() if found],
-        neighbours=[Comparison(name, _compare(apexes[name])) for name in controllers],
+        neighbours=[Comparison(name, _compare(measured[name], seed)) for name in controllers],
         distributions=[
-            {"controller": name, "command_m": command, "apexes_m": np.round(apex, 5).tolist()}
+            {
+                "controller": name,
+                "command_m": command,
+                "apexes_m": np.round(metrics.pooled_apexes(group), 5).tolist(),
+            }
             for name in controllers
-            for command, apex in apexes[name].items()
+            for command, group in windows(name, "fixed", "sequence").items()
         ],
         estimators=[
             found
@@ -60,22 +62,35 @@ def tabulate(runs: Sequence[trials.Run], controllers: Sequence[str], seed: int) 
     )
 
 
-def _compare(apexes: dict[float, Array]) -> list[Neighbours]:
-    return [
-        compare(low, apexes[low], high, apexes[high]) for low, high in itertools.pairwise(apexes)
-    ]
+def _compare(
+    measured: Sequence[tuple[trials.Run, metrics.HopWindow]], seed: int
+) -> list[statistics.Neighbours]:
+    """Compare neighbouring commands: within a run that has both, or of runs of equal number."""
+    apexes: dict[float, dict[tuple[str, int], Array]] = {}
+    for run, window in measured:
+        if run.trial.kind in ("fixed", "sequence"):
+            key, found = (run.trial.kind, run.repeat), apexes.setdefault(window.command, {})
+            found[key] = np.concatenate([found.get(key, np.empty(0)), window.apex])
+    rows = []
+    for low, high in itertools.pairwise(sorted(apexes)):
+        pairs = [key for key in apexes[low] if key in apexes[high]]
+        lower, upper = ([apexes[command][key] for key in pairs] for command in (low, high))
+        rows.append(statistics.compare(low, lower, high, upper, seed))
+    return rows
 
 
 def _staircase(label: str, runs: Sequence[trials.Run]) -> Staircase:
     measured = [metrics.measure(run.trace) for run in runs]
     steps = [list(group) for group in zip(*measured, strict=True)]
-    medians = np.array([of(np.median, metrics.pooled_apexes(step)) for step in steps])
-    per_run = np.array([[of(np.median, w.apex) for w in run] for run in measured])
+    commands = [step[0].command for step in steps]
+    errors = [np.median(np.concatenate(metrics.errors_of(step))) for step in steps]
+    medians, hopped = np.add(commands, errors), all(len(metrics.pooled_apexes(s)) for s in steps)
+    per_run = np.array([[statistics.of(np.median, w.apex) for w in run] for run in measured])
     return Staircase(
         controller=label,
-        commands_m=[step[0].command for step in steps],
+        commands_m=commands,
         median_apexes_m=medians.tolist(),
-        monotone=bool((np.diff(medians) > 0).all()),
+        monotone=bool((np.diff(medians) > 0).all() and hopped),
         monotone_runs=int((np.diff(per_run, axis=1) > 0).all(axis=1).sum()),
         runs=len(runs),
         skipped_hops=sum(metrics.skipped_in_run(run.trace) for run in runs),
@@ -86,8 +101,10 @@ def summarise(
     controller: str, robot: str, command: float, windows: Sequence[metrics.HopWindow], seed: int
 ) -> Summary:
     """Pool all windows of one controller at one command; the seed is of the bootstrap."""
-    apex = metrics.pooled_apexes(windows)
-    low, high = median_interval([w.error for w in windows], seed)
+    apex, errors = metrics.pooled_apexes(windows), metrics.errors_of(windows)
+    every = np.concatenate(errors)
+    low, high = statistics.bootstrap(errors, _centre, seed)
+    spread = statistics.bootstrap([w.apex for w in windows if len(w.apex)], _spread, seed)
     settled = sum(w.settled for w in windows)
     per_second = 1 / settled if settled else float("nan")
     quartiles = np.percentile(apex, [25, 75]) if len(apex) else np.full(2, np.nan)
@@ -97,11 +114,16 @@ def summarise(
         controller=controller,
         robot=robot,
         command_m=command,
-        median_error_m=of(np.median, apex - command),
-        median_error_low_m=low,
-        median_error_high_m=high,
-        mean_abs_error_m=of(np.mean, np.abs(apex - command)),
-        std_m=of(np.std, apex),
+        median_error_m=float(np.median(every)),
+        median_error_low_m=float(low[0]),
+        median_error_high_m=float(high[0]),
+        median_abs_error_m=float(np.median(np.abs(every))),
+        mean_abs_error_m=float(np.abs(every).mean()),
+        mean_abs_error_low_m=float(low[1]),
+        mean_abs_error_high_m=float(high[1]),
+        std_m=statistics.of(np.std, apex),
+        std_low_m=float(spread[0]),
+        std_high_m=float(spread[1]),
         iqr_m=float(quartiles[1] - quartiles[0]),
         hops=len(apex),
         skipped_hops=sum(w.skipped for w in windows),
@@ -119,7 +141,18 @@ def summarise(
         rms_knee_torque_nm=float(rms[1]),
         measured_s=settled,
         runs=len(windows),
+        missed_runs=sum(not len(w.apex) for w in windows),
     )
+
+
+def _centre(errors: list[Array]) -> tuple[float, float]:
+    """Return median and mean distance, m, of some runs' errors."""
+    every = np.concatenate(errors)
+    return float(np.median(every)), float(np.abs(every).mean())
+
+
+def _spread(apexes: list[Array]) -> float:
+    return statistics.of(np.std, np.concatenate(apexes)) if apexes else float("nan")
 
 
 def pool_group(group: str, rows: Sequence[Summary], seed: int) -> list[Group]:
@@ -132,19 +165,17 @@ def pool_group(group: str, rows: Sequence[Summary], seed: int) -> list[Group]:
 
 def _group_row(group: str, command: float, rows: Sequence[Summary], seed: int) -> Group:
     errors = np.array([row.median_error_m for row in rows])
-    spreads = np.array([row.std_m for row in rows])
-    known = errors[np.isfinite(errors)]
-    low, high = median_interval(list(known[:, None]), seed)
+    low, high = statistics.median_interval(list(errors[:, None]), seed)
     return Group(
         group=group,
         command_m=command,
         policies=len(rows),
-        motionless=len(rows) - len(known),
-        median_error_m=of(np.median, known),
+        motionless=sum(not row.hops for row in rows),
+        median_error_m=float(np.median(errors)),
         median_error_low_m=low,
         median_error_high_m=high,
-        worst_abs_error_m=of(np.max, np.abs(known)),
-        median_std_m=of(np.median, spreads[np.isfinite(spreads)]),
+        worst_abs_error_m=float(np.abs(errors).max()),
+        median_std_m=statistics.of(np.median, np.array([row.std_m for row in rows if row.hops])),
         skipped_hops=sum(row.skipped_hops for row in rows),
         body_contacts=sum(row.body_contacts for row in rows),
     )

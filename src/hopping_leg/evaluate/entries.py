@@ -104,14 +104,18 @@ def _expand(text: str) -> list[tuple[str, str]]:
     return [(path, path) for path in found]
 
 
+def entry_of(label: str, controller: Controller) -> Entry:
+    """Return a controller as an entry, a policy with the range of commands that it was made for."""
+    if not isinstance(controller, Policy):
+        return Entry(label, controller)
+    card = controller.card
+    return Entry(label, controller, (card.command_low, card.command_high))
+
+
 def _load(name: str, source: str, robot: Robot, rate: float) -> Entry:
     controller = load_controller(source, robot, rate=rate, other="accept")
-    if not isinstance(controller, Policy):
-        return Entry(name, controller)
-    card = controller.card
-    note = controller.stranger(robot, name)
-    notes = (note,) if note else ()
-    return Entry(name, controller, (card.command_low, card.command_high), notes=notes)
+    note = controller.stranger(robot, name) if isinstance(controller, Policy) else None
+    return replace(entry_of(name, controller), notes=(note,) if note else ())
 
 
 def _grouped(entries: list[Entry]) -> list[Entry]:

@@ -28,6 +28,8 @@ class HopWindow:
     """Desired apex height, m."""
     apex: Array
     """Height of every in-flight apex, m, (hops,)."""
+    standing: float
+    """Base height in which the run began, m."""
     settled: float
     """Time in which apexes were counted, s."""
     flight: float
@@ -57,6 +59,11 @@ class HopWindow:
         """Apex minus command, m, (hops,)."""
         return self.apex - self.command
 
+    @property
+    def miss(self) -> float:
+        """Error of a leg that never leaves the ground: standing height minus command, m."""
+        return self.standing - self.command
+
 
 def measure(trace: Trace) -> list[HopWindow]:
     """Measure a run: one window per stretch of constant command, in order of time."""
@@ -81,6 +88,7 @@ def _window(trace: Trace, start: int, end: int, rate: float, drop: float) -> Hop
     return HopWindow(
         command=float(trace.column("command_m")[start]),
         apex=hops.apex,
+        standing=float(height[0]),
         settled=hops.ticks / rate,
         flight=hops.flight_ticks / rate,
         skipped=hops.skipped,
@@ -111,6 +119,13 @@ def skipped_in_run(trace: Trace) -> int:
     rate = _rate(trace)
     height, velocity, clearance = map(trace.column, COLUMNS)
     return measure_hops(height, velocity, clearance, rate, round(START_SECONDS * rate)).skipped
+
+
+def errors_of(windows: Sequence[HopWindow]) -> list[Array]:
+    """Return apex minus command of every window's hops, m, (hops,); misses where it has none."""
+    return statistics.with_misses(
+        [w.error for w in windows], [w.settled for w in windows], [w.miss for w in windows]
+    )
 
 
 def pooled_apexes(windows: Sequence[HopWindow]) -> Array:

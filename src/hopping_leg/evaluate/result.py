@@ -6,26 +6,31 @@ from typing import Any
 from hopping_leg.evaluate.statistics import Neighbours
 from hopping_leg.io import json_text, plain
 
-SCHEMA = 1
+SCHEMA = 2
 """Version of the JSON, raised when a name changes its meaning."""
 
 
 @dataclass(frozen=True)
 class Summary:
-    """One controller at one command, hops of all its runs pooled."""
+    """One controller at one command, hops of all its runs pooled; 95 % intervals resample runs."""
 
     controller: str
     robot: str
     command_m: float
     median_error_m: float
-    """Median of apex minus command."""
+    """Median of apex minus command, misses included."""
     median_error_low_m: float
-    """Lower end of its 95 % bootstrap interval, whole runs resampled."""
     median_error_high_m: float
+    median_abs_error_m: float
+    """Median of |apex - command|, misses included."""
     mean_abs_error_m: float
-    """Mean over hops of |apex - command|."""
+    """Mean of |apex - command|, misses included."""
+    mean_abs_error_low_m: float
+    mean_abs_error_high_m: float
     std_m: float
     """Hop-to-hop standard deviation of the apex."""
+    std_low_m: float
+    std_high_m: float
     iqr_m: float
     """Interquartile range of the apex."""
     hops: int
@@ -47,6 +52,8 @@ class Summary:
     measured_s: float
     """Time in which hops were counted."""
     runs: int
+    missed_runs: int
+    """Runs without a hop: their errors are misses, standing height minus command."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +105,7 @@ class Group:
     command_m: float
     policies: int
     motionless: int
-    """Policies that never hopped; they have no error and are left out of the medians."""
+    """Policies that never hopped; their errors are misses, standing height minus command."""
     median_error_m: float
     """Median over policies of each policy's median error."""
     median_error_low_m: float

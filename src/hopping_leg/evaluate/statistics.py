@@ -1,5 +1,11 @@
-"""Are the heights different, by how much, and how sure is that?"""
+"""How far, how different, and how sure: the one place where samples become statements.
 
+Hops of one run depend on each other, runs with seeds of their own do not: tests are made per run
+and combined, and intervals resample runs, twins or policies, whatever was drawn independently.
+Nothing that failed is dropped: a run without a hop enters as misses, see ``with_misses``.
+"""
+
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -7,15 +13,95 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from hopping_leg.arrays import Array, IntArray
+from hopping_leg.arrays import Array
 
 CONFIDENCE = 0.95
 RESAMPLES = 1000
 
+LEAST_TWINS = 20
+"""Twins that an interval over twins needs: with fewer a bootstrap interval is too narrow."""
+
+Interval = tuple[float, float]
+
 
 def of(statistic: Callable[[Array], Any], values: Array) -> float:
     """Return a statistic of values, NaN where there are none."""
-    return float(statistic(values)) if len(values) else float("nan")
+    return float(statistic(values)) if len(values) else math.nan
+
+
+def with_misses(
+    runs: Sequence[Array], seconds: Sequence[float], misses: Sequence[float]
+) -> list[Array]:
+    """Return the runs' errors with those that have no hop filled in.
+
+    A run without a hop missed its command by the whole distance from where it stood. It counts as
+    often as a run of its length has hops in the median of the others, at least once.
+
+    Args:
+        runs: Errors of each run's hops, (hops,).
+        seconds: Time in which each run's hops were counted, s.
+        misses: Error of each run if it has none: standing height minus command, m.
+    """
+    rates = [len(r) / s for r, s in zip(runs, seconds, strict=True) if len(r) and s > 0]
+    rate = float(np.median(rates)) if rates else 0.0
+    return [
+        run if len(run) else np.full(max(1, round(rate * time)), miss)
+        for run, time, miss in zip(runs, seconds, misses, strict=True)
+    ]
+
+
+def bootstrap(
+    units: Sequence[Any], statistic: Callable[[list[Any]], Any], seed: int, least: int = 2
+) -> Array:
+    """Return 95 % percentile intervals of a statistic, (2,) or (2, values); units are resampled.
+
+    Args:
+        units: What was drawn independently: runs, twins, policies, each with all of its values.
+        statistic: Number, or several, of a list of units.
+        seed: Of the resampling.
+        least: Units below which the interval is unknown, NaN.
+    """
+    if len(units) < least:
+        return np.full((2, *np.shape(statistic(list(units)))), np.nan)
+    rng = np.random.default_rng(seed)
+    draws = rng.integers(len(units), size=(RESAMPLES, len(units)))
+    values = np.array([statistic([units[i] for i in draw]) for draw in draws])
+    tail = 50 * (1 - CONFIDENCE)
+    interval: Array = np.percentile(values, [tail, 100 - tail], axis=0)
+    return interval
+
+
+def median_interval(runs: Sequence[Array], seed: int, least: int = 2) -> Interval:
+    """Return the bootstrap interval of the median over all values, runs, (values,), resampled."""
+    filled = [run for run in runs if len(run)]
+    if not filled:
+        return math.nan, math.nan
+    low, high = bootstrap(filled, lambda drawn: np.median(np.concatenate(drawn)), seed, least)
+    return float(low), float(high)
+
+
+def twins_note(count: int) -> list[str]:
+    """Say so where there are too few twins for an interval."""
+    if count >= LEAST_TWINS:
+        return []
+    return [
+        f"{count} twin{' is' if count == 1 else 's are'} too few for intervals over twins; give"
+        f" {LEAST_TWINS} or more."
+    ]
+
+
+def share_interval(scores: Array, seed: int) -> Interval:
+    """Return the 95 % interval of a mean score, given one per realisation, 0 to 1, (n,).
+
+    It is a Bayesian bootstrap: realisations get random weights, beside Jeffreys' half a success and
+    half a failure, so that a few realisations that agree do not pass for certainty. For scores of 0
+    and 1 it is Jeffreys' interval of a share.
+    """
+    rng, mean = np.random.default_rng(seed), scores.mean()
+    weights = rng.dirichlet([*np.ones(len(scores)), 0.5, 0.5], 4 * RESAMPLES)
+    tail = 50 * (1 - CONFIDENCE)
+    low, high = np.percentile(weights @ np.append(scores, [0.0, 1.0]), [tail, 100 - tail])
+    return float(min(low, mean)), float(max(high, mean))
 
 
 @dataclass(frozen=True)
@@ -26,69 +112,61 @@ class Neighbours:
     """The lower command, m."""
     upper_m: float
     """The higher command, m."""
+    runs: int
+    """Pairs of runs with hops at both commands; a run that asks for both is its own pair."""
     p: float
-    """P-value of the two-sided Wilcoxon rank-sum test, normal approximation."""
+    """P-value, two-sided: Wilcoxon rank-sum test of each pair of runs, combined by Stouffer."""
     cliffs_delta: float
-    """P(upper > lower) - P(upper < lower) over all pairs of hops; 1 is full separation in order."""
+    """P(upper > lower) - P(upper < lower) over the hops of a pair of runs, mean over pairs; 1 is
+    full separation in order."""
+    cliffs_delta_low: float
+    """Lower end of its 95 % bootstrap interval, pairs of runs resampled."""
+    cliffs_delta_high: float
     overlap: float
     """Share of all hops between the smallest of the higher and the largest of the lower command."""
+    pooled_p: float
+    """The paper's own number: one rank-sum test of all hops, as if none depended on another."""
 
 
-def compare(lower_m: float, lower: Array, upper_m: float, upper: Array) -> Neighbours:
-    """Compare the apexes, m, (hops,) each, of two commands, m."""
-    if not len(lower) or not len(upper):
-        return Neighbours(lower_m, upper_m, float("nan"), float("nan"), float("nan"))
-    both = np.concatenate([lower, upper])
-    between = (both >= upper.min()) & (both <= lower.max())
-    p = float(stats.ranksums(lower, upper).pvalue)
-    return Neighbours(lower_m, upper_m, p, cliffs_delta(lower, upper), float(between.mean()))
+def compare(
+    lower_m: float, lower: Sequence[Array], upper_m: float, upper: Sequence[Array], seed: int
+) -> Neighbours:
+    """Compare the apexes of two commands, m.
+
+    Args:
+        lower_m: The lower command, m.
+        lower: Apexes of each run at it, m, (hops,) each.
+        upper_m: The higher command, m.
+        upper: The same, each run beside the one that it is compared with.
+        seed: Of the bootstrap.
+    """
+    pairs = [(a, b) for a, b in zip(lower, upper, strict=True) if len(a) and len(b)]
+    if not pairs:
+        return Neighbours(lower_m, upper_m, 0, *6 * (math.nan,))
+    below, above = (np.concatenate(side) for side in zip(*pairs, strict=True))
+    both = np.concatenate([below, above])
+    between = (both >= above.min()) & (both <= below.max())
+    deltas = [cliffs_delta(*pair) for pair in pairs]
+    low, high = bootstrap(deltas, np.mean, seed)
+    return Neighbours(
+        lower_m=lower_m,
+        upper_m=upper_m,
+        runs=len(pairs),
+        p=stouffer([stats.ranksums(b, a).statistic for a, b in pairs]),
+        cliffs_delta=float(np.mean(deltas)),
+        cliffs_delta_low=float(low),
+        cliffs_delta_high=float(high),
+        overlap=float(between.mean()),
+        pooled_p=float(stats.ranksums(above, below).pvalue),
+    )
+
+
+def stouffer(scores: Sequence[float]) -> float:
+    """Return the two-sided p-value of independent tests' normal scores, direction kept."""
+    return float(2 * stats.norm.sf(abs(np.sum(scores)) / math.sqrt(len(scores))))
 
 
 def cliffs_delta(lower: Array, upper: Array) -> float:
     """Return Cliff's delta, -1 to 1; 1 when every value of ``upper`` exceeds all of ``lower``."""
     u = stats.mannwhitneyu(upper, lower, method="asymptotic").statistic
     return float(2 * u / (len(lower) * len(upper)) - 1)
-
-
-def median_interval(
-    runs: Sequence[Array], seed: int, resamples: int = RESAMPLES
-) -> tuple[float, float]:
-    """Return the bootstrap interval of the median over all values.
-
-    Whole runs, (hops,) each, are resampled, because the hops of one run depend on each other; with
-    a single run its hops are. Without values the 95 % percentile interval is NaN.
-    """
-    filled = [known for r in runs if len(known := r[np.isfinite(r)])]
-    units = filled if len(filled) > 1 else [np.array([v]) for r in filled for v in r]
-    if len(units) < 2:
-        value = float(units[0][0]) if units else float("nan")
-        return value, value
-
-    def median_of(index: Array) -> float:
-        return float(np.median(np.concatenate([units[int(i)] for i in index])))
-
-    return bootstrap((np.arange(len(units)),), median_of, seed, resamples)
-
-
-def bootstrap(
-    samples: Sequence[Array | IntArray],
-    statistic: Callable[..., Any],
-    seed: int,
-    resamples: int = RESAMPLES,
-    *,
-    vectorized: bool = False,
-) -> tuple[float, float]:
-    """Return the 95 % percentile interval of a statistic, every sample resampled on its own.
-
-    Each sample is an argument of the statistic, which if vectorized has an argument ``axis``.
-    """
-    interval = stats.bootstrap(
-        samples,
-        statistic,
-        vectorized=vectorized,
-        n_resamples=resamples,
-        confidence_level=CONFIDENCE,
-        method="percentile",
-        rng=np.random.default_rng(seed),
-    ).confidence_interval
-    return float(interval.low), float(interval.high)

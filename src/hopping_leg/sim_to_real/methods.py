@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from hopping_leg.controllers.registry import ENERGY_SHAPING
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.identify.recording_format import Rig
 
@@ -41,6 +42,7 @@ class Method:
         ranges: What every leg in training draws for itself, around the robot.
         truth: Whether the twin's own file is the robot, [reality] left out but for the delay:
             what a perfect fit would find.
+        controller: Shipped controller that hops as it is, without a training.
     """
 
     name: str
@@ -49,6 +51,7 @@ class Method:
     robot: str | None = None
     ranges: Ranges = "none"
     truth: bool = False
+    controller: str | None = None
 
     @property
     def randomised(self) -> bool:
@@ -81,12 +84,13 @@ METHODS = {
         Method("two-pass", "the paper's two passes of CMA-ES", Fit("two-pass", search="two-pass")),
         Method("one-pass", "the same CMA-ES in one pass", Fit("one-pass", search="one-pass")),
         Method("truth", "true parameters: what a perfect fit would find", truth=True),
+        Method(ENERGY_SHAPING, "energy shaping, tuned, untouched", controller=ENERGY_SHAPING),
     )
 }
 """Every method by name."""
 
-DEFAULT = ("identified", "cad", "table-1", "randomised")
-"""What policies are trained on unless asked otherwise."""
+DEFAULT = ("identified", "cad", "table-1", "randomised", ENERGY_SHAPING)
+"""What policies are trained on, and what they hop beside, unless asked otherwise."""
 
 FORETOLD = (
     "identified", "cad", "table-1", "rail-only", "fixed-base-only", "two-pass", "one-pass", "truth",

@@ -4,21 +4,18 @@ A twin brings latency, noise and losses of its own; the paper's disturbance stay
 would come on top. A twin without [reality] is met with the paper's disturbance.
 """
 
-import hashlib
 import json
 from abc import abstractmethod
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import numpy as np
-
 from hopping_leg import io, trace
-from hopping_leg.controllers import RolloutConfig
+from hopping_leg.controllers import Controller, RolloutConfig
 from hopping_leg.controllers.policy import Policy
+from hopping_leg.controllers.registry import load_controller
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import entries, runner
-from hopping_leg.evaluate.result import Evaluation
 from hopping_leg.identify import cost, excitation, optimizers, parameters, plan, play_excitation
 from hopping_leg.identify.paper_excitation import Strokes, adapt, fixed_base, moving_base
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
@@ -316,13 +313,13 @@ class TrainPolicy(jobs.Job):
 FIRST_SEED = 1000
 """First seed of the trials; no seed from here on has chosen anything."""
 
-_KEPT = ("command_m", "median_error_m", "std_m", "hops", "skipped_hops", "hop_rate_hz",
-         "flight_fraction", "body_contacts")  # fmt: skip
+_KEPT = ("command_m", "median_error_m", "median_abs_error_m", "std_m", "hops", "skipped_hops",
+         "missed_runs", "hop_rate_hz", "flight_fraction", "body_contacts")  # fmt: skip
 
 
 @dataclass(frozen=True)
 class HopTrial(StoredJob):
-    """A policy that hops at the study's commands on some leg."""
+    """A controller that hops at the study's commands on some leg."""
 
     study: Study
     twin: TwinFile
@@ -336,22 +333,22 @@ class HopTrial(StoredJob):
 
     @property
     @abstractmethod
-    def policy(self) -> bytes:
-        """The policy's file."""
+    def controller(self) -> Controller:
+        """What hops."""
 
     @property
     def asked(self) -> dict[str, Any]:
-        """Policy, leg and trials."""
+        """Controller, leg and trials."""
         return {
-            "policy": hashlib.sha256(self.policy).hexdigest()[:16],
+            "policy": entries.fingerprint(self.controller),
             "twin": self.leg.digest,
             "commands": list(self.study.commands),
             "repeats": self.study.repeats,
         }
 
     def run(self, *, quiet: bool) -> None:
-        """Try the policy at every command and write what was measured."""
-        rows = hop(self.policy, self.leg, self.study)
+        """Try the controller at every command and write what was measured."""
+        rows = hop(self.controller, self.leg, self.study)
         io.write_json(self.file, {"asked": self.asked, "rows": rows})
 
     def measured(self) -> list[dict[str, Any]]:
@@ -362,7 +359,7 @@ class HopTrial(StoredJob):
 
 @dataclass(frozen=True)
 class HopOnTwin(HopTrial):
-    """A trained policy tried on a twin."""
+    """A trained policy, or a controller that needs no training, tried on a twin."""
 
     method: methods.Method
     seed: int
@@ -378,10 +375,13 @@ class HopOnTwin(HopTrial):
         return self.study.trial(self.twin, self.method, self.seed)
 
     @property
-    def policy(self) -> bytes:
-        """The selected policy of the training."""
+    def controller(self) -> Controller:
+        """The selected policy of the training, or the method's controller of the believed leg."""
+        if self.method.controller is not None:
+            return load_controller(self.method.controller, load_robot(self.twin.believed))
         folder = self.study.training(self.twin, self.method, self.seed)
-        return (folder / "policy.onnx").read_bytes()
+        content = (folder / "policy.onnx").read_bytes()
+        return Policy(content, "the trained policy", "policy")
 
     def rows(self) -> list[dict[str, Any]]:
         """Return what was measured, one row per command."""
@@ -394,32 +394,16 @@ def disturbance_of(robot: Robot) -> NoiseAndDelay:
     return NoiseAndDelay() if robot.reality.neutral else NO_NOISE
 
 
-def hop(content: bytes, robot: Robot, study: Study) -> list[dict[str, Any]]:
-    """Let a policy hop at a study's commands on a robot and return a row per command.
+def hop(controller: Controller, robot: Robot, study: Study) -> list[dict[str, Any]]:
+    """Let a controller hop at a study's commands on a robot and return a row per command.
 
     Errors are apex minus command. A leg that never leaves the ground at a command counts as
-    ``motionless`` with an error as large as the command.
+    ``motionless``; its error is standing height minus command.
     """
-    policy = Policy(content, "the trained policy", "policy")
-    bounds = (policy.card.command_low, policy.card.command_high)
     setup = RolloutConfig(robot, disturbance_of(robot), threads=study.threads)
     judged = runner.evaluate(
-        [entries.Entry("policy", policy, bounds)], setup, commands=study.commands,
+        [entries.entry_of("policy", controller)], setup, commands=study.commands,
         repeats=study.repeats, seed=FIRST_SEED, kinds=("fixed",),
     )  # fmt: skip
-    return _rows(judged.evaluation)
-
-
-def _rows(evaluation: Evaluation) -> list[dict[str, Any]]:
-    apexes = {d["command_m"]: np.array(d["apexes_m"]) for d in evaluation.distributions}
-    rows = []
-    for full in evaluation.to_json()["summary"]:
-        row = {name: full[name] for name in _KEPT}
-        command = row["command_m"]
-        errors = apexes[command] - command
-        row["motionless"] = not len(errors)
-        row["median_abs_error_m"] = float(np.median(np.abs(errors))) if len(errors) else command
-        if row["motionless"]:
-            row["median_error_m"] = -command
-        rows.append(row)
-    return rows
+    summary = judged.evaluation.to_json()["summary"]
+    return [{**{n: row[n] for n in _KEPT}, "motionless": not row["hops"]} for row in summary]

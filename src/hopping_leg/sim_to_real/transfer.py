@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from hopping_leg.arrays import Array, IntArray
+from hopping_leg.arrays import Array
 from hopping_leg.evaluate import runner, statistics
 from hopping_leg.sim_to_real import jobs, methods, stages
 from hopping_leg.sim_to_real.study import Study, TwinFile
@@ -49,13 +49,17 @@ def fits(study: Study) -> list[stages.IdentifyTwin]:
 
 def trainings(study: Study) -> list[stages.TrainPolicy]:
     """Return all trainings; several twins may share one."""
-    every = (stages.TrainPolicy(study, t, m, s) for s, m, t in _all(study))
+    every = (stages.TrainPolicy(study, t, m, s) for s, m, t in _all(study) if not m.controller)
     return list({train.path: train for train in every}.values())
 
 
 def hops(study: Study) -> list[stages.HopOnTwin]:
-    """Return all trials."""
-    return [stages.HopOnTwin(study, t, m, s) for s, m, t in _all(study)]
+    """Return all trials; what is not trained has one for each twin."""
+    return [
+        stages.HopOnTwin(study, t, m, s)
+        for s, m, t in _all(study)
+        if not m.controller or s == study.seeds[0]
+    ]
 
 
 def _all(study: Study) -> Iterable[tuple[int, methods.Method, TwinFile]]:
@@ -93,6 +97,7 @@ def tabulate(
         "identification": [fit_row(fit) for fit in fits],
         "trainings": [_training(training) for training in trainings],
         "trials": trials,
+        "notes": statistics.twins_note(len(study.twins)),
     }
 
 
@@ -115,6 +120,9 @@ def _best_in_own_simulation(trials: Sequence[Row], study: Study) -> Row:
         return {}
     best = {}
     for method, twin in itertools.product(study.methods, study.twins):
+        if method.controller:
+            best[method.name, twin.name] = study.seeds[0]
+            continue
         runs = [stages.TrainPolicy(study, twin, method, seed) for seed in study.seeds]
         best[method.name, twin.name] = min(runs, key=lambda run: run.own_score).seed
     chosen = [row for row in trials if row["seed"] == best[row["method"], row["twin"]]]
@@ -157,14 +165,14 @@ def _pooled(method: methods.Method, trials: Sequence[Row]) -> Row:
 def _median(trials: Sequence[Row], name: str) -> Row:
     """Return the median of a number and its interval over the twins."""
     numbers = _by_twin(trials, name)
-    low, high = statistics.median_interval(numbers, _SEED)
+    low, high = statistics.median_interval(numbers, _SEED, statistics.LEAST_TWINS)
     start = name.removesuffix("_m")
     median = float(np.median(np.concatenate(numbers)))
     return {name: median, f"{start}_low_m": low, f"{start}_high_m": high}
 
 
 def _sums(trials: Sequence[Row]) -> Row:
-    names = ("hops", "skipped_hops", "body_contacts", "motionless")
+    names = ("hops", "skipped_hops", "missed_runs", "body_contacts", "motionless")
     return {name: sum(r[name] for r in trials) for name in names}
 
 
@@ -241,7 +249,8 @@ def compare(first: str, other: str, trials: Sequence[dict[str, Any]], seed: int)
     """Return the ratio of two methods' errors, overall and at the command where it is smallest.
 
     Trials are one row per method, twin, seed and command. The medians are over all of them; the
-    interval resamples whole twins, so that both methods keep meeting the same ones.
+    interval resamples whole twins, so that both methods keep meeting the same ones; it is NaN with
+    fewer than ``LEAST_TWINS``.
     """
     count = len({row["twin"] for row in trials})
     errors = {
@@ -249,22 +258,20 @@ def compare(first: str, other: str, trials: Sequence[dict[str, Any]], seed: int)
         for name in (first, other)
     }
 
-    def ratio(index: IntArray) -> float:
+    def ratio(index: Sequence[int]) -> float:
         above, below = (
-            np.median(np.concatenate([errors[method][int(i)] for i in index]))
+            np.median(np.concatenate([errors[method][i] for i in index]))
             for method in (other, first)
         )
         return float(above / below)
 
-    low = high = whole = ratio(np.arange(count))
-    if count > 1:
-        low, high = statistics.bootstrap((np.arange(count),), ratio, seed)
+    low, high = statistics.bootstrap(range(count), ratio, seed, statistics.LEAST_TWINS)
     return {
         "method": other,
         "over": first,
-        "ratio": whole,
-        "ratio_low": low,
-        "ratio_high": high,
+        "ratio": ratio(range(count)),
+        "ratio_low": float(low),
+        "ratio_high": float(high),
         "least_ratio_of_a_command": min(
             _at(trials, other, c) / _at(trials, first, c)
             for c in dict.fromkeys(row["command_m"] for row in trials)

@@ -14,6 +14,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.evaluate.metrics import START_SECONDS
 from hopping_leg.evaluate.robustness.axes import Case, axis_named, times
+from hopping_leg.evaluate.statistics import with_misses
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.perturbation import Perturbation
 from hopping_leg.trace import Trace
@@ -117,17 +118,19 @@ def hops_after(trace: Trace, tick: int) -> Array:
 
 def _recovery(run: _Run, traces: Sequence[Trace], change: int) -> dict[str, Any]:
     start = round(START_SECONDS * change / AT)
+    stood = [float(trace.column("height_m")[0]) for trace in traces]
     found = [hop_detection.trace_hops(trace) for trace in traces]
-    before = [h.apex[(h.tick >= start) & (h.tick < change)] for h in found]
-    after = [hops_after(trace, change) - run.after for trace in traces]
+    before = [h.apex[(h.tick >= start) & (h.tick < change)] - run.before for h in found]
+    every = [hops_after(trace, change) - run.after for trace in traces]
+    after = [_padded(e, s - run.after) for e, s in zip(every, stood, strict=True)]
     sizes = [_median(np.abs(_kth(after, hop))) for hop in range(HOPS)]
     centres = [_median(_kth(after, hop)) for hop in range(HOPS)]
-    later = np.concatenate([errors[HOPS:] for errors in after])
+    later = _all([errors[HOPS:] for errors in every], [s - run.after for s in stood])
     settled, centre = _median(np.abs(later)), _median(later)
     return {
         "change": run.change,
         "command_m": run.after,
-        "before_abs_error_m": _median(np.abs(np.concatenate(before) - run.before)),
+        "before_abs_error_m": _median(np.abs(_all(before, [s - run.before for s in stood]))),
         "hop_abs_errors_m": sizes,
         "later_abs_error_m": settled,
         "later_error_m": centre,
@@ -139,30 +142,40 @@ def _recovery(run: _Run, traces: Sequence[Trace], change: int) -> dict[str, Any]
 
 def _step(run: _Run, traces: Sequence[Trace], change: int) -> dict[str, Any]:
     after = [hops_after(trace, change) for trace in traces]
-    steady = [np.median(apexes[HOPS:]) if len(apexes) > HOPS else np.nan for apexes in after]
-    distances = [np.abs(a - s) for a, s in zip(after, steady, strict=True)]
+    steady = [np.median(apexes[HOPS:]) if len(apexes) > HOPS else run.after for apexes in after]
+    stood = [float(trace.column("height_m")[0]) for trace in traces]
+    padded = [_padded(apexes, s) for apexes, s in zip(after, stood, strict=True)]
+    distances = [np.abs(a - s) for a, s in zip(padded, steady, strict=True)]
     sizes = [_median(_kth(distances, hop)) for hop in range(HOPS)]
     return {
         "from_m": run.before,
         "to_m": run.after,
-        "steady_error_m": _median(np.array(steady) - run.after),
+        "steady_error_m": _median(np.array([np.median(a[HOPS:]) - run.after for a in padded])),
         "hop_distances_m": sizes,
         "settled_after_hops": _back(sizes),
     }
 
 
+def _padded(values: Array, miss: float) -> Array:
+    """Return a value for each of the first hops; those that a run lacks are misses."""
+    return np.append(values, np.full(max(0, HOPS + 1 - len(values)), miss))
+
+
+def _all(errors: Sequence[Array], misses: Sequence[float]) -> Array:
+    """Return the errors of runs of equal length in one row, m."""
+    return np.concatenate(with_misses(errors, [1.0] * len(errors), misses))
+
+
 def _kth(rows: Sequence[Array], hop: int) -> Array:
-    """Return the value of one hop in all runs that have it."""
-    return np.array([row[hop] for row in rows if len(row) > hop])
+    return np.array([row[hop] for row in rows])
 
 
-def _median(values: Array) -> float | None:
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if len(known) else None
+def _median(values: Array) -> float:
+    return float(np.median(values))
 
 
-def _back(sizes: Sequence[float | None]) -> int | None:
+def _back(sizes: Sequence[float]) -> int | None:
     """Return the number of hops after which all others are near; None if the last is not."""
-    far = [k + 1 for k, size in enumerate(sizes) if size is None or abs(size) > BACK]
+    far = [k + 1 for k, size in enumerate(sizes) if abs(size) > BACK]
     last = max(far, default=0)
     return last if last < len(sizes) else None

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.evaluate import metrics, statistics
 from hopping_leg.evaluate.robustness.trials import AxisTrials
@@ -25,9 +24,10 @@ class Outcome:
     """Desired apex height."""
     repeat: int
     """Number of the realisation."""
-    error_m: float | None
-    """Median apex minus command; where the command steps, of the height that is missed most; None
-    without a hop."""
+    error_m: float
+    """Median apex minus command; where the command steps, of the height that is missed most."""
+    missed: bool
+    """Whether there was no hop at a height, whose error is standing height minus command."""
     skipped: int
     """Hops that should have happened and did not."""
     contacts: int
@@ -36,7 +36,7 @@ class Outcome:
     @property
     def success(self) -> bool:
         """Whether no hop was skipped and the median apex is as commanded."""
-        return self.skipped == 0 and self.error_m is not None and abs(self.error_m) <= TOLERANCE
+        return self.skipped == 0 and not self.missed and abs(self.error_m) <= TOLERANCE
 
 
 def run_axis(
@@ -57,7 +57,7 @@ def run_axis(
                 trial.level,
                 trial.command,
                 trial.repeat,
-                _worst_error(windows),
+                *_worst_error(windows),
                 sum(w.skipped for w in windows),
                 sum(w.body_contacts for w in windows),
             )
@@ -65,37 +65,37 @@ def run_axis(
     return outcomes
 
 
-def _worst_error(windows: list[metrics.HopWindow]) -> float | None:
-    """Return the median error of the command that is missed most; None if one has no hop."""
-    errors = []
-    for command in {w.command for w in windows}:
-        apex = metrics.pooled_apexes([w for w in windows if w.command == command])
-        if not len(apex):
-            return None
-        errors.append(float(np.median(apex)) - command)
-    return max(errors, key=abs)
+def _worst_error(windows: list[metrics.HopWindow]) -> tuple[float, bool]:
+    """Return the median error of the command that is missed most, and if one was without a hop."""
+    groups = [[w for w in windows if w.command == c] for c in {w.command for w in windows}]
+    errors = [float(np.median(np.concatenate(metrics.errors_of(group)))) for group in groups]
+    missed = any(not sum(len(w.apex) for w in group) for group in groups)
+    return max(errors, key=abs), missed
 
 
 OVERALL = "overall"
 """Row of the mean over all axes."""
 
 
-def share(axes: Sequence[Sequence[Array]], seed: int) -> tuple[float, float, float]:
+def share(axes: Sequence[Sequence[Outcome]], seed: int) -> tuple[float, float, float]:
     """Return the mean over axes of the mean over levels of the share of successes.
 
-    Its 95 % bootstrap interval follows, in which trials (1 for a success, 0 else) are resampled
-    within their level; NaN where a level has one trial alone.
+    Its 95 % interval follows, over realisations: all levels, commands and axes share their draws,
+    so that a realisation is one unit.
     """
-    levels = [level for axis in axes for level in axis]
-    weights = np.array([1 / len(axis) for axis in axes for _ in axis]) / len(axes)
+    repeats = sorted({one.repeat for axis in axes for one in axis})
+    scores = np.array(
+        [
+            np.mean([_mean_of_levels([one for one in axis if one.repeat == r]) for axis in axes])
+            for r in repeats
+        ]
+    )
+    return float(scores.mean()), *statistics.share_interval(scores, seed)
 
-    def statistic(*samples: Array, axis: int) -> Array:
-        return weights @ np.stack([sample.mean(axis=axis) for sample in samples])  # type: ignore[no-any-return]
 
-    score = float(weights @ [level.mean() for level in levels])
-    if any(len(level) < 2 for level in levels):
-        return score, float("nan"), float("nan")
-    return score, *statistics.bootstrap(levels, statistic, seed, vectorized=True)
+def _mean_of_levels(outcomes: Sequence[Outcome]) -> float:
+    levels = by_level(outcomes).values()
+    return float(np.mean([np.mean([one.success for one in level]) for level in levels]))
 
 
 def by_level(outcomes: Sequence[Outcome]) -> dict[float, list[Outcome]]:
@@ -110,14 +110,14 @@ def level_rows(controller: str, axis: str, outcomes: Sequence[Outcome]) -> list[
     """Return the results of each level of an axis, by rising level."""
     rows = []
     for level, group in by_level(outcomes).items():
-        sizes = [abs(one.error_m) for one in group if one.error_m is not None]
         rows.append(
             {
                 "controller": controller,
                 "axis": axis,
                 "level": level,
                 "success": float(np.mean([one.success for one in group])),
-                "median_abs_error_m": float(np.median(sizes)) if sizes else None,
+                "median_abs_error_m": float(np.median([abs(one.error_m) for one in group])),
+                "missed": sum(one.missed for one in group),
                 "skipped_hops": sum(one.skipped for one in group),
                 "body_contacts": sum(one.contacts for one in group),
                 "trials": len(group),
@@ -130,19 +130,13 @@ def score_rows(
     controller: str, outcomes: dict[str, list[Outcome]], seed: int
 ) -> list[dict[str, Any]]:
     """Return a controller's score on every axis, given its trials by axis, and overall."""
-    levels = {
-        axis: [
-            np.array([one.success for one in group], float) for group in by_level(found).values()
-        ]
-        for axis, found in outcomes.items()
-    }
     rows = []
     for axis, groups in {
-        **{a: [own] for a, own in levels.items()},
-        OVERALL: [*levels.values()],
+        **{a: [own] for a, own in outcomes.items()},
+        OVERALL: [*outcomes.values()],
     }.items():
         score, low, high = share(groups, seed)
-        trials = sum(len(level) for group in groups for level in group)
+        trials = sum(map(len, groups))
         row = {"controller": controller, "axis": axis, "score": score, "low": low, "high": high}
         rows.append({**row, "trials": trials})
     return rows

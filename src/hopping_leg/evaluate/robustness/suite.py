@@ -17,7 +17,7 @@ from hopping_leg.io import safe_file_name
 RECOVERY = "recovery"
 """Part that follows changes in the middle of a run; no axis, part of no score."""
 
-SCHEMA = 1
+SCHEMA = 2
 """Version of the JSON, raised when a name changes its meaning."""
 
 
@@ -57,6 +57,7 @@ class Suite:
         limits = self.setup.soft_limits
         return {
             **self.conditions,
+            "schema": SCHEMA,
             "controller": fingerprint(controller),
             "levels": _levels(axis),
             "soft_limits": asdict(limits) if limits else None,

@@ -7,7 +7,7 @@ import numpy as np
 
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
 from hopping_leg.controllers.stand_hop_land import STAND_SECONDS, StandHopLand
-from hopping_leg.evaluate import metrics, statistics
+from hopping_leg.evaluate import metrics
 from hopping_leg.evaluate.skills.landings import last_touchdown, peak_force
 from hopping_leg.hop_detection import trace_hops
 from hopping_leg.robot.parameters import Robot
@@ -37,7 +37,7 @@ class Counted:
     at_rest: float
     """Share of runs that end standing still."""
     median_error_m: float
-    """Apex minus command, all hops."""
+    """Apex minus command, all hops; of a run without one, standing height minus command."""
     worst_abs_error_m: float
     landing_force: float
     """Peak force of the ground in the last landing, weights of the leg, median over runs."""
@@ -71,7 +71,10 @@ def count_hops(
 def _row(command: float, asked: int, traces: Sequence[Trace], robot: Robot) -> Counted:
     apexes = [trace_hops(trace).apex for trace in traces]
     made = [len(apex) for apex in apexes]
-    errors = np.concatenate(apexes) - command
+    errors = np.concatenate(
+        [a if len(a) else t.column("height_m")[:1] for a, t in zip(apexes, traces, strict=True)]
+    )
+    errors -= command
     windows = [window for trace in traces for window in metrics.measure(trace)]
     return Counted(
         command_m=command,
@@ -80,8 +83,8 @@ def _row(command: float, asked: int, traces: Sequence[Trace], robot: Robot) -> C
         fewest=min(made),
         most=max(made),
         at_rest=float(np.mean([_rests(trace) for trace in traces])),
-        median_error_m=statistics.of(np.median, errors),
-        worst_abs_error_m=statistics.of(np.max, np.abs(errors)),
+        median_error_m=float(np.median(errors)),
+        worst_abs_error_m=float(np.abs(errors).max()),
         landing_force=float(np.median([_landing_force(robot, trace) for trace in traces])),
         body_contacts=sum(w.body_contacts for w in windows),
         runs=len(traces),

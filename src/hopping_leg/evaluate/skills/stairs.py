@@ -7,7 +7,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig, rollout
-from hopping_leg.evaluate import metrics, statistics
+from hopping_leg.evaluate import metrics
 from hopping_leg.hop_detection import trace_hops
 from hopping_leg.sim.perturbation import Perturbation
 from hopping_leg.trace import Trace
@@ -34,6 +34,8 @@ class Stair:
     median_error_m: float
     """Median apex minus command of all later hops on it."""
     hops: int
+    missed_runs: int
+    """Runs without a hop on it: their errors are standing height minus command."""
     runs: int
 
 
@@ -83,27 +85,24 @@ def climb(
             begin = step * ticks if step else round(metrics.START_SECONDS * setup.rate)
             rise = level - stairs[step - 1] if step else 0.0
             errors = [_errors(trace, range(begin, (step + 1) * ticks), rise) for trace in own]
-            first = np.array([e[0] for e in errors if len(e)])
-            later = np.concatenate([e[1:] for e in errors])
-            medians = (statistics.of(np.median, first), statistics.of(np.median, later))
-            rows.append(Stair(command, step, level, *medians, sum(map(len, errors)), len(own)))
+            missed = [trace.column("height_m")[:1] - command for trace in own]
+            first = [e[:1] if len(e) else m for e, m in zip(errors, missed, strict=True)]
+            later = [e[1:] if len(e) > 1 else m for e, m in zip(errors, missed, strict=True)]
+            centre, usual = (float(np.median(np.concatenate(hops))) for hops in (first, later))
+            counts = (sum(map(len, errors)), sum(not len(e) for e in errors), len(own))
+            rows.append(Stair(command, step, level, centre, usual, *counts))
         steps = rows[-len(stairs) :]
         wholes.append(
             Stairs(
                 command_m=command,
-                worst_first_error_m=_worst([step.first_error_m for step in steps]),
-                worst_error_m=_worst([step.median_error_m for step in steps]),
+                worst_first_error_m=max((s.first_error_m for s in steps), key=abs),
+                worst_error_m=max((s.median_error_m for s in steps), key=abs),
                 skipped_hops=sum(map(metrics.skipped_in_run, own)),
                 body_contacts=sum(w.body_contacts for trace in own for w in metrics.measure(trace)),
                 runs=len(own),
             )
         )
     return rows, wholes
-
-
-def _worst(errors: Sequence[float]) -> float:
-    """Return the largest by magnitude of what exists, m; NaN if nothing does."""
-    return max((e for e in errors if np.isfinite(e)), key=abs, default=float("nan"))
 
 
 def _errors(trace: Trace, steps: range, rise: float) -> Array:
