@@ -80,7 +80,7 @@ class Evaluate(Conditions):
     floor: Literal["soft", "stiff", "both"] = "both"
     """The robot's own contact (soft), the engine's default (stiff), or all trials on the first and
     the fixed ones on the second."""
-    engine: Engine = "mujoco"
+    engine: Engine = "stepper"
     """Physics engine; pybullet needs the extra `bullet` and is much slower."""
     video: bool = True
     """Put a short video of each controller into the report, if OpenGL is available."""

@@ -15,7 +15,7 @@ from hopping_leg.sim import (
     CONTROL_RATE,
     Engine,
     Ground,
-    MujocoSimulator,
+    LegSimulator,
     NoiseAndDelay,
     Plant,
     Simulator,
@@ -48,7 +48,7 @@ class RolloutConfig:
     takes the paper leg's 0.2 m, scaled to the links."""
     threads: int = 0
     """Worker threads, 0 for one per core."""
-    engine: Engine = "mujoco"
+    engine: Engine = "stepper"
     """What computes the physics."""
     ground: Ground = "robot"
     """What the foot stands on."""
@@ -142,11 +142,11 @@ def rollout(
             timestep=config.timestep, threads=config.threads,
         )  # fmt: skip
     else:
-        if config.engine != "mujoco":
-            raise UsageError(f"Perturbations need the engine mujoco, not {config.engine}.")
-        legs = MujocoSimulator(
+        if config.engine != "stepper":
+            raise UsageError(f"Perturbations need the engine stepper, not {config.engine}.")
+        legs = LegSimulator(
             config.robot, len(perturbation.robots), rate=config.rate, timestep=config.timestep,
-            threads=config.threads, robots=perturbation.robots, detailed=bool(perturbation.later),
+            threads=config.threads, robots=perturbation.robots,
         )  # fmt: skip
         perturber = Perturber(perturbation, legs)
     plant = Plant(legs, config.disturbance, config.soft_limits, np.random.default_rng(seed))
@@ -172,7 +172,6 @@ def rollout(
         data[8:10, tick] = plant.drive(torque).T
         if on_tick is not None:
             on_tick(tick + 1, ticks)
-    # MuJoCo resets an unstable simulation and goes on, so that only its speed shows it.
     if not np.abs(data[4:6]).max() < _IMPOSSIBLE:
         raise PhysicsError(
             f"The simulation of {config.robot.name} became unstable at a physics step of"

@@ -13,7 +13,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.deploy.drive_link import joint_transforms
 from hopping_leg.robot.parameters import Joint, Robot
-from hopping_leg.sim import MujocoSimulator
+from hopping_leg.sim import LegSimulator
 
 TIMESTEP = 5e-4
 """Physics step, s; the drives' control runs as often."""
@@ -33,9 +33,8 @@ class EmulatedLeg:
         free = replace(robot, hip=_unlimited(robot.hip), knee=_unlimited(robot.knee))
         immediate = replace(robot.reality.latency, command=0.0, jitter=0.0)
         free = replace(free, reality=replace(robot.reality, latency=immediate))
-        self._legs = MujocoSimulator(free, 1, rate=1 / TIMESTEP, timestep=TIMESTEP, threads=1)
-        if self._legs.mismatch is not None:
-            self._legs.mismatch.reseed(np.random.default_rng(seed))
+        self._legs = LegSimulator(free, 1, rate=1 / TIMESTEP, timestep=TIMESTEP, threads=1)
+        self._legs.reseed(np.random.default_rng(seed))
         self._legs.stand(slice(None), np.asarray(q, np.float64))
         self._links = (robot.thigh.length, robot.shank.length, robot.foot.radius)
 

@@ -20,7 +20,7 @@ from hopping_leg.envs.paper_reward import paper_reward
 from hopping_leg.envs.task import HoppingTask, Step
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import Robot, build_model, load_robot
-from hopping_leg.sim import MujocoSimulator
+from hopping_leg.sim import LegSimulator
 
 Image = npt.NDArray[np.uint8]
 
@@ -33,7 +33,7 @@ _LARGEST = float(np.finfo(np.float32).max)
 class Camera:
     """Draws one of many legs from the side; takes OpenGL up with its first picture."""
 
-    def __init__(self, legs: MujocoSimulator) -> None:
+    def __init__(self, legs: LegSimulator) -> None:
         self.legs = legs
         self._model = build_model(legs.robot)
         self._data = mujoco.MjData(self._model)

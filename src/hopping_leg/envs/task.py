@@ -14,7 +14,7 @@ from hopping_leg.envs.observation import (
     sample_scaling,
 )
 from hopping_leg.robot import Robot, kinematics
-from hopping_leg.sim import Measurement, MujocoSimulator, Plant, randomization
+from hopping_leg.sim import Measurement, LegSimulator, Plant, randomization
 
 _STANDING_SHARE = 0.3  # of the starts ``hop``
 
@@ -116,7 +116,7 @@ class HoppingTask:
         noise, self._rng, draws = rng.spawn(3)
         self._draw_seed, self._draw = int(draws.integers(2**62)), 0
         self._numbers = np.zeros((count, len(options.randomised)))
-        self.legs = MujocoSimulator(
+        self.legs = LegSimulator(
             robot, count, rate=options.rate, timestep=options.timestep, threads=threads
         )
         if options.randomize_from_start:
@@ -160,7 +160,7 @@ class HoppingTask:
     def reseed(self, rng: np.random.Generator) -> Array32:
         """Take all randomness from another source and begin anew; return what is seen."""
         noise, self._rng = rng.spawn(2)
-        self.plant.channel.reseed(noise)
+        self.plant.reseed(noise)
         return self.reset()
 
     def reset(self, ids: IntArray | None = None) -> Array32:
@@ -210,8 +210,7 @@ class HoppingTask:
     def state(self) -> dict[str, Any]:
         """Return everything needed to go on exactly from here, as arrays and plain values."""
         return {
-            "physics": self.legs.batch.state.copy(),
-            "waiting": self.legs.pending_torque.copy(),
+            "legs": self.legs.memory(),
             "channel": self.plant.channel.state(),
             "command": self.command.copy(),
             "tick": self._tick,
@@ -226,9 +225,7 @@ class HoppingTask:
 
     def restore(self, state: dict[str, Any]) -> Array32:
         """Go on from a ``state``; return the observations, (n, size)."""
-        self.legs.batch.state[:] = state["physics"]
-        if "waiting" in state:
-            self.legs.pending_torque = state["waiting"].copy()
+        self.legs.restore(state["legs"])
         self.plant.channel.restore(state["channel"])
         self.command[:] = state["command"]
         self._tick = int(state["tick"])

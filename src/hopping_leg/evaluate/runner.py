@@ -175,7 +175,7 @@ def setup_conditions(setup: RolloutConfig) -> dict[str, Any]:
     }
 
 
-def software_versions(engine: Engine = "mujoco") -> dict[str, str]:
+def software_versions(engine: Engine = "stepper") -> dict[str, str]:
     """Return the versions that the numbers may depend on."""
     names = ["hopping-leg", "mujoco", "numpy", "scipy", "onnxruntime"]
     names += ["pybullet"] if engine == "pybullet" else []

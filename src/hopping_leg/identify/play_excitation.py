@@ -11,7 +11,7 @@ from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.recording import Recording, make_recording
 from hopping_leg.identify.recording_format import MEASURED, PAIRS, Quantisation, RecordingMetadata
 from hopping_leg.robot import TIMESTEP, Robot
-from hopping_leg.sim import NO_NOISE, MujocoSimulator, Plant
+from hopping_leg.sim import NO_NOISE, LegSimulator, Plant
 from hopping_leg.trace import Trace
 
 _TARGETS = PAIRS["position_command"] + PAIRS["velocity_command"]
@@ -41,8 +41,8 @@ def play(
     """
     gains = gains or JointGains()
     fixed = excitation.rig == "fixed-base"
-    legs = MujocoSimulator(
-        robot, 1, rate=excitation.rate, timestep=timestep, threads=1, clamped=fixed
+    legs = LegSimulator(
+        robot, 1, rate=excitation.rate, timestep=timestep, threads=1, fixed_base=fixed
     )
     plant = Plant(legs, NO_NOISE, None, np.random.default_rng(seed))
     controller = JointPD(excitation.position, excitation.velocity, gains)

@@ -1,9 +1,11 @@
 """The leg simulated: many legs at once at the control rate, with noise and delay."""
 
 from hopping_leg.sim.channel import NO_NOISE, SAMPLES, Channel, Measurement, NoiseAndDelay
-from hopping_leg.sim.mujoco_simulator import MujocoSimulator, check_ground, make_simulator
+from hopping_leg.sim.engines import check_ground, make_simulator
+from hopping_leg.sim.leg_simulator import LegSimulator
 from hopping_leg.sim.plant import Plant
 from hopping_leg.sim.simulator import CONTROL_RATE, Engine, Ground, Simulator
+from hopping_leg.sim.stepper import LOADS
 
 __all__ = [
     "CONTROL_RATE",
@@ -13,7 +15,8 @@ __all__ = [
     "Engine",
     "Ground",
     "Measurement",
-    "MujocoSimulator",
+    "LOADS",
+    "LegSimulator",
     "NoiseAndDelay",
     "Plant",
     "Simulator",

@@ -8,7 +8,6 @@ import numpy as np
 
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import UsageError
-from hopping_leg.sim.mismatch_simulator import MismatchSimulator
 
 SAMPLES = 3
 """Joint samples a controller sees at a tick: t, t-1, t-2."""
@@ -178,41 +177,3 @@ class Channel:
         ticks = np.arange(first, first + self._block)[:, None, None]
         slots = (ticks - self._back) % len(self._buffer)
         self._rows = slots * self.count + np.arange(self.count)[:, None]
-
-
-class MismatchChannel(Channel):
-    """Carries the legs' own memory and randomness along, so that runs repeat and go on exactly.
-
-    The disturbance acts on top of what the legs' sensors report; judge a twin with ``NO_NOISE`` to
-    meet it as it is.
-    """
-
-    def __init__(
-        self,
-        simulator: MismatchSimulator,
-        disturbance: NoiseAndDelay,
-        period: float,
-        rng: np.random.Generator,
-    ) -> None:
-        super().__init__(simulator.count, disturbance, period, rng)
-        self._simulator = simulator
-        simulator.reseed(rng.spawn(1)[0])
-
-    def reseed(self, rng: np.random.Generator) -> None:
-        """Take all randomness from here on from another source."""
-        super().reseed(rng)
-        self._simulator.reseed(rng.spawn(1)[0])
-
-    def restart(self, ids: IntArray | slice, q: Array, qd: Array, command: Array) -> None:
-        """Forget the past of some legs, on the way to the motors, too."""
-        self._simulator.forget(np.arange(self.count)[ids])
-        super().restart(ids, q, qd, command)
-
-    def state(self) -> dict[str, Any]:
-        """Return everything needed to go on exactly from here, as arrays and plain values."""
-        return super().state() | self._simulator.memory()
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Go on from a ``state``; the legs' physics must have been restored."""
-        super().restore(state)
-        self._simulator.restore(state)

@@ -10,7 +10,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.robot.parameters import Robot
-from hopping_leg.sim.mujoco_simulator import MujocoSimulator
+from hopping_leg.sim.leg_simulator import LegSimulator
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Perturbation:
 class Perturber:
     """Applies a perturbation, tick by tick, to legs that were made of its robots."""
 
-    def __init__(self, perturbation: Perturbation, legs: MujocoSimulator) -> None:
+    def __init__(self, perturbation: Perturbation, legs: LegSimulator) -> None:
         self.perturbation, self.legs = perturbation, legs
         self.ground = np.zeros(legs.count)
         """Where the ground is under each leg, m above where it was, (n,)."""

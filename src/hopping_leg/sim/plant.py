@@ -4,7 +4,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.robot.limits import SoftLimiter, SoftLimits
-from hopping_leg.sim.channel import Channel, Measurement, MismatchChannel, NoiseAndDelay
+from hopping_leg.sim.channel import Channel, Measurement, NoiseAndDelay
 from hopping_leg.sim.simulator import Simulator
 
 
@@ -23,12 +23,14 @@ class Plant:
         rng: np.random.Generator,
     ) -> None:
         self.legs = legs
-        self.channel = (
-            Channel(legs.count, disturbance, legs.period, rng)
-            if legs.mismatch is None
-            else MismatchChannel(legs.mismatch, disturbance, legs.period, rng)
-        )
+        self.channel = Channel(legs.count, disturbance, legs.period, rng)
+        legs.reseed(rng.spawn(1)[0])
         self._limiter = SoftLimiter(legs.robot, soft_limits, legs.count) if soft_limits else None
+
+    def reseed(self, rng: np.random.Generator) -> None:
+        """Take all randomness from here on from another source."""
+        self.channel.reseed(rng)
+        self.legs.reseed(rng.spawn(1)[0])
 
     def sense(self, command: Array) -> Measurement:
         """Return what the controllers see; ``command`` is the desired height, m, (n,)."""

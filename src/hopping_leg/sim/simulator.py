@@ -8,10 +8,10 @@ import numpy as np
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import Robot, kinematics
-from hopping_leg.sim.mismatch_simulator import MismatchSimulator
+from hopping_leg.sim.stepper import LOADS
 
-Engine = Literal["mujoco", "pybullet"]
-"""What computes the physics."""
+Engine = Literal["stepper", "mujoco", "pybullet"]
+"""What computes the physics: the leg's own stepper, MuJoCo as its reference, or PyBullet."""
 
 CONTROL_RATE = 200.0
 """Control rate of the paper, Hz."""
@@ -26,8 +26,6 @@ class Simulator(ABC):
 
     ``state`` (n, 6) is a live view of the true state (x, q1, q2 and their rates), and so are its
     parts ``height``, ``height_rate`` (n,), ``q`` and ``qd`` (n, 2), in m, m/s, rad and rad/s.
-    ``measured_q`` and ``measured_qd`` (n, 2) are what the joints' encoders report, live.
-
     One ``step`` lasts ``1 / rate``, Hz, which is a whole number of physics steps ``timestep``, s.
 
     Raises:
@@ -39,10 +37,6 @@ class Simulator(ABC):
     height_rate: Array
     q: Array
     qd: Array
-    measured_q: Array
-    measured_qd: Array
-    mismatch: MismatchSimulator | None = None
-    """Where the robot's ``reality`` is simulated, if it is."""
 
     def __init__(self, robot: Robot, count: int, rate: float, timestep: float) -> None:
         self.substeps = _substeps(rate, timestep)
@@ -56,9 +50,30 @@ class Simulator(ABC):
         self.q, self.qd = state[:, 1:3], state[:, 4:6]
 
     @property
+    def measured_q(self) -> Array:
+        """Joint angles that the encoders report, rad, (n, 2)."""
+        return self.q
+
+    @property
+    def measured_qd(self) -> Array:
+        """Joint velocities that the encoders report, rad/s, (n, 2)."""
+        return self.qd
+
+    @property
     @abstractmethod
     def measured_torque(self) -> Array:
         """What the motors' torque measurement reports now, N m at the joints, (n, 2)."""
+
+    @property
+    def loads(self) -> Array:
+        """What the last control period was for the motors, (n, 8), see ``LOADS``; NaN if unknown."""
+        return np.full((self.count, len(LOADS)), np.nan)
+
+    def reseed(self, rng: np.random.Generator) -> None:  # noqa: B027
+        """Take the legs' own randomness, if any, from here on from another source."""
+
+    def forget(self, ids: IntArray | slice) -> None:  # noqa: B027
+        """Let legs begin anew in their state: no command under way, clean readings."""
 
     @abstractmethod
     def place(self, ids: IntArray | slice, height: Array | float, q: Array) -> None:

@@ -8,7 +8,7 @@ from hopping_leg.controllers import command_schedule, protocol, registry
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.robot import Robot, SoftLimits, load_robot
-from hopping_leg.sim import CONTROL_RATE, MujocoSimulator, Plant
+from hopping_leg.sim import CONTROL_RATE, LegSimulator, Plant
 from hopping_leg.viewer.live_settings import PUSH, LiveSettings, default_settings
 from hopping_leg.viewer.tracks import FIELDS, Track
 
@@ -231,7 +231,7 @@ class LiveLeg:
         return row
 
     def _make(self) -> None:
-        self._legs = MujocoSimulator(
+        self._legs = LegSimulator(
             self.settings.apply(self.robot), 1, rate=CONTROL_RATE, threads=1
         )
         self._plant = Plant(self._legs, self.settings.noise_and_delay, SoftLimits(), self._rng)

@@ -35,8 +35,8 @@ def run_skills(
         UsageError: A command is out of reach or of an entry's range, or the engine is not
             MuJoCo.
     """
-    if setup.engine != "mujoco":
-        raise UsageError("Stairs and drops need the engine mujoco; leave --engine out.")
+    if setup.engine != "stepper":
+        raise UsageError("Stairs and drops need the engine stepper; leave --engine out.")
     trials.check_repeats(repeats)
     chosen = trials.choose_commands(setup.robot, commands)
     check_labels(entries)

@@ -209,7 +209,7 @@ class TeacherStudentPPO(resumable.ResumablePPO):
         buffer = self.rollout_buffer
         begun = buffer.episode_starts.astype(np.bool_)
         seen, known = shift_to_arrival(
-            buffer.observations, begun, self.env.task.legs.delay_ticks, policy.measured
+            buffer.observations, begun, self.env.task.legs.command_delay_ticks, policy.measured
         )
         policy.student.add_rollout(seen, begun, known)
         losses = [self._dagger_step(policy) for _ in range(self._dagger.gradient_steps)]

@@ -15,7 +15,7 @@ from hopping_leg.sim.simulator import CONTROL_RATE, Ground, Simulator
 class PyBulletSimulator(Simulator):
     """Legs in PyBullet, each in a world of its own, one after the other.
 
-    Dynamics, motors' limits, friction and damping are those of ``MujocoSimulator``, see
+    Dynamics, motors' limits, friction and damping are those of ``LegSimulator``, see
     ``pybullet_urdf``; for the ground see ``ground_law``. Knee and base meet PyBullet's rigid
     ground where the foot meets the robot's, and else the foot's.
 
@@ -36,13 +36,13 @@ class PyBulletSimulator(Simulator):
         super().__init__(robot, count, rate, timestep)
         if not robot.reality.neutral:
             raise UsageError(
-                f"{robot.name} has effects in [reality], which only MuJoCo simulates; choose the"
-                " engine mujoco, or a robot without, e.g. legv2-paper."
+                f"{robot.name} has effects in [reality], which only the stepper simulates; leave"
+                " --engine out, or a robot without, e.g. legv2-paper."
             )
         if robot.of_joints("load_friction").any():
             raise UsageError(
-                f"{robot.name} has a 'load_friction', which only MuJoCo simulates; choose the"
-                " engine mujoco, or a robot without, e.g. legv2-paper."
+                f"{robot.name} has a 'load_friction', which only the stepper simulates; leave"
+                " --engine out, or a robot without, e.g. legv2-paper."
             )
         law = GroundLaw(robot)
         self._law = law if ground == "robot" else None
@@ -57,7 +57,6 @@ class PyBulletSimulator(Simulator):
         ]
         self._finalizer = weakref.finalize(self, _close, self._worlds)
         self._show(np.zeros((count, 6)))
-        self.measured_q, self.measured_qd = self.q, self.qd
         self._known = np.full((count, 6), np.nan)
         self._motors = MotorLimit(robot, count)
         self._applied = np.zeros((count, 2))
@@ -75,22 +74,19 @@ class PyBulletSimulator(Simulator):
         self.q[ids] = q
 
     def step(self, torque: Array) -> Array:
-        """Hold joint torques for one control period; return what the motors gave, N m, (n, 2)."""
-        self._applied = applied = self._motors.give(torque, self.qd)
+        """Command joint torques for a control period; return the motors' mean, N m, (n, 2)."""
         for leg in np.flatnonzero((self.state != self._known).any(axis=1)):
             self._worlds[leg].put(self.state[leg])
-        if self._law is None:
-            self._advance(applied, self.substeps)
-        else:
-            for _ in range(self.substeps):
-                self._push(self._law, applied)
-                self._advance(applied, 1)
+        total = np.zeros((self.count, 2))
+        for _ in range(self.substeps):
+            self._applied = self._motors.give(torque, self.qd)
+            if self._law is not None:
+                self._push(self._law, self._applied)
+            for leg, world in enumerate(self._worlds):
+                self.state[leg] = world.step(self._applied[leg], 1)
+            total += self._applied
         self._known[:] = self.state
-        return applied
-
-    def _advance(self, torque: Array, substeps: int) -> None:
-        for leg, world in enumerate(self._worlds):
-            self.state[leg] = world.step(torque[leg], substeps)
+        return total / self.substeps
 
     def _push(self, law: GroundLaw, torque: Array) -> None:
         force = law.force(self.state, torque)

@@ -1,0 +1,220 @@
+"""The leg's own physics: many legs, which may differ in everything but their rates."""
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from hopping_leg.arrays import Array, IntArray
+from hopping_leg.errors import UsageError
+from hopping_leg.robot import TIMESTEP, Robot
+from hopping_leg.sim import stepper
+from hopping_leg.sim.compiled import CompilingNotice
+from hopping_leg.sim.leg_table import leg_table
+from hopping_leg.sim.simulator import CONTROL_RATE, Simulator
+
+_STEPS_PER_THREAD = 4000
+"""Physics steps for which it is worth waking another thread."""
+
+
+class LegSimulator(Simulator):
+    """Legs in the compiled stepper; results do not depend on the number of threads.
+
+    The robots' ``reality`` holds. What the encoders report is the true state of the motors' side
+    unless a robot has noise, quantisation or latency of measurements.
+
+    Args:
+        robot: What controllers believe.
+        count: Number of legs n.
+        rate: Control rate, Hz.
+        timestep: Physics step, s.
+        threads: Threads at most, 0 for one per core.
+        fixed_base: Whether the bases stay where they are placed, where nothing touches the ground.
+        robots: What each leg is, n of them; all ``robot`` if empty.
+
+    Raises:
+        RobotError: A transmission cannot be simulated at this physics step.
+        UsageError: The physics step does not divide the control period, or robots are missing.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        count: int,
+        *,
+        rate: float = CONTROL_RATE,
+        timestep: float = TIMESTEP,
+        threads: int = 0,
+        fixed_base: bool = False,
+        robots: Sequence[Robot] = (),
+    ) -> None:
+        super().__init__(robot, count, rate, timestep)
+        if robots and len(robots) != count:
+            raise UsageError(f"{len(robots)} robots were given for {count} legs; give one each.")
+        self.threads, self.fixed_base = threads or os.cpu_count() or 1, fixed_base
+        self._show(np.zeros((count, 6)))
+        self._memory = np.zeros(count, stepper.MEMORY)
+        self._push = np.zeros(count)
+        self._command = np.zeros((count, stepper.COMMAND))
+        self._jitter = np.zeros(count)
+        self._reading = np.zeros((count, 6))
+        self._past = np.zeros((count, 0, 6))
+        self.rng = np.random.default_rng(0)
+        """Source of jitter and sensor noise."""
+        self.set_robots(robots or [robot] * count)
+        self._compile()
+
+    def _compile(self) -> None:
+        """Compile everything before the first step, which may be one of a control loop."""
+        if not _is_compiled:
+            with CompilingNotice():
+                self._advance(0, 0)
+                stepper.send_all(self.table, self._memory[:0], self._command, self._jitter)
+                stepper.read_sensors(
+                    self.table, self._memory[:0], self._past, self._reading, self._reading, 1.0
+                )
+            _is_compiled.append(True)
+
+    def set_robots(self, robots: Sequence[Robot]) -> None:
+        """Go on as other robots, one per leg, in the present state; commands stay under way.
+
+        Raises:
+            RobotError: A transmission cannot be simulated at this physics step.
+            UsageError: Commands are late by too many control periods.
+        """
+        self.table = leg_table(robots, self.timestep, fixed_base=self.fixed_base)
+        latest = float((self.table["command_latency"] + self.table["command_jitter"]).max())
+        if latest > (stepper.COMMANDS - 1) * self.period:
+            raise UsageError(
+                f"Commands that are {latest * 1e3:g} ms late do not fit a control period of"
+                f" {self.period * 1e3:g} ms; at most {stepper.COMMANDS - 1} may be under way."
+            )
+        self._jitters = bool(self.table["command_jitter"].any())
+        self._noisy = bool(self.table["sensor_noise"].any())
+        depth = int(np.ceil(self.table["measurement_latency"].max() / self.timestep - 1e-9))
+        self._sensed = bool(
+            depth or self._noisy or self.table["sensor_step"].any() or self.table["elastic"].any()
+        )
+        if depth and depth + 2 > self._past.shape[1]:
+            present = np.concatenate([self._memory["rotor"], self._memory["motor_torque"]], axis=1)
+            self._past = np.repeat(present[:, None], depth + 2, axis=1)
+
+    @property
+    def measured_q(self) -> Array:
+        """Joint angles that the encoders report, rad, (n, 2)."""
+        return self._reading[:, 0:2] if self._sensed else self.q
+
+    @property
+    def measured_qd(self) -> Array:
+        """Joint velocities that the encoders report, rad/s, (n, 2)."""
+        return self._reading[:, 2:4] if self._sensed else self.qd
+
+    @property
+    def measured_torque(self) -> Array:
+        """What the motors' torque measurement reports now, N m at the joints, (n, 2)."""
+        return self._reading[:, 4:6] if self._sensed else self._memory["motor_torque"]
+
+    @property
+    def command_delay_ticks(self) -> IntArray:
+        """Whole control periods by which each leg's commands are late, (n,)."""
+        return np.floor(self.table["command_latency"] / self.period + 1e-9).astype(np.int64)
+
+    @property
+    def loads(self) -> Array:
+        """What the last control period was for the motors, (n, 8), see ``LOADS``."""
+        loads: Array = self._memory["loads"]
+        return loads
+
+    def reseed(self, rng: np.random.Generator) -> None:
+        """Take jitter and sensor noise from here on from another source."""
+        self.rng = rng
+
+    def push(self, force: Array) -> None:
+        """Push the bases upward from now on, N, (n,)."""
+        self._push[:] = force
+
+    def raise_ground(self, rise: Array) -> None:
+        """Raise the ground under each leg, m, (n,): the leg, whose height is above it, is lower."""
+        self.height -= rise
+
+    def place(self, ids: IntArray | slice, height: Array | float, q: Array) -> None:
+        """Put legs at rest at a base height, m, (k,), and joint angles, rad, (k, 2) or (2,)."""
+        self.state[ids] = 0
+        self.height[ids], self.q[ids] = height, q
+        self.forget(ids)
+
+    def forget(self, ids: IntArray | slice) -> None:
+        """Let legs begin anew in their state: no command under way, clean readings."""
+        rows = np.arange(self.count)[ids]
+        self._memory[rows] = np.zeros((), stepper.MEMORY)
+        rotor = self.state[rows][:, [1, 2, 4, 5]]
+        self._memory["rotor"][rows] = rotor
+        self._reading[rows, :4], self._reading[rows, 4:] = rotor, 0
+        self._past[rows] = self._reading[rows, None]
+        step = self.table["sensor_step"][rows]
+        self._reading[rows] = stepper.rounded(self._reading[rows], step)
+
+    def step(self, torque: Array) -> Array:
+        """Command joint torques for a control period; return the motors' mean, N m, (n, 2)."""
+        self._command[:, :2] = torque
+        return self.step_drives(self._command)
+
+    def step_drives(self, command: Array) -> Array:
+        """Command the drives' own PD for a control period, (n, ``COMMAND``); return as ``step``."""
+        if self._jitters:
+            self._jitter = self.rng.random(self.count)
+        stepper.send_all(self.table, self._memory, command, self._jitter)
+        self._advance_all()
+        if self._sensed:
+            draws = self.rng.standard_normal((self.count, 6)) if self._noisy else self._reading
+            stepper.read_sensors(
+                self.table, self._memory, self._past, draws, self._reading, self.timestep
+            )
+        return self._memory["mean_torque"].copy()
+
+    def _advance_all(self) -> None:
+        work = self.count * self.substeps
+        parts = min(self.threads, self.count, 1 + work // _STEPS_PER_THREAD)
+        if parts < 2:
+            self._advance(0, self.count)
+            return
+        ends = np.linspace(0, self.count, parts + 1).astype(int).tolist()
+        pool = _pool(os.getpid())
+        others = [pool.submit(self._advance, *ends[k : k + 2]) for k in range(1, parts)]
+        self._advance(ends[0], ends[1])
+        wait(others)
+
+    def _advance(self, first: int, last: int) -> None:
+        stepper.step_legs(
+            self.table, self.state, self._memory, self._past, self._push, first, last,
+            self.substeps, self.timestep,
+        )  # fmt: skip
+
+    def memory(self) -> dict[str, Any]:
+        """Return everything that is needed to go on exactly from here."""
+        return {
+            "state": self.state.copy(),
+            "memory": self._memory.view(np.float64).reshape(self.count, -1).copy(),
+            "reading": self._reading.copy(),
+            "past": self._past.copy(),
+            "rng": self.rng.bit_generator.state,
+        }
+
+    def restore(self, memory: dict[str, Any]) -> None:
+        """Go on from a ``memory``."""
+        self.state[:], self._reading[:] = memory["state"], memory["reading"]
+        self._memory.view(np.float64).reshape(self.count, -1)[:] = memory["memory"]
+        self._past = np.array(memory["past"])
+        self.rng.bit_generator.state = memory["rng"]
+
+
+_is_compiled: list[bool] = []
+
+
+@cache
+def _pool(process: int) -> ThreadPoolExecutor:
+    """Return the process's helpers; a forked process has none of its parent's threads."""
+    return ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix=f"stepper-{process}")

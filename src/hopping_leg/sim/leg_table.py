@@ -1,0 +1,239 @@
+"""The table of parameters that the stepper reads: a row per leg, computed from its robot."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.errors import RobotError, UsageError
+from hopping_leg.robot import GRAVITY, JOINTS, Joint, Robot
+from hopping_leg.robot.model import FRICTION_TIME_CONSTANT, STOP_TIME_CONSTANT
+
+SENSORS = ("position", "velocity", "torque")
+"""What each joint's sensors measure; columns of readings are (hip, knee) of each in turn."""
+
+_SCALARS = (
+    # Masses and inertias, see leg_physics.mass_matrix; inertias with the rotor where it is rigid.
+    "mass", "thigh_moment", "shank_moment", "coupling", "hip_inertia", "shank_inertia",
+    "knee_inertia", "gravity", "fixed_base",
+    # Geometry.
+    "thigh_length", "shank_length", "base_radius", "knee_radius", "foot_radius",
+    # Ground and stops: MuJoCo's stiffness and damping, and regularisation per 1 - impedance.
+    "ground_friction", "contact_stiffness", "contact_damping", "base_softness", "shank_softness",
+    "stop_stiffness", "stop_damping",
+    # Rail and dry friction.
+    "rail_damping", "rail_friction", "rail_friction_stiffness", "friction_damping",
+    # Time between computer and leg, s.
+    "command_latency", "command_jitter", "measurement_latency",
+)  # fmt: skip
+
+_OF_JOINTS = (
+    "stop_lower", "stop_upper", "joint_softness",
+    # Friction, at the rotor where that is elastic.
+    "damping", "friction", "friction_stiffness", "load_friction", "stiction", "stiction_speed",
+    # Motor and gear.
+    "torque_limit", "saturation", "stall_torque", "speed_slope", "gain", "follow", "ripple",
+    "ripple_periods", "efficiency",
+    # Transmission.
+    "elastic", "armature", "belt_stiffness", "belt_damping", "half_backlash",
+)  # fmt: skip
+
+LEG = np.dtype(
+    [(name, np.float64) for name in _SCALARS]
+    + [(name, np.float64, (2,)) for name in _OF_JOINTS]
+    + [(name, np.float64, (6,)) for name in ("sensor_noise", "sensor_step")]
+)
+"""A row: everything of a leg that the physics needs at a given step."""
+
+_LEAST_IMPEDANCE, _FRICTION_IMPEDANCE, _WIDEST_IMPEDANCE = 0.9, 0.999, 0.95
+_LEAST_FRICTION = 1e-5  # MuJoCo's mjMINMU
+
+
+def leg_table(
+    robots: Sequence[Robot],
+    timestep: float,
+    *,
+    fixed_base: bool = False,
+    gravity: float = GRAVITY,
+) -> Array:
+    """Return the rows of robots for a physics step, s; (n,) of ``LEG``.
+
+    A robot's ``reality`` holds. A ``fixed_base`` stays where it is and nothing touches the ground.
+
+    Raises:
+        RobotError: A transmission is too stiff for the physics step, or has backlash but no
+            stiffness.
+    """
+    rows = {id(robot): _row(robot, timestep, fixed_base, gravity) for robot in set_by_id(robots)}
+    return np.array([rows[id(robot)] for robot in robots])
+
+
+def set_by_id(robots: Sequence[Robot]) -> list[Robot]:
+    """Return the distinct objects among robots, which are many times the same one."""
+    return list({id(robot): robot for robot in robots}.values())
+
+
+def _row(robot: Robot, timestep: float, fixed_base: bool, gravity: float) -> Array:
+    row = np.zeros((), LEG)
+    reality = robot.reality
+    row["fixed_base"], row["gravity"] = fixed_base, gravity
+    row["elastic"] = [_is_elastic(robot, name) for name in JOINTS]
+    _set_bodies(row, robot)
+    _set_ground(row, robot, timestep)
+    row["rail_damping"], row["rail_friction"] = robot.rail.damping, robot.rail.friction
+    row["damping"], row["friction"] = robot.of_joints("damping"), robot.of_joints("friction")
+    row["load_friction"] = robot.of_joints("load_friction")
+    row["stiction"] = robot.of_joints("friction") * (reality.of_drives("stiction") - 1)
+    row["stiction_speed"] = reality.of_drives("stiction_speed")
+    _set_drives(row, robot, timestep)
+    _set_softness(row, timestep)
+    for name, drive, joint in zip(JOINTS, (reality.hip, reality.knee), range(2), strict=True):
+        if row["elastic"][joint]:
+            _check_stiffness(robot, name, row, joint, timestep)
+        row["belt_damping"][joint] = drive.stiffness_damping
+    latency = reality.latency
+    row["command_latency"], row["command_jitter"] = latency.command, latency.jitter
+    row["measurement_latency"] = latency.measurement
+    for what in ("noise", "step"):
+        row[f"sensor_{what}"] = np.concatenate(
+            [reality.of_sensors(f"{sensor}_{what}") for sensor in SENSORS]
+        )
+    return row
+
+
+def _is_elastic(robot: Robot, name: str) -> bool:
+    drive = getattr(robot.reality, name)
+    if drive.backlash and drive.stiffness is None:
+        raise RobotError(
+            f"{robot.name}: 'reality.{name}' has a backlash of {drive.backlash:g} rad but no"
+            " 'stiffness', N m/rad; give the stiffness of gear and belt beyond it."
+        )
+    return drive.stiffness is not None
+
+
+def _set_bodies(row: Array, robot: Robot) -> None:
+    scale = robot.reality.mass
+    thigh, shank = robot.thigh, robot.shank
+    thigh_mass, shank_mass = thigh.mass * scale.thigh, shank.mass * scale.shank
+    armature = robot.of_joints("armature")
+    rigid = np.where(row["elastic"] > 0, 0.0, armature)
+    row["mass"] = robot.base.mass * scale.base + thigh_mass + shank_mass
+    row["thigh_moment"] = thigh_mass * thigh.com + shank_mass * thigh.length
+    row["shank_moment"] = shank_mass * shank.com
+    row["coupling"] = row["shank_moment"] * thigh.length
+    row["shank_inertia"] = shank.inertia * scale.shank + shank_mass * shank.com**2
+    row["hip_inertia"] = (
+        thigh.inertia * scale.thigh
+        + thigh_mass * thigh.com**2
+        + shank_mass * thigh.length**2
+        + row["shank_inertia"]
+        + rigid[0]
+    )
+    row["knee_inertia"] = row["shank_inertia"] + rigid[1]
+    row["armature"] = armature
+    row["thigh_length"], row["shank_length"] = thigh.length, shank.length
+    row["base_radius"], row["knee_radius"] = robot.base.radius, robot.knee_cap.radius
+    row["foot_radius"] = robot.foot.radius
+    row["shank_softness"] = shank.com  # until _set_softness, which needs all of the row
+
+
+def _set_ground(row: Array, robot: Robot, timestep: float) -> None:
+    believed, true = robot.contact, robot.reality.ground
+    time, ratio, friction = (
+        believed_value if true_value is None else true_value
+        for believed_value, true_value in (
+            (believed.time_constant, true.time_constant),
+            (believed.damping_ratio, true.damping_ratio),
+            (believed.friction, true.friction),
+        )
+    )
+    row["ground_friction"] = max(friction, _LEAST_FRICTION)
+    row["contact_stiffness"], row["contact_damping"] = _spring(time, ratio, timestep)
+    row["stop_lower"], row["stop_upper"] = (
+        robot.of_joints(name) for name in ("stop_lower", "stop_upper")
+    )
+    row["stop_stiffness"], row["stop_damping"] = _spring(STOP_TIME_CONSTANT, 1.0, timestep)
+
+
+def _spring(
+    time: float, ratio: float, timestep: float, impedance: float = _WIDEST_IMPEDANCE
+) -> tuple[float, float]:
+    """Return stiffness and damping of MuJoCo's ``solref``, which no step may outrun."""
+    time = max(time, 2 * timestep)
+    return 1 / (impedance * time * ratio) ** 2, 2 / (impedance * time)
+
+
+def _set_softness(row: Array, timestep: float) -> None:
+    """Set MuJoCo's ``invweight0``: inverse inertias of the hanging leg, which scale constraints."""
+    thigh_length, shank_com = row["thigh_length"], float(row["shank_softness"])
+    coupling = float(row["coupling"])
+    mass = np.array(
+        [
+            [row["mass"], 0, 0],
+            [0, row["hip_inertia"] + 2 * coupling, row["shank_inertia"] + coupling],
+            [0, row["shank_inertia"] + coupling, row["knee_inertia"]],
+        ]
+    )
+    inverse = np.linalg.inv(mass)
+    if row["fixed_base"]:
+        inverse[0, 0] = 0.0
+    forward = np.array([0.0, thigh_length + shank_com, shank_com])
+    row["base_softness"] = inverse[0, 0] / 3
+    row["shank_softness"] = (inverse[0, 0] + forward @ inverse @ forward) / 3
+    joints = inverse.diagonal()[1:]
+    row["joint_softness"] = joints
+    rotors = np.where(row["elastic"] > 0, 1 / np.maximum(row["armature"], 1e-12), joints)
+    hold = _FRICTION_IMPEDANCE / (1 - _FRICTION_IMPEDANCE)
+    row["friction_stiffness"] = hold / rotors
+    row["rail_friction_stiffness"] = hold / inverse[0, 0] if inverse[0, 0] else 1.0
+    _, row["friction_damping"] = _spring(
+        FRICTION_TIME_CONSTANT, 1.0, timestep, _FRICTION_IMPEDANCE
+    )
+
+
+def _set_drives(row: Array, robot: Robot, timestep: float) -> None:
+    """Set limits and losses of both drives, at the joints; a lower voltage moves the whole line."""
+    reality = robot.reality
+    for at, (name, drive) in enumerate(zip(JOINTS, (reality.hip, reality.knee), strict=True)):
+        joint: Joint = getattr(robot, name)
+        stall = joint.motor.peak_torque * joint.belt_ratio
+        row["torque_limit"][at] = joint.torque_limit
+        row["stall_torque"][at] = stall * reality.voltage
+        row["speed_slope"][at] = stall / joint.no_load_speed
+        row["saturation"][at] = stall if drive.torque_limit is None else drive.torque_limit
+        row["gain"][at] = joint.torque_gain * drive.torque_gain
+        row["follow"][at] = -np.expm1(-timestep / drive.torque_lag) if drive.torque_lag else 1.0
+        row["ripple"][at], row["ripple_periods"][at] = drive.ripple, drive.ripple_periods
+        row["efficiency"][at] = drive.efficiency
+        row["belt_stiffness"][at] = drive.stiffness or 0.0
+        row["half_backlash"][at] = drive.backlash / 2
+
+
+def _check_stiffness(
+    robot: Robot, name: str, row: Array, joint: int, timestep: float
+) -> None:
+    """Rotor and link against the spring oscillate at w; semi-implicit Euler needs w dt < 2."""
+    link = (robot.thigh, robot.shank)[joint]
+    about_joint = link.inertia + link.mass * link.com**2
+    reduced = 1 / (1 / float(row["armature"][joint]) + 1 / about_joint)
+    stiffness = float(row["belt_stiffness"][joint])
+    if stiffness > reduced / timestep**2:
+        raise RobotError(
+            f"{robot.name}: 'reality.{name}.stiffness' is {stiffness:g} N m/rad, too stiff for a"
+            f" physics step of {timestep:g} s; give at most {reduced / timestep**2:.3g}, a smaller"
+            f" step (below {(reduced / stiffness) ** 0.5:.2g} s), or leave it out for a rigid one."
+        )
+
+
+def check_latency(table: Array, period: float, commands: int) -> None:
+    """Refuse commands that would wait in a longer line than there is.
+
+    Raises:
+        UsageError: A command is late by more control periods than the line is long.
+    """
+    latest = float((table["command_latency"] + table["command_jitter"]).max(initial=0.0))
+    if latest > (commands - 1) * period:
+        raise UsageError(
+            f"Commands that are {latest * 1e3:.1f} ms late do not fit a control period of"
+            f" {period * 1e3:g} ms; at most {commands - 1} of them may be under way."
+        )

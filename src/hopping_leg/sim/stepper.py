@@ -1,0 +1,363 @@
+"""The stepper: many legs, many physics steps, compiled once by numba.
+
+At every physics step, in this order: the commands that arrive, the drive's own PD, software limit,
+gain, current loop, torque-speed line and saturation, cogging and gear loss; friction, contact,
+stops and transmission; the new velocity and position. Legs do not know of each other, so that the
+results are the same with any number of threads, which run without the interpreter's lock.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.sim.compiled import compiled, inlined
+from hopping_leg.sim.leg_physics import (
+    ROWS,
+    add_contacts,
+    add_stops,
+    constrained_acceleration,
+    mass_matrix,
+    rotor_acceleration,
+    solve,
+    times,
+)  # fmt: skip
+
+COMMANDS = 8
+"""Commands under way at most, the one that is in force not counted."""
+
+COMMAND = 10
+"""Numbers of a command: feed-forward torque, stiffness, position, damping and velocity, each of hip
+and knee: N m, N m/rad, rad, N m s/rad, rad/s at the joint."""
+
+LOADS = (
+    "hip_mean_square_torque", "knee_mean_square_torque", "hip_power", "knee_power", "least_power",
+    "hip_peak_speed", "knee_peak_speed", "stop_contact",
+)  # fmt: skip
+"""What a control period was for the motors: torque in (N m)^2 and mean mechanical power of each, W,
+least power of both together, W, highest speeds of the joints, rad/s, 1 if one was at its stop."""
+
+MEMORY = np.dtype(
+    [
+        ("rotor", np.float64, (4,)),  # angles and speeds behind elastic transmissions
+        ("acceleration", np.float64, (3,)),
+        ("motor_torque", np.float64, (2,)),
+        ("mean_torque", np.float64, (2,)),
+        ("loads", np.float64, (len(LOADS),)),
+        ("command", np.float64, (COMMAND,)),
+        ("pending", np.float64, (COMMANDS, 1 + COMMAND)),  # by time of arrival
+        ("waiting", np.float64),
+        ("newest", np.float64),
+    ]
+)
+"""What a leg remembers besides its state, all float64."""
+
+_LOSS_SPEED = 0.1  # joint speed below which a gear's loss fades: power has no direction at rest
+
+
+@inlined
+def send(memory: Any, command: Array, arrival: float) -> None:  # noqa: ANN401
+    """Put a command under way that arrives so many seconds from now.
+
+    It replaces those that would arrive later: none overtakes another.
+    """
+    count = int(memory.waiting)
+    while count > 0 and memory.pending[count - 1, 0] >= arrival:
+        count -= 1
+    count = min(count, COMMANDS - 1)
+    memory.pending[count, 0] = arrival
+    for i in range(COMMAND):
+        memory.pending[count, 1 + i] = command[i]
+    memory.waiting = count + 1
+
+
+@inlined
+def asked(command: Array, joint: int, angle: float, speed: float) -> float:
+    """Return the torque that a command asks of a joint's drive."""
+    torque: float = command[joint]
+    if command[2 + joint] != 0 or command[6 + joint] != 0:
+        torque += command[2 + joint] * (command[4 + joint] - angle)
+        torque += command[6 + joint] * (command[8 + joint] - speed)
+    return torque
+
+
+@inlined
+def receive(memory: Any, now: float, dt: float, t1: float, w1: float, t2: float, w2: float) -> tuple[float, float]:  # noqa: ANN401, E501
+    """Take the commands that arrive in a step; return the torques asked for, mean over the step."""
+    hip = knee = 0.0
+    rest = 1.0
+    arrived = 0
+    waiting = int(memory.waiting)
+    while arrived < waiting and memory.pending[arrived, 0] < now + dt:
+        share = min(max((memory.pending[arrived, 0] - now) / dt, 0.0) - (1 - rest), rest)
+        if share > 0:
+            hip += share * asked(memory.command, 0, t1, w1)
+            knee += share * asked(memory.command, 1, t2, w2)
+            rest -= share
+        for i in range(COMMAND):
+            memory.command[i] = memory.pending[arrived, 1 + i]
+        arrived += 1
+    if arrived > 0:
+        for k in range(arrived, waiting):
+            for i in range(1 + COMMAND):
+                memory.pending[k - arrived, i] = memory.pending[k, i]
+        memory.waiting = waiting - arrived
+    hip += rest * asked(memory.command, 0, t1, w1)
+    knee += rest * asked(memory.command, 1, t2, w2)
+    return hip, knee
+
+
+@inlined
+def motor_torque(p: Any, joint: int, torque: float, before: float, speed: float) -> float:  # noqa: ANN401
+    """Return what the motor gives, at the joint, if asked for ``torque`` and giving ``before``.
+
+    Where it drives, the torque-speed line bounds it: from the stall torque at rest to none at the
+    no-load speed.
+    """
+    limit = p.torque_limit[joint]
+    target = p.gain[joint] * min(max(torque, -limit), limit)
+    given = before + p.follow[joint] * (target - before)
+    drop = p.speed_slope[joint] * speed
+    upper = min(max(p.stall_torque[joint] - drop, 0.0), p.saturation[joint])
+    lower = max(min(-p.stall_torque[joint] - drop, 0.0), -p.saturation[joint])
+    return min(max(given, lower), upper)
+
+
+@inlined
+def relief(p: Any, memory: Any, joint: int, torque: float, given: float) -> float:  # noqa: ANN401
+    """Return the damping of the drive's own PD that is implicit: none where a limit holds."""
+    damping: float = memory.command[6 + joint]
+    if damping == 0 or abs(torque) > p.torque_limit[joint]:
+        return 0.0
+    return p.follow[joint] * p.gain[joint] * damping
+
+
+@inlined
+def after_gear(p: Any, joint: int, torque: float, angle: float, speed: float) -> float:  # noqa: ANN401
+    """Return what arrives at the joint: with cogging, less what the gear loses."""
+    if p.ripple[joint] != 0:
+        torque += p.ripple[joint] * math.sin(p.ripple_periods[joint] * angle)
+    if p.efficiency[joint] < 1:
+        direction = math.tanh(np.sign(torque) * speed / _LOSS_SPEED)
+        torque *= p.efficiency[joint] ** direction
+    return torque
+
+
+@inlined
+def dry_friction(p: Any, joint: int, torque: float, speed: float) -> float:  # noqa: ANN401
+    """Return a joint's dry friction under a motor's torque (Coulomb, load, Stribeck)."""
+    friction: float = p.friction[joint] + p.load_friction[joint] * abs(torque)
+    if p.stiction[joint] > 0:
+        friction += p.stiction[joint] * math.exp(-((speed / p.stiction_speed[joint]) ** 2))
+    return friction
+
+
+@inlined
+def transmitted(p: Any, joint: int, twist: float, rate: float) -> float:  # noqa: ANN401
+    """Return the torque of an elastic transmission with a dead band."""
+    half = p.half_backlash[joint]
+    beyond = twist - min(max(twist, -half), half)
+    return p.belt_stiffness[joint] * beyond + p.belt_damping[joint] * rate
+
+
+@compiled
+def step_leg(p: Any, state: Array, memory: Any, past: Array, rows: Array, push: float, steps: int, dt: float) -> None:  # noqa: ANN401, E501
+    """Advance one leg by physics steps.
+
+    Args:
+        p: The leg's row of the table.
+        state: (x, q1, q2) of the links and their rates, (6,).
+        memory: The leg's ``MEMORY``.
+        past: Ring of what the sensors saw, (k, 6); empty if nothing needs it.
+        rows: Scratch for constraints, (``ROWS``, 5).
+        push: Upward force on the base, N.
+        steps: How many.
+        dt: Physics step, s.
+    """
+    x, q1, q2, v0, v1, v2 = state[0], state[1], state[2], state[3], state[4], state[5]
+    t1, t2, w1, w2 = memory.rotor[0], memory.rotor[1], memory.rotor[2], memory.rotor[3]
+    a = (memory.acceleration[0], memory.acceleration[1], memory.acceleration[2])
+    hip, knee = memory.motor_torque[0], memory.motor_torque[1]
+    elastic1, elastic2 = p.elastic[0] > 0, p.elastic[1] > 0
+    fixed = p.fixed_base > 0
+    stiff1, stiff2 = p.friction_stiffness[0], p.friction_stiffness[1]
+    stiff = (p.rail_friction_stiffness, stiff1, stiff2)
+    soft = (1 / stiff[0], 1 / stiff1, 1 / stiff2)
+    mean1 = mean2 = square1 = square2 = power1 = power2 = 0.0
+    least, peak1, peak2, stop = np.inf, 0.0, 0.0, 0.0
+    for step in range(steps):
+        if not elastic1:
+            t1, w1 = q1, v1
+        if not elastic2:
+            t2, w2 = q2, v2
+        hip_asked, knee_asked = receive(memory, step * dt, dt, t1, w1, t2, w2)
+        hip = motor_torque(p, 0, hip_asked, hip, w1)
+        knee = motor_torque(p, 1, knee_asked, knee, w2)
+        relief1 = relief(p, memory, 0, hip_asked, hip)
+        relief2 = relief(p, memory, 1, knee_asked, knee)
+        joint1, joint2 = after_gear(p, 0, hip, t1, w1), after_gear(p, 1, knee, t2, w2)
+        loss1, loss2 = dry_friction(p, 0, hip, w1), dry_friction(p, 1, knee, w2)
+
+        s1, c1, s12, c12 = math.sin(q1), math.cos(q1), math.sin(q1 + q2), math.cos(q1 + q2)
+        m = mass_matrix(p, s1, s12, c1 * c12 + s1 * s12)
+        bend = p.coupling * (s12 * c1 - c12 * s1)
+        v12 = v1 + v2
+        swing = p.thigh_moment * c1 * v1 * v1 + p.shank_moment * c12 * v12 * v12
+        force0 = push - p.gravity * m[0] - swing - p.rail_damping * v0
+        force1 = bend * v2 * (v1 + v12) - p.gravity * m[1]
+        force2 = -bend * v1 * v1 - p.gravity * m[2]
+        damping1, damping2 = p.damping[0], p.damping[1]
+        rotor1 = rotor2 = 0.0
+        if elastic1:
+            link = transmitted(p, 0, t1 - q1, w1 - v1)
+            pull = joint1 - damping1 * w1 - link
+            rest = -p.friction_damping * w1
+            rotor1 = rotor_acceleration(p.armature[0], pull, rest, loss1, stiff1)
+            force1, loss1 = force1 + link, 0.0
+        else:
+            force1 += joint1 - damping1 * v1
+        if elastic2:
+            link = transmitted(p, 1, t2 - q2, w2 - v2)
+            pull = joint2 - damping2 * w2 - link
+            rest = -p.friction_damping * w2
+            rotor2 = rotor_acceleration(p.armature[1], pull, rest, loss2, stiff2)
+            force2, loss2 = force2 + link, 0.0
+        else:
+            force2 += joint2 - damping2 * v2
+
+        speed = (v0, v1, v2)
+        if fixed:
+            m = (1.0, 0.0, 0.0, m[3], m[4], m[5])
+            force0 = rail = 0.0
+            count = 0
+        else:
+            rail = p.rail_friction
+            count = add_contacts(p, rows, x, speed, s1, c1, s12, c12)
+        touching = count
+        count = add_stops(p, rows, count, (x, q1, q2), speed)
+        if count > touching:
+            stop = 1.0
+        force, loss = (force0, force1, force2), (rail, loss1, loss2)
+        b = -p.friction_damping
+        a = constrained_acceleration(
+            m, force, (b * v0, b * v1, b * v2), loss, stiff, soft, rows, count, a
+        )
+
+        f0, f1, f2 = times(m, a)
+        if elastic1:
+            inertia = p.armature[0] + dt * (damping1 + relief1 + p.belt_damping[0])
+            tie = dt * p.belt_damping[0]
+            h1 = tie - tie * tie / inertia
+            f1 += tie / inertia * p.armature[0] * rotor1
+        else:
+            h1 = dt * (damping1 + relief1)
+        if elastic2:
+            inertia2 = p.armature[1] + dt * (damping2 + relief2 + p.belt_damping[1])
+            tie2 = dt * p.belt_damping[1]
+            h2 = tie2 - tie2 * tie2 / inertia2
+            f2 += tie2 / inertia2 * p.armature[1] * rotor2
+        else:
+            h2 = dt * (damping2 + relief2)
+        h0 = 0.0 if fixed else dt * p.rail_damping
+        y0, y1, y2 = solve((m[0] + h0, m[1], m[2], m[3] + h1, m[4], m[5] + h2), (f0, f1, f2))
+        if elastic1:
+            w1 += dt * (p.armature[0] * rotor1 + tie * y1) / inertia
+            t1 += dt * w1
+        if elastic2:
+            w2 += dt * (p.armature[1] * rotor2 + tie2 * y2) / inertia2
+            t2 += dt * w2
+        v0, v1, v2 = v0 + dt * y0, v1 + dt * y1, v2 + dt * y2
+        x, q1, q2 = x + dt * v0, q1 + dt * v1, q2 + dt * v2
+
+        mean1, mean2 = mean1 + hip, mean2 + knee
+        square1, square2 = square1 + hip * hip, square2 + knee * knee
+        speed1, speed2 = (w1 if elastic1 else v1), (w2 if elastic2 else v2)
+        power1, power2 = power1 + hip * speed1, power2 + knee * speed2
+        least = min(least, hip * speed1 + knee * speed2)
+        peak1, peak2 = max(peak1, abs(v1)), max(peak2, abs(v2))
+        if len(past):
+            slot = (int(memory.newest) + 1) % len(past)
+            memory.newest = slot
+            seen = past[slot]
+            seen[0], seen[1] = (t1 if elastic1 else q1), (t2 if elastic2 else q2)
+            seen[2], seen[3], seen[4], seen[5] = speed1, speed2, hip, knee
+    for k in range(int(memory.waiting)):
+        memory.pending[k, 0] -= steps * dt
+    state[0], state[1], state[2], state[3], state[4], state[5] = x, q1, q2, v0, v1, v2
+    if not elastic1:
+        t1, w1 = q1, v1
+    if not elastic2:
+        t2, w2 = q2, v2
+    memory.rotor[0], memory.rotor[1], memory.rotor[2], memory.rotor[3] = t1, t2, w1, w2
+    memory.acceleration[0], memory.acceleration[1], memory.acceleration[2] = a
+    memory.motor_torque[0], memory.motor_torque[1] = hip, knee
+    memory.mean_torque[0], memory.mean_torque[1] = mean1 / steps, mean2 / steps
+    loads = memory.loads
+    loads[0], loads[1], loads[2], loads[3] = square1 / steps, square2 / steps, power1 / steps, power2 / steps  # noqa: E501
+    loads[4], loads[5], loads[6], loads[7] = least, peak1, peak2, stop
+
+
+@compiled
+def step_legs(table: Array, state: Array, memory: Array, past: Array, push: Array, first: int, last: int, steps: int, dt: float) -> None:  # noqa: E501
+    """Advance the legs from ``first`` to before ``last``."""
+    rows = np.empty((ROWS, 5))
+    for k in range(first, last):
+        step_leg(table[k], state[k], memory[k], past[k], rows, push[k], steps, dt)
+
+
+@compiled
+def send_all(table: Array, memory: Array, command: Array, jitter: Array) -> None:
+    """Send every leg's command, (n, ``COMMAND``); ``jitter`` is the share of it, [0, 1), (n,)."""
+    for k in range(len(memory)):
+        p = table[k]
+        send(memory[k], command[k], p.command_latency + jitter[k] * p.command_jitter)
+
+
+@compiled
+def read_sensors(table: Array, memory: Array, past: Array, draws: Array, reading: Array, dt: float) -> None:  # noqa: E501
+    """Set what each leg's sensors report at the end of a control period.
+
+    Args:
+        table: Rows of ``LEG``, (n,).
+        memory: Rows of ``MEMORY``, (n,).
+        past: Rings of true values after each physics step, (n, k, 6).
+        draws: Standard normal, (n, 6).
+        reading: Position, velocity and torque of hip and knee, (n, 6); set.
+        dt: Physics step, s.
+    """
+    for k in range(len(memory)):
+        p, leg = table[k], memory[k]
+        back = p.measurement_latency / dt
+        whole = int(back)
+        for i in range(6):
+            if back > 0:
+                depth, newest = past.shape[1], int(leg.newest)
+                near = past[k, (newest - whole) % depth, i]
+                value = near + (back - whole) * (past[k, (newest - whole - 1) % depth, i] - near)
+            else:
+                value = leg.rotor[i] if i < 4 else leg.motor_torque[i - 4]
+            if p.sensor_noise[i] > 0:
+                value += p.sensor_noise[i] * draws[k, i]
+            step = p.sensor_step[i]
+            reading[k, i] = round(value / step) * step if step > 0 else value
+
+
+def rounded(values: Array, step: Array) -> Array:
+    """Return values rounded to steps, zero for none."""
+    safe = np.where(step > 0, step, 1.0)
+    return np.where(step > 0, np.round(values / safe) * safe, values)
+
+
+@compiled
+def motor_torques(table: Array, torque: Array, qd: Array, given: Array, friction: Array) -> None:
+    """Set what motors give, and the joints' dry friction, for one physics step of rigid legs.
+
+    Torques asked for and ``given`` before are in N m, speeds in rad/s, all (n, 2).
+    """
+    for k in range(len(table)):
+        p = table[k]
+        for joint in range(2):
+            motor = motor_torque(p, joint, torque[k, joint], given[k, joint], qd[k, joint])
+            given[k, joint] = motor
+            friction[k, joint] = dry_friction(p, joint, motor, qd[k, joint])
