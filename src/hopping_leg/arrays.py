@@ -1,5 +1,7 @@
 """Array types shared by all rooms."""
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -11,3 +13,9 @@ Array32 = npt.NDArray[np.float32]
 
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.int64]
+
+Records = npt.NDArray[np.void]
+"""A structured array: a record per leg."""
+
+Record = Any
+"""One of them; in compiled code its fields are attributes."""

@@ -28,7 +28,6 @@ from hopping_leg.evaluate.runner import evaluate, software_versions
 from hopping_leg.io import safe_file_name
 from hopping_leg.rl.checkpoint import list_checkpoints, read_checkpoint
 from hopping_leg.rl.distillation.teacher_student import Teacher
-from hopping_leg.rl.legacy_names import upgrade_config
 from hopping_leg.rl.recipes import recipe_of
 from hopping_leg.rl.resumable import restore_learner
 from hopping_leg.robot import Robot, load_robot
@@ -255,7 +254,7 @@ def teacher_of_run(run: Path, robot: Robot) -> Teacher:
     found = list_checkpoints(run / "checkpoints")
     if not file.exists() or not found:
         raise UsageError(f"{run} holds no run with a checkpoint; train one with `hop train`.")
-    config = upgrade_config(json.loads(file.read_text(encoding="utf-8")))
+    config = json.loads(file.read_text(encoding="utf-8"))
     recipe = recipe_of(config["recipe"], config["options"]).fit(robot)
     if recipe.distillation is None:
         raise UsageError(

@@ -26,7 +26,7 @@ from hopping_leg.evaluate.result_files import ResultCache
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.robot import JOINTS, Robot, load_robot
 from hopping_leg.robot.kinematics import foot_position, joint_angles
-from hopping_leg.sim import MujocoSimulator
+from hopping_leg.sim import LegSimulator
 
 KNOTS = (0.45, 0.65, 0.85, 0.97)
 """Leg lengths, over the straight leg's, between which the torques are interpolated."""
@@ -204,7 +204,7 @@ def hop(study: ReachStudy, ways: Array, limit: Array) -> list[Trial]:
     """
     robot, count = study.robot, len(ways)
     straight = robot.thigh.length + robot.shank.length
-    legs = MujocoSimulator(robot, count, threads=study.threads)
+    legs = LegSimulator(robot, count, threads=study.threads)
     legs.stand(slice(None), joint_angles(robot, np.array([_START * straight, 0.0])))
     low, high = _FLIGHT
     lengths = straight * (low + (high - low) * ways[:, 0])

@@ -22,7 +22,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import Robot, load_robot
 from hopping_leg.robot.kinematics import joint_angles
-from hopping_leg.sim import NO_NOISE, MujocoSimulator, NoiseAndDelay
+from hopping_leg.sim import NO_NOISE, LegSimulator, NoiseAndDelay
 
 REFERENCE = 6.25e-5
 """Physics step that the others are compared with, s."""
@@ -180,7 +180,7 @@ def _held(
     robot: Robot, step: float, length: Callable[[float], float], clearance: float, seconds: float
 ) -> Array:
     """Track leg lengths (over the straight leg's) by joint PD; return the height, (ticks,)."""
-    legs = MujocoSimulator(robot, 1, timestep=step, threads=1)
+    legs = LegSimulator(robot, 1, timestep=step, threads=1)
     reach = robot.thigh.length + robot.shank.length
     legs.stand(slice(None), joint_angles(robot, np.array([length(0.0) * reach, 0.0])), clearance)
     heights = np.empty(round(seconds * legs.rate))

@@ -1,8 +1,9 @@
-"""Speed of the environment against the bare physics inside it and against Gymnasium's Hopper-v5.
+"""Speed of the stepper beside MuJoCo, and of the environments around it.
 
-The environment first runs once while its motor torques are recorded. Then it runs again from the
-same state, in turn with bare physics that gets the recorded torques: both simulate the very same
-motion, so their difference is what noise, delay, limits, reward, observation and episodes cost.
+The environment runs once while its motor torques are recorded. Then, in turn, it runs again from
+the same state, and bare physics gets the recorded torques: the stepper and ``mujoco.batch`` on one
+thread, for the plain leg, and the stepper with every effect of the twin. All simulate the same
+motion, so that their ratios are what physics, noise, delay, reward and observation cost.
 """
 
 from collections.abc import Callable, Mapping
@@ -13,6 +14,7 @@ from typing import Any
 import gymnasium
 import mujoco
 import numpy as np
+from mujoco import batch
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
@@ -22,7 +24,7 @@ from hopping_leg.cli.options import at_least
 from hopping_leg.envs import HoppingEnv, HoppingTask, TaskConfig, paper_reward
 from hopping_leg.robot import TIMESTEP, Robot, build_model, load_robot
 from hopping_leg.robot.kinematics import joint_angles
-from hopping_leg.sim import MujocoSimulator
+from hopping_leg.sim import LegSimulator
 from studies.shared import Timed, host, interleave, median_ratio
 
 _BENT, _STRETCHED = 0.55, 0.8
@@ -57,16 +59,16 @@ class EnvBenchmark:
 
 @dataclass(frozen=True)
 class Motion:
-    """One hopping motion: the actions that lead to it and the motor torques that were applied.
+    """One hopping motion: the actions that lead to it and the motors' mean torques.
 
     Attributes:
         actions: (ticks, n, 2).
-        controls: At the motors, N m, (ticks, n, 2).
+        torques: At the joints, N m, (ticks, n, 2).
         start: State of the task at the first tick.
     """
 
     actions: Array
-    controls: Array
+    torques: Array
     start: dict[str, Any]
 
 
@@ -76,46 +78,46 @@ def bench_env(
     """Time everything in one run, alternating.
 
     Returns:
-        ``batched_env_steps_per_s``, ``batched_env_over_bare_physics`` (throughput, 1 is free),
-        ``single_env_cost_over_bare_physics`` (time, 1 is free), ratios to Hopper-v5, and more.
+        Times of a physics step per leg and thread, s, their ratios, throughput of the batched and
+        time of the single environment, ratios to Hopper-v5.
     """
     functions, steps = _functions(benchmark)
     taken = interleave(functions, benchmark.repeats, on_repeat)
-    rate = {name: float(np.median(steps[name] / taken[name])) for name in taken}
-    batched = taken["batched_env"] / steps["batched_env"]
-    single = taken["single_env"] / steps["single_env"]
-    leg = taken["hopper_v5"] / steps["hopper_v5"]
-    bare = taken["single_mj_step"] / steps["single_mj_step"]
+    per_step = {name: taken[name] / steps[name] for name in taken}
+    typical = {name: float(np.median(times)) for name, times in per_step.items()}
+    substeps = _substeps(benchmark)
     return {
-        "batched_env_steps_per_s": rate["batched_env"],
-        "batched_env_over_bare_physics": median_ratio(
-            taken["batched_physics"], taken["batched_env"]
+        "stepper_step_s": typical["stepper"] / substeps,
+        "stepper_with_effects_step_s": typical["stepper_with_effects"] / substeps,
+        "mujoco_batch_step_s": typical["mujoco_batch"] / substeps,
+        "stepper_over_mujoco": median_ratio(per_step["mujoco_batch"], per_step["stepper"]),
+        "stepper_with_effects_over_mujoco": median_ratio(
+            per_step["mujoco_batch"], per_step["stepper_with_effects"]
         ),
-        "single_env_cost_over_bare_physics": median_ratio(single, bare),
-        "single_env_cost_over_one_leg_batch": median_ratio(
-            taken["single_env"], taken["single_batch"]
+        "batched_env_steps_per_s": 1 / typical["batched_env"],
+        "batched_env_overhead_s": float(
+            np.median(per_step["batched_env"] - per_step["batched_physics"])
         ),
-        "single_env_steps_per_s": rate["single_env"],
-        "batched_physics_steps_per_s": rate["batched_physics"],
-        "single_physics_steps_per_s": rate["single_mj_step"],
-        "hopper_v5_steps_per_s": rate["hopper_v5"],
-        "single_env_over_hopper_v5": median_ratio(leg, single),
-        "batched_env_over_hopper_v5": median_ratio(leg, batched),
-        "single_env_overhead_us": float(np.median(single - bare) * 1e6),
+        "single_env_step_s": typical["single_env"],
+        "single_env_over_hopper_v5": median_ratio(per_step["hopper_v5"], per_step["single_env"]),
+        "batched_env_over_hopper_v5": median_ratio(per_step["hopper_v5"], per_step["batched_env"]),
         "setup": _setup(benchmark),
         "host": host(),
     }
 
 
+def _substeps(benchmark: EnvBenchmark) -> int:
+    return round(1 / (_options(benchmark).rate * benchmark.timestep))
+
+
 def _setup(benchmark: EnvBenchmark) -> dict[str, Any]:
-    options = _options(benchmark)
     return {
         "robot": benchmark.robot.name,
         "legs": benchmark.count,
         "threads": benchmark.threads,
         "repeats": benchmark.repeats,
         "timestep_s": benchmark.timestep,
-        "substeps": round(1 / (options.rate * options.timestep)),
+        "substeps": _substeps(benchmark),
         "noise_and_delay": True,
     }
 
@@ -139,26 +141,27 @@ def _functions(benchmark: EnvBenchmark) -> tuple[Mapping[str, Timed], Mapping[st
     env = HoppingEnv(robot, options)
     env.reset(seed=benchmark.seed)
     one = record(env.task, benchmark.single_ticks)
-    bare = MujocoSimulator(
+    bare = LegSimulator(
         robot, benchmark.count, timestep=benchmark.timestep, threads=benchmark.threads
     )
-    lone = MujocoSimulator(robot, 1, timestep=benchmark.timestep, threads=1)
+    plain = LegSimulator(robot, benchmark.count, timestep=benchmark.timestep, threads=1)
+    twin = LegSimulator(load_robot("twin"), benchmark.count, timestep=benchmark.timestep, threads=1)
     leg = gymnasium.make(
         "Hopper-v5", frame_skip=bare.substeps, terminate_when_unhealthy=False
     ).unwrapped
     leg.reset(seed=benchmark.seed)
     functions = {
         "batched_env": lambda: _run_task(task, many),
-        "batched_physics": lambda: _run_batch(bare, many),
+        "batched_physics": lambda: _run_legs(bare, many),
+        "stepper": lambda: _run_legs(plain, many),
+        "stepper_with_effects": lambda: _run_legs(twin, many),
+        "mujoco_batch": _mujoco_batch(plain, many),
         "single_env": lambda: _run_env(env, one),
-        "single_batch": lambda: _run_batch(lone, one),
-        "single_mj_step": _mj_step(lone, one),
         "hopper_v5": lambda: _run_hopper(leg, benchmark.single_ticks),
     }
-    legs = {"batched_env": benchmark.count, "batched_physics": benchmark.count}
-    ticks = {"batched_env": benchmark.ticks, "batched_physics": benchmark.ticks}
+    of_one = {"single_env": benchmark.single_ticks, "hopper_v5": benchmark.single_ticks}
     return functions, {
-        name: legs.get(name, 1) * ticks.get(name, benchmark.single_ticks) for name in functions
+        name: of_one.get(name, benchmark.count * benchmark.ticks) for name in functions
     }
 
 
@@ -169,14 +172,14 @@ def record(task: HoppingTask, ticks: int) -> Motion:
     half = round(_PERIOD * task.options.rate / 2)
     task.reset()
     start = task.state()
-    actions, controls = np.empty((2, ticks, task.count, 2))
+    actions, torques = np.empty((2, ticks, task.count, 2))
     for tick in range(ticks):
         seen, target = task.measurement, postures[tick // half % 2]
         torque = _STIFFNESS * (target - seen.q[:, 0]) - _DAMPING * seen.qd[:, 0]
         actions[tick] = np.clip(torque / task.options.action_torque, -1, 1).astype(np.float32)
         task.step(actions[tick])
-        controls[tick] = task.legs.batch.bind("ctrl")
-    return Motion(actions, controls, start)
+        torques[tick] = task.applied_torque
+    return Motion(actions, torques, start)
 
 
 def _run_task(task: HoppingTask, motion: Motion) -> None:
@@ -192,25 +195,27 @@ def _run_env(env: HoppingEnv, motion: Motion) -> None:
         env.step(action)
 
 
-def _run_batch(legs: MujocoSimulator, motion: Motion) -> None:
-    legs.batch.state[:] = motion.start["physics"]
-    control, substeps = legs.batch.bind("ctrl"), legs.substeps
-    for row in motion.controls:
-        control[:] = row
-        legs.batch.step(nstep=substeps)
+def _run_legs(legs: LegSimulator, motion: Motion) -> None:
+    start = motion.start["legs"]["state"]
+    legs.place(slice(None), start[:, 0], start[:, 1:3])
+    legs.state[:] = start
+    for torque in motion.torques:
+        legs.step(torque)
 
 
-def _mj_step(legs: MujocoSimulator, motion: Motion) -> Timed:
-    """Return the plainest physics there is: MuJoCo's own step on one leg."""
+def _mujoco_batch(legs: LegSimulator, motion: Motion) -> Timed:
+    """Return MuJoCo's batch on one thread under the same torques."""
     model = build_model(legs.robot, legs.timestep)
-    data = mujoco.MjData(model)
-    start, substeps = motion.start["physics"][0], legs.substeps
+    simulation = batch.Batch(model, legs.count, 1)
+    first = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_TIME)
+    state, control = simulation.state[:, first : first + 6], simulation.bind("ctrl")
+    controls = motion.torques / legs.robot.of_joints("belt_ratio")
 
     def run() -> None:
-        mujoco.mj_setState(model, data, start, mujoco.mjtState.mjSTATE_INTEGRATION)
-        for row in motion.controls[:, 0]:
-            data.ctrl[:] = row
-            mujoco.mj_step(model, data, nstep=substeps)
+        state[:] = motion.start["legs"]["state"]
+        for row in controls:
+            control[:] = row
+            simulation.step(nstep=legs.substeps)
 
     return run
 

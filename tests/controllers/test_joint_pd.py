@@ -4,7 +4,7 @@ import pytest
 from hopping_leg.controllers.joint_pd import JointGains, JointPD
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot
-from hopping_leg.sim import NO_NOISE, Measurement, MujocoSimulator, Plant
+from hopping_leg.sim import NO_NOISE, LegSimulator, Measurement, Plant
 
 
 def seen(q, qd):
@@ -28,7 +28,7 @@ def test_torque_is_the_law_and_the_end_is_held():
 def test_every_leg_follows_with_the_default_gains(name):
     time = np.arange(400) / 200
     target = np.stack([0.5 * np.sin(3 * time), -1.2 + 0.3 * np.cos(3 * time)], axis=1)
-    legs = MujocoSimulator(load_robot(name), 1, threads=1, clamped=True)
+    legs = LegSimulator(load_robot(name), 1, threads=1, fixed_base=True)
     plant = Plant(legs, NO_NOISE, None, np.random.default_rng(0))
     legs.place(slice(None), 1.0, target[0])
     pd = JointPD(target)

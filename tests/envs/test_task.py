@@ -117,9 +117,9 @@ def test_resetting_some_legs_leaves_the_others_alone():
     some = task(TaskConfig(disturbance=NO_NOISE), count=4)
     for action in actions(30, count=4):
         some.step(action)
-    before = some.legs.batch.state.copy()
+    before = some.legs.state.copy()
     some.reset(np.array([1, 3]))
-    np.testing.assert_array_equal(some.legs.batch.state[[0, 2]], before[[0, 2]])
+    np.testing.assert_array_equal(some.legs.state[[0, 2]], before[[0, 2]])
     np.testing.assert_allclose(some.legs.height[[1, 3]], 0.2 + ROBOT.foot.radius)
 
 

@@ -2,6 +2,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from hopping_leg.sim.mismatch_model import mismatch_model
 
 from hopping_leg.errors import RobotError
 from hopping_leg.robot import (
@@ -13,7 +14,6 @@ from hopping_leg.robot import (
     load_robot,
 )
 from hopping_leg.sim import NO_NOISE, MujocoSimulator, NoiseAndDelay, Plant
-from hopping_leg.sim.mismatch_model import mismatch_model
 from tests.sim.legs import POSTURE, with_reality
 
 CAD = load_robot("legv2")

@@ -14,7 +14,7 @@ from hopping_leg.envs.observation import (
     sample_scaling,
 )
 from hopping_leg.robot import Robot, kinematics
-from hopping_leg.sim import Measurement, LegSimulator, Plant, randomization
+from hopping_leg.sim import LegSimulator, Measurement, Plant, randomization
 
 _STANDING_SHARE = 0.3  # of the starts ``hop``
 
@@ -132,6 +132,8 @@ class HoppingTask:
         for constant in (self._never, self._nan):
             constant.flags.writeable = False
         self.command = np.empty(count)
+        self.applied_torque = np.zeros((count, 2))
+        """What the motors gave in the last control period, mean, N m, (n, 2)."""
         self._tick = 0
         self._end = np.empty(count, np.int64)
         self._switch = np.full(count, np.iinfo(np.int64).max)
@@ -179,7 +181,7 @@ class HoppingTask:
         np.maximum(taken, self._lowest, out=taken)
         np.minimum(taken, self._highest, out=taken)
         height_before = legs.height.copy()
-        self.plant.drive(taken * self._torque)
+        self.applied_torque = self.plant.drive(taken * self._torque)
         apex, apex_height, apex_error = self._apexes(height_before)
         reward, terms = self.reward(
             rewards.Transition(

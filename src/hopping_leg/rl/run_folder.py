@@ -7,7 +7,7 @@ from typing import Any
 
 from hopping_leg.errors import UsageError
 from hopping_leg.io import versions, write_json
-from hopping_leg.rl import checkpoint, legacy_names, recipes
+from hopping_leg.rl import checkpoint, recipes
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.robot.parameters import Robot
 
@@ -87,11 +87,7 @@ class RunFolder:
         if not new:
             self.check_same()
             refuse_finished(self.policy)
-        tree = (
-            legacy_names.upgrade_checkpoint(checkpoint.read_checkpoint(found[-1]))
-            if found
-            else self._from_source()
-        )
+        tree = checkpoint.read_checkpoint(found[-1]) if found else self._from_source()
         if new:
             self.write("config.json", self.config)
         return tree
@@ -102,10 +98,7 @@ class RunFolder:
         found = checkpoint.list_checkpoints(self._source / "checkpoints")
         if not found:
             raise UsageError(f"{self._source} holds no checkpoint to begin from.")
-        return {
-            **legacy_names.upgrade_checkpoint(checkpoint.read_checkpoint(found[-1])),
-            "history": [],
-        }
+        return {**checkpoint.read_checkpoint(found[-1]), "history": []}
 
     def write(self, name: str, content: Any) -> None:  # noqa: ANN401
         """Write a JSON file of the folder, whole or not at all."""
@@ -113,7 +106,7 @@ class RunFolder:
 
     def check_same(self) -> None:
         """Raise ``UsageError`` where the run in the folder was asked for something else."""
-        stored = legacy_names.upgrade_config(read_json(self.path / "config.json"))
+        stored = read_json(self.path / "config.json")
         # A run from before an option existed was asked for what is its default.
         _complete(stored.get("options", {}), self._defaults)
         stored.setdefault("parallel_seeds", 1)

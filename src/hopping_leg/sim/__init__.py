@@ -9,14 +9,14 @@ from hopping_leg.sim.stepper import LOADS
 
 __all__ = [
     "CONTROL_RATE",
+    "LOADS",
     "NO_NOISE",
     "SAMPLES",
     "Channel",
     "Engine",
     "Ground",
-    "Measurement",
-    "LOADS",
     "LegSimulator",
+    "Measurement",
     "NoiseAndDelay",
     "Plant",
     "Simulator",

@@ -20,12 +20,9 @@ matrix is (m00, m01, m02, m11, m12, m22). Lengths are in m, masses in kg, angles
 throughout; torques are the joint's.
 """
 
-import math
-from typing import Any
-
 import numpy as np
 
-from hopping_leg.arrays import Array
+from hopping_leg.arrays import Array, Record
 from hopping_leg.sim.compiled import inlined
 
 ROWS = 11
@@ -39,7 +36,7 @@ _SEARCHES = 40
 
 
 @inlined
-def mass_matrix(p: Any, s1: float, s12: float, cos_knee: float) -> Symmetric:  # noqa: ANN401
+def mass_matrix(p: Record, s1: float, s12: float, cos_knee: float) -> Symmetric:
     """Return M for the sines of q1 and q1 + q2 and the cosine of q2."""
     coupling = p.coupling * cos_knee
     rail_knee = p.shank_moment * s12
@@ -95,7 +92,7 @@ def impedance(depth: float) -> float:
 
 @inlined
 def add_contact(
-    p: Any,  # noqa: ANN401
+    p: Record,
     rows: Array,
     count: int,
     gap: float,
@@ -125,7 +122,7 @@ def add_contact(
 
 @inlined
 def add_contacts(
-    p: Any,  # noqa: ANN401
+    p: Record,
     rows: Array,
     height: float,
     speed: Vector,
@@ -160,7 +157,7 @@ def add_contacts(
 
 
 @inlined
-def add_stops(p: Any, rows: Array, count: int, q: Vector, speed: Vector) -> int:  # noqa: ANN401
+def add_stops(p: Record, rows: Array, count: int, q: Vector, speed: Vector) -> int:
     """Add a row for each joint beyond its mechanical stop; return the new count."""
     for joint in range(2):
         angle = q[1] if joint == 0 else q[2]
@@ -180,9 +177,7 @@ def add_stops(p: Any, rows: Array, count: int, q: Vector, speed: Vector) -> int:
 
 
 @inlined
-def active(
-    a: Vector, rest: Vector, loss: Vector, bound: Vector, rows: Array, count: int
-) -> int:
+def active(a: Vector, rest: Vector, loss: Vector, bound: Vector, rows: Array, count: int) -> int:
     """Return which pieces of the s_i hold at an acceleration, as bits.
 
     Friction i slides where ``a - rest`` is beyond ``bound``; ``rest`` is its reference.
@@ -330,7 +325,9 @@ def constrained_acceleration(
 
 
 @inlined
-def rotor_acceleration(inertia: float, force: float, rest: float, loss: float, stiff: float) -> float:
+def rotor_acceleration(
+    inertia: float, force: float, rest: float, loss: float, stiff: float
+) -> float:
     """Return a rotor's acceleration: the same principle in one unknown."""
     free = force / inertia
     if loss <= 0:

@@ -120,7 +120,8 @@ class LegSimulator(Simulator):
     @property
     def command_delay_ticks(self) -> IntArray:
         """Whole control periods by which each leg's commands are late, (n,)."""
-        return np.floor(self.table["command_latency"] / self.period + 1e-9).astype(np.int64)
+        ticks: IntArray = (self.table["command_latency"] / self.period + 1e-9).astype(np.int64)
+        return ticks
 
     @property
     def loads(self) -> Array:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hopping_leg.arrays import Array
+from hopping_leg.arrays import Records
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.robot import GRAVITY, JOINTS, Joint, Robot
 from hopping_leg.robot.model import FRICTION_TIME_CONSTANT, STOP_TIME_CONSTANT
@@ -33,7 +33,7 @@ _OF_JOINTS = (
     "damping", "friction", "friction_stiffness", "load_friction", "stiction", "stiction_speed",
     # Motor and gear.
     "torque_limit", "saturation", "stall_torque", "speed_slope", "gain", "follow", "ripple",
-    "ripple_periods", "efficiency",
+    "ripple_periods", "log_efficiency",
     # Transmission.
     "elastic", "armature", "belt_stiffness", "belt_damping", "half_backlash",
 )  # fmt: skip
@@ -55,7 +55,7 @@ def leg_table(
     *,
     fixed_base: bool = False,
     gravity: float = GRAVITY,
-) -> Array:
+) -> Records:
     """Return the rows of robots for a physics step, s; (n,) of ``LEG``.
 
     A robot's ``reality`` holds. A ``fixed_base`` stays where it is and nothing touches the ground.
@@ -73,7 +73,7 @@ def set_by_id(robots: Sequence[Robot]) -> list[Robot]:
     return list({id(robot): robot for robot in robots}.values())
 
 
-def _row(robot: Robot, timestep: float, fixed_base: bool, gravity: float) -> Array:
+def _row(robot: Robot, timestep: float, fixed_base: bool, gravity: float) -> Records:
     row = np.zeros((), LEG)
     reality = robot.reality
     row["fixed_base"], row["gravity"] = fixed_base, gravity
@@ -111,7 +111,7 @@ def _is_elastic(robot: Robot, name: str) -> bool:
     return drive.stiffness is not None
 
 
-def _set_bodies(row: Array, robot: Robot) -> None:
+def _set_bodies(row: Records, robot: Robot) -> None:
     scale = robot.reality.mass
     thigh, shank = robot.thigh, robot.shank
     thigh_mass, shank_mass = thigh.mass * scale.thigh, shank.mass * scale.shank
@@ -137,7 +137,7 @@ def _set_bodies(row: Array, robot: Robot) -> None:
     row["shank_softness"] = shank.com  # until _set_softness, which needs all of the row
 
 
-def _set_ground(row: Array, robot: Robot, timestep: float) -> None:
+def _set_ground(row: Records, robot: Robot, timestep: float) -> None:
     believed, true = robot.contact, robot.reality.ground
     time, ratio, friction = (
         believed_value if true_value is None else true_value
@@ -163,7 +163,7 @@ def _spring(
     return 1 / (impedance * time * ratio) ** 2, 2 / (impedance * time)
 
 
-def _set_softness(row: Array, timestep: float) -> None:
+def _set_softness(row: Records, timestep: float) -> None:
     """Set MuJoCo's ``invweight0``: inverse inertias of the hanging leg, which scale constraints."""
     thigh_length, shank_com = row["thigh_length"], float(row["shank_softness"])
     coupling = float(row["coupling"])
@@ -186,12 +186,10 @@ def _set_softness(row: Array, timestep: float) -> None:
     hold = _FRICTION_IMPEDANCE / (1 - _FRICTION_IMPEDANCE)
     row["friction_stiffness"] = hold / rotors
     row["rail_friction_stiffness"] = hold / inverse[0, 0] if inverse[0, 0] else 1.0
-    _, row["friction_damping"] = _spring(
-        FRICTION_TIME_CONSTANT, 1.0, timestep, _FRICTION_IMPEDANCE
-    )
+    _, row["friction_damping"] = _spring(FRICTION_TIME_CONSTANT, 1.0, timestep, _FRICTION_IMPEDANCE)
 
 
-def _set_drives(row: Array, robot: Robot, timestep: float) -> None:
+def _set_drives(row: Records, robot: Robot, timestep: float) -> None:
     """Set limits and losses of both drives, at the joints; a lower voltage moves the whole line."""
     reality = robot.reality
     for at, (name, drive) in enumerate(zip(JOINTS, (reality.hip, reality.knee), strict=True)):
@@ -204,14 +202,12 @@ def _set_drives(row: Array, robot: Robot, timestep: float) -> None:
         row["gain"][at] = joint.torque_gain * drive.torque_gain
         row["follow"][at] = -np.expm1(-timestep / drive.torque_lag) if drive.torque_lag else 1.0
         row["ripple"][at], row["ripple_periods"][at] = drive.ripple, drive.ripple_periods
-        row["efficiency"][at] = drive.efficiency
+        row["log_efficiency"][at] = np.log(drive.efficiency)
         row["belt_stiffness"][at] = drive.stiffness or 0.0
         row["half_backlash"][at] = drive.backlash / 2
 
 
-def _check_stiffness(
-    robot: Robot, name: str, row: Array, joint: int, timestep: float
-) -> None:
+def _check_stiffness(robot: Robot, name: str, row: Records, joint: int, timestep: float) -> None:
     """Rotor and link against the spring oscillate at w; semi-implicit Euler needs w dt < 2."""
     link = (robot.thigh, robot.shank)[joint]
     about_joint = link.inertia + link.mass * link.com**2
@@ -225,7 +221,7 @@ def _check_stiffness(
         )
 
 
-def check_latency(table: Array, period: float, commands: int) -> None:
+def check_latency(table: Records, period: float, commands: int) -> None:
     """Refuse commands that would wait in a longer line than there is.
 
     Raises:

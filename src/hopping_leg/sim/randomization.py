@@ -226,6 +226,8 @@ MISMATCH_RANGES = (
     Range("reality.latency.measurement", "s", 0.0, 1.5e-3, "[C] bus cycle"),
     Range("reality.latency.jitter", "s", 0.0, 1e-3, "[C] computer without real time"),
     *_drives(),
+    Range("reality.hip.stiffness", "N m/rad", 800.0, 2000.0, "[C] planetary stage", "logarithmic"),
+    Range("reality.hip.stiffness_damping", "N m s/rad", 0.02, 0.1, "[C] grease"),
     Range("reality.knee.stiffness", "N m/rad", 150.0, 600.0, "[C] timing belt", "logarithmic"),
     Range("reality.knee.stiffness_damping", "N m s/rad", 0.01, 0.05, "[C] rubber"),
     Range("reality.mass.base", "1", 0.97, 1.03, "[C] cables and screws"),

@@ -66,7 +66,7 @@ class Simulator(ABC):
 
     @property
     def loads(self) -> Array:
-        """What the last control period was for the motors, (n, 8), see ``LOADS``; NaN if unknown."""
+        """What the last control period was for the motors, (n, 8), ``LOADS``; NaN if unknown."""
         return np.full((self.count, len(LOADS)), np.nan)
 
     def reseed(self, rng: np.random.Generator) -> None:  # noqa: B027

@@ -7,11 +7,10 @@ results are the same with any number of threads, which run without the interpret
 """
 
 import math
-from typing import Any
 
 import numpy as np
 
-from hopping_leg.arrays import Array
+from hopping_leg.arrays import Array, Record, Records
 from hopping_leg.sim.compiled import compiled, inlined
 from hopping_leg.sim.leg_physics import (
     ROWS,
@@ -57,7 +56,7 @@ _LOSS_SPEED = 0.1  # joint speed below which a gear's loss fades: power has no d
 
 
 @inlined
-def send(memory: Any, command: Array, arrival: float) -> None:  # noqa: ANN401
+def send(memory: Record, command: Array, arrival: float) -> None:
     """Put a command under way that arrives so many seconds from now.
 
     It replaces those that would arrive later: none overtakes another.
@@ -83,7 +82,9 @@ def asked(command: Array, joint: int, angle: float, speed: float) -> float:
 
 
 @inlined
-def receive(memory: Any, now: float, dt: float, t1: float, w1: float, t2: float, w2: float) -> tuple[float, float]:  # noqa: ANN401, E501
+def receive(
+    memory: Record, now: float, dt: float, t1: float, w1: float, t2: float, w2: float
+) -> tuple[float, float]:
     """Take the commands that arrive in a step; return the torques asked for, mean over the step."""
     hip = knee = 0.0
     rest = 1.0
@@ -109,7 +110,7 @@ def receive(memory: Any, now: float, dt: float, t1: float, w1: float, t2: float,
 
 
 @inlined
-def motor_torque(p: Any, joint: int, torque: float, before: float, speed: float) -> float:  # noqa: ANN401
+def motor_torque(p: Record, joint: int, torque: float, before: float, speed: float) -> float:
     """Return what the motor gives, at the joint, if asked for ``torque`` and giving ``before``.
 
     Where it drives, the torque-speed line bounds it: from the stall torque at rest to none at the
@@ -125,7 +126,7 @@ def motor_torque(p: Any, joint: int, torque: float, before: float, speed: float)
 
 
 @inlined
-def relief(p: Any, memory: Any, joint: int, torque: float, given: float) -> float:  # noqa: ANN401
+def relief(p: Record, memory: Record, joint: int, torque: float, given: float) -> float:
     """Return the damping of the drive's own PD that is implicit: none where a limit holds."""
     damping: float = memory.command[6 + joint]
     if damping == 0 or abs(torque) > p.torque_limit[joint]:
@@ -134,27 +135,27 @@ def relief(p: Any, memory: Any, joint: int, torque: float, given: float) -> floa
 
 
 @inlined
-def after_gear(p: Any, joint: int, torque: float, angle: float, speed: float) -> float:  # noqa: ANN401
+def after_gear(p: Record, joint: int, torque: float, angle: float, speed: float) -> float:
     """Return what arrives at the joint: with cogging, less what the gear loses."""
     if p.ripple[joint] != 0:
         torque += p.ripple[joint] * math.sin(p.ripple_periods[joint] * angle)
-    if p.efficiency[joint] < 1:
-        direction = math.tanh(np.sign(torque) * speed / _LOSS_SPEED)
-        torque *= p.efficiency[joint] ** direction
+    if p.log_efficiency[joint] < 0:
+        share = speed / math.sqrt(speed * speed + _LOSS_SPEED * _LOSS_SPEED)
+        torque *= math.exp(p.log_efficiency[joint] * (share if torque > 0 else -share))
     return torque
 
 
 @inlined
-def dry_friction(p: Any, joint: int, torque: float, speed: float) -> float:  # noqa: ANN401
+def dry_friction(p: Record, joint: int, torque: float, speed: float) -> float:
     """Return a joint's dry friction under a motor's torque (Coulomb, load, Stribeck)."""
     friction: float = p.friction[joint] + p.load_friction[joint] * abs(torque)
-    if p.stiction[joint] > 0:
+    if p.stiction[joint] > 0 and abs(speed) < 6 * p.stiction_speed[joint]:
         friction += p.stiction[joint] * math.exp(-((speed / p.stiction_speed[joint]) ** 2))
     return friction
 
 
 @inlined
-def transmitted(p: Any, joint: int, twist: float, rate: float) -> float:  # noqa: ANN401
+def transmitted(p: Record, joint: int, twist: float, rate: float) -> float:
     """Return the torque of an elastic transmission with a dead band."""
     half = p.half_backlash[joint]
     beyond = twist - min(max(twist, -half), half)
@@ -162,7 +163,16 @@ def transmitted(p: Any, joint: int, twist: float, rate: float) -> float:  # noqa
 
 
 @compiled
-def step_leg(p: Any, state: Array, memory: Any, past: Array, rows: Array, push: float, steps: int, dt: float) -> None:  # noqa: ANN401, E501
+def step_leg(
+    p: Record,
+    state: Array,
+    memory: Record,
+    past: Array,
+    rows: Array,
+    push: float,
+    steps: int,
+    dt: float,
+) -> None:
     """Advance one leg by physics steps.
 
     Args:
@@ -277,7 +287,9 @@ def step_leg(p: Any, state: Array, memory: Any, past: Array, rows: Array, push: 
         least = min(least, hip * speed1 + knee * speed2)
         peak1, peak2 = max(peak1, abs(v1)), max(peak2, abs(v2))
         if len(past):
-            slot = (int(memory.newest) + 1) % len(past)
+            slot = int(memory.newest) + 1
+            if slot == len(past):
+                slot = 0
             memory.newest = slot
             seen = past[slot]
             seen[0], seen[1] = (t1 if elastic1 else q1), (t2 if elastic2 else q2)
@@ -294,12 +306,27 @@ def step_leg(p: Any, state: Array, memory: Any, past: Array, rows: Array, push: 
     memory.motor_torque[0], memory.motor_torque[1] = hip, knee
     memory.mean_torque[0], memory.mean_torque[1] = mean1 / steps, mean2 / steps
     loads = memory.loads
-    loads[0], loads[1], loads[2], loads[3] = square1 / steps, square2 / steps, power1 / steps, power2 / steps  # noqa: E501
+    loads[0], loads[1], loads[2], loads[3] = (
+        square1 / steps,
+        square2 / steps,
+        power1 / steps,
+        power2 / steps,
+    )
     loads[4], loads[5], loads[6], loads[7] = least, peak1, peak2, stop
 
 
 @compiled
-def step_legs(table: Array, state: Array, memory: Array, past: Array, push: Array, first: int, last: int, steps: int, dt: float) -> None:  # noqa: E501
+def step_legs(
+    table: Records,
+    state: Array,
+    memory: Records,
+    past: Array,
+    push: Array,
+    first: int,
+    last: int,
+    steps: int,
+    dt: float,
+) -> None:
     """Advance the legs from ``first`` to before ``last``."""
     rows = np.empty((ROWS, 5))
     for k in range(first, last):
@@ -307,7 +334,7 @@ def step_legs(table: Array, state: Array, memory: Array, past: Array, push: Arra
 
 
 @compiled
-def send_all(table: Array, memory: Array, command: Array, jitter: Array) -> None:
+def send_all(table: Records, memory: Records, command: Array, jitter: Array) -> None:
     """Send every leg's command, (n, ``COMMAND``); ``jitter`` is the share of it, [0, 1), (n,)."""
     for k in range(len(memory)):
         p = table[k]
@@ -315,7 +342,9 @@ def send_all(table: Array, memory: Array, command: Array, jitter: Array) -> None
 
 
 @compiled
-def read_sensors(table: Array, memory: Array, past: Array, draws: Array, reading: Array, dt: float) -> None:  # noqa: E501
+def read_sensors(
+    table: Records, memory: Records, past: Array, draws: Array, reading: Array, dt: float
+) -> None:
     """Set what each leg's sensors report at the end of a control period.
 
     Args:
@@ -350,7 +379,7 @@ def rounded(values: Array, step: Array) -> Array:
 
 
 @compiled
-def motor_torques(table: Array, torque: Array, qd: Array, given: Array, friction: Array) -> None:
+def motor_torques(table: Records, torque: Array, qd: Array, given: Array, friction: Array) -> None:
     """Set what motors give, and the joints' dry friction, for one physics step of rigid legs.
 
     Torques asked for and ``given`` before are in N m, speeds in rad/s, all (n, 2).

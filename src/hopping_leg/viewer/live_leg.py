@@ -231,7 +231,5 @@ class LiveLeg:
         return row
 
     def _make(self) -> None:
-        self._legs = LegSimulator(
-            self.settings.apply(self.robot), 1, rate=CONTROL_RATE, threads=1
-        )
+        self._legs = LegSimulator(self.settings.apply(self.robot), 1, rate=CONTROL_RATE, threads=1)
         self._plant = Plant(self._legs, self.settings.noise_and_delay, SoftLimits(), self._rng)

@@ -83,6 +83,6 @@ def test_command_line_writes_everything(tmp_path, capsys):
     assert "weights" in capsys.readouterr().out
 
 
-def test_skills_need_mujoco(setup, shaping):
-    with pytest.raises(UsageError, match="mujoco"):
+def test_skills_need_the_stepper(setup, shaping):
+    with pytest.raises(UsageError, match="stepper"):
         run_skills([Entry("es", shaping)], dataclasses.replace(setup, engine="pybullet"))

@@ -75,8 +75,8 @@ class PyBulletSimulator(Simulator):
 
     def step(self, torque: Array) -> Array:
         """Command joint torques for a control period; return the motors' mean, N m, (n, 2)."""
-        for leg in np.flatnonzero((self.state != self._known).any(axis=1)):
-            self._worlds[leg].put(self.state[leg])
+        for moved in np.flatnonzero((self.state != self._known).any(axis=1)):
+            self._worlds[moved].put(self.state[moved])
         total = np.zeros((self.count, 2))
         for _ in range(self.substeps):
             self._applied = self._motors.give(torque, self.qd)
