@@ -13,7 +13,7 @@ pytest.importorskip("torch")
 from hopping_leg.rl.recipes.fast import FAST
 from hopping_leg.sim_to_real import transfer as transfer_run
 
-NUMBERS = {"rows": [], "methods": [], "comparison": []}
+NUMBERS = {"rows": [], "methods": [], "comparison": [], "notes": []}
 
 
 @pytest.fixture
@@ -33,7 +33,8 @@ def calls(monkeypatch):
 def test_it_goes_from_a_twin_to_a_judged_policy(calls, tmp_path, capsys):
     assert main(["reproduce", "--out", str(tmp_path), "--seed", "3"]) == 0
     [(study, at_once)] = calls["transfer"]
-    assert [method.name for method in study.methods] == ["identified", "cad"]
+    assert [method.name for method in study.methods] == [
+        "identified", "cad", "energy-shaping"]  # fmt: skip
     assert (study.seeds, len(study.twins), at_once) == ((3,), 1, 2)
     assert not study.twins[0].robot.reality.neutral
     [judged] = calls["evaluate"]

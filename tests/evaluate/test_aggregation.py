@@ -50,7 +50,7 @@ def test_a_run_without_hops_stays_in_median_distance_and_interval():
     still = with_column(standing, "foot_clearance_m", np.zeros(len(standing.table)))
     (hops,), (none,) = measure(hopping), measure(still)
     assert none.miss == pytest.approx(0.21 - 0.30)
-    row = summarise("c", "leg", 0.30, [hops, none, none], 0)
+    row = summarise("c", 0.30, [hops, none, none], 0)
     assert (row.runs, row.missed_runs, row.hops) == (3, 2, len(hops.apex))
     assert row.median_error_m == pytest.approx(-0.09)
     assert row.mean_abs_error_m == pytest.approx((0.01 + 2 * 0.09) / 3, abs=1e-4)

@@ -13,6 +13,7 @@ from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.robot import Robot, SoftLimits, kinematics
 from hopping_leg.sim import (
     CONTROL_RATE,
+    LOADS,
     Engine,
     Ground,
     LegSimulator,
@@ -28,7 +29,7 @@ from hopping_leg.trace import COLUMNS, Trace
 _START_SHARE = 0.2 / 0.29  # leg length of the standing start as a share of the straight leg's
 _IMPOSSIBLE = 1e4  # joint speed that no leg reaches, rad/s
 
-_COLUMNS = (*list(COLUMNS)[2:], "command_m")
+_COLUMNS = (*list(COLUMNS)[2:], "command_m", "hip_soft_limit_nm", "knee_soft_limit_nm", *LOADS)
 """Columns of a rollout that ``_record_state`` and the loop fill by their places."""
 
 
@@ -170,6 +171,8 @@ def rollout(
         if perturbation is not None:
             torque = torque + perturbation.torque[tick]
         data[8:10, tick] = plant.drive(torque).T
+        data[14:16, tick] = plant.soft_limit_torque.T
+        data[16:, tick] = legs.loads.T
         if on_tick is not None:
             on_tick(tick + 1, ticks)
     if not np.abs(data[4:6]).max() < _IMPOSSIBLE:

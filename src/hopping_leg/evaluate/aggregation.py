@@ -6,20 +6,23 @@ from collections.abc import Sequence
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.evaluate import metrics, statistics, trials
+from hopping_leg.evaluate import metrics, motor_load, statistics, trials
 from hopping_leg.evaluate.result import Comparison, Evaluation, Group, Staircase, Summary
+from hopping_leg.robot import Robot
 
 
-def tabulate(runs: Sequence[trials.Run], controllers: Sequence[str], seed: int) -> Evaluation:
+def tabulate(
+    runs: Sequence[trials.Run], controllers: Sequence[str], seed: int, robot: Robot | None = None
+) -> Evaluation:
     """Measure runs and arrange the numbers; conditions, versions and notes stay empty.
 
     Args:
         runs: Runs of all controllers.
         controllers: Their names in the order of the rows.
         seed: Seed of the bootstrap.
+        robot: The leg of all runs; without it nothing is told of its motors.
     """
     own = {name: [run for run in runs if run.controller == name] for name in controllers}
-    robot = str(runs[0].trace.header.get("robot", "")) if runs else ""
     measured = {
         name: [(run, window) for run in own[name] for window in metrics.measure(run.trace)]
         for name in controllers
@@ -33,7 +36,7 @@ def tabulate(runs: Sequence[trials.Run], controllers: Sequence[str], seed: int) 
 
     def rows(*kinds: str) -> list[Summary]:
         return [
-            summarise(name, robot, command, group, seed)
+            summarise(name, command, group, seed, robot)
             for name in controllers
             for command, group in windows(name, *kinds).items()
         ]
@@ -98,9 +101,15 @@ def _staircase(label: str, runs: Sequence[trials.Run]) -> Staircase:
 
 
 def summarise(
-    controller: str, robot: str, command: float, windows: Sequence[metrics.HopWindow], seed: int
+    controller: str,
+    command: float,
+    windows: Sequence[metrics.HopWindow],
+    seed: int,
+    robot: Robot | None = None,
 ) -> Summary:
     """Pool all windows of one controller at one command; the seed is of the bootstrap."""
+    parts = [w.part for w in windows]
+    load = motor_load.motor_load(parts, robot) if robot else motor_load.unknown()
     apex, errors = metrics.pooled_apexes(windows), metrics.errors_of(windows)
     every = np.concatenate(errors)
     low, high = statistics.bootstrap(errors, _centre, seed)
@@ -109,10 +118,9 @@ def summarise(
     per_second = 1 / settled if settled else float("nan")
     quartiles = np.percentile(apex, [25, 75]) if len(apex) else np.full(2, np.nan)
     peak = np.max([w.peak_torque for w in windows], axis=0)
-    rms = np.sqrt(np.mean([np.square(w.rms_torque) for w in windows], axis=0))
     return Summary(
         controller=controller,
-        robot=robot,
+        robot=str(parts[0].header.get("robot", "")),
         command_m=command,
         median_error_m=float(np.median(every)),
         median_error_low_m=float(low[0]),
@@ -137,11 +145,10 @@ def summarise(
         knee_contacts=sum(w.knee_contacts for w in windows),
         peak_hip_torque_nm=float(peak[0]),
         peak_knee_torque_nm=float(peak[1]),
-        rms_hip_torque_nm=float(rms[0]),
-        rms_knee_torque_nm=float(rms[1]),
         measured_s=settled,
         runs=len(windows),
         missed_runs=sum(not len(w.apex) for w in windows),
+        **vars(load),
     )
 
 

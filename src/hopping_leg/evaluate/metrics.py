@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.evaluate import result, statistics
+from hopping_leg.arrays import Array
+from hopping_leg.evaluate import motor_load, result, statistics
 from hopping_leg.hop_detection import COLUMNS, measure_hops, trace_hops
 from hopping_leg.robot.parameters import JOINTS
 from hopping_leg.trace import Trace
@@ -47,7 +47,8 @@ class HopWindow:
     knee_contacts: int
     peak_torque: Array
     """Largest magnitude the motors gave at hip and knee, N m, (2,)."""
-    rms_torque: Array
+    part: Trace
+    """The stretch itself."""
 
     @property
     def body_contacts(self) -> int:
@@ -95,10 +96,10 @@ def _window(trace: Trace, start: int, end: int, rate: float, drop: float) -> Hop
         bounces=hops.bounces,
         min_height=float(height[start:end].min()),
         max_sink=max(0.0, float(-clearance[start:end].min())),
-        base_contacts=_events(trace.column("base_clearance_m")[start:end] <= 0),
-        knee_contacts=_events(trace.column("knee_clearance_m")[start:end] <= 0),
+        base_contacts=motor_load.events(trace.column("base_clearance_m")[start:end] <= 0),
+        knee_contacts=motor_load.events(trace.column("knee_clearance_m")[start:end] <= 0),
         peak_torque=np.abs(torque).max(axis=1),
-        rms_torque=np.sqrt(np.square(torque).mean(axis=1)),
+        part=Trace(trace.table[start:end], trace.header),
     )
 
 
@@ -106,12 +107,6 @@ def _rate(trace: Trace) -> float:
     """Return the control rate, Hz."""
     time = trace.column("time_s")
     return float((len(time) - 1) / (time[-1] - time[0]))
-
-
-def _events(touching: BoolArray) -> int:
-    """Count the beginnings of contacts; one that lasts counts once."""
-    began = touching[1:] & ~touching[:-1]
-    return int(began.sum()) + int(touching[:1].sum())
 
 
 def skipped_in_run(trace: Trace) -> int:

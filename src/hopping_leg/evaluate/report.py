@@ -127,6 +127,7 @@ def write_report(judged: runner.EvaluationRun, videos: dict[str, Video] | None =
         evaluation=evaluation,
         tables={
             "summary": table(tables.SUMMARY, evaluation.summary),
+            "load": table(tables.LOAD, evaluation.summary),
             "groups": table(tables.GROUPS, evaluation.groups),
             "secondary": table(tables.SUMMARY, secondary.summary if secondary else []),
             "estimators": tables.estimator_table(evaluation.estimators),

@@ -3,6 +3,7 @@
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from hopping_leg.evaluate.motor_load import MotorLoad
 from hopping_leg.evaluate.statistics import Neighbours
 from hopping_leg.io import json_text, plain
 
@@ -10,8 +11,8 @@ SCHEMA = 2
 """Version of the JSON, raised when a name changes its meaning."""
 
 
-@dataclass(frozen=True)
-class Summary:
+@dataclass(frozen=True, kw_only=True)
+class HopStatistics:
     """One controller at one command, hops of all its runs pooled; 95 % intervals resample runs."""
 
     controller: str
@@ -47,13 +48,16 @@ class Summary:
     knee_contacts: int
     peak_hip_torque_nm: float
     peak_knee_torque_nm: float
-    rms_hip_torque_nm: float
-    rms_knee_torque_nm: float
     measured_s: float
     """Time in which hops were counted."""
     runs: int
     missed_runs: int
     """Runs without a hop: their errors are misses, standing height minus command."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Summary(MotorLoad, HopStatistics):
+    """How one controller hops at one command, and what that is for the motors."""
 
 
 @dataclass(frozen=True)

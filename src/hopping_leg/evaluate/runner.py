@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from hopping_leg.controllers import RolloutConfig
-from hopping_leg.evaluate import aggregation, result, trials
+from hopping_leg.evaluate import aggregation, motor_load, result, trials
 from hopping_leg.evaluate.entries import Entry, check_labels, check_range
 from hopping_leg.io import versions
 from hopping_leg.robot import JOINTS, TIMESTEP, hopping_ranges
@@ -70,7 +70,7 @@ def evaluate(
         )
         notes += _note_stopped(entry.label, own, setup)
         runs += own
-    measured = aggregation.tabulate(runs, [c.label for c in entries], seed)
+    measured = aggregation.tabulate(runs, [c.label for c in entries], seed, world.robot)
     members: dict[str, list[str]] = {}
     for entry in entries:
         members.setdefault(entry.group or "", []).append(entry.label)
@@ -93,6 +93,7 @@ def evaluate(
                 "ground": world.ground,
                 "contact_time_constant_s": world.robot.contact.time_constant,
                 "contact_damping_ratio": world.robot.contact.damping_ratio,
+                "motors": motor_load.constants(world.robot),
                 "seed": seed,
                 "seeds": repeats,
             },

@@ -53,8 +53,8 @@ def _interval(row: Summary | Group) -> str:
     return f"{low} .. {millimetres(row.median_error_high_m, sign=True)}"
 
 
-def _positive(value: float) -> bool:
-    return value > 0
+def _positive(value: float | None) -> bool:
+    return value is not None and value > 0
 
 
 _CONTROLLER = column("controller", "controller")
@@ -85,7 +85,28 @@ SUMMARY = (
         "peak torque hip, knee / N m",
         lambda r: f"{r.peak_hip_torque_nm:.1f}, {r.peak_knee_torque_nm:.1f}",
     ),
-    Column("RMS", lambda r: f"{r.rms_hip_torque_nm:.1f}, {r.rms_knee_torque_nm:.1f}"),
+    _percent("outside limits", "outside_limits_fraction"),
+    _percent("limits' share of torque", "soft_limit_share"),
+)
+
+LOAD = (
+    _CONTROLLER,
+    _COMMAND,
+    column("RMS hip / N m", "rms_hip_torque_nm", ".1f"),
+    column("RMS knee / N m", "rms_knee_torque_nm", ".1f"),
+    column("RMS / rated", "rated_torque_share", ".0f", 100, " %", bad=lambda share: share > 1),
+    Column(
+        "min until limited",
+        lambda r: f"{r.thermal_minutes:.1f}" if math.isfinite(r.thermal_minutes) else "-",
+    ),
+    column("mechanical / W", "mean_power_w", ".1f"),
+    column("electrical / W", "mean_electrical_power_w", ".1f"),
+    column("peak regeneration / W", "peak_regeneration_w", ".0f"),
+    column("bus rise / V", "bus_voltage_rise_v", ".2f"),
+    column("peak knee speed / (rad/s)", "peak_knee_speed_rad_s", ".1f"),
+    column("reversals / Hz", "torque_reversals_hz", ".1f"),
+    column("soft limits, RMS / N m", "soft_limit_rms_nm", ".2f"),
+    column("stop contacts", "stop_contacts", bad=_positive),
 )
 
 LADDER = (_CONTROLLER, _COMMAND, _ERROR, _STD, _HOPS, _SKIPPED, _CONTACTS)
@@ -114,6 +135,7 @@ _SHORT = (
     _percent("flight", "flight_fraction"),
     column("base", "min_base_height_m", ".0f", 1e3),
     column("contacts", "body_contacts"),
+    _percent("out", "outside_limits_fraction"),
 )
 
 _COUNTED = (
@@ -149,15 +171,17 @@ _LANDINGS = (
 def neighbour_table(comparisons: Sequence[Comparison]) -> Markup:
     """Return the tests between neighbouring commands."""
     p = column("", "p", ".3f")
+    low, high = (column("", f"cliffs_delta_{end}", "+.3f") for end in ("low", "high"))
     columns = (
         _CONTROLLER,
         Column("commands / m", lambda r: f"{r['lower_m']:.2f} and {r['upper_m']:.2f}"),
         Column(
-            "p, rank sum",
+            "p, rank sums of runs",
             lambda r: "< 0.001" if r["p"] < 1e-3 else p.text(r),
             lambda r: not r["p"] < 1e-3,
         ),
         column("Cliff's delta", "cliffs_delta", "+.3f"),
+        Column("95 % interval", lambda r: f"{low.text(r)} .. {high.text(r)}"),
         column("hops in the overlap", "overlap", ".1f", 100, " %"),
     )
     return table(
@@ -218,7 +242,8 @@ def print_evaluation(console: Console, evaluation: Evaluation) -> None:
         )
         caption = (
             "error: median of apex - command; skip: skipped hops; 1/s: hop rate;\n"
-            "base: lowest height over whole runs; contacts: of base or knee with the ground"
+            "base: lowest height over whole runs; contacts: of base or knee with the ground;\n"
+            "out: time with a joint outside its soft limits"
         )
         console.print(_text_table(_SHORT, one.summary, title, caption))
     lines = [
@@ -227,9 +252,23 @@ def print_evaluation(console: Console, evaluation: Evaluation) -> None:
         " skipped hops."
         for step in evaluation.staircase
     ]
+    lines += [_load_line(evaluation.rows(name)) for name in evaluation.controllers]
     lines += acceptance_lines(map(dataclasses.asdict, evaluation.summary))
     for line in [*lines, *(f"Note: {note}" for note in evaluation.notes)]:
         console.print(line, highlight=False)
+
+
+def _load_line(rows: Sequence[Summary]) -> str:
+    """Return what a controller asks of the motors at worst, of all its commands."""
+    share, minutes = (max(r.rated_torque_share for r in rows), min(r.thermal_minutes for r in rows))
+    limited = f"limited after {minutes:.1f} min" if share > 1 else "never limited by heat"
+    return (
+        f"Motors, {rows[0].controller}: RMS torque {100 * share:.0f} % of the rated ({limited}),"
+        f" {max(r.mean_electrical_power_w for r in rows):.0f} W from the bus, up to"
+        f" {max(r.peak_regeneration_w for r in rows):.0f} W back"
+        f" (+{max(r.bus_voltage_rise_v for r in rows):.2f} V),"
+        f" {max(r.torque_reversals_hz for r in rows):.0f} torque reversals per s."
+    )
 
 
 def print_robustness(console: Console, result: dict[str, Any]) -> None:

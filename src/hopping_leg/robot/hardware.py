@@ -26,6 +26,15 @@ class Servo:
     """Joint angle at which the motor reads zero."""
     max_current: float = quantity("A", 100.0)
     """Phase current that the drive is configured for (``servo.max_current_A``)."""
+    torque_constant: float = quantity("N m/A", 0.0788)
+    """Torque at the rotor per ampere of a phase's peak; by default what moteus' formula
+    1.5/sqrt(3) 60/(2 pi K_v) gives for the qdd100's 105 rpm/V."""
+    winding_resistance: float = quantity("ohm", 0.150)
+    """Of one phase; by default what moteus' motor models (``utils/extrapolated_motor_models.py``)
+    state as measured of the qdd100's stator wound for 135 rpm/V, 0.091 ohm, with the same copper
+    for 105 rpm/V: times (135/105)^2."""
+    thermal_time_constant: float = quantity("s", 578.0)
+    """Of drive and motor as one lump; by default 2.74 K/W times 210.9 J/K, of the same models."""
     serial: str = ""
     """Serial number of the drive's controller, 24 hex digits; empty accepts any."""
 
@@ -42,6 +51,10 @@ class Hardware:
     """Bus voltage below which the leg does not run."""
     voltage_high: float = quantity("V", 42.0)
     """Bus voltage above which the leg does not run; the drives trip at 46 V."""
+    bus_voltage: float = quantity("V", 26.0)
+    """Usual bus voltage: that at which the qdd100 has its no-load speed in the robot files."""
+    bus_capacitance: float = quantity("F", 4e-3)
+    """Capacitance of the bus; by default the most that mjbots' power distributor may precharge."""
     temperature_limit: float = quantity("deg C", 65.0)
     """Highest temperature of the drives' electronics; they derate from 50 and trip at 75."""
 

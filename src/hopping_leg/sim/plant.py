@@ -12,7 +12,8 @@ class Plant:
     """Legs behind a disturbed channel, with the soft joint limits in force unless None.
 
     The soft limits act on what the encoders report, free of noise and delay, as they run beside
-    the motors, after the torque noise and before the motors' own limit.
+    the motors, after the torque noise and before the motors' own limit. ``soft_limit_torque`` is
+    what they added in the last tick, N m, (n, 2).
     """
 
     def __init__(
@@ -26,6 +27,7 @@ class Plant:
         self.channel = Channel(legs.count, disturbance, legs.period, rng)
         legs.reseed(rng.spawn(1)[0])
         self._limiter = SoftLimiter(legs.robot, soft_limits, legs.count) if soft_limits else None
+        self.soft_limit_torque: Array = np.zeros((legs.count, 2))
 
     def reseed(self, rng: np.random.Generator) -> None:
         """Take all randomness from here on from another source."""
@@ -44,5 +46,7 @@ class Plant:
         """Apply joint torques for one control period; return what the motors gave, N m, (n, 2)."""
         disturbed = self.channel.actuate(torque)
         if self._limiter is not None:
-            disturbed = self._limiter.apply(disturbed, self.legs.measured_q, self.legs.measured_qd)
+            q, qd = self.legs.measured_q, self.legs.measured_qd
+            limited = self._limiter.apply(disturbed, q, qd)
+            self.soft_limit_torque, disturbed = limited - disturbed, limited
         return self.legs.step(disturbed)

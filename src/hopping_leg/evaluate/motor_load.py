@@ -1,0 +1,151 @@
+"""What hopping asks of the motors, of their drives and of the bus that feeds them.
+
+Windings lose P = 3/2 R (tau / (N k_t))^2, with tau at the joint, N the gear's and belt's ratio, k_t
+and R the rotor's torque constant and the resistance of a phase: moteus' own formula for its power.
+
+Heat is one lump. A drive's temperature nears ambient + (T_derate - ambient) (tau_rms / tau_rated)^2
+with one time constant T, since the rated torque is by its definition the one that may be held for
+ever; it is there after -T ln(1 - (tau_rated / tau_rms)^2), or never. From there on (50 deg C of a
+moteus) the drive takes torque away, and at its fault temperature (75 deg C) the rest.
+
+Braking gives power back. On a bus that takes none, its capacitance C is charged from V_0 by a burst
+of the energy E to sqrt(V_0^2 + 2 E / C).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.robot.parameters import JOINTS, Robot
+from hopping_leg.sim import LOADS
+from hopping_leg.trace import Trace
+
+REVERSAL = 4.0
+"""Change of a joint's commanded torque within a tick that counts as a reversal, N m."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotorLoad:
+    """Load over whole runs, their start included; NaN where the simulation does not tell it."""
+
+    outside_limits_fraction: float
+    """Share of time in which a joint's true angle is outside its soft limits."""
+    soft_limit_rms_nm: float
+    """RMS of what the soft limits' PD added at both joints, root of the sum of their squares."""
+    soft_limit_share: float
+    """Share of the PD's RMS in the sum of it and the controller's own."""
+    rms_hip_torque_nm: float
+    """At the joint, over physics steps."""
+    rms_knee_torque_nm: float
+    rated_torque_share: float
+    """RMS torque over the motor's rated one, of the motor that has more of it."""
+    thermal_minutes: float
+    """Time from cold until a drive takes torque away; infinite if it never does."""
+    peak_knee_speed_rad_s: float
+    torque_reversals_hz: float
+    """Changes of sign of the commanded torque by more than ``REVERSAL``, both joints together."""
+    mean_power_w: float
+    """Mechanical: mean of what each motor puts in, none counted in the ticks in which it brakes."""
+    mean_electrical_power_w: float
+    """From the bus: mechanical power, braking subtracted, and the windings' loss."""
+    peak_regeneration_w: float
+    """Largest mechanical power that both motors together take out at one physics step."""
+    bus_voltage_rise_v: float
+    """Of the worst burst of braking, less the windings' loss, on a bus that takes none of it."""
+    stop_contacts: int | None
+    """Times a joint touched a mechanical stop; None where the simulation does not tell it."""
+
+
+def motor_load(parts: Sequence[Trace], robot: Robot) -> MotorLoad:
+    """Measure some stretches of runs together, each in one piece."""
+    ends = np.cumsum([len(part.table) for part in parts])
+    period = float(np.diff(parts[0].column("time_s")).mean())
+    angle, command, soft = (
+        _columns(parts, [f"{joint}_{name}" for joint in JOINTS])
+        for name in ("position_rad", "command_nm", "soft_limit_nm")
+    )
+    loads = dict(zip(LOADS, _columns(parts, LOADS).T, strict=True))
+    square = np.stack([loads[f"{joint}_mean_square_torque"] for joint in JOINTS], axis=1)
+    power = np.stack([loads[f"{joint}_power"] for joint in JOINTS], axis=1)
+    joints, servos = (robot.hip, robot.knee), robot.hardware.servos
+    gain = robot.of_joints("belt_ratio") * [j.motor.gear_ratio for j in joints]
+    gain *= [servo.torque_constant for servo in servos]
+    loss = 1.5 * np.array([servo.winding_resistance for servo in servos]) / gain**2
+    bus = (power + loss * square).sum(axis=1)
+    rms, added, own = np.sqrt(square.mean(axis=0)), _rms(soft), _rms(command)
+    share = rms / [joint.motor.rated_torque * joint.belt_ratio for joint in joints]
+    outside = (angle < robot.of_joints("lower")) | (angle > robot.of_joints("upper"))
+    stops = np.split(loads["stop_contact"], ends[:-1])
+    stored = max(_stored(-b * period) for b in np.split(bus, ends[:-1]))
+    start, capacitance = robot.hardware.bus_voltage, robot.hardware.bus_capacitance
+    return MotorLoad(
+        outside_limits_fraction=float(outside.any(axis=1).mean()),
+        soft_limit_rms_nm=added,
+        soft_limit_share=added / (added + own) if added + own else 0.0,
+        rms_hip_torque_nm=float(rms[0]),
+        rms_knee_torque_nm=float(rms[1]),
+        rated_torque_share=float(share.max()),
+        thermal_minutes=min(map(_minutes, share, [s.thermal_time_constant for s in servos])),
+        peak_knee_speed_rad_s=float(loads["knee_peak_speed"].max()),
+        torque_reversals_hz=sum(map(_reversals, np.split(command, ends[:-1])))
+        / (period * len(command)),
+        mean_power_w=float(np.maximum(power, 0).sum(axis=1).mean()),
+        mean_electrical_power_w=float(bus.mean()),
+        peak_regeneration_w=float(np.maximum(-loads["least_power"], 0).max()),
+        bus_voltage_rise_v=float(np.sqrt(start**2 + 2 * stored / capacitance) - start),
+        stop_contacts=None if np.isnan(rms).any() else sum(events(touch > 0) for touch in stops),
+    )
+
+
+def constants(robot: Robot) -> dict[str, Any]:
+    """Return what the loads depend on beside the run, as JSON values."""
+    names = ("torque_constant", "winding_resistance", "thermal_time_constant")
+    return {
+        "bus_voltage_v": robot.hardware.bus_voltage,
+        "bus_capacitance_f": robot.hardware.bus_capacitance,
+        **{name: [getattr(servo, name) for servo in robot.hardware.servos] for name in names},
+        "thermal_minutes": "null where no motor's RMS torque exceeds its rated one: never limited",
+    }
+
+
+def unknown() -> MotorLoad:
+    """Return the load of a leg that nothing is known of."""
+    return MotorLoad(**dict.fromkeys(MotorLoad.__dataclass_fields__, np.nan))  # type: ignore[arg-type]
+
+
+def events(happens: BoolArray) -> int:
+    """Count the beginnings of something; what lasts counts once."""
+    return int((happens[1:] & ~happens[:-1]).sum()) + int(happens[:1].sum())
+
+
+def _columns(parts: Sequence[Trace], names: Sequence[str]) -> Array:
+    """Return columns, (ticks, names); those that a trace lacks, as of hardware, are NaN."""
+    tables = [
+        [p.column(n) if n in p.table.columns else np.full(len(p.table), np.nan) for n in names]
+        for p in parts
+    ]
+    return np.concatenate(tables, axis=1).T
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.square(values).sum(axis=1).mean()))
+
+
+def _minutes(share: float, time_constant: float) -> float:
+    if share > 1:
+        return float(-time_constant * np.log(1 - share**-2)) / 60
+    return np.inf if share <= 1 else np.nan
+
+
+def _reversals(command: Array) -> int:
+    before, after = command[:-1], command[1:]
+    return int(((before * after < 0) & (np.abs(after - before) > REVERSAL)).sum())
+
+
+def _stored(given: Array) -> float:
+    """Return the most that the bus holds, J, given what it gets in each tick, (ticks,)."""
+    total = np.cumsum(given)
+    return float((total - np.minimum.accumulate(np.minimum(total, 0))).max())
