@@ -6,10 +6,18 @@ TABLES = (
     (
         "table",
         "physics_step.json",
-        "",
-        "largest_step_for_judging_s*1000=step to judge, ms",
-        "judging_tolerance_m*1000=tolerance, mm",
-        "largest_step_for_training_s*1000=step to train, ms",
-        "training_tolerance_m*1000=tolerance, mm",
+        "converged",
+        "controller",
+        "robot",
+        "timestep_s*1000=converged at, ms",
+    ),
+    (
+        "table",
+        "physics_step.json",
+        "variants",
+        "variant",
+        "robot",
+        "largest_median_shift_m*1000=median, mm",
+        "largest_std_change_m*1000=std, mm",
     ),
 )

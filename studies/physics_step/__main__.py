@@ -2,8 +2,8 @@
 
 import sys
 
-from studies.physics_step.run import Convergence
+from studies.physics_step.run import PhysicsStep
 from studies.shared import main
 
 if __name__ == "__main__":
-    sys.exit(main("physics_step", Convergence))
+    sys.exit(main("physics_step", PhysicsStep))

@@ -1,38 +1,44 @@
 import pytest
 
 from hopping_leg.robot import load_robot
-from studies.physics_step.run import (
-    ConvergenceStudy,
-    _sufficient,
-    bench_convergence,
-    stiff,
-)
-
-ROBOT = load_robot("legv2-paper")
+from studies.physics_step.run import PhysicsStep, _fits, converged
 
 
-def test_errors_shrink_with_the_step():
-    study = ConvergenceStudy(
-        [ROBOT], commands=(0.3,), seeds=1, duration=1, steps=(5e-3, 1e-3), reference=5e-4, threads=1
-    )
-    rows = bench_convergence(study)["rows"]
-    assert [row["timestep_s"] for row in rows] == [5e-3, 1e-3]
-    for name in ("drop_height_error_m", "stance_height_error_m"):
-        assert rows[1][name] < rows[0][name] / 2
-        assert rows[1][name] < 0.003
+def rows(*medians, std=0.001):
+    return [
+        {
+            "controller": "c",
+            "robot": "r",
+            "timestep_s": 1e-3 / 2**k,
+            "median_error_m": m,
+            "std_m": std,
+        }
+        for k, m in enumerate(medians)
+    ]
 
 
-def test_a_step_suffices_only_if_all_finer_ones_do():
-    def row(step, shift):
-        return {"timestep_s": step, "noisy_largest_median_shift_m": shift}
-
-    rows = [row(4e-3, 0.001), row(2e-3, 0.004), row(1e-3, 0.001), row(5e-4, 0.0)]
-    assert _sufficient(rows, 0.002) == 1e-3
-    assert _sufficient(rows, 0.01) == 4e-3
-    assert _sufficient([*rows, row(5e-4, None)], 0.01) is None
+def test_a_step_has_converged_if_all_finer_halvings_move_little():
+    assert converged(rows(0.004, 0.002, 0.0018, 0.0017)) == 5e-4
+    assert converged(rows(0.004, 0.004, 0.001, 0.0009)) == 2.5e-4
+    assert converged(rows(0.004, 0.002, None, 0.0017)) is None
+    assert converged(rows(0.004, 0.002)) is None
 
 
-def test_the_stiff_floor_is_mujocos_default():
-    contact = stiff(ROBOT).contact
-    assert (contact.time_constant, contact.damping_ratio) == (0.02, 1.0)
-    assert contact.friction == pytest.approx(ROBOT.contact.friction)
+def test_a_policy_hops_on_its_own_robot_alone():
+    assert _fits("precise", load_robot("legv2-paper"))
+    assert not _fits("precise", load_robot("legv1"))
+    assert _fits("energy-shaping", load_robot("legv1"))
+
+
+def test_energy_shaping_hops_alike_at_both_steps_and_in_mujoco():
+    study = PhysicsStep(
+        ("energy-shaping",), ("legv2-paper",), (0.3,), 5e-4, halvings=1, repeats=3, duration=4,
+        threads=1,
+    )  # fmt: skip
+    result = study.measure()
+    coarse, fine = result["rows"]
+    assert coarse["hops"] >= 10
+    assert coarse["median_error_m"] == pytest.approx(fine["median_error_m"], abs=0.005)
+    assert [row["variant"] for row in result["variants"]][:2] == ["as it is", "elliptic cone"]
+    assert result["variants"][0]["largest_median_shift_m"] == 0
+    assert all(row["largest_median_shift_m"] < 0.02 for row in result["variants"])

@@ -115,6 +115,7 @@ def rollout(
     on_tick: Callable[[int, int], None] | None = None,
     on_legs: Callable[[Simulator], None] | None = None,
     perturbation: Perturbation | None = None,
+    legs: Simulator | None = None,
 ) -> Rollout:
     """Let a controller hop from a standing start; a ``PrivilegedController`` is shown the legs.
 
@@ -127,6 +128,7 @@ def rollout(
         on_legs: Called once with the legs, which it may place where they shall start instead.
         perturbation: Changes of the legs that ``config`` does not know; recorded heights are above
             the ground of the moment, recorded commands are the controller's.
+        legs: What hops instead of what ``config`` describes.
 
     Returns:
         One row per control period: the state at its start and the torques during it.
@@ -135,10 +137,9 @@ def rollout(
         PhysicsError: The simulation became unstable.
     """
     ticks, count = commands.shape
-    legs: Simulator
     if perturbation is None:
         perturber = None
-        legs = make_simulator(
+        legs = legs or make_simulator(
             config.robot, count, engine=config.engine, ground=config.ground, rate=config.rate,
             timestep=config.timestep, threads=config.threads,
         )  # fmt: skip

@@ -1,5 +1,7 @@
 """The same leg in MuJoCo: the reference for the stepper, and an engine of its own."""
 
+from collections.abc import Callable
+
 import mujoco
 import numpy as np
 from mujoco import batch
@@ -21,7 +23,7 @@ class MujocoSimulator(Simulator):
         rate: Control rate, Hz.
         timestep: Physics step, s.
         threads: MuJoCo's threads, 0 for one per core.
-        tolerance: MuJoCo's, of its solver.
+        edit: Changes the model before it is compiled.
 
     Raises:
         UsageError: The robot has a ``reality``, or the physics step does not divide the period.
@@ -35,7 +37,7 @@ class MujocoSimulator(Simulator):
         rate: float = CONTROL_RATE,
         timestep: float = TIMESTEP,
         threads: int = 0,
-        tolerance: float = 1e-8,
+        edit: Callable[[mujoco.MjSpec], None] | None = None,
     ) -> None:
         super().__init__(robot, count, rate, timestep)
         if not robot.reality.neutral:
@@ -44,7 +46,8 @@ class MujocoSimulator(Simulator):
                 " --engine out."
             )
         spec = get_spec(robot, timestep)
-        spec.option.tolerance = tolerance
+        if edit is not None:
+            edit(spec)
         for actuator in spec.actuators:
             actuator.ctrllimited = False
         model = compile_spec(spec, robot.name)
