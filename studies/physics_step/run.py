@@ -4,6 +4,7 @@ Single hops diverge after the first few whatever the step, since contact makes t
 is compared are medians and standard deviations of many hops under the same noise.
 """
 
+import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -202,7 +203,7 @@ def converged(
     ]
     steps = sorted({row["timestep_s"] for row in chosen})
     best = None
-    for fine, coarse in zip(steps, steps[1:], strict=False):
+    for fine, coarse in itertools.pairwise(steps):
         one, other = ([r for r in chosen if r["timestep_s"] == s] for s in (coarse, fine))
         moved = [_largest(one, other, name) for name in ("median_error_m", "std_m")]
         if any(change is None or change > TOLERANCE for change in moved):
@@ -216,13 +217,11 @@ def _largest(one: list[dict[str, Any]], other: list[dict[str, Any]], name: str) 
     pairs = [(a[name], b[name]) for a, b in zip(one, other, strict=True)]
     if any(value is None for pair in pairs for value in pair):
         return None
-    return max(abs(a - b) for a, b in pairs)
+    return max((abs(float(a - b)) for a, b in pairs), default=None)
 
 
 def _print(result: dict[str, Any]) -> None:
-    table = Table(
-        "controller", "robot", "step, ms", "command, m", "median error, mm", "std", "hops"
-    )
+    table = Table("controller", "robot", "step, ms", "command, m", "error, mm", "std", "hops")
     for row in result["rows"]:
         lengths = (row["median_error_m"], row["std_m"])
         table.add_row(
