@@ -11,7 +11,7 @@ from hopping_leg.robot import load_robot
 from studies.finetuning import run as module
 from studies.finetuning.run import FIRST_JUDGE, Study, draw_finetuning, measure
 
-WIDE = Guard(np.full(2, -9.0), np.full(2, 9.0), np.full(2, 999.0))
+WIDE = Guard(np.full(2, -9.0), np.full(2, 9.0), np.full(2, 999.0), np.zeros(2))
 
 
 @pytest.fixture

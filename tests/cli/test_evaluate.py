@@ -4,6 +4,8 @@ import re
 import pytest
 
 from hopping_leg.cli import main
+from hopping_leg.cli.evaluate import Evaluate
+from hopping_leg.evaluate.runner import setup_conditions
 from hopping_leg.trace import Trace
 from tests.evaluate.test_comparison import TRAINING
 
@@ -95,3 +97,10 @@ def test_a_page_or_figure_of_nothing_is_refused(tmp_path, refused):
     pages = ([], ["none", "nothing"], ["a", "b", "--out", str(tmp_path)])
     for words in (["figures"], ["figures", trace], *(["page", *page] for page in pages)):
         refused(["report", *words], "")
+
+
+@pytest.mark.parametrize("on", [True, False])
+def test_soft_limits_may_be_left_out(on):
+    _, setup = Evaluate(("energy-shaping",), soft_limits=on).load()
+    assert (setup.soft_limits is not None) == on
+    assert (setup_conditions(setup)["soft_limits"] is not None) == on

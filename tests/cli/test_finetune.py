@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from hopping_leg.cli import main
@@ -33,7 +34,11 @@ def test_what_has_no_meaning_is_refused_in_a_sentence(words, sentence, refused, 
 def test_the_guard_is_the_supervisors():
     robot = load_robot("legv2-paper")
     guard = guard_of(robot, 200.0)
-    assert (guard.lower < robot.of_joints("lower")).all()
+    assert (guard.lower == robot.of_joints("stop_lower")).all()
+    rest, towards = np.zeros(2), np.array([0.0, -20.0])
+    near = robot.of_joints("stop_lower") + 0.01
+    assert not guard.complaint(near, rest)
+    assert "left its range" in guard.complaint(near, towards)
     assert (guard.speed > robot.of_joints("no_load_speed")).all()
 
 

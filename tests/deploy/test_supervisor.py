@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from hopping_leg.deploy.drive_link import Action, DriveMode, Reply
 from hopping_leg.deploy.safety_limits import hopping_limits
-from hopping_leg.deploy.stop_reasons import Operator, Reason, SupervisorInput
+from hopping_leg.deploy.stop_reasons import Counts, Operator, Reason, SupervisorInput, find_cause
 from hopping_leg.deploy.supervisor import State, SupervisorState, supervise
 from hopping_leg.robot import load_robot
 
@@ -136,7 +136,25 @@ def test_a_joint_that_drifts_out_of_its_range_is_caught():
         angle, tick = angle + 0.02, tick + 1
         memory, _ = supervise(LIMITS, memory, at(tick, 0, position=angle, velocity=4.0))
     assert memory.cause.reason is Reason.POSITION_LIMIT
-    assert angle == pytest.approx(LIMITS.upper[0], abs=0.021)
+    assert angle == pytest.approx(LIMITS.upper[0] - 4.0 * LIMITS.braking[0], abs=0.021)
+
+
+@pytest.mark.parametrize(
+    ("side", "index"), [("lower", 1), ("upper", 1), ("lower", 0), ("upper", 0)]
+)
+def test_a_joint_is_braked_earlier_the_faster_it_nears_a_stop(side, index):
+    stop, sign = getattr(LIMITS, side)[index], -1 if side == "lower" else 1
+
+    def found(speed, before):
+        reply = good(index, position=stop - sign * before, velocity=sign * speed, taken=2 * PERIOD)
+        replies = tuple(reply if i == index else good(i, taken=2 * PERIOD) for i in range(2))
+        return find_cause(LIMITS, Counts(), Counts(), seen(2, replies=replies), arming=False)
+
+    for speed in (0.0, 5.0, 20.0):
+        margin = LIMITS.braking[index] * speed
+        assert found(speed, margin + 0.01) is None
+        assert found(speed, margin - 0.01).reason is Reason.POSITION_LIMIT
+    assert found(-20.0, 0.01) is None  # on its way back
 
 
 @pytest.mark.parametrize(

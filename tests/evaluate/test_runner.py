@@ -139,10 +139,18 @@ def test_a_twin_under_the_papers_disturbance_is_noted(spring):
     assert "came on top" not in notes("legv2-paper", NoiseAndDelay())
 
 
-@pytest.mark.parametrize(("knee", "stopped"), [(-1.0, 0), (-0.05, 2), (-2.71, 2)])
-def test_who_would_be_stopped_on_the_real_leg_is_noted(setup, knee, stopped):
-    angles = {"hip_position_rad": np.array([0.5, 0.6]), "knee_position_rad": np.array([-1.0, knee])}
-    runs = [SimpleNamespace(trace=SimpleNamespace(column=angles.get))] * 2
+@pytest.mark.parametrize(
+    ("knee", "speed", "stopped"),
+    [(-1.0, -20.0, 0), (-2.69, 0.0, 0), (-2.71, 0.0, 2), (-2.65, -20.0, 2), (-2.65, 20.0, 0)],
+)
+def test_who_would_be_stopped_on_the_real_leg_is_noted(setup, knee, speed, stopped):
+    columns = {
+        "hip_position_rad": np.array([0.5, 0.6]),
+        "hip_velocity_rad_s": np.zeros(2),
+        "knee_position_rad": np.array([-1.0, knee]),
+        "knee_velocity_rad_s": np.array([0.0, speed]),
+    }
+    runs = [SimpleNamespace(trace=SimpleNamespace(column=columns.get))] * 2
     notes = _note_stopped("mine", runs, setup)
     assert len(notes) == (stopped > 0)
     assert all(f"in {stopped} of 2 runs" in note for note in notes)

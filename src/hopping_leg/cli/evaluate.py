@@ -27,7 +27,7 @@ from hopping_leg.controllers import RolloutConfig
 from hopping_leg.evaluate import Entry, EvaluationRun, evaluate, tables, trials
 from hopping_leg.evaluate.entries import load_entries
 from hopping_leg.evaluate.report import render_videos, write_report
-from hopping_leg.robot import load_robot
+from hopping_leg.robot import SoftLimits, load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, Engine, NoiseAndDelay
 
 
@@ -48,6 +48,8 @@ class Conditions:
     json: options.JsonFile = None
     noise: bool = True
     """The paper's sensor noise, torque noise and delay."""
+    soft_limits: bool = True
+    """Pull joints back that pass their soft limits, on the samples that the controller has."""
     timestep: float = 5e-4
     """Physics step, s."""
     rate: float = CONTROL_RATE
@@ -62,8 +64,9 @@ class Conditions:
         robot = load_robot(self.robot)
         noise = NoiseAndDelay() if self.noise else NO_NOISE
         setup = RolloutConfig(
-            robot, noise, rate=self.rate, timestep=self.timestep, threads=self.threads
-        )
+            robot, noise, SoftLimits() if self.soft_limits else None,
+            rate=self.rate, timestep=self.timestep, threads=self.threads,
+        )  # fmt: skip
         return load_entries(self.controllers, robot, self.rate), setup
 
 

@@ -109,7 +109,8 @@ def guard_of(robot: Robot, rate: float) -> "Guard":
     from hopping_leg.rl.finetune.simulated import Guard
 
     limits = safety_limits.hopping_limits(robot, rate)
-    return Guard(*(np.array(pair) for pair in (limits.lower, limits.upper, limits.speed)))
+    pairs = (limits.lower, limits.upper, limits.speed, limits.braking)
+    return Guard(*(np.array(pair) for pair in pairs))
 
 
 def _refuse(args: Finetune, policy: "Policy", robot: Robot) -> None:

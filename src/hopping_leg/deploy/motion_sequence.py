@@ -131,7 +131,7 @@ class MotionSequence:
             asked = self.controller.act(measurement)[0]
         else:
             asked = self._hold(phase, lasted, q, qd)
-        torque = asked if self.limiter is None else self.limiter.apply(asked, q, qd)
+        torque = asked if self.limiter is None else asked + self.limiter.added(asked, q, qd)
         own = _pair(asked) if phase is Part.HOP else (np.nan, np.nan)
         return SequenceStep(_pair(torque), command, phase, own)
 

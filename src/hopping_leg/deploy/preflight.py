@@ -143,7 +143,7 @@ def _check(
     if facts.mode == drive_link.DriveMode.FAULT:
         fault = stop_reasons.fault_text(facts.fault)
     voltage_low, voltage_high = limits.voltage_low, limits.voltage_high
-    lower, upper = limits.lower[joint], limits.upper[joint]
+    lower, upper = limits.start[joint]
     return [
         answers,
         finding(

@@ -1,12 +1,16 @@
 """Within what the leg may move; beyond it the supervisor damps."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from hopping_leg.deploy.drive_link import Pair
-from hopping_leg.robot import Robot, hopping_ranges
+from hopping_leg.robot import OVERSPEED, Robot, braking_times
 
 RECORDING_MARGIN = 0.1
 """How far a recorded leg may pass its mechanical range, rad: backlash and the belt's give."""
+
+START_MARGIN = 0.5
+"""How far beyond its soft limits a joint may stand before it hops, rad; farther, it is bent to the
+wrong side, or homed wrongly."""
 
 
 @dataclass(frozen=True)
@@ -17,6 +21,10 @@ class SafetyLimits:
     """rad"""
     upper: Pair
     """rad"""
+    start: tuple[Pair, Pair]
+    """Between which angles hip and knee may stand when the drives are armed, rad."""
+    braking: Pair
+    """How long before these angles a joint at its present speed must be braked, s."""
     torque: Pair
     """Largest torque that leaves, N m."""
     speed: Pair
@@ -53,26 +61,34 @@ class SafetyLimits:
 
 
 def hopping_limits(robot: Robot, rate: float) -> SafetyLimits:
-    """Return the limits for a hopping leg at a rate, Hz: its soft limits and a margin."""
-    return _limits(robot, rate, hopping_ranges(robot))
+    """Return the limits for a hopping leg at a rate, Hz: it can be braked before any stop."""
+    limits = _limits(robot, rate, 0.0, braking_times(robot, rate).tolist())
+    hip, knee = (
+        (max(j.lower - START_MARGIN, j.stop_lower), min(j.upper + START_MARGIN, j.stop_upper))
+        for j in (robot.hip, robot.knee)
+    )
+    return replace(limits, start=(hip, knee))
 
 
 def recording_limits(robot: Robot, rate: float) -> SafetyLimits:
-    """Return the limits for excitations at a rate, Hz: the whole mechanical range and a margin."""
-    ranges = [
-        (joint.stop_lower - RECORDING_MARGIN, joint.stop_upper + RECORDING_MARGIN)
-        for joint in (robot.hip, robot.knee)
-    ]
-    return _limits(robot, rate, ranges)
+    """Return the limits for excitations at a rate, Hz: the whole mechanical range and a margin.
+
+    How fast a joint nears a stop does not count: an excitation turns round by itself.
+    """
+    return _limits(robot, rate, RECORDING_MARGIN, (0.0, 0.0))
 
 
-def _limits(robot: Robot, rate: float, ranges: list[Pair]) -> SafetyLimits:
+def _limits(robot: Robot, rate: float, margin: float, braking: Pair) -> SafetyLimits:
     hip, knee, hardware = robot.hip, robot.knee, robot.hardware
+    lower = hip.stop_lower - margin, knee.stop_lower - margin
+    upper = hip.stop_upper + margin, knee.stop_upper + margin
     return SafetyLimits(
-        lower=(ranges[0][0], ranges[1][0]),
-        upper=(ranges[0][1], ranges[1][1]),
+        lower,
+        upper,
+        start=((lower[0], upper[0]), (lower[1], upper[1])),
+        braking=(braking[0], braking[1]),
         torque=(hip.torque_limit, knee.torque_limit),
-        speed=(1.3 * hip.no_load_speed, 1.3 * knee.no_load_speed),
+        speed=(OVERSPEED * hip.no_load_speed, OVERSPEED * knee.no_load_speed),
         voltage_low=hardware.voltage_low,
         voltage_high=hardware.voltage_high,
         temperature=hardware.temperature_limit,

@@ -172,11 +172,13 @@ def _of_joint(limits: SafetyLimits, index: int, last: Reply | None, reply: Reply
         error = abs(reply.position - predicted)
         if not error <= limits.jump * max(1.0, elapsed / limits.period):
             return Cause(Reason.ENCODER_JUMP, f"{error:.3g} rad off")
-    if not limits.lower[index] <= reply.position <= limits.upper[index]:
+    ahead = reply.position + limits.braking[index] * reply.velocity
+    lower, upper = limits.lower[index], limits.upper[index]
+    if not (lower <= min(reply.position, ahead) and max(reply.position, ahead) <= upper):
         return Cause(
             Reason.POSITION_LIMIT,
-            f"{reply.position:.3g} rad, valid"
-            f" {limits.lower[index]:.3g} to {limits.upper[index]:.3g} rad",
+            f"{reply.position:.3g} rad at {reply.velocity:.3g} rad/s would end at {ahead:.3g} rad,"
+            f" valid {lower:.3g} to {upper:.3g} rad",
         )
     if not abs(reply.velocity) <= limits.speed[index]:
         return Cause(

@@ -5,11 +5,13 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from hopping_leg.controllers import RolloutConfig
 from hopping_leg.evaluate import aggregation, motor_load, result, trials
 from hopping_leg.evaluate.entries import Entry, check_labels, check_range
 from hopping_leg.io import versions
-from hopping_leg.robot import JOINTS, TIMESTEP, hopping_ranges
+from hopping_leg.robot import JOINTS, TIMESTEP, braking_times
 from hopping_leg.sim import NO_NOISE, Engine
 
 
@@ -145,16 +147,21 @@ def _note_left_out(
 
 def _note_stopped(label: str, runs: Sequence[trials.Run], setup: RolloutConfig) -> list[str]:
     """Say so where the supervisor of the real leg would not let a controller hop on."""
-    stopped = 0
+    robot, stopped = setup.robot, 0
+    lower, upper = robot.of_joints("stop_lower"), robot.of_joints("stop_upper")
     for run in runs:
-        angles = [run.trace.column(f"{joint}_position_rad") for joint in JOINTS]
-        pairs = zip(angles, hopping_ranges(setup.robot), strict=True)
-        stopped += any(angle.min() < low or angle.max() > high for angle, (low, high) in pairs)
+        q, qd = (
+            np.stack([run.trace.column(f"{joint}_{what}") for joint in JOINTS], axis=1)
+            for what in ("position_rad", "velocity_rad_s")
+        )
+        ahead = q + braking_times(robot, setup.rate) * qd
+        low, high = np.minimum(q, ahead), np.maximum(q, ahead)
+        stopped += bool(((low < lower) | (high > upper)).any())
     if not stopped:
         return []
     return [
-        f"{label} swings a joint beyond what `hop deploy` allows in {stopped} of {len(runs)} runs;"
-        " its supervisor would stop the leg there."
+        f"{label} brings a joint to a mechanical stop, or too fast to be braked before it, in"
+        f" {stopped} of {len(runs)} runs; the supervisor of `hop deploy` would stop the leg there."
     ]
 
 
@@ -170,6 +177,7 @@ def setup_conditions(setup: RolloutConfig) -> dict[str, Any]:
         "robot": setup.robot.name,
         "robot_digest": setup.robot.digest,
         "disturbance": asdict(setup.disturbance),
+        "soft_limits": asdict(setup.soft_limits) if setup.soft_limits else None,
         "timestep_s": setup.timestep,
         "rate_hz": setup.rate,
         "start_length_m": setup.standing_length,

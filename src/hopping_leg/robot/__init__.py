@@ -2,11 +2,12 @@
 
 from hopping_leg.robot.hardware import REGISTER_MAP, Hardware, Servo
 from hopping_leg.robot.limits import (
+    OVERSPEED,
     MotorLimit,
     SoftLimiter,
     SoftLimits,
+    braking_times,
     command_limits,
-    hopping_ranges,
 )
 from hopping_leg.robot.model import GRAVITY, TIMESTEP, build_model, compile_spec, get_spec
 from hopping_leg.robot.model_mismatch import (
@@ -35,6 +36,7 @@ __all__ = [
     "GRAVITY",
     "JOINTS",
     "NO_MISMATCH",
+    "OVERSPEED",
     "REGISTER_MAP",
     "TIMESTEP",
     "Contact",
@@ -52,13 +54,13 @@ __all__ = [
     "Servo",
     "SoftLimiter",
     "SoftLimits",
+    "braking_times",
     "build_model",
     "check_physics",
     "command_limits",
     "compile_spec",
     "doubts",
     "get_spec",
-    "hopping_ranges",
     "load_robot",
     "load_tree",
     "numbers",

@@ -11,9 +11,11 @@ from hopping_leg.sim.simulator import Simulator
 class Plant:
     """Legs behind a disturbed channel, with the soft joint limits in force unless None.
 
-    The soft limits act on what the encoders report, free of noise and delay, as they run beside
-    the motors, after the torque noise and before the motors' own limit. ``soft_limit_torque`` is
-    what they added in the last tick, N m, (n, 2).
+    The soft limits act on the newest sample that the controllers saw, noisy and late as it is, as
+    on the robot; what they add goes through the torque noise and the limits with the rest. Every
+    tick calls ``sense`` or ``samples``, then ``drive``.
+
+    ``soft_limit_torque`` is what they added in the last tick, before noise and limits, N m, (n, 2).
     """
 
     def __init__(
@@ -27,6 +29,7 @@ class Plant:
         self.channel = Channel(legs.count, disturbance, legs.period, rng)
         legs.reseed(rng.spawn(1)[0])
         self._limiter = SoftLimiter(legs.robot, soft_limits, legs.count) if soft_limits else None
+        self._newest: Array = np.empty((0, 5))
         self.soft_limit_torque: Array = np.zeros((legs.count, 2))
 
     def reseed(self, rng: np.random.Generator) -> None:
@@ -36,17 +39,19 @@ class Plant:
 
     def sense(self, command: Array) -> Measurement:
         """Return what the controllers see; ``command`` is the desired height, m, (n,)."""
-        return self.channel.sense(self.legs.measured_q, self.legs.measured_qd, command)
+        return self.channel.measurement(self.samples(command))
 
     def samples(self, command: Array) -> Array:
         """Return the same as ``sense`` as (q1, q2, qd1, qd2, command), newest first, (n, 3, 5)."""
-        return self.channel.samples(self.legs.measured_q, self.legs.measured_qd, command)
+        legs = self.legs
+        samples = self.channel.samples(legs.measured_q, legs.measured_qd, command)
+        self._newest = samples[:, 0]
+        return samples
 
     def drive(self, torque: Array) -> Array:
         """Apply joint torques for one control period; return what the motors gave, N m, (n, 2)."""
-        disturbed = self.channel.actuate(torque)
         if self._limiter is not None:
-            q, qd = self.legs.measured_q, self.legs.measured_qd
-            limited = self._limiter.apply(disturbed, q, qd)
-            self.soft_limit_torque, disturbed = limited - disturbed, limited
-        return self.legs.step(disturbed)
+            q, qd = self._newest[:, 0:2], self._newest[:, 2:4]
+            self.soft_limit_torque = self._limiter.added(torque, q, qd)
+            torque = torque + self.soft_limit_torque
+        return self.legs.step(self.channel.actuate(torque))

@@ -129,7 +129,7 @@ def test_a_simulated_trial_tells_what_was_measured_and_keeps_the_truth_apart():
 
 
 def test_a_guard_takes_the_leg_away_and_ends_the_trial():
-    narrow = Guard(np.array([-9.0, -9.0]), np.array([9.0, 9.0]), np.array([9.0, 9.0]))
+    narrow = Guard(np.array([-9.0, -9.0]), np.array([9.0, 9.0]), np.array([9.0, 9.0]), np.zeros(2))
     trial = SimulatedTrials(ROBOT, narrow).hop(POLICY, CommandSchedule(((0.3, 2.0),)), 1)
     assert "faster" in trial.complaint
     assert 0 < trial.seconds < 2.0

@@ -54,13 +54,11 @@ class Suite:
 
     def asked(self, controller: Controller, axis: str) -> dict[str, Any]:
         """Return all that a result depends on, as JSON values."""
-        limits = self.setup.soft_limits
         return {
             **self.conditions,
             "schema": SCHEMA,
             "controller": fingerprint(controller),
             "levels": _levels(axis),
-            "soft_limits": asdict(limits) if limits else None,
             "versions": runner.software_versions(),
         }
 

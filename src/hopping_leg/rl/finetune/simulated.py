@@ -32,10 +32,13 @@ class Guard:
     """rad"""
     speed: Array
     """rad/s"""
+    braking: Array
+    """How long before these angles a joint at its present speed must be braked, s."""
 
     def complaint(self, q: Array, qd: Array) -> str:
         """Return what is wrong with a leg's joints, rad and rad/s, (2,) each; empty if nothing."""
-        if (q < self.lower).any() or (q > self.upper).any():
+        ahead = q + self.braking * qd
+        if (np.minimum(q, ahead) < self.lower).any() or (np.maximum(q, ahead) > self.upper).any():
             return "A joint left its range."
         if (np.abs(qd) > self.speed).any():
             return "A joint is faster than its motor can turn it."
