@@ -30,7 +30,7 @@ def test_policy_file_gives_the_actors_torques(name, factor):
     policy.reset(50)
     m = measurement(50)
     samples = np.concatenate([m.q, m.qd, m.command[..., None]], axis=-1)
-    seen = PaperObservation(sample_scaling(ROBOT, recipe.task), 50).view(samples)
+    seen = PaperObservation(sample_scaling(ROBOT, recipe.task)).view(samples)
     expected, _ = model.predict(seen, deterministic=True)
     action = policy.act(m) / recipe.task.action_torque
     np.testing.assert_allclose(action, expected, atol=1e-5)

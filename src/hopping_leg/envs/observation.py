@@ -17,6 +17,7 @@ from hopping_leg.controllers import observation_history
 from hopping_leg.envs.task_config import TaskConfig
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import SAMPLES, Channel, Simulator
+from hopping_leg.sim.compiled import compiled
 
 SIZE = 15
 """Entries of the paper's observation."""
@@ -87,19 +88,26 @@ class PaperObservation(Observation):
     layout = observation_history.ThreeSamples.name
     size = SIZE
 
-    def __init__(self, sample: Scaling, count: int) -> None:
+    def __init__(self, sample: Scaling) -> None:
         place = np.arange(SIZE).reshape(SAMPLES, 5)
         self.order = np.concatenate([place[:, 0:2].ravel(), place[:, 2:4].ravel(), place[:, 4]])
         tiled = [np.tile(values, SAMPLES)[self.order] for values in (sample.offset, sample.gain)]
         self.scaling = Scaling(*tiled)
-        shape = (count, SAMPLES, 1)
-        self._offset, self._gain = np.tile(sample.offset, shape), np.tile(sample.gain, shape)
+        self._sample = sample
 
     def view(self, samples: Array) -> Array32:
         """Return the normalised samples, (n, 15)."""
-        centred = samples - self._offset
-        centred *= self._gain
-        return centred.reshape(-1, SIZE).astype(np.float32)
+        seen = np.empty((len(samples), SIZE), np.float32)
+        _normalise(samples, self._sample.offset, self._sample.gain, seen)
+        return seen
+
+
+@compiled
+def _normalise(samples: Array, offset: Array, gain: Array, seen: Array32) -> None:
+    for leg in range(len(samples)):
+        for k in range(SAMPLES):
+            for i in range(5):
+                seen[leg, 5 * k + i] = (samples[leg, k, i] - offset[i]) * gain[i]
 
 
 class HistoryObservation(Observation):
@@ -156,7 +164,7 @@ def make_observation(robot: Robot, config: TaskConfig, count: int) -> Observatio
     """Return the observation that a task asks for."""
     sample = sample_scaling(robot, config)
     if config.observation == observation_history.ThreeSamples.name:
-        return PaperObservation(sample, count)
+        return PaperObservation(sample)
     layout = observation_history.make_observation_history(config.observation, 1 / config.rate)
     torque = np.array(config.action_torque)
     parts = {

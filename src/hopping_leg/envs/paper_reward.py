@@ -1,14 +1,15 @@
 """The paper's reward (Sec. II-C, "Reward"): R = w1 Ge - w2 Ph - w3 Pj - w4 Pjp - w5 Pjv."""
 
-from collections.abc import Callable
+import math
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.envs.rewards import Reward, RewardTerm, Transition, sum_of_joints
+from hopping_leg.envs.rewards import Reward, RewardTerm, per_leg
 from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim.compiled import compiled
 
 Barrier = Literal["step", "printed"]
 
@@ -41,70 +42,75 @@ def paper_reward(robot: Robot, config: PaperRewardConfig = PaperRewardConfig()) 
     """Return the paper's reward for a leg, whose joint limits and motors count."""
     c, limit = config, config.velocity_limit
     speed = robot.of_joints("no_load_speed") if limit is None else np.full(2, limit)
+    rest, printed = c.rest_length + robot.foot.radius, c.barrier == "printed"
     return Reward(
         (
-            RewardTerm("energy", c.energy, energy_gain(c.rest_length + robot.foot.radius)),
-            RewardTerm("height", -c.height, height_barrier(c.barrier)),
-            RewardTerm("jerk", -c.jerk, action_jerk),
-            RewardTerm("position", -c.position, joint_position_penalty(robot)),
-            RewardTerm("velocity", -c.velocity, joint_velocity_penalty(speed)),
+            RewardTerm("energy", c.energy, per_leg(energy_gain, rest)),
+            RewardTerm("height", -c.height, per_leg(height_barrier, printed)),
+            RewardTerm("jerk", -c.jerk, per_leg(action_jerk)),
+            RewardTerm(
+                "position", -c.position, per_leg(joint_position_penalty, position_limits(robot))
+            ),
+            RewardTerm("velocity", -c.velocity, per_leg(joint_velocity_penalty, speed)),
         )
     )
 
 
-def energy_gain(rest: float) -> Callable[[Transition], Array]:
-    """Return Ge: base velocity and height above its rest, both squared, m2/s2 + m2."""
-
-    def term(t: Transition) -> Array:
-        offset, rate = t.height - rest, t.rate
-        return rate * rate + offset * offset
-
-    return term
+def position_limits(robot: Robot) -> Array:
+    """Return lower and upper soft limits of hip and knee, rad, (2, 2)."""
+    return np.stack([robot.of_joints("lower"), robot.of_joints("upper")])
 
 
-def height_barrier(barrier: Barrier) -> Callable[[Transition], Array | float]:
-    """Return Ph: grows with the base's height above the desired one, 0 below."""
-
-    def term(t: Transition) -> Array | float:
-        excess = t.height - t.command
-        crossed = excess >= 0
-        if not np.count_nonzero(crossed):
-            return 0.0
-        growth = np.exp(excess)
-        return (1 - growth if barrier == "printed" else growth) * crossed
-
-    return term
+@compiled
+def energy_gain(
+    state: Array, command: Array, action: Array, last: Array, rest: float, term: Array
+) -> None:
+    """Set Ge: base velocity and height above its rest, both squared, m2/s2 + m2."""
+    for leg in range(len(term)):
+        offset, rate = state[leg, 0] - rest, state[leg, 3]
+        term[leg] = rate * rate + offset * offset
 
 
-def action_jerk(t: Transition) -> Array:
-    """Return Pj: the squared change of the action."""
-    change = t.action - t.last_action
-    return sum_of_joints(change * change)
+@compiled
+def height_barrier(
+    state: Array, command: Array, action: Array, last: Array, printed: bool, term: Array
+) -> None:
+    """Set Ph: grows with the base's height above the desired one, 0 below."""
+    for leg in range(len(term)):
+        excess = state[leg, 0] - command[leg]
+        growth = math.exp(excess) if excess >= 0 else 0.0
+        term[leg] = 1 - growth if printed and excess >= 0 else growth
 
 
-def joint_position_penalty(robot: Robot) -> Callable[[Transition], Array]:
-    """Return Pjp: 1 for each joint beyond its limits, and rising towards it inside."""
-    lower, upper = robot.of_joints("lower"), robot.of_joints("upper")
-
-    def term(t: Transition) -> Array:
-        below, above = lower - t.q, t.q - upper
-        outside = np.maximum(below, above) > 0
-        near = np.exp(_SHARPNESS * below) + np.exp(_SHARPNESS * above)
-        if np.count_nonzero(outside):
-            near[outside] = 1.0
-        return sum_of_joints(near)
-
-    return term
+@compiled
+def action_jerk(state: Array, command: Array, action: Array, last: Array, term: Array) -> None:
+    """Set Pj: the squared change of the action."""
+    for leg in range(len(term)):
+        hip, knee = action[leg, 0] - last[leg, 0], action[leg, 1] - last[leg, 1]
+        term[leg] = hip * hip + knee * knee
 
 
-def joint_velocity_penalty(limit: Array) -> Callable[[Transition], Array | float]:
-    """Return Pjv: squared joint velocity less its limit's square, where it is faster, rad2/s2."""
-    least = np.square(limit)
+@compiled
+def joint_position_penalty(
+    state: Array, command: Array, action: Array, last: Array, limits: Array, term: Array
+) -> None:
+    """Set Pjp: 1 for each joint beyond its limits, rad, (2, 2), and rising towards it inside."""
+    for leg in range(len(term)):
+        term[leg] = 0.0
+        for joint in range(2):
+            q = state[leg, 1 + joint]
+            below, above = limits[0, joint] - q, q - limits[1, joint]
+            near = math.exp(_SHARPNESS * below) + math.exp(_SHARPNESS * above)
+            term[leg] += 1.0 if max(below, above) > 0 else near
 
-    def term(t: Transition) -> Array | float:
-        over = np.square(t.qd) - least
-        if not np.count_nonzero(over > 0):
-            return 0.0
-        return sum_of_joints(np.maximum(over, 0.0))
 
-    return term
+@compiled
+def joint_velocity_penalty(
+    state: Array, command: Array, action: Array, last: Array, limit: Array, term: Array
+) -> None:
+    """Set Pjv: squared joint velocity less its limit's square, where it is faster, rad2/s2."""
+    for leg in range(len(term)):
+        term[leg] = 0.0
+        for joint in range(2):
+            qd = state[leg, 4 + joint]
+            term[leg] += max(qd * qd - limit[joint] * limit[joint], 0.0)

@@ -9,6 +9,7 @@ import numpy as np
 
 from hopping_leg import errors, hop_detection
 from hopping_leg.arrays import Array, BoolArray, IntArray
+from hopping_leg.sim.compiled import compiled
 
 
 @dataclass
@@ -100,6 +101,22 @@ class AnnealedTerm(Protocol):
         ...
 
 
+def per_leg(
+    function: Callable[..., None], *numbers: Array | float
+) -> Callable[[Transition], Array]:
+    """Return the term that a compiled function sets, leg by leg: numpy takes longer for few legs.
+
+    It is called as ``function(state, command, action, last_action, *numbers, term)``.
+    """
+
+    def term(t: Transition) -> Array:
+        values = np.empty(len(t.command))
+        function(t.state, t.command, t.action, t.last_action, *numbers, values)
+        return values
+
+    return term
+
+
 class RewardTerm(NamedTuple):
     """A line of a reward."""
 
@@ -146,7 +163,9 @@ class Reward:
         terms = np.empty((len(transition.state), len(self.terms)))
         for column, function in enumerate(self._functions):
             terms[:, column] = function(transition)
-        return self.scale * np.add.reduce(terms * self._weights, axis=1), terms
+        reward = np.empty(len(terms))
+        _weigh(terms, self._weights, self.scale, reward)
+        return reward, terms
 
     def reset(self, rows: IntArray) -> None:
         """Begin new episodes of some legs."""
@@ -161,3 +180,12 @@ class Reward:
         """Go on from a ``state``."""
         for name, term in self._stateful.items():
             term.restore(state[name])
+
+
+@compiled
+def _weigh(terms: Array, weights: Array, scale: float, reward: Array) -> None:
+    for leg in range(len(terms)):
+        total = 0.0
+        for k in range(len(weights)):
+            total += weights[k] * terms[leg, k]
+        reward[leg] = scale * total

@@ -1,5 +1,6 @@
 """The learning problem for many legs at once: observation, reward, commands, episodes."""
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from hopping_leg.envs.observation import (
 )
 from hopping_leg.robot import Robot, kinematics
 from hopping_leg.sim import LegSimulator, Measurement, Plant, randomization
+from hopping_leg.sim.compiled import compiled
 
 _STANDING_SHARE = 0.3  # of the starts ``hop``
 
@@ -125,8 +127,7 @@ class HoppingTask:
         self.observation = make_observation(robot, options, count)
         self._scaling = sample_scaling(robot, options)
         self._reset_sampler = ResetSampler(robot, options)
-        self._torque = np.tile(options.action_torque, (count, 1))
-        self._lowest, self._highest = np.full((count, 2), -1.0), np.full((count, 2), 1.0)
+        self._torque = np.array(options.action_torque)
         self._horizon = max(1, round(options.episode * options.rate))
         self._never, self._nan = np.zeros(count, np.bool_), np.full(count, np.nan)
         for constant in (self._never, self._nan):
@@ -177,11 +178,10 @@ class HoppingTask:
     def step(self, action: Array | Array32) -> Step:
         """Act for a period; actions are torques over ``action_torque`` in [-1, 1], (n, 2)."""
         legs = self.legs
-        taken = action.astype(np.float64)
-        np.maximum(taken, self._lowest, out=taken)
-        np.minimum(taken, self._highest, out=taken)
+        taken, torque = np.array(action, np.float64), np.empty((self.count, 2))
+        _clip(taken, self._torque, torque)
         height_before = legs.height.copy()
-        self.applied_torque = self.plant.drive(taken * self._torque)
+        self.applied_torque = self.plant.drive(torque)
         apex, apex_height, apex_error = self._apexes(height_before)
         reward, terms = self.reward(
             rewards.Transition(
@@ -315,3 +315,13 @@ class HoppingTask:
             max(1, round(time * self.options.rate)) for time in self.options.command_resampling_time
         )
         return self._rng.integers(shortest, longest + 1, count)
+
+
+@compiled
+def _clip(action: Array, full: Array, torque: Array) -> None:
+    """Clip actions to [-1, 1] and set their torques; ``full`` are those of a full action, (2,)."""
+    for leg in range(len(action)):
+        for joint in range(2):
+            if abs(action[leg, joint]) > 1:
+                action[leg, joint] = math.copysign(1.0, action[leg, joint])
+            torque[leg, joint] = action[leg, joint] * full[joint]

@@ -8,6 +8,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import UsageError
+from hopping_leg.sim.compiled import compiled
 
 SAMPLES = 3
 """Joint samples a controller sees at a tick: t, t-1, t-2."""
@@ -86,19 +87,16 @@ class Channel:
         depth = disturbance.delay_buffer
         self._orders = np.array(list(itertools.combinations(range(depth), SAMPLES)))
         self._buffer = np.zeros((depth, count, 5))
-        self._flat = self._buffer.reshape(-1, 5)
-        self._q = [slot[:, 0:2] for slot in self._buffer]
-        self._qd = [slot[:, 2:4] for slot in self._buffer]
-        self._command = [slot[:, 4] for slot in self._buffer]
+        self._parts = [(slot[:, 0:2], slot[:, 2:4], slot[:, 4]) for slot in self._buffer]
+        self._back = np.zeros((count, SAMPLES))
         self._block = min(max(_BLOCK_SIZE // count, 16), 512)
         self._draws = np.empty((self._block, count, _DRAWS))
-        self._tick = self._index = 0
+        self._tick = 0
         self._draw()
 
     def reseed(self, rng: np.random.Generator) -> None:
         """Take all randomness from here on from another source."""
-        self.rng = rng
-        self._tick = self._index = 0
+        self.rng, self._tick = rng, 0
         self._draw()
 
     def restart(self, ids: IntArray | slice, q: Array, qd: Array, command: Array) -> None:
@@ -121,24 +119,25 @@ class Channel:
 
     def samples(self, q: Array, qd: Array, command: Array) -> Array:
         """Return the same as ``sense`` in one array of (q1, q2, qd1, qd2, command), (n, 3, 5)."""
-        index, slot = self._index, self._tick % len(self._buffer)
-        np.multiply(q, self._q_noise[index], out=self._q[slot])
-        np.multiply(qd, self._qd_noise[index], out=self._qd[slot])
-        self._command[slot][:] = command
-        seen: Array = self._flat.take(self._rows[index], axis=0)
-        return seen
+        positions, velocities, commands = self._parts[self._tick % len(self._parts)]
+        positions[:], velocities[:], commands[:] = q, qd, command
+        samples, disturbance = np.empty((self.count, SAMPLES, 5)), self.disturbance
+        _disturb(
+            self._draws, self._buffer, self._orders, self._tick, disturbance.joint_noise,
+            disturbance.delay_probability, samples, self._back,
+        )  # fmt: skip
+        return samples
 
     def measurement(self, samples: Array) -> Measurement:
         """Name the parts of this tick's ``samples``."""
-        age = self._back[self._index] * self.period
+        age = self._back * self.period
         return Measurement(samples[..., 0:2], samples[..., 2:4], samples[..., 4], age)
 
     def actuate(self, torque: Array) -> Array:
         """Return the torques that reach the motors, N m, (n, 2); ends the tick."""
-        disturbed: Array = torque * self._torque_noise[self._index]
+        disturbed: Array = torque * self._torque_noise[self._tick % self._block]
         self._tick += 1
-        self._index = self._tick % self._block
-        if self._index == 0:
+        if self._tick % self._block == 0:
             self._draw()
         return disturbed
 
@@ -156,24 +155,40 @@ class Channel:
         self._buffer[:] = state["buffer"]
         self._draws[:] = state["draws"]
         self._tick = int(state["tick"])
-        self._index = self._tick % self._block
         self.rng.bit_generator.state = state["rng"]
-        self._prepare(self._tick - self._index)
+        self._set_torque_noise()
 
     def _draw(self) -> None:
         self.rng.random(out=self._draws)
-        self._prepare(self._tick)
+        self._set_torque_noise()
 
-    def _prepare(self, first: int) -> None:
-        """Turn the block's random numbers into noise factors and rows of the buffer."""
-        draws, disturbance = self._draws, self.disturbance
-        centred = 2 * draws - 1
-        self._q_noise = 1 + disturbance.joint_noise * centred[..., 0:2]
-        self._qd_noise = 1 + disturbance.joint_noise * centred[..., 2:4]
-        self._torque_noise = 1 + disturbance.torque_noise * centred[..., 6:8]
-        delayed = draws[..., 4] < disturbance.delay_probability
-        order = self._orders[(draws[..., 5] * len(self._orders)).astype(np.int64)]
-        self._back = np.where(delayed[..., None], order, np.arange(SAMPLES))
-        ticks = np.arange(first, first + self._block)[:, None, None]
-        slots = (ticks - self._back) % len(self._buffer)
-        self._rows = slots * self.count + np.arange(self.count)[:, None]
+    def _set_torque_noise(self) -> None:
+        self._torque_noise = 1 + self.disturbance.torque_noise * (2 * self._draws[..., 6:8] - 1)
+
+
+@compiled
+def _disturb(
+    draws: Array,
+    buffer: Array,
+    orders: IntArray,
+    tick: int,
+    joint_noise: float,
+    delay_probability: float,
+    samples: Array,
+    back: Array,
+) -> None:
+    """Set a tick's ``samples`` and by how many ticks they lie ``back``, of true values.
+
+    The newest slot of the buffer holds the true values, which noise disturbs.
+    """
+    depth = len(buffer)
+    for leg, draw in enumerate(draws[tick % len(draws)]):
+        newest = buffer[tick % depth, leg]
+        for i in range(4):
+            newest[i] *= 1 + joint_noise * (2 * draw[i] - 1)
+        order = orders[int(draw[5] * len(orders))]
+        late = draw[4] < delay_probability
+        for k in range(SAMPLES):
+            ticks = order[k] if late else k
+            back[leg, k] = ticks
+            samples[leg, k] = buffer[(tick - ticks) % depth, leg]
