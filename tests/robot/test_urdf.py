@@ -36,6 +36,8 @@ def test_limits_and_belt_stand_in_the_file(name):
         limit = root.find(f"joint[@name='{joint}']/limit").attrib
         assert float(limit["effort"]) == parameters.torque_limit
         assert float(limit["velocity"]) == parameters.no_load_speed
-        assert float(limit["lower"]) == parameters.lower
+        assert float(limit["lower"]) == parameters.stop_lower
+        soft = root.find(f"joint[@name='{joint}']/safety_controller").attrib
+        assert float(soft["soft_upper_limit"]) == parameters.upper
         reduction = root.find(f"transmission[@name='{joint}_belt']/actuator/mechanicalReduction")
         assert float(reduction.text) == parameters.belt_ratio

@@ -1,6 +1,5 @@
 """What the joints may do: the motors' torque-speed limit and the paper's soft position limits."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,20 +42,17 @@ class MotorLimit:
     """Torque each joint's motor can give at a speed.
 
     The driving torque falls on the line from the peak torque at rest to zero at the no-load speed;
-    the software limit caps it; braking is limited by the software limit alone. A robot per leg is
-    given where legs differ. With a ``count`` of legs n, all inputs are (n, 2), which is faster.
+    the software limit caps it; braking is limited by the software limit alone. With a ``count`` of
+    legs n, all inputs are (n, 2), which is faster.
     """
 
-    def __init__(self, robot: Robot | Sequence[Robot], count: int | None = None) -> None:
-        robots = [robot] if isinstance(robot, Robot) else robot
-        lines = np.stack([_torque_speed_line(one) for one in robots], axis=1)
-        limit, peak, slope = lines[:, 0] if isinstance(robot, Robot) else lines
-        self.limit, self.peak, self._slope = (_per_leg(x, count) for x in (limit, peak, slope))
+    def __init__(self, robot: Robot, count: int | None = None) -> None:
+        line = (_per_leg(values, count) for values in _torque_speed_line(robot))
+        self.limit, self.peak, self._slope = line
         self._minus_limit, self._minus_peak = -self.limit, -self.peak
         self._zero = np.zeros_like(self.limit)
-        gains = np.stack([one.of_joints("torque_gain") for one in robots])
-        gain = gains[0] if isinstance(robot, Robot) else gains
-        self._gain = _per_leg(gain, count) if (gains != 1).any() else None
+        gain = robot.of_joints("torque_gain")
+        self._gain = _per_leg(gain, count) if (gain != 1).any() else None
 
     def give(self, torque: Array, qd: Array) -> Array:
         """Return what the motors give, N m, (..., 2), if asked for so much at a speed, rad/s."""

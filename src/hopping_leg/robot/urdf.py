@@ -2,7 +2,8 @@
 
 URDF knows neither a motor's reflected inertia nor its torque-speed limit: the former stands in the
 file as a comment, for the latter a joint's ``velocity`` is the speed at which its motor has no
-torque left. All limits are at the joint's side of the belt.
+torque left. A joint's ``limit`` are its mechanical stops, its ``safety_controller`` has the soft
+limits, all at the joint's side of the belt.
 """
 
 from xml.etree import ElementTree as Xml
@@ -92,9 +93,11 @@ def _rail(root: Xml.Element, robot: Robot) -> None:
 def _hinge(root: Xml.Element, name: str, parent: str, child: str, z: float, joint: Joint) -> None:
     hinge = _joint(root, "revolute", name, parent, child, z)
     Xml.SubElement(hinge, "axis", xyz="0 -1 0")
-    limit = {"lower": joint.lower, "upper": joint.upper}
+    limit = {"lower": joint.stop_lower, "upper": joint.stop_upper}
     limit |= {"effort": joint.torque_limit, "velocity": joint.no_load_speed}
     Xml.SubElement(hinge, "limit", {key: _text(value) for key, value in limit.items()})
+    soft = {"soft_lower_limit": joint.lower, "soft_upper_limit": joint.upper, "k_velocity": 0.0}
+    Xml.SubElement(hinge, "safety_controller", {key: _text(value) for key, value in soft.items()})
     Xml.SubElement(hinge, "dynamics", damping=_text(joint.damping), friction=_text(joint.friction))
     hinge.append(Xml.Comment(f" reflected inertia at the joint: {joint.armature!r} kg m2 "))
 
