@@ -52,14 +52,16 @@ def _speed(result: dict[str, Any]) -> list[Bar]:
     found: list[Bar] = []
     speed = result.get("throughput")
     if speed is not None:
-        two, cores = speed["batch_two_threads_over_loop"], speed["batch_two_threads_over_one"]
+        fixed = speed["fixed_base_candidate_s"] / speed["paper_size_share"]
+        loop, cores = speed["replay_one_thread_over_loop"], speed["replay_two_threads_over_one"]
         found = [
-            ("batch on two threads over a loop of mj_step", 3.0, "times", two, True),
-            ("batch: two threads over one", 1.8, "times", cores, True),
+            ("a candidate, 240 s, fixed base, one thread", 0.15, "s", fixed, False),
+            ("replay on one thread over a loop of mj_step", 25.0, "times", loop, True),
+            ("replay: two threads over one", 1.8, "times", cores, True),
         ]
     for row in result.get("paper_size", {}).get("rows", []):
         what = f"{row['recorded_s']:g} s of recordings: {row['method']}"
-        found.append((what, 10.0, "minutes", row["wall_minutes"], False))
+        found.append((what, 90.0, "s", 60 * row["wall_minutes"], False))
     return found
 
 

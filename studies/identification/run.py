@@ -70,7 +70,7 @@ def bench_identify(
     if "throughput" in parts:
         result["throughput"] = cache.load_or_run(
             "throughput",
-            "throughput: batch and plain loops in turn",
+            "throughput: replay and plain loop in turn",
             {**study.asked("cma", study.throughput_seconds), "repeats": study.repeats},
             lambda: throughput(study, on_repeat),
         )

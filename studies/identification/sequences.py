@@ -10,12 +10,12 @@ import numpy as np
 from mujoco import sysid
 
 from hopping_leg.arrays import Array
-from hopping_leg.identify.actuator_model import build_rig_model
 from hopping_leg.identify.initial_states import base_rate, start_states
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.windows import Window, cut
 from hopping_leg.robot import TIMESTEP, MotorLimit
+from studies.identification.throughput import build_rig_model
 from studies.identification.twin import believed
 
 Way = Literal["whole", "windows"]

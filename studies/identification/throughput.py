@@ -1,4 +1,4 @@
-"""What a candidate costs: simulated in one batch, and in a plain loop, in turn in the same run."""
+"""What a candidate costs: replayed by the stepper, and in a plain loop, in turn in the same run."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -8,17 +8,27 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RecordingError
-from hopping_leg.identify.actuator_model import build_rig_model
 from hopping_leg.identify.initial_states import base_rate, start_states
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import make_plan
 from hopping_leg.identify.recording import Recording
+from hopping_leg.identify.recording_format import Rig
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import Window, cut
-from hopping_leg.robot import TIMESTEP, MotorLimit, Robot
+from hopping_leg.robot import TIMESTEP, MotorLimit, Robot, compile_spec, get_spec
 from studies.identification.study import Study
 from studies.identification.twin import believed, record_paper
 from studies.shared import Timed, host, interleave, median_ratio
+
+
+def build_rig_model(robot: Robot, rig: Rig, timestep: float) -> mujoco.MjModel:
+    """Compile a robot on its rig; its actuators ask for torques at the joint, less ``biasprm``."""
+    spec = get_spec(robot, timestep, fixed_base=rig == "fixed-base")
+    for actuator in spec.actuators:
+        actuator.ctrllimited = False
+        actuator.gear[0] = 1
+        actuator.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+    return compile_spec(spec, robot.name)
 
 
 class PlainLoop:
@@ -39,18 +49,13 @@ class PlainLoop:
         self._states = [start_states(recording) for recording in recordings]
         self._recordings = recordings
 
-    def run(self, candidate: LegHypothesis, *, whole_ticks: bool = False) -> list[Array]:
-        """Return the joint positions of each window, rad, (rows, 2).
-
-        Args:
-            candidate: Whose robot is simulated; its drives are those of the recording.
-            whole_ticks: Let one call of mj_step do all physics steps between two commands.
-        """
-        limit = MotorLimit(candidate.robot)
-        models = [build_rig_model(candidate.robot, s.rig, self._timestep) for s in self._setups]
-        heights = [_heights(recording, candidate.robot) for recording in self._recordings]
+    def run(self, candidate: LegHypothesis) -> list[Array]:
+        """Return the joint positions of each window, rad, (rows, 2)."""
+        robot, step = candidate.robot, self._timestep
+        models = [build_rig_model(robot, s.rig, step) for s in self._setups]
+        heights = [_heights(recording, robot) for recording in self._recordings]
         return [
-            self._window(w, models[w.recording], heights[w.recording], limit, whole_ticks)
+            self._window(w, models[w.recording], heights[w.recording], MotorLimit(robot))
             for w in self._windows
         ]
 
@@ -60,12 +65,9 @@ class PlainLoop:
         model: mujoco.MjModel,
         heights: tuple[Array, Array],
         limit: MotorLimit,
-        whole_ticks: bool,
     ) -> Array:
         setup, targets = self._setups[window.recording], self._targets[window.recording]
         stiffness, damping = (np.array(pair) for pair in (setup.stiffness, setup.damping))
-        substeps = round(setup.period / self._timestep)
-        calls, steps = (1, substeps) if whole_ticks else (substeps, 1)
         data = mujoco.MjData(model)
         q, qd = data.qpos[-2:], data.qvel[-2:]
         position, velocity = self._states[window.recording]
@@ -77,9 +79,9 @@ class PlainLoop:
         for row in range(window.length):
             rows[row] = q
             torque = stiffness * (targets[window.start + row] - q) - damping * qd
-            data.ctrl[:] = limit.clip(torque, qd)
-            for _ in range(calls):
-                mujoco.mj_step(model, data, steps)
+            for _ in range(round(setup.period / self._timestep)):
+                data.ctrl[:] = limit.clip(torque, qd)
+                mujoco.mj_step(model, data)
         return rows
 
 
@@ -97,9 +99,9 @@ def _heights(recording: Recording, robot: Robot) -> tuple[Array, Array]:
 def throughput(
     study: Study, on_repeat: Callable[[int, int], None] = lambda done, total: None
 ) -> dict[str, Any]:
-    """Time a generation on the paper's recordings.
+    """Time a generation on the paper's recordings, and one candidate on its fixed base alone.
 
-    Each loop simulates one candidate, each batch a whole generation; all simulate the same
+    The loop simulates one candidate, each replay a whole generation; both simulate the same
     windows, steps and PD, which is checked.
 
     Args:
@@ -107,7 +109,7 @@ def throughput(
         on_repeat: Called with (rounds done, rounds in all).
 
     Returns:
-        Seconds per candidate, and how many times faster the batch is, on one thread and on two.
+        Seconds per candidate, and how many times faster the replay is, on one thread and on two.
     """
     recordings = record_paper(study.throughput_seconds)
     plan = make_plan(recordings, believed(), search="two-pass")
@@ -117,29 +119,29 @@ def throughput(
     vectors = rng.uniform(low, high, (study.population, len(low)))
     candidates = plan.parameters.hypotheses(vectors)
     loop = PlainLoop(recordings, windows, TIMESTEP)
-    batches = {
+    replays = {
         threads: WindowSimulator(recordings, windows, timestep=TIMESTEP, threads=threads)
         for threads in (1, 2)
     }
+    fixed = WindowSimulator(recordings[:1], cut(recordings[:1]), timestep=TIMESTEP, threads=1)
     functions: dict[str, Timed] = {
-        "loop": lambda: _run_loop(loop, candidates[0], whole_ticks=False),
-        "loop_ticks": lambda: _run_loop(loop, candidates[0], whole_ticks=True),
-        "batch_1": lambda: _run_batch(batches[1], candidates),
-        "batch_2": lambda: _run_batch(batches[2], candidates),
+        "loop": lambda: _discard(loop.run(candidates[0])),
+        "replay_1": lambda: _discard(replays[1].run(candidates)),
+        "replay_2": lambda: _discard(replays[2].run(candidates)),
+        "fixed": lambda: _discard(fixed.run(candidates[:1])),
     }
     taken = interleave(functions, study.repeats, on_repeat)
-    per = {n: t / (study.population if n.startswith("batch") else 1) for n, t in taken.items()}
+    per = {n: t / (study.population if n.startswith("replay") else 1) for n, t in taken.items()}
     return {
         "rows": [
-            _row("Python loop, one physics step per mj_step call", per["loop"], per["loop"]),
-            _row("Python loop, one control period per call", per["loop_ticks"], per["loop"]),
-            _row("batch, one thread", per["batch_1"], per["loop"]),
-            _row("batch, two threads", per["batch_2"], per["loop"]),
+            _row("loop of mj_step in Python", per["loop"], per["loop"]),
+            _row("replay, one thread", per["replay_1"], per["loop"]),
+            _row("replay, two threads", per["replay_2"], per["loop"]),
         ],
-        "batch_one_thread_over_loop": median_ratio(per["loop"], per["batch_1"]),
-        "batch_two_threads_over_loop": median_ratio(per["loop"], per["batch_2"]),
-        "batch_two_threads_over_one": median_ratio(per["batch_1"], per["batch_2"]),
-        "largest_difference_rad": _difference(loop, batches[1], candidates[0]),
+        "fixed_base_candidate_s": float(np.median(taken["fixed"])),
+        "replay_one_thread_over_loop": median_ratio(per["loop"], per["replay_1"]),
+        "replay_two_threads_over_one": median_ratio(per["replay_1"], per["replay_2"]),
+        "largest_difference_rad": _difference(loop, replays[1], candidates[0]),
         "recorded_s": 2 * study.throughput_seconds,
         "paper_size_share": study.throughput_seconds / 240.0,
         "windows": len(windows),
@@ -159,16 +161,12 @@ def _row(what: str, seconds: Array, loop: Array) -> dict[str, Any]:
     }
 
 
-def _run_loop(loop: PlainLoop, candidate: LegHypothesis, *, whole_ticks: bool) -> None:
-    loop.run(candidate, whole_ticks=whole_ticks)
+def _discard(_: object) -> None:
+    """Forget a result."""
 
 
-def _run_batch(batch: WindowSimulator, candidates: list[LegHypothesis]) -> None:
-    batch.run(candidates)
-
-
-def _difference(loop: PlainLoop, batch: WindowSimulator, candidate: LegHypothesis) -> float:
+def _difference(loop: PlainLoop, simulator: WindowSimulator, candidate: LegHypothesis) -> float:
     """Return the largest difference of a joint position between the two ways, rad."""
-    plain, batched = loop.run(candidate), batch.run([candidate]).position[0]
-    pairs = zip(plain, batched, strict=True)
+    plain, replayed = loop.run(candidate), simulator.run([candidate]).position[0]
+    pairs = zip(plain, replayed, strict=True)
     return float(max(np.abs(rows - other[: len(rows)]).max() for rows, other in pairs))

@@ -3,7 +3,6 @@ import numpy as np
 import polars as pl
 import pytest
 
-from hopping_leg.identify.actuator_model import build_rig_model
 from hopping_leg.identify.initial_states import OffsetFinder, base_rate, full_states, start_states
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import make_recording
@@ -12,7 +11,7 @@ from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.validation import open_loop
 from hopping_leg.identify.windows import cut, part
 from hopping_leg.robot import kinematics, load_robot
-from tests.identify.twin import LEG, STEP, changed, noisy, record, swing
+from tests.identify.twin import LEG, STEP, changed, noisy, record, rig_model, swing
 
 RUN = record(LEG, swing(3.0))
 FAST = record(LEG, np.repeat(swing(2.0), 3, axis=0), rate=500.0)
@@ -33,7 +32,7 @@ def test_smoothing_comes_nearer_to_the_truth():
 
 def base_speed(run):
     """Return the true speed of the base: the recording's torques on the leg that was recorded."""
-    model = build_rig_model(LEG, "rail", STEP)
+    model = rig_model(LEG, "rail")
     data = mujoco.MjData(model)
     data.qpos[:] = [run.trace.column("height_m")[0], *run.array("position")[0]]
     speeds = []

@@ -6,10 +6,9 @@ import mujoco
 import numpy as np
 import polars as pl
 
-from hopping_leg.identify.actuator_model import build_rig_model
 from hopping_leg.identify.recording import make_recording
 from hopping_leg.identify.recording_format import PAIRS, RecordingMetadata
-from hopping_leg.robot import MotorLimit, kinematics, load_robot
+from hopping_leg.robot import MotorLimit, compile_spec, get_spec, kinematics, load_robot
 
 STEP = 1e-3
 LEG = load_robot("legv2")
@@ -27,24 +26,33 @@ def swing(seconds, rig="fixed-base", rate=200.0, phase=0.0):
     return np.stack([hip, knee], axis=1)
 
 
+def rig_model(robot, rig, timestep=STEP):
+    """Return MuJoCo's model of a robot on its rig, driven by torques at its joints."""
+    spec = get_spec(robot, timestep, fixed_base=rig == "fixed-base")
+    spec.option.tolerance = 1e-15
+    for actuator in spec.actuators:
+        actuator.ctrllimited = False
+        actuator.gear[0] = 1
+    return compile_spec(spec, robot.name)
+
+
 def record(robot, targets, rig="fixed-base", rate=200.0, onboard="zoh", name="twin"):
-    """Track targets with a 200 Hz PD on a simulated robot, one simulation, no batch."""
-    model = build_rig_model(robot, rig, STEP)
+    """Track targets with a PD at the rows' rate on a robot in MuJoCo."""
+    model = rig_model(robot, rig)
     data = mujoco.MjData(model)
     limit = MotorLimit(robot)
     kp, kd = (np.array(GAINS[k]) for k in ("stiffness", "damping"))
     data.qpos[-2:] = targets[0]
     if rig != "fixed-base":
         data.qpos[0] = kinematics.stance_height(robot, targets[0])
-    rows, before = [], np.zeros(2)
+    rows, asked = [], kp * (targets[0] - data.qpos[-2:])
     for target in targets:
         q, qd = data.qpos[-2:].copy(), data.qvel[-2:].copy()
-        height = data.qpos[0]
-        torque = limit.clip(kp * (target - q) - kd * qd, qd)
-        rows.append((q, qd, before, torque, target, height))
-        before = torque
-        data.ctrl[:] = torque
+        height, measured = data.qpos[0], limit.clip(asked, qd)
+        asked = kp * (target - q) - kd * qd
+        rows.append((q, qd, measured, asked, target, height))
         for _ in range(round(1 / rate / STEP)):
+            data.ctrl[:] = limit.clip(asked, data.qvel[-2:])
             mujoco.mj_step(model, data)
     q, qd, measured, torque, target, height = (np.array(c) for c in zip(*rows, strict=True))
     columns = {"time_s": np.arange(len(q)) / rate}

@@ -156,7 +156,10 @@ class OffsetFinder:
         time = recording.time
         stop = min(float(time[-1]), float(time[0]) + SETTLING)
         self._grid = np.arange(float(time[0]), stop, _GRID)
-        self._time, self._command = time, np.nan_to_num(recording.array("torque_command"))
+        command = np.nan_to_num(recording.array("torque_command"))
+        pushes = np.diff(time)[:, None] * command[:-1]
+        self._time, self._first = time, command[0]
+        self._impulse = np.concatenate([np.zeros((1, 2)), np.cumsum(pushes, axis=0)])
         self._q, self._qd = (
             np.stack([np.interp(self._grid, time, column) for column in values.T], axis=1)
             for values in (position, velocity)
@@ -183,10 +186,13 @@ class OffsetFinder:
         return offsets
 
     def _torque(self, hypothesis: parameters.LegHypothesis) -> Array:
-        """Return what the joints felt on the grid, N m, (n, 2)."""
-        late = self._grid - hypothesis.drive.delay
-        row = np.searchsorted(self._time, late, side="right") - 1
-        return hypothesis.robot.of_joints("torque_gain") * self._command[np.maximum(row, 0)]
+        """Return what the joints felt until the next moment of the grid, N m, (n, 2)."""
+        edges = np.append(self._grid, self._grid[-1] + _GRID) - hypothesis.drive.delay
+        impulse = [np.interp(edges, self._time, column) for column in self._impulse.T]
+        # before the first row its command holds
+        early = np.minimum(edges - self._time[0], 0)[:, None] * self._first
+        felt = np.diff(np.stack(impulse, axis=1) + early, axis=0) / _GRID
+        return np.asarray(hypothesis.robot.of_joints("torque_gain") * felt)
 
     def _imbalance(
         self, hypothesis: parameters.LegHypothesis, offsets: Array, torque: Array

@@ -2,16 +2,16 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass
-from functools import cached_property
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from functools import cache, cached_property
 from operator import attrgetter
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError, unknown_name
-from hopping_leg.io import quantity, replace_at
+from hopping_leg.io import quantity
 from hopping_leg.robot import TIMESTEP, Robot
 
 
@@ -58,37 +58,53 @@ class LegHypothesis:
 
     def get(self, name: str) -> float:
         """Return a parameter's value, or raise UsageError if there is no such parameter."""
-        return float(attrgetter(_path(self, name))(self))
+        return float(attrgetter(self._path(name))(self))
 
     def replace(self, values: dict[str, float]) -> "LegHypothesis":
         """Return the hypothesis with other values of parameters; UsageError if one is unknown."""
-        hypothesis = self
+        tree: dict[str, Any] = {}
         for name, value in values.items():
-            hypothesis = replace_at(hypothesis, _path(self, name), float(value))
+            *path, last = self._path(name).split(".")
+            inner = tree
+            for key in path:
+                inner = inner.setdefault(key, {})
+            inner[last] = float(value)
+        hypothesis: LegHypothesis = _replaced(self, tree)
         return hypothesis
 
+    def _path(self, name: str) -> str:
+        if name not in _names():
+            raise UsageError(unknown_name("parameter", name, _names()))
+        return name if name.startswith("drive.") else f"robot.{name}"
 
-def parameter_units(hypothesis: LegHypothesis) -> dict[str, str]:
+
+def _replaced(owner: Any, tree: dict[str, Any]) -> Any:  # noqa: ANN401
+    values = {
+        key: _replaced(getattr(owner, key), value) if isinstance(value, dict) else value
+        for key, value in tree.items()
+    }
+    return replace(owner, **values)
+
+
+@cache
+def _names() -> dict[str, str]:
+    return _units(Robot) | _units(Actuators, "drive.")
+
+
+def parameter_units() -> dict[str, str]:
     """Return every parameter's name and unit."""
-    return _units(hypothesis.robot) | _units(hypothesis.drive, "drive.")
+    return dict(_names())
 
 
-def _units(owner: Any, prefix: str = "") -> dict[str, str]:  # noqa: ANN401
+def _units(kind: type[Any], prefix: str = "") -> dict[str, str]:
+    hints = get_type_hints(kind)
     found: dict[str, str] = {}
-    for spec in fields(owner):
-        value = getattr(owner, spec.name)
-        if is_dataclass(value):
-            found |= _units(value, f"{prefix}{spec.name}.")
+    for spec in fields(kind):
+        if is_dataclass(hints[spec.name]):
+            found |= _units(hints[spec.name], f"{prefix}{spec.name}.")
         elif "unit" in spec.metadata:
             found[prefix + spec.name] = spec.metadata["unit"]
     return found
-
-
-def _path(hypothesis: LegHypothesis, name: str) -> str:
-    units = parameter_units(hypothesis)
-    if name not in units:
-        raise UsageError(unknown_name("parameter", name, units))
-    return name if name.startswith("drive.") else f"robot.{name}"
 
 
 _RANGES = {
@@ -206,7 +222,7 @@ def choose(
     Raises:
         UsageError: A name does not exist, or bounds exclude the start.
     """
-    units = parameter_units(base)
+    units = parameter_units()
     parameters = []
     for name in names:
         value = (start or {}).get(name, base.get(name))

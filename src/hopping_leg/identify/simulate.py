@@ -1,35 +1,44 @@
 """All hypotheses times all windows simulated at once, under the controller of the recording."""
 
+import os
 from collections.abc import Sequence
+from concurrent.futures import wait
 from dataclasses import dataclass
-from operator import attrgetter
 
 import numpy as np
-from mujoco import batch
 
-from hopping_leg.arrays import Array
+from hopping_leg.arrays import Array, Records
 from hopping_leg.errors import RecordingError, UsageError
-from hopping_leg.identify import actuator_model, initial_states, parameters, resampling
+from hopping_leg.identify import initial_states, parameters, replay
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.windows import Window
 from hopping_leg.robot import TIMESTEP, Robot, kinematics
+from hopping_leg.sim.compiled import CompilingNotice
+from hopping_leg.sim.leg_simulator import thread_pool
+from hopping_leg.sim.leg_table import leg_table
 
 _GAINS = ("stiffness", "damping", "integral")
-_BLOCK = 256  # ticks whose commands are prepared at once
-_TICKS_PER_PERIOD = 5  # at which a drive that closes its own loop renews target and limits
-_WILD = 1e4  # joint velocity beyond which a simulation has broken down, rad/s
+_ONBOARD = {"torque": replay.TORQUE, "zoh": replay.ZOH, "continuous": replay.CONTINUOUS}
+_compiled: list[bool] = []
+_PARTS = 4  # pieces of work per thread, as windows differ in length
 
 
-class WindowGroup:
-    """Windows that share rig, rate and on-board controller.
+def _drive_values(hypotheses: Sequence[parameters.LegHypothesis], name: str) -> Array:
+    """Return an attribute of both drives, (hypotheses, 2)."""
+    return np.array([[getattr(h.drive.hip, name), getattr(h.drive.knee, name)] for h in hypotheses])
 
-    The simulation advances by ticks of the recording's period, rounded to physics steps; recorded
-    rows may lie anywhere between ticks. Row n holds state and torque before command n acts. A
-    ``zoh`` PD is computed once per tick from the simulated state; a ``continuous`` one is the
-    actuators' own and acts at every physics step, its target, integral and limits renewed at
-    several ticks a period. Arguments are those of ``WindowSimulator``. UsageError says that the
-    physics step is longer than the period.
-    """
+
+def _recorded_gains(recording: Recording, name: str) -> Array:
+    """Return a gain of the on-board PD, (rows, 2), NaN if unknown; rows win over the metadata."""
+    pair = getattr(recording.metadata, name)
+    if name == "integral":
+        return np.tile(pair or (0.0, 0.0), (len(recording), 1))
+    rows = recording.array(name)
+    return np.where(np.isnan(rows), pair or (np.nan, np.nan), rows)
+
+
+class _WindowGroup:
+    """Windows that share rig, on-board controller and gravity; arguments as ``WindowSimulator``."""
 
     def __init__(
         self,
@@ -38,218 +47,139 @@ class WindowGroup:
         timestep: float,
         threads: int,
     ) -> None:
-        self._timestep, self._threads = timestep, threads
-        self._recordings = [recordings[w.recording] for w in windows]
+        self._timestep, self._threads = timestep, threads or os.cpu_count() or 1
+        numbers = sorted({w.recording for w in windows})
+        self._recordings = [recordings[n] for n in numbers]
         self._metadata = self._recordings[0].metadata
-        period = self._metadata.period
+        period = min(r.metadata.period for r in self._recordings)
         if timestep > period * 1.001:
             raise UsageError(
                 f"A physics step of {timestep} s is longer than the recordings' period of"
                 f" {period:g} s; take {period:g} s or less."
             )
-        parts = _TICKS_PER_PERIOD if self._metadata.onboard == "continuous" else 1
-        self._substeps = max(1, round(period / timestep / parts))
-        self._tick = self._substeps * timestep
-        self._zoh = self._metadata.onboard == "zoh"
-        self._numbers = sorted({w.recording for w in windows})
-        self._of_window = np.array([self._numbers.index(w.recording) for w in windows])
-        self._distinct = [recordings[n] for n in self._numbers]
-        self._start_rows = np.array([w.start for w in windows])
-        self._prepare_rows(recordings, windows)
-        self._prepare_commands()
+        self._of_window = np.array([numbers.index(w.recording) for w in windows])
+        starts = np.cumsum([0, *map(len, self._recordings)])
+        self._spans = np.zeros(len(windows), replay.SPAN)
+        self._spans["recording"] = self._of_window
+        self._spans["first"] = starts[self._of_window]
+        self._spans["start"] = self._spans["first"] + [w.start for w in windows]
+        self._spans["length"] = [w.length for w in windows]
+        self._rows = np.concatenate([_recorded_rows(r) for r in self._recordings])
+        self._moving = self._metadata.rig != "fixed-base"
+        heights = [
+            r.trace.column("height_m") if r.has_column("height_m") else np.full(len(r), np.nan)
+            for r in self._recordings
+        ]
+        self._height0 = np.concatenate(heights)[self._spans["start"]]
         self._offsets = [
             initial_states.OffsetFinder(r)
             if initial_states.has_encoder_offsets(r.metadata)
             else None
-            for r in self._distinct
+            for r in self._recordings
         ]
         self._base_rates: dict[tuple[float, ...], Array] = {}
-        self._batches: dict[int, batch.Batch] = {}
 
-    def run(
-        self, hypotheses: Sequence[parameters.LegHypothesis]
-    ) -> tuple[Array, Array, Array, Array]:
-        """Return the arrays of ``SimulatedWindows``."""
+    def run(self, hypotheses: Sequence[parameters.LegHypothesis]) -> Array:
+        """Return the results, (hypotheses, windows, rows, ``RESULT``)."""
         found = [
             [np.zeros(2) if f is None else f.find(h) for f in self._offsets] for h in hypotheses
         ]
         offsets = np.array(found)[:, self._of_window]
-        simulation = self._start(hypotheses, offsets)
-        *history, heights = self._advance(simulation, hypotheses)
-        shape = (self._rows.ticks, len(hypotheses), -1, 2)
-        q, qd, torque = (values.reshape(shape) for values in history)
-        height = self._rows.linear(heights.reshape(*shape[:3], 1))[..., 0]
-        position, velocity = self._rows.cubic(q, qd)
-        position += offsets[:, :, None]
-        gain = actuator_model.drive_values(hypotheses, "sensor_gain")[:, None, None]
-        offset = actuator_model.drive_values(hypotheses, "torque_offset")[:, None, None]
-        measured = gain * self._rows.linear(torque) + offset
-        for values in (position, velocity, measured, height):
-            values[:, self._rows.padding] = np.nan
-        return position, velocity, measured, height
+        table, drives = self._table(hypotheses), self._drives(hypotheses)
+        state = self._start(hypotheses, offsets)
+        shape = (*state.shape[:2], int(self._spans["length"].max()), replay.RESULT)
+        result = np.full(shape, np.nan)
 
-    def _prepare_rows(self, recordings: Sequence[Recording], windows: Sequence[Window]) -> None:
-        times = []
-        self._begin = np.empty(len(windows))
-        states = {n: initial_states.start_states(recordings[n]) for n in self._numbers}
-        self._q0, self._qd0 = np.empty((len(windows), 2)), np.empty((len(windows), 2))
-        self._height0 = np.full(len(windows), np.nan)
-        for i, w in enumerate(windows):
-            recording = recordings[w.recording]
-            stamps = recording.time[w.start : w.start + w.length]
-            self._begin[i] = stamps[0]
-            even = self._tick * np.arange(w.length, dtype=float)
-            times.append(even if self._zoh else stamps - stamps[0])
-            self._q0[i], self._qd0[i] = (values[w.start] for values in states[w.recording])
-            if recording.has_column("height_m"):
-                self._height0[i] = recording.trace.column("height_m")[w.start]
-        self._rows = resampling.RowResampling(times, self._tick)
+        def work(first: int, last: int) -> None:
+            replay.replay(
+                table, drives, self._rows, self._spans, _ONBOARD[self._metadata.onboard],
+                self._timestep, state, first, last, result,
+            )  # fmt: skip
 
-    def _prepare_commands(self) -> None:
-        self._held, self._ramps, self._gains = [], [], []
-        for recording in self._distinct:
-            time, names = recording.time, ("position", "velocity", "torque")
-            columns = [np.nan_to_num(recording.array(f"{name}_command")) for name in names]
-            self._held.append(resampling.HeldSignal(time, np.concatenate(columns, axis=1)))
-            self._ramps.append(resampling.HeldSignal(time, np.zeros_like(columns[1]), columns[1]))
-            rows = [actuator_model.recorded_gains(recording, name) for name in _GAINS]
-            self._gains.append(resampling.HeldSignal(time, np.concatenate(rows, axis=1)))
+        if not _compiled:
+            with CompilingNotice():
+                work(0, 0)
+            _compiled.append(True)
+        pairs = state.shape[0] * state.shape[1]
+        if self._threads == 1 or pairs == 1:
+            work(0, pairs)
+        else:
+            parts = min(pairs, _PARTS * self._threads)
+            ends = np.linspace(0, pairs, parts + 1).astype(int).tolist()
+            tasks = [thread_pool().submit(work, *ends[k : k + 2]) for k in range(parts)]
+            wait(tasks)
+        result[..., 0:2] += offsets[:, :, None]
+        gain, offset = (_drive_values(hypotheses, n) for n in ("sensor_gain", "torque_offset"))
+        result[..., 4:6] = gain[:, None, None] * result[..., 4:6] + offset[:, None, None]
+        if not self._moving:
+            result[..., 6] = np.nan
+        return result
 
-    def _start(self, hypotheses: Sequence[parameters.LegHypothesis], offsets: Array) -> batch.Batch:
-        metadata, windows = self._metadata, len(self._begin)
-        models = [
-            actuator_model.build_rig_model(
-                h.robot, metadata.rig, self._timestep, metadata.effective_gravity
-            )
-            for h in hypotheses
-        ]
-        count = len(hypotheses) * windows
-        if count not in self._batches:
-            self._batches[count] = batch.Batch(models[0], count, self._threads)
-        simulation = self._batches[count]
-        for name in actuator_model.FIELDS:
-            values = np.stack([attrgetter(name)(m) for m in models])
-            simulation.expand(name)[...] = np.repeat(values, windows, axis=0)
-        simulation.reset(stage=0)
-        q, qd = simulation.bind("qpos"), simulation.bind("qvel")
-        q[:, -2:] = (self._q0 - offsets).reshape(-1, 2)
-        qd[:, -2:] = np.tile(self._qd0, (len(hypotheses), 1))
-        if metadata.rig != "fixed-base":
-            standing = [kinematics.stance_height(h.robot, self._q0) for h in hypotheses]
-            height = np.where(np.isnan(self._height0), np.stack(standing), self._height0)
-            q[:, 0] = height.ravel()
-            qd[:, 0] = np.concatenate([self._base_rate(h.robot) for h in hypotheses])
-        return simulation
+    def _table(self, hypotheses: Sequence[parameters.LegHypothesis]) -> Records:
+        """Return the legs' rows with the software limits of drives, (hypotheses, recordings)."""
+        legs = leg_table(
+            [h.robot for h in hypotheses],
+            self._timestep,
+            fixed_base=not self._moving,
+            gravity=self._metadata.effective_gravity,
+        )
+        table = np.repeat(legs[:, None], len(self._recordings), axis=1)
+        fitted = _drive_values(hypotheses, "torque_limit")
+        for n, recording in enumerate(self._recordings):
+            stated = recording.metadata.torque_limit or table["torque_limit"][:, n]
+            table["torque_limit"][:, n] = np.where(np.isnan(fitted), stated, fitted)
+        return table
+
+    def _drives(self, hypotheses: Sequence[parameters.LegHypothesis]) -> Records:
+        drives = np.zeros(len(hypotheses), replay.DRIVE)
+        for name in ("delay", "velocity_window", "ramp"):
+            drives[name] = [getattr(h.drive, name) for h in hypotheses]
+        if self._metadata.onboard == "torque":
+            return drives
+        drives["gains"] = np.concatenate([_drive_values(hypotheses, n) for n in _GAINS], axis=1)
+        for index, name in enumerate(_GAINS[:2]):
+            columns = slice(2 * index, 2 * index + 2)
+            unknown = np.isnan(self._rows["gains"][:, columns]).any(axis=0)
+            if (unknown & np.isnan(drives["gains"][:, columns])).any():
+                raise RecordingError(
+                    f"{self._recordings[0].name} does not say the {name} of its on-board PD; state"
+                    f" it in the sidecar, or fit 'drive.hip.{name}' and 'drive.knee.{name}'."
+                )
+        return drives
+
+    def _start(self, hypotheses: Sequence[parameters.LegHypothesis], offsets: Array) -> Array:
+        """Return the states that windows start in, (hypotheses, windows, 6)."""
+        measured = self._rows["state"][self._spans["start"]]
+        state = np.zeros((len(hypotheses), len(measured), 6))
+        state[..., 1:3] = measured[:, :2] - offsets
+        state[..., 4:6] = measured[:, 2:]
+        if self._moving:
+            standing = [kinematics.stance_height(h.robot, measured[:, :2]) for h in hypotheses]
+            state[..., 0] = np.where(np.isnan(self._height0), np.stack(standing), self._height0)
+            state[..., 3] = [self._base_rate(h.robot) for h in hypotheses]
+        return state
 
     def _base_rate(self, robot: Robot) -> Array:
         """Return the base's first speed in each window, m/s; zero if no height was measured."""
         lengths = (robot.thigh.length, robot.shank.length, robot.foot.radius)
         if lengths not in self._base_rates:
-            rates = self._base_rates[lengths] = np.zeros(len(self._begin))
-            for n, recording in enumerate(self._distinct):
-                if recording.has_column("height_m"):
-                    mine = self._of_window == n
-                    rates[mine] = initial_states.base_rate(recording, robot)[self._start_rows[mine]]
+            rates = [
+                initial_states.base_rate(r, robot) if r.has_column("height_m") else np.zeros(len(r))
+                for r in self._recordings
+            ]
+            self._base_rates[lengths] = np.concatenate(rates)[self._spans["start"]]
         return self._base_rates[lengths]
 
-    def _advance(
-        self, simulation: batch.Batch, hypotheses: Sequence[parameters.LegHypothesis]
-    ) -> tuple[Array, Array, Array, Array]:
-        """Run all ticks; return q, qd and torque, (ticks, n, 2), and base height, (ticks, n)."""
-        windows, count = len(self._begin), simulation.nsim
-        shape = (self._rows.ticks, count, 2)
-        positions, velocities, torques = (np.full(shape, np.nan) for _ in range(3))
-        heights = np.full(shape[:2], np.nan)
-        q, qd = simulation.bind("qpos")[:, -2:], simulation.bind("qvel")[:, -2:]
-        base = simulation.bind("qpos")[:, 0] if self._metadata.rig != "fixed-base" else np.nan
-        ctrl = simulation.bind("ctrl")
-        bias = simulation.expand("actuator_biasprm")
-        force = simulation.expand("actuator_forcerange")
-        friction = simulation.expand("dof_frictionloss")[:, -2:]
-        still = friction.copy()
-        bounds = actuator_model.MotorBounds(hypotheses, self._recordings)
-        gain, load = (
-            np.repeat([h.robot.of_joints(name) for h in hypotheses], windows, axis=0)
-            for name in ("torque_gain", "load_friction")
-        )
-        delay = np.repeat([h.drive.delay for h in hypotheses], windows)
-        line = actuator_model.DelayLine(delay / self._tick)
-        window = np.repeat([h.drive.velocity_window for h in hypotheses], windows)
-        lagging = (window > 0)[:, None]
-        windowed = bool(lagging.any()) and not self._zoh
-        seen = actuator_model.VelocityWindow(window, self._tick, q, qd)
-        integral, last = np.zeros((count, 2)), np.zeros((count, 2))
-        alive = np.arange(count)
-        for tick in range(self._rows.ticks):
-            if tick % _BLOCK == 0:
-                commands, gains = self._block(tick, delay, hypotheses)
-            target, rate, feed = np.split(commands[tick % _BLOCK], 3, axis=-1)
-            kp, kd, ki = gains[tick % _BLOCK]
-            lower, upper = bounds.at(qd)
-            push = feed + ki * integral
-            if windowed:
-                push = push - np.where(lagging, kd * seen.push(q, qd), 0.0)
-            if self._zoh:
-                asked = push + kp * (target - q) + kd * (rate - qd)
-                torque = ctrl.copy()
-                ctrl[...] = gain * np.clip(np.add(*line.push(asked)), lower, upper)
-                torque = torque if tick else ctrl.copy()
-            else:
-                asked = push + kp * target + kd * rate
-                kd = np.where(lagging, 0.0, kd)
-                reply = np.clip((last if tick else asked) - kp * q - kd * qd, lower, upper)
-                torque, last = gain * reply, asked
-                ctrl[...] = gain * asked
-                bias[:, :, 1], bias[:, :, 2] = -gain * kp, -gain * kd
-                force[..., 0], force[..., 1] = gain * lower, gain * upper
-            integral += self._tick * (target - q)
-            positions[tick], velocities[tick], torques[tick] = q, qd, torque
-            heights[tick] = base
-            if load.any():
-                friction[...] = still + load * np.abs(ctrl if self._zoh else torque)
-            simulation.step(ids=alive, nstep=self._substeps)
-            wild = ~(np.abs(qd) < _WILD).all(axis=1)
-            if wild.any():
-                alive = np.setdiff1d(alive, np.flatnonzero(wild))
-                if not len(alive):
-                    break
-        positions[:, np.setdiff1d(np.arange(count), alive)] = np.nan
-        return positions, velocities, torques, heights
 
-    def _block(
-        self, tick: int, delay: Array, hypotheses: Sequence[parameters.LegHypothesis]
-    ) -> tuple[Array, Array]:
-        """Return a block of ticks' commands, (ticks, n, 6), and gains, (ticks, 3, n, 2)."""
-        windows, number = len(self._begin), len(hypotheses)
-        ticks = np.arange(tick, min(tick + _BLOCK, self._rows.ticks))[:, None, None] * self._tick
-        late = np.zeros(number) if self._zoh else delay[::windows]
-        late = late[:1] if (late == late[0]).all() else late
-        ramp = np.array([[h.drive.ramp] for h in hypotheses])
-        commands = np.empty((len(ticks), number, windows, 6))
-        gains = np.empty((len(ticks), 3, number, windows, 2))
-        fitted = np.array([actuator_model.drive_values(hypotheses, name) for name in _GAINS])[
-            :, :, None
-        ]
-        for n in range(len(self._numbers)):
-            mine = self._of_window == n
-            start = self._begin[mine] + ticks - late[:, None]
-            held = self._held[n].average(start, self._tick)
-            if ramp.any():
-                held = np.repeat(held, number // len(late), axis=1)
-                held[..., :2] += ramp[:, None] * self._ramps[n].average(start, self._tick)
-            commands[:, :, mine] = held
-            rows = self._gains[n].at(start + 1e-9)
-            rows = np.moveaxis(rows.reshape(*start.shape, 3, 2), 3, 1)
-            gains[:, :, :, mine] = np.where(np.isnan(fitted), rows, fitted)
-        if self._metadata.onboard == "torque":
-            gains[...] = 0.0
-        for index, name in enumerate(_GAINS[:2]):
-            if np.isnan(gains[:, index]).any():
-                raise RecordingError(
-                    f"{self._recordings[0].name} does not say the {name} of its on-board PD; state"
-                    f" it in the sidecar, or fit 'drive.hip.{name}' and 'drive.knee.{name}'."
-                )
-        return commands.reshape(len(ticks), -1, 6), gains.reshape(len(ticks), 3, -1, 2)
+def _recorded_rows(recording: Recording) -> Records:
+    rows = np.zeros(len(recording), replay.ROW)
+    rows["time"] = recording.time
+    rows["state"] = np.concatenate(initial_states.start_states(recording), axis=1)
+    for name in ("position", "velocity", "torque"):
+        rows[name] = np.nan_to_num(recording.array(f"{name}_command"))
+    rows["slope"][:-1] = rows["velocity"][:-1]
+    rows["gains"] = np.concatenate([_recorded_gains(recording, n) for n in _GAINS], axis=1)
+    return rows
 
 
 @dataclass(frozen=True)
@@ -269,11 +199,13 @@ class SimulatedWindows:
 class WindowSimulator:
     """Simulates windows of recordings for any number of hypotheses at once.
 
-    Windows of the same rig, rate and on-board controller share one ``mujoco.batch.Batch``; results
-    do not depend on the number of threads, nor on what else is simulated beside a hypothesis.
+    Windows of the same rig and on-board controller are one compiled call; results depend neither on
+    the number of threads, nor on what else is simulated beside a hypothesis.
 
-    The physics step, s, is the training's own by default; 0 threads are one per core. No
-    window raises UsageError.
+    The physics step, s, is the training's own by default; 0 threads are one per core.
+
+    Raises:
+        UsageError: There is no window, or the physics step is longer than a recording's period.
     """
 
     def __init__(
@@ -292,10 +224,10 @@ class WindowSimulator:
         kinds: dict[tuple[object, ...], list[int]] = {}
         for index, window in enumerate(windows):
             metadata = recordings[window.recording].metadata
-            kind = (metadata.rig, metadata.rate_hz, metadata.onboard, metadata.effective_gravity)
+            kind = (metadata.rig, metadata.onboard, metadata.effective_gravity)
             kinds.setdefault(kind, []).append(index)
         self._groups = [
-            (ids, WindowGroup(recordings, [windows[i] for i in ids], timestep, threads))
+            (ids, _WindowGroup(recordings, [windows[i] for i in ids], timestep, threads))
             for ids in kinds.values()
         ]
 
@@ -304,11 +236,9 @@ class WindowSimulator:
 
         RecordingError says that a needed gain is open, RobotError that a robot is impossible.
         """
-        shape = (len(hypotheses), len(self.windows), self.rows, 2)
-        position, velocity, torque = (np.full(shape, np.nan) for _ in range(3))
-        height = np.full(shape[:3], np.nan)
+        shape = (len(hypotheses), len(self.windows), self.rows, replay.RESULT)
+        whole = np.full(shape, np.nan)
         for ids, group in self._groups:
-            parts = group.run(hypotheses)
-            for whole, part in zip((position, velocity, torque, height), parts, strict=True):
-                whole[:, ids, : part.shape[2]] = part
-        return SimulatedWindows(position, velocity, torque, height)
+            part = group.run(hypotheses)
+            whole[:, ids, : part.shape[2]] = part
+        return SimulatedWindows(whole[..., 0:2], whole[..., 2:4], whole[..., 4:6], whole[..., 6])

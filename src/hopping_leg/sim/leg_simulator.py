@@ -183,7 +183,7 @@ class LegSimulator(Simulator):
             self._advance(0, self.count)
             return
         ends = np.linspace(0, self.count, parts + 1).astype(int).tolist()
-        pool = _pool(os.getpid())
+        pool = thread_pool()
         others = [pool.submit(self._advance, *ends[k : k + 2]) for k in range(1, parts)]
         self._advance(ends[0], ends[1])
         wait(others)
@@ -215,7 +215,11 @@ class LegSimulator(Simulator):
 _is_compiled: list[bool] = []
 
 
+def thread_pool() -> ThreadPoolExecutor:
+    """Return the threads of this process, one per core; a fork has none of its parent's."""
+    return _pool(os.getpid())
+
+
 @cache
 def _pool(process: int) -> ThreadPoolExecutor:
-    """Return the process's helpers; a forked process has none of its parent's threads."""
     return ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix=f"stepper-{process}")
