@@ -4,9 +4,9 @@ import dataclasses
 
 import numpy as np
 
-from hopping_leg.robot import ModelMismatch, load_robot
+from hopping_leg.robot import DriveMismatch, ModelMismatch, load_robot
 from hopping_leg.robot.dynamics import kinetic_energy, potential_energy
-from hopping_leg.sim import MujocoSimulator
+from hopping_leg.sim import LegSimulator
 
 POSTURE = np.array([0.7, -1.4])
 
@@ -16,12 +16,39 @@ def with_reality(robot=None, **parts):
     return dataclasses.replace(robot or load_robot("legv2"), reality=ModelMismatch(**parts))
 
 
+def both(**numbers):
+    """Return the same effects for hip and knee."""
+    return {"hip": DriveMismatch(**numbers), "knee": DriveMismatch(**numbers)}
+
+
 def without_friction(robot, *, damping=False):
     """Return a robot whose rail and joints have no Coulomb friction, and damping only if asked."""
     none = {"friction": 0.0} if damping else {"friction": 0.0, "damping": 0.0}
-    parts = ("rail", "hip", "knee")
-    changed = {name: dataclasses.replace(getattr(robot, name), **none) for name in parts}
-    return dataclasses.replace(robot, **changed)
+    return with_joints(robot, rail=none, **none)
+
+
+def with_joints(robot, rail=None, **changes):
+    """Return a robot with numbers of both joints, and of the rail, changed."""
+    parts = {name: dataclasses.replace(getattr(robot, name), **changes) for name in ("hip", "knee")}
+    return dataclasses.replace(robot, rail=dataclasses.replace(robot.rail, **(rail or {})), **parts)
+
+
+def with_strong_motors(robot):
+    """Return a robot whose motors give what they are asked for at any speed."""
+    strong = {"peak_torque": 1e6, "no_load_speed": 1e9}
+    hip, knee = (dataclasses.replace(j.motor, **strong) for j in (robot.hip, robot.knee))
+    return dataclasses.replace(
+        robot,
+        hip=dataclasses.replace(robot.hip, motor=hip),
+        knee=dataclasses.replace(robot.knee, motor=knee),
+    )
+
+
+def hanging(robot, count=1, q=(0.0, 0.0), **options):
+    """Return legs with a fixed base."""
+    legs = LegSimulator(robot, count, threads=1, fixed_base=True, **options)
+    legs.place(slice(None), 1.0, np.asarray(q, float))
+    return legs
 
 
 def energy(legs):
@@ -39,12 +66,3 @@ def states(legs, ticks=60):
         legs.step(np.tile(rng.uniform(-4, 4, 2), (legs.count, 1)))
         found.append(legs.state.copy())
     return np.stack(found)
-
-
-def assert_as_alone(legs, robots):
-    """Check that each leg moves as a lone one of its robot does, to the bit."""
-    together = states(legs)
-    for index, robot in enumerate(robots):
-        alone = states(MujocoSimulator(robot, 1, threads=1))
-        np.testing.assert_array_equal(together[:, index], alone[:, 0])
-    return together

@@ -62,12 +62,16 @@ def inlined(function: Function) -> Function:
 
 
 class CompilingNotice:
-    """Says on stderr that the physics is being compiled if its block takes over a second."""
+    """Says on stderr that the physics is being compiled if its block takes over a second.
+
+    Loading what is compiled already takes less, or is not to be told.
+    """
 
     def __enter__(self) -> None:
         self._timer = threading.Timer(1.0, self._say)
         self._timer.daemon = True
-        self._timer.start()
+        if not any(_FOLDER.rglob("*.nbc")):
+            self._timer.start()
 
     def __exit__(self, *_: object) -> None:
         self._timer.cancel()

@@ -31,8 +31,12 @@ ROWS = 11
 Vector = tuple[float, float, float]
 Symmetric = tuple[float, float, float, float, float, float]
 
+Friction = tuple[Vector, Vector, Vector, Vector]
+"""Dry frictions: force F (zero for none), D, r, and the bound F / D beyond which they slide."""
+
 _ITERATIONS = 60
 _SEARCHES = 40
+_FIRST_ROW = 64  # bit of the first row, behind two for each dry friction
 
 
 @inlined
@@ -177,11 +181,12 @@ def add_stops(p: Record, rows: Array, count: int, q: Vector, speed: Vector) -> i
 
 
 @inlined
-def active(a: Vector, rest: Vector, loss: Vector, bound: Vector, rows: Array, count: int) -> int:
+def active(a: Vector, friction: Friction, rows: Array, count: int) -> int:
     """Return which pieces of the s_i hold at an acceleration, as bits.
 
-    Friction i slides where ``a - rest`` is beyond ``bound``; ``rest`` is its reference.
+    Two bits each say whether a dry friction slides forward or backward, one whether a row pushes.
     """
+    loss, _, rest, bound = friction
     bits = 0
     for i in range(3):
         if loss[i] > 0:
@@ -193,23 +198,29 @@ def active(a: Vector, rest: Vector, loss: Vector, bound: Vector, rows: Array, co
     for c in range(count):
         row = rows[c]
         if row[0] * a[0] + row[1] * a[1] + row[2] * a[2] < row[3]:
-            bits |= 64 << c
+            bits |= _FIRST_ROW << c
     return bits
 
 
 @inlined
+def friction_slope(i: int, a: Vector, friction: Friction, bits: int) -> tuple[float, float]:
+    """Return first and second derivative of a dry friction's s_i by a_i on the piece that holds."""
+    loss, stiff, rest, _ = friction
+    if loss[i] <= 0:
+        return 0.0, 0.0
+    if bits & (1 << (2 * i)):
+        return loss[i], 0.0
+    if bits & (2 << (2 * i)):
+        return -loss[i], 0.0
+    return stiff[i] * (a[i] - rest[i]), stiff[i]
+
+
+@inlined
 def slope_along(
-    along: float,
-    a: Vector,
-    x: Vector,
-    rest: Vector,
-    loss: Vector,
-    bound: Vector,
-    stiff: Vector,
-    rows: Array,
-    count: int,
+    along: float, a: Vector, x: Vector, friction: Friction, rows: Array, count: int
 ) -> tuple[float, float]:
     """Return first and second derivative of all s_i along a + t x at t = ``along``."""
+    loss, stiff, rest, bound = friction
     first = second = 0.0
     for i in range(3):
         if loss[i] > 0:
@@ -233,15 +244,7 @@ def slope_along(
 
 @inlined
 def constrained_acceleration(
-    m: Symmetric,
-    force: Vector,
-    rest: Vector,
-    loss: Vector,
-    stiff: Vector,
-    soft: Vector,
-    rows: Array,
-    count: int,
-    a: Vector,
+    m: Symmetric, force: Vector, friction: Friction, rows: Array, count: int, a: Vector
 ) -> Vector:
     """Return the acceleration that minimises Gauss' principle, beginning at ``a``.
 
@@ -250,47 +253,23 @@ def constrained_acceleration(
     Args:
         m: Mass matrix.
         force: f - b.
-        rest: References of the dry frictions.
-        loss: Dry frictions, zero for none.
-        stiff: Curvatures D of the dry frictions.
-        soft: Their inverses.
-        rows: Contacts and stops, (``ROWS``, 5).
+        friction: The dry frictions.
+        rows: Contacts and stops (J, r, D), (``ROWS``, 5).
         count: How many there are.
         a: Where to begin.
     """
-    bound = (loss[0] * soft[0], loss[1] * soft[1], loss[2] * soft[2])
-    bits = active(a, rest, loss, bound, rows, count)
+    bits = active(a, friction, rows, count)
     for _ in range(_ITERATIONS):
-        g0, g1, g2 = times(m, a)
-        g0, g1, g2 = g0 - force[0], g1 - force[1], g2 - force[2]
-        residual = (g0, g1, g2)
-        h0, h1, h2, h3, h4, h5 = m
-        if loss[0] > 0:
-            if bits & 1:
-                g0 += loss[0]
-            elif bits & 2:
-                g0 -= loss[0]
-            else:
-                g0 += stiff[0] * (a[0] - rest[0])
-                h0 += stiff[0]
-        if loss[1] > 0:
-            if bits & 4:
-                g1 += loss[1]
-            elif bits & 8:
-                g1 -= loss[1]
-            else:
-                g1 += stiff[1] * (a[1] - rest[1])
-                h3 += stiff[1]
-        if loss[2] > 0:
-            if bits & 16:
-                g2 += loss[2]
-            elif bits & 32:
-                g2 -= loss[2]
-            else:
-                g2 += stiff[2] * (a[2] - rest[2])
-                h5 += stiff[2]
+        # Gradient g and Hessian h of the principle on the pieces that hold.
+        r0, r1, r2 = times(m, a)
+        residual = (r0 - force[0], r1 - force[1], r2 - force[2])
+        s0, d0 = friction_slope(0, a, friction, bits)
+        s1, d1 = friction_slope(1, a, friction, bits)
+        s2, d2 = friction_slope(2, a, friction, bits)
+        g0, g1, g2 = residual[0] + s0, residual[1] + s1, residual[2] + s2
+        h0, h1, h2, h3, h4, h5 = m[0] + d0, m[1], m[2], m[3] + d1, m[4], m[5] + d2
         for c in range(count):
-            if bits & (64 << c):
+            if bits & (_FIRST_ROW << c):
                 row = rows[c]
                 j0, j1, j2, d = row[0], row[1], row[2], row[4]
                 pull = d * (j0 * a[0] + j1 * a[1] + j2 * a[2] - row[3])
@@ -299,14 +278,14 @@ def constrained_acceleration(
                 h3, h4, h5 = h3 + d * j1 * j1, h4 + d * j1 * j2, h5 + d * j2 * j2
         x = solve((h0, h1, h2, h3, h4, h5), (-g0, -g1, -g2))
         after = (a[0] + x[0], a[1] + x[1], a[2] + x[2])
-        reached = active(after, rest, loss, bound, rows, count)
-        if reached == bits:
+        if active(after, friction, rows, count) == bits:
             return after
+        # Exact line search: Newton's method within a bracket on the slope along x.
         descent = abs(g0 * x[0] + g1 * x[1] + g2 * x[2])
         linear, square = dot(residual, x), dot(x, times(m, x))
         along, low, high = 1.0, 0.0, np.inf
         for _ in range(_SEARCHES):
-            first, second = slope_along(along, a, x, rest, loss, bound, stiff, rows, count)
+            first, second = slope_along(along, a, x, friction, rows, count)
             first, second = first + linear + along * square, second + square
             if abs(first) <= 1e-12 * descent:
                 break
@@ -318,7 +297,7 @@ def constrained_acceleration(
             if not low < along < high:
                 along = (low + high) / 2 if high < np.inf else 2 * low
         a = (a[0] + along * x[0], a[1] + along * x[1], a[2] + along * x[2])
-        bits = active(a, rest, loss, bound, rows, count)
+        bits = active(a, friction, rows, count)
         if descent <= 1e-300:
             break
     return a

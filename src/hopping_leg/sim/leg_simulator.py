@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from typing import Any
 
@@ -62,6 +62,7 @@ class LegSimulator(Simulator):
         self._jitter = np.zeros(count)
         self._reading = np.zeros((count, 6))
         self._past = np.zeros((count, 0, 6))
+        self._disturbed = False
         self.rng = np.random.default_rng(0)
         """Source of jitter and sensor noise."""
         self.set_robots(robots or [robot] * count)
@@ -85,37 +86,56 @@ class LegSimulator(Simulator):
             RobotError: A transmission cannot be simulated at this physics step.
             UsageError: Commands are late by too many control periods.
         """
-        self.table = leg_table(robots, self.timestep, fixed_base=self.fixed_base)
-        latest = float((self.table["command_latency"] + self.table["command_jitter"]).max())
+        table = leg_table(robots, self.timestep, fixed_base=self.fixed_base)
+        latest = float((table["command_latency"] + table["command_jitter"]).max())
         if latest > (stepper.COMMANDS - 1) * self.period:
             raise UsageError(
                 f"Commands that are {latest * 1e3:g} ms late do not fit a control period of"
                 f" {self.period * 1e3:g} ms; at most {stepper.COMMANDS - 1} may be under way."
             )
-        self._jitters = bool(self.table["command_jitter"].any())
-        self._noisy = bool(self.table["sensor_noise"].any())
-        depth = int(np.ceil(self.table["measurement_latency"].max() / self.timestep - 1e-9))
-        self._sensed = bool(
-            depth or self._noisy or self.table["sensor_step"].any() or self.table["elastic"].any()
-        )
-        if depth and depth + 2 > self._past.shape[1]:
-            present = np.concatenate([self._memory["rotor"], self._memory["motor_torque"]], axis=1)
-            self._past = np.repeat(present[:, None], depth + 2, axis=1)
+        self.table = table
+        self._jitters = bool(table["command_jitter"].any())
+        self._noisy = bool(table["sensor_noise"].any())
+        late = bool(table["measurement_latency"].any())
+        if late:
+            self._remember(2 + int(np.ceil(table["measurement_latency"].max() / self.timestep)))
+        disturbed = late or self._noisy or table["sensor_step"].any() or table["elastic"].any()
+        if disturbed and not self._disturbed:
+            self._reading[:] = stepper.rounded(self._true_reading(), table["sensor_step"])
+        self._disturbed = bool(disturbed)
+
+    def _true_reading(self) -> Array:
+        """Return what undisturbed sensors would report, (n, 6)."""
+        rotor = self._memory["rotor"] if self._disturbed else self.state[:, [1, 2, 4, 5]]
+        return np.concatenate([rotor, self._memory["motor_torque"]], axis=1)
+
+    def _remember(self, depth: int) -> None:
+        """Remember that many physics steps, at least; what came before those known is unknown."""
+        known = self._past.shape[1]
+        if known >= depth:
+            return
+        if not known:
+            self._past = np.repeat(self._true_reading()[:, None], depth, axis=1)
+            return
+        ages = np.minimum(np.arange(depth)[::-1], known - 1)
+        slots = (self._memory["newest"].astype(np.int64)[:, None] - ages) % known
+        self._past = np.take_along_axis(self._past, slots[:, :, None], axis=1)
+        self._memory["newest"] = depth - 1
 
     @property
     def measured_q(self) -> Array:
         """Joint angles that the encoders report, rad, (n, 2)."""
-        return self._reading[:, 0:2] if self._sensed else self.q
+        return self._reading[:, 0:2] if self._disturbed else self.q
 
     @property
     def measured_qd(self) -> Array:
         """Joint velocities that the encoders report, rad/s, (n, 2)."""
-        return self._reading[:, 2:4] if self._sensed else self.qd
+        return self._reading[:, 2:4] if self._disturbed else self.qd
 
     @property
     def measured_torque(self) -> Array:
         """What the motors' torque measurement reports now, N m at the joints, (n, 2)."""
-        return self._reading[:, 4:6] if self._sensed else self._memory["motor_torque"]
+        return self._reading[:, 4:6] if self._disturbed else self._memory["motor_torque"]
 
     @property
     def command_delay_ticks(self) -> IntArray:
@@ -161,15 +181,18 @@ class LegSimulator(Simulator):
     def step(self, torque: Array) -> Array:
         """Command joint torques for a control period; return the motors' mean, N m, (n, 2)."""
         self._command[:, :2] = torque
-        return self.step_drives(self._command)
+        return self._step(self._command)
 
     def step_drives(self, command: Array) -> Array:
         """Command the drives' own PD for a control period, (n, ``COMMAND``); return as ``step``."""
+        return self._step(np.array(command, np.float64, order="C"))
+
+    def _step(self, command: Array) -> Array:
         if self._jitters:
             self._jitter = self.rng.random(self.count)
         stepper.send_all(self.table, self._memory, command, self._jitter)
         self._advance_all()
-        if self._sensed:
+        if self._disturbed:
             draws = self.rng.standard_normal((self.count, 6)) if self._noisy else self._reading
             stepper.read_sensors(
                 self.table, self._memory, self._past, draws, self._reading, self.timestep
@@ -186,7 +209,8 @@ class LegSimulator(Simulator):
         pool = thread_pool()
         others = [pool.submit(self._advance, *ends[k : k + 2]) for k in range(1, parts)]
         self._advance(ends[0], ends[1])
-        wait(others)
+        for other in others:
+            other.result()
 
     def _advance(self, first: int, last: int) -> None:
         stepper.step_legs(
@@ -195,9 +219,10 @@ class LegSimulator(Simulator):
         )  # fmt: skip
 
     def memory(self) -> dict[str, Any]:
-        """Return everything that is needed to go on exactly from here."""
+        """Return everything that is needed to go on exactly from here with the same robots."""
         return {
             "state": self.state.copy(),
+            "push": self._push.copy(),
             "memory": self._memory.view(np.float64).reshape(self.count, -1).copy(),
             "reading": self._reading.copy(),
             "past": self._past.copy(),
@@ -206,7 +231,8 @@ class LegSimulator(Simulator):
 
     def restore(self, memory: dict[str, Any]) -> None:
         """Go on from a ``memory``."""
-        self.state[:], self._reading[:] = memory["state"], memory["reading"]
+        self.state[:], self._push[:] = memory["state"], memory["push"]
+        self._reading[:] = memory["reading"]
         self._memory.view(np.float64).reshape(self.count, -1)[:] = memory["memory"]
         self._past = np.array(memory["past"])
         self.rng.bit_generator.state = memory["rng"]

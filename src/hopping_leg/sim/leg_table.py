@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hopping_leg.arrays import Records
-from hopping_leg.errors import RobotError, UsageError
+from hopping_leg.errors import RobotError
 from hopping_leg.robot import GRAVITY, JOINTS, Joint, Robot
 from hopping_leg.robot.model import FRICTION_TIME_CONSTANT, STOP_TIME_CONSTANT
 
@@ -218,18 +218,4 @@ def _check_stiffness(robot: Robot, name: str, row: Records, joint: int, timestep
             f"{robot.name}: 'reality.{name}.stiffness' is {stiffness:g} N m/rad, too stiff for a"
             f" physics step of {timestep:g} s; give at most {reduced / timestep**2:.3g}, a smaller"
             f" step (below {(reduced / stiffness) ** 0.5:.2g} s), or leave it out for a rigid one."
-        )
-
-
-def check_latency(table: Records, period: float, commands: int) -> None:
-    """Refuse commands that would wait in a longer line than there is.
-
-    Raises:
-        UsageError: A command is late by more control periods than the line is long.
-    """
-    latest = float((table["command_latency"] + table["command_jitter"]).max(initial=0.0))
-    if latest > (commands - 1) * period:
-        raise UsageError(
-            f"Commands that are {latest * 1e3:.1f} ms late do not fit a control period of"
-            f" {period * 1e3:g} ms; at most {commands - 1} of them may be under way."
         )

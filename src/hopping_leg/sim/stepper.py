@@ -84,8 +84,12 @@ def asked(command: Array, joint: int, angle: float, speed: float) -> float:
 @inlined
 def receive(
     memory: Record, now: float, dt: float, t1: float, w1: float, t2: float, w2: float
-) -> tuple[float, float]:
-    """Take the commands that arrive in a step; return the torques asked for, mean over the step."""
+) -> tuple[float, float, float]:
+    """Take the commands that arrive in a step.
+
+    Return the torques asked for, mean over the step, and the share of it in which the last command
+    was in force.
+    """
     hip = knee = 0.0
     rest = 1.0
     arrived = 0
@@ -106,32 +110,41 @@ def receive(
         memory.waiting = waiting - arrived
     hip += rest * asked(memory.command, 0, t1, w1)
     knee += rest * asked(memory.command, 1, t2, w2)
-    return hip, knee
+    return hip, knee, rest
 
 
 @inlined
-def motor_torque(p: Record, joint: int, torque: float, before: float, speed: float) -> float:
+def motor_torque(
+    p: Record, joint: int, torque: float, before: float, speed: float
+) -> tuple[float, float]:
     """Return what the motor gives, at the joint, if asked for ``torque`` and giving ``before``.
 
     Where it drives, the torque-speed line bounds it: from the stall torque at rest to none at the
-    no-load speed.
+    no-load speed. The second number is the derivative by what is asked: none where a limit holds.
     """
     limit = p.torque_limit[joint]
-    target = p.gain[joint] * min(max(torque, -limit), limit)
-    given = before + p.follow[joint] * (target - before)
+    within = min(max(torque, -limit), limit)
+    free = before + p.follow[joint] * (p.gain[joint] * within - before)
     drop = p.speed_slope[joint] * speed
     upper = min(max(p.stall_torque[joint] - drop, 0.0), p.saturation[joint])
     lower = max(min(-p.stall_torque[joint] - drop, 0.0), -p.saturation[joint])
-    return min(max(given, lower), upper)
+    given = min(max(free, lower), upper)
+    limited = within != torque or given != free
+    return given, 0.0 if limited else p.follow[joint] * p.gain[joint]
 
 
 @inlined
-def relief(p: Record, memory: Record, joint: int, torque: float, given: float) -> float:
-    """Return the damping of the drive's own PD that is implicit: none where a limit holds."""
-    damping: float = memory.command[6 + joint]
-    if damping == 0 or abs(torque) > p.torque_limit[joint]:
-        return 0.0
-    return p.follow[joint] * p.gain[joint] * damping
+def after_arrival(
+    p: Record, command: Array, joint: int, mean: float, angle: float, speed: float
+) -> float:
+    """Return the motor's torque at the end of a step in which a command arrived.
+
+    It is the new command's, no mean of both; a current loop that lags knows the mean alone.
+    """
+    if p.follow[joint] < 1:
+        return mean
+    given, _ = motor_torque(p, joint, asked(command, joint, angle, speed), mean, speed)
+    return given
 
 
 @inlined
@@ -160,6 +173,41 @@ def transmitted(p: Record, joint: int, twist: float, rate: float) -> float:
     half = p.half_backlash[joint]
     beyond = twist - min(max(twist, -half), half)
     return p.belt_stiffness[joint] * beyond + p.belt_damping[joint] * rate
+
+
+@inlined
+def through_transmission(
+    p: Record, joint: int, torque: float, loss: float, q: float, v: float, t: float, w: float
+) -> tuple[float, float, float]:
+    """Return the torque on a link, the dry friction that holds it, and its rotor's acceleration.
+
+    A rigid link (q, v) is its rotor (t, w), too: torque, damping and friction are its own.
+    """
+    if p.elastic[joint] == 0:
+        return torque - p.damping[joint] * v, loss, 0.0
+    link = transmitted(p, joint, t - q, w - v)
+    pull, rest = torque - p.damping[joint] * w - link, -p.friction_damping * w
+    stiff = p.friction_stiffness[joint]
+    return link, 0.0, rotor_acceleration(p.armature[joint], pull, rest, loss, stiff)
+
+
+@inlined
+def implicit_damping(p: Record, joint: int, relief: float, dt: float) -> tuple[float, float, float]:
+    """Return what damping that is implicit in the new velocity adds to a link's inertia.
+
+    Of an elastic joint (link l, rotor r, belt's damping c, armature A) the rows are
+
+        (M + dt c) y_l - dt c y_r = M a_l,    -dt c y_l + (A + dt (d + c)) y_r = A a_r,
+
+    from which y_r is eliminated; the other two numbers are its factor and the belt's dt c.
+    ``relief`` is damping of the drive's own PD.
+    """
+    drag = dt * (p.damping[joint] + relief)
+    if p.elastic[joint] == 0:
+        return drag, 1.0, 0.0
+    tie = dt * p.belt_damping[joint]
+    inertia = p.armature[joint] + drag + tie
+    return tie - tie * tie / inertia, inertia, tie
 
 
 @compiled
@@ -191,127 +239,106 @@ def step_leg(
     hip, knee = memory.motor_torque[0], memory.motor_torque[1]
     elastic1, elastic2 = p.elastic[0] > 0, p.elastic[1] > 0
     fixed = p.fixed_base > 0
-    stiff1, stiff2 = p.friction_stiffness[0], p.friction_stiffness[1]
-    stiff = (p.rail_friction_stiffness, stiff1, stiff2)
-    soft = (1 / stiff[0], 1 / stiff1, 1 / stiff2)
+    armature1, armature2 = p.armature[0], p.armature[1]
+    stiff = (p.rail_friction_stiffness, p.friction_stiffness[0], p.friction_stiffness[1])
+    soft = (1 / stiff[0], 1 / stiff[1], 1 / stiff[2])
+    rail = 0.0 if fixed else p.rail_friction
+    rail_drag = 0.0 if fixed else dt * p.rail_damping
     mean1 = mean2 = square1 = square2 = power1 = power2 = 0.0
     least, peak1, peak2, stop = np.inf, 0.0, 0.0, 0.0
+    if not elastic1:
+        t1, w1 = q1, v1
+    if not elastic2:
+        t2, w2 = q2, v2
     for step in range(steps):
-        if not elastic1:
-            t1, w1 = q1, v1
-        if not elastic2:
-            t2, w2 = q2, v2
-        hip_asked, knee_asked = receive(memory, step * dt, dt, t1, w1, t2, w2)
-        hip = motor_torque(p, 0, hip_asked, hip, w1)
-        knee = motor_torque(p, 1, knee_asked, knee, w2)
-        relief1 = relief(p, memory, 0, hip_asked, hip)
-        relief2 = relief(p, memory, 1, knee_asked, knee)
-        joint1, joint2 = after_gear(p, 0, hip, t1, w1), after_gear(p, 1, knee, t2, w2)
+        # The drives: torques of motors and gears, dry friction.
+        asked1, asked2, in_force = receive(memory, step * dt, dt, t1, w1, t2, w2)
+        hip, response1 = motor_torque(p, 0, asked1, hip, w1)
+        knee, response2 = motor_torque(p, 1, asked2, knee, w2)
+        relief1, relief2 = response1 * memory.command[6], response2 * memory.command[7]
         loss1, loss2 = dry_friction(p, 0, hip, w1), dry_friction(p, 1, knee, w2)
+        force1, loss1, rotor1 = through_transmission(
+            p, 0, after_gear(p, 0, hip, t1, w1), loss1, q1, v1, t1, w1
+        )
+        force2, loss2, rotor2 = through_transmission(
+            p, 1, after_gear(p, 1, knee, t2, w2), loss2, q2, v2, t2, w2
+        )
 
+        # Mass matrix M and forces f - b.
         s1, c1, s12, c12 = math.sin(q1), math.cos(q1), math.sin(q1 + q2), math.cos(q1 + q2)
         m = mass_matrix(p, s1, s12, c1 * c12 + s1 * s12)
         bend = p.coupling * (s12 * c1 - c12 * s1)
         v12 = v1 + v2
         swing = p.thigh_moment * c1 * v1 * v1 + p.shank_moment * c12 * v12 * v12
         force0 = push - p.gravity * m[0] - swing - p.rail_damping * v0
-        force1 = bend * v2 * (v1 + v12) - p.gravity * m[1]
-        force2 = -bend * v1 * v1 - p.gravity * m[2]
-        damping1, damping2 = p.damping[0], p.damping[1]
-        rotor1 = rotor2 = 0.0
-        if elastic1:
-            link = transmitted(p, 0, t1 - q1, w1 - v1)
-            pull = joint1 - damping1 * w1 - link
-            rest = -p.friction_damping * w1
-            rotor1 = rotor_acceleration(p.armature[0], pull, rest, loss1, stiff1)
-            force1, loss1 = force1 + link, 0.0
-        else:
-            force1 += joint1 - damping1 * v1
-        if elastic2:
-            link = transmitted(p, 1, t2 - q2, w2 - v2)
-            pull = joint2 - damping2 * w2 - link
-            rest = -p.friction_damping * w2
-            rotor2 = rotor_acceleration(p.armature[1], pull, rest, loss2, stiff2)
-            force2, loss2 = force2 + link, 0.0
-        else:
-            force2 += joint2 - damping2 * v2
+        force1 += bend * v2 * (v1 + v12) - p.gravity * m[1]
+        force2 -= bend * v1 * v1 + p.gravity * m[2]
 
+        # Constraints, and the acceleration under them.
         speed = (v0, v1, v2)
+        touching = 0
         if fixed:
             m = (1.0, 0.0, 0.0, m[3], m[4], m[5])
-            force0 = rail = 0.0
-            count = 0
+            force0 = 0.0
         else:
-            rail = p.rail_friction
-            count = add_contacts(p, rows, x, speed, s1, c1, s12, c12)
-        touching = count
-        count = add_stops(p, rows, count, (x, q1, q2), speed)
+            touching = add_contacts(p, rows, x, speed, s1, c1, s12, c12)
+        count = add_stops(p, rows, touching, (x, q1, q2), speed)
         if count > touching:
             stop = 1.0
-        force, loss = (force0, force1, force2), (rail, loss1, loss2)
         b = -p.friction_damping
-        a = constrained_acceleration(
-            m, force, (b * v0, b * v1, b * v2), loss, stiff, soft, rows, count, a
-        )
+        loss = (rail, loss1, loss2)
+        bound = (rail * soft[0], loss1 * soft[1], loss2 * soft[2])
+        friction = (loss, stiff, (b * v0, b * v1, b * v2), bound)
+        a = constrained_acceleration(m, (force0, force1, force2), friction, rows, count, a)
 
+        # The new velocity, in which damping is implicit, and the position that follows it.
         f0, f1, f2 = times(m, a)
-        if elastic1:
-            inertia = p.armature[0] + dt * (damping1 + relief1 + p.belt_damping[0])
-            tie = dt * p.belt_damping[0]
-            h1 = tie - tie * tie / inertia
-            f1 += tie / inertia * p.armature[0] * rotor1
-        else:
-            h1 = dt * (damping1 + relief1)
-        if elastic2:
-            inertia2 = p.armature[1] + dt * (damping2 + relief2 + p.belt_damping[1])
-            tie2 = dt * p.belt_damping[1]
-            h2 = tie2 - tie2 * tie2 / inertia2
-            f2 += tie2 / inertia2 * p.armature[1] * rotor2
-        else:
-            h2 = dt * (damping2 + relief2)
-        h0 = 0.0 if fixed else dt * p.rail_damping
-        y0, y1, y2 = solve((m[0] + h0, m[1], m[2], m[3] + h1, m[4], m[5] + h2), (f0, f1, f2))
-        if elastic1:
-            w1 += dt * (p.armature[0] * rotor1 + tie * y1) / inertia
-            t1 += dt * w1
-        if elastic2:
-            w2 += dt * (p.armature[1] * rotor2 + tie2 * y2) / inertia2
-            t2 += dt * w2
+        drag1, inertia1, tie1 = implicit_damping(p, 0, relief1, dt)
+        drag2, inertia2, tie2 = implicit_damping(p, 1, relief2, dt)
+        f1 += tie1 / inertia1 * armature1 * rotor1
+        f2 += tie2 / inertia2 * armature2 * rotor2
+        y0, y1, y2 = solve(
+            (m[0] + rail_drag, m[1], m[2], m[3] + drag1, m[4], m[5] + drag2), (f0, f1, f2)
+        )
         v0, v1, v2 = v0 + dt * y0, v1 + dt * y1, v2 + dt * y2
         x, q1, q2 = x + dt * v0, q1 + dt * v1, q2 + dt * v2
+        if elastic1:
+            w1 += dt * (armature1 * rotor1 + tie1 * y1) / inertia1
+            t1 += dt * w1
+        else:
+            t1, w1 = q1, v1
+        if elastic2:
+            w2 += dt * (armature2 * rotor2 + tie2 * y2) / inertia2
+            t2 += dt * w2
+        else:
+            t2, w2 = q2, v2
 
+        # What it was for the motors, and what their sensors see.
         mean1, mean2 = mean1 + hip, mean2 + knee
         square1, square2 = square1 + hip * hip, square2 + knee * knee
-        speed1, speed2 = (w1 if elastic1 else v1), (w2 if elastic2 else v2)
-        power1, power2 = power1 + hip * speed1, power2 + knee * speed2
-        least = min(least, hip * speed1 + knee * speed2)
+        power1, power2 = power1 + hip * w1, power2 + knee * w2
+        least = min(least, hip * w1 + knee * w2)
         peak1, peak2 = max(peak1, abs(v1)), max(peak2, abs(v2))
+        if in_force < 1:
+            hip = after_arrival(p, memory.command, 0, hip, t1, w1)
+            knee = after_arrival(p, memory.command, 1, knee, t2, w2)
         if len(past):
             slot = int(memory.newest) + 1
             if slot == len(past):
                 slot = 0
             memory.newest = slot
             seen = past[slot]
-            seen[0], seen[1] = (t1 if elastic1 else q1), (t2 if elastic2 else q2)
-            seen[2], seen[3], seen[4], seen[5] = speed1, speed2, hip, knee
+            seen[0], seen[1], seen[2], seen[3], seen[4], seen[5] = t1, t2, w1, w2, hip, knee
     for k in range(int(memory.waiting)):
         memory.pending[k, 0] -= steps * dt
     state[0], state[1], state[2], state[3], state[4], state[5] = x, q1, q2, v0, v1, v2
-    if not elastic1:
-        t1, w1 = q1, v1
-    if not elastic2:
-        t2, w2 = q2, v2
     memory.rotor[0], memory.rotor[1], memory.rotor[2], memory.rotor[3] = t1, t2, w1, w2
     memory.acceleration[0], memory.acceleration[1], memory.acceleration[2] = a
     memory.motor_torque[0], memory.motor_torque[1] = hip, knee
     memory.mean_torque[0], memory.mean_torque[1] = mean1 / steps, mean2 / steps
     loads = memory.loads
-    loads[0], loads[1], loads[2], loads[3] = (
-        square1 / steps,
-        square2 / steps,
-        power1 / steps,
-        power2 / steps,
-    )
+    loads[0], loads[1] = square1 / steps, square2 / steps
+    loads[2], loads[3] = power1 / steps, power2 / steps
     loads[4], loads[5], loads[6], loads[7] = least, peak1, peak2, stop
 
 
@@ -347,6 +374,9 @@ def read_sensors(
 ) -> None:
     """Set what each leg's sensors report at the end of a control period.
 
+    Late positions and velocities are interpolated between physics steps; torques are those of the
+    step, as a blend of two commands is none that any motor gave.
+
     Args:
         table: Rows of ``LEG``, (n,).
         memory: Rows of ``MEMORY``, (n,).
@@ -355,17 +385,19 @@ def read_sensors(
         reading: Position, velocity and torque of hip and knee, (n, 6); set.
         dt: Physics step, s.
     """
+    depth = past.shape[1]
     for k in range(len(memory)):
         p, leg = table[k], memory[k]
         back = p.measurement_latency / dt
         whole = int(back)
+        near, far = int(leg.newest) - whole, int(leg.newest) - whole - 1
         for i in range(6):
-            if back > 0:
-                depth, newest = past.shape[1], int(leg.newest)
-                near = past[k, (newest - whole) % depth, i]
-                value = near + (back - whole) * (past[k, (newest - whole - 1) % depth, i] - near)
-            else:
+            if back == 0:
                 value = leg.rotor[i] if i < 4 else leg.motor_torque[i - 4]
+            else:
+                value = past[k, near % depth, i]
+                if i < 4:
+                    value += (back - whole) * (past[k, far % depth, i] - value)
             if p.sensor_noise[i] > 0:
                 value += p.sensor_noise[i] * draws[k, i]
             step = p.sensor_step[i]
@@ -387,6 +419,6 @@ def motor_torques(table: Records, torque: Array, qd: Array, given: Array, fricti
     for k in range(len(table)):
         p = table[k]
         for joint in range(2):
-            motor = motor_torque(p, joint, torque[k, joint], given[k, joint], qd[k, joint])
+            motor, _ = motor_torque(p, joint, torque[k, joint], given[k, joint], qd[k, joint])
             given[k, joint] = motor
             friction[k, joint] = dry_friction(p, joint, motor, qd[k, joint])

@@ -201,6 +201,7 @@ class LiveLeg:
         self._make()
         self._legs.place(_ALL, state[:, 0], state[0, 1:3])
         self._legs.state[:] = state
+        self._legs.forget(_ALL)
         self._legs.push(np.array([self._force]))
         self._plant.channel.restart(_ALL, self._legs.q, self._legs.qd, np.array([height]))
 

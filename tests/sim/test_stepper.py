@@ -1,0 +1,211 @@
+"""The stepper is MuJoCo, to rounding, and what it does beyond is as stated."""
+
+import mujoco
+import numpy as np
+import pytest
+from mujoco import batch
+
+from hopping_leg.io import replace_at
+from hopping_leg.robot import JOINTS, DriveMismatch, get_spec, kinematics, load_robot
+from hopping_leg.sim import LegSimulator
+from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES, Range, sample
+from tests.sim.legs import with_joints, with_reality, with_strong_motors
+
+BODIES = {"hip": "thigh", "knee": "shank"}
+FURTHER = tuple(
+    Range(f"{joint}.{name}", "1", 0.0, high, "test")
+    for joint in JOINTS
+    for name, high in (("load_friction", 0.3), ("friction", 1.0))
+)
+
+
+def tight_model(spec):
+    """Compile a spec whose solver goes on to rounding and whose motors have no limits."""
+    option = spec.option
+    option.tolerance, option.ls_tolerance = 1e-17, 1e-9  # at 1e-15 it is 8e-12 short at worst
+    option.iterations, option.ls_iterations = 200, 100
+    for actuator in spec.actuators:
+        actuator.ctrllimited = False
+    return spec.compile()
+
+
+def add_transmission(spec, name, drive):
+    """Hang a joint's link on a second hinge; the joint keeps armature, friction and motor.
+
+    The spring, which may have a dead band, is applied from outside. The stop is the link's.
+    """
+    joint = spec.joint(name)
+    hinge = spec.body(BODIES[name]).add_joint(
+        name=f"{name}_link", type=mujoco.mjtJoint.mjJNT_HINGE, axis=joint.axis
+    )
+    hinge.damping = [drive.stiffness_damping, 0, 0]
+    stop = spec.add_tendon(name=f"{name}_stop", limited=True, range=joint.range)
+    stop.solref_limit, stop.solimp_limit = joint.solref_limit, joint.solimp_limit
+    for each in (name, f"{name}_link"):
+        stop.wrap_joint(each, 1.0)
+    joint.limited = False
+
+
+class Reference:
+    """Legs in MuJoCo with a tight tolerance, built for these tests alone."""
+
+    def __init__(self, robots, timestep, *, fixed_base=False):
+        self.elastic = robots[0].reality.hip.stiffness is not None
+        models = []
+        for robot in robots:
+            spec = get_spec(robot, timestep, fixed_base=fixed_base)
+            if self.elastic:
+                for name in JOINTS:
+                    add_transmission(spec, name, getattr(robot.reality, name))
+            models.append(tight_model(spec))
+        model, self.robots = models[0], robots
+        self.batch = batch.Batch(model, len(robots), 1)
+        for name in batch.MODEL_FIELDS:
+            values = [np.asarray(getattr(model, name)) for model in models if hasattr(model, name)]
+            if values and values[0].dtype.kind == "f" and values[0].size:
+                own = np.stack(values)
+                if (own != own[0]).any():
+                    self.batch.expand(name)[:] = own
+        self.first = 0 if fixed_base else 1
+        self.motors = [model.joint(name).dofadr[0] for name in JOINTS]
+        self.links = [model.joint(f"{n}_link").dofadr[0] for n in JOINTS] if self.elastic else []
+        self.position, self.speed = self.batch.bind("qpos"), self.batch.bind("qvel")
+        self.ctrl, self.force = self.batch.bind("ctrl"), self.batch.bind("qfrc_applied")
+        self.loss = self.batch.expand("dof_frictionloss")
+        self.belt, self.coulomb, self.load = (
+            np.array([robot.of_joints(name) for robot in robots])
+            for name in ("belt_ratio", "friction", "load_friction")
+        )
+        self.stiffness, self.half = (
+            np.array([robot.reality.of_drives(name) for robot in robots]) * factor
+            for name, factor in (("stiffness", 1.0), ("backlash", 0.5))
+        )
+
+    def set_state(self, state, rotor):
+        """Take a stepper's state (n, 6), and its rotors' (n, 4)."""
+        if self.first:
+            self.position[:, 0], self.speed[:, 0] = state[:, 0], state[:, 3]
+        for values, link, motor in (
+            (self.position, state[:, 1:3], rotor[:, :2]),
+            (self.speed, state[:, 4:6], rotor[:, 2:]),
+        ):
+            values[:, self.motors] = motor if self.elastic else link
+            if self.elastic:
+                values[:, self.links] = link - motor
+
+    def get_state(self):
+        """Return state and rotors' state, (n, 10)."""
+        found = []
+        for values in (self.position, self.speed):
+            motor = values[:, self.motors]
+            link = motor + values[:, self.links] if self.elastic else motor
+            rail = values[:, :1] if self.first else np.zeros((len(values), 1))
+            found.append((rail, link, motor))
+        (x, q, t), (v, qd, w) = found
+        return np.concatenate([x, q, v, qd, t, w], axis=1)
+
+    def step(self, torque, push, substeps):
+        """Hold joint torques and an upward push for some steps."""
+        self.ctrl[:] = torque / self.belt
+        self.loss[:, self.motors] = self.coulomb + self.load * np.abs(torque)
+        if self.first:
+            self.force[:, 0] = push
+        for _ in range(substeps if self.elastic else 1):
+            if self.elastic:
+                twist = self.position[:, self.links]
+                beyond = twist - np.clip(twist, -self.half, self.half)
+                self.force[:, self.links] = -self.stiffness * beyond
+            self.batch.step(nstep=1 if self.elastic else substeps)
+
+
+def worst_difference(robots, ticks, timestep=5e-4, *, fixed_base=False, seed=0):
+    """Return the largest difference after a control period, and how often what touched.
+
+    The difference is relative to a leg's greatest number, if above 1.
+    Legs are pushed off, caught and thrown against their stops by random torques, and go on from
+    MuJoCo's state.
+    """
+    count, rng = len(robots), np.random.default_rng(seed)
+    reference = Reference(robots, timestep, fixed_base=fixed_base)
+    legs = LegSimulator(
+        robots[0], count, timestep=timestep, threads=1, fixed_base=fixed_base, robots=robots
+    )
+    legs.height[:] = 0.0 if fixed_base else rng.uniform(0.02, 0.4, count)
+    legs.q[:] = np.stack([rng.uniform(-0.5, 1.5, count), rng.uniform(-2.75, 0.2, count)], 1)
+    legs.state[:, 3:] = rng.normal(0, 1, (count, 3)) * [not fixed_base, 1, 1]
+    legs.forget(slice(None))
+    limit = robots[0].of_joints("torque_limit")
+    worst, seen = 0.0, dict.fromkeys(("foot", "knee", "base", "stop", "still"), 0)
+    for tick in range(ticks):
+        if tick % 50 == 25:
+            legs.state[::4, 1:3] = rng.uniform(-3.2, 3.2, (len(legs.state[::4]), 2))
+            legs.forget(slice(None))
+        memory = legs.memory()["memory"]
+        reference.set_state(legs.state, memory[:, :4])
+        pushing = (legs.height < 0.22)[:, None]
+        torque = np.where(pushing, [-6.0, 6.0], 8 * ([0.7, -1.4] - legs.q) - 0.2 * legs.qd)
+        torque = (torque + rng.normal(0, 1, (count, 2))).clip(-limit, limit)
+        torque[::7] = 0.0
+        push = rng.normal(0, 5, count) * (tick % 3 == 0)
+        legs.push(push)
+        legs.step(torque)
+        reference.step(torque, push, legs.substeps)
+        rotor = legs.memory()["memory"][:, :4]
+        found = reference.get_state()
+        scale = np.maximum(1, np.abs(found).max(axis=1, keepdims=True))
+        difference = np.abs(np.concatenate([legs.state, rotor], 1) - found)
+        worst = max(worst, (difference / scale).max())
+        for part in ("foot", "knee", "base"):
+            gap = getattr(kinematics, f"{part}_clearance")
+            joints = () if part == "base" else (legs.q,)
+            seen[part] += np.count_nonzero(gap(robots[0], legs.height, *joints) < 0)
+        seen["stop"] += np.count_nonzero(legs.loads[:, 7])
+        seen["still"] += np.count_nonzero(np.abs(legs.qd) < 1e-4)
+        legs.state[:] = found[:, :6]
+    return worst, seen
+
+
+def randomised(name, count, seed=0, **reality):
+    ranges = IDENTIFIABLE_RANGES + tuple(r for r in WIDE_RANGES if "reality" not in r.path)
+    base = with_reality(load_robot(name), **reality) if reality else load_robot(name)
+    robots = sample(base, ranges + FURTHER, count, np.random.default_rng(seed), 0.5)
+    return [with_strong_motors(with_joints(robot, torque_gain=1.0)) for robot in robots]
+
+
+ELASTIC = {
+    "hip": DriveMismatch(stiffness=900.0, stiffness_damping=0.05),
+    "knee": DriveMismatch(stiffness=200.0, stiffness_damping=0.02, backlash=0.01),
+}
+
+
+@pytest.mark.parametrize("name", ["legv2", "legv2-paper"])
+def test_the_stepper_is_mujoco_for_legs_of_any_kind(name):
+    worst, seen = worst_difference(randomised(name, 32), 100)
+    assert worst < 1e-12
+    assert min(seen.values()) > 20
+
+
+@pytest.mark.parametrize("reality", [{}, ELASTIC], ids=["rigid", "elastic"])
+@pytest.mark.parametrize("fixed_base", [False, True], ids=["rail", "fixed base"])
+def test_elastic_legs_and_fixed_bases_are_mujocos_too(reality, fixed_base):
+    robots = randomised("legv2", 16, 1, **reality)
+    worst, seen = worst_difference(robots, 60, fixed_base=fixed_base, seed=1)
+    assert worst < 1e-12
+    assert seen["stop"] > 20
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "timestep", "reality", "fixed_base"),
+    [
+        ("legv2", 5e-4, {}, False),
+        ("legv2-paper", 5e-4, {}, False),
+        ("legv2", 1.25e-4, {}, False),
+        ("legv2", 5e-4, {}, True),
+        ("legv2", 5e-4, ELASTIC, False),
+    ],
+)
+def test_a_hundred_thousand_control_periods_are_mujocos(name, timestep, reality, fixed_base):
+    robots = randomised(name, 256, 2, **reality)
+    worst, _ = worst_difference(robots, 100, timestep, fixed_base=fixed_base, seed=2)
+    assert worst < 1e-12
