@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from mujoco import batch
 
-from hopping_leg.io import replace_at
 from hopping_leg.robot import JOINTS, DriveMismatch, get_spec, kinematics, load_robot
 from hopping_leg.sim import LegSimulator
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES, Range, sample
