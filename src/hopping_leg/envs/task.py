@@ -194,8 +194,8 @@ class HoppingTask:
 
     def _apexes(self, height_before: Array) -> tuple[BoolArray, Array, Array]:
         legs = self.legs
-        rose, self._rises = self._rises, legs.height_rate > 0
-        if not np.count_nonzero(rose > self._rises):
+        rose, self._rises = self._rises, np.empty(self.count, np.bool_)
+        if not _update_rises(legs.state, rose, self._rises):
             return self._never, self._nan, self._nan
         apex = hop_detection.at_apex(rose, self._rises, legs.foot_clearance())
         height = np.where(apex, np.maximum(height_before, legs.height), np.nan)
@@ -325,3 +325,13 @@ def _clip(action: Array, full: Array, torque: Array) -> None:
             if abs(action[leg, joint]) > 1:
                 action[leg, joint] = math.copysign(1.0, action[leg, joint])
             torque[leg, joint] = action[leg, joint] * full[joint]
+
+
+@compiled
+def _update_rises(state: Array, rose: BoolArray, rises: BoolArray) -> int:
+    """Set which bases rise, (n,); return how many have stopped to rise since."""
+    stopped = 0
+    for leg in range(len(rose)):
+        rises[leg] = state[leg, 3] > 0
+        stopped += rose[leg] > rises[leg]
+    return stopped

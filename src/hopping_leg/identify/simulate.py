@@ -13,7 +13,7 @@ from hopping_leg.identify import initial_states, parameters, replay
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.windows import Window
 from hopping_leg.robot import TIMESTEP, Robot, kinematics
-from hopping_leg.sim.compiled import CompilingNotice
+from hopping_leg.sim.compiled import compiling_notice
 from hopping_leg.sim.leg_simulator import thread_pool
 from hopping_leg.sim.leg_table import leg_table
 
@@ -97,7 +97,7 @@ class _WindowGroup:
             )  # fmt: skip
 
         if not _compiled:
-            with CompilingNotice():
+            with compiling_notice(replay.replay):
                 work(0, 0)
             _compiled.append(True)
         pairs = state.shape[0] * state.shape[1]

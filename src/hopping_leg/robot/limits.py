@@ -128,7 +128,7 @@ class SoftLimiter:
         """
         back = np.minimum(np.maximum(q, self._lower), self._upper) - q
         if not np.count_nonzero(back):
-            return np.zeros_like(back)
+            return back
         soft = self.soft
         outside = back != 0
         if soft.inset:

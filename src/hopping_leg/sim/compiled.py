@@ -4,12 +4,15 @@ Numba notices that a function's own file changed, but not what it calls in other
 compiled code lies in a folder that is named by a digest of the files that others call.
 """
 
+import getpass
 import hashlib
+import multiprocessing
 import os
 import sys
 import tempfile
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -26,30 +29,42 @@ _OPTIONS = {"nogil": True, "error_model": "numpy"}
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-def _cache_folder() -> Path:
-    """Return the folder for the sources as they are, in the user's cache if that can be written."""
+def _cache_folder() -> str | None:
+    """Return this user's folder for the sources as they are, None if none can be written."""
     digest = hashlib.sha256(f"{sys.version}{numba.__version__}".encode())
     for name in _SOURCES:
         digest.update((Path(__file__).parent / name).read_bytes())
+    for find in (_in_home, _in_temporary):
+        try:
+            folder = find() / digest.hexdigest()[:16]
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            # What another user left there must not be run.
+            own = not hasattr(os, "getuid") or folder.stat().st_uid == os.getuid()
+        except (OSError, RuntimeError, KeyError):
+            continue
+        if own and os.access(folder, os.W_OK):
+            return str(folder)
+    return None
+
+
+def _in_home() -> Path:
     home = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-    folder = Path(home).expanduser() / "hopping-leg" / digest.hexdigest()[:16]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if os.access(folder, os.W_OK):
-            return folder
-    except OSError:
-        pass
-    return Path(tempfile.gettempdir()) / f"hopping-leg-{digest.hexdigest()[:16]}"
+    return Path(home).expanduser() / "hopping-leg"
 
 
-_FOLDER = _cache_folder()
+def _in_temporary() -> Path:
+    return Path(tempfile.gettempdir()) / f"hopping-leg-{getpass.getuser()}"
+
+
+FOLDER = _cache_folder()
+"""Where the compiled code lies; None if it lives as long as the process."""
 
 
 def compiled(function: Function) -> Function:
     """Compile a function at its first call or load it from the cache; it runs without the GIL."""
-    before, config.CACHE_DIR = config.CACHE_DIR, str(_FOLDER)
+    before, config.CACHE_DIR = config.CACHE_DIR, FOLDER or ""
     try:
-        result: Function = numba.njit(cache=True, **_OPTIONS)(function)
+        result: Function = numba.njit(cache=FOLDER is not None, **_OPTIONS)(function)
         return result
     finally:
         config.CACHE_DIR = before
@@ -61,21 +76,23 @@ def inlined(function: Function) -> Function:
     return result
 
 
-class CompilingNotice:
-    """Says on stderr that the physics is being compiled if its block takes over a second.
+@contextmanager
+def compiling_notice(*functions: Callable[..., Any]) -> Iterator[None]:
+    """Say on stderr, after a second, if one of the functions is being compiled rather than loaded.
 
-    Loading what is compiled already takes less, or is not to be told.
+    Workers say nothing: each of them would.
     """
 
-    def __enter__(self) -> None:
-        self._timer = threading.Timer(1.0, self._say)
-        self._timer.daemon = True
-        if not any(_FOLDER.rglob("*.nbc")):
-            self._timer.start()
+    def say() -> None:
+        if any(function.stats.cache_misses for function in functions):  # type: ignore[attr-defined]
+            text = "Compiling the leg's physics, once; some ten seconds."
+            print(text, file=sys.stderr, flush=True)
 
-    def __exit__(self, *_: object) -> None:
-        self._timer.cancel()
-
-    @staticmethod
-    def _say() -> None:
-        print("Compiling the leg's physics, once; some ten seconds.", file=sys.stderr, flush=True)
+    timer = threading.Timer(1.0, say)
+    timer.daemon = True
+    if multiprocessing.parent_process() is None:
+        timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()

@@ -1,5 +1,6 @@
 """The leg's own physics: many legs, which may differ in everything but their rates."""
 
+import itertools
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -12,8 +13,8 @@ from hopping_leg.arrays import Array, IntArray
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import TIMESTEP, Robot
 from hopping_leg.sim import stepper
-from hopping_leg.sim.compiled import CompilingNotice
-from hopping_leg.sim.leg_table import leg_table
+from hopping_leg.sim.compiled import compiling_notice
+from hopping_leg.sim.leg_table import LEG, leg_table
 from hopping_leg.sim.simulator import CONTROL_RATE, Simulator
 
 _STEPS_PER_THREAD = 4000
@@ -54,7 +55,11 @@ class LegSimulator(Simulator):
         super().__init__(robot, count, rate, timestep)
         if robots and len(robots) != count:
             raise UsageError(f"{len(robots)} robots were given for {count} legs; give one each.")
-        self.threads, self.fixed_base = threads or os.cpu_count() or 1, fixed_base
+        self.fixed_base = fixed_base
+        parts = 1 + count * self.substeps // _STEPS_PER_THREAD
+        parts = max(1, min(threads or os.cpu_count() or 1, count, parts))
+        ends = np.linspace(0, count, parts + 1).astype(int).tolist()
+        self._parts = list(itertools.pairwise(ends))
         self._show(np.zeros((count, 6)))
         self._memory = np.zeros(count, stepper.MEMORY)
         self._push = np.zeros(count)
@@ -66,18 +71,7 @@ class LegSimulator(Simulator):
         self.rng = np.random.default_rng(0)
         """Source of jitter and sensor noise."""
         self.set_robots(robots or [robot] * count)
-        self._compile()
-
-    def _compile(self) -> None:
-        """Compile everything before the first step, which may be one of a control loop."""
-        if not _is_compiled:
-            with CompilingNotice():
-                self._advance(0, 0)
-                stepper.send_all(self.table, self._memory[:0], self._command, self._jitter)
-                stepper.read_sensors(
-                    self.table, self._memory[:0], self._past, self._reading, self._reading, 1.0
-                )
-            _is_compiled.append(True)
+        compile_physics()
 
     def set_robots(self, robots: Sequence[Robot]) -> None:
         """Go on as other robots, one per leg, in the present state; commands stay under way.
@@ -200,17 +194,14 @@ class LegSimulator(Simulator):
         return self._memory["mean_torque"].copy()
 
     def _advance_all(self) -> None:
-        work = self.count * self.substeps
-        parts = min(self.threads, self.count, 1 + work // _STEPS_PER_THREAD)
-        if parts < 2:
-            self._advance(0, self.count)
+        first, *others = self._parts
+        if not others:
+            self._advance(*first)
             return
-        ends = np.linspace(0, self.count, parts + 1).astype(int).tolist()
-        pool = thread_pool()
-        others = [pool.submit(self._advance, *ends[k : k + 2]) for k in range(1, parts)]
-        self._advance(ends[0], ends[1])
-        for other in others:
-            other.result()
+        futures = [thread_pool().submit(self._advance, *part) for part in others]
+        self._advance(*first)
+        for future in futures:
+            future.result()
 
     def _advance(self, first: int, last: int) -> None:
         stepper.step_legs(
@@ -234,11 +225,22 @@ class LegSimulator(Simulator):
         self.state[:], self._push[:] = memory["state"], memory["push"]
         self._reading[:] = memory["reading"]
         self._memory.view(np.float64).reshape(self.count, -1)[:] = memory["memory"]
-        self._past = np.array(memory["past"])
+        self._past = np.array(memory["past"], np.float64, order="C")
         self.rng.bit_generator.state = memory["rng"]
 
 
-_is_compiled: list[bool] = []
+@cache
+def compile_physics() -> None:
+    """Compile the stepper before a first step, which may be one of a control loop.
+
+    Before many processes simulate, one does it for all of them.
+    """
+    table, memory = np.zeros(0, LEG), np.zeros(0, stepper.MEMORY)
+    rows, values, past = np.zeros((0, 6)), np.zeros(0), np.zeros((0, 0, 6))
+    with compiling_notice(stepper.step_legs, stepper.send_all, stepper.read_sensors):
+        stepper.step_legs(table, rows, memory, past, values, 0, 0, 1, TIMESTEP)
+        stepper.send_all(table, memory, rows, values)
+        stepper.read_sensors(table, memory, past, rows, rows, TIMESTEP)
 
 
 def thread_pool() -> ThreadPoolExecutor:

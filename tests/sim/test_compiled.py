@@ -1,0 +1,79 @@
+"""What is compiled is compiled once, before the first step, and kept."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from hopping_leg.robot import load_robot
+from hopping_leg.sim import LegSimulator, stepper
+
+USE = """
+from hopping_leg.robot import load_robot
+from hopping_leg.sim import LegSimulator, compiled
+import numpy as np
+legs = LegSimulator(load_robot("legv2"), 1)
+legs.stand(slice(None), np.array([0.7, -1.4]))
+legs.step(np.zeros((1, 2)))
+print(compiled.FOLDER)
+"""
+
+
+def use(**environment):
+    """Use the simulator in a process of its own; return it and its cache folder."""
+    done = subprocess.run(
+        [sys.executable, "-c", USE],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=300,
+    )
+    return done, done.stdout.strip()
+
+
+def compiled_versions():
+    entries = (stepper.step_legs, stepper.send_all, stepper.read_sensors)
+    return [len(entry.signatures) for entry in entries]
+
+
+def test_no_use_of_the_simulator_compiles_anything_anew():
+    robot = load_robot("twin")
+    legs = LegSimulator(robot, 2, timestep=np.float64(0.0005), threads=2)
+    assert compiled_versions() == [1, 1, 1]
+    wide = np.zeros((4, 4))
+    fixed = np.zeros((2, 2))
+    fixed.flags.writeable = False
+    for torque in (wide[::2, ::2], np.asfortranarray(wide[:2, :2]), fixed, [[0, 1], [1, 0]]):
+        legs.step(torque)
+    for kind in (np.int64, np.float32):
+        legs.step(np.zeros((2, 2), kind))
+        legs.step_drives(np.zeros((2, stepper.COMMAND), kind))
+    legs.step_drives(np.zeros((stepper.COMMAND, 2)).T)
+    legs.push(np.arange(2))
+    legs.place([1], 0.3, (1, -1))
+    legs.restore({**legs.memory(), "past": np.asfortranarray(legs.memory()["past"])})
+    legs.set_robots((load_robot("legv2"), robot))
+    legs.step(np.zeros((2, 2)))
+    LegSimulator(robot, 1, timestep=0.00025, fixed_base=True).step(np.zeros((1, 2)))
+    assert compiled_versions() == [1, 1, 1]
+
+
+@pytest.mark.slow
+def test_a_first_use_says_so_once_and_the_next_ones_are_quiet(tmp_path):
+    first, folder = use(XDG_CACHE_HOME=str(tmp_path))
+    again, same = use(XDG_CACHE_HOME=str(tmp_path))
+    assert first.stderr.count("Compiling the leg's physics") == 1
+    assert again.stderr == ""
+    assert folder == same
+    assert folder.startswith(str(tmp_path))
+
+
+@pytest.mark.slow
+def test_a_home_that_cannot_be_written_is_no_obstacle(tmp_path):
+    nowhere = tmp_path / "file"
+    nowhere.touch()
+    _, folder = use(XDG_CACHE_HOME=str(nowhere), TMPDIR=str(tmp_path))
+    assert folder.startswith(str(tmp_path / "hopping-leg-"))
