@@ -18,6 +18,7 @@ from hopping_leg.rl import loggers, model_card, policy_evaluation, run_folder
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.train import Trained, check, train
 from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim import compile_physics
 from hopping_leg.workers import ProcessWorkers
 
 _DECISION = "decision.json"
@@ -73,6 +74,7 @@ class ParallelSeeds:
         )
         folder.begin(resume=resume)
         if any(self._decision(number) is None for number in range(self.count)):
+            compile_physics()
             with ProcessWorkers(self.count) as workers:
                 workers.map(self.work, ((number,) for number in range(self.count)))
         return self._finish(folder)

@@ -29,6 +29,7 @@ from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.search_space import Tuning, defaults
 from hopping_leg.rl.train import train
 from hopping_leg.robot import load_robot
+from hopping_leg.sim import compile_physics
 from hopping_leg.workers import ProcessWorkers, RayWorkers
 
 FOLDER, ERROR = "folder", "error"
@@ -110,6 +111,7 @@ def tune(tuning: Tuning, workers: int | None = None, ray: str | None = None) -> 
         )
         cluster.map(work, ((here, k) for k in range(cluster.count)))
     else:
+        compile_physics()
         with ProcessWorkers(workers or 1) as processes:
             processes.map(work, ((tuning, k) for k in range(processes.count)))
     return {**conditions(tuning), "robot": tuning.robot, **record(study)}

@@ -2,7 +2,7 @@
 
 from hopping_leg.sim.channel import NO_NOISE, SAMPLES, Channel, Measurement, NoiseAndDelay
 from hopping_leg.sim.engines import check_ground, make_simulator
-from hopping_leg.sim.leg_simulator import LegSimulator
+from hopping_leg.sim.leg_simulator import LegSimulator, compile_physics
 from hopping_leg.sim.plant import Plant
 from hopping_leg.sim.simulator import CONTROL_RATE, Engine, Ground, Simulator
 from hopping_leg.sim.stepper import LOADS
@@ -21,5 +21,6 @@ __all__ = [
     "Plant",
     "Simulator",
     "check_ground",
+    "compile_physics",
     "make_simulator",
 ]

@@ -55,9 +55,8 @@ class LegSimulator(Simulator):
         super().__init__(robot, count, rate, timestep)
         if robots and len(robots) != count:
             raise UsageError(f"{len(robots)} robots were given for {count} legs; give one each.")
-        self.fixed_base = fixed_base
-        parts = 1 + count * self.substeps // _STEPS_PER_THREAD
-        parts = max(1, min(threads or os.cpu_count() or 1, count, parts))
+        self.threads, self.fixed_base = threads or os.cpu_count() or 1, fixed_base
+        parts = min(self.threads, max(count, 1), 1 + count * self.substeps // _STEPS_PER_THREAD)
         ends = np.linspace(0, count, parts + 1).astype(int).tolist()
         self._parts = list(itertools.pairwise(ends))
         self._show(np.zeros((count, 6)))

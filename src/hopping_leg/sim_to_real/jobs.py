@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 
 from hopping_leg.progress import LiveProgress, minutes
+from hopping_leg.sim import compile_physics
 from hopping_leg.workers import ProcessWorkers
 
 _LOOK_EVERY = 1.0
@@ -105,6 +106,7 @@ def work(jobs: Sequence[Job], at_once: int, board: Board) -> None:
 
 
 def _share_out(jobs: Sequence[Job], at_once: int, board: Board) -> None:
+    compile_physics()
     with ProcessWorkers(min(at_once, len(jobs))) as workers:
         running = {workers.submit(_run, job): job for job in jobs}
         while running:
