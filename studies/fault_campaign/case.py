@@ -19,8 +19,8 @@ from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.server import EmulatorConfig
-from hopping_leg.robot import Robot, SoftLimiter, SoftLimits
-from hopping_leg.sim import CONTROL_RATE
+from hopping_leg.robot import Robot, SoftLimits
+from hopping_leg.sim import CONTROL_RATE, SoftLimiter
 from studies.fault_campaign.families import Family, Mishap
 from studies.fault_campaign.verdict import Limits
 

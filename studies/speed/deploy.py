@@ -35,8 +35,8 @@ from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.metrics import START_SECONDS
 from hopping_leg.hop_detection import BOUNCE, FLIGHT_CLEARANCE, find_hops
-from hopping_leg.robot import Robot, SoftLimiter, SoftLimits, kinematics, load_robot
-from hopping_leg.sim import CONTROL_RATE, NO_NOISE
+from hopping_leg.robot import Robot, SoftLimits, kinematics, load_robot
+from hopping_leg.sim import CONTROL_RATE, NO_NOISE, SoftLimiter
 from hopping_leg.trace import Trace
 from studies.shared import host
 from studies.speed.inference import bench_inference

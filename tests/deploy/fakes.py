@@ -10,7 +10,8 @@ from hopping_leg.deploy.flight_recorder import FlightRecorder
 from hopping_leg.deploy.loop import ControlLoop, columns
 from hopping_leg.deploy.motion_sequence import MotionSequence, Poses, SequenceTiming
 from hopping_leg.deploy.safety_limits import hopping_limits
-from hopping_leg.robot import SoftLimiter, SoftLimits, load_robot
+from hopping_leg.robot import SoftLimits, load_robot
+from hopping_leg.sim import SoftLimiter
 
 LEG = load_robot("legv2")
 RATE = 200.0

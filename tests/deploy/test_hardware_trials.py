@@ -17,7 +17,8 @@ from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.errors import HardwareError
-from hopping_leg.robot import SoftLimiter, SoftLimits, load_robot
+from hopping_leg.robot import SoftLimits, load_robot
+from hopping_leg.sim import SoftLimiter
 from hopping_leg.trace import Trace
 from tests.deploy.fakes import Still
 

@@ -3,8 +3,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from hopping_leg.robot import SoftLimiter, SoftLimits, load_robot
-from hopping_leg.sim import LegSimulator, NoiseAndDelay, Plant
+from hopping_leg.robot import SoftLimits, load_robot
+from hopping_leg.sim import LegSimulator, NoiseAndDelay, Plant, SoftLimiter
 
 ROBOT = load_robot("legv2")
 OUTSIDE = np.array([1.5, -2.5])
@@ -29,7 +29,7 @@ def test_soft_limits_act_on_the_sample_that_the_controllers_saw(replace):
         seen = made.sense(np.zeros(COUNT))
         torque = np.full((COUNT, 2), 0.5)
         made.drive(torque)
-        expected = limiter.added(torque, seen.q[:, 0], seen.qd[:, 0])
+        expected = limiter.added(torque, np.concatenate([seen.q, seen.qd], axis=2))
         np.testing.assert_array_equal(made.soft_limit_torque, expected)
     assert (seen.age[:, 0] > 0).any()
     assert (made.soft_limit_torque != 0).any()

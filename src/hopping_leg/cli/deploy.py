@@ -31,8 +31,8 @@ from hopping_leg.deploy.loop import ControlLoop
 from hopping_leg.deploy.motion_sequence import MotionSequence, SequenceTiming, hopping_poses
 from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.identify.excitation import load_excitation
-from hopping_leg.robot import Robot, SoftLimiter, SoftLimits, load_robot
-from hopping_leg.sim import CONTROL_RATE
+from hopping_leg.robot import Robot, SoftLimits, load_robot
+from hopping_leg.sim import CONTROL_RATE, SoftLimiter
 
 _SECONDS = 10.0
 

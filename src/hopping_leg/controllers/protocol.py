@@ -4,8 +4,9 @@ from typing import Protocol
 
 from hopping_leg.arrays import Array
 from hopping_leg.sim.channel import SAMPLES, Measurement
+from hopping_leg.sim.soft_limiter import SoftLimiter
 
-__all__ = ["SAMPLES", "Controller", "Measurement"]
+__all__ = ["SAMPLES", "Controller", "Measurement", "SoftLimiter"]
 
 
 class Controller(Protocol):

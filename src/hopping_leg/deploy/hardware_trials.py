@@ -21,7 +21,7 @@ from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTim
 from hopping_leg.deploy.realtime import Clock, RealClock, keeping_time
 from hopping_leg.errors import HardwareError
 from hopping_leg.io import safe_file_name, versions
-from hopping_leg.robot import Robot, SoftLimiter, SoftLimits
+from hopping_leg.robot import Robot, SoftLimits
 from hopping_leg.trace import Trace
 
 if TYPE_CHECKING:
@@ -186,7 +186,7 @@ class DeployedRobot:
             controller,
             schedule,
             hopping_poses(self.robot),
-            SoftLimiter(self.robot, SoftLimits()),
+            protocol.SoftLimiter(self.robot, SoftLimits()),
             SequenceTiming(hop=schedule.seconds),
         )
         with self.connect() as link:

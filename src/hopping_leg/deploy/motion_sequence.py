@@ -13,7 +13,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.controllers import command_schedule, joint_pd, protocol
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.deploy.drive_link import Pair
-from hopping_leg.robot import Robot, SoftLimiter, kinematics
+from hopping_leg.robot import Robot, kinematics
 
 _ROUNDING = 1e-6  # Rounding of tick times, s; far less than a tick
 
@@ -97,7 +97,7 @@ class MotionSequence:
     controller: protocol.Controller
     commands: command_schedule.Commands
     poses: Poses
-    limiter: SoftLimiter | None
+    limiter: protocol.SoftLimiter | None
     timing: SequenceTiming = field(default_factory=SequenceTiming)
     gains: joint_pd.JointGains = field(default_factory=joint_pd.JointGains)
 
@@ -131,7 +131,10 @@ class MotionSequence:
             asked = self.controller.act(measurement)[0]
         else:
             asked = self._hold(phase, lasted, q, qd)
-        torque = asked if self.limiter is None else asked + self.limiter.added(asked, q, qd)
+        torque = asked
+        if self.limiter is not None:
+            samples = np.concatenate([measurement.q, measurement.qd], axis=2)
+            torque = asked + self.limiter.added(asked[None], samples)[0]
         own = _pair(asked) if phase is Part.HOP else (np.nan, np.nan)
         return SequenceStep(_pair(torque), command, phase, own)
 

@@ -4,7 +4,6 @@ from hopping_leg.robot.hardware import REGISTER_MAP, Hardware, Servo
 from hopping_leg.robot.limits import (
     OVERSPEED,
     MotorLimit,
-    SoftLimiter,
     SoftLimits,
     braking_times,
     command_limits,
@@ -52,7 +51,6 @@ __all__ = [
     "Robot",
     "SensorMismatch",
     "Servo",
-    "SoftLimiter",
     "SoftLimits",
     "braking_times",
     "build_model",

@@ -110,36 +110,6 @@ class SoftLimits:
                 raise UsageError(f"'{name}' of the soft limits is {value} but {valid}.")
 
 
-class SoftLimiter:
-    """Adds the soft limits' PD to a robot's joint torques, in simulation and deployment alike.
-
-    With a ``count`` of legs n, all inputs are (n, 2), which is faster; any shape if None.
-    """
-
-    def __init__(self, robot: Robot, soft: SoftLimits, count: int | None = None) -> None:
-        self.soft = soft
-        self._lower = _per_leg(robot.of_joints("lower"), count)
-        self._upper = _per_leg(robot.of_joints("upper"), count)
-
-    def added(self, torque: Array, q: Array, qd: Array) -> Array:
-        """Return what to add to a controller's torque, N m, (..., 2), at a sample of the joints.
-
-        The sum is then limited as any torque is; nothing is added where a joint is within bounds.
-        """
-        back = np.minimum(np.maximum(q, self._lower), self._upper) - q
-        if not np.count_nonzero(back):
-            return back
-        soft = self.soft
-        outside = back != 0
-        if soft.inset:
-            back += np.copysign(soft.inset, back)
-        pull = soft.stiffness * back - soft.damping * qd
-        if soft.replace:
-            pull -= torque
-        pull *= outside
-        return pull
-
-
 def _per_leg(of_joints: Array, count: int | None) -> Array:
     """Repeat (2,) for every leg: numpy adds equal shapes in half the time of broadcast ones."""
     return of_joints if count is None else np.broadcast_to(of_joints, (count, 2)).copy()

@@ -5,6 +5,7 @@ from hopping_leg.sim.engines import check_ground, make_simulator
 from hopping_leg.sim.leg_simulator import LegSimulator, compile_physics
 from hopping_leg.sim.plant import Plant
 from hopping_leg.sim.simulator import CONTROL_RATE, Engine, Ground, Simulator
+from hopping_leg.sim.soft_limiter import SoftLimiter
 from hopping_leg.sim.stepper import LOADS
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "NoiseAndDelay",
     "Plant",
     "Simulator",
+    "SoftLimiter",
     "check_ground",
     "compile_physics",
     "make_simulator",

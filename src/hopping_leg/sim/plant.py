@@ -3,9 +3,10 @@
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.robot.limits import SoftLimiter, SoftLimits
+from hopping_leg.robot import SoftLimits
 from hopping_leg.sim.channel import Channel, Measurement, NoiseAndDelay
 from hopping_leg.sim.simulator import Simulator
+from hopping_leg.sim.soft_limiter import SoftLimiter
 
 
 class Plant:
@@ -28,8 +29,8 @@ class Plant:
         self.legs = legs
         self.channel = Channel(legs.count, disturbance, legs.period, rng)
         legs.reseed(rng.spawn(1)[0])
-        self._limiter = SoftLimiter(legs.robot, soft_limits, legs.count) if soft_limits else None
-        self._newest: Array = np.empty((0, 5))
+        self._limiter = SoftLimiter(legs.robot, soft_limits) if soft_limits else None
+        self._samples: Array = np.empty((0, 3, 5))
         self.soft_limit_torque: Array = np.zeros((legs.count, 2))
 
     def reseed(self, rng: np.random.Generator) -> None:
@@ -44,14 +45,12 @@ class Plant:
     def samples(self, command: Array) -> Array:
         """Return the same as ``sense`` as (q1, q2, qd1, qd2, command), newest first, (n, 3, 5)."""
         legs = self.legs
-        samples = self.channel.samples(legs.measured_q, legs.measured_qd, command)
-        self._newest = samples[:, 0]
-        return samples
+        self._samples = self.channel.samples(legs.measured_q, legs.measured_qd, command)
+        return self._samples
 
     def drive(self, torque: Array) -> Array:
         """Apply joint torques for one control period; return what the motors gave, N m, (n, 2)."""
         if self._limiter is not None:
-            q, qd = self._newest[:, 0:2], self._newest[:, 2:4]
-            self.soft_limit_torque = self._limiter.added(torque, q, qd)
+            self.soft_limit_torque = self._limiter.added(torque, self._samples)
             torque = torque + self.soft_limit_torque
         return self.legs.step(self.channel.actuate(torque))
