@@ -237,27 +237,70 @@ def precision(file: str, high: float = 1.0) -> str:
 
 
 def against(file: str, rival: str) -> str:
-    """Return at how many commands controllers are nearer than a rival: a row per controller.
+    """Return at how many commands controllers beat a rival: a row per controller.
 
     Of all commands, and of those at which the rival flies for half of the time, as asked of all.
+    One is smaller than the other where their intervals over runs do not overlap.
     """
     rows_of: dict[str, dict[float, dict[str, Any]]] = {}
     for row in read(file)["summary"]:
         rows_of.setdefault(row["controller"], {})[row["command_m"]] = row
     other = rows_of.pop(rival)
     flying = [command for command, row in other.items() if row["flight_fraction"] >= LEAST_FLIGHT]
-    rows = []
-    for name, mine in rows_of.items():
-        cells = []
-        for commands in (list(other), flying):
-            for column in ("median_error_m", "std_m", "mean_abs_error_m"):
-                nearer = [abs(mine[c][column]) < abs(other[c][column]) for c in commands]
-                cells.append(f"{sum(nearer)} of {len(nearer)}")
-        rows.append([name, *cells])
-    measures = ("error smaller at", "std", "mean distance")
+    rows = [
+        [
+            name,
+            *(
+                _told_apart([(mine[c], other[c]) for c in commands], measure)
+                for commands in (list(other), flying)
+                for measure in ("mean_abs_error", "std")
+            ),
+        ]
+        for name, mine in rows_of.items()
+    ]
     half = f"where `{rival}` flies {100 * LEAST_FLIGHT:.0f} %"
-    titles = ["controller", *measures, f"error, {half}", *(f"{m}, there" for m in measures[1:])]
+    titles = ["controller", "mean distance", "std", f"mean distance, {half}", f"std, {half}"]
     return grid(titles, rows) + origin(file)
+
+
+def _told_apart(pairs: list[tuple[dict[str, Any], dict[str, Any]]], measure: str) -> str:
+    low, high = f"{measure}_low_m", f"{measure}_high_m"
+    less = sum(mine[high] < other[low] for mine, other in pairs)
+    more = sum(other[high] < mine[low] for mine, other in pairs)
+    return f"smaller at {less}, larger at {more}, not told apart at {len(pairs) - less - more}"
+
+
+def one(
+    file: str,
+    path: str,
+    key: str,
+    factor: float = 1.0,
+    digits: int = 1,
+    **where: Any,  # noqa: ANN401
+) -> str:
+    """Return one number of the record in a list that has these entries, times a factor."""
+    (row,) = _rows(file, path, where)
+    return (
+        f"{row[key] * factor:+.{digits}f}" if "error" in key else f"{row[key] * factor:.{digits}f}"
+    )
+
+
+def separation(file: str, controller: str) -> str:
+    """Return how neighbouring commands of a controller differ, the least distinct pair of them."""
+    (found,) = _rows(file, "neighbours", {"controller": controller})
+    pairs = found["neighbours"]
+    p, pooled = (max(pair[name] for pair in pairs) for name in ("p", "pooled_p"))
+    delta = min(pairs, key=lambda pair: pair["cliffs_delta"])
+    interval = f"{delta['cliffs_delta_low']:.2f} to {delta['cliffs_delta_high']:.2f}"
+    return (
+        f"p {_p(pooled)} (pooled), p {_p(p)} (run by run); Cliff's delta"
+        f" {delta['cliffs_delta']:.2f} ({interval});"
+        f" overlap {100 * max(pair['overlap'] for pair in pairs):.0f} %"
+    )
+
+
+def _p(value: float) -> str:
+    return "< 0.001" if value < 1e-3 else f"= {value:.3f}"
 
 
 def pictures(study: str) -> list[str]:
@@ -290,11 +333,13 @@ MACROS = {
     "commands": commands(),
     "curve": curve,
     "entries": entries,
+    "one": one,
     "percentiles": percentiles,
     "pictures": pictures,
     "pivot": pivot,
     "precision": precision,
     "recoveries": recoveries,
+    "separation": separation,
     "table": table,
     "value": value,
 }

@@ -46,6 +46,7 @@ TABLES = (
         "table",
         "prediction.json",
         "methods",
+        "controller",
         "meaning=simulation",
         "median_abs_error_m*1000=error, mm",
         "median_abs_error_low_m*1000=from",
