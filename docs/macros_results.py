@@ -265,8 +265,9 @@ def against(file: str, rival: str) -> str:
 
 def _told_apart(pairs: list[tuple[dict[str, Any], dict[str, Any]]], measure: str) -> str:
     low, high = f"{measure}_low_m", f"{measure}_high_m"
-    less = sum(mine[high] < other[low] for mine, other in pairs)
-    more = sum(other[high] < mine[low] for mine, other in pairs)
+    known = [pair for pair in pairs if None not in (pair[0][low], pair[1][low])]
+    less = sum(mine[high] < other[low] for mine, other in known)
+    more = sum(other[high] < mine[low] for mine, other in known)
     return f"smaller at {less}, larger at {more}, not told apart at {len(pairs) - less - more}"
 
 
