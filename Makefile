@@ -27,6 +27,7 @@ $(STAMP): pyproject.toml constraints.txt
 	$(PIP) install -c constraints.txt --no-build-isolation -e '.[train,tune,cluster,hardware,bench,view,docs,dev]'
 	$(PIP) install -c constraints.txt --only-binary pybullet pybullet || \
 	  echo "There is no PyBullet for this Python; what needs it is left out, its tests are skipped."
+	$(BIN)/hop doctor
 	@touch $@
 reproduce: $(STAMP)
 	$(BIN)/hop reproduce $(ARGS)

@@ -1,6 +1,7 @@
 """Check the drives of a leg without moving it; write their configuration, tell them where they are.
 
-Without a transport it says which extras of the package are missing, and the command for each.
+Without a transport it says which extras of the package are missing, and the command for each, and
+compiles what is compiled, so that nothing waits for it later.
 
 Examples:
   hop doctor                                               # what is installed, what is not
@@ -14,13 +15,17 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
 from typing import TYPE_CHECKING
 
+import numpy as np
 from packaging.requirements import Requirement
 
 from hopping_leg.cli import motors, options
 from hopping_leg.deploy import preflight, safety_limits
+from hopping_leg.envs import HoppingEnv
 from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.robot import JOINTS, Robot, load_robot
-from hopping_leg.sim import CONTROL_RATE
+from hopping_leg.sim import CONTROL_RATE, compile_physics
+from hopping_leg.sim.compiled import FOLDER
+from hopping_leg.sim.mujoco_simulator import MujocoSimulator
 
 if TYPE_CHECKING:
     from hopping_leg.deploy.moteus_link import MoteusLink
@@ -67,6 +72,10 @@ def run(args: Doctor) -> None:
             options.say(f"{extra}: {state}; {PURPOSES[extra]}")
             if missing:
                 options.say(f"  pip install 'hopping-leg[{extra}]'")
+        compile_everything()
+        options.say(
+            f"compiled code: {FOLDER or 'no folder can be written; lost with each process'}"
+        )
         return
     robot = load_robot(args.robot)
     limits = safety_limits.hopping_limits(robot, CONTROL_RATE)
@@ -82,6 +91,16 @@ def run(args: Doctor) -> None:
     if any(finding.complaint for finding in findings):
         raise HardwareError("The leg may not be armed; the sentences above say why.")
     options.say("The leg may be armed.")
+
+
+def compile_everything() -> None:
+    """Compile what simulation and environment need, or load it."""
+    robot = load_robot("legv2-paper")
+    compile_physics()
+    env = HoppingEnv(robot)
+    env.reset(seed=0)
+    env.step(np.zeros(2, np.float32))
+    MujocoSimulator(robot, 1).step(np.zeros((1, 2)))
 
 
 def _write(

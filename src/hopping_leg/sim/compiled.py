@@ -13,6 +13,7 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -80,13 +81,12 @@ def inlined(function: Function) -> Function:
 def compiling_notice(*functions: Callable[..., Any]) -> Iterator[None]:
     """Say on stderr, after a second, if one of the functions is being compiled rather than loaded.
 
-    Workers say nothing: each of them would.
+    It is said once. Workers say nothing: each of them would.
     """
 
     def say() -> None:
         if any(function.stats.cache_misses for function in functions):  # type: ignore[attr-defined]
-            text = "Compiling the leg's physics, once; some ten seconds."
-            print(text, file=sys.stderr, flush=True)
+            _say()
 
     timer = threading.Timer(1.0, say)
     timer.daemon = True
@@ -96,3 +96,9 @@ def compiling_notice(*functions: Callable[..., Any]) -> Iterator[None]:
         yield
     finally:
         timer.cancel()
+
+
+@cache
+def _say() -> None:
+    text = "Compiling the leg's physics, once; some ten seconds."
+    print(text, file=sys.stderr, flush=True)

@@ -1,7 +1,6 @@
 """A live simulation of one leg, or two side by side, that follow commands while they hop."""
 
 import numpy as np
-from mujoco import batch
 
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import command_schedule, protocol, registry
@@ -178,7 +177,8 @@ class LiveLeg:
         self.controller, self.robot, self.settings = controller, robot, settings
         self._rng = np.random.default_rng(seed)
         self._force = 0.0
-        self._make()
+        self._legs = LegSimulator(settings.apply(robot), 1, rate=CONTROL_RATE, threads=1)
+        self._connect()
         self.stand(height)
 
     def stand(self, height: float) -> None:
@@ -196,13 +196,9 @@ class LiveLeg:
 
     def set_settings(self, settings: LiveSettings, height: float) -> None:
         """Change the settings in the present state; the controller is not told."""
-        state = self._legs.state.copy()
         self.settings = settings
-        self._make()
-        self._legs.place(_ALL, state[:, 0], state[0, 1:3])
-        self._legs.state[:] = state
-        self._legs.forget(_ALL)
-        self._legs.push(np.array([self._force]))
+        self._legs.set_robots([settings.apply(self.robot)])
+        self._connect()
         self._plant.channel.restart(_ALL, self._legs.q, self._legs.qd, np.array([height]))
 
     def tick(self, height: float, force: float) -> Array:
@@ -222,15 +218,11 @@ class LiveLeg:
         row[3:5] = legs.q[0]
         row[7] = legs.foot_clearance()[0]
         torque = self.controller.act(self._plant.sense(np.array([height])))
-        try:
-            row[5:7] = self._plant.drive(torque)[0]
-        except batch.SimulationError as error:
-            raise PhysicsError(f"The simulation of {self.robot.name} failed: {error}.") from error
+        row[5:7] = self._plant.drive(torque)[0]
         row[8] = self.controller.internals().get("phase", np.array([np.nan]))[0]
         if not np.abs(legs.qd).max() < _IMPOSSIBLE:
             raise PhysicsError(f"The simulation of {self.robot.name} became unstable.")
         return row
 
-    def _make(self) -> None:
-        self._legs = LegSimulator(self.settings.apply(self.robot), 1, rate=CONTROL_RATE, threads=1)
+    def _connect(self) -> None:
         self._plant = Plant(self._legs, self.settings.noise_and_delay, SoftLimits(), self._rng)
