@@ -1,0 +1,289 @@
+"""What the stepper has between a command and a joint: delays, drive, motor, gear, transmission."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from hopping_leg.robot import DriveMismatch, Latency, load_robot
+from hopping_leg.sim import LegSimulator
+from hopping_leg.sim.stepper import COMMAND
+from tests.sim.legs import (
+    POSTURE,
+    both,
+    hanging,
+    with_joints,
+    with_reality,
+    with_strong_motors,
+    without_friction,
+)  # fmt: skip
+
+CAD = load_robot("legv2")
+STEP = 5e-4
+
+
+def late(command=0.0, jitter=0.0):
+    return with_reality(latency=Latency(command=command, jitter=jitter))
+
+
+@pytest.mark.parametrize(("steps", "rate"), [(1, 2000), (4, 2000), (7, 2000), (10, 200), (60, 200)])
+def test_latency_shifts_the_response_by_the_stated_time(steps, rate):
+    legs = hanging(CAD, 2, rate=rate, robots=[CAD, late(steps * STEP)])
+    moved = []
+    for _ in range(10):
+        legs.step(np.array([[3.0, 0.0], [3.0, 0.0]]))
+        moved.append(np.abs(legs.qd[:, 0]) > 1e-6)
+    first, second = np.argmax(moved, axis=0)
+    assert (second - first) * legs.substeps == steps
+
+
+def test_motion_is_smooth_in_a_latency_of_parts_of_a_step():
+    """What a late command did changes with its latency as evenly within steps as across them."""
+    smooth = without_friction(CAD)
+    latencies = np.linspace(0, 8e-3, 161)
+    robots = [with_reality(smooth, latency=Latency(command=late)) for late in latencies]
+    legs = hanging(smooth, len(robots), robots=robots)
+    for tick in range(8):
+        legs.step(np.full((len(robots), 2), 0.4 * np.sin(tick)))
+    slopes = np.diff(legs.q, axis=0) / np.abs(np.diff(legs.q, axis=0)).max(0)
+    assert np.abs(np.diff(slopes, axis=0)).max() < 0.15
+    assert np.ptp(legs.q, axis=0).min() > 1e-4
+
+
+@given(st.floats(0, 0.02), st.floats(0, 0.01), st.integers(0, 2**32 - 1))
+@settings(max_examples=60)
+def test_no_command_overtakes_another_and_none_is_blended_in_what_is_measured(
+    latency, jitter, seed
+):
+    """Commands count up, so that a falling torque would be a command overtaken."""
+    legs = LegSimulator(CAD, 5, threads=1, robots=[late(latency, jitter)] * 5)
+    legs.reseed(np.random.default_rng(seed))
+    legs.place(slice(None), 5.0, POSTURE)
+    before = np.zeros((5, 2))
+    for tick in range(12):
+        mean = legs.step(np.full((5, 2), 0.1 * (tick + 1)))
+        now = legs.measured_torque
+        np.testing.assert_allclose(np.round(now * 10) / 10, now, atol=1e-15)
+        assert (before <= mean + 1e-12).all()
+        assert (mean <= now + 1e-12).all()
+        newest = 0.1 * np.clip(np.floor(tick + 2 - (latency + jitter) / legs.period), 0, None)
+        assert (now >= newest - 0.1 - 1e-9).all()
+        before = now.copy()
+
+
+def test_jitter_spreads_evenly_over_its_range():
+    legs = LegSimulator(late(0.002, 0.002), 2000, threads=1)
+    legs.place(slice(None), 5.0, POSTURE)
+    means = [legs.step(np.full((2000, 2), 0.1 * (tick + 1)))[:, 0] for tick in range(3)]
+    share = (0.3 - means[2]) / 0.1  # of the 5 ms in which the command before still held
+    assert 0.4 <= share.min() < 0.41
+    assert 0.79 < share.max() <= 0.8
+    assert share.std() == pytest.approx(0.4 / np.sqrt(12), rel=0.05)
+
+
+@pytest.mark.parametrize("voltage", [1.0, 0.5])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_the_torque_speed_line_holds_at_every_physics_step(voltage, sign):
+    robot = with_reality(without_friction(CAD), voltage=voltage)
+    legs = LegSimulator(robot, 1, rate=1 / STEP, threads=1)
+    legs.place(slice(None), 50.0, np.array([0.0, -2.0 * sign]))
+    stall = CAD.knee.motor.peak_torque * CAD.knee.belt_ratio
+    fastest = 0.0
+    for _ in range(150):
+        share = sign * legs.qd[0, 1] / CAD.knee.no_load_speed
+        line = stall * max(voltage - share, 0.0)
+        given = legs.step(np.array([[0.0, sign * 1e3]]))[0, 1]
+        assert given == pytest.approx(sign * min(line, CAD.knee.torque_limit), abs=1e-12)
+        fastest = max(fastest, abs(legs.qd[0, 1]))
+        assert legs.loads[0, 6] == pytest.approx(abs(legs.qd[0, 1]))
+        if abs(legs.q[0, 1]) > 2.5:
+            break
+    assert 0.6 * voltage < fastest / CAD.knee.no_load_speed < 1.05 * voltage
+
+
+def test_braking_is_limited_by_the_software_alone():
+    legs = hanging(without_friction(CAD), rate=1 / STEP)
+    legs.qd[0] = [0.0, -1.2 * CAD.knee.no_load_speed]
+    assert legs.step(np.array([[0.0, 50.0]]))[0, 1] == CAD.knee.torque_limit
+
+
+def test_gain_lag_and_limits_shape_the_motor_torque():
+    drive = DriveMismatch(torque_gain=0.9, torque_lag=0.01, torque_limit=4.0)
+    legs = hanging(with_reality(hip=drive, knee=DriveMismatch(torque_limit=8.0)))
+    seen = []
+    for _ in range(20):
+        legs.step(np.array([[3.0, 0.0]]))
+        seen.append(legs.measured_torque[0, 0])
+    time = 0.005 * np.arange(1, 21)
+    np.testing.assert_allclose(seen, 2.7 * (1 - np.exp(-time / 0.01)), rtol=1e-9)
+    for _ in range(20):
+        legs.step(np.full((1, 2), 50.0))
+        legs.place(slice(None), 1.0, np.zeros(2)) if abs(legs.q).max() > 1 else None
+    legs.place(slice(None), 1.0, np.zeros(2))
+    hip, knee = legs.step(np.full((1, 2), 50.0))[0]
+    assert 0 < hip <= 4.0
+    assert knee == 8.0
+
+
+def drive_command(count=1, **columns):
+    """Return a command to the drives' own PD; each column is of hip and knee."""
+    names = ("torque", "stiffness", "position", "damping", "velocity")
+    command = np.zeros((count, COMMAND))
+    for name, values in columns.items():
+        at = 2 * names.index(name)
+        command[:, at : at + 2] = values
+    return command
+
+
+@pytest.mark.parametrize("damping", [0.2, 3.0])
+def test_a_drives_own_pd_is_the_continuous_one(damping):
+    """Against the equations of motion, integrated finely; a strong damping stays stable."""
+    robot = with_strong_motors(without_friction(CAD))
+    command = drive_command(stiffness=15.0, position=[0.5, -1.0], damping=damping, velocity=0.3)
+    errors = []
+    for step in (STEP, STEP / 4):
+        legs = hanging(robot, timestep=step, q=(0.2, -0.4))
+        for _ in range(30):
+            legs.step_drives(command)
+        errors.append(np.abs(legs.q[0] - continuous(robot, command[0], 0.15)[:2]).max())
+    assert errors[0] < 1e-3
+    assert errors[1] == pytest.approx(errors[0] / 4, rel=0.05)
+
+
+def continuous(robot, command, duration):
+    """Integrate a fixed leg under PD; return its angles and speeds."""
+    from hopping_leg.robot import dynamics
+
+    def rate(_, y):
+        q, qd = y[:2], y[2:]
+        torque = command[2:4] * (command[4:6] - q) + command[6:8] * (command[8:10] - qd)
+        mass, bias = dynamics.mass_matrix(robot, q), dynamics.bias_force(robot, q, qd)
+        return np.concatenate([qd, np.linalg.solve(mass[1:, 1:], torque - bias[1:])])
+
+    start = np.array([0.2, -0.4, 0.0, 0.0])
+    return solve_ivp(rate, (0, duration), start, rtol=1e-10, atol=1e-12).y[:, -1]
+
+
+def test_damping_of_a_drive_is_no_inertia_where_its_torque_is_limited():
+    one, other = hanging(CAD), hanging(CAD)
+    for _ in range(10):
+        asked = drive_command(torque=[500.0, -500.0], damping=2.0)
+        np.testing.assert_array_equal(one.step_drives(asked), other.step(asked[:, :2]))
+    np.testing.assert_array_equal(one.state, other.state)
+
+
+def test_a_gear_takes_from_driving_and_adds_to_braking():
+    """What arrives at the joint, as the joint's own acceleration tells."""
+    robot = with_strong_motors(without_friction(CAD))
+    gained = []
+    for efficiency in (1.0, 0.8):
+        geared = with_reality(robot, knee=DriveMismatch(efficiency=efficiency))
+        legs = hanging(geared, 3, rate=1 / STEP)
+        legs.qd[:, 1] = [5.0, -5.0, 5.0]
+        before = legs.qd[:, 1].copy()
+        torque = legs.step(np.array([[0.0, 1.0], [0.0, 1.0], [0.0, 0.0]]))
+        np.testing.assert_array_equal(torque[:, 1], [1, 1, 0])
+        np.testing.assert_array_equal(legs.measured_torque[:, 1], [1, 1, 0])
+        gained.append(legs.qd[:, 1] - before)
+        gained[-1][:2] -= [gained[-1][2], gained[-1][2]]
+    share = gained[1][:2] / gained[0][:2]
+    np.testing.assert_allclose(share, [0.8, 1 / 0.8], rtol=1e-2)
+
+
+def test_cogging_repeats_with_the_motor_angle_and_has_its_amplitude():
+    robot = with_strong_motors(without_friction(CAD))
+    angles = np.linspace(0, 2 * np.pi / 8, 64, endpoint=False)
+    q = np.stack([angles, np.zeros(64)], axis=1)
+    speeds = []
+    for ripple in (0.0, 0.1):
+        drive = DriveMismatch(ripple=ripple, ripple_periods=8.0)
+        legs = hanging(with_reality(robot, hip=drive), 64, q=q, rate=1 / STEP)
+        legs.step(np.ones((64, 2)))
+        speeds.append(legs.qd.copy())
+    turned = (speeds[1] - speeds[0])[:, 0]
+    np.testing.assert_allclose(turned / turned[16], np.sin(8 * angles), atol=1e-9)
+
+
+FRICTION = {"rail": {"friction": 3.0, "damping": 0.0}, "friction": 0.4, "damping": 0.0}
+
+
+@pytest.mark.parametrize("timestep", [5e-4, 1.25e-4])
+@pytest.mark.parametrize("reality", [{}, both(stiffness=400.0, stiffness_damping=0.02)])
+def test_dry_friction_holds_at_90_percent_and_gives_way_at_110(timestep, reality):
+    robot = with_reality(with_joints(CAD, **FRICTION), **reality)
+    legs = hanging(robot, 2, timestep=timestep)
+    shares = np.array([[0.9], [1.1]])
+    for _ in range(100):
+        legs.step(0.4 * shares * [1, 0])
+    before = legs.measured_q.copy()
+    for _ in range(100):
+        legs.step(0.4 * shares * [1, 0])
+    crept = np.abs(legs.measured_q - before) / 0.5
+    assert crept[0, 0] < 1e-4
+    assert abs(legs.measured_q[0, 0]) < 1e-3
+    assert abs(legs.measured_q[1, 0]) > 0.02
+
+
+def test_the_rail_holds_what_its_friction_can():
+    legs = LegSimulator(with_joints(CAD, **FRICTION), 2, threads=1)
+    legs.place(slice(None), 3.0, np.zeros(2))
+    legs.push(CAD.mass * 9.81 + 3.0 * np.array([0.9, 1.1]))
+    for _ in range(100):
+        legs.step(np.zeros((2, 2)))
+    assert abs(legs.height_rate[0]) < 1e-4
+    assert legs.height_rate[1] == pytest.approx(0.3 * 0.5 / CAD.mass, rel=1e-3)
+
+
+@pytest.mark.parametrize(("torque", "moves"), [(0.55, False), (0.65, True)])
+def test_stiction_holds_up_to_its_share_of_friction(torque, moves):
+    sticky = with_joints(CAD, **FRICTION)
+    legs = hanging(with_reality(sticky, hip=DriveMismatch(stiction=1.5)))
+    slippery = hanging(sticky)
+    for one in (legs, slippery):
+        for _ in range(20):
+            one.step(np.array([[torque, 0.0]]))
+    assert (abs(legs.q[0, 0]) > 1e-4) == moves
+    assert abs(slippery.q[0, 0]) > 0.02
+
+
+def test_a_gear_under_load_takes_its_share_of_the_torque_and_may_hold():
+    """1.2 N m against 0.2 + 0.3 x 1.2 N m of friction move the hip as 0.84 N m without load do."""
+    moved = []
+    for share, torque, ticks in ((0.3, 1.2, 4), (0, 0.84, 4), (0.9, 1, 1), (0, 1, 1)):
+        hip = dataclasses.replace(CAD.hip, friction=0.2, damping=0.0, load_friction=share)
+        legs = hanging(dataclasses.replace(CAD, hip=hip))
+        for _ in range(ticks):
+            legs.step(np.array([[torque, 0.0]]))
+        moved.append(float(legs.qd[0, 0]))
+    assert moved[0] > 0.5
+    assert abs(moved[2]) < 1e-4 < 0.4 < moved[3]
+    assert moved[0] == pytest.approx(moved[1], rel=1e-6)
+
+
+@pytest.mark.parametrize("joint", ["hip", "knee"])
+@pytest.mark.parametrize("stiffness", [300.0, 1200.0])
+def test_backlash_leaves_a_dead_band_of_its_width(joint, stiffness):
+    width, index = 0.02, ["hip", "knee"].index(joint)
+    drive = DriveMismatch(backlash=width, stiffness=stiffness, stiffness_damping=0.1)
+    legs = hanging(with_reality(with_joints(CAD, friction=5.0), **{joint: drive}), 2)
+    # Friction holds the motor; gravity swings the link to the side's end of the gap.
+    legs.place(slice(None), 1.0, np.eye(2)[index] * np.array([[-1.0], [1.0]]))
+    for _ in range(400):
+        legs.step(np.zeros((2, 2)))
+    gap = np.diff((legs.measured_q - legs.q)[:, index])[0]
+    lever = CAD.shank.mass * CAD.shank.com
+    if joint == "hip":
+        lever += CAD.thigh.mass * CAD.thigh.com + CAD.shank.mass * CAD.thigh.length
+    assert gap == pytest.approx(width + 2 * 9.81 * lever * np.sin(1.0) / stiffness, rel=0.02)
+
+
+def test_a_belt_yields_by_torque_over_stiffness():
+    soft = DriveMismatch(stiffness=20.0, stiffness_damping=0.05)
+    held = hanging(with_reality(with_joints(CAD, friction=5.0), knee=soft), q=(0.0, -np.pi / 2))
+    for _ in range(600):
+        held.step(np.zeros((1, 2)))
+    torque = -9.81 * CAD.shank.mass * CAD.shank.com * np.sin(held.q[0].sum())
+    assert (held.q - held.measured_q)[0, 1] == pytest.approx(torque / 20.0, rel=1e-3)

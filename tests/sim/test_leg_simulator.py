@@ -1,0 +1,413 @@
+"""Many legs at once: energy, threads, memory, robots that change, sensors, loads."""
+
+import dataclasses
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hopping_leg.errors import UsageError
+from hopping_leg.robot import (
+    DriveMismatch,
+    GroundMismatch,
+    Latency,
+    MassScale,
+    SensorMismatch,
+    load_robot,
+)
+from hopping_leg.sim import LegSimulator, NoiseAndDelay, Plant, stepper
+from hopping_leg.sim.randomization import draw_twin
+from tests.sim.legs import (
+    POSTURE,
+    both,
+    energy,
+    hanging,
+    states,
+    with_joints,
+    with_reality,
+    without_friction,
+)  # fmt: skip
+
+CAD = load_robot("legv2")
+TWIN = load_robot("twin")
+ROBOTS = (
+    CAD,
+    TWIN,
+    draw_twin(3).robot,
+    with_reality(latency=Latency(command=0.0043, measurement=0.0012)),
+    with_reality(**both(torque_gain=0.8, torque_lag=0.003)),
+    with_reality(**both(stiffness=400.0, backlash=0.01, stiction=1.5)),
+    with_reality(voltage=0.5, **both(sensor=SensorMismatch(position_step=0.01))),
+    dataclasses.replace(CAD, knee=dataclasses.replace(CAD.knee, load_friction=0.1)),
+)
+"""Legs with every effect, drawn or one at a time."""
+
+
+def noiseless(robot):
+    """Return a robot without what is drawn at random, which depends on who else is there."""
+    reality = robot.reality
+    drives = {
+        name: dataclasses.replace(
+            drive,
+            sensor=dataclasses.replace(
+                drive.sensor, position_noise=0.0, velocity_noise=0.0, torque_noise=0.0
+            ),
+        )
+        for name, drive in (("hip", reality.hip), ("knee", reality.knee))
+    }
+    latency = dataclasses.replace(reality.latency, jitter=0.0)
+    return dataclasses.replace(
+        robot, reality=dataclasses.replace(reality, latency=latency, **drives)
+    )
+
+
+def rows(legs):
+    return np.concatenate(
+        [legs.state, legs.measured_q, legs.measured_qd, legs.measured_torque, legs.loads], axis=1
+    )
+
+
+def shaken(legs, ticks=40, seed=1):
+    """Return all that is seen of legs under the same random torques, (ticks, n, 20)."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for _ in range(ticks):
+        legs.step(np.tile(rng.uniform(-6, 6, 2), (legs.count, 1)))
+        found.append(rows(legs))
+    return np.array(found)
+
+
+def standing(robots, **options):
+    legs = LegSimulator(CAD, len(robots), robots=robots, **{"threads": 1} | options)
+    legs.stand(slice(None), POSTURE, 0.05)
+    return legs
+
+
+def free_legs(timestep, robot=CAD, count=8):
+    """Return frictionless legs in the air, far from stops, that swing fast."""
+    rng = np.random.default_rng(0)
+    legs = LegSimulator(without_friction(robot), count, timestep=timestep, threads=1)
+    legs.place(slice(None), 3.0, rng.uniform(-0.8, 0.8, (count, 2)))
+    legs.state[:, 3:] = rng.normal(0, 3, (count, 3))
+    legs.forget(slice(None))
+    return legs
+
+
+def test_energy_drifts_in_proportion_to_the_step():
+    drifts = []
+    for timestep in (5e-4, 1.25e-4):
+        legs = free_legs(timestep)
+        before = energy(legs)
+        for _ in range(40):
+            legs.step(np.zeros((legs.count, 2)))
+        assert not legs.loads[:, 7].any()
+        drifts.append(np.abs(energy(legs) - before).max())
+    assert drifts[0] < 0.02
+    assert drifts[1] == pytest.approx(drifts[0] / 4, rel=0.2)
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=5)
+def test_energy_never_grows_without_torque(seed):
+    """Friction, damping, ground and stops only take; what a contact stores, it gives back at most.
+
+    So the energy is never above what it was when nothing touched before.
+    """
+    rng = np.random.default_rng(seed)
+    legs = LegSimulator(load_robot("legv2-paper"), 16, timestep=1.25e-4, threads=1)
+    legs.stand(slice(None), rng.uniform([-1, -2.4], [1, 0], (16, 2)), rng.uniform(0.1, 0.3, 16))
+    legs.state[:, 3:] = rng.normal(0, 2, (16, 3))
+    free_energy, landings = energy(legs), 0
+    for _ in range(120):
+        legs.step(np.zeros((16, 2)))
+        now = energy(legs)
+        assert (now <= free_energy + 2e-3).all()
+        gaps = [legs.foot_clearance(), legs.knee_clearance(), legs.base_clearance()]
+        free = (np.min(gaps, axis=0) > 0) & (legs.loads[:, 7] == 0)
+        free_energy = np.where(free, now, free_energy)
+        landings += np.count_nonzero(~free)
+    assert landings > 100
+
+
+def elastic_energy(legs):
+    """Return the energy of legs whose rotors hang on springs, J, (n,)."""
+    robot = legs.robot
+    bare = with_joints(robot, armature=1e-12)
+    twist, speed = legs.measured_q - legs.q, legs.measured_qd
+    rotor = 0.5 * robot.of_joints("armature") * speed**2
+    half = robot.reality.of_drives("backlash") / 2
+    beyond = np.maximum(np.abs(twist) - half, 0)
+    spring = 0.5 * robot.reality.of_drives("stiffness") * beyond**2
+    legs.robot = bare
+    links = energy(legs)
+    legs.robot = robot
+    return links + (rotor + spring).sum(1)
+
+
+def test_energy_of_elastic_legs_is_kept_or_goes_into_the_damper():
+    for damping, kept in ((0.0, True), (0.05, False)):
+        drive = both(stiffness=30.0, backlash=0.01, stiffness_damping=damping)
+        legs = free_legs(5e-5, with_reality(**drive))
+        before = elastic_energy(legs)
+        twists = []
+        for _ in range(40):
+            legs.step(np.zeros((legs.count, 2)))
+            assert (elastic_energy(legs) <= before + 0.02).all()
+            twists.append(np.abs(legs.measured_q - legs.q).max())
+        assert max(twists) > 0.01
+        lost = before - elastic_energy(legs)
+        assert (np.abs(lost) < 0.02).all() if kept else (lost > 0.02).all()
+
+
+@pytest.mark.parametrize("timestep", [5e-4, 1.25e-4])
+def test_same_bytes_at_any_number_of_threads(timestep):
+    robots = ROBOTS * 60
+    one, *others = (
+        shaken(standing(robots, threads=threads, timestep=timestep), 12) for threads in (1, 2, 5)
+    )
+    for other in others:
+        np.testing.assert_array_equal(other, one)
+    assert np.ptp(one[-1, :, 0]) > 1e-4
+
+
+def test_every_leg_moves_as_it_does_alone():
+    robots = [noiseless(robot) for robot in ROBOTS]
+    together = shaken(standing(robots))
+    for index, robot in enumerate(robots):
+        np.testing.assert_array_equal(together[:, index], shaken(standing([robot]))[:, 0])
+    turned = standing(robots[::-1])
+    turned.set_robots(robots)
+    turned.stand(slice(None), POSTURE, 0.05)
+    np.testing.assert_array_equal(shaken(turned), together)
+
+
+@given(st.integers(0, 12), st.integers(0, 2**32 - 1))
+@settings(max_examples=20)
+def test_legs_go_on_exactly_from_a_memory(ticks, seed):
+    """Whatever is under way: late and jittered commands, noise, pushes."""
+    late = with_reality(TWIN, latency=Latency(command=0.0123, measurement=0.0031, jitter=0.004))
+    one, other = standing([*ROBOTS, late]), standing([*ROBOTS, late])
+    one.reseed(np.random.default_rng(seed))
+    one.push(np.arange(one.count, dtype=float))
+    shaken(one, ticks)
+    memory = one.memory()
+    rest = shaken(one, 10, seed=2)
+    shaken(other, 7)
+    other.restore(memory)
+    np.testing.assert_array_equal(shaken(other, 10, seed=2), rest)
+
+
+@pytest.mark.parametrize("name", ["twin", "legv2"])
+def test_a_plant_repeats_with_its_seed_alone(name):
+    def track(seed):
+        legs = LegSimulator(load_robot(name), 3, threads=1)
+        legs.stand(slice(None), POSTURE, 0.02)
+        plant = Plant(legs, NoiseAndDelay(), None, np.random.default_rng(seed))
+        plant.channel.restart(slice(None), legs.measured_q, legs.measured_qd, np.zeros(3))
+        for _ in range(40):
+            seen = plant.sense(np.zeros(3))
+            plant.drive(20 * (POSTURE - seen.q[:, 0]) - 0.2 * seen.qd[:, 0])
+        return rows(legs).tobytes()
+
+    assert track(4) == track(4) != track(5)
+
+
+def test_nothing_compiles_whatever_it_is_called_with():
+    legs = standing(ROBOTS)
+    functions = (stepper.step_legs, stepper.send_all, stepper.read_sensors)
+    before = [len(function.signatures) for function in functions]
+    torque = np.zeros((len(ROBOTS), 2))
+    for given_torque in (torque, torque.astype(np.float32), np.asfortranarray(torque), 0.0):
+        legs.step(given_torque)
+    locked = np.zeros((len(ROBOTS), stepper.COMMAND))
+    locked.flags.writeable = False
+    for command in (locked, np.asfortranarray(locked), locked.astype(np.float32)):
+        legs.step_drives(command)
+    legs.restore(legs.memory())
+    legs.step(torque)
+    assert [len(function.signatures) for function in functions] == before == [1, 1, 1]
+
+
+@pytest.mark.slow
+def test_only_the_first_process_compiles_and_says_so(tmp_path):
+    code = "from hopping_leg.sim import LegSimulator; from hopping_leg.robot import load_robot;"
+    code += "LegSimulator(load_robot('legv2'), 1)"
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env=os.environ | {"XDG_CACHE_HOME": str(tmp_path)},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stderr
+        for _ in range(2)
+    ]
+    assert said == ["Compiling the leg's physics, once; some ten seconds.\n", ""]
+
+
+def test_becoming_the_same_changes_nothing_and_another_only_what_follows():
+    plain, changed = standing([CAD, CAD]), standing([CAD, CAD])
+    np.testing.assert_array_equal(shaken(plain, 20), shaken(changed, 20))
+    changed.set_robots([CAD, ROBOTS[4]])
+    after, otherwise = shaken(changed, 20, 2), shaken(plain, 20, 2)
+    np.testing.assert_array_equal(after[:, 0], otherwise[:, 0])
+    assert np.abs(after[-1, 1] - otherwise[-1, 1]).max() > 1e-6
+
+
+def test_sensors_that_change_begin_in_the_present_and_keep_the_past():
+    legs = standing([CAD, CAD], rate=2000)
+    past = [legs.q.copy()]
+    legs.place(slice(None), 3.0, POSTURE)
+
+    def go(ticks):
+        for _ in range(ticks):
+            legs.step(np.array([[2.0, -1.0], [1.0, 0.0]]))
+            past.append(legs.q.copy())
+
+    go(5)
+    for steps in (2, 4.25):
+        late = with_reality(latency=Latency(measurement=steps * 5e-4))
+        legs.set_robots([late, CAD])
+        whole, part = int(steps), steps % 1
+        if whole == 2:
+            np.testing.assert_array_equal(legs.measured_q, past[-1])
+        go(3)
+        expected = (1 - part) * past[-1 - whole][0] + part * past[-2 - whole][0]
+        np.testing.assert_allclose(legs.measured_q[0], expected, atol=1e-12)
+        np.testing.assert_array_equal(legs.measured_q[1], past[-1][1])
+
+
+def test_a_delay_that_begins_keeps_the_command_under_way():
+    legs = standing([CAD])
+    legs.step(np.full((1, 2), 2.0))
+    legs.set_robots([with_reality(latency=Latency(command=0.005))])
+    np.testing.assert_allclose(legs.step(np.full((1, 2), -3.0)), 2.0)
+    np.testing.assert_allclose(legs.step(np.zeros((1, 2))), -3.0)
+    with pytest.raises(UsageError, match="at most 7"):
+        legs.set_robots([with_reality(latency=Latency(command=0.03, jitter=0.006))])
+
+
+def test_a_leg_that_begins_anew_has_no_command_under_way():
+    legs = standing([with_reality(TWIN, latency=Latency(command=2e-3))] * 2)
+    legs.step(np.full((2, 2), 5.0))
+    legs.stand(np.array([0]), POSTURE, 0.1)
+    assert not legs.measured_qd[0].any()
+    assert not legs.measured_torque[0].any()
+    legs.step(np.zeros((2, 2)))
+    assert np.abs(legs.qd[0]).max() < 0.2 * np.abs(legs.qd[1]).max()
+
+
+def test_what_is_written_to_the_state_moves_motor_and_link():
+    legs = LegSimulator(TWIN, 2, threads=1)
+    legs.place(slice(None), 3.0, POSTURE)
+    legs.qd[0] = [3.0, -2.0]
+    legs.forget(slice(None))
+    legs.step(np.zeros((2, 2)))
+    np.testing.assert_allclose(legs.q[0] - POSTURE, [0.015, -0.01], atol=5e-3)
+    assert np.abs(legs.q[1] - POSTURE).max() < 2e-3
+
+
+def test_readings_are_multiples_of_the_sensors_steps():
+    steps = (0.003, 0.02, 0.01)
+    noise = {"position_noise": 1e-3, "velocity_noise": 0.1, "torque_noise": 0.05}
+    legs = standing([with_reality(**both(sensor=SensorMismatch(*steps, **noise)))] * 4)
+    for _ in range(10):
+        for reading, step in zip(
+            (legs.measured_q, legs.measured_qd, legs.measured_torque), steps, strict=True
+        ):
+            np.testing.assert_allclose(reading / step, np.round(reading / step), atol=1e-9)
+        legs.step(np.full((4, 2), 1.234))
+    assert not np.isclose(legs.q / 0.003, np.round(legs.q / 0.003)).all()
+
+
+def test_noise_has_the_stated_spread_and_leaves_the_physics_alone():
+    noisy = SensorMismatch(position_noise=2e-3, velocity_noise=0.1, torque_noise=0.05)
+    legs = LegSimulator(with_reality(hip=DriveMismatch(sensor=noisy)), 2000, threads=1)
+    legs.place(slice(None), 5.0, POSTURE)
+    legs.step(np.ones((2000, 2)))
+    error = legs.measured_q - legs.q
+    assert error[:, 0].std() == pytest.approx(2e-3, rel=0.05)
+    assert (error[:, 1] == 0).all()
+    assert (legs.measured_qd - legs.qd)[:, 0].std() == pytest.approx(0.1, rel=0.05)
+    assert legs.measured_torque[:, 0].std() == pytest.approx(0.05, rel=0.05)
+    assert np.ptp(legs.q, axis=0).max() == 0.0
+
+
+def test_true_masses_and_ground_are_those_of_a_robot_that_has_them():
+    changed = dataclasses.replace(
+        CAD,
+        base=dataclasses.replace(CAD.base, mass=1.1 * CAD.base.mass),
+        thigh=dataclasses.replace(
+            CAD.thigh, mass=1.2 * CAD.thigh.mass, inertia=1.2 * CAD.thigh.inertia
+        ),
+        contact=dataclasses.replace(CAD.contact, time_constant=0.05, friction=0.3),
+    )
+    ground = GroundMismatch(time_constant=0.05, friction=0.3)
+    deceived = with_reality(mass=MassScale(base=1.1, thigh=1.2), ground=ground)
+    one, other = (states(LegSimulator(robot, 1, threads=1)) for robot in (deceived, changed))
+    np.testing.assert_allclose(one, other, atol=1e-9)
+    assert np.abs(one - states(LegSimulator(CAD, 1, threads=1))).max() > 1e-3
+
+
+@pytest.mark.parametrize("robot", [load_robot("legv2-paper"), TWIN], ids=lambda robot: robot.name)
+def test_a_fixed_base_stays_and_its_leg_swings(robot):
+    legs = hanging(robot, 2)
+    legs.place(slice(None), 0.1, POSTURE)
+    legs.qd[:] = [5.0, -5.0]
+    legs.forget(slice(None))
+    for _ in range(100):
+        legs.step(np.zeros((2, 2)))
+    assert (legs.height == 0.1).all()
+    assert (legs.height_rate == 0.0).all()
+    assert np.abs(legs.q - POSTURE).max() > 0.1
+
+
+@pytest.mark.parametrize("robot", [CAD, noiseless(ROBOTS[5])], ids=["rigid", "elastic"])
+def test_loads_are_means_extremes_and_contacts_of_the_steps(robot):
+    fine, coarse = standing([robot], rate=2000), standing([robot])
+    for tick in range(60):
+        torque = np.array([[1.0, 4.0]]) * np.cos(tick)
+        coarse.step(torque)
+        steps = []
+        for _ in range(10):
+            given_torque = fine.step(torque)[0]
+            steps.append([*given_torque**2, *(given_torque * fine.measured_qd[0])])
+            steps[-1] += [sum(steps[-1][2:]), *np.abs(fine.qd[0]), fine.loads[0, 7]]
+        steps = np.array(steps)
+        expected = [*steps[:, :4].mean(0), steps[:, 4].min(), *steps[:, 5:].max(0)]
+        np.testing.assert_allclose(coarse.loads[0], expected, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("joint", ["hip", "knee"])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_stop_holds_a_joint_and_is_reported(joint, sign):
+    index = ["hip", "knee"].index(joint)
+    legs = hanging(CAD, q=np.array([0.0, 0.0]))
+    stop = CAD.of_joints("stop_upper" if sign > 0 else "stop_lower")[index]
+    reached = []
+    for _ in range(200):
+        legs.step(np.eye(2)[[index]] * sign * 4.0 - 0.1 * legs.qd)
+        beyond = sign * (legs.q[0, index] - stop)
+        assert beyond < 0.06
+        reached.append(legs.loads[0, 7])
+        assert reached[-1] or beyond <= 0
+    assert reached[0] == 0
+    assert reached[-1] == 1
+
+
+def test_what_cannot_be_is_refused():
+    with pytest.raises(UsageError, match="3 robots were given for 2 legs"):
+        LegSimulator(CAD, 2, robots=[CAD] * 3)
+    for timestep in (3e-3, 0.0, -1e-3, float("nan")):
+        with pytest.raises(UsageError, match="physics step"):
+            LegSimulator(CAD, 1, timestep=timestep)
+
+
+def test_a_neutral_reality_does_not_change_the_digest():
+    assert load_robot("legv2-paper").has_digest("9634a0cc2dd452ea")
+    assert load_robot("legv2").has_digest("a599bb119353a5f1")
+    assert with_reality(hip=DriveMismatch(backlash=1e-3)).digest != CAD.digest
