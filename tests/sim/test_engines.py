@@ -1,17 +1,17 @@
-"""The mechanics that every simulator obeys."""
+"""The mechanics that every engine obeys."""
 
 import numpy as np
 import pytest
 
 from hopping_leg.robot import GRAVITY, load_robot
 from hopping_leg.sim import make_simulator
-from tests.sim.legs import energy, without_friction
+from tests.sim.legs import POSTURE, energy, without_friction
 
 PAPER = load_robot("legv2-paper")
 FRICTIONLESS = without_friction(load_robot("legv2"))
 
 
-@pytest.fixture(params=["mujoco", "pybullet"])
+@pytest.fixture(params=["stepper", "mujoco", "pybullet"])
 def make(request):
     """Return a function that makes simulators."""
     if request.param == "pybullet":
@@ -58,3 +58,23 @@ def test_drop_on_the_rail_follows_friction_and_damping(make):
     speed = force / damping * (1 - np.exp(-damping * 0.3 / PAPER.mass))
     np.testing.assert_allclose(legs.height_rate, -speed, rtol=2e-3)
     np.testing.assert_allclose(legs.q, 0.0, atol=1e-9)
+
+
+def test_a_motor_hardly_drives_beyond_its_no_load_speed(make):
+    legs = make(FRICTIONLESS, 1)
+    legs.place(slice(None), 50.0, np.array([0.0, -2.0]))
+    limit, speed = (FRICTIONLESS.of_joints(name) for name in ("torque_limit", "no_load_speed"))
+    fastest = 0.0
+    for _ in range(60):
+        assert (np.abs(legs.step(np.array([[0.0, 1e3]]))) <= limit).all()
+        if legs.q[0, 1] > 2.5:
+            break
+        fastest = max(fastest, float(legs.qd[0, 1]))
+    assert 0.7 < fastest / speed[1] < 1.05
+
+
+def test_a_standing_leg_rests_on_the_ground(make):
+    legs = make(PAPER, 1)
+    for clearance in (0.0, 0.05):
+        legs.stand(slice(None), POSTURE, clearance)
+        np.testing.assert_allclose(legs.foot_clearance(), clearance, atol=1e-12)

@@ -1,9 +1,6 @@
 """Many legs at once: energy, threads, memory, robots that change, sensors, loads."""
 
 import dataclasses
-import os
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -19,7 +16,7 @@ from hopping_leg.robot import (
     SensorMismatch,
     load_robot,
 )
-from hopping_leg.sim import LegSimulator, NoiseAndDelay, Plant, stepper
+from hopping_leg.sim import LegSimulator, NoiseAndDelay, Plant
 from hopping_leg.sim.randomization import draw_twin
 from tests.sim.legs import (
     POSTURE,
@@ -150,7 +147,7 @@ def elastic_energy(legs):
 
 def test_energy_of_elastic_legs_is_kept_or_goes_into_the_damper():
     for damping, kept in ((0.0, True), (0.05, False)):
-        drive = both(stiffness=30.0, backlash=0.01, stiffness_damping=damping)
+        drive = both(stiffness=30.0, backlash=0.002, stiffness_damping=damping)
         legs = free_legs(5e-5, with_reality(**drive))
         before = elastic_energy(legs)
         twists = []
@@ -158,7 +155,7 @@ def test_energy_of_elastic_legs_is_kept_or_goes_into_the_damper():
             legs.step(np.zeros((legs.count, 2)))
             assert (elastic_energy(legs) <= before + 0.02).all()
             twists.append(np.abs(legs.measured_q - legs.q).max())
-        assert max(twists) > 0.01
+        assert max(twists) > 0.002
         lost = before - elastic_energy(legs)
         assert (np.abs(lost) < 0.02).all() if kept else (lost > 0.02).all()
 
@@ -214,39 +211,6 @@ def test_a_plant_repeats_with_its_seed_alone(name):
         return rows(legs).tobytes()
 
     assert track(4) == track(4) != track(5)
-
-
-def test_nothing_compiles_whatever_it_is_called_with():
-    legs = standing(ROBOTS)
-    functions = (stepper.step_legs, stepper.send_all, stepper.read_sensors)
-    before = [len(function.signatures) for function in functions]
-    torque = np.zeros((len(ROBOTS), 2))
-    for given_torque in (torque, torque.astype(np.float32), np.asfortranarray(torque), 0.0):
-        legs.step(given_torque)
-    locked = np.zeros((len(ROBOTS), stepper.COMMAND))
-    locked.flags.writeable = False
-    for command in (locked, np.asfortranarray(locked), locked.astype(np.float32)):
-        legs.step_drives(command)
-    legs.restore(legs.memory())
-    legs.step(torque)
-    assert [len(function.signatures) for function in functions] == before == [1, 1, 1]
-
-
-@pytest.mark.slow
-def test_only_the_first_process_compiles_and_says_so(tmp_path):
-    code = "from hopping_leg.sim import LegSimulator; from hopping_leg.robot import load_robot;"
-    code += "LegSimulator(load_robot('legv2'), 1)"
-    said = [
-        subprocess.run(
-            [sys.executable, "-c", code],
-            env=os.environ | {"XDG_CACHE_HOME": str(tmp_path)},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stderr
-        for _ in range(2)
-    ]
-    assert said == ["Compiling the leg's physics, once; some ten seconds.\n", ""]
 
 
 def test_becoming_the_same_changes_nothing_and_another_only_what_follows():

@@ -6,7 +6,7 @@ import pytest
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import SoftLimits, dynamics, load_robot
 from hopping_leg.robot.kinematics import joint_angles
-from hopping_leg.sim import MujocoSimulator, NoiseAndDelay, Plant
+from hopping_leg.sim import LegSimulator, NoiseAndDelay, Plant
 from hopping_leg.sim.pybullet import PyBulletSimulator
 from tests.robot.legs import random_state
 from tests.sim.legs import POSTURE, without_friction
@@ -55,8 +55,8 @@ def sink_and_rest(legs):
 
 
 @pytest.mark.slow
-def test_a_drop_sinks_into_the_robots_ground_as_in_mujoco():
-    deepest, last = sink_and_rest(MujocoSimulator(PAPER, 1, rate=1000, threads=1))
+def test_a_drop_sinks_into_the_robots_ground_as_in_the_stepper():
+    deepest, last = sink_and_rest(LegSimulator(PAPER, 1, rate=1000, threads=1))
     in_bullet = sink_and_rest(PyBulletSimulator(PAPER, 1, rate=1000))
     assert in_bullet == pytest.approx((deepest, last), abs=2e-3)
     assert deepest > 0.03
@@ -97,7 +97,7 @@ def test_legs_do_not_meet_each_other():
 
 
 def test_a_leg_with_a_reality_is_refused():
-    with pytest.raises(UsageError, match="only MuJoCo"):
+    with pytest.raises(UsageError, match="only the stepper"):
         PyBulletSimulator(load_robot("twin"), 1)
 
 

@@ -1,4 +1,4 @@
-"""Each leg of a batch gets its own numbers; a constant delay is the one that twins have."""
+"""Each leg of a batch gets its own numbers, drawn from stated ranges."""
 
 import dataclasses
 import functools
@@ -9,9 +9,8 @@ import pytest
 
 from hopping_leg.envs import HoppingTask, TaskConfig, paper_reward
 from hopping_leg.errors import RobotError, UsageError
-from hopping_leg.io import replace_at
 from hopping_leg.robot import Latency, load_robot, load_tree, robot_text
-from hopping_leg.sim import MujocoSimulator
+from hopping_leg.sim import LegSimulator
 from hopping_leg.sim.randomization import (
     IDENTIFIABLE_RANGES,
     TWIN_RANGES,
@@ -21,7 +20,7 @@ from hopping_leg.sim.randomization import (
     normalized,
     sample,
 )  # fmt: skip
-from tests.sim.legs import POSTURE, assert_as_alone, states, with_reality
+from tests.sim.legs import POSTURE, states, with_reality
 
 LEG = load_robot("legv2")
 
@@ -34,42 +33,20 @@ def late(delay, **effects):
     return with_reality(latency=Latency(command=delay), **effects)
 
 
-def with_each(path, *values):
-    return [replace_at(LEG, path, value) for value in values]
-
-
-@pytest.mark.parametrize(
-    "robots",
-    [
-        drawn(4),
-        with_each("hip.load_friction", 0.02, 0.1),
-        with_each("knee.torque_gain", 0.7, 1.2),
-        [late(0.01), late(0.0), late(0.015)],
-        [late(0.012), late(0.002), late(0.017)],
-    ],
-    ids=["identifiable", "load friction", "torque gain", "late", "late by parts of a tick"],
-)
-def test_every_leg_moves_as_its_own_robot_does_alone(robots):
-    count = len(robots)
-    legs = MujocoSimulator(LEG, count, threads=1, robots=robots)
-    assert legs.mismatch is None
-    together = assert_as_alone(legs, robots)
+def test_every_leg_moves_as_its_own_robot_does_alone():
+    robots = drawn(4)
+    together = states(LegSimulator(LEG, 4, threads=1, robots=robots))
+    for index, robot in enumerate(robots):
+        alone = states(LegSimulator(robot, 1, threads=1))
+        np.testing.assert_array_equal(together[:, index], alone[:, 0])
     assert np.ptp(together[-1, :, 0]) > 1e-5
-    turned = MujocoSimulator(LEG, count, threads=1, robots=robots[::-1])
-    turned.set_robots(robots)
-    np.testing.assert_array_equal(states(turned), together)
-
-
-def test_delays_that_differ_by_parts_of_a_tick_are_left_to_the_twins_physics():
-    robots = [late(5e-3), late(7e-3)]
-    assert MujocoSimulator(LEG, 2, threads=1, robots=robots).mismatch is not None
 
 
 @pytest.mark.parametrize("spread", IDENTIFIABLE_RANGES, ids=lambda spread: spread.path)
 def test_every_range_of_the_twins_reaches_the_physics(spread):
     low, high = (dataclasses.replace(spread, low=v, high=v) for v in (spread.low, spread.high))
     robots = [sample(LEG, [end], 1, np.random.default_rng(0))[0] for end in (low, high)]
-    one, other = np.moveaxis(states(MujocoSimulator(LEG, 2, threads=1, robots=robots)), 1, 0)
+    one, other = np.moveaxis(states(LegSimulator(LEG, 2, threads=1, robots=robots)), 1, 0)
     assert np.abs(one - other).max() > 1e-6
 
 
@@ -124,11 +101,11 @@ def test_whatever_a_leg_is_like_it_can_be_surprised(delay, rubs):
     found = normalized(robot, robots, WIDE_RANGES)
     assert np.isfinite(found).all()
     assert (np.abs(found).max(axis=0) > 0.5).sum() >= len(WIDE_RANGES) - 2
-    legs = MujocoSimulator(robot, 60, threads=1)
+    legs = LegSimulator(robot, 60, threads=1)
     legs.stand(slice(None), POSTURE, 0.05)
     legs.step(np.full((60, 2), 3.0))
     legs.set_robots(robots)
-    assert set(legs.delay_ticks) == {0, 1, 2, 3}
+    assert set(legs.command_delay_ticks) == {0, 1, 2, 3}
     for _ in range(20):
         legs.step(np.full((60, 2), 3.0))
     assert np.ptp(legs.height) > 1e-3
@@ -148,10 +125,6 @@ def test_what_controllers_believe_may_not_vary():
         drawn(2, ranges=[Range("thigh.length", "m", 0.1, 0.2, "test")])
     with pytest.raises(RobotError, match="time_constant"):
         drawn(2, ranges=[Range("contact.time_constant", "s", 1e-4, 1e-4, "test")])
-    with pytest.raises(UsageError, match="3 robots were given for 2 legs"):
-        MujocoSimulator(LEG, 2, robots=drawn(3))
-    with pytest.raises(UsageError, match="clamped"):
-        MujocoSimulator(LEG, 2, robots=drawn(2), clamped=True)
 
 
 def task(seed, ranges=IDENTIFIABLE_RANGES, robot=LEG):
@@ -192,39 +165,6 @@ def test_a_critic_may_see_in_which_leg_it_is():
     numbers = seen[:, plain.privileged_size :]
     assert (np.abs(numbers) <= 1).all()
     assert len(np.unique(numbers, axis=0)) == 5
-
-
-@pytest.mark.parametrize("delay", [5e-4, 2e-3, 5e-3, 7.5e-3, 1.2e-2])
-def test_a_constant_delay_is_the_one_that_twins_have(delay):
-    fast, slow = (
-        MujocoSimulator(late(delay), 3, threads=1),
-        MujocoSimulator(late(delay, voltage=1 - 1e-12), 3, threads=1),
-    )
-    assert fast.mismatch is None
-    assert slow.mismatch is not None
-    np.testing.assert_allclose(states(fast), states(slow), atol=1e-8)
-    assert np.abs(states(fast) - states(MujocoSimulator(LEG, 3, threads=1))).max() > 1e-3
-
-
-def test_legs_in_motion_become_later_without_losing_a_command():
-    legs, same = MujocoSimulator(LEG, 2, threads=1), MujocoSimulator(LEG, 2, threads=1)
-    for one in (legs, same):
-        one.stand(slice(None), POSTURE, 0.05)
-        one.step(np.full((2, 2), 2.0))
-    legs.set_robots([LEG, late(1e-2)])
-    given = np.stack([legs.step(np.full((2, 2), float(k))) for k in range(4)])
-    same.step(np.zeros((2, 2)))
-    np.testing.assert_allclose(given[:, 0, 0], [0, 1, 2, 3])
-    np.testing.assert_allclose(given[:, 1, 0], [0, 0, 0, 1])
-
-
-def test_a_leg_that_begins_anew_has_no_command_under_way():
-    legs = MujocoSimulator(late(2e-3), 2, threads=1)
-    legs.stand(slice(None), POSTURE, 0.1)
-    legs.step(np.full((2, 2), 5.0))
-    legs.stand(np.array([0]), POSTURE, 0.1)
-    legs.step(np.zeros((2, 2)))
-    assert np.abs(legs.qd[0]).max() < 0.2 * np.abs(legs.qd[1]).max()
 
 
 def test_a_number_is_drawn_by_chance_and_is_the_robots_otherwise():
@@ -270,7 +210,7 @@ def test_a_twin_can_extend_a_users_file(tmp_path):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_drawn_twins_are_simulated(seed):
-    legs = MujocoSimulator(draw_twin(seed).robot, 1, threads=1)
+    legs = LegSimulator(draw_twin(seed).robot, 1, threads=1)
     legs.stand(slice(None), POSTURE)
     for _ in range(20):
         legs.step(10 * (POSTURE - legs.measured_q) - 0.2 * legs.measured_qd)

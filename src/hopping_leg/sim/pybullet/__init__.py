@@ -1,4 +1,4 @@
-"""Legs in PyBullet, the second engine: does a controller lean on what only MuJoCo does?"""
+"""Legs in PyBullet, another engine: does a controller lean on what only MuJoCo's physics does?"""
 
 import weakref
 

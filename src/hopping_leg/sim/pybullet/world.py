@@ -61,7 +61,7 @@ class PyBulletWorld:
         self._world = {"physicsClientId": self._id}
         if self._id < 0:
             raise UsageError(
-                "PyBullet has no world left for another leg; simulate fewer at once or in MuJoCo."
+                "PyBullet has no world left for another leg; simulate fewer at once, or leave --engine out."
             )
         bullet.setGravity(0, 0, -GRAVITY, **self._world)
         solver = {"numSolverIterations": _ITERATIONS, "solverResidualThreshold": 0}
@@ -182,7 +182,7 @@ def pybullet_urdf(robot: Robot, *, foot_collides: bool = True) -> str:
     if robot.base.mass <= _ROTOR_MASS:
         raise RobotError(
             f"The base of {robot.name} weighs {robot.base.mass:g} kg but must weigh more than"
-            f" {_ROTOR_MASS:g} kg in PyBullet; simulate it in MuJoCo."
+            f" {_ROTOR_MASS:g} kg in PyBullet; leave --engine out."
         )
     base = dataclasses.replace(robot.base, mass=robot.base.mass - _ROTOR_MASS)
     inertia = robot.thigh.inertia + robot.hip.armature
