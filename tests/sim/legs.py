@@ -52,9 +52,16 @@ def hanging(robot, count=1, q=(0.0, 0.0), **options):
 
 
 def energy(legs):
-    """Return the mechanical energy of each leg, J, (n,)."""
-    kinetic = kinetic_energy(legs.robot, legs.q, legs.height_rate, legs.qd)
-    return kinetic + potential_energy(legs.robot, legs.height, legs.q)
+    """Return the energy of each leg, J, (n,), with that of rotors on springs."""
+    robot, reality, rotors = legs.robot, legs.robot.reality, 0.0
+    if reality.hip.stiffness is not None:
+        robot = with_joints(robot, armature=0.0)
+        armature = legs.robot.of_joints("armature")
+        beyond = np.abs(legs.measured_q - legs.q) - reality.of_drives("backlash") / 2
+        spring = reality.of_drives("stiffness") * np.maximum(beyond, 0) ** 2
+        rotors = (spring + armature * legs.measured_qd**2).sum(axis=1) / 2
+    kinetic = kinetic_energy(robot, legs.q, legs.height_rate, legs.qd)
+    return kinetic + potential_energy(robot, legs.height, legs.q) + rotors
 
 
 def states(legs, ticks=60):

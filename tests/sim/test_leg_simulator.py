@@ -24,7 +24,6 @@ from tests.sim.legs import (
     energy,
     hanging,
     states,
-    with_joints,
     with_reality,
     without_friction,
 )  # fmt: skip
@@ -84,27 +83,26 @@ def standing(robots, **options):
     return legs
 
 
-def free_legs(timestep, robot=CAD, count=8):
-    """Return frictionless legs in the air, far from stops, that swing fast."""
-    rng = np.random.default_rng(0)
-    legs = LegSimulator(without_friction(robot), count, timestep=timestep, threads=1)
-    legs.place(slice(None), 3.0, rng.uniform(-0.8, 0.8, (count, 2)))
-    legs.state[:, 3:] = rng.normal(0, 3, (count, 3))
-    legs.forget(slice(None))
-    return legs
-
-
-def test_energy_drifts_in_proportion_to_the_step():
+@pytest.mark.parametrize(
+    "robot", [CAD, with_reality(**both(stiffness=30.0, backlash=0.002))], ids=["rigid", "elastic"]
+)
+def test_energy_drifts_in_proportion_to_the_step(robot):
     drifts = []
-    for timestep in (5e-4, 1.25e-4):
-        legs = free_legs(timestep)
-        before = energy(legs)
+    for timestep in (1e-4, 2.5e-5):
+        rng = np.random.default_rng(0)
+        legs = LegSimulator(without_friction(robot), 8, timestep=timestep, threads=1)
+        legs.place(slice(None), 3.0, rng.uniform(-0.8, 0.8, (8, 2)))
+        legs.state[:, 3:] = rng.normal(0, 3, (8, 3))
+        legs.forget(slice(None))
+        before, twist = energy(legs), 0.0
         for _ in range(40):
-            legs.step(np.zeros((legs.count, 2)))
-        assert not legs.loads[:, 7].any()
+            legs.step(np.zeros((8, 2)))
+            twist = max(twist, np.abs(legs.measured_q - legs.q).max())
+            assert not legs.loads[:, 7].any()
         drifts.append(np.abs(energy(legs) - before).max())
-    assert drifts[0] < 0.02
-    assert drifts[1] == pytest.approx(drifts[0] / 4, rel=0.2)
+    assert drifts[0] < 4e-3
+    assert drifts[1] == pytest.approx(drifts[0] / 4, rel=0.1)
+    assert twist == 0 if robot is CAD else twist > 0.0015
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -128,36 +126,6 @@ def test_energy_never_grows_without_torque(seed):
         free_energy = np.where(free, now, free_energy)
         landings += np.count_nonzero(~free)
     assert landings > 100
-
-
-def elastic_energy(legs):
-    """Return the energy of legs whose rotors hang on springs, J, (n,)."""
-    robot = legs.robot
-    bare = with_joints(robot, armature=1e-12)
-    twist, speed = legs.measured_q - legs.q, legs.measured_qd
-    rotor = 0.5 * robot.of_joints("armature") * speed**2
-    half = robot.reality.of_drives("backlash") / 2
-    beyond = np.maximum(np.abs(twist) - half, 0)
-    spring = 0.5 * robot.reality.of_drives("stiffness") * beyond**2
-    legs.robot = bare
-    links = energy(legs)
-    legs.robot = robot
-    return links + (rotor + spring).sum(1)
-
-
-def test_energy_of_elastic_legs_is_kept_or_goes_into_the_damper():
-    for damping, kept in ((0.0, True), (0.05, False)):
-        drive = both(stiffness=30.0, backlash=0.002, stiffness_damping=damping)
-        legs = free_legs(5e-5, with_reality(**drive))
-        before = elastic_energy(legs)
-        twists = []
-        for _ in range(40):
-            legs.step(np.zeros((legs.count, 2)))
-            assert (elastic_energy(legs) <= before + 0.02).all()
-            twists.append(np.abs(legs.measured_q - legs.q).max())
-        assert max(twists) > 0.002
-        lost = before - elastic_energy(legs)
-        assert (np.abs(lost) < 0.02).all() if kept else (lost > 0.02).all()
 
 
 @pytest.mark.parametrize("timestep", [5e-4, 1.25e-4])

@@ -61,7 +61,8 @@ class PyBulletWorld:
         self._world = {"physicsClientId": self._id}
         if self._id < 0:
             raise UsageError(
-                "PyBullet has no world left for another leg; simulate fewer at once, or leave --engine out."
+                "PyBullet has no world left for another leg; simulate fewer at once, or leave"
+                " --engine out."
             )
         bullet.setGravity(0, 0, -GRAVITY, **self._world)
         solver = {"numSolverIterations": _ITERATIONS, "solverResidualThreshold": 0}
