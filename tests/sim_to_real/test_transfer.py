@@ -1,14 +1,18 @@
 """The tables say what came out."""
 
+import dataclasses
 import json
 
 import numpy as np
 import pytest
 
+from hopping_leg.evaluate import motor_load
 from hopping_leg.sim_to_real import transfer
 from hopping_leg.sim_to_real.methods import METHODS
 from hopping_leg.sim_to_real.transfer import compare
 from tests.sim_to_real.studies import study
+
+LOAD = dataclasses.asdict(motor_load.unknown())
 
 
 def trials(errors, commands=(0.25, 0.35), **more):
@@ -18,7 +22,7 @@ def trials(errors, commands=(0.25, 0.35), **more):
             "method": method, "twin": twin, "seed": 0, "command_m": command,
             "median_error_m": float(error), "median_abs_error_m": abs(float(error)),
             "std_m": 0.001, "hops": 10, "skipped_hops": 1, "body_contacts": 0,
-            "missed_runs": 0, "motionless": False, **more,
+            "missed_runs": 0, "motionless": False, **LOAD, **more,
         }
         for method, twins in errors.items()
         for twin, of_commands in twins.items()

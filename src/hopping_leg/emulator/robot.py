@@ -21,7 +21,6 @@ from hopping_leg.robot import JOINTS, REGISTER_MAP, Robot
 
 _MODEL = 0x0000  # Board r4
 _FIRMWARE = 0x010D  # Firmware version in its binary-coded form
-_NOMINAL_VOLTAGE = 26.0  # Bus voltage at which the qdd100 has the speed limit of the robot files, V
 _AIRBORNE = 0.01  # Height of the foot in a flight that counts as the first, m: no bounce
 
 
@@ -134,7 +133,7 @@ def _drive(robot: Robot, joint: int, configured: bool) -> EmulatedDrive:
         settings.Settings(**changes),
         gear_ratio=motor.gear_ratio,
         brake=motor.peak_torque / motor.no_load_speed,
-        voltage=_NOMINAL_VOLTAGE * robot.reality.voltage,
+        voltage=robot.hardware.bus_voltage * robot.reality.voltage,
     )
 
 

@@ -9,7 +9,7 @@ from markupsafe import Markup
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import figures, report, result_files, trials
 from hopping_leg.evaluate.result import Evaluation, flat_conditions
-from hopping_leg.evaluate.tables import SUMMARY, column, millimetres
+from hopping_leg.evaluate.tables import LOAD, SUMMARY, column, millimetres
 from hopping_leg.html_page import Column, page_template, svg_uri, table
 
 _OF_CONTROLLERS = ("summary", "sequence", "ladder", "staircase", "neighbours", "estimators")
@@ -198,6 +198,7 @@ def write_comparison(compared: Compared, command: str = "") -> bytes:
         compared=compared,
         beside=_beside_table(evaluation),
         summary=table(SUMMARY, evaluation.summary),
+        load=table(LOAD, evaluation.summary),
         pictures=pictures,
         learning=svg_uri(figures.draw_learning(histories)) if histories else "",
         trainings=table(_TRAINING, rows),

@@ -16,6 +16,7 @@ from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import entries, runner
+from hopping_leg.evaluate.motor_load import MotorLoad
 from hopping_leg.identify import cost, excitation, optimizers, parameters, plan, play_excitation
 from hopping_leg.identify.paper_excitation import Strokes, adapt, fixed_base, moving_base
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
@@ -314,7 +315,8 @@ FIRST_SEED = 1000
 """First seed of the trials; no seed from here on has chosen anything."""
 
 _KEPT = ("command_m", "median_error_m", "median_abs_error_m", "std_m", "hops", "skipped_hops",
-         "missed_runs", "hop_rate_hz", "flight_fraction", "body_contacts")  # fmt: skip
+         "missed_runs", "hop_rate_hz", "flight_fraction", "body_contacts",
+         *MotorLoad.__dataclass_fields__)  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -176,6 +176,13 @@ def _sums(trials: Sequence[Row]) -> Row:
     return {name: sum(r[name] for r in trials) for name in names}
 
 
+def _loads(trials: Sequence[Row]) -> Row:
+    """Return the medians of what hopping asks of the motors and of the soft limits."""
+    names = ("outside_limits_fraction", "soft_limit_share", "rated_torque_share",
+             "mean_electrical_power_w", "peak_regeneration_w", "torque_reversals_hz")  # fmt: skip
+    return {name: float(np.median([r[name] for r in trials])) for name in names}
+
+
 def _by_twin(trials: Sequence[Row], name: str) -> list[Array]:
     """Return a number of every seed, one array per twin."""
     twins = dict.fromkeys(r["twin"] for r in trials)
@@ -197,6 +204,7 @@ def _whole(method: methods.Method, trials: Sequence[Row], study: Study) -> Row:
         ),
         "worst_abs_error_m": max(r["median_abs_error_m"] for r in mine),
         "ordered": sum(map(_ordered, runs.values())),
+        **_loads(mine),
         **_sums(mine),
     }
 
