@@ -188,7 +188,7 @@ def _replay_window(
                     angle, speed = seen[joint], seen[2 + joint]
                     wanted, given = asked(command, joint, angle, speed), memory.motor_torque[joint]
                     result[n, joint], result[n, 2 + joint] = angle, speed
-                    result[n, 4 + joint] = motor_torque(p, joint, wanted, given, speed)
+                    result[n, 4 + joint], _ = motor_torque(p, joint, wanted, given, speed)
                 result[n, 6] = state[0]
                 step = 0
                 if last:
