@@ -17,7 +17,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, IntArray
 from hopping_leg.envs.paper_reward import action_jerk, joint_position_penalty, position_limits
-from hopping_leg.envs.rewards import Reward, RewardTerm, Transition, per_leg, sum_of_joints
+from hopping_leg.envs.rewards import PerLeg, Reward, RewardTerm, Transition, sum_of_joints
 from hopping_leg.robot import Robot, kinematics
 
 _FASTEST_SQUARED = 4.0  # base velocity squared beyond which the energy gain grows no more, m2/s2
@@ -88,10 +88,10 @@ def apex_reward(robot: Robot, config: ApexRewardConfig, rate: float) -> Reward:
                 lambda share: c.energy * max(0.0, 1 - share / c.energy_until),
                 bounded_energy_gain(c.energy_beyond, c.effective_gravity),
             ),
-            RewardTerm("jerk", -c.jerk, per_leg(action_jerk)),
+            RewardTerm("jerk", -c.jerk, PerLeg(action_jerk)),
             RewardTerm("effort", -c.effort, flight_effort),
             RewardTerm(
-                "position", -c.position, per_leg(joint_position_penalty, position_limits(robot))
+                "position", -c.position, PerLeg(joint_position_penalty, position_limits(robot))
             ),
             RewardTerm("velocity", -c.velocity, joint_overspeed(c.velocity_limit)),
             RewardTerm("clearance", -c.clearance, ground_closeness(robot, config)),

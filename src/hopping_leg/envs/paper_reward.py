@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from hopping_leg.arrays import Array
-from hopping_leg.envs.rewards import Reward, RewardTerm, per_leg
+from hopping_leg.envs.rewards import PerLeg, Reward, RewardTerm
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.compiled import compiled
 
@@ -45,13 +45,13 @@ def paper_reward(robot: Robot, config: PaperRewardConfig = PaperRewardConfig()) 
     rest, printed = c.rest_length + robot.foot.radius, c.barrier == "printed"
     return Reward(
         (
-            RewardTerm("energy", c.energy, per_leg(energy_gain, rest)),
-            RewardTerm("height", -c.height, per_leg(height_barrier, printed)),
-            RewardTerm("jerk", -c.jerk, per_leg(action_jerk)),
+            RewardTerm("energy", c.energy, PerLeg(energy_gain, rest)),
+            RewardTerm("height", -c.height, PerLeg(height_barrier, printed)),
+            RewardTerm("jerk", -c.jerk, PerLeg(action_jerk)),
             RewardTerm(
-                "position", -c.position, per_leg(joint_position_penalty, position_limits(robot))
+                "position", -c.position, PerLeg(joint_position_penalty, position_limits(robot))
             ),
-            RewardTerm("velocity", -c.velocity, per_leg(joint_velocity_penalty, speed)),
+            RewardTerm("velocity", -c.velocity, PerLeg(joint_velocity_penalty, speed)),
         )
     )
 
@@ -63,54 +63,74 @@ def position_limits(robot: Robot) -> Array:
 
 @compiled
 def energy_gain(
-    state: Array, command: Array, action: Array, last: Array, rest: float, term: Array
+    state: Array, command: Array, action: Array, last: Array, rest: float, terms: Array, column: int
 ) -> None:
     """Set Ge: base velocity and height above its rest, both squared, m2/s2 + m2."""
-    for leg in range(len(term)):
+    for leg in range(len(terms)):
         offset, rate = state[leg, 0] - rest, state[leg, 3]
-        term[leg] = rate * rate + offset * offset
+        terms[leg, column] = rate * rate + offset * offset
 
 
 @compiled
 def height_barrier(
-    state: Array, command: Array, action: Array, last: Array, printed: bool, term: Array
+    state: Array,
+    command: Array,
+    action: Array,
+    last: Array,
+    printed: bool,
+    terms: Array,
+    column: int,
 ) -> None:
     """Set Ph: grows with the base's height above the desired one, 0 below."""
-    for leg in range(len(term)):
+    for leg in range(len(terms)):
         excess = state[leg, 0] - command[leg]
         growth = math.exp(excess) if excess >= 0 else 0.0
-        term[leg] = 1 - growth if printed and excess >= 0 else growth
+        terms[leg, column] = 1 - growth if printed and excess >= 0 else growth
 
 
 @compiled
-def action_jerk(state: Array, command: Array, action: Array, last: Array, term: Array) -> None:
+def action_jerk(
+    state: Array, command: Array, action: Array, last: Array, terms: Array, column: int
+) -> None:
     """Set Pj: the squared change of the action."""
-    for leg in range(len(term)):
+    for leg in range(len(terms)):
         hip, knee = action[leg, 0] - last[leg, 0], action[leg, 1] - last[leg, 1]
-        term[leg] = hip * hip + knee * knee
+        terms[leg, column] = hip * hip + knee * knee
 
 
 @compiled
 def joint_position_penalty(
-    state: Array, command: Array, action: Array, last: Array, limits: Array, term: Array
+    state: Array,
+    command: Array,
+    action: Array,
+    last: Array,
+    limits: Array,
+    terms: Array,
+    column: int,
 ) -> None:
     """Set Pjp: 1 for each joint beyond its limits, rad, (2, 2), and rising towards it inside."""
-    for leg in range(len(term)):
-        term[leg] = 0.0
+    for leg in range(len(terms)):
+        terms[leg, column] = 0.0
         for joint in range(2):
             q = state[leg, 1 + joint]
             below, above = limits[0, joint] - q, q - limits[1, joint]
             near = math.exp(_SHARPNESS * below) + math.exp(_SHARPNESS * above)
-            term[leg] += 1.0 if max(below, above) > 0 else near
+            terms[leg, column] += 1.0 if max(below, above) > 0 else near
 
 
 @compiled
 def joint_velocity_penalty(
-    state: Array, command: Array, action: Array, last: Array, limit: Array, term: Array
+    state: Array,
+    command: Array,
+    action: Array,
+    last: Array,
+    limit: Array,
+    terms: Array,
+    column: int,
 ) -> None:
     """Set Pjv: squared joint velocity less its limit's square, where it is faster, rad2/s2."""
-    for leg in range(len(term)):
-        term[leg] = 0.0
+    for leg in range(len(terms)):
+        terms[leg, column] = 0.0
         for joint in range(2):
             qd = state[leg, 4 + joint]
-            term[leg] += max(qd * qd - limit[joint] * limit[joint], 0.0)
+            terms[leg, column] += max(qd * qd - limit[joint] * limit[joint], 0.0)

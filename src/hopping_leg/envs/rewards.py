@@ -101,20 +101,24 @@ class AnnealedTerm(Protocol):
         ...
 
 
-def per_leg(
-    function: Callable[..., None], *numbers: Array | float
-) -> Callable[[Transition], Array]:
-    """Return the term that a compiled function sets, leg by leg: numpy takes longer for few legs.
+class PerLeg:
+    """A term that a compiled function sets, leg by leg: numpy takes longer for few legs.
 
-    It is called as ``function(state, command, action, last_action, *numbers, term)``.
+    It is called as ``function(state, command, action, last_action, *numbers, terms, column)``.
     """
 
-    def term(t: Transition) -> Array:
-        values = np.empty(len(t.command))
-        function(t.state, t.command, t.action, t.last_action, *numbers, values)
-        return values
+    def __init__(self, function: Callable[..., None], *numbers: Array | float) -> None:
+        self._function, self._numbers = function, numbers
 
-    return term
+    def set(self, t: Transition, terms: Array, column: int) -> None:
+        """Set a column of the terms, (n, k)."""
+        self._function(t.state, t.command, t.action, t.last_action, *self._numbers, terms, column)
+
+    def __call__(self, transition: Transition) -> Array:
+        """Return the unweighted term, (n,)."""
+        terms = np.empty((len(transition.command), 1))
+        self.set(transition, terms, 0)
+        return terms[:, 0]
 
 
 class RewardTerm(NamedTuple):
@@ -162,7 +166,10 @@ class Reward:
         """Return the reward, (n,), and its unweighted terms, (n, k)."""
         terms = np.empty((len(transition.state), len(self.terms)))
         for column, function in enumerate(self._functions):
-            terms[:, column] = function(transition)
+            if isinstance(function, PerLeg):
+                function.set(transition, terms, column)
+            else:
+                terms[:, column] = function(transition)
         reward = np.empty(len(terms))
         _weigh(terms, self._weights, self.scale, reward)
         return reward, terms

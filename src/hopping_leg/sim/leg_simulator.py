@@ -183,8 +183,11 @@ class LegSimulator(Simulator):
     def _step(self, command: Array) -> Array:
         if self._jitters:
             self._jitter = self.rng.random(self.count)
-        stepper.send_all(self.table, self._memory, command, self._jitter)
-        self._advance_all()
+        first, *others = self._parts
+        futures = [thread_pool().submit(self._advance, command, *part) for part in others]
+        self._advance(command, *first)
+        for future in futures:
+            future.result()
         if self._disturbed:
             draws = self.rng.standard_normal((self.count, 6)) if self._noisy else self._reading
             stepper.read_sensors(
@@ -192,20 +195,10 @@ class LegSimulator(Simulator):
             )
         return self._memory["mean_torque"].copy()
 
-    def _advance_all(self) -> None:
-        first, *others = self._parts
-        if not others:
-            self._advance(*first)
-            return
-        futures = [thread_pool().submit(self._advance, *part) for part in others]
-        self._advance(*first)
-        for future in futures:
-            future.result()
-
-    def _advance(self, first: int, last: int) -> None:
+    def _advance(self, command: Array, first: int, last: int) -> None:
         stepper.step_legs(
-            self.table, self.state, self._memory, self._past, self._push, first, last,
-            self.substeps, self.timestep,
+            self.table, self.state, self._memory, self._past, command, self._jitter, self._push,
+            first, last, self.substeps, self.timestep,
         )  # fmt: skip
 
     def memory(self) -> dict[str, Any]:
@@ -236,9 +229,8 @@ def compile_physics() -> None:
     """
     table, memory = np.zeros(0, LEG), np.zeros(0, stepper.MEMORY)
     rows, values, past = np.zeros((0, 6)), np.zeros(0), np.zeros((0, 0, 6))
-    with compiling_notice(stepper.step_legs, stepper.send_all, stepper.read_sensors):
-        stepper.step_legs(table, rows, memory, past, values, 0, 0, 1, TIMESTEP)
-        stepper.send_all(table, memory, rows, values)
+    with compiling_notice(stepper.step_legs, stepper.read_sensors):
+        stepper.step_legs(table, rows, memory, past, rows, values, values, 0, 0, 1, TIMESTEP)
         stepper.read_sensors(table, memory, past, rows, rows, TIMESTEP)
 
 

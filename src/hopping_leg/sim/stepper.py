@@ -348,24 +348,23 @@ def step_legs(
     state: Array,
     memory: Records,
     past: Array,
+    command: Array,
+    jitter: Array,
     push: Array,
     first: int,
     last: int,
     steps: int,
     dt: float,
 ) -> None:
-    """Advance the legs from ``first`` to before ``last``."""
+    """Send commands to the legs from ``first`` to before ``last`` and advance these.
+
+    Commands are (n, ``COMMAND``); ``jitter`` is the share of it, [0, 1), (n,).
+    """
     rows = np.empty((ROWS, 5))
     for k in range(first, last):
-        step_leg(table[k], state[k], memory[k], past[k], rows, push[k], steps, dt)
-
-
-@compiled
-def send_all(table: Records, memory: Records, command: Array, jitter: Array) -> None:
-    """Send every leg's command, (n, ``COMMAND``); ``jitter`` is the share of it, [0, 1), (n,)."""
-    for k in range(len(memory)):
-        p = table[k]
-        send(memory[k], command[k], p.command_latency + jitter[k] * p.command_jitter)
+        p, leg = table[k], memory[k]
+        send(leg, command[k], p.command_latency + jitter[k] * p.command_jitter)
+        step_leg(p, state[k], leg, past[k], rows, push[k], steps, dt)
 
 
 @compiled
