@@ -199,15 +199,15 @@ def implicit_damping(p: Record, joint: int, relief: float, dt: float) -> tuple[f
 
         (M + dt c) y_l - dt c y_r = M a_l,    -dt c y_l + (A + dt (d + c)) y_r = A a_r,
 
-    from which y_r is eliminated; the other two numbers are its factor and the belt's dt c.
-    ``relief`` is damping of the drive's own PD.
+    from which y_r is eliminated; the other two numbers are dt c and its factor's inverse, zero for
+    a rigid joint. ``relief`` is damping of the drive's own PD.
     """
     drag = dt * (p.damping[joint] + relief)
     if p.elastic[joint] == 0:
-        return drag, 1.0, 0.0
+        return drag, 0.0, 0.0
     tie = dt * p.belt_damping[joint]
-    inertia = p.armature[joint] + drag + tie
-    return tie - tie * tie / inertia, inertia, tie
+    ease = 1 / (p.armature[joint] + drag + tie)
+    return tie - tie * tie * ease, tie, ease
 
 
 @compiled
@@ -293,22 +293,22 @@ def step_leg(
 
         # The new velocity, in which damping is implicit, and the position that follows it.
         f0, f1, f2 = times(m, a)
-        drag1, inertia1, tie1 = implicit_damping(p, 0, relief1, dt)
-        drag2, inertia2, tie2 = implicit_damping(p, 1, relief2, dt)
-        f1 += tie1 / inertia1 * armature1 * rotor1
-        f2 += tie2 / inertia2 * armature2 * rotor2
+        drag1, tie1, ease1 = implicit_damping(p, 0, relief1, dt)
+        drag2, tie2, ease2 = implicit_damping(p, 1, relief2, dt)
+        f1 += tie1 * ease1 * armature1 * rotor1
+        f2 += tie2 * ease2 * armature2 * rotor2
         y0, y1, y2 = solve(
             (m[0] + rail_drag, m[1], m[2], m[3] + drag1, m[4], m[5] + drag2), (f0, f1, f2)
         )
         v0, v1, v2 = v0 + dt * y0, v1 + dt * y1, v2 + dt * y2
         x, q1, q2 = x + dt * v0, q1 + dt * v1, q2 + dt * v2
         if elastic1:
-            w1 += dt * (armature1 * rotor1 + tie1 * y1) / inertia1
+            w1 += dt * ease1 * (armature1 * rotor1 + tie1 * y1)
             t1 += dt * w1
         else:
             t1, w1 = q1, v1
         if elastic2:
-            w2 += dt * (armature2 * rotor2 + tie2 * y2) / inertia2
+            w2 += dt * ease2 * (armature2 * rotor2 + tie2 * y2)
             t2 += dt * w2
         else:
             t2, w2 = q2, v2
