@@ -1,24 +1,23 @@
 """Rows of the stepper's table are what a robot file says, or a sentence."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from hopping_leg.errors import RobotError
-from hopping_leg.robot import DriveMismatch, build_model, load_robot, shipped_robots
-from hopping_leg.sim.leg_table import LEG, leg_table
+from hopping_leg.robot import DriveMismatch, ModelMismatch, build_model, load_robot, shipped_robots
+from hopping_leg.sim.leg_table import leg_table
 from tests.sim.legs import with_reality
 
 
 @pytest.mark.parametrize("name", shipped_robots())
 def test_softness_of_constraints_is_mujocos_inverse_weight(name):
-    robot = load_robot(name)
+    robot = dataclasses.replace(load_robot(name), reality=ModelMismatch())
     (row,), model = leg_table([robot], 5e-4), build_model(robot)
-    if not (row["elastic"] > 0).any() and robot.reality.mass == load_robot("legv2").reality.mass:
-        np.testing.assert_allclose(row["joint_softness"], model.dof_invweight0[1:], rtol=1e-9)
-        weights = [model.body_invweight0[model.body(body).id, 0] for body in ("base", "shank")]
-        softness = [row["base_softness"], row["shank_softness"]]
-        np.testing.assert_allclose(softness, weights, rtol=1e-9)
-    assert all(np.isfinite(row[field]).all() for field in LEG.names)
+    bodies = [model.body_invweight0[model.body(body).id, 0] for body in ("base", "shank")]
+    softness = [row["base_softness"], row["shank_softness"], *row["joint_softness"]]
+    np.testing.assert_allclose(softness, [*bodies, *model.dof_invweight0[1:]], rtol=1e-9)
 
 
 def test_equal_robots_share_a_row_and_order_stays():
@@ -33,17 +32,3 @@ def test_a_transmission_that_cannot_be_simulated_is_refused():
         leg_table([with_reality(knee=DriveMismatch(stiffness=1e6))], 5e-4)
     with pytest.raises(RobotError, match=r"reality.hip' has a backlash .* 'stiffness'"):
         leg_table([with_reality(hip=DriveMismatch(backlash=0.01))], 5e-4)
-
-
-@pytest.mark.parametrize("factor", [0.999, 1.001])
-def test_the_stiffest_transmission_that_is_allowed_stays_stable(factor):
-    import re
-
-    try:
-        leg_table([with_reality(knee=DriveMismatch(stiffness=1e6))], 5e-4)
-    except RobotError as error:
-        most = float(re.search(r"at most ([\d.e+]+)", str(error))[1])
-    robot = with_reality(knee=DriveMismatch(stiffness=factor * most))
-    if factor > 1.01:
-        with pytest.raises(RobotError):
-            leg_table([robot], 5e-4)

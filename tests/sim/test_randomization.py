@@ -33,15 +33,6 @@ def late(delay, **effects):
     return with_reality(latency=Latency(command=delay), **effects)
 
 
-def test_every_leg_moves_as_its_own_robot_does_alone():
-    robots = drawn(4)
-    together = states(LegSimulator(LEG, 4, threads=1, robots=robots))
-    for index, robot in enumerate(robots):
-        alone = states(LegSimulator(robot, 1, threads=1))
-        np.testing.assert_array_equal(together[:, index], alone[:, 0])
-    assert np.ptp(together[-1, :, 0]) > 1e-5
-
-
 @pytest.mark.parametrize("spread", IDENTIFIABLE_RANGES, ids=lambda spread: spread.path)
 def test_every_range_of_the_twins_reaches_the_physics(spread):
     low, high = (dataclasses.replace(spread, low=v, high=v) for v in (spread.low, spread.high))
