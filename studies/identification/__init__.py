@@ -8,6 +8,8 @@ RESULTS = (
     "--json studies/identification/results/identify.json",
     "python -m studies.identification --parts synthetic throughput mujoco-sysid --json "
     "studies/identification/results/known_legs.json",
+    "python -m studies.identification --parts coverage --json "
+    "studies/identification/results/coverage.json",
     "python -m studies.identification --parts paper-size --searches two-pass --json "
     "studies/identification/results/paper_size.json",
     "python -m studies.identification --parts recordings --json "
@@ -23,6 +25,15 @@ TABLES = (
         "what",
         "s_per_candidate=s per candidate",
         "times_faster=times faster",
+    ),
+    ("table", "coverage.json", "bars", "what", "bar", "measured", "unit", "reached"),
+    (
+        "table",
+        "coverage.json",
+        "coverage.rows",
+        "parameter",
+        "share_inside=intervals that hold the truth",
+        "rms_error_over_half_width=error over half width, rms",
     ),
     ("table", "paper_size.json", "bars", "what", "bar", "measured", "unit", "reached"),
     ("table", "recordings.json", "bars", "what", "bar", "measured", "unit", "reached"),

@@ -59,6 +59,13 @@ def _speed(result: dict[str, Any]) -> list[Bar]:
             ("replay on one thread over a loop of mj_step", 25.0, "times", loop, True),
             ("replay: two threads over one", 1.8, "times", cores, True),
         ]
+    arms = result.get("coverage")
+    if arms is not None:
+        share, longest = 100 * arms["share_inside"], arms["fit_longest_s"]
+        found += [
+            ("independent arms: 95 % intervals that hold the truth", 90.0, "%", share, True),
+            ("independent arms, 12 s each: longest fit", 10.0, "s", longest, False),
+        ]
     for row in result.get("paper_size", {}).get("rows", []):
         what = f"{row['recorded_s']:g} s of recordings: {row['method']}"
         found.append((what, 90.0, "s", 60 * row["wall_minutes"], False))

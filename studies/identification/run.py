@@ -16,6 +16,7 @@ from hopping_leg.cli.options import at_least
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.identify.result import software_versions
 from hopping_leg.identify.search import Report
+from studies.identification.arm import coverage
 from studies.identification.bars import bars
 from studies.identification.fits import METHODS
 from studies.identification.mujoco_sysid import mujoco_sysid
@@ -25,8 +26,11 @@ from studies.identification.synthetic import paper_size, synthetic
 from studies.identification.throughput import throughput
 from studies.shared import host
 
-PARTS = ("synthetic", "throughput", "mujoco-sysid", "paper-size", "recordings")
+PARTS = ("synthetic", "throughput", "coverage", "mujoco-sysid", "paper-size", "recordings")
 """What can be measured, in order."""
+
+ARM_SECONDS = 12.0
+"""Of each recording of an independent arm."""
 
 PAPER_METHODS = ("least-squares", "two-pass")
 """Searches on recordings of the paper's size."""
@@ -73,6 +77,13 @@ def bench_identify(
             "throughput: replay and plain loop in turn",
             {**study.asked("cma", study.throughput_seconds), "repeats": study.repeats},
             lambda: throughput(study, on_repeat),
+        )
+    if "coverage" in parts:
+        result["coverage"] = cache.load_or_run(
+            "coverage",
+            "independent arms",
+            {"arms": study.arms, "seed": study.seed, "threads": study.threads},
+            lambda: coverage(study.arms, ARM_SECONDS, study.seed, study.threads, on_repeat),
         )
     if "mujoco-sysid" in parts:
         result["mujoco_sysid"] = mujoco_sysid(study, cache, result["synthetic"]["rows"])
@@ -121,7 +132,7 @@ class Identify:
     """
 
     parts: tuple[str, ...] = ()
-    """Of synthetic, throughput, mujoco-sysid, paper-size and recordings; default: all."""
+    """Of synthetic, throughput, coverage, mujoco-sysid, paper-size and recordings; default: all."""
     searches: tuple[str, ...] = ("least-squares", "cma", "two-pass")
     """Of known twins and of recordings of the paper's size."""
     recordings: Path | None = None
@@ -138,6 +149,8 @@ class Identify:
     """Of each recording that is timed; the paper's are of 240 s."""
     paper_seconds: float = 240.0
     """Of each recording of the paper's size."""
+    arms: int = 120
+    """Independent arms whose truth intervals have to hold."""
     threads: int = 2
     """Of the fits; results do not depend on it."""
     seed: int = 0
@@ -149,7 +162,8 @@ class Identify:
 
     def measure(self) -> dict[str, Any]:
         """Run it, print what was to be reached and what was, return every number."""
-        at_least(1, generations=self.generations, repeats=self.repeats, threads=self.threads)
+        at_least(1, generations=self.generations, repeats=self.repeats)
+        at_least(1, threads=self.threads, arms=self.arms)
         at_least(4, population=self.population)
         at_least(0, seed=self.seed)
         for name, least in (("seconds", 16), ("throughput_seconds", 12), ("paper_seconds", 12)):
@@ -165,6 +179,7 @@ class Identify:
             self.repeats,
             self.throughput_seconds,
             self.paper_seconds,
+            self.arms,
             self.threads,
             self.seed,
             self.searches,
@@ -176,7 +191,7 @@ class Identify:
                 FitCache(self.out, progress.begin, progress.report),
                 parts=self.parts or PARTS,
                 recordings=self.recordings or _recordings(),
-                on_repeat=lambda done, total: console.print(f"round {done} of {total}"),
+                on_repeat=lambda done, total: console.print(f"{done} of {total}"),
             )
         _print(console, result)
         return result

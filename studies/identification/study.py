@@ -30,6 +30,8 @@ class Study:
     """Of each of the two recordings on which throughput is measured."""
     paper_seconds: float = 240.0
     """Of each of the two recordings of the paper's size."""
+    arms: int = 120
+    """Independent arms whose truth intervals have to hold."""
     threads: int = 2
     """Worker threads of all fits."""
     seed: int = 0

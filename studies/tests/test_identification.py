@@ -21,25 +21,24 @@ from studies.identification.twin import AIR, GROUND, record, twin
 from studies.shared import main
 
 
-def test_twins_are_recorded_with_the_step_that_fits_take():
+def test_twins_are_recorded_with_a_finer_step_than_fits_take():
     recording = record(AIR, "swings", 16.0)
-    assert recording.trace.header["timestep_s"] == TIMESTEP
-    assert make_plan([recording], load_robot("legv2")).timestep == TIMESTEP
+    plan = make_plan([recording], load_robot("legv2"))
+    assert recording.trace.header["timestep_s"] < plan.timestep == TIMESTEP
 
 
-@pytest.mark.parametrize("motion", ["swings", "hops"])
-def test_plain_loop_and_replay_simulate_the_same(motion):
+@pytest.mark.parametrize(("motion", "error"), [("swings", 3e-4), ("hops", 3e-3)])
+def test_plain_loop_and_replay_simulate_the_same(motion, error):
     recordings = [record(GROUND, motion, 16.0)]
-    windows = cut(recordings, 0.25)[4::12]
+    windows = cut(recordings, 0.25)[4::24]
     candidate = LegHypothesis(load_robot("legv2"))
-    loop = PlainLoop(recordings, windows, TIMESTEP)
-    plain = loop.run(candidate)
-    batch = WindowSimulator(recordings, windows, timestep=TIMESTEP, threads=1)
-    batched = batch.run([candidate]).position[0]
-    np.testing.assert_allclose(np.stack(plain), batched, atol=1e-9)
+    plain = np.stack(PlainLoop(recordings, windows, TIMESTEP / 16).run(candidate))
+    replay = WindowSimulator(recordings, windows, timestep=TIMESTEP, threads=1)
+    replayed = replay.run([candidate]).position[0]
+    np.testing.assert_allclose(plain, replayed, atol=error)
     start = np.array([recordings[0].array("position")[w.start] for w in windows])
-    np.testing.assert_allclose(np.stack(plain)[:, 0], start, atol=1e-9)
-    assert np.ptp(np.stack(plain), axis=1).max() > 0.2
+    np.testing.assert_allclose(plain[:, 0], start, atol=1e-9)
+    assert np.ptp(plain, axis=1).max() > 0.2
 
 
 def test_work_is_done_once(tmp_path):
@@ -122,7 +121,7 @@ def test_a_missing_extra_is_said(monkeypatch, tmp_path):
 
 
 @pytest.mark.skipif(not mujoco_sysid.available(), reason="mujoco.sysid is not installed")
-@pytest.mark.parametrize(("way", "error"), [("windows", 1e-12), ("whole", 1e-3)])
+@pytest.mark.parametrize(("way", "error"), [("windows", 5e-4), ("whole", 1.5e-3)])
 def test_the_truth_explains_the_data_to_mujoco_sysid(way, error):
     from mujoco import sysid
 
@@ -156,7 +155,6 @@ def test_the_command_measures_keeps_and_goes_on(tmp_path):
     assert main("identification", Identify, [*words, *sizes]) == 0
     first = json.loads(file.read_text())
     speed = first["throughput"]
-    assert speed["largest_difference_rad"] < 1e-6
     assert all(row["s_per_candidate"] > 0 for row in speed["rows"])
     assert [row["bar"] for row in first["bars"]] == [0.15, 25.0, 1.8]
     assert "--throughput-seconds 12" in first["command"]
@@ -172,3 +170,9 @@ def test_a_known_twin_is_found(tmp_path):
     assert row["identifiable"] == 8
     assert row["other_swings_rms_rad"] < 1e-3
     assert twin(AIR) != load_robot("legv2")
+
+
+@pytest.mark.slow
+def test_intervals_hold_the_truth_of_independent_arms(tmp_path):
+    result = bench_identify(Study(arms=12, seed=500), FitCache(tmp_path), parts=["coverage"])
+    assert result["coverage"]["share_inside"] > 0.9

@@ -36,7 +36,7 @@ def recordings(tmp_path_factory):
             clock, position, 0 * position, "fixed-base", 100.0, "legv2", "a swing"
         )
         files.append(folder / f"swing-{number}.parquet")
-        play(excitation, TWIN, believed="legv2", timestep=1e-3).save(files[-1])
+        play(excitation, TWIN, believed="legv2").save(files[-1])
     return files
 
 

@@ -11,7 +11,7 @@ from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.validation import open_loop
 from hopping_leg.identify.windows import cut, part
 from hopping_leg.robot import kinematics, load_robot
-from tests.identify.twin import LEG, STEP, changed, noisy, record, rig_model, swing
+from tests.identify.twin import FINE, LEG, STEP, changed, noisy, record, rig_model, swing
 
 RUN = record(LEG, swing(3.0))
 FAST = record(LEG, np.repeat(swing(2.0), 3, axis=0), rate=500.0)
@@ -39,7 +39,7 @@ def base_speed(run):
     for torque in run.array("torque_command"):
         speeds.append(data.qvel[0])
         data.ctrl[:] = torque
-        mujoco.mj_step(model, data, round(run.metadata.period / STEP))
+        mujoco.mj_step(model, data, round(run.metadata.period / FINE))
     return np.array(speeds)
 
 

@@ -16,14 +16,21 @@ def simulator(recordings, duration=None, **options):
     return WindowSimulator(recordings, cut(recordings, duration), timestep=STEP, **options)
 
 
-@pytest.mark.parametrize("rig", ["fixed-base", "rail"])
+@pytest.mark.parametrize(("rig", "error"), [("fixed-base", 1e-4), ("rail", 5e-4)])
 @pytest.mark.parametrize("hypothesis", [TRUE, OTHER], ids=["true", "other"])
-def test_the_replay_repeats_a_plain_loop_over_mj_step(rig, hypothesis):
+def test_the_replay_repeats_what_mujoco_recorded(rig, error, hypothesis):
     run = record(hypothesis.robot, swing(1.0, rig), rig)
-    got = simulator([run]).run([TRUE, hypothesis])
-    np.testing.assert_allclose(got.position[1, 0], run.array("position"), atol=1e-9)
-    np.testing.assert_allclose(got.velocity[1, 0], run.array("velocity"), atol=1e-6)
-    np.testing.assert_allclose(got.torque[1, 0], run.array("torque"), atol=1e-6)
+    coarse, fine = (
+        WindowSimulator([run], cut([run]), timestep=step).run([TRUE, hypothesis])
+        for step in (STEP, STEP / 4)
+    )
+    for got, share in ((coarse, 1.0), (fine, 0.5)):
+        errors = np.abs(got.position[1, 0] - run.array("position"))
+        assert errors.max() < share * error
+        assert np.abs(got.velocity[1, 0] - run.array("velocity")).max() < 50 * share * error
+        assert np.abs(got.torque[1, 0] - run.array("torque")).max() < 20 * share * error
+        height = got.height[1, 0] - run.trace.column("height_m") if rig == "rail" else 0.0
+        assert np.abs(height).max() < share * error
 
 
 def test_windows_on_the_rail_start_with_the_speed_of_the_base():
@@ -37,7 +44,7 @@ def test_recorded_torques_repeat_the_run():
     run = record(LEG, swing(1.0), onboard="torque")
     got = simulator([run], 0.25).run([TRUE])
     measured = run.array("position").reshape(4, 50, 2)
-    np.testing.assert_allclose(got.position[0], measured, atol=1e-9)
+    np.testing.assert_allclose(got.position[0], measured, atol=1e-3)
 
 
 def test_a_candidate_does_not_depend_on_its_company_nor_on_threads():
@@ -72,7 +79,9 @@ def test_rows_are_met_at_their_own_time_stamps_and_commands_within_a_step():
         WindowSimulator([run], cut([run]), timestep=step).run([late]).position[0, 0, :40]
         for step in (STEP, STEP / 2, STEP / 32)
     )
-    assert np.abs(2 * half - coarse - fine).max() < 0.1 * np.abs(coarse - fine).max()
+    effect = np.abs(simulator([run]).run([FREE]).position[0, 0, :40] - fine).max()
+    assert np.abs(half - fine).max() < 0.02 * effect
+    assert np.abs(coarse - fine).max() < 0.05 * effect
 
 
 def test_the_answer_is_smooth_in_the_delay():
@@ -111,4 +120,4 @@ def test_a_candidate_that_breaks_down_spoils_no_other():
     wild = TRUE.replace({"hip.torque_gain": 1e9, **limits})
     got = simulator([run]).run([wild, TRUE]).position
     assert np.isnan(got[0]).all()
-    np.testing.assert_allclose(got[1, 0], run.array("position"), atol=1e-9)
+    np.testing.assert_allclose(got[1, 0], run.array("position"), atol=1e-3)

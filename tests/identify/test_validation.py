@@ -18,9 +18,9 @@ def judge(hypothesis, onboard="zoh"):
 def test_the_true_robot_predicts_its_own_recording(onboard):
     validation = judge(TRUE, onboard)
     if onboard == "zoh":
-        assert max(validation.closed_loop_position) < 1e-6
-        assert max(validation.closed_loop_torque) < 1e-6
-    assert all(max(pair) < 1e-6 for pair in validation.open_loop_position.values())
+        assert max(validation.closed_loop_position) < 1e-4
+        assert max(validation.closed_loop_torque) < 1e-3
+    assert all(max(pair) < 1e-3 for pair in validation.open_loop_position.values())
 
 
 def test_a_wrong_robot_errs_the_more_the_longer_it_predicts():

@@ -11,6 +11,9 @@ from hopping_leg.identify.recording_format import PAIRS, RecordingMetadata
 from hopping_leg.robot import MotorLimit, compile_spec, get_spec, kinematics, load_robot
 
 STEP = 1e-3
+"""Physics step of the fits."""
+FINE = STEP / 4
+"""Physics step of the recordings, by Runge-Kutta's method."""
 LEG = load_robot("legv2")
 GAINS = {"stiffness": (8.0, 8.0), "damping": (0.3, 0.3)}
 
@@ -26,10 +29,11 @@ def swing(seconds, rig="fixed-base", rate=200.0, phase=0.0):
     return np.stack([hip, knee], axis=1)
 
 
-def rig_model(robot, rig, timestep=STEP):
+def rig_model(robot, rig, timestep=FINE):
     """Return MuJoCo's model of a robot on its rig, driven by torques at its joints."""
     spec = get_spec(robot, timestep, fixed_base=rig == "fixed-base")
     spec.option.tolerance = 1e-15
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
     for actuator in spec.actuators:
         actuator.ctrllimited = False
         actuator.gear[0] = 1
@@ -51,7 +55,7 @@ def record(robot, targets, rig="fixed-base", rate=200.0, onboard="zoh", name="tw
         height, measured = data.qpos[0], limit.clip(asked, qd)
         asked = kp * (target - q) - kd * qd
         rows.append((q, qd, measured, asked, target, height))
-        for _ in range(round(1 / rate / STEP)):
+        for _ in range(round(1 / rate / FINE)):
             data.ctrl[:] = limit.clip(asked, data.qvel[-2:])
             mujoco.mj_step(model, data)
     q, qd, measured, torque, target, height = (np.array(c) for c in zip(*rows, strict=True))

@@ -2,7 +2,8 @@
 
 Near the best fit the residuals are r + J dv, so the values' covariance is s2 (J' J)^-1 with the
 residuals' variance s2. Neighbouring samples are not independent; s2 is inflated by the residuals'
-own correlation time, else the intervals would be far too narrow.
+own correlation time, else the intervals would be far too narrow. Nor is the model right: what
+another law of dry friction would make of the values is added to their intervals.
 """
 
 from collections.abc import Sequence
@@ -37,9 +38,16 @@ class Identifiability:
 
 
 def identifiability(
-    parameters: ParameterSet, vector: Array, residuals: Array, jacobian: Array
+    parameters: ParameterSet,
+    vector: Array,
+    residuals: Array,
+    jacobian: Array,
+    change: Array | None = None,
 ) -> Identifiability:
-    """Judge a fit by its best search vector (k,), residuals there (m,) and their slopes (m, k)."""
+    """Judge a fit by its best search vector (k,), residuals there (m,) and their slopes (m, k).
+
+    The ``change`` of the residuals, (m,), is what another model would make of them.
+    """
     freedom = max(len(residuals) / correlation_time(residuals) - len(vector), 1.0)
     variance = float(np.sum(np.square(residuals))) / freedom
     covariance, blind = _covariance(jacobian, variance)
@@ -47,7 +55,10 @@ def identifiability(
     scale = np.where(deviation > 0, deviation, 1.0)
     correlation = covariance / np.outer(scale, scale)
     np.fill_diagonal(correlation, 1.0)
-    half = np.where(blind, np.inf, _NINETY_FIVE * deviation * parameters.scale)
+    half = _NINETY_FIVE * deviation
+    if change is not None:
+        half += np.abs(covariance @ (jacobian.T @ change)) / max(variance, 1e-300)
+    half = np.where(blind, np.inf, half * parameters.scale)
     values = parameters.values(vector)
     low, high = parameters.bounds
     near = 1e-6 * (high - low)

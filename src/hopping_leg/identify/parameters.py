@@ -40,6 +40,8 @@ class Actuators:
     velocity_window: float = quantity("s", 0.0)
     """Over which a drive that closes its own loop averages the velocity that it damps; its delay
     makes stiff loops ring."""
+    creep: float = quantity("rad/s", 0.0)
+    """Speed that a joint has where its dry friction is only just there; 0 holds it still."""
     ramp: float = quantity("1", 0.0)
     """Share of the commanded velocity by which a drive moves its position target on until the
     next command: 0 holds the target, 1 ramps it as mjbots' moteus does."""
@@ -118,6 +120,7 @@ _RANGES = {
     "armature": (1e-6, 0.05),
     "drive.delay": (0.0, 0.02),
     "drive.velocity_window": (0.0, 0.02),
+    "drive.creep": (0.0, 0.1),
     "drive.ramp": (0.0, 1.0),
     "drive.stiffness": (0.0, 500.0),
     "drive.damping": (0.0, 10.0),

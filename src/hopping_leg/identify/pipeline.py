@@ -21,6 +21,7 @@ from hopping_leg.identify.windows import SHORTEST, cut, duration, hold_out
 from hopping_leg.io import write_json
 from hopping_leg.robot import NO_MISMATCH, Robot, check_physics
 
+_CREEP = 0.02  # rad/s; intervals hold what friction that fades below it makes of the values
 _CONFIG, _RESULT = "config.json", "result.json"
 
 
@@ -177,10 +178,13 @@ def _conclude(
     step, bounds = options.effort.least_squares.step, last.parameters.bounds
     residuals = objective.residuals(vector[None])[0]
     slopes = optimizers.jacobian(objective.residuals, vector, bounds, step, objective.jumping)
+    creeping = replace(last.parameters, base=last.parameters.base.replace({"drive.creep": _CREEP}))
+    change = replace(objective, parameters=creeping).residuals(vector[None])[0] - residuals
     if objective.loss is not None:
         weights = objective.loss.weights(residuals)
         residuals, slopes = weights * residuals, weights[:, None] * slopes
-    return hypothesis, identifiability(last.parameters, vector, residuals, slopes)
+        change = weights * change
+    return hypothesis, identifiability(last.parameters, vector, residuals, slopes, change)
 
 
 def _config(

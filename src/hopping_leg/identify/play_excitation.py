@@ -15,6 +15,8 @@ from hopping_leg.sim import NO_NOISE, LegSimulator, Plant
 from hopping_leg.trace import Trace
 
 _TARGETS = PAIRS["position_command"] + PAIRS["velocity_command"]
+TRUE_TIMESTEP = TIMESTEP / 4
+"""Physics step of a leg that plays the real one, s: that of training would pass for a delay."""
 _IMPOSSIBLE = 1e4  # joint speed that no leg reaches, rad/s
 
 
@@ -25,7 +27,7 @@ def play(
     believed: str,
     seed: int = 0,
     gains: JointGains | None = None,
-    timestep: float = TIMESTEP,
+    timestep: float = TRUE_TIMESTEP,
     on_tick: Callable[[int, int], None] | None = None,
 ) -> Recording:
     """Record a leg that tracks an excitation by the paper's joint PD.

@@ -123,6 +123,14 @@ class _WindowGroup:
             fixed_base=not self._moving,
             gravity=self._metadata.effective_gravity,
         )
+        # Damping is implicit, so half a step of it would pass for inertia.
+        for joint, inertia in enumerate(("hip_inertia", "knee_inertia")):
+            legs[inertia] -= self._timestep / 2 * legs["damping"][:, joint]
+        creep = np.array([h.drive.creep for h in hypotheses])[:, None]
+        soft = legs["friction"] / np.maximum(creep, 1e-6) * self._timestep
+        soft = np.where(legs["friction"] > 0, np.minimum(soft, legs["friction_stiffness"]), 1.0)
+        legs["friction_stiffness"] = np.where(creep > 0, soft, legs["friction_stiffness"])
+        legs["friction_damping"][creep[:, 0] > 0] = 1 / self._timestep
         table = np.repeat(legs[:, None], len(self._recordings), axis=1)
         fitted = _drive_values(hypotheses, "torque_limit")
         for n, recording in enumerate(self._recordings):
