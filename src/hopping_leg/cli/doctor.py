@@ -22,6 +22,7 @@ from hopping_leg.cli import motors, options
 from hopping_leg.deploy import preflight, safety_limits
 from hopping_leg.envs import HoppingEnv
 from hopping_leg.errors import HardwareError, UsageError
+from hopping_leg.identify.simulate import compile_replay
 from hopping_leg.robot import JOINTS, Robot, load_robot
 from hopping_leg.sim import CONTROL_RATE, compile_physics
 from hopping_leg.sim.compiled import FOLDER
@@ -94,9 +95,10 @@ def run(args: Doctor) -> None:
 
 
 def compile_everything() -> None:
-    """Compile what simulation and environment need, or load it."""
+    """Compile what simulation, environment and identification need, or load it."""
     robot = load_robot("legv2-paper")
     compile_physics()
+    compile_replay()
     env = HoppingEnv(robot)
     env.reset(seed=0)
     env.step(np.zeros(2, np.float32))

@@ -4,6 +4,7 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import wait
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -15,12 +16,21 @@ from hopping_leg.identify.windows import Window
 from hopping_leg.robot import TIMESTEP, Robot, kinematics
 from hopping_leg.sim.compiled import compiling_notice
 from hopping_leg.sim.leg_simulator import thread_pool
-from hopping_leg.sim.leg_table import leg_table
+from hopping_leg.sim.leg_table import LEG, leg_table
 
 _GAINS = ("stiffness", "damping", "integral")
 _ONBOARD = {"torque": replay.TORQUE, "zoh": replay.ZOH, "continuous": replay.CONTINUOUS}
-_compiled: list[bool] = []
 _PARTS = 4  # pieces of work per thread, as windows differ in length
+
+
+@cache
+def compile_replay() -> None:
+    """Compile the replay before its first use, or load it."""
+    state, result = np.zeros((1, 1, 6)), np.zeros((1, 1, 1, replay.RESULT))
+    table, drives = np.zeros((1, 1), LEG), np.zeros(1, replay.DRIVE)
+    rows, spans = np.zeros(1, replay.ROW), np.zeros(1, replay.SPAN)
+    with compiling_notice(replay.replay):
+        replay.replay(table, drives, rows, spans, 0, TIMESTEP, state, 0, 0, result)
 
 
 def _drive_values(hypotheses: Sequence[parameters.LegHypothesis], name: str) -> Array:
@@ -96,10 +106,7 @@ class _WindowGroup:
                 self._timestep, state, first, last, result,
             )  # fmt: skip
 
-        if not _compiled:
-            with compiling_notice(replay.replay):
-                work(0, 0)
-            _compiled.append(True)
+        compile_replay()
         pairs = state.shape[0] * state.shape[1]
         if self._threads == 1 or pairs == 1:
             work(0, pairs)
