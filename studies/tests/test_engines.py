@@ -57,12 +57,12 @@ def test_a_ground_that_the_engine_lacks_is_refused():
 
 
 @pytest.mark.slow
-def test_controllers_hop_in_pybullet_without_retraining():
+def test_a_controller_hops_in_pybullet_as_it_is():
     """At a coarse step, for speed; the results file has the accuracy."""
     pytest.importorskip("pybullet", reason="needs the extra 'bullet'")
     setup = RolloutConfig(ROBOT, engine="pybullet", ground="rigid", timestep=1e-3)
     judged = evaluate(
-        [Entry("fast", load_controller("fast", ROBOT))],
+        [Entry("energy-shaping", load_controller("energy-shaping", ROBOT))],
         setup,
         commands=[0.3],
         repeats=1,
@@ -70,6 +70,7 @@ def test_controllers_hop_in_pybullet_without_retraining():
     ).evaluation
     assert judged.summary[0].hops > 15
     assert abs(judged.summary[0].median_error_m) < 0.03
+    assert judged.summary[0].stop_contacts is None, "PyBullet tells nothing of the motors"
     assert judged.conditions["engine"] == "pybullet"
     assert "rigid" in judged.conditions["floor_meaning"]
     assert "pybullet" in judged.versions

@@ -252,7 +252,8 @@ def print_evaluation(console: Console, evaluation: Evaluation) -> None:
         " skipped hops."
         for step in evaluation.staircase
     ]
-    lines += [_load_line(evaluation.rows(name)) for name in evaluation.controllers]
+    own = [evaluation.rows(name) for name in evaluation.controllers]
+    lines += [_load_line(rows) for rows in own if math.isfinite(rows[0].rated_torque_share)]
     lines += acceptance_lines(map(dataclasses.asdict, evaluation.summary))
     for line in [*lines, *(f"Note: {note}" for note in evaluation.notes)]:
         console.print(line, highlight=False)
