@@ -3,7 +3,7 @@
 from hopping_leg.envs.apex_reward import ApexRewardConfig, apex_reward
 from hopping_leg.envs.gymnasium_envs import HoppingEnv, HoppingVectorEnv
 from hopping_leg.envs.paper_reward import PaperRewardConfig, paper_reward
-from hopping_leg.envs.rewards import Reward, RewardTerm, Transition
+from hopping_leg.envs.rewards import PerLeg, Reward, RewardTerm, Transition
 from hopping_leg.envs.task import HoppingTask, Step
 from hopping_leg.envs.task_config import TaskConfig
 
@@ -13,6 +13,7 @@ __all__ = [
     "HoppingTask",
     "HoppingVectorEnv",
     "PaperRewardConfig",
+    "PerLeg",
     "Reward",
     "RewardTerm",
     "Step",
