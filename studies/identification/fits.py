@@ -11,7 +11,7 @@ from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.search import SearchOptions
 from hopping_leg.identify.validation import validate
-from hopping_leg.robot.model import TIMESTEP
+from hopping_leg.robot.model import COARSE_TIMESTEP
 from studies.identification.study import Clock, FitCache, Study
 from studies.identification.twin import believed
 
@@ -142,6 +142,6 @@ def unseen_errors(
     """Return the rms error of joint positions in closed loop on each recording, rad."""
     found = {}
     for name, recording in unseen.items():
-        pair = validate([recording], candidate, TIMESTEP, threads).closed_loop_position
+        pair = validate([recording], candidate, COARSE_TIMESTEP, threads).closed_loop_position
         found[f"{name.replace(' ', '_')}_rms_rad"] = float(np.max(pair))
     return found

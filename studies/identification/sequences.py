@@ -14,7 +14,7 @@ from hopping_leg.identify.initial_states import base_rate, start_states
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.windows import Window, cut
-from hopping_leg.robot import TIMESTEP, MotorLimit
+from hopping_leg.robot import COARSE_TIMESTEP, MotorLimit
 from studies.identification.throughput import build_rig_model
 from studies.identification.twin import believed
 
@@ -62,7 +62,7 @@ def _build(
     recording: Recording, way: Way, names: Sequence[str], values: Sequence[float]
 ) -> mujoco.MjModel:
     robot = LegHypothesis(believed()).replace(dict(zip(names, values, strict=True))).robot
-    model = build_rig_model(robot, recording.metadata.rig, TIMESTEP)
+    model = build_rig_model(robot, recording.metadata.rig, COARSE_TIMESTEP)
     if way == "whole":
         model.actuator_biasprm[:, 1] = -np.array(recording.metadata.stiffness)
         model.actuator_biasprm[:, 2] = -np.array(recording.metadata.damping)
@@ -97,7 +97,7 @@ def _trajectory(
     window: Window,
 ) -> Any:  # noqa: ANN401
     rows = slice(window.start, window.start + window.length)
-    substeps = round(recording.metadata.period / TIMESTEP)
+    substeps = round(recording.metadata.period / COARSE_TIMESTEP)
     held = np.repeat(control[rows], substeps, axis=0)
     seconds = np.arange(window.length) * recording.metadata.period
     kind = sysid.SignalType.MjStateQPos
@@ -106,7 +106,7 @@ def _trajectory(
     q, qd = (values[window.start] for values in states)
     return sysid.SystemTrajectory(
         model=model,
-        control=sysid.TimeSeries(np.arange(len(held)) * TIMESTEP, held),
+        control=sysid.TimeSeries(np.arange(len(held)) * COARSE_TIMESTEP, held),
         sensordata=sysid.TimeSeries(seconds, angles, mapping),
         initial_state=sysid.create_initial_state(model, q, qd),
         state=None,

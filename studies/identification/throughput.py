@@ -15,7 +15,7 @@ from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.recording_format import Rig
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import Window, cut
-from hopping_leg.robot import TIMESTEP, MotorLimit, Robot, compile_spec, get_spec
+from hopping_leg.robot import COARSE_TIMESTEP, MotorLimit, Robot, compile_spec, get_spec
 from studies.identification.study import Study
 from studies.identification.twin import believed, record_paper
 from studies.shared import Timed, host, interleave, median_ratio
@@ -118,12 +118,14 @@ def throughput(
     low, high = (np.clip(bound, -1, 1) for bound in plan.parameters.bounds)
     vectors = rng.uniform(low, high, (study.population, len(low)))
     candidates = plan.parameters.hypotheses(vectors)
-    loop = PlainLoop(recordings, windows, TIMESTEP)
+    loop = PlainLoop(recordings, windows, COARSE_TIMESTEP)
     replays = {
-        threads: WindowSimulator(recordings, windows, timestep=TIMESTEP, threads=threads)
+        threads: WindowSimulator(recordings, windows, timestep=COARSE_TIMESTEP, threads=threads)
         for threads in (1, 2)
     }
-    fixed = WindowSimulator(recordings[:1], cut(recordings[:1]), timestep=TIMESTEP, threads=1)
+    fixed = WindowSimulator(
+        recordings[:1], cut(recordings[:1]), timestep=COARSE_TIMESTEP, threads=1
+    )
     functions: dict[str, Timed] = {
         "loop": lambda: _discard(loop.run(candidates[0])),
         "replay_1": lambda: _discard(replays[1].run(candidates)),
@@ -146,7 +148,7 @@ def throughput(
         "windows": len(windows),
         "window_s": plan.window,
         "candidates": study.population,
-        "timestep_s": TIMESTEP,
+        "timestep_s": COARSE_TIMESTEP,
         "repeats": study.repeats,
         "host": host(),
     }

@@ -22,7 +22,7 @@ from rich.table import Table
 from hopping_leg.arrays import Array
 from hopping_leg.cli.options import at_least
 from hopping_leg.envs import HoppingEnv, HoppingTask, TaskConfig, paper_reward
-from hopping_leg.robot import TIMESTEP, Robot, build_model, load_robot
+from hopping_leg.robot import COARSE_TIMESTEP, Robot, build_model, load_robot
 from hopping_leg.robot.kinematics import joint_angles
 from hopping_leg.sim import LegSimulator
 from studies.shared import Timed, host, interleave, median_ratio
@@ -239,7 +239,7 @@ class Env:
     """Rounds; medians over them are reported."""
     threads: int = 0
     """Of the batched environment and the batched physics alike, 0 for one per core."""
-    timestep: float = TIMESTEP
+    timestep: float = COARSE_TIMESTEP
     """Physics step, s."""
     seed: int = 0
     """Of noise and delay."""

@@ -8,7 +8,7 @@ from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import make_plan
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import cut
-from hopping_leg.robot import TIMESTEP, load_robot
+from hopping_leg.robot import COARSE_TIMESTEP, load_robot
 from studies.identification import mujoco_sysid
 from studies.identification.bars import bars
 from studies.identification.fits import compare, summary
@@ -24,7 +24,7 @@ from studies.shared import main
 def test_twins_are_recorded_with_a_finer_step_than_fits_take():
     recording = record(AIR, "swings", 16.0)
     plan = make_plan([recording], load_robot("legv2"))
-    assert recording.trace.header["timestep_s"] < plan.timestep == TIMESTEP
+    assert recording.trace.header["timestep_s"] < plan.timestep == COARSE_TIMESTEP
 
 
 @pytest.mark.parametrize(("motion", "error"), [("swings", 3e-4), ("hops", 3e-3)])
@@ -32,8 +32,8 @@ def test_plain_loop_and_replay_simulate_the_same(motion, error):
     recordings = [record(GROUND, motion, 16.0)]
     windows = cut(recordings, 0.25)[4::24]
     candidate = LegHypothesis(load_robot("legv2"))
-    plain = np.stack(PlainLoop(recordings, windows, TIMESTEP / 16).run(candidate))
-    replay = WindowSimulator(recordings, windows, timestep=TIMESTEP, threads=1)
+    plain = np.stack(PlainLoop(recordings, windows, COARSE_TIMESTEP / 16).run(candidate))
+    replay = WindowSimulator(recordings, windows, timestep=COARSE_TIMESTEP, threads=1)
     replayed = replay.run([candidate]).position[0]
     np.testing.assert_allclose(plain, replayed, atol=error)
     start = np.array([recordings[0].array("position")[w.start] for w in windows])

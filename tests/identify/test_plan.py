@@ -4,7 +4,7 @@ import pytest
 
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.plan import make_plan
-from hopping_leg.robot.model import TIMESTEP
+from hopping_leg.robot.model import COARSE_TIMESTEP
 from tests.identify.twin import LEG, changed, record, swing
 
 FIXED = record(LEG, swing(1.0))
@@ -67,8 +67,8 @@ def test_impossible_plans_get_a_sentence():
 
 
 def test_held_commands_are_simulated_with_the_step_of_training():
-    assert make_plan([FIXED], LEG).timestep == TIMESTEP
-    assert make_plan([TORQUES], LEG).timestep > TIMESTEP
+    assert make_plan([FIXED], LEG).timestep == COARSE_TIMESTEP
+    assert make_plan([TORQUES], LEG).timestep > COARSE_TIMESTEP
 
 
 def test_a_motor_is_not_believed_slower_than_its_joint_was_seen():

@@ -27,7 +27,7 @@ from hopping_leg.controllers import RolloutConfig
 from hopping_leg.evaluate import Entry, EvaluationRun, evaluate, tables, trials
 from hopping_leg.evaluate.entries import load_entries
 from hopping_leg.evaluate.report import render_videos, write_report
-from hopping_leg.robot import SoftLimits, load_robot
+from hopping_leg.robot import TIMESTEP, SoftLimits, load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, Engine, NoiseAndDelay
 
 
@@ -50,7 +50,7 @@ class Conditions:
     """The paper's sensor noise, torque noise and delay."""
     soft_limits: bool = True
     """Pull joints back that pass their soft limits, on the samples that the controller has."""
-    timestep: float = 5e-4
+    timestep: float = TIMESTEP
     """Physics step, s."""
     rate: float = CONTROL_RATE
     """Control rate, Hz."""

@@ -10,7 +10,7 @@ import polars as pl
 from hopping_leg.arrays import Array
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.errors import PhysicsError, UsageError
-from hopping_leg.robot import Robot, SoftLimits, kinematics
+from hopping_leg.robot import TIMESTEP, Robot, SoftLimits, kinematics
 from hopping_leg.sim import (
     CONTROL_RATE,
     LOADS,
@@ -42,7 +42,7 @@ class RolloutConfig:
     soft_limits: SoftLimits | None = field(default_factory=SoftLimits)
     rate: float = CONTROL_RATE
     """Control rate, Hz."""
-    timestep: float = 5e-4
+    timestep: float = TIMESTEP
     """Physics step, s."""
     start_length: float | None = None
     """Leg length of the standing start, m, hip axis to the foot's centre, foot below the hip; none

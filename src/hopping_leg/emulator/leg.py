@@ -12,11 +12,12 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.deploy.drive_link import joint_transforms
+from hopping_leg.robot import model as robot_model
 from hopping_leg.robot.parameters import Joint, Robot
 from hopping_leg.sim import LegSimulator
 
 TIMESTEP = 5e-4
-"""Physics step, s; the drives' control runs as often."""
+"""Period of the drives' control, s; the physics steps more often within it."""
 
 
 class EmulatedLeg:
@@ -33,7 +34,9 @@ class EmulatedLeg:
         free = replace(robot, hip=_unlimited(robot.hip), knee=_unlimited(robot.knee))
         immediate = replace(robot.reality.latency, command=0.0, jitter=0.0)
         free = replace(free, reality=replace(robot.reality, latency=immediate))
-        self._legs = LegSimulator(free, 1, rate=1 / TIMESTEP, timestep=TIMESTEP, threads=1)
+        self._legs = LegSimulator(
+            free, 1, rate=1 / TIMESTEP, timestep=robot_model.TIMESTEP, threads=1
+        )
         self._legs.reseed(np.random.default_rng(seed))
         self._legs.stand(slice(None), np.asarray(q, np.float64))
         self._links = (robot.thigh.length, robot.shank.length, robot.foot.radius)

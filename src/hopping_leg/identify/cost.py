@@ -12,7 +12,7 @@ from hopping_leg.identify.parameters import ParameterSet
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import Window
-from hopping_leg.robot.model import TIMESTEP
+from hopping_leg.robot.model import COARSE_TIMESTEP
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ class Objective:
     windows: tuple[Window, ...]
     parameters: ParameterSet
     scoring: Scoring
-    timestep: float = TIMESTEP
+    timestep: float = COARSE_TIMESTEP
     """Physics step, s."""
     threads: int = 0
     """Worker threads, 0 for one per core."""

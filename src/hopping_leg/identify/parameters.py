@@ -12,7 +12,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.io import quantity
-from hopping_leg.robot import TIMESTEP, Robot
+from hopping_leg.robot import COARSE_TIMESTEP, Robot
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def _units(kind: type[Any], prefix: str = "") -> dict[str, str]:
 _RANGES = {
     "rail.friction": (0.0, 10.0),
     "rail.damping": (0.0, 20.0),
-    "contact.time_constant": (2 * TIMESTEP, 0.2),
+    "contact.time_constant": (2 * COARSE_TIMESTEP, 0.2),
     "contact.damping_ratio": (0.1, 3.0),
     "contact.friction": (0.2, 2.0),
     "friction": (0.0, 1.0),

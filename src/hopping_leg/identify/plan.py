@@ -9,7 +9,7 @@ from hopping_leg.errors import RecordingError, RobotError, UsageError, unknown_n
 from hopping_leg.identify import cost, initial_states, recording_format
 from hopping_leg.identify.parameters import LegHypothesis, ParameterSet, choose
 from hopping_leg.identify.recording import Recording
-from hopping_leg.robot import JOINTS, TIMESTEP, Robot, load_robot
+from hopping_leg.robot import COARSE_TIMESTEP, JOINTS, Robot, load_robot
 
 _TOLERANCE = 0.2  # share by which link lengths may differ between files of one leg
 
@@ -235,7 +235,7 @@ def _scoring(recordings: Sequence[Recording]) -> cost.Scoring:
 def _timestep(recordings: Sequence[Recording]) -> float:
     """Return training's physics step wherever its errors could pass for parameters."""
     rough = all(r.metadata.rig == "fixed-base" and r.metadata.onboard != "zoh" for r in recordings)
-    return _COARSE if rough else TIMESTEP
+    return _COARSE if rough else COARSE_TIMESTEP
 
 
 def _window(recordings: Sequence[Recording]) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from hopping_leg.errors import RecordingError, UsageError
 from hopping_leg.identify import initial_states, parameters, replay
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.windows import Window
-from hopping_leg.robot import TIMESTEP, Robot, kinematics
+from hopping_leg.robot import COARSE_TIMESTEP, Robot, kinematics
 from hopping_leg.sim.compiled import compiling_notice
 from hopping_leg.sim.leg_simulator import thread_pool
 from hopping_leg.sim.leg_table import LEG, leg_table
@@ -228,7 +228,7 @@ class WindowSimulator:
         recordings: Sequence[Recording],
         windows: Sequence[Window],
         *,
-        timestep: float = TIMESTEP,
+        timestep: float = COARSE_TIMESTEP,
         threads: int = 0,
     ) -> None:
         if not windows:

@@ -10,7 +10,7 @@ from hopping_leg.identify import initial_states, parameters, recording_format, s
 from hopping_leg.identify.cost import measured
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.windows import Window, cut, duration
-from hopping_leg.robot.model import TIMESTEP
+from hopping_leg.robot.model import COARSE_TIMESTEP
 
 HORIZONS = (0.2, 0.5, 1.0)
 """How far to predict without looking at the recording again, s."""
@@ -33,7 +33,7 @@ class Validation:
 def validate(
     recordings: Sequence[Recording],
     hypothesis: parameters.LegHypothesis,
-    timestep: float = TIMESTEP,
+    timestep: float = COARSE_TIMESTEP,
     threads: int = 0,
 ) -> Validation:
     """Judge a hypothesis on recordings; one that is shorter than a horizon is left out there.
@@ -57,7 +57,7 @@ def open_loop(
     recordings: Sequence[Recording],
     hypothesis: parameters.LegHypothesis,
     horizon: float,
-    timestep: float = TIMESTEP,
+    timestep: float = COARSE_TIMESTEP,
     threads: int = 0,
 ) -> recording_format.Pair:
     """Return the rms position error of predictions restarted every half horizon, rad.

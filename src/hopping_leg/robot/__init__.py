@@ -8,7 +8,14 @@ from hopping_leg.robot.limits import (
     braking_times,
     command_limits,
 )
-from hopping_leg.robot.model import GRAVITY, TIMESTEP, build_model, compile_spec, get_spec
+from hopping_leg.robot.model import (
+    COARSE_TIMESTEP,
+    GRAVITY,
+    TIMESTEP,
+    build_model,
+    compile_spec,
+    get_spec,
+)
 from hopping_leg.robot.model_mismatch import (
     NO_MISMATCH,
     DriveMismatch,
@@ -32,6 +39,7 @@ from hopping_leg.robot.robot_files import (
 from hopping_leg.robot.urdf import to_urdf
 
 __all__ = [
+    "COARSE_TIMESTEP",
     "GRAVITY",
     "JOINTS",
     "NO_MISMATCH",

@@ -11,8 +11,11 @@ from hopping_leg.robot.parameters import Joint, Link, Rail, Robot
 GRAVITY = 9.81
 """Standard gravity, m/s2; leg.xml states the same."""
 
-TIMESTEP = 5e-4
-"""Default physics step, s: a compromise whose price ``python -m studies.physics_step`` measures."""
+TIMESTEP = 1.25e-4
+"""Physics step of environment and evaluation, s, see ``python -m studies.physics_step``."""
+
+COARSE_TIMESTEP = 5e-4
+"""Physics step of identification, whose errors are below those of recordings, s."""
 
 STOP_TIME_CONSTANT = 0.005
 """Time constant with which a mechanical stop pushes a joint back, critically damped, s."""

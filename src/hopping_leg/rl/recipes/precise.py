@@ -19,7 +19,6 @@ PRECISE = recipe.Recipe(
         observation="dated-long",
         command_range=(0.20, 0.46),
         command_skew=1.5,
-        timestep=5e-4,
         randomize_from_start=False,
     ),
     reward=ApexRewardConfig(
