@@ -30,7 +30,7 @@ def compile_replay() -> None:
     table, drives = np.zeros((1, 1), LEG), np.zeros(1, replay.DRIVE)
     rows, spans = np.zeros(1, replay.ROW), np.zeros(1, replay.SPAN)
     with compiling_notice(replay.replay):
-        replay.replay(table, drives, rows, spans, 0, TIMESTEP, state, 0, 0, result)
+        replay.replay(table, drives, rows, spans, 0, COARSE_TIMESTEP, state, 0, 0, result)
 
 
 def _drive_values(hypotheses: Sequence[parameters.LegHypothesis], name: str) -> Array:
