@@ -112,7 +112,8 @@ def draw_estimate(trace: Trace, title: str = "") -> Figure:
     over_time.set(xlabel="time / s", ylabel="base height / m")
     over_time.margins(y=0.15)
     over_time.legend(loc="upper right", ncols=2)
-    flight, error = trace.column("foot_clearance_m") > 0, 1e3 * (estimate - height)
+    flight = trace.column("foot_clearance_m") >= hop_detection.FLIGHT_CLEARANCE
+    error = 1e3 * (estimate - height)
     known = (time >= START_SECONDS) & np.isfinite(error)
     bins = np.linspace(error[known].min() - 1, error[known].max() + 1, 50)
     for name, phase, paint in (("flight", flight, COLOURS[0]), ("stance", ~flight, COLOURS[1])):

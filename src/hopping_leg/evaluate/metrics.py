@@ -8,7 +8,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.evaluate import motor_load, result, statistics
-from hopping_leg.hop_detection import COLUMNS, measure_hops, trace_hops
+from hopping_leg.hop_detection import COLUMNS, FLIGHT_CLEARANCE, measure_hops, trace_hops
 from hopping_leg.robot.parameters import JOINTS
 from hopping_leg.trace import Trace
 
@@ -166,7 +166,7 @@ def judge_estimator(controller: str, traces: Sequence[Trace]) -> result.Estimato
 def _errors(trace: Trace, *, flying: bool) -> Array:
     error = trace.column(ESTIMATED_HEIGHT) - trace.column("height_m")
     settled = trace.column("time_s") >= START_SECONDS
-    phase = (trace.column("foot_clearance_m") > 0) == flying
+    phase = (trace.column("foot_clearance_m") >= FLIGHT_CLEARANCE) == flying
     chosen: Array = error[settled & phase & np.isfinite(error)]
     return chosen
 

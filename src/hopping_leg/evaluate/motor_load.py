@@ -4,9 +4,9 @@ Windings lose P = 3/2 R (tau / (N k_t))^2, with tau at the joint, N the gear's a
 and R the rotor's torque constant and the resistance of a phase: moteus' own formula for its power.
 
 Heat is one lump. A drive's temperature nears ambient + (T_derate - ambient) (tau_rms / tau_rated)^2
-with one time constant T, since the rated torque is by its definition the one that may be held for
-ever; it is there after -T ln(1 - (tau_rated / tau_rms)^2), or never. From there on (50 deg C of a
-moteus) the drive takes torque away, and at its fault temperature (75 deg C) the rest.
+with one time constant T, as the rated torque is by definition the one that may be held for ever; it
+is there after -T ln(1 - (tau_rated / tau_rms)^2), or never. Then (a moteus at 50 deg C) the drive
+takes torque away, and at its fault temperature (75 deg C) the rest.
 
 Braking gives power back. On a bus that takes none, its capacitance C is charged from V_0 by a burst
 of the energy E to sqrt(V_0^2 + 2 E / C).
@@ -50,7 +50,7 @@ class MotorLoad:
     mean_power_w: float
     """Mechanical: mean of what each motor puts in, none counted in the ticks in which it brakes."""
     mean_electrical_power_w: float
-    """From the bus: mechanical power, braking subtracted, and the windings' loss."""
+    """From the bus: mechanical power, less what braking gives back, and the windings' loss."""
     peak_regeneration_w: float
     """Largest mechanical power that both motors together take out at one physics step."""
     bus_voltage_rise_v: float
@@ -90,8 +90,7 @@ def motor_load(parts: Sequence[Trace], robot: Robot) -> MotorLoad:
         rated_torque_share=float(share.max()),
         thermal_minutes=min(map(_minutes, share, [s.thermal_time_constant for s in servos])),
         peak_knee_speed_rad_s=float(loads["knee_peak_speed"].max()),
-        torque_reversals_hz=sum(map(_reversals, np.split(command, ends[:-1])))
-        / (period * len(command)),
+        torque_reversals_hz=sum(map(_reversals, np.split(command, ends[:-1]))) / period / ends[-1],
         mean_power_w=float(np.maximum(power, 0).sum(axis=1).mean()),
         mean_electrical_power_w=float(bus.mean()),
         peak_regeneration_w=float(np.maximum(-loads["least_power"], 0).max()),
