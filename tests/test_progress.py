@@ -45,17 +45,17 @@ def test_a_training_tells_only_what_it_knows(capsys, monkeypatch):
 def test_a_study_counts_earlier_jobs_but_not_their_time(capsys, monkeypatch):
     now = 0.0
     monkeypatch.setattr(time, "monotonic", lambda: now)
-    with Board(4.0) as board:
-        board.finish("old", 2.0, new=False)
-        now = 60.0
-        board.finish("new", 1.0)
+    with Board(400.0) as board:
+        board.finish("old", 200.0, new=False)
+        now = 250.0  # twice as long as the weight of what is new says
+        board.finish("new", 120.0)
         board.show(["last"])
-    assert capsys.readouterr().err == "75 % · done: new\n75 % · last · about 1:00 left\n"
+    assert capsys.readouterr().err == "80 % · done: new\n80 % · last · about 2:40 left\n"
     now = 0.0
-    with Board(4.0) as board:
+    with Board(400.0, at_once=2) as board:
         now = 60.0
-        board.show(["running"], begun=2.0)
-    assert capsys.readouterr().err == "50 % · running · about 1:00 left\n"
+        board.show(["running"], begun=120.0)
+    assert capsys.readouterr().err == "30 % · running · about 2:20 left\n"
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(0.4, "0:00"), (59.6, "1:00"), (3601, "60:01")])

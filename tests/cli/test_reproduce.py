@@ -21,7 +21,7 @@ def calls(monkeypatch):
     """Replace study and evaluation by notes of what they were asked for."""
     found = {"transfer": [], "evaluate": []}
 
-    def fake_transfer(study, at_once):
+    def fake_transfer(study, at_once, _afterwards):
         found["transfer"].append((study, at_once))
         return NUMBERS
 

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import pytest
 
+from hopping_leg.sim_to_real import jobs
 from hopping_leg.sim_to_real.jobs import Board, Job, work
 
 
@@ -34,11 +35,52 @@ class Note(Job):
 
 @pytest.mark.parametrize("at_once", [1, 2])
 def test_jobs_that_are_done_are_not_done_again(tmp_path, at_once, capsys):
-    jobs = [Note(tmp_path / f"{number}.txt") for number in range(3)]
-    jobs[1].file.write_text("earlier")
+    notes = [Note(tmp_path / f"{number}.txt") for number in range(3)]
+    notes[1].file.write_text("earlier")
     with Board(3.0, own_bars=at_once == 1) as board:
-        work(jobs, at_once, board)
-    assert jobs[1].file.read_text() == "earlier"
-    here = {job.file.read_text() for job in (jobs[0], jobs[2])} == {str(os.getpid())}
+        work(notes, at_once, board)
+    assert notes[1].file.read_text() == "earlier"
+    here = {job.file.read_text() for job in (notes[0], notes[2])} == {str(os.getpid())}
     assert here == (at_once == 1)
     assert "done: 2" in capsys.readouterr().err
+
+
+@dataclasses.dataclass(frozen=True)
+class Told(Job):
+    """A job that is only told of."""
+
+    name: str = ""
+    weight: float = 0.0
+    on_all_cores: bool = False
+    done = False
+    known: ClassVar[dict[str, float]] = {}
+
+    def run(self, *, quiet):
+        raise AssertionError
+
+    def progress(self):
+        return self.known.get(self.name, 0.0), str(self.known.get(self.name))
+
+
+@pytest.mark.parametrize("pace", [0.5, 1.0, 4.0])
+def test_the_time_left_is_true_to_a_factor_of_two_after_the_first_tenth(pace, monkeypatch, capsys):
+    rounds = [[Told("record", 5.0)] * 2, [Told("identify", 40.0, on_all_cores=True)]]
+    rounds += [[Told("train", 190.0)] * 2, [Told("hop", 8.0)] * 2]
+    total = 100.0 + sum(job.weight for stage in rounds for job in stage)
+    now, since = 0.0, {}
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    monkeypatch.setattr(Told, "known", {})
+    monkeypatch.setattr("hopping_leg.progress._LINE_SECONDS", 0.0)
+    board = Board(total, at_once=2)
+    whole = pace * total / 2
+    for stage in rounds:
+        begin, taken = now, pace * sum(job.weight for job in stage) / 2
+        while now < begin + taken:
+            Told.known["train"] = (now - begin) / taken // 0.2 * 0.2  # its snapshots tell
+            jobs._show(stage, since, board)
+            left = capsys.readouterr().err.rpartition("about ")[2].split()[0].split(":")
+            if 0.1 * whole < now < 0.95 * whole:
+                assert 0.5 < (60 * int(left[0]) + int(left[1])) / (whole - now) < 2.0
+            now += 1.0
+        for job in stage:
+            board.finish(job.name, job.weight)

@@ -29,6 +29,8 @@ _MINIATURE = ("identified", "cad", ENERGY_SHAPING)
 _PAPER = (*DEFAULT, "rail-only", "fixed-base-only", "two-pass", "one-pass")
 _GLANCE = LeastSquaresOptions(rounds=1, evaluations=2)
 _MARK = "size.txt"
+_JUDGING, _QUICK_JUDGING = 60.0, 10.0
+"""Rough time that the evaluation and its report take, s."""
 
 NOTHING_MEANT = (
     "This was a quick run: fit, training and trials were cut so short that its numbers mean"
@@ -79,7 +81,8 @@ def run(args: Reproduce) -> None:
     folder, notes = args.folder, [NOTHING_MEANT] if args.quick else []
     study = make_study(args)
     io.write_atomically(folder / _MARK, f"{args.size}\n".encode())
-    result = transfer(study, args.jobs)
+    judging = _QUICK_JUDGING if args.quick else _JUDGING
+    result = transfer(study, args.jobs, args.jobs * judging)
     io.write_json(folder / "transfer.json", {**result, "notes": [*notes, *result["notes"]]})
     twin, method = study.twins[0], study.methods[0]
     policy = study.training(twin, method, args.seed) / "policy.onnx"

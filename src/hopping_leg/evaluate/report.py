@@ -1,6 +1,8 @@
 """The report: figures of an evaluation, and one HTML page that holds all and needs nothing."""
 
+import os
 from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -149,13 +151,18 @@ def write_report(judged: runner.EvaluationRun, videos: dict[str, Video] | None =
 
 def render_videos(judged: runner.EvaluationRun, robot: Robot) -> dict[str, Video]:
     """Render one video per controller; after a first failure the rest are not tried."""
-    videos: dict[str, Video] = {}
-    none = Video(None, "it was not asked for")
-    for name in judged.evaluation.controllers:
-        failed = next((video for video in videos.values() if video.content is None), None)
-        traces = fixed_traces(judged.runs, name)
-        videos[name] = failed or (render_video(robot, traces) if traces else none)
-    return videos
+    names = judged.evaluation.controllers
+    videos = dict.fromkeys(names, Video(None, "it was not asked for"))
+    hopped = {name: traces for name in names if (traces := fixed_traces(judged.runs, name))}
+    if not hopped:
+        return videos
+    (first, traces), *others = hopped.items()
+    videos[first] = render_video(robot, traces)
+    if videos[first].content is None:
+        return videos | dict.fromkeys(hopped, videos[first])
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        rendered = pool.map(lambda one: render_video(robot, one[1]), others)
+        return videos | dict(zip([name for name, _ in others], rendered, strict=True))
 
 
 def _subtitle(c: dict[str, Any]) -> str:

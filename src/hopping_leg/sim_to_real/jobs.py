@@ -2,24 +2,36 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import FIRST_COMPLETED, wait
+from typing import ClassVar
 
 from hopping_leg.progress import LiveProgress, minutes
 from hopping_leg.sim import compile_physics
 from hopping_leg.workers import ProcessWorkers
 
 _LOOK_EVERY = 1.0
+_MOST_GUESSED = 0.95
+
+
+_BELIEVED = 10.0
+"""Work, s, after which the pace of this computer counts as much as that of the weights."""
 
 
 class Board(LiveProgress):
     """Shows which jobs run and how much of their total weight is left, as a context manager.
 
     Where jobs draw bars of their own, there is a line per job instead of a bar.
+
+    Args:
+        total: Weight of all that is shown, what follows the jobs included, s of a core.
+        at_once: How many cores work.
+        own_bars: Whether jobs draw bars of their own.
     """
 
-    def __init__(self, total: float, *, own_bars: bool = False) -> None:
+    def __init__(self, total: float, at_once: int = 1, *, own_bars: bool = False) -> None:
         super().__init__("transfer", total, lines=True if own_bars else None)
-        self._total, self._old, self._new, self._begun = total, 0.0, 0.0, 0.0
+        self._total, self.at_once = total, at_once
+        self._old, self._new, self._begun = 0.0, 0.0, 0.0
 
     def begin(self, name: str) -> None:
         """Say that a job begins in this process."""
@@ -46,9 +58,15 @@ class Board(LiveProgress):
     def _done(self) -> float:
         return self._old + self._new + self._begun
 
+    @property
+    def pace(self) -> float:
+        """How long work takes, over what the weights say."""
+        new = self._new + self._begun
+        return (self.passed * self.at_once + _BELIEVED) / (new + _BELIEVED)
+
     def _time_left(self) -> str:
-        new, left = self._new + self._begun, self._total - self._done
-        return f"about {minutes(self.passed / new * left)} left" if new and left > 0 else ""
+        left = (self._total - self._done) * self.pace / self.at_once
+        return f"about {minutes(left)} left" if left > 0 else ""
 
     def _told(self, text: str) -> str:
         return f"{100 * self._done / max(self._total, 1e-9):.0f} % · {text}"
@@ -60,7 +78,10 @@ class Job(ABC):
     @property
     @abstractmethod
     def weight(self) -> float:
-        """Rough time it takes one core, min, for the time left."""
+        """Rough time that it keeps one core busy, s; a job on all cores counts all of them."""
+
+    on_all_cores: ClassVar[bool] = False
+    """Whether one alone keeps every core busy."""
 
     @property
     @abstractmethod
@@ -81,7 +102,7 @@ class Job(ABC):
         """Do it and store the result, whole or not at all; what was killed goes on."""
 
     def progress(self) -> tuple[float, str]:
-        """Return the share done and what to show while it runs in another process."""
+        """Return the share that is known to be done in another process, and what to show."""
         return 0.0, ""
 
 
@@ -109,22 +130,27 @@ def _share_out(jobs: Sequence[Job], at_once: int, board: Board) -> None:
     compile_physics()
     with ProcessWorkers(min(at_once, len(jobs))) as workers:
         running = {workers.submit(_run, job): job for job in jobs}
+        since: dict[str, float] = {}
         while running:
             ended, _ = wait(running, _LOOK_EVERY, FIRST_COMPLETED)
             for future in ended:
                 job = running.pop(future)
                 future.result()
                 board.finish(job.name, job.weight)
-            _show(running, at_once, board)
+            busy = [job for future, job in running.items() if future.running() and not job.done]
+            _show(busy[:at_once], since, board)
 
 
-def _show(running: dict[Future[None], Job], at_once: int, board: Board) -> None:
-    busy = [job for future, job in running.items() if future.running() and not job.done]
+def _show(busy: Sequence[Job], since: dict[str, float], board: Board) -> None:
+    """Show what runs; a job that tells nothing new goes on as fast as its weight says."""
     notes, begun = [], 0.0
-    for job in busy[:at_once]:
-        share, note = job.progress()
+    for job in busy:
+        known, note = job.progress()
+        begin = since.setdefault(f"{job.name} {note}", board.passed)
+        cores = board.at_once / len(busy) if job.on_all_cores else 1.0
+        guessed = known + cores * (board.passed - begin) / (board.pace * job.weight)
         notes.append(f"{job.name} {note}".strip())
-        begun += share * job.weight
+        begun += job.weight * min(guessed, max(known, _MOST_GUESSED))
     board.show(notes, begun)
 
 

@@ -85,7 +85,7 @@ class RecordTwin(StoredJob):
     twin: TwinFile
     rig: Rig
 
-    weight: ClassVar[float] = 0.1
+    weight: ClassVar[float] = 5.0
 
     @property
     def name(self) -> str:
@@ -141,10 +141,13 @@ class IdentifyTwin(StoredJob):
     twin: TwinFile
     method: methods.Method
 
+    on_all_cores: ClassVar[bool] = True
+
     @property
     def weight(self) -> float:
-        """Rough time, min."""
-        return 10.0 if self.study.least_squares == USUAL_FIT else 1.0
+        """Rough time, s."""
+        usual = self.study.least_squares == USUAL_FIT
+        return 5.0 + self.study.seconds if usual else 10.0
 
     @property
     def name(self) -> str:
@@ -224,8 +227,8 @@ class TrainPolicy(jobs.Job):
 
     @property
     def weight(self) -> float:
-        """Rough time, min."""
-        return self.study.steps / 600_000
+        """Rough time, s."""
+        return 10.0 + self.study.steps / 17_000
 
     @property
     def name(self) -> str:
@@ -326,7 +329,7 @@ class HopTrial(StoredJob):
     study: Study
     twin: TwinFile
 
-    weight: ClassVar[float] = 0.3
+    weight: ClassVar[float] = 8.0
 
     @property
     def leg(self) -> Robot:

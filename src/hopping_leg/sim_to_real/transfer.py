@@ -15,22 +15,27 @@ from hopping_leg.sim_to_real.study import Study, TwinFile
 J = TypeVar("J", bound=jobs.Job)
 
 
-def transfer(study: Study, at_once: int = 1) -> dict[str, Any]:
+def transfer(study: Study, at_once: int = 1, afterwards: float = 0.0) -> dict[str, Any]:
     """Run a study, or what is left of it, and return its numbers.
+
+    What the caller does ``afterwards``, s of a core, counts in the time left.
 
     Raises:
         UsageError: The folder holds results of other options, or there is no such recipe.
     """
     for training in trainings(study):
         training.recipe()
-    work_through((records(study), fits(study), trainings(study), hops(study)), at_once)
+    rounds = (records(study), fits(study), trainings(study), hops(study))
+    work_through(rounds, at_once, afterwards)
     return tabulate(study, fits(study), trainings(study), hops(study))
 
 
-def work_through(rounds: Sequence[Sequence[jobs.Job]], at_once: int) -> None:
+def work_through(
+    rounds: Sequence[Sequence[jobs.Job]], at_once: int, afterwards: float = 0.0
+) -> None:
     """Do what is not done of some stages, one stage after the other."""
-    total = sum(job.weight for stage in rounds for job in stage)
-    with jobs.Board(total, own_bars=at_once == 1) as board:
+    total = afterwards + sum(job.weight for stage in rounds for job in stage)
+    with jobs.Board(total, at_once, own_bars=at_once == 1) as board:
         for stage in rounds:
             jobs.work(stage, at_once, board)
 
