@@ -76,3 +76,16 @@ def test_a_standing_leg_rests_on_the_ground(make):
     for clearance in (0.0, 0.05):
         legs.stand(slice(None), POSTURE, clearance)
         np.testing.assert_allclose(legs.foot_clearance(), clearance, atol=1e-12)
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_stops_hold_the_joints(make, sign):
+    legs, reached = make(PAPER, 1), 0.0
+    legs.place(slice(None), 50.0, np.zeros(2))
+    for _ in range(100):
+        legs.step(sign * np.array([[1.0, 3.0]]) - 0.1 * legs.qd)
+        beyond = np.maximum(PAPER.of_joints("stop_lower") - legs.q, 0)
+        beyond += np.maximum(legs.q - PAPER.of_joints("stop_upper"), 0)
+        assert beyond.max() < 0.06
+        reached = max(reached, float(np.abs(legs.q[0, 1])))
+    assert reached > 2.69

@@ -128,18 +128,13 @@ def heights(one, ticks=80):
     return np.stack([one.step(action).height for action in plan])
 
 
-def test_a_randomised_task_repeats_with_its_seed():
-    np.testing.assert_array_equal(heights(task(0)), heights(task(0)))
-    assert not np.array_equal(heights(task(0)), heights(task(1)))
-
-
-@pytest.mark.parametrize("robot", [LEG, late(2e-3), late(7e-3)], ids=["prompt", "2 ms", "7 ms"])
-def test_a_task_goes_on_exactly(robot):
-    ranges = IDENTIFIABLE_RANGES if robot is LEG else ()
-    one, other = (task(0, ranges, robot) for _ in range(2))
+def test_a_task_goes_on_exactly_and_repeats_with_its_seed():
+    one, other = task(0), task(0)
     heights(one, 33)
     other.restore(one.state())
     np.testing.assert_array_equal(heights(one), heights(other))
+    np.testing.assert_array_equal(heights(task(0)), heights(task(0)))
+    assert not np.array_equal(heights(task(0)), heights(task(1)))
 
 
 def test_randomising_draws_nothing_from_the_task_itself():
@@ -199,14 +194,14 @@ def test_a_twin_can_extend_a_users_file(tmp_path):
     assert twin.robot.thigh.length == load_robot("legv1").thigh.length
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_drawn_twins_are_simulated(seed):
-    legs = LegSimulator(draw_twin(seed).robot, 1, threads=1)
+def test_drawn_twins_stand():
+    robots = [draw_twin(seed).robot for seed in range(12)]
+    legs = LegSimulator(LEG, 12, threads=1, robots=robots)
     legs.stand(slice(None), POSTURE)
     for _ in range(20):
         legs.step(10 * (POSTURE - legs.measured_q) - 0.2 * legs.measured_qd)
     assert abs(legs.q - POSTURE).max() < 0.5
-    assert legs.height[0] > 0.1
+    assert legs.height.min() > 0.1
 
 
 def test_what_is_written_reads_back(tmp_path):
@@ -218,11 +213,8 @@ def test_what_is_written_reads_back(tmp_path):
 
 
 @pytest.mark.parametrize(("low", "high", "scale"), [(2, 1, "uniform"), (0, 1, "logarithmic")])
-def test_an_impossible_range_is_refused(low, high, scale):
+def test_what_cannot_be_drawn_is_refused(low, high, scale):
     with pytest.raises(UsageError, match=r"hip\.friction"):
         Range("hip.friction", "N m", low, high, "[C]", scale)
-
-
-def test_a_negative_seed_is_refused():
     with pytest.raises(UsageError, match="seed of -1"):
         draw_twin(-1)

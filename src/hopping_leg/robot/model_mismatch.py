@@ -14,7 +14,7 @@ from hopping_leg.io import quantity
 
 @dataclass(frozen=True)
 class Latency:
-    """Time between the controller and the leg, in whole physics steps when simulated."""
+    """Time between the controller and the leg."""
 
     command: float = quantity("s", 0.0, zero=True)
     """From the controller's decision to the motor's torque."""
@@ -43,7 +43,7 @@ class DriveMismatch:
     """Motor, gear and belt of one joint; all numbers at the joint's side."""
 
     torque_limit: float | None = quantity("N m", None)
-    """Where the motor saturates; without it, where the software limits."""
+    """Where the motor saturates; without it, at its peak torque."""
     torque_gain: float = quantity("1", 1.0)
     """Motor torque over commanded torque; the torque measurement shows it."""
     torque_lag: float = quantity("s", 0.0, zero=True)
@@ -59,7 +59,7 @@ class DriveMismatch:
     stiction_speed: float = quantity("rad/s", 0.05)
     """Speed at which friction has fallen to Coulomb's (Stribeck)."""
     backlash: float = quantity("rad", 0.0, zero=True)
-    """Whole width of the dead band between motor and link."""
+    """Whole width of the dead band between motor and link; needs a ``stiffness``."""
     stiffness: float | None = quantity("N m/rad", None)
     """Stiffness of the belt between motor and link; without it, rigid."""
     stiffness_damping: float = quantity("N m s/rad", 0.0, zero=True)

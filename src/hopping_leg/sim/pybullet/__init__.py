@@ -16,8 +16,8 @@ class PyBulletSimulator(Simulator):
     """Legs in PyBullet, each in a world of its own, one after the other.
 
     Dynamics, motors' limits, friction and damping are those of ``LegSimulator``, see
-    ``pybullet_urdf``; for the ground see ``ground_law``. Knee and base meet PyBullet's rigid
-    ground where the foot meets the robot's, and else the foot's.
+    ``pybullet_urdf``; stops are rigid; for the ground see ``ground_law``. Knee and base meet
+    PyBullet's rigid ground where the foot meets the robot's, and else the foot's.
 
     Raises:
         UsageError: PyBullet is not installed, the physics step does not divide the control period,

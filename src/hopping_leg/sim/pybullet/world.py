@@ -174,8 +174,8 @@ def import_pybullet() -> Any:  # noqa: ANN401
 def pybullet_urdf(robot: Robot, *, foot_collides: bool = True) -> str:
     """Return the URDF to be loaded with ``URDF_USE_INERTIA_FROM_FILE``.
 
-    The fixed frame ``foot`` is left out (a link without inertia weighs 1 kg in PyBullet), and so
-    are the joints' limits, which act in control. Knee and base collide in any case.
+    The fixed frame ``foot`` is left out (a link without inertia weighs 1 kg in PyBullet), and the
+    rail is long. Knee and base collide in any case.
 
     Raises:
         RobotError: The base is too light to give the rotor its mass.
@@ -191,24 +191,13 @@ def pybullet_urdf(robot: Robot, *, foot_collides: bool = True) -> str:
     root = Xml.fromstring(to_urdf(dataclasses.replace(robot, base=base, thigh=thigh)))
     for element in [e for e in root if e.get("name") in ("foot", "foot_tip")]:
         root.remove(element)
-    for joint in root.iter("joint"):
-        _free(joint)
+    for limit in root.iterfind("joint[@name='rail']/limit"):
+        limit.attrib.update(lower="-1000", upper="1000")
     if not foot_collides:
         for shank in root.iterfind("link[@name='shank']"):
             shank.remove(shank.findall("collision")[-1])
     _add_rotor(root, robot.knee.armature)
     return Xml.tostring(root, encoding="unicode")
-
-
-def _free(joint: Xml.Element) -> None:
-    limit = joint.find("limit")
-    if limit is None:
-        return
-    if joint.get("type") == "revolute":
-        joint.set("type", "continuous")
-        joint.remove(limit)
-    else:
-        limit.attrib.update(lower="-1000", upper="1000")
 
 
 def _add_rotor(root: Xml.Element, inertia: float) -> None:
