@@ -66,9 +66,8 @@ def test_impossible_plans_get_a_sentence():
         make_plan([], LEG)
 
 
-def test_held_commands_are_simulated_with_the_step_of_training():
+def test_the_replay_takes_a_coarse_step():
     assert make_plan([FIXED], LEG).timestep == COARSE_TIMESTEP
-    assert make_plan([TORQUES], LEG).timestep > COARSE_TIMESTEP
 
 
 def test_a_motor_is_not_believed_slower_than_its_joint_was_seen():

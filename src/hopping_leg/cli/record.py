@@ -27,7 +27,7 @@ from hopping_leg.deploy.motion_sequence import MotionSequence, Poses, SequenceTi
 from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.identify import play_excitation, recording_format
 from hopping_leg.identify.excitation import Excitation, load_excitation
-from hopping_leg.robot import Robot, load_robot, parent_robot
+from hopping_leg.robot import TIMESTEP, Robot, load_robot, parent_robot
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Record:
     """Stiffness of the joint PD, hip and knee, N m/rad."""
     damping: recording_format.Pair = joint_pd.JointGains().damping
     """Damping of the joint PD, hip and knee, N m s/rad."""
-    timestep: float = play_excitation.TRUE_TIMESTEP
+    timestep: float = TIMESTEP
     """Physics step, s."""
 
 

@@ -64,7 +64,6 @@ _RAIL_PARAMETERS = ["rail.friction", "rail.damping"]
 _INERTIAS = ["thigh.inertia", "shank.inertia"]
 _SOLVER_PARAMETERS = ["contact.time_constant", "contact.damping_ratio"]
 """Table I; inertias and the contact's are fixed in the first pass."""
-_COARSE = 1e-3  # physics step for a clamped leg whose drives' loop is only approximated, s
 _GAINS = {"stiffness": 10.0, "damping": 0.5, "integral": 1.0}
 """Where a search for an unknown gain begins, in the gain's unit at the joint."""
 _OFTEN, _BEYOND = 0.8, 1.5  # share of the time, and factor, that tell a torque limit from a spike
@@ -119,7 +118,7 @@ def make_plan(
         choose(start, names, bounds=limits),
         scoring or (cost.Scoring() if paper else _scoring(recordings)),
         *_window(recordings),
-        _timestep(recordings),
+        COARSE_TIMESTEP,
         search,
     )
 
@@ -230,12 +229,6 @@ def _scoring(recordings: Sequence[Recording]) -> cost.Scoring:
     rails = [r for r in recordings if r.metadata.rig == "rail"]
     height = 0.002 if any(r.has_column("height_m") for r in rails) else None
     return cost.Scoring(position=0.005, torque=torque, height=height, robust=3.0, unexplained=0.4)
-
-
-def _timestep(recordings: Sequence[Recording]) -> float:
-    """Return training's physics step wherever its errors could pass for parameters."""
-    rough = all(r.metadata.rig == "fixed-base" and r.metadata.onboard != "zoh" for r in recordings)
-    return _COARSE if rough else COARSE_TIMESTEP
 
 
 def _window(recordings: Sequence[Recording]) -> tuple[float, float]:

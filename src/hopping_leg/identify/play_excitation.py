@@ -10,13 +10,11 @@ from hopping_leg.errors import PhysicsError, RecordingError
 from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.recording import Recording, make_recording
 from hopping_leg.identify.recording_format import MEASURED, PAIRS, Quantisation, RecordingMetadata
-from hopping_leg.robot import COARSE_TIMESTEP, Robot
+from hopping_leg.robot import TIMESTEP, Robot
 from hopping_leg.sim import NO_NOISE, LegSimulator, Plant
 from hopping_leg.trace import Trace
 
 _TARGETS = PAIRS["position_command"] + PAIRS["velocity_command"]
-TRUE_TIMESTEP = COARSE_TIMESTEP / 4
-"""Physics step of a leg that plays the real one, s: that of training would pass for a delay."""
 _IMPOSSIBLE = 1e4  # joint speed that no leg reaches, rad/s
 
 
@@ -27,7 +25,7 @@ def play(
     believed: str,
     seed: int = 0,
     gains: JointGains | None = None,
-    timestep: float = TRUE_TIMESTEP,
+    timestep: float = TIMESTEP,
     on_tick: Callable[[int, int], None] | None = None,
 ) -> Recording:
     """Record a leg that tracks an excitation by the paper's joint PD.
