@@ -217,6 +217,11 @@ def test_a_delay_that_begins_keeps_the_command_under_way():
     legs.set_robots([with_reality(latency=Latency(command=0.005))])
     np.testing.assert_allclose(legs.step(np.full((1, 2), -3.0)), 2.0)
     np.testing.assert_allclose(legs.step(np.zeros((1, 2))), -3.0)
+    legs.set_robots([with_reality(latency=Latency(command=0.0075))])
+    legs.step(np.full((1, 2), 5.0))
+    legs.set_robots([CAD])  # what is new arrives before what is under way, and replaces it
+    for torque in (1.0, 2.0):
+        np.testing.assert_allclose(legs.step(np.full((1, 2), torque)), torque)
     with pytest.raises(UsageError, match="at most 7"):
         legs.set_robots([with_reality(latency=Latency(command=0.03, jitter=0.006))])
 
