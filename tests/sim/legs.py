@@ -10,6 +10,14 @@ from hopping_leg.sim import LegSimulator
 
 POSTURE = np.array([0.7, -1.4])
 
+STEP = 5e-4
+"""Physics step of these tests, s, unless they are about it."""
+
+
+def make_legs(robot, count=1, **options):
+    """Return legs on one thread at the physics step of these tests."""
+    return LegSimulator(robot, count, **{"threads": 1, "timestep": STEP} | options)
+
 
 def with_reality(robot=None, **parts):
     """Return a robot, legv2 unless given, with some effects of ``[reality]``."""
@@ -46,7 +54,7 @@ def with_strong_motors(robot):
 
 def hanging(robot, count=1, q=(0.0, 0.0), **options):
     """Return legs with a fixed base."""
-    legs = LegSimulator(robot, count, threads=1, fixed_base=True, **options)
+    legs = make_legs(robot, count, fixed_base=True, **options)
     legs.place(slice(None), 1.0, np.asarray(q, float))
     return legs
 

@@ -9,12 +9,13 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from hopping_leg.robot import DriveMismatch, Latency, dynamics, load_robot
-from hopping_leg.sim import LegSimulator
 from hopping_leg.sim.stepper import COMMAND
 from tests.sim.legs import (
     POSTURE,
+    STEP,
     both,
     hanging,
+    make_legs,
     with_joints,
     with_reality,
     with_strong_motors,
@@ -22,7 +23,6 @@ from tests.sim.legs import (
 )  # fmt: skip
 
 CAD = load_robot("legv2")
-STEP = 5e-4
 
 
 def late(command=0.0, jitter=0.0):
@@ -59,7 +59,7 @@ def test_no_command_overtakes_another_and_none_is_blended_in_what_is_measured(
     latency, jitter, seed
 ):
     """Commands count up, so that a falling torque would be a command overtaken."""
-    legs = LegSimulator(CAD, 5, threads=1, robots=[late(latency, jitter)] * 5)
+    legs = make_legs(CAD, 5, robots=[late(latency, jitter)] * 5)
     legs.reseed(np.random.default_rng(seed))
     legs.place(slice(None), 5.0, POSTURE)
     before = np.zeros((5, 2))
@@ -75,7 +75,7 @@ def test_no_command_overtakes_another_and_none_is_blended_in_what_is_measured(
 
 
 def test_jitter_spreads_evenly_over_its_range():
-    legs = LegSimulator(late(0.002, 0.002), 2000, threads=1)
+    legs = make_legs(late(0.002, 0.002), 2000)
     legs.place(slice(None), 5.0, POSTURE)
     means = [legs.step(np.full((2000, 2), 0.1 * (tick + 1)))[:, 0] for tick in range(3)]
     share = (0.3 - means[2]) / 0.1  # of the 5 ms in which the command before still held
@@ -88,7 +88,7 @@ def test_jitter_spreads_evenly_over_its_range():
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_the_torque_speed_line_holds_at_every_physics_step(voltage, sign):
     robot = with_reality(without_friction(CAD), voltage=voltage)
-    legs = LegSimulator(robot, 1, rate=1 / STEP, threads=1)
+    legs = make_legs(robot, 1, rate=1 / STEP)
     legs.place(slice(None), 50.0, np.array([0.0, -2.0 * sign]))
     stall = CAD.knee.motor.peak_torque * CAD.knee.belt_ratio
     fastest = 0.0
@@ -216,7 +216,7 @@ def test_dry_friction_holds_at_90_percent_and_gives_way_at_110(timestep, reality
 
 
 def test_the_rail_holds_what_its_friction_can():
-    legs = LegSimulator(with_joints(CAD, **FRICTION), 2, threads=1)
+    legs = make_legs(with_joints(CAD, **FRICTION), 2)
     legs.place(slice(None), 3.0, np.zeros(2))
     legs.push(CAD.mass * 9.81 + 3.0 * np.array([0.9, 1.1]))
     for _ in range(100):

@@ -25,6 +25,7 @@ from tests.sim.legs import (
     both,
     energy,
     hanging,
+    make_legs,
     states,
     with_reality,
     without_friction,
@@ -70,7 +71,7 @@ def shaken(legs, ticks=40, seed=1):
 
 
 def standing(robots, **options):
-    legs = LegSimulator(CAD, len(robots), robots=robots, **{"threads": 1} | options)
+    legs = make_legs(CAD, len(robots), robots=robots, **options)
     legs.stand(slice(None), POSTURE, 0.05)
     return legs
 
@@ -82,7 +83,7 @@ def test_energy_drifts_in_proportion_to_the_step(robot):
     drifts = []
     for timestep in (1e-4, 2.5e-5):
         rng = np.random.default_rng(0)
-        legs = LegSimulator(without_friction(robot), 8, timestep=timestep, threads=1)
+        legs = make_legs(without_friction(robot), 8, timestep=timestep)
         legs.place(slice(None), 3.0, rng.uniform(-0.8, 0.8, (8, 2)))
         legs.state[:, 3:] = rng.normal(0, 3, (8, 3))
         legs.forget(slice(None))
@@ -114,7 +115,7 @@ def test_energy_never_grows_without_torque(seed):
     So the energy is never above what it was when nothing touched before.
     """
     rng = np.random.default_rng(seed)
-    legs = LegSimulator(load_robot("legv2-paper"), 16, timestep=1.25e-4, threads=1)
+    legs = make_legs(load_robot("legv2-paper"), 16, timestep=1.25e-4)
     legs.stand(slice(None), rng.uniform([-1, -2.4], [1, 0], (16, 2)), rng.uniform(0.1, 0.3, 16))
     legs.state[:, 3:] = rng.normal(0, 2, (16, 3))
     free_energy, landings = energy(legs), 0
@@ -167,7 +168,7 @@ def test_legs_go_on_exactly_from_a_memory(ticks, seed):
 @pytest.mark.parametrize("name", ["twin", "legv2"])
 def test_a_plant_repeats_with_its_seed_alone(name):
     def track(seed):
-        legs = LegSimulator(load_robot(name), 3, threads=1)
+        legs = make_legs(load_robot(name), 3)
         legs.stand(slice(None), POSTURE, 0.02)
         plant = Plant(legs, NoiseAndDelay(), None, np.random.default_rng(seed))
         plant.channel.restart(slice(None), legs.measured_q, legs.measured_qd, np.zeros(3))
@@ -237,7 +238,7 @@ def test_a_leg_that_begins_anew_has_no_command_under_way():
 
 
 def test_what_is_written_to_the_state_moves_motor_and_link():
-    legs = LegSimulator(TWIN, 2, threads=1)
+    legs = make_legs(TWIN, 2)
     legs.place(slice(None), 3.0, POSTURE)
     legs.qd[0] = [3.0, -2.0]
     legs.forget(slice(None))
@@ -261,7 +262,7 @@ def test_readings_are_multiples_of_the_sensors_steps():
 
 def test_noise_has_the_stated_spread_and_leaves_the_physics_alone():
     noisy = SensorMismatch(position_noise=2e-3, velocity_noise=0.1, torque_noise=0.05)
-    legs = LegSimulator(with_reality(hip=DriveMismatch(sensor=noisy)), 2000, threads=1)
+    legs = make_legs(with_reality(hip=DriveMismatch(sensor=noisy)), 2000)
     legs.place(slice(None), 5.0, POSTURE)
     legs.step(np.ones((2000, 2)))
     error = legs.measured_q - legs.q
@@ -284,9 +285,9 @@ def test_true_masses_and_ground_are_those_of_a_robot_that_has_them():
         ("contact.friction", 0.3),
     ):
         changed = replace_at(changed, path, value)
-    one, other = (states(LegSimulator(robot, 1, threads=1)) for robot in (deceived, changed))
+    one, other = (states(make_legs(robot, 1)) for robot in (deceived, changed))
     np.testing.assert_allclose(one, other, atol=1e-9)
-    assert np.abs(one - states(LegSimulator(CAD, 1, threads=1))).max() > 1e-3
+    assert np.abs(one - states(make_legs(CAD, 1))).max() > 1e-3
 
 
 @pytest.mark.parametrize("robot", [load_robot("legv2-paper"), TWIN], ids=lambda robot: robot.name)

@@ -9,7 +9,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import NO_NOISE, make_simulator
 from hopping_leg.sim.mujoco_simulator import MujocoSimulator
-from tests.sim.legs import POSTURE, with_joints
+from tests.sim.legs import POSTURE, STEP, with_joints
 
 CAD = load_robot("legv2")
 
@@ -24,7 +24,9 @@ def hops(engine, robot, ticks=400):
 
     The legs fall a little first: whether a foot at zero distance touches is up to rounding.
     """
-    config = RolloutConfig(robot=robot, engine=engine, disturbance=NO_NOISE, threads=1)
+    config = RolloutConfig(
+        robot=robot, engine=engine, disturbance=NO_NOISE, timestep=STEP, threads=1
+    )
     commands = np.tile([0.28, 0.33], (ticks, 1))
     controller = load_controller("energy-shaping", robot)
 

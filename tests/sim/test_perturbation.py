@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from hopping_leg.robot import load_robot
-from hopping_leg.sim import LegSimulator
 from hopping_leg.sim.perturbation import Perturbation, Perturber
-from tests.sim.legs import POSTURE, without_friction
+from tests.sim.legs import POSTURE, make_legs, without_friction
 
 LEG = load_robot("legv2")
 
@@ -27,7 +26,7 @@ def perturbed(legs, force=0.0, ground=0.0, ticks=40, **later):
 
 def test_a_push_changes_the_base_speed_by_impulse_over_mass():
     frictionless = without_friction(LEG)
-    pushed, free = (LegSimulator(frictionless, 1, threads=1) for _ in range(2))
+    pushed, free = (make_legs(frictionless, 1) for _ in range(2))
     force, ticks = 20.0, 4
     perturber = perturbed(pushed, force)
     for legs in (pushed, free):
@@ -43,7 +42,7 @@ def test_a_push_changes_the_base_speed_by_impulse_over_mass():
 
 @pytest.mark.parametrize("rise", [0.03, -0.03])
 def test_ground_steps_shift_floor_and_clearance_once_the_foot_is_clear(rise):
-    legs = LegSimulator(LEG, 2, threads=1)
+    legs = make_legs(LEG, 2)
     legs.stand(slice(None), POSTURE, np.array([0.05, 0.0]))
     height, clearance = legs.height.copy(), legs.foot_clearance()
     perturber = perturbed(legs, ground=rise)
@@ -60,7 +59,7 @@ def test_ground_steps_shift_floor_and_clearance_once_the_foot_is_clear(rise):
 
 def test_legs_become_others_at_the_stated_tick():
     heavy = dataclasses.replace(LEG, base=dataclasses.replace(LEG.base, mass=2 * LEG.base.mass))
-    changed, plain = (LegSimulator(LEG, 2, threads=1) for _ in range(2))
+    changed, plain = (make_legs(LEG, 2) for _ in range(2))
     perturber = perturbed(changed, later=(LEG, heavy), change=10)
     for legs in (changed, plain):
         legs.stand(slice(None), POSTURE)

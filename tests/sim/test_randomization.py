@@ -10,7 +10,6 @@ import pytest
 from hopping_leg.envs import HoppingTask, TaskConfig, paper_reward
 from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.robot import Latency, load_robot, load_tree, robot_text
-from hopping_leg.sim import LegSimulator
 from hopping_leg.sim.randomization import (
     IDENTIFIABLE_RANGES,
     TWIN_RANGES,
@@ -20,7 +19,7 @@ from hopping_leg.sim.randomization import (
     normalized,
     sample,
 )  # fmt: skip
-from tests.sim.legs import POSTURE, states, with_reality
+from tests.sim.legs import POSTURE, make_legs, states, with_reality
 
 LEG = load_robot("legv2")
 
@@ -37,7 +36,7 @@ def late(delay, **effects):
 def test_every_range_of_the_twins_reaches_the_physics(spread):
     low, high = (dataclasses.replace(spread, low=v, high=v) for v in (spread.low, spread.high))
     robots = [sample(LEG, [end], 1, np.random.default_rng(0))[0] for end in (low, high)]
-    one, other = np.moveaxis(states(LegSimulator(LEG, 2, threads=1, robots=robots)), 1, 0)
+    one, other = np.moveaxis(states(make_legs(LEG, 2, robots=robots)), 1, 0)
     assert np.abs(one - other).max() > 1e-6
 
 
@@ -92,7 +91,7 @@ def test_whatever_a_leg_is_like_it_can_be_surprised(delay, rubs):
     found = normalized(robot, robots, WIDE_RANGES)
     assert np.isfinite(found).all()
     assert (np.abs(found).max(axis=0) > 0.5).sum() >= len(WIDE_RANGES) - 2
-    legs = LegSimulator(robot, 60, threads=1)
+    legs = make_legs(robot, 60)
     legs.stand(slice(None), POSTURE, 0.05)
     legs.step(np.full((60, 2), 3.0))
     legs.set_robots(robots)
@@ -196,7 +195,7 @@ def test_a_twin_can_extend_a_users_file(tmp_path):
 
 def test_drawn_twins_stand():
     robots = [draw_twin(seed).robot for seed in range(12)]
-    legs = LegSimulator(LEG, 12, threads=1, robots=robots)
+    legs = make_legs(LEG, 12, robots=robots)
     legs.stand(slice(None), POSTURE)
     for _ in range(20):
         legs.step(10 * (POSTURE - legs.measured_q) - 0.2 * legs.measured_qd)
