@@ -4,6 +4,7 @@ import contextlib
 
 import numpy as np
 import pytest
+from numba.core import event
 
 from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.registry import load_controller, load_policy
@@ -101,6 +102,14 @@ def test_configuring_and_homing_make_a_delivered_drive_fit(emulated):
     np.testing.assert_allclose([f.position for f in facts], lockstep.robot.leg.q, atol=1e-3)
     lockstep.robot.drives[0].settings.load()
     assert lockstep.robot.drives[0].settings["servo.timeout_mode"] == 15
+
+
+def test_nothing_is_compiled_or_loaded_in_a_control_loop(emulated, tmp_path):
+    lockstep = emulated()
+    SoftLimiter(LEG, SoftLimits())
+    with event.install_recorder("numba:compile") as recorder:
+        run(lockstep, tmp_path / "run.parquet", hop=0.1)
+    assert not recorder.buffer
 
 
 def test_a_run_is_a_trace_like_any_other_and_the_motors_give_what_was_sent(emulated, tmp_path):

@@ -3,8 +3,8 @@
 A twin plays the real leg. It is recorded, identified from the recordings, a controller is trained
 from scratch on what was identified, evaluated there beside the shipped controllers with the paper's
 trials, and hops on the twin without tuning, beside a controller that was trained on the CAD's
-robot. Takes less than 15 minutes on two cores. A run that was interrupted or killed goes on where
-it was when the same command is called again.
+robot. Takes less than five minutes on two idle cores. A run that was interrupted or killed goes on
+where it was when the same command is called again.
 
 Examples:
   hop reproduce --quick                         # does everything work here?
@@ -29,7 +29,7 @@ _MINIATURE = ("identified", "cad", ENERGY_SHAPING)
 _PAPER = (*DEFAULT, "rail-only", "fixed-base-only", "two-pass", "one-pass")
 _GLANCE = LeastSquaresOptions(rounds=1, evaluations=2)
 _MARK = "size.txt"
-_JUDGING, _QUICK_JUDGING = 60.0, 10.0
+_JUDGING, _QUICK_JUDGING = 50.0, 10.0
 """Rough time that the evaluation and its report take, s."""
 
 NOTHING_MEANT = (
