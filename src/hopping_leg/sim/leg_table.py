@@ -7,7 +7,12 @@ import numpy as np
 from hopping_leg.arrays import Records
 from hopping_leg.errors import RobotError
 from hopping_leg.robot import GRAVITY, JOINTS, Joint, Robot
-from hopping_leg.robot.model import FRICTION_TIME_CONSTANT, STOP_TIME_CONSTANT
+from hopping_leg.robot.model import (
+    FRICTION_IMPEDANCE,
+    FRICTION_TIME_CONSTANT,
+    STOP_IMPEDANCE,
+    STOP_TIME_CONSTANT,
+)  # fmt: skip
 
 SENSORS = ("position", "velocity", "torque")
 """What each joint's sensors measure; columns of readings are (hip, knee) of each in turn."""
@@ -45,7 +50,6 @@ LEG = np.dtype(
 )
 """A row: everything of a leg that the physics needs at a given step."""
 
-_LEAST_IMPEDANCE, _FRICTION_IMPEDANCE, _WIDEST_IMPEDANCE = 0.9, 0.999, 0.95
 _LEAST_FRICTION = 1e-5  # MuJoCo's mjMINMU
 
 
@@ -64,13 +68,9 @@ def leg_table(
         RobotError: A transmission is too stiff for the physics step, or has backlash but no
             stiffness.
     """
-    rows = {id(robot): _row(robot, timestep, fixed_base, gravity) for robot in set_by_id(robots)}
+    distinct = {id(robot): robot for robot in robots}  # many times the same one
+    rows = {key: _row(robot, timestep, fixed_base, gravity) for key, robot in distinct.items()}
     return np.array([rows[id(robot)] for robot in robots])
-
-
-def set_by_id(robots: Sequence[Robot]) -> list[Robot]:
-    """Return the distinct objects among robots, which are many times the same one."""
-    return list({id(robot): robot for robot in robots}.values())
 
 
 def _row(robot: Robot, timestep: float, fixed_base: bool, gravity: float) -> Records:
@@ -78,19 +78,18 @@ def _row(robot: Robot, timestep: float, fixed_base: bool, gravity: float) -> Rec
     reality = robot.reality
     row["fixed_base"], row["gravity"] = fixed_base, gravity
     row["elastic"] = [_is_elastic(robot, name) for name in JOINTS]
+    row["rail_damping"], row["rail_friction"] = robot.rail.damping, robot.rail.friction
+    for name in ("damping", "friction", "load_friction", "armature", "stop_lower", "stop_upper"):
+        row[name] = robot.of_joints(name)
+    row["stiction"] = row["friction"] * (reality.of_drives("stiction") - 1)
+    row["stiction_speed"] = reality.of_drives("stiction_speed")
+    row["belt_damping"] = reality.of_drives("stiffness_damping")
     _set_bodies(row, robot)
     _set_ground(row, robot, timestep)
-    row["rail_damping"], row["rail_friction"] = robot.rail.damping, robot.rail.friction
-    row["damping"], row["friction"] = robot.of_joints("damping"), robot.of_joints("friction")
-    row["load_friction"] = robot.of_joints("load_friction")
-    row["stiction"] = robot.of_joints("friction") * (reality.of_drives("stiction") - 1)
-    row["stiction_speed"] = reality.of_drives("stiction_speed")
     _set_drives(row, robot, timestep)
-    _set_softness(row, timestep)
-    for name, drive, joint in zip(JOINTS, (reality.hip, reality.knee), range(2), strict=True):
-        if row["elastic"][joint]:
-            _check_stiffness(robot, name, row, joint, timestep)
-        row["belt_damping"][joint] = drive.stiffness_damping
+    _set_softness(row, robot, timestep)
+    for joint in np.flatnonzero(row["elastic"]):
+        _check_stiffness(robot, row, int(joint), timestep)
     latency = reality.latency
     row["command_latency"], row["command_jitter"] = latency.command, latency.jitter
     row["measurement_latency"] = latency.measurement
@@ -115,8 +114,7 @@ def _set_bodies(row: Records, robot: Robot) -> None:
     scale = robot.reality.mass
     thigh, shank = robot.thigh, robot.shank
     thigh_mass, shank_mass = thigh.mass * scale.thigh, shank.mass * scale.shank
-    armature = robot.of_joints("armature")
-    rigid = np.where(row["elastic"] > 0, 0.0, armature)
+    rigid = np.where(row["elastic"] > 0, 0.0, row["armature"])
     row["mass"] = robot.base.mass * scale.base + thigh_mass + shank_mass
     row["thigh_moment"] = thigh_mass * thigh.com + shank_mass * thigh.length
     row["shank_moment"] = shank_mass * shank.com
@@ -130,11 +128,9 @@ def _set_bodies(row: Records, robot: Robot) -> None:
         + rigid[0]
     )
     row["knee_inertia"] = row["shank_inertia"] + rigid[1]
-    row["armature"] = armature
     row["thigh_length"], row["shank_length"] = thigh.length, shank.length
     row["base_radius"], row["knee_radius"] = robot.base.radius, robot.knee_cap.radius
     row["foot_radius"] = robot.foot.radius
-    row["shank_softness"] = shank.com  # until _set_softness, which needs all of the row
 
 
 def _set_ground(row: Records, robot: Robot, timestep: float) -> None:
@@ -149,44 +145,42 @@ def _set_ground(row: Records, robot: Robot, timestep: float) -> None:
     )
     row["ground_friction"] = max(friction, _LEAST_FRICTION)
     row["contact_stiffness"], row["contact_damping"] = _spring(time, ratio, timestep)
-    row["stop_lower"], row["stop_upper"] = (
-        robot.of_joints(name) for name in ("stop_lower", "stop_upper")
-    )
     row["stop_stiffness"], row["stop_damping"] = _spring(STOP_TIME_CONSTANT, 1.0, timestep)
 
 
 def _spring(
-    time: float, ratio: float, timestep: float, impedance: float = _WIDEST_IMPEDANCE
+    time: float, ratio: float, timestep: float, impedance: float = STOP_IMPEDANCE[1]
 ) -> tuple[float, float]:
     """Return stiffness and damping of MuJoCo's ``solref``, which no step may outrun."""
     time = max(time, 2 * timestep)
     return 1 / (impedance * time * ratio) ** 2, 2 / (impedance * time)
 
 
-def _set_softness(row: Records, timestep: float) -> None:
+def _set_softness(row: Records, robot: Robot, timestep: float) -> None:
     """Set MuJoCo's ``invweight0``: inverse inertias of the hanging leg, which scale constraints."""
-    thigh_length, shank_com = row["thigh_length"], float(row["shank_softness"])
-    coupling = float(row["coupling"])
+    both = row["shank_inertia"] + row["coupling"]
     mass = np.array(
         [
             [row["mass"], 0, 0],
-            [0, row["hip_inertia"] + 2 * coupling, row["shank_inertia"] + coupling],
-            [0, row["shank_inertia"] + coupling, row["knee_inertia"]],
+            [0, row["hip_inertia"] + 2 * row["coupling"], both],
+            [0, both, row["knee_inertia"]],
         ]
     )
     inverse = np.linalg.inv(mass)
     if row["fixed_base"]:
         inverse[0, 0] = 0.0
-    forward = np.array([0.0, thigh_length + shank_com, shank_com])
+    # Upwards the hanging shank's centre of mass moves with the base, forward with both joints.
+    forward = np.array([0.0, robot.thigh.length + robot.shank.com, robot.shank.com])
     row["base_softness"] = inverse[0, 0] / 3
     row["shank_softness"] = (inverse[0, 0] + forward @ inverse @ forward) / 3
     joints = inverse.diagonal()[1:]
     row["joint_softness"] = joints
     rotors = np.where(row["elastic"] > 0, 1 / np.maximum(row["armature"], 1e-12), joints)
-    hold = _FRICTION_IMPEDANCE / (1 - _FRICTION_IMPEDANCE)
+    impedance = FRICTION_IMPEDANCE[0]
+    hold = impedance / (1 - impedance)
     row["friction_stiffness"] = hold / rotors
     row["rail_friction_stiffness"] = hold / inverse[0, 0] if inverse[0, 0] else 1.0
-    _, row["friction_damping"] = _spring(FRICTION_TIME_CONSTANT, 1.0, timestep, _FRICTION_IMPEDANCE)
+    _, row["friction_damping"] = _spring(FRICTION_TIME_CONSTANT, 1.0, timestep, impedance)
 
 
 def _set_drives(row: Records, robot: Robot, timestep: float) -> None:
@@ -207,7 +201,7 @@ def _set_drives(row: Records, robot: Robot, timestep: float) -> None:
         row["half_backlash"][at] = drive.backlash / 2
 
 
-def _check_stiffness(robot: Robot, name: str, row: Records, joint: int, timestep: float) -> None:
+def _check_stiffness(robot: Robot, row: Records, joint: int, timestep: float) -> None:
     """Rotor and link against the spring oscillate at w; semi-implicit Euler needs w dt < 2."""
     link = (robot.thigh, robot.shank)[joint]
     about_joint = link.inertia + link.mass * link.com**2
@@ -215,7 +209,8 @@ def _check_stiffness(robot: Robot, name: str, row: Records, joint: int, timestep
     stiffness = float(row["belt_stiffness"][joint])
     if stiffness > reduced / timestep**2:
         raise RobotError(
-            f"{robot.name}: 'reality.{name}.stiffness' is {stiffness:g} N m/rad, too stiff for a"
-            f" physics step of {timestep:g} s; give at most {reduced / timestep**2:.3g}, a smaller"
-            f" step (below {(reduced / stiffness) ** 0.5:.2g} s), or leave it out for a rigid one."
+            f"{robot.name}: 'reality.{JOINTS[joint]}.stiffness' is {stiffness:g} N m/rad, too stiff"
+            f" for a physics step of {timestep:g} s; give at most {reduced / timestep**2:.3g}, a"
+            f" smaller step (below {(reduced / stiffness) ** 0.5:.2g} s), or leave it out for a"
+            " rigid one."
         )
