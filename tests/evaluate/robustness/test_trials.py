@@ -10,6 +10,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.robustness.axes import AXES, JOINT, NOMINAL, Case, axis_names
 from hopping_leg.evaluate.robustness.outcome import run_axis
 from hopping_leg.evaluate.robustness.trials import PUSH_SECONDS, make_trials
+from hopping_leg.sim import LegSimulator
 
 COMMANDS = (0.25, 0.35)
 LEADERBOARD = {"model error", "velocity noise", "torque noise", "torque response"}
@@ -46,6 +47,7 @@ def test_levels_and_moderate_ranges_lie_around_the_neutral_level(robot, axis):
     assert len(set(map(repr, altered))) == len(axis.levels)
     for case in altered:
         assert case.robot.thigh.length == robot.thigh.length
+    assert LegSimulator(robot, len(altered), robots=[case.robot for case in altered]).count
 
 
 def test_the_leaderboards_axes_are_among_them():

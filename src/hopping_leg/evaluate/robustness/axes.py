@@ -80,6 +80,23 @@ def _rubbing_joints(case: Case, torque: float) -> Case:
     return replace(case, robot=with_numbers(robot, more))
 
 
+_STIFFNESS, _STIFFNESS_DAMPING = 300.0, 0.03
+"""Of a transmission that has play and no stiffness of its own, N m/rad and N m s/rad."""
+
+
+def _backlash(case: Case, angle: float) -> Case:
+    if not angle:
+        return case
+    numbers: dict[str, float] = {}
+    for joint in JOINTS:
+        drive, at = getattr(case.robot.reality, joint), f"reality.{joint}"
+        numbers[f"{at}.backlash"] = angle
+        if drive.stiffness is None:
+            numbers[f"{at}.stiffness"] = _STIFFNESS
+            numbers[f"{at}.stiffness_damping"] = _STIFFNESS_DAMPING
+    return replace(case, robot=with_numbers(case.robot, numbers))
+
+
 def _times(*paths: str) -> Alter:
     return lambda case, factor: replace(case, robot=times(case.robot, factor, *paths))
 
@@ -137,7 +154,7 @@ AXES = (
     Axis("voltage", "battery over its nominal voltage, which moves the motors' torque-speed line",
          "1", 1.0, (0.9, 0.8, 0.7, 0.6, 0.5, 0.4), (0.8, 1.0), _numbers("reality.voltage")),
     Axis("backlash", "dead band between motor and link of both joints",
-         "rad", 0.0, (0.005, 0.01, 0.02, 0.05, 0.1, 0.2), (0.0, 0.02), _joints("backlash")),
+         "rad", 0.0, (0.005, 0.01, 0.02, 0.05, 0.1, 0.2), (0.0, 0.02), _backlash),
     Axis("pushes", "impulse on the base, up or down, at a random moment of every second",
          "N s", 0.0, (0.2, 0.5, 1.0, 1.5, 2.0, 3.0), (0.0, 0.2),
          lambda case, value: replace(case, push=value), "perturbation"),
