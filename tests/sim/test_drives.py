@@ -186,9 +186,11 @@ def gained(torque, q=(0.0, 0.0), qd=(0.0, 0.0), **drive):
     return speeds[0] - speeds[1]
 
 
-@pytest.mark.parametrize(("speed", "share"), [(5.0, 0.8), (-5.0, 1 / 0.8)])
-def test_a_gear_takes_from_driving_and_adds_to_braking(speed, share):
-    lossy, ideal = (gained(1.0, qd=(0.0, speed), efficiency=e) for e in (0.8, 1.0))
+@pytest.mark.parametrize("torque", [-1.0, 1.0])
+@pytest.mark.parametrize(("sign", "share"), [(1.0, 0.8), (-1.0, 1 / 0.8)])
+def test_a_gear_takes_from_driving_and_adds_to_braking(torque, sign, share):
+    speed = 5 * sign * torque
+    lossy, ideal = (gained(torque, qd=(0.0, speed), efficiency=e) for e in (0.8, 1.0))
     np.testing.assert_allclose(lossy / ideal, share, rtol=1e-2)
 
 
