@@ -83,19 +83,20 @@ def compiling_notice(*functions: Callable[..., Any]) -> Iterator[None]:
 
     It is said once. Workers say nothing: each of them would.
     """
+    done = threading.Event()
 
-    def say() -> None:
-        if any(function.stats.cache_misses for function in functions):  # type: ignore[attr-defined]
-            _say()
+    def watch() -> None:
+        while not done.wait(1.0):
+            if any(one.stats.cache_misses for one in functions):  # type: ignore[attr-defined]
+                _say()
+                return
 
-    timer = threading.Timer(1.0, say)
-    timer.daemon = True
     if multiprocessing.parent_process() is None:
-        timer.start()
+        threading.Thread(target=watch, daemon=True).start()
     try:
         yield
     finally:
-        timer.cancel()
+        done.set()
 
 
 @cache
