@@ -342,9 +342,3 @@ def test_what_cannot_be_is_refused():
     for timestep in (3e-3, 0.0, -1e-3, float("nan")):
         with pytest.raises(UsageError, match="physics step"):
             LegSimulator(CAD, 1, timestep=timestep)
-
-
-def test_a_neutral_reality_does_not_change_the_digest():
-    assert load_robot("legv2-paper").has_digest("9634a0cc2dd452ea")
-    assert load_robot("legv2").has_digest("a599bb119353a5f1")
-    assert with_reality(hip=DriveMismatch(backlash=1e-3)).digest != CAD.digest
