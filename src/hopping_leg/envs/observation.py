@@ -105,7 +105,7 @@ class PaperObservation(Observation):
 @compiled
 def _normalise(samples: Array, offset: Array, gain: Array, seen: Array32) -> None:
     for leg in range(len(samples)):
-        for k in range(SAMPLES):
+        for k in range(samples.shape[1]):
             for i in range(5):
                 seen[leg, 5 * k + i] = (samples[leg, k, i] - offset[i]) * gain[i]
 
