@@ -9,7 +9,7 @@ from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes.adaptive import ADAPTIVE
 from hopping_leg.rl.recipes.fast import FAST
 from hopping_leg.rl.recipes.paper import PAPER
-from hopping_leg.rl.recipes.precise import GRU, PRECISE
+from hopping_leg.rl.recipes.precise import GRU, PRECISE, SHOOTING
 from hopping_leg.rl.resumable import ResumablePPO
 from hopping_leg.robot import load_robot
 from hopping_leg.sim.randomization import WIDE_RANGES
@@ -30,6 +30,7 @@ STUDENT = {
 TINY_FAST = FAST.replace(SMALL)
 TINY_PRECISE = PRECISE.replace(SMALL | STUDENT, eval_commands=(0.3,), teachers=3)
 TINY_GRU = PRECISE.replace(GRU | SMALL | STUDENT | {"dagger.buffer_size": 400})
+TINY_SHOOTING = PRECISE.replace(SHOOTING | SMALL | STUDENT)
 TINY_ADAPTIVE = ADAPTIVE.replace(SMALL | STUDENT)
 
 
@@ -45,6 +46,7 @@ TINY_PPO = TinyPPO(**vars(PAPER.replace(steps=640, privileged_critic=False, num_
 EVERY = {
     "sac": TINY, "ppo": TINY_PPO, "fast": TINY_FAST, "precise": TINY_PRECISE,
     "recurrent": TINY_GRU, "adaptive": TINY_ADAPTIVE,
+    "shooting": TINY_SHOOTING,
     "surprised": TINY_PRECISE.replace({"task.randomised": WIDE_RANGES}),
 }  # fmt: skip
 

@@ -1,12 +1,13 @@
-"""Controllers by name: energy shaping, shipped policies, a user's policy, gain file or class."""
+"""Controllers by name: energy shaping, shooting, policies, a user's policy, gain file or class."""
 
 from collections.abc import Callable
 from functools import partial
 from importlib import resources
 from pathlib import Path
 
-from hopping_leg.controllers import energy_shaping, protocol, user_controllers
+from hopping_leg.controllers import energy_shaping, protocol, shooting, user_controllers
 from hopping_leg.controllers.policy import OtherRobot, Policy
+from hopping_leg.controllers.rollout import PrivilegedController
 from hopping_leg.errors import PolicyError, UsageError, unknown_name
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim import CONTROL_RATE
@@ -20,12 +21,16 @@ ENERGY_SHAPING_FLYING = "energy-shaping-flying"
 ENERGY_SHAPING_LITERAL = "energy-shaping-literal"
 """The paper's law and gains as printed."""
 
+SHOOTING = "shooting"
+"""Plans every push in the true state: in simulation alone."""
+
 _FACTORIES: dict[str, Callable[..., protocol.Controller]] = {
     ENERGY_SHAPING: energy_shaping.tuned_energy_shaping,
     ENERGY_SHAPING_FLYING: partial(
         energy_shaping.tuned_energy_shaping, gains=ENERGY_SHAPING_FLYING
     ),
     ENERGY_SHAPING_LITERAL: energy_shaping.paper_energy_shaping,
+    SHOOTING: shooting.Shooting,
 }
 _SHIPPED = resources.files("hopping_leg") / "policies"
 
@@ -68,6 +73,7 @@ def load_controller(
     *,
     rate: float = CONTROL_RATE,
     other: OtherRobot = "warn",
+    simulated: bool = False,
 ) -> protocol.Controller:
     """Load a controller for a robot.
 
@@ -77,15 +83,22 @@ def load_controller(
         robot: The leg it shall drive.
         rate: Control rate, Hz.
         other: See ``OtherRobot``.
+        simulated: Whether the leg is a simulated one, whose true state a controller may see.
 
     Raises:
         PolicyError: The file is missing, truncated or foreign, or does not fit the robot or rate.
         ControllerError: A Python class cannot be loaded or is no controller.
-        UsageError: There is no such controller.
+        UsageError: There is no such controller, or it needs a simulated leg.
     """
     name = str(name_or_path)
     if name in _FACTORIES:
-        return _FACTORIES[name](robot, rate=rate)
+        controller = _FACTORIES[name](robot, rate=rate)
+        if isinstance(controller, PrivilegedController) and not simulated:
+            raise UsageError(
+                f"{name} sees the true state, which only `hop evaluate` and studies know; choose"
+                f" another controller, e.g. {ENERGY_SHAPING}."
+            )
+        return controller
     if name.endswith(".toml"):
         return energy_shaping.tuned_energy_shaping(robot, rate=rate, gains=name)
     if user_controllers.is_user_controller(name):

@@ -113,7 +113,7 @@ def entry_of(label: str, controller: Controller) -> Entry:
 
 
 def _load(name: str, source: str, robot: Robot, rate: float) -> Entry:
-    controller = load_controller(source, robot, rate=rate, other="accept")
+    controller = load_controller(source, robot, rate=rate, other="accept", simulated=True)
     note = controller.stranger(robot, name) if isinstance(controller, Policy) else None
     return replace(entry_of(name, controller), notes=(note,) if note else ())
 

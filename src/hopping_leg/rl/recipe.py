@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from hopping_leg import envs, io
+from hopping_leg.controllers import shooting
 from hopping_leg.rl import algorithms, onnx_export, sb3_env, sb3_policies
 from hopping_leg.rl.distillation.distillation import Distillation
 from hopping_leg.robot.parameters import Robot
@@ -112,7 +113,9 @@ class Recipe:
         """Build the training environment."""
         rng, count = np.random.default_rng(seed), self.schedule.num_envs
         task = envs.HoppingTask(robot, count, self.task, self.make_reward(robot), rng, threads)
-        return sb3_env.TaskVecEnv(task, privileged=self.network.privileged_critic)
+        computed = self.distillation is not None and self.distillation.teacher == "shooting"
+        teacher = shooting.Shooting(robot, rate=self.task.rate) if computed else None
+        return sb3_env.TaskVecEnv(task, privileged=self.network.privileged_critic, teacher=teacher)
 
     def make_reward(self, robot: Robot) -> envs.Reward:
         """Build the reward."""

@@ -2,6 +2,7 @@
 
 import time
 from collections import deque
+from collections.abc import Callable
 from typing import Any
 
 import gymnasium
@@ -9,6 +10,7 @@ import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 
 from hopping_leg.arrays import Array, Array32, BoolArray
+from hopping_leg.controllers.shooting import Shooting
 from hopping_leg.envs.task import HoppingTask, Step
 
 _RECENT_HOPS = 500
@@ -19,12 +21,22 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
     """A ``HoppingTask`` for stable-baselines3.
 
     Observations are (n, size); with ``privileged`` the true state follows in the same
-    rows, for critics that may see it in training.
+    rows, for critics that may see it in training, and then what a ``teacher`` would do, (n, 2).
+
+    Attributes:
+        correct: Changes commands, m, (n,), to those that the teacher is asked for.
     """
 
-    def __init__(self, task: HoppingTask, *, privileged: bool = False) -> None:
-        self.task, self._privileged = task, privileged
+    def __init__(
+        self, task: HoppingTask, *, privileged: bool = False, teacher: Shooting | None = None
+    ) -> None:
+        self.task, self._privileged, self.teacher = task, privileged, teacher
+        self.correct: Callable[[Array], Array] = lambda command: command
         size = task.observation.size + (task.privileged_size if privileged else 0)
+        if teacher is not None:
+            size += 2
+            teacher.watch(task.legs)
+            teacher.reset(task.count)
         space = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
         self.render_mode = None
         super().__init__(task.count, space, gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32))
@@ -61,7 +73,10 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
     def reset(self) -> Array32:
         """Begin new episodes of all legs."""
         self._return[:], self._length[:] = 0.0, 0
-        return self._observation(self.task.reset())
+        seen = self.task.reset()
+        if self.teacher is not None:
+            self.teacher.reset(self.num_envs)
+        return self._observation(seen)
 
     def step_async(self, actions: Array32) -> None:
         """Keep the actions, (n, 2), for ``step_wait``."""
@@ -80,6 +95,10 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
             self.hops += len(legs)
             self._recent.extend(zip(command[legs], step.apex_error[legs], strict=True))
         done = step.terminated | step.truncated
+        if self.teacher is not None:
+            scale = self.task.options.action_torque
+            self.teacher.take_applied(self._action.clip(-1, 1) * scale)
+            self.teacher.begin(np.flatnonzero(done))
         infos = self._end_episodes(step, done) if done.any() else self._nothing
         return self._observation(step.observation), step.reward, done, infos
 
@@ -90,7 +109,8 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
             final: Any = step.final_observation[leg]
             if self._privileged:
                 assert step.final_privileged is not None
-                final = np.concatenate([final, step.final_privileged[leg]])
+                nothing = np.zeros(2 if self.teacher is not None else 0, np.float32)
+                final = np.concatenate([final, step.final_privileged[leg], nothing])
             infos[leg] = {
                 "terminal_observation": final,
                 "TimeLimit.truncated": bool(step.truncated[leg]),
@@ -104,14 +124,19 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
         return infos
 
     def _observation(self, seen: Array32) -> Array32:
-        if self._privileged:
-            return np.concatenate([seen, self.task.privileged()], axis=1)
-        return seen
+        if not self._privileged:
+            return seen
+        parts = [seen, self.task.privileged()]
+        if self.teacher is not None:
+            torque = self.teacher.torque(self.correct(self.task.command))
+            parts.append((torque / self.task.options.action_torque).clip(-1, 1).astype(np.float32))
+        return np.concatenate(parts, axis=1)
 
     def state(self) -> dict[str, Any]:
         """Return everything needed to go on exactly from here."""
         return {
             "task": self.task.state(),
+            "teacher": self.teacher.state() if self.teacher else {},
             "hops": self.hops,
             "recent": np.array(self._recent).reshape(-1, 2),
             "return": self._return.copy(),
@@ -121,6 +146,8 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
     def restore(self, state: dict[str, Any]) -> None:
         """Go on from a ``state``."""
         self.task.restore(state["task"])
+        if self.teacher is not None:
+            self.teacher.restore(state["teacher"])
         self.hops = state["hops"]
         self._recent = deque(map(tuple, state["recent"].tolist()), maxlen=_RECENT_HOPS)
         self._return[:], self._length[:] = state["return"], state["length"]

@@ -2,7 +2,7 @@
 
 import itertools
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from typing import Any
@@ -142,6 +142,11 @@ class LegSimulator(Simulator):
         loads: Array = self._memory["loads"]
         return loads
 
+    @property
+    def solution(self) -> tuple[Array, Array]:
+        """Accelerations that the solver begins with, (n, 3), and motors' torques, N m, (n, 2)."""
+        return self._memory["acceleration"].copy(), self._memory["motor_torque"].copy()
+
     def reseed(self, rng: np.random.Generator) -> None:
         """Take jitter and sensor noise from here on from another source."""
         self.rng = rng
@@ -183,17 +188,21 @@ class LegSimulator(Simulator):
     def _step(self, command: Array) -> Array:
         if self._jitters:
             self._jitter = self.rng.random(self.count)
-        first, *others = self._parts
-        futures = [thread_pool().submit(self._advance, command, *part) for part in others]
-        self._advance(command, *first)
-        for future in futures:
-            future.result()
+        self.in_parallel(lambda first, last: self._advance(command, first, last))
         if self._disturbed:
             draws = self.rng.standard_normal((self.count, 6)) if self._noisy else self._reading
             stepper.read_sensors(
                 self.table, self._memory, self._past, draws, self._reading, self.timestep
             )
         return self._memory["mean_torque"].copy()
+
+    def in_parallel(self, work: Callable[[int, int], None]) -> None:
+        """Do something for the legs from a first to before a last one, on as many threads."""
+        first, *others = self._parts
+        futures = [thread_pool().submit(work, *part) for part in others]
+        work(*first)
+        for future in futures:
+            future.result()
 
     def _advance(self, command: Array, first: int, last: int) -> None:
         stepper.step_legs(

@@ -55,6 +55,8 @@ class StudentConfig:
 class Distillation:
     """Teachers learn in turn on the true state; the best one's student learns on measurements."""
 
+    teacher: Literal["ppo", "shooting"] = "ppo"
+    """What teaches: policies that learn by PPO, or shooting, which need not learn."""
     teacher_share: float = 0.5
     """Share of the training in which teachers learn at most; in the rest the student does."""
     teachers: int = 2
@@ -84,6 +86,8 @@ class Distillation:
     @property
     def stages(self) -> list[Stage]:
         """The curriculum, in order."""
+        if self.teacher == "shooting":
+            return [Stage("student", 1.0, None)]
         each, accept = self.teacher_share / self.teachers, self.teacher_accept_score
         taught = [
             Stage(f"teacher {k + 1}", (k + 1) * each, accept if self.teachers > 1 else None)
@@ -122,6 +126,7 @@ class Distillation:
                 "measured": measured,
                 "teacher_sees": [*state, *teacher_student.last_torque(task.options)],
                 "student": lambda: self.make_student(env),
+                "computed": self.teacher == "shooting",
             },
         )
 
@@ -184,6 +189,8 @@ class Distillation:
 
         A teacher whose score, m, is accepted gives away the time of those after it.
         """
+        if self.teacher == "shooting":
+            return 0.0
         if not self._accepted(scores):
             return self.teacher_share
         return self.teacher_share * len(scores) / self.teachers
@@ -244,14 +251,14 @@ class Distillation:
 
     def _due(self, share: float) -> int:
         """Return how many evaluations have been due; a single teacher takes none."""
-        if self.teachers == 1:
+        if self.teachers == 1 or self.teacher == "shooting":
             return 0
         before, learnt = self._learnt(share)
         return min(before + (learnt >= 1.0), self.teachers)
 
     def _learnt(self, share: float) -> tuple[int, float]:
         """Return how many teachers have had their time, and the next one's share of it."""
-        if share >= self.teacher_share:
+        if share >= self.teacher_share or self.teacher == "shooting":
             return self.teachers, 1.0
         learnt = self.teachers * share / self.teacher_share
         before = min(int(learnt), self.teachers - 1)

@@ -81,6 +81,12 @@ class CommandCorrection:
         """Return the teacher's commands instead of those that are observed, (n,)."""
         return command + _shares(command, self._knots) @ self.values
 
+    def of_heights(self, command: Array) -> Array:
+        """Return corrected commands, m, (n,), of those that are desired."""
+        seen = torch.from_numpy((command - self._offset) * self._gain).float()
+        corrected: Array = self(seen).numpy() / self._gain + self._offset
+        return corrected
+
     def state(self) -> checkpoint.Tree:
         """Return the corrections."""
         return {"values": self.values.numpy().copy()}
@@ -101,7 +107,7 @@ class TeacherStudentPolicy(sb3_policies.AsymmetricPolicy):
     """PPO policy whose actor is the teacher, with a student beside it.
 
     Observations are the ``measured`` entries that the student sees, then the true state, which the
-    critic sees.
+    critic sees; behind them what a teacher would do if it is ``computed`` and does not learn.
 
     Attributes:
         student_learns: Whether the student acts and learns, rather than the teacher.
@@ -116,10 +122,11 @@ class TeacherStudentPolicy(sb3_policies.AsymmetricPolicy):
         measured: int,
         teacher_sees: Sequence[int],
         student: Callable[[], Any],
+        computed: bool = False,
         **kwargs: Any,  # noqa: ANN401
     ) -> None:
         self.student_learns, self.mixing = False, 0.0
-        self.measured, self._make_student = measured, student
+        self.measured, self._make_student, self._computed = measured, student, computed
         self.begun: Callable[[], BoolArray] = lambda: np.ones((), np.bool_)
         super().__init__(*args, actor_size=measured, actor_sees=list(teacher_sees), **kwargs)
 
@@ -140,6 +147,8 @@ class TeacherStudentPolicy(sb3_policies.AsymmetricPolicy):
 
     def teacher_action(self, observation: torch.Tensor) -> torch.Tensor:
         """Return what the teacher would do, within -1 and 1, (n, 2)."""
+        if self._computed:
+            return observation[:, -2:]
         action: torch.Tensor = self.action_net(self.mlp_extractor.forward_actor(observation))
         return action.clamp(-1.0, 1.0)
 
@@ -180,6 +189,7 @@ class TeacherStudentPPO(resumable.ResumablePPO):
         self._true_command = task.observation.size + PRIVILEGED_COMMAND
         self._correction = CommandCorrection(scaling.offset[-1], scaling.gain[-1], dagger.knots)
         self.policy.begun = lambda: self._last_episode_starts
+        self.env.correct = self._correction.of_heights
 
     def evaluate_teacher(self) -> None:
         """Examine the teacher that has learnt; keep it if it is the best so far."""

@@ -61,6 +61,19 @@ GRU = {
 networks bring no advantage (Sec. II-C). Errors are traced back through 128 control steps, longer
 than a hop; a batch is made of whole sequences."""
 
+SHOOTING = {
+    "teacher": "shooting",
+    "task.action_torque": (6.0, 14.0),
+    "task.command_range": (0.21, 0.44),
+    "task.command_skew": 1.0,
+    "task.episode": 8.0,
+    "steps": 6_000_000,
+    "dagger_mixing_share": 0.2,
+    "dagger.gradient_steps": 64,
+    "dagger.batch_size": 2048,
+}
+"""A teacher that is computed instead of learnt: it plans every push in the true state."""
+
 VARIANTS = {
     "recipe": ("the recipe", PRECISE),
     "one-teacher": ("one teacher with all the teachers' time", PRECISE.replace(teachers=1)),
@@ -96,6 +109,10 @@ VARIANTS = {
     "newest-only": (
         "only the newest tenth of the ticks from which the policy learns",
         PRECISE.replace({"dagger.buffer_size": PRECISE.value("dagger.buffer_size") // 10}),
+    ),
+    "shooting-teacher": (
+        "the shooting controller teaches, which need not learn",
+        PRECISE.replace(SHOOTING),
     ),
     "coarse-physics": ("physics at 1 ms in training", PRECISE.replace({"task.timestep": 1e-3})),
 }
