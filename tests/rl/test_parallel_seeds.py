@@ -154,18 +154,21 @@ ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
 COMMAND = [sys.executable, "-c", _SEVERAL]
 
 
-@pytest.fixture(scope="module")
-def alone(tmp_path_factory):
-    """Return the folder of trainings that nothing interrupted."""
-    out = tmp_path_factory.mktemp("seeds") / "alone"
-    subprocess.run([*COMMAND, str(out)], check=True, env=ENVIRONMENT)
-    return out
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
-def test_workers_end_with_who_began_them_and_go_on_with_the_next(how, alone, tmp_path):
-    out = tmp_path / "killed"
+def test_workers_end_with_who_began_them_and_go_on_with_the_next(tmp_path, monkeypatch):
+    interrupt(tmp_path / "interrupted", signal.SIGINT)
+    out, alone = tmp_path / "killed", tmp_path / "alone"
+    interrupt(out, signal.SIGKILL)
+    subprocess.run([*COMMAND, str(out)], check=True, env=ENVIRONMENT)
+    monkeypatch.setattr(module.ProcessWorkers, "map", lambda _, f, args: [f(*a) for a in args])
+    monkeypatch.setattr(sys, "argv", ["-c", str(alone)])
+    exec(_SEVERAL, {})
+    for name in ("policy.onnx", "start-0/policy.onnx", "start-1/policy.onnx"):
+        assert (out / name).read_bytes() == (alone / name).read_bytes()
+
+
+def interrupt(out, how):
+    """Interrupt trainings soon after they have begun; nobody must go on with them."""
     process = subprocess.Popen([*COMMAND, str(out)], env=ENVIRONMENT)
     while process.poll() is None and not checkpoints(out):
         time.sleep(0.01)
@@ -176,6 +179,3 @@ def test_workers_end_with_who_began_them_and_go_on_with_the_next(how, alone, tmp
     assert left
     time.sleep(2)
     assert checkpoints(out) == left, "a worker goes on without the process that began it"
-    subprocess.run([*COMMAND, str(out)], check=True, env=ENVIRONMENT)
-    for name in ("policy.onnx", "start-0/policy.onnx", "start-1/policy.onnx"):
-        assert (out / name).read_bytes() == (alone / name).read_bytes()
