@@ -108,3 +108,11 @@ def test_what_tells_the_zeros_is_not_predicted():
 def test_a_drive_that_tracks_positions_is_believed(onboard):
     run = record(PENDULUM, swing(1.0)).with_metadata(onboard=onboard, zeroed=True)
     np.testing.assert_array_equal(simulated(run), simulated(run.with_metadata(zeroed=False)))
+
+
+def test_zeros_are_smooth_in_the_delay():
+    finder = OffsetFinder(ZEROED)
+    delays = 2e-5 * np.arange(100)
+    steps = np.diff([finder.find(TRUE.replace({"drive.delay": delay})) for delay in delays], axis=0)
+    assert (np.abs(steps) > 0).all()
+    assert (np.abs(steps).max(axis=0) < 3 * np.abs(steps).mean(axis=0)).all()
