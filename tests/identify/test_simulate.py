@@ -121,3 +121,13 @@ def test_a_candidate_that_breaks_down_spoils_no_other():
     got = simulator([run]).run([wild, TRUE]).position
     assert np.isnan(got[0]).all()
     np.testing.assert_allclose(got[1, 0], run.array("position"), atol=1e-3)
+
+
+def test_a_stiff_drive_does_not_depend_on_the_step():
+    stiff = {"stiffness": (8.0, 60.0), "damping": (0.3, 3.2)}
+    run = record(LEG, swing(1.0)).with_metadata(onboard="continuous", **stiff)
+    coarse, fine = (
+        WindowSimulator([run], cut([run]), timestep=step).run([TRUE]).position
+        for step in (STEP, STEP / 20)
+    )
+    assert np.abs(coarse - fine).max() < 2e-4

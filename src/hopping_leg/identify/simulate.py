@@ -20,6 +20,7 @@ from hopping_leg.sim.leg_table import LEG, leg_table
 
 _GAINS = ("stiffness", "damping", "integral")
 _ONBOARD = {"torque": replay.TORQUE, "zoh": replay.ZOH, "continuous": replay.CONTINUOUS}
+_SURPLUS = 0.3  # share of an inertia beyond which damping is not made up for
 _PARTS = 4  # pieces of work per thread, as windows differ in length
 
 
@@ -130,9 +131,15 @@ class _WindowGroup:
             fixed_base=not self._moving,
             gravity=self._metadata.effective_gravity,
         )
-        # Damping is implicit, so half a step of it would pass for inertia.
+        # Damping is implicit, the drives' own, too: half a step of it would pass for inertia.
+        damping = legs["damping"].copy()
+        if self._metadata.onboard == "continuous":
+            fitted = _drive_values(hypotheses, "damping")
+            stated = self._rows["gains"][0, 2:4]
+            damping += legs["gain"] * np.where(np.isnan(fitted), stated, fitted)
         for joint, inertia in enumerate(("hip_inertia", "knee_inertia")):
-            legs[inertia] -= self._timestep / 2 * legs["damping"][:, joint]
+            surplus = self._timestep / 2 * damping[:, joint]
+            legs[inertia] -= np.minimum(surplus, _SURPLUS * legs[inertia])
         creep = np.array([h.drive.creep for h in hypotheses])[:, None]
         soft = legs["friction"] / np.maximum(creep, 1e-6) * self._timestep
         soft = np.where(legs["friction"] > 0, np.minimum(soft, legs["friction_stiffness"]), 1.0)
