@@ -134,9 +134,9 @@ class _WindowGroup:
         # Damping is implicit, the drives' own, too: half a step of it would pass for inertia.
         damping = legs["damping"].copy()
         if self._metadata.onboard == "continuous":
-            fitted = _drive_values(hypotheses, "damping")
-            stated = self._rows["gains"][0, 2:4]
-            damping += legs["gain"] * np.where(np.isnan(fitted), stated, fitted)
+            own = _drive_values(hypotheses, "damping")
+            own = np.where(np.isnan(own), self._rows["gains"][0, 2:4], own)
+            damping += legs["gain"] * own
         for joint, inertia in enumerate(("hip_inertia", "knee_inertia")):
             surplus = self._timestep / 2 * damping[:, joint]
             legs[inertia] -= np.minimum(surplus, _SURPLUS * legs[inertia])
