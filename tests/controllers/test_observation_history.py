@@ -87,18 +87,6 @@ def test_age_is_that_of_the_newest_sample(layout):
     assert 0.6 < np.mean(np.array(ages) == 0) < 0.7  # 0.5 + 0.5 * 3 / 10
 
 
-def test_state_restores_the_whole_memory(layout):
-    one, other = layout, Dated(PERIOD)
-    for tick, measurement in measurements(50):
-        one.update(measurement, np.full((4, 2), float(tick)))
-        if tick == 30:
-            other.restore(one.state())
-        if tick > 30:
-            other.update(measurement, np.full((4, 2), float(tick)))
-            for name, values in one.inputs().items():
-                np.testing.assert_array_equal(values, other.inputs()[name])
-
-
 @pytest.mark.parametrize("rows", [[1], [0, 3]])
 def test_a_restarted_leg_forgets_and_the_others_do_not(layout, rows):
     for _, measurement in measurements(30):

@@ -3,8 +3,6 @@ import pytest
 
 from hopping_leg.controllers.energy_shaping import equations
 from hopping_leg.controllers.energy_shaping.virtual_leg import (
-    foot_force_torque,
-    leg_force,
     retraction,
 )
 from hopping_leg.robot import GRAVITY, load_robot
@@ -32,29 +30,6 @@ def test_gain_rests_at_the_desired_height_and_moves_towards_it(exponent):
 def test_absurd_estimates_move_the_gain_a_bounded_step(reached):
     gain = equations.updated_gain(np.ones(1), np.array([0.3]), np.array([reached]), 2.0)
     assert equations.STEP[0] ** 2 <= gain[0] <= equations.STEP[1] ** 2
-
-
-def test_share_of_period_ends_the_push_where_it_should():
-    length = np.array([0.245, 0.2, 0.26])
-    share = equations.share_of_period(length, np.full(3, 2.0), np.full(3, 0.25), 0.005)
-    np.testing.assert_allclose(share, [0.5, 1.0, 0.0])
-
-
-def test_both_apex_estimates_agree_on_a_parabola():
-    height, speed, airborne = np.array([0.25]), np.array([1.2]), np.array([0.3])
-    touchdown = equations.ballistic_height(height, speed, airborne)
-    apex = equations.ballistic_apex(height, speed)
-    np.testing.assert_allclose(equations.flight_time_apex(height, touchdown, airborne), apex)
-    peak = equations.ballistic_height(height, speed, speed / GRAVITY)
-    np.testing.assert_allclose(peak, apex)
-
-
-def test_torques_of_a_foot_force_do_the_force_s_work():
-    q, push_force = np.array([[0.6, -1.3]]), np.array([30.0])
-    torque = foot_force_torque(ROBOT, q, push_force, np.array([4.0]))
-    np.testing.assert_allclose(leg_force(ROBOT, q, torque), push_force)
-    straight = leg_force(ROBOT, np.zeros((1, 2)), np.ones((1, 2)))
-    assert np.isfinite(straight).all()
 
 
 def test_retraction_starts_and_ends_at_rest_at_its_ends():

@@ -24,10 +24,6 @@ def complaints(knee, robot=LEG):
     return [finding.complaint for finding in findings if finding.complaint]
 
 
-def test_healthy_drives_may_be_armed():
-    require_fit(check_drives(LEG, LIMITS, (healthy(0), healthy(1))))
-
-
 @pytest.mark.parametrize(
     ("changes", "words"),
     [

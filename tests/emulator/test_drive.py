@@ -188,14 +188,3 @@ def test_the_millisecond_counter_counts_from_power_up():
     assert bench.read(R.MILLISECOND_COUNTER, resolution=moteus.INT32) == pytest.approx(1250, abs=1)
     bench.robot.drives[0].boot(0.0)
     assert bench.read(R.MILLISECOND_COUNTER, resolution=moteus.INT32) == 0
-
-
-def test_the_same_commands_give_the_same_run():
-    def run():
-        bench = Bench(robot="twin", held=False, seed=4)
-        bench.power()
-        for n in range(60):
-            bench.push(math.sin(n / 5), -math.cos(n / 7), seconds=0.005)
-        return bench.robot.leg.q.tobytes()
-
-    assert run() == run()

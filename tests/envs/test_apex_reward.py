@@ -98,11 +98,3 @@ def test_coming_close_to_the_ground_costs(reward):
     assert term(reward, "clearance", 0.2, 0.0) == 0.0
     near, touching = (term(reward, "clearance", height, 0.0) for height in (0.15, 0.13))
     assert 0.0 < near < 1.0 < CONFIG.touch < touching
-
-
-def test_state_survives_a_restart(reward):
-    fly(reward, 10)
-    other = make()
-    other.restore(reward.state())
-    hop = transition(0.3, 0.0, apex=True)
-    assert reward(hop)[0] == other(hop)[0]

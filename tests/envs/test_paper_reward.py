@@ -76,20 +76,6 @@ def test_the_height_barrier_as_printed_rewards_overshoot_and_the_step_does_not(b
     assert (above[0] > below[0]) == (barrier == "printed")
 
 
-def test_every_leg_is_judged_by_itself():
-    rng = np.random.default_rng(0)
-    many = [
-        transition(rng.uniform(0.1, 0.5), rng.normal(), rng.uniform(-2, 1, 2), rng.normal(0, 30, 2))
-        for _ in range(20)
-    ]
-    paper = paper_reward(ROBOT)
-    singles = [paper(one)[0].item() for one in many]
-    columns = zip(*([*vars(one).values()][:6] for one in many), strict=True)
-    arrays = [np.concatenate(values) for values in columns]
-    together, _ = paper(Transition(*arrays, lambda: np.zeros(20)))
-    np.testing.assert_allclose(together, singles, rtol=1e-12)
-
-
 def test_velocity_limit_can_be_chosen():
     config = PaperRewardConfig(velocity_limit=10.0)
     assert terms_of(config, qd=(11.0, -12.0))[1]["velocity"] == pytest.approx(21.0 + 44.0)

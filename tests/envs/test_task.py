@@ -1,4 +1,3 @@
-import json
 from dataclasses import replace
 from typing import ClassVar
 
@@ -52,15 +51,6 @@ def test_a_restored_task_goes_on_exactly(ticks):
     np.testing.assert_array_equal(other.restore(one.state()), last.observation)
     for action in plan[ticks:]:
         assert fingerprint(one.step(action)) == fingerprint(other.step(action))
-
-
-def test_the_state_is_arrays_and_plain_values():
-    def plain(value):
-        if isinstance(value, dict):
-            return {key: plain(entry) for key, entry in value.items()}
-        return value.tolist() if isinstance(value, np.ndarray) else value
-
-    assert json.loads(json.dumps(plain(task().state())))["tick"] == 0
 
 
 def test_observations_are_newest_first_and_normalised():

@@ -126,13 +126,6 @@ def test_the_paper_search_has_two_passes_over_its_table():
     assert found.identifiability.names == second.parameters.names
 
 
-def test_threads_change_no_bit():
-    one, two = (
-        identify([run()], LEG, options=options(threads=threads, search="cma")) for threads in (1, 2)
-    )
-    assert as_json(one) == as_json(two)
-
-
 @pytest.mark.slow
 def test_a_cluster_changes_no_bit():
     pytest.importorskip("ray", reason="Ray is not installed (extra 'cluster')")

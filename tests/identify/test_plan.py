@@ -4,7 +4,6 @@ import pytest
 
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.plan import make_plan
-from hopping_leg.robot.model import COARSE_TIMESTEP
 from tests.identify.twin import LEG, changed, record, swing
 
 FIXED = record(LEG, swing(1.0))
@@ -64,10 +63,6 @@ def test_impossible_plans_get_a_sentence():
         make_plan([FIXED], LEG, search="gradient")
     with pytest.raises(UsageError, match="at least one recording"):
         make_plan([], LEG)
-
-
-def test_the_replay_takes_a_coarse_step():
-    assert make_plan([FIXED], LEG).timestep == COARSE_TIMESTEP
 
 
 def test_a_motor_is_not_believed_slower_than_its_joint_was_seen():

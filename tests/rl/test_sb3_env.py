@@ -43,16 +43,3 @@ def test_terms_of_the_reward_are_means_since_they_were_last_taken():
         for _ in range(ticks):
             env.step(np.full((3, 2), 0.5))
         assert list(env.take_reward_terms().values()) == pytest.approx(expected.tolist())
-
-
-def test_state_continues_exactly():
-    env, other = make(True), make(True)
-    env.reset()
-    rng = np.random.default_rng(1)
-    for _ in range(7):
-        env.step(rng.uniform(-1, 1, (3, 2)))
-    other.restore(env.state())
-    for _ in range(30):
-        action = rng.uniform(-1, 1, (3, 2))
-        for a, b in zip(env.step(action)[:3], other.step(action)[:3], strict=True):
-            np.testing.assert_array_equal(a, b)

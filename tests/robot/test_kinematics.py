@@ -34,17 +34,6 @@ def test_the_straight_leg_is_within_reach():
     np.testing.assert_allclose(q, 0, atol=1e-6)
 
 
-@given(SEEDS, angles)
-def test_jacobian_equals_the_finite_difference(seed, q):
-    robot, step = random_robot(np.random.default_rng(seed)), 1e-6
-    columns = [
-        (kinematics.foot_position(robot, q + d) - kinematics.foot_position(robot, q - d))
-        / (2 * step)
-        for d in np.eye(2) * step
-    ]
-    np.testing.assert_allclose(kinematics.jacobian(robot, q), np.stack(columns, -1), atol=1e-8)
-
-
 @settings(max_examples=25)
 @given(SEEDS)
 def test_foot_and_clearances_agree_with_mujoco(seed):

@@ -89,13 +89,6 @@ def test_a_pendulum_swings_freely_but_cannot_hop():
         HoppingEnv("doublependulum")
 
 
-def test_armature_follows_from_rotor_gear_and_belt():
-    knee = load_robot("legv2").knee
-    ratio = knee.motor.gear_ratio * knee.belt_ratio
-    assert knee.armature == pytest.approx(knee.motor.rotor_inertia * ratio**2)
-    assert load_robot("legv2-paper").knee.armature == 0.0001
-
-
 def test_a_leg_that_states_no_stops_has_leg_v2s_and_a_pendulum_none_within_a_turn():
     for name in shipped_robots():
         robot = load_robot(name)

@@ -204,30 +204,6 @@ def test_cogging_repeats_with_the_motor_angle_and_has_its_amplitude():
 FRICTION = {"rail": {"friction": 3.0, "damping": 0.0}, "friction": 0.4, "damping": 0.0}
 
 
-@pytest.mark.parametrize("timestep", [5e-4, 1.25e-4])
-@pytest.mark.parametrize("reality", [{}, both(stiffness=400.0, stiffness_damping=0.02)])
-def test_dry_friction_holds_at_90_percent_and_gives_way_at_110(timestep, reality):
-    robot = with_reality(with_joints(CAD, **FRICTION), **reality)
-    legs = hanging(robot, 2, timestep=timestep)
-    past = []
-    for _ in range(200):
-        legs.step(0.4 * np.array([[0.9, 0.0], [1.1, 0.0]]))
-        past.append(legs.measured_q[:, 0].copy())
-    assert abs(past[-1][0] - past[100][0]) < 1e-4 * 0.5
-    assert abs(past[-1][0]) < 1e-3
-    assert abs(past[-1][1]) > 0.02
-
-
-def test_the_rail_holds_what_its_friction_can():
-    legs = make_legs(with_joints(CAD, **FRICTION), 2)
-    legs.place(slice(None), 3.0, np.zeros(2))
-    legs.push(CAD.mass * 9.81 + 3.0 * np.array([0.9, 1.1]))
-    for _ in range(100):
-        legs.step(np.zeros((2, 2)))
-    assert abs(legs.height_rate[0]) < 1e-4
-    assert legs.height_rate[1] == pytest.approx(0.3 * 0.5 / CAD.mass, rel=1e-3)
-
-
 def test_stiction_holds_up_to_its_share_of_friction():
     robots = [
         with_reality(with_joints(CAD, **FRICTION), **both(stiction=s)) for s in (1.0, 1.5, 1.5)
@@ -250,29 +226,3 @@ def test_a_gear_under_load_takes_its_share_of_the_torque_and_may_hold():
     assert moved[0] > 0.5
     assert abs(moved[2]) < 1e-4 < 0.4 < moved[3]
     assert moved[0] == pytest.approx(moved[1], rel=1e-6)
-
-
-@pytest.mark.parametrize("joint", ["hip", "knee"])
-@pytest.mark.parametrize("stiffness", [300.0, 1200.0])
-def test_backlash_leaves_a_dead_band_of_its_width(joint, stiffness):
-    width, index = 0.02, ["hip", "knee"].index(joint)
-    drive = DriveMismatch(backlash=width, stiffness=stiffness, stiffness_damping=0.1)
-    legs = hanging(with_reality(with_joints(CAD, friction=5.0), **{joint: drive}), 2)
-    # Friction holds the motor; gravity swings the link to the side's end of the gap.
-    legs.place(slice(None), 1.0, np.eye(2)[index] * np.array([[-1.0], [1.0]]))
-    for _ in range(400):
-        legs.step(np.zeros((2, 2)))
-    gap = np.diff((legs.measured_q - legs.q)[:, index])[0]
-    lever = CAD.shank.mass * CAD.shank.com
-    if joint == "hip":
-        lever += CAD.thigh.mass * CAD.thigh.com + CAD.shank.mass * CAD.thigh.length
-    assert gap == pytest.approx(width + 2 * 9.81 * lever * np.sin(1.0) / stiffness, rel=0.02)
-
-
-def test_a_belt_yields_by_torque_over_stiffness():
-    soft = DriveMismatch(stiffness=20.0, stiffness_damping=0.05)
-    held = hanging(with_reality(with_joints(CAD, friction=5.0), knee=soft), q=(0.0, -np.pi / 2))
-    for _ in range(600):
-        held.step(np.zeros((1, 2)))
-    torque = -9.81 * CAD.shank.mass * CAD.shank.com * np.sin(held.q[0].sum())
-    assert (held.q - held.measured_q)[0, 1] == pytest.approx(torque / 20.0, rel=1e-3)

@@ -1,5 +1,3 @@
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -46,21 +44,3 @@ def test_what_soft_limits_add_is_noisy_and_limited_with_the_rest():
     np.testing.assert_array_equal(by_hand.drive(torque + made.soft_limit_torque), given)
     assert (np.abs(made.soft_limit_torque) > 1).all()
     assert (np.abs(given) <= ROBOT.of_joints("torque_limit")).all()
-
-
-def test_without_soft_limits_nothing_is_added():
-    made = plant(None, NoiseAndDelay())
-    made.sense(np.zeros(COUNT))
-    made.drive(np.zeros((COUNT, 2)))
-    assert not made.soft_limit_torque.any()
-
-
-def test_within_the_limits_nothing_is_added():
-    hip, knee = (
-        dataclasses.replace(joint, lower=joint.stop_lower, upper=joint.stop_upper)
-        for joint in (ROBOT.hip, ROBOT.knee)
-    )
-    made = plant(SoftLimits(), NoiseAndDelay(), dataclasses.replace(ROBOT, hip=hip, knee=knee))
-    made.sense(np.zeros(COUNT))
-    made.drive(np.zeros((COUNT, 2)))
-    assert not made.soft_limit_torque.any()

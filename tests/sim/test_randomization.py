@@ -9,7 +9,7 @@ import pytest
 
 from hopping_leg.envs import HoppingTask, TaskConfig, paper_reward
 from hopping_leg.errors import RobotError, UsageError
-from hopping_leg.robot import Latency, load_robot, load_tree, robot_text
+from hopping_leg.robot import Latency, load_robot
 from hopping_leg.sim.randomization import (
     IDENTIFIABLE_RANGES,
     TWIN_RANGES,
@@ -127,15 +127,6 @@ def heights(one, ticks=80):
     return np.stack([one.step(action).height for action in plan])
 
 
-def test_a_task_goes_on_exactly_and_repeats_with_its_seed():
-    one, other = task(0), task(0)
-    heights(one, 33)
-    other.restore(one.state())
-    np.testing.assert_array_equal(heights(one), heights(other))
-    np.testing.assert_array_equal(heights(task(0)), heights(task(0)))
-    assert not np.array_equal(heights(task(0)), heights(task(1)))
-
-
 def test_randomising_draws_nothing_from_the_task_itself():
     fixed = Range("rail.friction", "N", LEG.rail.friction, LEG.rail.friction, "as it is")
     np.testing.assert_array_equal(heights(task(0, [fixed])), heights(task(0, [])))
@@ -201,14 +192,6 @@ def test_drawn_twins_stand():
         legs.step(10 * (POSTURE - legs.measured_q) - 0.2 * legs.measured_qd)
     assert abs(legs.q - POSTURE).max() < 0.5
     assert legs.height.min() > 0.1
-
-
-def test_what_is_written_reads_back(tmp_path):
-    tree = load_tree("twin")
-    file = tmp_path / "again.toml"
-    file.write_text(robot_text(tree, "a comment\nof two lines"))
-    assert load_tree(file) == tree
-    assert file.read_text().startswith("# a comment\n# of two lines\n")
 
 
 @pytest.mark.parametrize(("low", "high", "scale"), [(2, 1, "uniform"), (0, 1, "logarithmic")])

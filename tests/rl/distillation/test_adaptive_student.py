@@ -8,9 +8,7 @@ import torch
 
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.distillation.adaptive_student import HopErrors
-from hopping_leg.robot.model_mismatch import Latency, ModelMismatch
-from hopping_leg.sim.randomization import WIDE_RANGES
-from tests.rl.learners import ROBOT, TINY_ADAPTIVE, learner
+from tests.rl.learners import TINY_ADAPTIVE, learner
 
 
 @pytest.mark.parametrize("command", [-1.0, -0.4, 1.0])
@@ -32,25 +30,6 @@ def test_a_correction_follows_the_true_error_by_its_share_of_every_hop(command):
     shares = np.array([(1 - command) / 2, (1 + command) / 2])
     correction = student._memory[0, :2].numpy() @ shares
     assert correction == pytest.approx(0.1 * TINY_ADAPTIVE.value("integrator.share"), rel=1e-4)
-
-
-def test_an_identified_leg_may_differ_too():
-    """Its gears rub under load, and its commands are late by parts of a tick."""
-    leg = dataclasses.replace(
-        ROBOT,
-        knee=dataclasses.replace(ROBOT.knee, load_friction=0.1),
-        reality=ModelMismatch(latency=Latency(command=4.56e-3)),
-    )
-    env = TINY_ADAPTIVE.make_env(leg, 0)
-    env.reset()
-    for draw in (1, 2):
-        env.task.randomize(draw)
-        for _ in range(10):
-            env.step_async(np.full((TINY_ADAPTIVE.schedule.num_envs, 2), 0.3, np.float32))
-            seen, reward, _, _ = env.step_wait()
-        assert np.isfinite(seen).all()
-        assert np.isfinite(reward).all()
-        assert np.ptp(seen[:, -len(WIDE_RANGES) :], axis=0).max() > 0
 
 
 def test_the_teacher_is_asked_at_the_corrected_command():
