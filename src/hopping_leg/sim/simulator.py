@@ -84,8 +84,11 @@ class Simulator(ABC):
         """Hold joint torques for one control period; return what the motors gave, N m, (n, 2)."""
 
     def stand(self, ids: IntArray | slice, q: Array, clearance: Array | float = 0.0) -> None:
-        """Put legs at rest in a posture with the foot ``clearance`` above the ground, m, (k,)."""
-        self.place(ids, kinematics.stance_height(self.robot, q) + clearance, q)
+        """Put legs at rest in a posture with the foot ``clearance`` above the ground, m, (k,).
+
+        A foot on the ground touches it by a nanometre, so that no rounding decides.
+        """
+        self.place(ids, kinematics.stance_height(self.robot, q) + clearance - 1e-9, q)
 
     def foot_clearance(self) -> Array:
         """Return the gap between each foot and the ground, m, (n,)."""

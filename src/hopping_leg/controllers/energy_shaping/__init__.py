@@ -8,6 +8,7 @@ from hopping_leg.controllers.energy_shaping.gains import (
     TUNED,
     ShapingGains,
     load_gains,
+    own_gains,
     scale_gains,
 )
 from hopping_leg.robot import Robot, load_robot
@@ -17,8 +18,11 @@ from hopping_leg.sim import CONTROL_RATE
 def tuned_energy_shaping(
     robot: Robot, *, rate: float = CONTROL_RATE, gains: str = TUNED
 ) -> EnergyShaping:
-    """Return the baseline with shipped gains or those of a file, carried over to ``robot``."""
-    found = load_gains(gains)
+    """Return the baseline with shipped gains or those of a file, carried over to ``robot``.
+
+    Shipped ones are those that were tuned on this very leg, if there are any.
+    """
+    found = load_gains(own_gains(gains, robot))
     scaled = scale_gains(found.gains, load_robot(found.robot), robot)
     return EnergyShaping(robot, scaled, ROBUST, rate=rate, name=gains)
 

@@ -167,6 +167,12 @@ class GainFile:
     gains: ShapingGains
 
 
+def own_gains(name: str, robot: Robot) -> str:
+    """Return the name of the shipped set ``name`` that was tuned on a robot, else ``name``."""
+    own = f"{name}-{robot.name}"
+    return own if (_SHIPPED / f"{own}.toml").is_file() else name
+
+
 def load_gains(name_or_path: str | Path = TUNED) -> GainFile:
     """Load a tuned set by shipped name or from a TOML file.
 
