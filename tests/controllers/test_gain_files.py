@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import pytest
 
+from hopping_leg.controllers.energy_shaping import tuned_energy_shaping
 from hopping_leg.controllers.energy_shaping.gains import (
     GainFile,
     ShapingGains,
@@ -19,6 +20,14 @@ def test_gains_survive_a_file(tmp_path):
     stored = GainFile("legv2", 'a "quoted" search', ShapingGains(k0=1.25, exponent=0.5))
     save_gains(tmp_path / "g.toml", stored)
     assert load_gains(tmp_path / "g.toml") == stored
+
+
+def test_a_leg_gets_the_gains_that_were_tuned_on_it():
+    for name in ("energy-shaping", "energy-shaping-flying"):
+        own = tuned_energy_shaping(load_robot("legv2"), gains=name)
+        assert own.gains == load_gains(f"{name}-legv2").gains
+        assert own.name == name
+        assert load_gains(f"{name}-legv2").robot == "legv2"
 
 
 @pytest.mark.parametrize("name", ["energy-shaping", "by-hand"])
