@@ -15,7 +15,7 @@ from hopping_leg.identify.paper_excitation import (
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.play_excitation import play
 from hopping_leg.identify.recording import Recording
-from hopping_leg.robot import Robot, load_robot
+from hopping_leg.robot import TIMESTEP, Robot, load_robot
 
 BELIEVED = "legv2"
 """Where fits begin: the CAD program's values."""
@@ -99,4 +99,4 @@ def record_paper(seconds: float) -> tuple[Recording, Recording]:
 def _play(truth: tuple[tuple[str, float], ...], strokes: Strokes) -> Recording:
     robot = believed()
     excitation = make_excitation(adapt(strokes, robot), robot)
-    return play(excitation, twin(dict(truth)), believed=BELIEVED)
+    return play(excitation, twin(dict(truth)), believed=BELIEVED, timestep=TIMESTEP / 16)
