@@ -1,15 +1,23 @@
+import contextlib
+import gc
 import itertools
 import math
+import os
+import sys
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from hopping_leg.deploy import realtime
 from hopping_leg.deploy.drive_link import BRAKE, STOP, Action, Reply
 from hopping_leg.deploy.flight_recorder import recover
 from hopping_leg.deploy.loop import SampleBuffer
-from hopping_leg.deploy.motion_sequence import Part
+from hopping_leg.deploy.motion_sequence import Part, SequenceTiming, hopping_poses
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.supervisor import State
+from hopping_leg.robot import kinematics, load_robot, shipped_robots
 from tests.deploy.fakes import LEG, POSES, FakeClock, FakeLink, Still, make_loop
 
 
@@ -162,3 +170,50 @@ def test_one_sample_stands_for_the_past_and_there_is_none_without_both_joints():
     seen = samples.measurement(0, 0.3)
     assert seen.q.shape == seen.qd.shape == (1, 3, 2)
     np.testing.assert_allclose(seen.q[0], [[1, 2]] * 3)
+
+
+def test_the_parts_of_a_sequence_follow_each_other():
+    timing = SequenceTiming(hop=10, rise=2, settle=0.5, sink=1.5)
+    times = [0, 1.9, 2, 2.4, 2.5, 12.4, 12.5, 13.9, 14.0, 99]
+    parts = [timing.phase(t)[0] for t in times]
+    assert parts == [
+        *(Part.RISE, Part.RISE, Part.SETTLE, Part.SETTLE, Part.HOP),
+        *(Part.HOP, Part.SINK, Part.SINK, Part.DONE, Part.DONE),
+    ]
+
+
+@given(st.integers(1, 3000), st.floats(0, 1e6))
+def test_a_hop_of_some_ticks_lasts_so_many_wherever_time_began(ticks, began):
+    timing = SequenceTiming(hop=ticks / 200, rise=0.4, settle=0.1)
+    times = began + np.arange(ticks + 200) * 0.005 - began
+    parts = [timing.phase(time)[0] for time in times]
+    assert parts.count(Part.HOP) == ticks
+
+
+@pytest.mark.parametrize("name", [n for n in shipped_robots() if load_robot(n).kind == "leg"])
+def test_poses_lie_within_the_soft_limits_with_the_foot_below_the_hip(name):
+    robot = load_robot(name)
+    poses = hopping_poses(robot)
+    for pose in (poses.start, poses.rest):
+        assert kinematics.foot_position(robot, pose)[1] == pytest.approx(0, abs=1e-9)
+        assert (pose >= robot.of_joints("lower")).all()
+        assert (pose <= robot.of_joints("upper")).all()
+
+
+def test_garbage_collection_is_held_off_and_comes_back():
+    interval = sys.getswitchinterval()
+    with contextlib.suppress(RuntimeError), realtime.uninterrupted():
+        assert not gc.isenabled()
+        raise RuntimeError
+    assert gc.isenabled()
+    assert sys.getswitchinterval() == interval
+
+
+def test_what_is_not_permitted_is_a_notice(monkeypatch):
+    def refuse(*_):
+        raise PermissionError
+
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    assert "SCHED_FIFO" in realtime.prefer_this_process()
+    with realtime.keeping_time(realtime=False) as notices:
+        assert notices == ()

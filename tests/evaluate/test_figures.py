@@ -5,11 +5,13 @@ import numpy as np
 import polars as pl
 import pytest
 from matplotlib.figure import Figure
+from PIL import Image
 
 from hopping_leg.evaluate import figures as drawing
 from hopping_leg.evaluate import metrics
 from hopping_leg.evaluate.report import draw_report_figures
 from hopping_leg.evaluate.trials import load_run
+from hopping_leg.evaluate.video import CLIP_SECONDS, FRAME_RATE, clip, fixed_traces, render_video
 from hopping_leg.figure_style import INCHES, encode, fit_width, to_svg
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE, find_hops
 from hopping_leg.trace import Trace
@@ -125,3 +127,37 @@ def test_every_format_and_the_same_bytes_twice(figure):
     assert encode(figure, "png").startswith(b"\x89PNG")
     image = plt.imread(io.BytesIO(encode(figure, "png", "column")))
     assert image.shape[1] == round(300 * INCHES["column"])
+
+
+@pytest.fixture(scope="module")
+def traces(judged):
+    return fixed_traces(judged.runs, judged.evaluation.controllers[0])
+
+
+def test_a_clip_begins_at_an_apex_after_the_start(traces):
+    poses = clip(traces[0.35])
+    assert poses.shape == (round(CLIP_SECONDS * FRAME_RATE), 3)
+    assert poses[1, 0] < poses[0, 0]
+    assert np.ptp(poses[:, 0]) > 0.05
+
+
+def test_without_opengl_there_is_a_reason_instead(robot, traces, monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "nonsense")
+    video = render_video(robot, traces)
+    assert video.content is None
+    assert video.reason.startswith("nonsense: ")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["webp", "gif"])
+def test_a_video_moves_or_says_why_there_is_none(kind, robot, traces):
+    video = render_video(robot, traces, kind)
+    if video.content is None:
+        assert video.reason
+        return
+    image = Image.open(io.BytesIO(video.content))
+    assert image.format == kind.upper()
+    assert image.n_frames == round(CLIP_SECONDS * FRAME_RATE)
+    first = np.asarray(image.convert("RGB"), dtype=float)
+    image.seek(image.n_frames // 2)
+    assert np.abs(np.asarray(image.convert("RGB"), dtype=float) - first).max() > 50

@@ -1,12 +1,13 @@
 import numpy as np
 import pytest
 
-from hopping_leg.errors import UsageError
+from hopping_leg.errors import RecordingError, UsageError
+from hopping_leg.identify.cost import Scoring
 from hopping_leg.identify.identifiability import identifiability
 from hopping_leg.identify.optimizers import jacobian
 from hopping_leg.identify.parameters import choose
-from tests.identify.searches import CAD, TRUTH, TWO, objective
-from tests.identify.twin import record, swing
+from tests.identify.searches import CAD, RUN, TRUTH, TWO, objective
+from tests.identify.twin import changed, record, swing
 
 
 @pytest.mark.parametrize(
@@ -61,3 +62,59 @@ def test_what_the_data_do_not_touch_is_said():
     known = identifiability(TWO, np.ones(2), np.random.default_rng(0).normal(size=50), slopes)
     assert known.half_width[1] == np.inf
     assert "These data say nothing about 'knee.friction'." in known.statements
+
+
+HERE = np.zeros((1, 2))
+"""The CAD's values among vectors of two parameters."""
+
+
+def test_the_paper_cost_is_the_sum_of_squared_position_errors():
+    goal = objective(scoring=Scoring(), length=None)
+    simulated = goal.simulator.run([CAD]).position[0, 0, 1:]
+    expected = np.sum((simulated - RUN.array("position")[1:]) ** 2)
+    assert goal(HERE)[0] == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_robust_cost_counts_small_errors_alike_and_large_ones_less():
+    plain, robust = (
+        objective(scoring=Scoring(position=0.01, robust=bound), length=None).residuals(HERE)
+        for bound in (None, 0.5)
+    )
+    small, large = np.abs(plain) < 0.02, np.abs(plain) > 1.0
+    np.testing.assert_allclose(robust[small], plain[small], rtol=1e-3, atol=1e-12)
+    assert large.any()
+    assert (np.abs(robust[large]) < np.abs(plain[large])).all()
+
+
+def test_unmeasured_samples_do_not_count():
+    run, torques = changed(RUN, hip_torque_nm=None), Scoring(None, None, 1.0)
+    both, one = (objective(scoring=torques, recordings=[r]).groups.size for r in (RUN, run))
+    assert one == both / 2
+    mute = objective(scoring=torques, recordings=[changed(run, knee_torque_nm=None)])
+    with pytest.raises(RecordingError, match="no measured sample"):
+        mute.residuals(HERE)
+
+
+def test_the_height_of_the_base_tells_of_the_rail():
+    truth = CAD.replace({"rail.friction": 2.0})
+    air, ground = record(truth.robot, swing(1.0)), record(truth.robot, swing(2.0, "rail"), "rail")
+    friction, scoring = choose(truth, ["rail.friction"]), Scoring(position=None, height=1e-3)
+    goal = objective(friction, scoring, [air, ground], 0.1)
+    assert goal.groups.size == 20 * 19
+    at_truth, beside = goal(friction.vector(np.array([[2.0], [0.5]])))
+    assert at_truth < 0.01 * beside
+    with pytest.raises(RecordingError, match="record height"):
+        objective(friction, scoring, [air], 0.1).residuals(HERE[:, :1])
+
+
+def test_a_window_counts_in_full_below_the_level_and_the_same_far_beyond():
+    goal = objective(scoring=Scoring(0.1, unexplained=0.5))
+    plain = goal.residuals(HERE)[0]
+    squares = np.square(plain).sum()
+    assert goal.loss.cost(1e-4 * plain) == pytest.approx(1e-8 * squares, rel=1e-3)
+    assert goal.loss.cost(1e5 * plain) == pytest.approx(plain.size, rel=1e-3)
+    weighted = goal.loss.weights(plain) * plain
+    rest = goal.loss.rest(plain)
+    expected = np.square(plain.reshape(4, -1, 2)).mean(axis=1)
+    expected = (1 - 1 / np.sqrt(1 + expected / 0.5)).sum() * plain.size / 8
+    assert np.sum(weighted**2) + np.sum(rest**2) == pytest.approx(expected, rel=1e-12)

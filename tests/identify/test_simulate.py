@@ -4,7 +4,8 @@ import pytest
 from hopping_leg.errors import RecordingError
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.simulate import WindowSimulator
-from hopping_leg.identify.windows import cut
+from hopping_leg.identify.validation import validate
+from hopping_leg.identify.windows import cut, deal, hold_out, part
 from tests.identify.twin import LEG, STEP, changed, record, swing
 
 TRUE = LegHypothesis(LEG)
@@ -84,6 +85,13 @@ def test_rows_are_met_at_their_own_time_stamps_and_commands_within_a_step():
     assert np.abs(coarse - fine).max() < 0.05 * effect
 
 
+def test_the_answer_is_smooth_in_the_delay():
+    run = record(LEG, swing(1.0), onboard="torque")
+    late = [FREE.replace({"drive.delay": delay}) for delay in 1e-3 + np.arange(0, 2e-3, 2e-5)]
+    steps = np.diff(simulator([run]).run(late).position[:, 0, 50], axis=0)
+    np.testing.assert_allclose(steps, np.broadcast_to(steps.mean(0), steps.shape), rtol=0.1)
+
+
 def test_friction_that_grows_with_load_slows_the_leg():
     run = record(LEG, swing(1.0), onboard="torque")
     lossy = TRUE.replace({"hip.load_friction": 0.3, "knee.load_friction": 0.3})
@@ -124,3 +132,93 @@ def test_a_stiff_drive_does_not_depend_on_the_step():
         for step in (STEP, STEP / 20)
     )
     assert np.abs(coarse - fine).max() < 2e-4
+
+
+RUN = record(LEG, swing(3.0))
+
+
+def test_windows_tile_a_recording():
+    windows = cut([RUN], 0.5)
+    rows = [r for w in windows for r in range(w.start, w.start + w.length)]
+    assert rows == list(range(len(RUN)))
+    (window,) = cut([RUN], unscored=0.1)
+    assert (window.start, window.length, window.unscored) == (0, 600, 20)
+    with pytest.raises(RecordingError, match="too short for windows of 5 s"):
+        cut([RUN], 5.0)
+
+
+def test_dealt_windows_are_all_there_and_every_share_is_spread_over_them():
+    windows = cut([RUN], 0.1)
+    shares = deal(windows, 4, np.random.default_rng(0))
+    assert sorted((w for share in shares for w in share), key=lambda w: w.start) == windows
+    for share in shares:
+        assert [w.start // 80 for w in share] == list(range(len(share)))
+        assert len({w.start % 80 for w in share}) > 1
+    assert [len(share) for share in deal(cut([RUN], 1.0), 9, np.random.default_rng(0))] == [1, 1, 1]
+
+
+LONG = record(LEG, swing(60.0))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_every_fourth_stretch_is_held_out_and_nothing_is_lost(seed):
+    fit, held = hold_out([LONG], 2.0, np.random.default_rng(seed))
+    times = np.sort(np.concatenate([r.time for r in (*fit, *held)]))
+    np.testing.assert_array_equal(times, LONG.time)
+    assert sum(map(len, held)) == pytest.approx(0.25 * len(LONG), abs=4)
+    gaps = np.diff([r.time[0] for r in held])
+    np.testing.assert_allclose(gaps, 20.0, atol=0.02)
+
+
+def test_a_short_recording_gives_its_last_quarter():
+    run = record(LEG, swing(8.0))
+    (fit,), (held,) = hold_out([run], 4.0, np.random.default_rng(0))
+    assert len(fit) == 3 * len(held)
+    assert fit.time[-1] < held.time[0]
+    with pytest.raises(RecordingError, match=r"5 s, but 5\.34 s are needed.*--validate"):
+        hold_out([record(LEG, swing(5.0))], 4.0, np.random.default_rng(0))
+
+
+def test_a_part_says_which_seconds_it_is():
+    run = part(LONG, 200, 400)
+    assert run.name.endswith("1.0-2.0 s")
+    np.testing.assert_array_equal(run.array("position"), LONG.array("position")[200:400])
+
+
+WRONG = TRUE.replace({"hip.friction": 0.4})
+
+
+def judge(hypothesis, onboard="zoh"):
+    run = record(LEG, swing(2.0), onboard=onboard)
+    return validate([run], hypothesis, STEP)
+
+
+@pytest.mark.parametrize("onboard", ["zoh", "torque"])
+def test_the_true_robot_predicts_its_own_recording(onboard):
+    validation = judge(TRUE, onboard)
+    if onboard == "zoh":
+        assert max(validation.closed_loop_position) < 1e-4
+        assert max(validation.closed_loop_torque) < 1e-3
+    assert all(max(pair) < 1e-3 for pair in validation.open_loop_position.values())
+
+
+def test_a_wrong_robot_errs_the_more_the_longer_it_predicts():
+    validation = judge(WRONG)
+    assert validation.closed_loop_position[0] > 1e-3
+    assert validation.open_loop_position[0.5][0] > validation.open_loop_position[0.2][0] > 1e-3
+
+
+def test_without_torques_there_is_no_open_loop():
+    bare = changed(record(LEG, swing(2.0)), hip_torque_nm=None, knee_torque_nm=None)
+    validation = validate([bare], TRUE, STEP)
+    assert np.isnan(validation.closed_loop_torque).all()
+    assert np.isnan(validation.open_loop_position[0.2]).all()
+
+
+def test_where_torques_are_commanded_no_loop_is_closed():
+    validation = judge(WRONG, "torque")
+    assert np.isnan([*validation.closed_loop_position, *validation.closed_loop_torque]).all()
+    assert validation.open_loop_position[0.2][0] > 1e-3
+    closed, commanded = (record(LEG, swing(2.0), onboard=name) for name in ("zoh", "torque"))
+    both = validate([closed, commanded], WRONG, STEP).closed_loop_position
+    assert both == validate([closed], WRONG, STEP).closed_loop_position

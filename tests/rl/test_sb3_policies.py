@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 import torch
 
+from hopping_leg.envs import HoppingTask, TaskConfig
 from hopping_leg.envs.observation import PaperObservation, sample_scaling
+from hopping_leg.rl.sb3_env import TaskVecEnv
 from hopping_leg.sim.channel import Measurement
-from tests.rl.learners import EVERY, ROBOT, learner, policy_file
+from tests.rl.learners import EVERY, ROBOT, TINY, learner, policy_file
 
 
 def measurement(count):
@@ -64,3 +66,42 @@ def test_a_policy_file_acts_beside_the_task_as_the_actor_and_remembers_the_same(
             model.env.step_async(action)
             seen, begun = model.env.step_wait()[0], np.zeros(task.count, bool)
         assert not file.remembers or np.abs(file._memory).min() > 1e-4
+
+
+def make(privileged=False, episode=0.05, num_envs=3):
+    options = TaskConfig(episode=episode)
+    rng = np.random.default_rng(0)
+    task = HoppingTask(ROBOT, num_envs, options, TINY.make_reward(ROBOT), rng, 1)
+    return TaskVecEnv(task, privileged=privileged)
+
+
+@pytest.mark.parametrize("privileged", [False, True])
+def test_an_episode_ends_as_stable_baselines_wants_it(privileged):
+    env = make(privileged)
+    env.reset()
+    total = 0.0
+    for tick in range(10):
+        observation, reward, done, infos = env.step(np.full((3, 2), 0.5))
+        total += reward[0]
+        assert done.all() == (tick == 9)
+    assert observation.shape == env.observation_space.shape or observation.shape == (
+        3,
+        *env.observation_space.shape,
+    )
+    assert infos[0]["TimeLimit.truncated"]
+    assert infos[0]["episode"]["l"] == 10
+    assert infos[0]["episode"]["r"] == pytest.approx(total)
+    assert not np.allclose(infos[0]["terminal_observation"], observation[0])
+    assert infos[0]["terminal_observation"].shape == env.observation_space.shape
+
+
+def test_terms_of_the_reward_are_means_since_they_were_last_taken():
+    env, task = make(), make().task
+    env.reset()
+    task.reset()
+    assert env.take_reward_terms() == {}
+    for ticks in (4, 2):
+        expected = np.mean([task.step(np.full((3, 2), 0.5)).terms for _ in range(ticks)], (0, 1))
+        for _ in range(ticks):
+            env.step(np.full((3, 2), 0.5))
+        assert list(env.take_reward_terms().values()) == pytest.approx(expected.tolist())

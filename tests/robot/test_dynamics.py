@@ -1,9 +1,12 @@
+from xml.etree import ElementTree
+
 import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from hopping_leg.robot import build_model, dynamics, kinematics, load_robot
+from hopping_leg.robot import build_model, dynamics, kinematics, load_robot, shipped_robots, to_urdf
 from tests.robot.legs import SEEDS, posed, random_robot, random_state
 
 
@@ -37,3 +40,98 @@ def test_shapes_are_batched():
     assert dynamics.bias_force(robot, q, q).shape == (4, 5, 3)
     assert dynamics.kinetic_energy(robot, q, np.zeros((4, 5)), q).shape == (4, 5)
     assert kinematics.jacobian(robot, q).shape == (4, 5, 2, 2)
+
+
+angles = st.tuples(st.floats(-3.1, 3.1), st.floats(-3.1, -0.02)).map(np.array)
+
+
+@given(SEEDS, angles)
+def test_inverse_kinematics_undoes_forward_kinematics(seed, q):
+    robot = random_robot(np.random.default_rng(seed))
+    foot = kinematics.foot_position(robot, q)
+    if np.linalg.norm(foot) < 1e-3:
+        return
+    again = kinematics.joint_angles(robot, foot)
+    np.testing.assert_allclose(kinematics.foot_position(robot, again), foot, atol=1e-9)
+    turns = (again - q) / (2 * np.pi)
+    np.testing.assert_allclose(turns, np.round(turns), atol=1e-6)
+
+
+@given(st.floats(0.2901, 10), st.floats(-np.pi, np.pi))
+def test_a_foot_out_of_reach_has_no_angles(distance, direction):
+    robot = load_robot("legv2")
+    foot = distance * np.array([np.cos(direction), np.sin(direction)])
+    assert np.isnan(kinematics.joint_angles(robot, foot)).all()
+
+
+def test_the_straight_leg_is_within_reach():
+    robot = load_robot("legv2")
+    q = kinematics.joint_angles(robot, np.array([robot.thigh.length + robot.shank.length, 0.0]))
+    np.testing.assert_allclose(q, 0, atol=1e-6)
+
+
+@settings(max_examples=25)
+@given(SEEDS)
+def test_foot_and_clearances_agree_with_mujoco(seed):
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng)
+    height, rate, q, qd = random_state(rng)
+    model = build_model(robot)
+    data = posed(model, height, rate, q, qd)
+    foot = data.site("foot").xpos
+    down, forward = kinematics.foot_position(robot, q)[0]
+    np.testing.assert_allclose([height[0] - down, forward], foot[[2, 0]], atol=1e-12)
+    bottom = {
+        "foot": kinematics.foot_clearance(robot, height, q),
+        "knee_cap": kinematics.knee_clearance(robot, height, q),
+        "base": kinematics.base_clearance(robot, height),
+    }
+    for name, clearance in bottom.items():
+        geom = model.geom(name).id
+        gap = mujoco.mj_geomDistance(model, data, model.geom("floor").id, geom, 10.0, None)
+        np.testing.assert_allclose(clearance[0], gap, atol=1e-9)
+    jacobian = np.zeros((3, 3))
+    mujoco.mj_jacSite(model, data, jacobian, None, model.site("foot").id)
+    velocity = jacobian @ data.qvel
+    rates = kinematics.foot_velocity(robot, q, qd)[0]
+    np.testing.assert_allclose([rate[0] - rates[0], rates[1]], velocity[[2, 0]], atol=1e-9)
+
+
+def test_smooth_step_rate_is_its_derivative():
+    s, h = np.linspace(0.05, 0.95, 19), 1e-6
+    slope = (kinematics.smooth_step(s + h) - kinematics.smooth_step(s - h)) / (2 * h)
+    np.testing.assert_allclose(kinematics.smooth_step_rate(s), slope, rtol=1e-6)
+
+
+@settings(max_examples=25)
+@given(SEEDS)
+def test_mujoco_reads_the_same_dynamics_from_the_urdf(seed):
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng)
+    model = mujoco.MjModel.from_xml_string(to_urdf(robot))
+    assert [model.joint(i).name for i in range(3)] == ["rail", "hip", "knee"]
+    height, rate, q, qd = random_state(rng)
+    data = posed(model, height, rate, q, qd)
+    full = np.zeros((3, 3))
+    mujoco.mj_fullM(model, data, full)
+    full += np.diag([0, robot.hip.armature, robot.knee.armature])
+    np.testing.assert_allclose(dynamics.mass_matrix(robot, q)[0], full, rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(
+        dynamics.bias_force(robot, q, qd)[0], data.qfrc_bias, rtol=1e-7, atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("name", shipped_robots())
+def test_limits_and_belt_stand_in_the_file(name):
+    robot = load_robot(name)
+    root = ElementTree.fromstring(to_urdf(robot))
+    for joint in ("hip", "knee"):
+        parameters = getattr(robot, joint)
+        limit = root.find(f"joint[@name='{joint}']/limit").attrib
+        assert float(limit["effort"]) == parameters.torque_limit
+        assert float(limit["velocity"]) == parameters.no_load_speed
+        assert float(limit["lower"]) == parameters.stop_lower
+        soft = root.find(f"joint[@name='{joint}']/safety_controller").attrib
+        assert float(soft["soft_upper_limit"]) == parameters.upper
+        reduction = root.find(f"transmission[@name='{joint}_belt']/actuator/mechanicalReduction")
+        assert float(reduction.text) == parameters.belt_ratio

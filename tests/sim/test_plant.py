@@ -1,7 +1,11 @@
+import dataclasses
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from hopping_leg.robot import SoftLimits, load_robot
+from hopping_leg.robot import SoftLimits, dynamics, load_robot
 from hopping_leg.sim import LegSimulator, NoiseAndDelay, Plant, SoftLimiter
 
 ROBOT = load_robot("legv2")
@@ -44,3 +48,54 @@ def test_what_soft_limits_add_is_noisy_and_limited_with_the_rest():
     np.testing.assert_array_equal(by_hand.drive(torque + made.soft_limit_torque), given)
     assert (np.abs(made.soft_limit_torque) > 1).all()
     assert (np.abs(given) <= ROBOT.of_joints("torque_limit")).all()
+
+
+finite = st.floats(-100, 100)
+pairs = st.tuples(finite, finite).map(np.array)
+
+
+def added(soft, torque, q, qd, robot=ROBOT):
+    """Return what soft limits add to the torque of one leg at a sample, (2,) each."""
+    return SoftLimiter(robot, soft).added(torque[None], np.concatenate([q, qd])[None, None])[0]
+
+
+@given(st.floats(0, 1), st.floats(0, 1), pairs, pairs)
+def test_soft_limits_leave_torques_inside_the_limits_alone(hip, knee, torque, qd):
+    lower, upper = ROBOT.of_joints("lower"), ROBOT.of_joints("upper")
+    q = lower + np.array([hip, knee]) * (upper - lower)
+    np.testing.assert_array_equal(added(SoftLimits(), torque, q, qd), 0)
+
+
+@pytest.mark.parametrize(("side", "sign"), [("lower", 1), ("upper", -1)])
+@pytest.mark.parametrize("replace", [False, True])
+def test_soft_limits_pull_back_inside(side, sign, replace):
+    q = ROBOT.of_joints(side) - sign * 0.1
+    soft = SoftLimits(stiffness=20.0, damping=0.0, replace=replace)
+    pull = added(soft, np.ones(2), q, np.zeros(2))
+    np.testing.assert_allclose(pull, sign * 2.0 - replace)
+
+
+@pytest.mark.parametrize("late", [0, 1])
+@pytest.mark.parametrize("joint", [0, 1])
+@pytest.mark.parametrize("name", ["legv1", "legv2", "legv2-paper"])
+def test_soft_limits_do_not_ring_on_a_late_sample(name, joint, late):
+    robot, period = load_robot(name), 0.005
+    bounds = {"lower": 0.0, "upper": 0.0}  # outside on both sides
+    hip, knee = (dataclasses.replace(j, **bounds) for j in (robot.hip, robot.knee))
+    bounded = dataclasses.replace(robot, hip=hip, knee=knee)
+    mobility = np.linalg.inv(dynamics.mass_matrix(robot, np.array([0.5, -1.2])))
+    damping = (robot.hip, robot.knee)[joint].damping
+    q, qd, samples = 0.1, 0.0, [(0.1, 0.0)] * (late + 1)
+    for _ in range(100):
+        seen = (np.eye(2)[joint] * value for value in samples[-1 - late])
+        torque = added(SoftLimits(), np.zeros(2), *seen, robot=bounded)[joint]
+        for _ in range(50):
+            qd += period / 50 * (torque - damping * qd) * mobility[joint + 1, joint + 1]
+            q += period / 50 * qd
+        samples.append((q, qd))
+    angle = np.array(samples)[:, 0]
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(angle)))) + 1
+    swings = np.abs(angle[turns])
+    swings = swings[swings > 1e-3]
+    assert (swings[1:] < 0.57 * swings[:-1]).all()  # what a damping ratio of 0.18 leaves
+    assert abs(angle[-1]) < 5e-3

@@ -2,13 +2,22 @@
 
 import dataclasses
 import json
+import os
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
+from hopping_leg.errors import RobotError, UsageError
 from hopping_leg.evaluate import motor_load
-from hopping_leg.sim_to_real import transfer
-from hopping_leg.sim_to_real.methods import METHODS
+from hopping_leg.robot import load_robot
+from hopping_leg.sim_to_real import jobs, transfer
+from hopping_leg.sim_to_real.jobs import Board, Job, work
+from hopping_leg.sim_to_real.methods import METHODS, choose_methods
+from hopping_leg.sim_to_real.study import TwinFile, find_twins
 from hopping_leg.sim_to_real.transfer import compare
 from tests.sim_to_real.studies import study
 
@@ -94,3 +103,142 @@ def test_of_several_trainings_the_better_one_is_chosen_in_its_own_simulation_alo
     assert [row["worst_abs_error_m"] for row in found["methods"]] == [0.1, 0.1]
     assert found["comparison"][0]["ratio"] == pytest.approx(1.0)
     assert transfer._best_in_own_simulation(rows, study(tmp_path)) == {}
+
+
+def test_drawn_twins_are_the_same_each_time_and_believed_to_be_the_cad(tmp_path):
+    one, again = (find_twins(["2"], tmp_path) for _ in range(2))
+    assert one == again
+    assert [twin.believed for twin in one] == ["legv2", "legv2"]
+    assert one[0].robot.digest != one[1].robot.digest
+    assert not one[0].robot.reality.only_delays
+
+
+def test_anyone_can_bring_a_twin(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text('name = "mine"\nextends = "legv2-paper"\n')
+    (twin, shipped) = find_twins([str(file), "twin"], tmp_path)
+    assert (twin.name, twin.believed) == ("mine", "legv2-paper")
+    assert shipped.name == "twin"
+    for words, error in (
+        (["0"], "too few"),
+        (["legv2"], "extends no robot"),
+        ([str(file), str(file)], "Two twins are called 'mine'"),
+        (["legv9"], "There is no robot"),
+    ):
+        with pytest.raises((UsageError, RobotError), match=error):
+            find_twins(words, tmp_path)
+
+
+def test_a_twin_file_knows_who_it_is():
+    twin = TwinFile("twin", "twin", "legv2-paper")
+    assert twin.robot == load_robot("twin")
+    assert twin.without_surprises.reality.only_delays
+    hip = twin.without_surprises.hip
+    assert replace(load_robot("legv2-paper").hip, armature=hip.armature) == hip
+
+
+def test_trainings_that_do_not_depend_on_the_twin_are_shared(tmp_path):
+    one = study(tmp_path, ("identified", "cad", "randomised"))
+    folders = {m.name: {one.training(t, m, 0) for t in one.twins} for m in one.methods}
+    assert {name: len(found) for name, found in folders.items()} == {
+        "identified": 2, "cad": 1, "randomised": 1,
+    }  # fmt: skip
+    assert len(set.union(*folders.values())) == 4
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"seconds": 5.0}, "too short"),
+        ({"steps": 0}, "at least 1"),
+        ({"seeds": ()}, "each given once"),
+        ({"seeds": (1, 1)}, "each given once"),
+        ({"seeds": (-1,)}, "each given once"),
+    ],
+)
+def test_options_without_meaning_are_refused(tmp_path, options, says):
+    with pytest.raises(UsageError, match=says):
+        study(tmp_path, **options)
+
+
+def test_methods_are_checked():
+    with pytest.raises(UsageError, match="Did you mean 'identified'"):
+        choose_methods(["identifed"])
+    with pytest.raises(UsageError, match="named twice"):
+        choose_methods(["cad", "cad"])
+    with pytest.raises(UsageError, match="No method"):
+        choose_methods([])
+
+
+@dataclasses.dataclass(frozen=True)
+class Note(Job):
+    """A job that writes down which process did it."""
+
+    file: Path
+    seconds: float = 0.0
+    weight: ClassVar[float] = 1.0
+
+    @property
+    def name(self):
+        return self.file.stem
+
+    @property
+    def done(self):
+        return self.file.exists()
+
+    def run(self, *, quiet):
+        time.sleep(self.seconds)
+        self.file.write_text(str(os.getpid()))
+
+
+@pytest.mark.parametrize("at_once", [1, 2])
+def test_jobs_that_are_done_are_not_done_again(tmp_path, at_once, capsys):
+    notes = [Note(tmp_path / f"{number}.txt") for number in range(3)]
+    notes[1].file.write_text("earlier")
+    with Board(3.0, own_bars=at_once == 1) as board:
+        work(notes, at_once, board)
+    assert notes[1].file.read_text() == "earlier"
+    here = {job.file.read_text() for job in (notes[0], notes[2])} == {str(os.getpid())}
+    assert here == (at_once == 1)
+    assert "done: 2" in capsys.readouterr().err
+
+
+@dataclasses.dataclass(frozen=True)
+class Told(Job):
+    """A job that is only told of."""
+
+    name: str = ""
+    weight: float = 0.0
+    on_all_cores: bool = False
+    done = False
+    known: ClassVar[dict[str, float]] = {}
+
+    def run(self, *, quiet):
+        raise AssertionError
+
+    def progress(self):
+        return self.known.get(self.name, 0.0), str(self.known.get(self.name))
+
+
+@pytest.mark.parametrize("pace", [0.5, 1.0, 4.0])
+def test_the_time_left_is_true_to_a_factor_of_two_after_the_first_tenth(pace, monkeypatch, capsys):
+    rounds = [[Told("record", 5.0)] * 2, [Told("identify", 40.0, on_all_cores=True)]]
+    rounds += [[Told("train", 190.0)] * 2, [Told("hop", 8.0)] * 2]
+    total = 100.0 + sum(job.weight for stage in rounds for job in stage)
+    now, since = 0.0, {}
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    monkeypatch.setattr(Told, "known", {})
+    monkeypatch.setattr("hopping_leg.progress._LINE_SECONDS", 0.0)
+    board = Board(total, at_once=2)
+    whole = pace * total / 2
+    for stage in rounds:
+        begin, taken = now, pace * sum(job.weight for job in stage) / 2
+        while now < begin + taken:
+            Told.known["train"] = (now - begin) / taken // 0.2 * 0.2  # its snapshots tell
+            jobs._show(stage, since, board)
+            left = capsys.readouterr().err.rpartition("about ")[2].split()[0].split(":")
+            if 0.1 * whole < now < 0.95 * whole:
+                assert 0.5 < (60 * int(left[0]) + int(left[1])) / (whole - now) < 2.0
+            now += 1.0
+        for job in stage:
+            board.finish(job.name, job.weight)

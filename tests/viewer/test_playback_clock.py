@@ -3,6 +3,7 @@ import math
 import numpy as np
 import pytest
 
+from hopping_leg.viewer import scene
 from hopping_leg.viewer.playback_clock import LONGEST, PlaybackClock
 
 TICK = 0.005
@@ -50,3 +51,27 @@ def test_a_pause_leaves_no_debt():
     clock.due(1.0)
     clock.paused = False
     assert clock.due(0.004) == 0.0
+
+
+@pytest.fixture
+def linux(monkeypatch):
+    monkeypatch.setattr("sys.platform", "linux")
+
+
+@pytest.mark.parametrize("device", ["dri/renderD128", "nvidia0", "dxg"])
+def test_a_device_that_draws_is_seen(device, tmp_path, linux):
+    assert not scene.has_gpu(tmp_path)
+    (tmp_path / device).parent.mkdir(exist_ok=True)
+    (tmp_path / device).touch()
+    assert scene.has_gpu(tmp_path)
+
+
+def test_other_systems_always_have_one(tmp_path, monkeypatch):
+    monkeypatch.setattr("sys.platform", "darwin")
+    assert scene.has_gpu(tmp_path)
+
+
+@pytest.mark.parametrize(("gpu", "detail"), [(True, None), (False, scene.COARSE)])
+def test_only_a_processor_is_spared_pixels(gpu, detail, monkeypatch):
+    monkeypatch.setattr(scene, "has_gpu", lambda: gpu)
+    assert scene.pixel_ratio() == detail

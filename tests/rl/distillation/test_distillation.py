@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 import torch
 
+from hopping_leg.controllers.shooting import Shooting
 from hopping_leg.rl.distillation import distillation
-from hopping_leg.rl.distillation.teacher_student import shift_to_arrival
+from hopping_leg.rl.distillation.teacher_student import CommandCorrection, shift_to_arrival
 from hopping_leg.rl.recipes.precise import PRECISE
 from hopping_leg.sim.randomization import WIDE_RANGES
-from tests.rl.learners import ROBOT, TINY_PRECISE, learner
+from tests.rl.learners import ROBOT, TINY_PRECISE, TINY_SHOOTING, learner
 
 RECIPE = PRECISE.replace(num_envs=8, batch_size=512)
 DISTILLATION = PRECISE.distillation
@@ -224,3 +225,69 @@ def test_every_stage_of_the_curriculum_learns_from_the_full_rate_down():
     for begun, stage in zip((0.0, 0.25, 0.5), stages, strict=True):
         assert DISTILLATION.pace(begun + 1e-6, (), RATE) > 0.9 * RATE
         assert DISTILLATION.pace(stage.until - 1e-6, (), RATE) < 0.03 * RATE
+
+
+def aim():
+    return CommandCorrection(offset=0.31, gain=1 / 0.11, knots=8)
+
+
+def test_without_errors_the_teacher_is_told_the_command():
+    told = torch.linspace(-1, 1, 9)
+    untouched = aim()
+    untouched.correct(np.zeros(0), np.zeros(0), 0.5)
+    torch.testing.assert_close(untouched(told), told)
+
+
+def test_aiming_takes_an_offset_that_depends_on_height_away():
+    rng = np.random.default_rng(0)
+    corrected = aim()
+
+    def hop(commands):
+        told = corrected(torch.from_numpy((commands - 0.31) / 0.11).float()).numpy() * 0.11 + 0.31
+        return told - 0.004 - 0.05 * (told - 0.31) + rng.normal(0, 0.005, len(commands))
+
+    for _ in range(200):
+        commands = rng.uniform(0.20, 0.42, 400)
+        corrected.correct(commands, hop(commands) - commands, 0.1)
+    for command in (0.22, 0.31, 0.40):
+        many = np.full(4000, command)
+        assert np.mean(hop(many)) == pytest.approx(command, abs=0.001)
+
+
+def test_a_height_where_nobody_hopped_is_left_alone():
+    corrected = aim()
+    corrected.correct(np.full(50, 0.20), np.full(50, 0.01), 0.5)
+    assert corrected.values[0] < 0
+    assert not corrected.values[1:].any()
+
+
+def test_a_rollout_shows_what_shooting_would_do_at_the_corrected_command():
+    model = learner(TINY_SHOOTING)
+    env = model.env
+    env.correct = lambda command: command + 0.01
+    seen = env.reset()
+    other = Shooting(ROBOT)
+    other.watch(env.task.legs)
+    other.reset(env.num_envs)
+    for _ in range(40):
+        wanted = other.torque(env.task.command + 0.01) / env.task.options.action_torque
+        np.testing.assert_allclose(seen[:, -2:], wanted.clip(-1, 1), atol=1e-6)
+        action = np.full((env.num_envs, 2), 0.3, np.float32)
+        seen, _, done, _ = env.step(action)
+        other.take_applied(action * env.task.options.action_torque)
+        other.begin(np.flatnonzero(done))
+
+
+def test_the_student_acts_from_the_start_and_comes_nearer_to_shooting():
+    model = learner(TINY_SHOOTING)
+    TINY_SHOOTING.anneal(model, model.env, 0.0)
+    assert model.policy.student_learns
+    assert model.policy.mixing == 1.0
+    TINY_SHOOTING.anneal(model, model.env, 0.5)
+    assert model.policy.mixing == 0.0
+    assert [stage.name for stage in TINY_SHOOTING.distillation.stages] == ["student"]
+    observation = torch.from_numpy(model.env.reset())
+    torch.testing.assert_close(model.policy.teacher_action(observation), observation[:, -2:])
+    model.learn(TINY_SHOOTING.schedule.steps)
+    losses = [model._dagger_step(model.policy) for _ in range(200)]
+    assert np.mean(losses[-20:]) < np.mean(losses[:20])
