@@ -81,7 +81,8 @@ def run(args: View) -> None:
         detail=scene.pixel_ratio() if args.detail is None else args.detail,
     )
     say(f"Open {viewer.address} in a browser; Ctrl-C stops.")
-    if args.browser and _has_screen():
+    screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if args.browser and (screen or sys.platform in ("win32", "darwin")):
         webbrowser.open(viewer.address)
     try:
         viewer.run(args.seconds)
@@ -103,8 +104,3 @@ def _source(args: View) -> "DataSource":
     if args.box is not None:
         return RecorderSource(args.box, args.robot)
     return LiveSimulation(args.controllers, args.robot or _ROBOT, args.height, args.seed)
-
-
-def _has_screen() -> bool:
-    screens = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    return bool(screens) or sys.platform in ("win32", "darwin")

@@ -4,7 +4,7 @@ from typing import Protocol
 
 from hopping_leg.arrays import Array
 from hopping_leg.sim.channel import SAMPLES, Measurement
-from hopping_leg.sim.soft_limiter import SoftLimiter
+from hopping_leg.sim.plant import SoftLimiter
 
 __all__ = ["SAMPLES", "Controller", "Measurement", "SoftLimiter"]
 

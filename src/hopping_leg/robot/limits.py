@@ -42,33 +42,23 @@ class MotorLimit:
     """Torque each joint's motor can give at a speed.
 
     The driving torque falls on the line from the peak torque at rest to zero at the no-load speed;
-    the software limit caps it; braking is limited by the software limit alone. With a ``count`` of
-    legs n, all inputs are (n, 2), which is faster.
+    the software limit caps it; braking is limited by the software limit alone.
     """
 
-    def __init__(self, robot: Robot, count: int | None = None) -> None:
-        line = (_per_leg(values, count) for values in _torque_speed_line(robot))
-        self.limit, self.peak, self._slope = line
-        self._minus_limit, self._minus_peak = -self.limit, -self.peak
-        self._zero = np.zeros_like(self.limit)
-        gain = robot.of_joints("torque_gain")
-        self._gain = _per_leg(gain, count) if (gain != 1).any() else None
+    def __init__(self, robot: Robot) -> None:
+        self.limit, self.peak, self._slope = _torque_speed_line(robot)
+        self._gain = robot.of_joints("torque_gain")
 
     def give(self, torque: Array, qd: Array) -> Array:
         """Return what the motors give, N m, (..., 2), if asked for so much at a speed, rad/s."""
-        within = self.clip(torque, qd)
-        return within if self._gain is None else self._gain * within
+        return self._gain * self.clip(torque, qd)
 
     def clip(self, torque: Array, qd: Array) -> Array:
         """Return ``torque`` within what the motors can do at speed ``qd``, see ``give``."""
         drop = self._slope * qd
-        upper = self.peak - drop
-        np.maximum(upper, self._zero, out=upper)
-        np.minimum(upper, self.limit, out=upper)
-        lower = np.subtract(self._minus_peak, drop, out=drop)
-        np.minimum(lower, self._zero, out=lower)
-        np.maximum(lower, self._minus_limit, out=lower)
-        return np.minimum(np.maximum(torque, lower), upper)
+        upper = np.clip(self.peak - drop, 0.0, self.limit)
+        lower = np.clip(-self.peak - drop, -self.limit, 0.0)
+        return np.clip(torque, lower, upper)
 
 
 def _torque_speed_line(robot: Robot) -> Array:
@@ -108,8 +98,3 @@ class SoftLimits:
             if not 0 <= value < float("inf"):
                 valid = "must be zero or more and finite"
                 raise UsageError(f"'{name}' of the soft limits is {value} but {valid}.")
-
-
-def _per_leg(of_joints: Array, count: int | None) -> Array:
-    """Repeat (2,) for every leg: numpy adds equal shapes in half the time of broadcast ones."""
-    return of_joints if count is None else np.broadcast_to(of_joints, (count, 2)).copy()

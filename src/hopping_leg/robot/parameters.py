@@ -20,15 +20,9 @@ JOINTS = ("hip", "knee")
 KINDS = ("leg", "pendulum")
 """What a robot may be."""
 
-
 DEFAULT_STOPS = {"hip": float(np.pi), "knee": 2.7}
 """Where the joints of a leg whose file states no mechanical stops end, rad to either side: what
 recordings of leg V2 show."""
-
-
-def reflected_inertia(rotor_inertia: float, gear_ratio: float) -> float:
-    """Return a rotor's inertia as felt behind a reduction, ``I n^2``, in kg m2."""
-    return rotor_inertia * gear_ratio**2
 
 
 @dataclass(frozen=True)
@@ -122,8 +116,7 @@ class Joint:
     def __post_init__(self) -> None:
         if np.isnan(self.armature):
             ratio = self.motor.gear_ratio * self.belt_ratio
-            inertia = reflected_inertia(self.motor.rotor_inertia, ratio)
-            object.__setattr__(self, "armature", inertia)
+            object.__setattr__(self, "armature", self.motor.rotor_inertia * ratio**2)
 
     @property
     def torque_limit(self) -> float:

@@ -188,7 +188,12 @@ class LegSimulator(Simulator):
     def _step(self, command: Array) -> Array:
         if self._jitters:
             self._jitter = self.rng.random(self.count)
-        self.in_parallel(lambda first, last: self._advance(command, first, last))
+        self.in_parallel(
+            lambda first, last: stepper.step_legs(
+                self.table, self.state, self._memory, self._past, command, self._jitter,
+                self._push, first, last, self.substeps, self.timestep,
+            )
+        )  # fmt: skip
         if self._disturbed:
             draws = self.rng.standard_normal((self.count, 6)) if self._noisy else self._reading
             stepper.read_sensors(
@@ -203,12 +208,6 @@ class LegSimulator(Simulator):
         work(*first)
         for future in futures:
             future.result()
-
-    def _advance(self, command: Array, first: int, last: int) -> None:
-        stepper.step_legs(
-            self.table, self.state, self._memory, self._past, command, self._jitter, self._push,
-            first, last, self.substeps, self.timestep,
-        )  # fmt: skip
 
     def memory(self) -> dict[str, Any]:
         """Return everything that is needed to go on exactly from here with the same robots."""

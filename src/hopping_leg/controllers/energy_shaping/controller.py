@@ -3,8 +3,6 @@
 Paper, "Energy Shaping". Each push presses with k F_f; each hop corrects k by the energy reached.
 """
 
-from typing import Protocol
-
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
@@ -13,21 +11,9 @@ from hopping_leg.controllers.energy_shaping.gains import Gain, ShapingGains, Sha
 from hopping_leg.controllers.sample_history import DatedObserver
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import Robot, kinematics
-from hopping_leg.sim import CONTROL_RATE
-from hopping_leg.sim.channel import Measurement
+from hopping_leg.sim import CONTROL_RATE, Measurement, Simulator
 
 _BLIND_TICKS = 4  # ticks after a change of phase in which true contact still flickers
-
-
-class Truth(Protocol):
-    """What the simulator knows and the leg does not; live views of n legs."""
-
-    height: Array
-    height_rate: Array
-
-    def foot_clearance(self) -> Array:
-        """Return the gap under each foot, m, (n,)."""
-        ...
 
 
 class EnergyShaping:
@@ -50,12 +36,12 @@ class EnergyShaping:
         self.robot, self.name, self.period = robot, name, 1 / rate
         self.gains = gains or ShapingGains()
         self.options = options or ShapingOptions()
-        self.truth: Truth | None = None
+        self.truth: Simulator | None = None
         thigh, shank = robot.thigh.length, robot.shank.length
         bent = 2 * thigh * shank * np.cos(robot.knee.upper)
         self._longest = float(np.sqrt(thigh**2 + shank**2 + bent))
 
-    def watch(self, legs: Truth) -> None:
+    def watch(self, legs: Simulator) -> None:
         """Take the true state where an option reads ``"true"``, else ignore it."""
         if "true" in (self.options.contact, self.options.height):
             self.truth = legs
@@ -207,7 +193,7 @@ class EnergyShaping:
         if self.truth is not None:
             self._highest = np.maximum(self._highest, self.truth.height)
 
-    def _true(self) -> Truth:
+    def _true(self) -> Simulator:
         if self.truth is None:
             raise UsageError(
                 "Options that read 'true' exist in simulation only, where `watch` shows the legs."

@@ -268,17 +268,12 @@ def _as_tree(
 
 
 def _numbers(judged: Score, prefix: str) -> Row:
-    commands = list(judged.by_command)
     return {
         f"{prefix}error_m": judged.error,
         f"{prefix}hops": judged.hops,
         f"{prefix}by_command": [
-            {
-                "command_m": c,
-                "median_abs_error_m": judged.by_command[c],
-                "median_error_m": judged.offsets[c],
-            }
-            for c in commands
+            {"command_m": c, "median_abs_error_m": error, "median_error_m": judged.offsets[c]}
+            for c, error in judged.by_command.items()
         ],
     }
 

@@ -34,15 +34,11 @@ class PyBulletSimulator(Simulator):
         ground: Ground = "robot",
     ) -> None:
         super().__init__(robot, count, rate, timestep)
-        if not robot.reality.neutral:
+        friction = "a 'load_friction'" if robot.of_joints("load_friction").any() else ""
+        if beyond := friction if robot.reality.neutral else "effects in [reality]":
             raise UsageError(
-                f"{robot.name} has effects in [reality], which only the stepper simulates; leave"
-                " --engine out, or a robot without, e.g. legv2-paper."
-            )
-        if robot.of_joints("load_friction").any():
-            raise UsageError(
-                f"{robot.name} has a 'load_friction', which only the stepper simulates; leave"
-                " --engine out, or a robot without, e.g. legv2-paper."
+                f"{robot.name} has {beyond}, which only the stepper simulates; leave --engine out,"
+                " or a robot without, e.g. legv2-paper."
             )
         law = GroundLaw(robot)
         self._law = law if ground == "robot" else None
@@ -58,7 +54,7 @@ class PyBulletSimulator(Simulator):
         self._finalizer = weakref.finalize(self, _close, self._worlds)
         self._show(np.zeros((count, 6)))
         self._known = np.full((count, 6), np.nan)
-        self._motors = MotorLimit(robot, count)
+        self._motors = MotorLimit(robot)
         self._applied = np.zeros((count, 2))
 
     @property
