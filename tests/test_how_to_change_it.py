@@ -1,4 +1,4 @@
-"""Each change on the page is carried out as it stands there, in a copy of the package."""
+"""Each change on the page is carried out as it stands there, in a copy if it is the package's."""
 
 import os
 import re
@@ -48,10 +48,11 @@ def carry_out(title, text, source):
 @pytest.mark.parametrize(("name", "section"), CHANGES, ids=[name for name, _ in CHANGES])
 def test_the_change_works_as_the_page_says(name, section, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    package = tmp_path / "package" / "hopping_leg"
-    shutil.copytree(Path(hopping_leg.__file__).parent, package)
     blocks = BLOCK.findall(section)
     assert blocks
+    package = Path(hopping_leg.__file__).parent
+    if any(title.startswith("src/") for title, _ in blocks):  # a copy compiles its physics anew
+        package = shutil.copytree(package, tmp_path / "package" / "hopping_leg")
     for title, text in blocks:
         carry_out(title, text, package)
     said = ""

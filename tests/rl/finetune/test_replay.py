@@ -49,7 +49,7 @@ def environment(run):
     options = TaskConfig(
         observation=card.layout, action_torque=card.torque_scale, commands=(COMMAND,),
         command_range=(card.command_low, card.command_high), disturbance=NO_NOISE,
-        timestep=5e-4, episode=60.0,
+        episode=60.0,
     )  # fmt: skip
     _, reward = writer()
     task = HoppingTask(ROBOT, 1, options, reward, np.random.default_rng(0), 1, autoreset=False)
