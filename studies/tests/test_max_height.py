@@ -40,7 +40,8 @@ def test_a_search_is_repeatable_and_keeps_within_its_torques(tmp_path):
 def test_more_torque_reaches_no_less_and_a_killed_search_goes_on(tmp_path):
     pairs, cache, begun = ((6.0, 6.0), (6.0, 12.0)), ResultCache(tmp_path / "whole"), []
     rows = measure_reach(study(*pairs, seconds=3.0), cache)["rows"]
-    assert 0.3 < rows[0]["apex_m"] <= rows[1]["apex_m"]
+    assert rows[0]["apex_m"] <= rows[1]["apex_m"]
+    assert rows[1]["apex_m"] > 0.3
     cut = ResultCache(tmp_path / "cut", begun.append)
     measure_reach(study(pairs[0], seconds=3.0), cut)
     assert measure_reach(study(*pairs, seconds=3.0), cut)["rows"] == rows

@@ -11,6 +11,7 @@ from hopping_leg.envs import ApexRewardConfig
 from hopping_leg.rl import algorithms, recipe, search_space
 from hopping_leg.rl.distillation.distillation import Distillation
 from hopping_leg.rl.recipes.fast import FAST
+from hopping_leg.robot import TIMESTEP
 
 PRECISE = recipe.Recipe(
     name="precise",
@@ -19,6 +20,7 @@ PRECISE = recipe.Recipe(
         observation="dated-long",
         command_range=(0.20, 0.46),
         command_skew=1.5,
+        timestep=TIMESTEP,
         randomize_from_start=False,
     ),
     reward=ApexRewardConfig(
