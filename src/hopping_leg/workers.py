@@ -173,11 +173,7 @@ def _unreached(address: str | None, why: str) -> str:
 
 
 def _knock(address: str | None) -> None:
-    """Fail at once where nothing answers; Ray itself would try for minutes.
-
-    Raises:
-        OSError: Nothing answers at an address of the form ``host:port``.
-    """
+    """Fail at once with an OSError where nothing answers; Ray itself would try for minutes."""
     host, _, port = (address or "").removeprefix("ray://").rpartition(":")
     if host and port.isdigit():
         socket.create_connection((host, int(port)), _PATIENCE).close()

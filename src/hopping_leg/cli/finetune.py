@@ -114,12 +114,7 @@ def guard_of(robot: Robot, rate: float) -> "Guard":
 
 
 def _refuse(args: Finetune, policy: "Policy", robot: Robot) -> None:
-    """Refuse what cannot be done, before anything moves.
-
-    Raises:
-        UsageError: An option has no meaning.
-        RobotError: The believed robot is a twin.
-    """
+    """Refuse what cannot be done, before anything moves."""
     if (args.on is None) == (args.transport is None):
         raise errors.UsageError(
             "Give either --on, a twin that plays the leg, or --transport, its drives."

@@ -32,7 +32,10 @@ class Diagnostic:
         for line in lines:
             words = line.decode("latin1").split()
             if words:
-                self._output += self._execute(words, time)
+                try:
+                    self._output += self._answer(words, time)
+                except UsageError as error:
+                    self._output += f"ERR {error}\r\n".encode()
 
     def poll(self, most: int) -> bytes:
         """Return the next bytes of the answers, at most so many."""
@@ -45,12 +48,6 @@ class Diagnostic:
             self._packet = self._packet % (_PACKETS - 1) + 1
             self._sent = self.poll(most)
         return self._packet, self._sent
-
-    def _execute(self, words: list[str], time: float) -> bytes:
-        try:
-            return self._answer(words, time)
-        except UsageError as error:
-            return f"ERR {error}\r\n".encode()
 
     def _answer(self, words: list[str], time: float) -> bytes:
         settings = self._settings

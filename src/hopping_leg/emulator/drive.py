@@ -98,11 +98,8 @@ class EmulatedDrive:
         """Power up with the output at a true position, revolutions."""
         self.settings.load()
         self.encoder.boot(output)
-        self.machine, self.command, self.uptime = (
-            mode_machine.ModeMachine(),
-            torque_law.Command(),
-            0.0,
-        )
+        self.machine, self.command = mode_machine.ModeMachine(), torque_law.Command()
+        self.uptime = 0.0
 
     def write(self, register: int, resolution: int, value: float) -> int:
         """Take one register from the host; return 0 or an error code."""

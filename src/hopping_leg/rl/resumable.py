@@ -103,7 +103,10 @@ def restore(model: BaseAlgorithm, tree: Tree) -> None:
     model.ep_info_buffer = deque(tree["episodes"], maxlen=model._stats_window_size)
     model.ep_success_buffer = deque(maxlen=model._stats_window_size)
     if "replay" in tree:
-        _restore_replay(model.replay_buffer, tree["replay"])
+        buffer, replay = model.replay_buffer, tree["replay"]
+        for name, values in replay["arrays"].items():
+            getattr(buffer, name)[: len(values)] = values
+        buffer.pos, buffer.full = replay["pos"], replay["full"]
     model.restore_own(tree["own"])
     _restore_random(model, tree["random"])
 
@@ -145,12 +148,6 @@ def _replay_state(buffer: Any) -> Tree:  # noqa: ANN401
     filled = buffer.buffer_size if buffer.full else buffer.pos
     arrays = {name: getattr(buffer, name)[:filled] for name in _REPLAY}
     return {"pos": buffer.pos, "full": buffer.full, "arrays": arrays}
-
-
-def _restore_replay(buffer: Any, state: Tree) -> None:  # noqa: ANN401
-    for name, values in state["arrays"].items():
-        getattr(buffer, name)[: len(values)] = values
-    buffer.pos, buffer.full = state["pos"], state["full"]
 
 
 def _random_state(model: BaseAlgorithm) -> Tree:

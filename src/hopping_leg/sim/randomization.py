@@ -77,17 +77,14 @@ class Range:
 
     def sample(self, rng: np.random.Generator, own: float = 0.0) -> float:
         """Return one value; ``own`` is what the robot itself has."""
-        drawn = self._sample(rng)
-        if self.bounds == "values":
-            return drawn
-        return own * drawn if self.bounds == "factors" else own + drawn
-
-    def _sample(self, rng: np.random.Generator) -> float:
         if self.scale == "uniform":
             drawn = float(rng.uniform(self.low, self.high))
         else:
             drawn = float(math.exp(rng.uniform(math.log(self.low), math.log(self.high))))
-        return round(drawn / self.step) * self.step if self.step else drawn
+        drawn = round(drawn / self.step) * self.step if self.step else drawn
+        if self.bounds == "values":
+            return drawn
+        return own * drawn if self.bounds == "factors" else own + drawn
 
     def normalize(self, value: float, own: float = 0.0) -> float:
         """Return where a value lies in the range, -1 at its lower and 1 at its upper bound.

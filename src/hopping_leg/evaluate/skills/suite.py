@@ -32,8 +32,8 @@ def run_skills(
         ``counted``, ``stairs``, ``climbs``, ``landings``, ``conditions``, ``versions``, ``notes``.
 
     Raises:
-        UsageError: A command is out of reach or of an entry's range, or the engine is not
-            MuJoCo.
+        UsageError: A command is out of reach or of an entry's range, or the engine is not the
+            stepper.
     """
     if setup.engine != "stepper":
         raise UsageError("Stairs and drops need the engine stepper; leave --engine out.")
