@@ -68,13 +68,6 @@ def test_from_recordings_to_robot_numbers_and_report(recordings, tmp_path, capsy
     assert not re.search(r'(?:src|href)="(?!data:)', page.read_text())
 
 
-def test_the_same_seed_gives_the_same_bytes(recordings, tmp_path):
-    words = [recordings[0], *FEW, "--generations", 3, "--seed", 7]
-    assert [call(tmp_path / name, *words) for name in ("one", "two")] == [0, 0]
-    one, two = ((tmp_path / name / "leg.toml").read_bytes() for name in ("one", "two"))
-    assert one == two
-
-
 @pytest.mark.slow
 def test_a_killed_run_resumes_to_the_same_bytes(recordings, tmp_path):
     words = [recordings[0], *FEW, "--generations", 12, "--seed", 7]

@@ -50,12 +50,6 @@ def test_a_new_command_holds_for_the_next_push():
     np.testing.assert_allclose(found.apex[late], asked[late], atol=0.005)
 
 
-def test_the_same_seed_gives_the_same_hops():
-    robot = load_robot("legv2")
-    one, other = (hop(robot, np.array([0.3])).data["height_m"] for _ in range(2))
-    np.testing.assert_array_equal(one, other)
-
-
 def test_lengths_of_a_hop_fit_the_leg():
     robot = load_robot("legv2")
     numbers = HopShape().hops(robot, np.linspace(0.22, 0.44, 12))

@@ -1,9 +1,22 @@
 """A reward follows from its list of terms: names, sum, annealing, what is remembered."""
 
+import math
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from hopping_leg.envs import HoppingEnv, HoppingTask, Reward, RewardTerm, TaskConfig, paper_reward
+from hopping_leg.envs import (
+    HoppingEnv,
+    HoppingTask,
+    PaperRewardConfig,
+    Reward,
+    RewardTerm,
+    TaskConfig,
+    Transition,
+    paper_reward,
+)
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot
 
@@ -77,3 +90,75 @@ def test_a_weight_may_depend_on_the_share_of_the_training():
 def test_two_terms_of_one_name_are_refused():
     with pytest.raises(UsageError, match="names of their own"):
         paper_reward(ROBOT).with_terms(RewardTerm("jerk", 1.0, squared_action))
+
+
+LOWER, UPPER = ROBOT.of_joints("lower"), ROBOT.of_joints("upper")
+SPEED = ROBOT.of_joints("no_load_speed")
+REST = 0.2 + ROBOT.foot.radius
+PRINTED = PaperRewardConfig()
+
+
+def transition(
+    height=0.3, rate=0.0, q=(0.7, -1.4), qd=(0.0, 0.0), command=0.3, action=(0, 0), last=(0, 0)
+):
+    def row(value):
+        return np.array([value], dtype=float)
+
+    return Transition(
+        state=row((height, *q, rate, *qd)),
+        command=row(command),
+        action=row(action),
+        last_action=row(last),
+        apex=np.array([False]),
+        apex_height=row(np.nan),
+        measure_clearance=lambda: row(0.0),
+    )
+
+
+def terms_of(config=PRINTED, **state):
+    paper = paper_reward(ROBOT, config)
+    reward, terms = paper(transition(**state))
+    return float(reward[0]), dict(zip(paper.names, terms[0].tolist(), strict=True))
+
+
+heights, rates = st.floats(0.05, 0.6), st.floats(-5, 5)
+angles = st.tuples(st.floats(-2, 3), st.floats(-4, 1))
+speeds = st.tuples(st.floats(-90, 90), st.floats(-90, 90))
+actions = st.tuples(st.floats(-1, 1), st.floats(-1, 1))
+
+
+@given(heights, rates, angles, speeds, st.floats(0.2, 0.4), actions, actions)
+def test_every_term_is_as_printed(height, rate, q, qd, command, action, last):
+    reward, terms = terms_of(
+        height=height, rate=rate, q=q, qd=qd, command=command, action=action, last=last
+    )
+    energy = rate**2 + (height - REST) ** 2
+    barrier = math.exp(height - command) if height >= command else 0.0
+    jerk = sum((a - b) ** 2 for a, b in zip(action, last, strict=True))
+    position = sum(
+        math.exp(-10 * (x - low)) + math.exp(10 * (x - high)) if low <= x <= high else 1.0
+        for x, low, high in zip(q, LOWER, UPPER, strict=True)
+    )
+    velocity = sum(v**2 - m**2 if abs(v) > m else 0.0 for v, m in zip(qd, SPEED, strict=True))
+    expected = {"energy": energy, "height": barrier, "jerk": jerk, "position": position}
+    expected["velocity"] = velocity
+    assert terms == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    total = 0.5 * energy - 2 * barrier - 0.05 * jerk - 0.02 * position - 0.005 * velocity
+    assert reward == pytest.approx(total, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("barrier", "expected"),
+    [("step", math.exp(0.05)), ("printed", 1 - math.exp(0.05))],
+)
+def test_the_height_barrier_as_printed_rewards_overshoot_and_the_step_does_not(barrier, expected):
+    config = PaperRewardConfig(barrier=barrier)
+    assert terms_of(config, height=0.35)[1]["height"] == pytest.approx(expected)
+    below, above = (terms_of(config, height=height) for height in (0.29, 0.40))
+    assert below[1]["height"] == 0.0
+    assert (above[0] > below[0]) == (barrier == "printed")
+
+
+def test_velocity_limit_can_be_chosen():
+    config = PaperRewardConfig(velocity_limit=10.0)
+    assert terms_of(config, qd=(11.0, -12.0))[1]["velocity"] == pytest.approx(21.0 + 44.0)

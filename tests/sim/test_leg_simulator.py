@@ -18,7 +18,7 @@ from hopping_leg.robot import (
     SensorMismatch,
     load_robot,
 )
-from hopping_leg.sim import LegSimulator, NoiseAndDelay, Plant
+from hopping_leg.sim import LegSimulator
 from hopping_leg.sim.perturbation import Perturbation, Perturber
 from hopping_leg.sim.randomization import draw_twin
 from tests.sim.legs import (
@@ -155,21 +155,6 @@ def test_legs_go_on_exactly_from_a_memory(ticks, seed):
     shaken(other, 7)
     other.restore(memory)
     np.testing.assert_array_equal(shaken(other, 10, seed=2), rest)
-
-
-@pytest.mark.parametrize("name", ["twin", "legv2"])
-def test_a_plant_repeats_with_its_seed_alone(name):
-    def track(seed):
-        legs = make_legs(load_robot(name), 3)
-        legs.stand(slice(None), POSTURE, 0.02)
-        plant = Plant(legs, NoiseAndDelay(), None, np.random.default_rng(seed))
-        plant.channel.restart(slice(None), legs.measured_q, legs.measured_qd, np.zeros(3))
-        for _ in range(40):
-            seen = plant.sense(np.zeros(3))
-            plant.drive(20 * (POSTURE - seen.q[:, 0]) - 0.2 * seen.qd[:, 0])
-        return rows(legs).tobytes()
-
-    assert track(4) == track(4) != track(5)
 
 
 def test_sensors_that_change_begin_in_the_present_and_keep_the_past():

@@ -82,16 +82,6 @@ def test_a_simulated_trace_is_shown_as_recorded(simulated, tmp_path):
     assert np.all(apexes > 0.2)
 
 
-def test_without_a_measured_height_the_leg_stands():
-    time, values, note = trace_rows(hardware_trace(hip_position_rad=[0.8, 0.9]), ROBOT)
-    q = np.array([[0.8, -1.6], [0.9, -1.6]])
-    assert len(time) == 2
-    height = values[FIELDS.index("height_m")]
-    np.testing.assert_allclose(height, kinematics.stance_height(ROBOT, q))
-    assert np.isnan(values[FIELDS.index("foot_clearance_m")]).all()
-    assert "standing" in note
-
-
 def test_an_estimate_stands_in_for_the_height():
     trace = hardware_trace(estimated_height_m=[0.31, np.nan])
     _, values, note = trace_rows(trace, ROBOT)
