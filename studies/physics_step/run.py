@@ -88,7 +88,7 @@ class PhysicsStep:
     duration: float = 10.0
     """Of a run, s."""
     variants: bool = True
-    """Whether MuJoCo's other numbers are varied, for energy shaping on the first robot at 0.25 ms."""
+    """Whether MuJoCo's other numbers are varied: energy shaping on the first robot at 0.25 ms."""
     seed: int = 0
     """Of noise and delay, the same at every step."""
     threads: int = 0
