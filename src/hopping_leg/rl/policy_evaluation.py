@@ -71,7 +71,7 @@ def evaluate_policy(
     rate: float = 200.0,
     threads: int = 1,
 ) -> list[CommandResult]:
-    """Let a controller hop at fixed commands, m, rising, with noise and delay, physics at 0.5 ms.
+    """Let a controller hop at fixed commands, m, rising, with noise and delay.
 
     Each seed adds four legs per command; ``threads`` of 0 are one per core.
     """

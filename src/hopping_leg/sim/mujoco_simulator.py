@@ -69,10 +69,6 @@ class MujocoSimulator(Simulator):
         """Push the bases upward from now on, N, (n,)."""
         self._force[:, 0] = force
 
-    def raise_ground(self, rise: Array) -> None:
-        """Raise the ground under each leg, m, (n,): the leg, whose height is above it, is lower."""
-        self.height -= rise
-
     def place(self, ids: IntArray | slice, height: Array | float, q: Array) -> None:
         """Put legs at rest at a base height, m, (k,), and joint angles, rad, (k, 2) or (2,)."""
         self.batch.reset(np.arange(self.count)[ids], stage=0)

@@ -166,25 +166,22 @@ class Finetuning:
     def _learn(self, trial: hardware_trial.HardwareTrial, ticks: int, *, explored: bool) -> None:
         if self._learner is None:
             self._network, self._correction = self._best
-            self._begin_learning()
-            assert self._learner is not None
-            first_steps = self._options.first_steps
-            self._learner.learn(first_steps, self._seed(0, 5), critics_only=True)
+            taught = self._begin_learning()
+            taught.learn(self._options.first_steps, self._seed(0, 5), critics_only=True)
         else:
-            self._keep(trial.trace, bool(trial.complaint))
-        assert self._learner is not None
+            taught = self._learner
+            self._keep(taught, trial.trace, bool(trial.complaint))
         self._explored += explored
         steps = round(self._options.steps_per_tick * ticks)
         first = self._explored <= self._options.critics_first
-        self._learner.learn(steps, self._seed(len(self.rows), 3), critics_only=first)
-        self._network = self._learner.network()
+        taught.learn(steps, self._seed(len(self.rows), 3), critics_only=first)
+        self._network = taught.network()
 
-    def _keep(self, trace: Trace, ended: bool) -> None:
-        assert self._learner is not None
+    def _keep(self, taught: learner.Learner, trace: Trace, ended: bool) -> None:
         data = TrialData.of([trace])
-        self._learner.keep(self._writer()(data, self._estimator(data), ended=ended))
+        taught.keep(self._writer()(data, self._estimator(data), ended=ended))
 
-    def _begin_learning(self) -> None:
+    def _begin_learning(self) -> learner.Learner:
         """Make a learner that knows the believed robot and every trial so far."""
         o, task = self._options, self._task
         self._origin = (self._network, self._correction)
@@ -197,9 +194,10 @@ class Finetuning:
             task.robot, task.commands, task.seed,
             explorer, self._estimator, self._writer(), o.believed_seconds,
         )  # fmt: skip
-        self._learner = learner.Learner(self._network, rows, o.learner, task.seed)
+        self._learner = taught = learner.Learner(self._network, rows, o.learner, task.seed)
         for row in self.rows:
-            self._keep(Trace.load(self._trace(row["outing"])), bool(row["complaint"]))
+            self._keep(taught, Trace.load(self._trace(row["outing"])), bool(row["complaint"]))
+        return taught
 
     def _writer(self) -> replay.TransitionWriter:
         o, card = self._options, self._task.policy.card
@@ -247,9 +245,7 @@ class Finetuning:
         self.rows, self._explored = tree["rows"], tree["explored"]
         if tree["learner"] is not None:
             self._network, self._correction = self._from_tree(tree["origin"])
-            self._begin_learning()
-            assert self._learner is not None
-            self._learner.restore(tree["learner"])
+            self._begin_learning().restore(tree["learner"])
         self._network, self._correction = self._from_tree(tree["now"])
         self._best = self._from_tree(tree["best"])
 
