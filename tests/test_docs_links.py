@@ -13,7 +13,7 @@ from urllib.parse import unquote, urljoin, urlsplit
 import pytest
 
 from tests.doc_pages import PAGES, ROOT
-from tests.evaluate.test_acceptance import GOOD
+from tests.evaluate.test_metrics import GOOD
 
 CLICKS = 2
 """From the front page to any other."""
