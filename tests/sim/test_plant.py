@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hopping_leg.errors import UsageError
 from hopping_leg.robot import SoftLimits, dynamics, load_robot
-from hopping_leg.sim import LegSimulator, NoiseAndDelay, Plant, SoftLimiter
+from hopping_leg.sim import NO_NOISE, Channel, LegSimulator, NoiseAndDelay, Plant, SoftLimiter
 
 ROBOT = load_robot("legv2")
 OUTSIDE = np.array([1.5, -2.5])
@@ -99,3 +100,124 @@ def test_soft_limits_do_not_ring_on_a_late_sample(name, joint, late):
     swings = swings[swings > 1e-3]
     assert (swings[1:] < 0.57 * swings[:-1]).all()  # what a damping ratio of 0.18 leaves
     assert abs(angle[-1]) < 5e-3
+
+
+PERIOD = 0.005
+QUIET = NoiseAndDelay(joint_noise=0.0, torque_noise=0.0)
+
+
+def channel(count, disturbance, seed=0):
+    return Channel(count, disturbance, PERIOD, np.random.default_rng(seed))
+
+
+def at(tick, count):
+    """A true state and command that spell the tick."""
+    value = float(tick)
+    return np.full((count, 2), value), np.full((count, 2), -value), np.full(count, value)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 7), st.integers(3, 10))
+def test_delayed_samples_stay_in_order_and_carry_their_age(seed, count, depth):
+    delayed = channel(count, dataclasses.replace(QUIET, delay_buffer=depth), seed)
+    delayed.restart(slice(None), *at(0, count))
+    for tick in range(1, 40):
+        seen = delayed.sense(*at(tick, count))
+        delayed.actuate(np.zeros((count, 2)))
+        ages = np.round(seen.age / PERIOD).astype(int)
+        assert (np.diff(ages, axis=1) > 0).all()
+        assert ages.min() >= 0
+        assert ages.max() < depth
+        stamps = np.maximum(tick - ages, 0)
+        np.testing.assert_array_equal(seen.q, np.repeat(stamps[..., None], 2, axis=2))
+        np.testing.assert_array_equal(seen.qd, -seen.q)
+        np.testing.assert_array_equal(seen.command, stamps)
+
+
+def test_half_of_all_ticks_are_delayed():
+    delayed = channel(64, QUIET)
+    late = []
+    for tick in range(200):
+        late.append(delayed.sense(*at(tick, 64)).age[:, 2] > 2.5 * PERIOD)
+        delayed.actuate(np.zeros((64, 2)))
+    # One of the 120 ways to draw three samples in order is the undelayed one.
+    assert np.mean(late) == pytest.approx(0.5 * 119 / 120, abs=0.015)
+
+
+@given(st.floats(0, 1), st.floats(0, 1))
+def test_noise_stays_within_its_share_of_the_value(joint_noise, torque_noise):
+    noisy = channel(50, NoiseAndDelay(joint_noise, torque_noise, 0.0))
+    q, qd, torque = (np.random.default_rng(k).normal(0, 5, (50, 2)) for k in range(3))
+    seen = noisy.sense(q, qd, np.full(50, 0.3))
+    for sample, truth in ((seen.q[:, 0], q), (seen.qd[:, 0], qd)):
+        assert (np.abs(sample - truth) <= joint_noise * np.abs(truth) + 1e-12).all()
+    disturbed = noisy.actuate(torque)
+    assert (np.abs(disturbed - torque) <= torque_noise * np.abs(torque) + 1e-12).all()
+    assert (seen.command[:, 0] == 0.3).all()
+
+
+def test_noise_fills_its_range_evenly():
+    noisy = channel(2000, NoiseAndDelay(delay_probability=0.0))
+    ones = np.ones((2000, 2))
+    share = (noisy.sense(ones, ones, np.ones(2000)).q[:, 0] - 1) / 0.05
+    torque = (noisy.actuate(ones) - 1) / 0.15
+    for uniform in (torque, share):
+        assert uniform.mean() == pytest.approx(0.0, abs=0.05)
+        assert uniform.std() == pytest.approx(1 / np.sqrt(3), abs=0.02)
+
+
+def test_no_disturbance_passes_everything_unchanged():
+    clean = channel(3, NO_NOISE)
+    for tick in range(30):
+        q, qd, command = at(tick, 3)
+        seen = clean.sense(q, qd, command)
+        np.testing.assert_array_equal(seen.q[:, 0], q)
+        np.testing.assert_array_equal(seen.age, np.tile([0, PERIOD, 2 * PERIOD], (3, 1)))
+        np.testing.assert_array_equal(clean.actuate(qd), qd)
+
+
+def test_sensing_twice_in_a_tick_sees_the_same():
+    noisy = channel(4, NoiseAndDelay())
+    for tick in range(1200):
+        first = noisy.sense(*at(tick, 4))
+        again = noisy.sense(*at(tick, 4))
+        np.testing.assert_array_equal(first.q, again.q)
+        np.testing.assert_array_equal(first.age, again.age)
+        noisy.actuate(np.zeros((4, 2)))
+
+
+def test_a_restarted_leg_has_no_past():
+    noisy = channel(2, QUIET)
+    for tick in range(25):
+        noisy.sense(*at(tick, 2))
+        noisy.actuate(np.zeros((2, 2)))
+    noisy.restart(np.array([1]), *at(100, 1))
+    seen = noisy.sense(*at(100, 2))
+    assert (seen.q[1] == 100).all()
+    assert (seen.q[0, 1:] < 100).all()
+
+
+@pytest.mark.parametrize("ticks", [3, 511, 512, 700])
+def test_a_restored_channel_goes_on_exactly(ticks):
+    one, other = channel(1, NoiseAndDelay(), 1), channel(1, NoiseAndDelay(), 2)
+    for tick in range(ticks):
+        one.sense(*at(tick, 1))
+        one.actuate(np.ones((1, 2)))
+    other.restore(one.state())
+    for tick in range(ticks, ticks + 600):
+        np.testing.assert_array_equal(one.sense(*at(tick, 1)).q, other.sense(*at(tick, 1)).q)
+        ones = np.ones((1, 2))
+        np.testing.assert_array_equal(one.actuate(ones), other.actuate(ones))
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("joint_noise", -0.1),
+        ("torque_noise", float("nan")),
+        ("delay_probability", 2),
+        ("delay_buffer", 2),
+    ],
+)
+def test_a_meaningless_disturbance_is_refused(field, value):
+    with pytest.raises(UsageError, match=field):
+        NoiseAndDelay(**{field: value})
