@@ -9,7 +9,7 @@ from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes.adaptive import ADAPTIVE
 from hopping_leg.rl.recipes.fast import FAST
 from hopping_leg.rl.recipes.paper import PAPER
-from hopping_leg.rl.recipes.precise import GRU, PRECISE, SHOOTING
+from hopping_leg.rl.recipes.precise import GRU, LEARNT, PRECISE
 from hopping_leg.rl.resumable import ResumablePPO
 from hopping_leg.robot import load_robot
 from hopping_leg.sim.randomization import WIDE_RANGES
@@ -28,9 +28,9 @@ STUDENT = {
     "dagger.batch_size": 64,
 }  # fmt: skip
 TINY_FAST = FAST.replace(SMALL)
-TINY_PRECISE = PRECISE.replace(SMALL | STUDENT, eval_commands=(0.3,), teachers=3)
-TINY_GRU = PRECISE.replace(GRU | SMALL | STUDENT | {"dagger.buffer_size": 400})
-TINY_SHOOTING = PRECISE.replace(SHOOTING | SMALL | STUDENT)
+TINY_LEARNT = LEARNT.replace(SMALL | STUDENT, eval_commands=(0.3,), teachers=3)
+TINY_GRU = LEARNT.replace(GRU | SMALL | STUDENT | {"dagger.buffer_size": 400})
+TINY_PRECISE = PRECISE.replace(SMALL | STUDENT)
 TINY_ADAPTIVE = ADAPTIVE.replace(SMALL | STUDENT)
 
 
@@ -44,10 +44,10 @@ class TinyPPO(Recipe):
 
 TINY_PPO = TinyPPO(**vars(PAPER.replace(steps=640, privileged_critic=False, num_envs=2)))
 EVERY = {
-    "sac": TINY, "ppo": TINY_PPO, "fast": TINY_FAST, "precise": TINY_PRECISE,
+    "sac": TINY, "ppo": TINY_PPO, "fast": TINY_FAST, "learnt": TINY_LEARNT,
     "recurrent": TINY_GRU, "adaptive": TINY_ADAPTIVE,
-    "shooting": TINY_SHOOTING,
-    "surprised": TINY_PRECISE.replace({"task.randomised": WIDE_RANGES}),
+    "precise": TINY_PRECISE,
+    "surprised": TINY_LEARNT.replace({"task.randomised": WIDE_RANGES}),
 }  # fmt: skip
 
 

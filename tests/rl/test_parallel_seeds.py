@@ -22,7 +22,7 @@ from hopping_leg.rl.parallel_seeds import ParallelSeeds
 from hopping_leg.rl.policy_evaluation import CommandResult, command_score, score
 from hopping_leg.rl.run_folder import RunFolder
 from hopping_leg.rl.train import train
-from tests.rl.learners import ROBOT, TINY, TINY_PRECISE
+from tests.rl.learners import ROBOT, TINY, TINY_LEARNT
 
 
 def leave(folder, *, score, minutes, policy):
@@ -77,7 +77,7 @@ def test_the_best_goes_on_with_the_threads_of_all(scores, best, finished, tmp_pa
 def test_a_start_stops_at_the_exam_of_its_teacher_and_goes_on_from_there(tmp_path, monkeypatch):
     monkeypatch.setattr(policy_evaluation, "_SECONDS", 0.5)
     monkeypatch.setattr(Distillation, "evaluate_teacher", lambda *_args: 0.005)
-    several = ParallelSeeds(TINY_PRECISE, ROBOT, 1, tmp_path, 2, quiet=True)
+    several = ParallelSeeds(TINY_LEARNT, ROBOT, 1, tmp_path, 2, quiet=True)
     several.work(1)
     run = several.folder(1)
     decision = json.loads((run / "decision.json").read_text())
@@ -85,12 +85,12 @@ def test_a_start_stops_at_the_exam_of_its_teacher_and_goes_on_from_there(tmp_pat
     (last,) = list_checkpoints(run / "checkpoints")
     stopped = int(last.name.split("-")[-1])
     # Each of three teachers learns for a third of 0.4 of the steps.
-    assert TINY_PRECISE.schedule.steps * 0.4 / 3 <= stopped < TINY_PRECISE.schedule.steps / 2
+    assert TINY_LEARNT.schedule.steps * 0.4 / 3 <= stopped < TINY_LEARNT.schedule.steps / 2
     assert not (run / "policy.onnx").exists()
     several.work(1)
     assert list_checkpoints(run / "checkpoints") == [last]
-    alone = train(TINY_PRECISE, ROBOT, 3, tmp_path / "alone", quiet=True)
-    going_on = train(TINY_PRECISE, ROBOT, 3, run, resume=True, quiet=True)
+    alone = train(TINY_LEARNT, ROBOT, 3, tmp_path / "alone", quiet=True)
+    going_on = train(TINY_LEARNT, ROBOT, 3, run, resume=True, quiet=True)
     assert going_on.policy.read_bytes() == alone.policy.read_bytes()
 
 

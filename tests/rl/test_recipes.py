@@ -21,7 +21,7 @@ from hopping_leg.rl.recipes import (
     randomise,
     recipe_of,
 )
-from hopping_leg.rl.recipes.precise import PRECISE
+from hopping_leg.rl.recipes.precise import LEARNT
 from hopping_leg.rl.run_folder import RunFolder
 from hopping_leg.robot import load_robot, shipped_robots
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES, Range
@@ -223,7 +223,7 @@ def test_a_card_tells_how_teachers_did():
 
 
 def test_a_card_tells_who_learnt_until_when():
-    stages = PRECISE.distillation.stages
+    stages = LEARNT.distillation.stages
     said = curriculum([stage._asdict() for stage in stages])
     assert "teacher 1 until 25 % (accepted from 7 mm)" in said
     assert "student until 100 %" in said

@@ -9,14 +9,14 @@ import torch
 from hopping_leg.controllers.shooting import Shooting
 from hopping_leg.rl.distillation import distillation
 from hopping_leg.rl.distillation.teacher_student import CommandCorrection, shift_to_arrival
-from hopping_leg.rl.recipes.precise import PRECISE
+from hopping_leg.rl.recipes.precise import LEARNT
 from hopping_leg.sim.randomization import WIDE_RANGES
-from tests.rl.learners import ROBOT, TINY_PRECISE, TINY_SHOOTING, learner
+from tests.rl.learners import ROBOT, TINY_LEARNT, TINY_PRECISE, learner
 
-RECIPE = PRECISE.replace(num_envs=8, batch_size=512)
-DISTILLATION = PRECISE.distillation
-RATE = PRECISE.algorithm.learning_rate
-COMMANDS = PRECISE.selection.eval_commands
+RECIPE = LEARNT.replace(num_envs=8, batch_size=512)
+DISTILLATION = LEARNT.distillation
+RATE = LEARNT.algorithm.learning_rate
+COMMANDS = LEARNT.selection.eval_commands
 
 
 @pytest.fixture(scope="module")
@@ -74,27 +74,27 @@ def test_the_teacher_with_the_best_score_teaches():
         evaluated.append({k: v.clone() for k, v in policy.state_dict().items()})
         return next(scores)
 
-    chooser = learner(TINY_PRECISE)
+    chooser = learner(TINY_LEARNT)
     chooser._evaluate_teacher = evaluate_teacher
-    for share in np.linspace(0, TINY_PRECISE.distillation.teacher_share, 7):
-        TINY_PRECISE.anneal(chooser, chooser.env, share)
+    for share in np.linspace(0, TINY_LEARNT.distillation.teacher_share, 7):
+        TINY_LEARNT.anneal(chooser, chooser.env, share)
         with torch.no_grad():
             chooser.policy.action_net.bias += 1.0
     with torch.no_grad():
         chooser.policy.action_net.bias -= 1.0
-    assert TINY_PRECISE.extra_results(chooser)["teacher_scores_m"] == [0.03, 0.01, 0.02]
+    assert TINY_LEARNT.extra_results(chooser)["teacher_scores_m"] == [0.03, 0.01, 0.02]
     first, second, third = (one["mlp_extractor.policy_net.0.weight"] for one in evaluated)
     assert not torch.equal(first, second)
     assert not torch.equal(second, third)
     now = chooser.policy.state_dict()
     best = {k: v for k, v in evaluated[1].items() if k != "log_std"}
     assert all(torch.equal(now[name], value) for name, value in best.items())
-    TINY_PRECISE.anneal(chooser, chooser.env, 1.0)
+    TINY_LEARNT.anneal(chooser, chooser.env, 1.0)
     assert len(chooser.teacher_scores) == 3
 
 
 def test_a_teacher_that_passes_gives_the_time_of_the_next_ones_to_the_policy():
-    recipe = TINY_PRECISE.replace(teacher_accept_score=0.01)
+    recipe = TINY_LEARNT.replace(teacher_accept_score=0.01)
     scores = iter([0.03, 0.005])
     chooser = learner(recipe)
     chooser._evaluate_teacher = lambda policy: next(scores)
@@ -122,7 +122,7 @@ def test_the_policys_rate_falls_from_when_its_teacher_passed():
 
 
 def test_a_single_teacher_is_not_evaluated():
-    alone = TINY_PRECISE.replace(teachers=1)
+    alone = TINY_LEARNT.replace(teachers=1)
     model = learner(alone)
     for share in (0.0, alone.distillation.teacher_share, 1.0):
         alone.anneal(model, model.env, share)
@@ -158,7 +158,7 @@ def test_the_evaluation_counts_the_worst_height_and_time_on_the_ground(
 
 
 def test_imitation_brings_the_student_to_its_teacher_and_leaves_the_teacher_alone():
-    student = learner(TINY_PRECISE)
+    student = learner(TINY_LEARNT)
     policy = student.policy
     student.on_boundary = lambda: setattr(policy, "student_learns", True)
     student.learn(128)
@@ -179,7 +179,7 @@ def test_imitation_brings_the_student_to_its_teacher_and_leaves_the_teacher_alon
 
 
 def test_the_papers_observation_can_be_taught_too():
-    model = learner(TINY_PRECISE.replace({"task.observation": "three-samples"}))
+    model = learner(TINY_LEARNT.replace({"task.observation": "three-samples"}))
     model.on_boundary = lambda: setattr(model.policy, "student_learns", True)
     model.learn(128)
     assert model.policy.measured == 15
@@ -187,7 +187,7 @@ def test_the_papers_observation_can_be_taught_too():
 
 
 def test_legs_differ_for_the_policy_but_not_for_its_teacher():
-    recipe = TINY_PRECISE.replace({"task.randomised": WIDE_RANGES})
+    recipe = TINY_LEARNT.replace({"task.randomised": WIDE_RANGES})
     model = learner(recipe)
     apart = []
     for share in (0.0, recipe.distillation.teacher_share):
@@ -262,7 +262,7 @@ def test_a_height_where_nobody_hopped_is_left_alone():
 
 
 def test_a_rollout_shows_what_shooting_would_do_at_the_corrected_command():
-    model = learner(TINY_SHOOTING)
+    model = learner(TINY_PRECISE)
     env = model.env
     env.correct = lambda command: command + 0.01
     seen = env.reset()
@@ -279,15 +279,15 @@ def test_a_rollout_shows_what_shooting_would_do_at_the_corrected_command():
 
 
 def test_the_student_acts_from_the_start_and_comes_nearer_to_shooting():
-    model = learner(TINY_SHOOTING)
-    TINY_SHOOTING.anneal(model, model.env, 0.0)
+    model = learner(TINY_PRECISE)
+    TINY_PRECISE.anneal(model, model.env, 0.0)
     assert model.policy.student_learns
     assert model.policy.mixing == 1.0
-    TINY_SHOOTING.anneal(model, model.env, 0.5)
+    TINY_PRECISE.anneal(model, model.env, 0.5)
     assert model.policy.mixing == 0.0
-    assert [stage.name for stage in TINY_SHOOTING.distillation.stages] == ["student"]
+    assert [stage.name for stage in TINY_PRECISE.distillation.stages] == ["student"]
     observation = torch.from_numpy(model.env.reset())
     torch.testing.assert_close(model.policy.teacher_action(observation), observation[:, -2:])
-    model.learn(TINY_SHOOTING.schedule.steps)
+    model.learn(TINY_PRECISE.schedule.steps)
     losses = [model._dagger_step(model.policy) for _ in range(200)]
     assert np.mean(losses[-20:]) < np.mean(losses[:20])

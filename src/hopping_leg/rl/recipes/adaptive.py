@@ -5,20 +5,20 @@ from dataclasses import replace
 from hopping_leg.rl.distillation.distillation import Distillation, StudentConfig
 from hopping_leg.rl.recipe import Recipe, Schedule, SelectionConfig
 from hopping_leg.rl.recipes.fast import FAST
-from hopping_leg.rl.recipes.precise import PRECISE
+from hopping_leg.rl.recipes.precise import LEARNT
 from hopping_leg.sim.randomization import WIDE_RANGES
 
 ADAPTIVE = Recipe(
     name="adaptive",
     task=replace(
-        PRECISE.task,
+        LEARNT.task,
         command_range=(0.20, 0.42),
         command_skew=1.0,
         randomised=WIDE_RANGES,
         randomize_probability=0.5,
         nominal_fraction=0.5,
     ),
-    reward=PRECISE.reward,
+    reward=LEARNT.reward,
     algorithm=FAST.algorithm,
     network=FAST.network,
     schedule=Schedule(num_envs=512, steps=12_000_000, log_every=4),

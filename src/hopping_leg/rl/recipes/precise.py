@@ -1,8 +1,9 @@
 """The precise recipe: one network from 0.7 s of joint samples to torques, taught by the true state.
 
-The teacher's reward is calmer than that of ``fast``: the calmer it is, the better it can be
-imitated. Its energy gain ends where hops are too high: otherwise it learns one high hop for all
-commands, from which some never come back to the low ones.
+The teacher is the shooting controller, which plans every push and need not learn. ``LEARNT`` has a
+teacher that learns by PPO instead, with a reward that is calmer than that of ``fast``: the calmer
+it is, the better it can be imitated. Its energy gain ends where hops are too high: otherwise it
+learns one high hop for all commands, from which some never come back to the low ones.
 """
 
 from dataclasses import replace
@@ -13,7 +14,7 @@ from hopping_leg.rl.distillation.distillation import Distillation
 from hopping_leg.rl.recipes.fast import FAST
 from hopping_leg.robot import TIMESTEP
 
-PRECISE = recipe.Recipe(
+LEARNT = recipe.Recipe(
     name="precise",
     task=replace(
         FAST.task,
@@ -36,6 +37,21 @@ PRECISE = recipe.Recipe(
     ),
     distillation=Distillation(),
 )
+
+SHOOTING = {
+    "teacher": "shooting",
+    "task.action_torque": (6.0, 14.0),
+    "task.command_range": (0.21, 0.44),
+    "task.command_skew": 1.0,
+    "task.episode": 8.0,
+    "steps": 6_000_000,
+    "dagger_mixing_share": 0.2,
+    "dagger.gradient_steps": 64,
+    "dagger.batch_size": 2048,
+}
+"""What is different with a teacher that is computed."""
+
+PRECISE = LEARNT.replace(SHOOTING)
 
 SEARCH_SPACE: search_space.SearchSpace = {
     "learning_rate": search_space.Real(2e-4, 4e-3, log=True),
@@ -63,59 +79,46 @@ GRU = {
 networks bring no advantage (Sec. II-C). Errors are traced back through 128 control steps, longer
 than a hop; a batch is made of whole sequences."""
 
-SHOOTING = {
-    "teacher": "shooting",
-    "task.action_torque": (6.0, 14.0),
-    "task.command_range": (0.21, 0.44),
-    "task.command_skew": 1.0,
-    "task.episode": 8.0,
-    "steps": 6_000_000,
-    "dagger_mixing_share": 0.2,
-    "dagger.gradient_steps": 64,
-    "dagger.batch_size": 2048,
-}
-"""A teacher that is computed instead of learnt: it plans every push in the true state."""
-
 VARIANTS = {
     "recipe": ("the recipe", PRECISE),
-    "one-teacher": ("one teacher with all the teachers' time", PRECISE.replace(teachers=1)),
+    "learnt-teacher": (
+        "a teacher that learns by PPO; what follows changes a part of it",
+        LEARNT,
+    ),
+    "one-teacher": ("one teacher with all the teachers' time", LEARNT.replace(teachers=1)),
     "all-heights-alike": (
         "low commands as often as high ones",
-        PRECISE.replace({"task.command_skew": 1.0}),
+        LEARNT.replace({"task.command_skew": 1.0}),
     ),
     "energy-anywhere": (
         "the teacher's energy gain is paid at any height, and half as much",
-        PRECISE.replace({"reward.energy": 0.4, "reward.energy_beyond": 0.0}),
+        LEARNT.replace({"reward.energy": 0.4, "reward.energy_beyond": 0.0}),
     ),
     "four-passes": (
         "four passes over a rollout instead of eight",
-        PRECISE.replace(n_epochs=4),
+        LEARNT.replace(n_epochs=4),
     ),
     "no-teacher": (
         "no teacher: reinforcement learning on the same inputs, as `fast` learns",
-        FAST.replace(task=PRECISE.task, eval_commands=PRECISE.selection.eval_commands),
+        FAST.replace(task=LEARNT.task, eval_commands=LEARNT.selection.eval_commands),
     ),
     "short-past": (
         "50 ms of dated samples instead of 0.7 s",
-        PRECISE.replace({"task.observation": "dated"}),
+        LEARNT.replace({"task.observation": "dated"}),
     ),
-    "recurrent": ("50 ms and a recurrent unit instead of 0.7 s", PRECISE.replace(GRU)),
+    "recurrent": ("50 ms and a recurrent unit instead of 0.7 s", LEARNT.replace(GRU)),
     "jumpy-teacher": (
         "a teacher for whom jerky actions cost what they cost `fast`, and torque nothing",
-        PRECISE.replace({"reward.jerk": FAST.value("reward.jerk"), "reward.effort": 0.0}),
+        LEARNT.replace({"reward.jerk": FAST.value("reward.jerk"), "reward.effort": 0.0}),
     ),
     "no-aim": (
         "a teacher that is told the command itself",
-        PRECISE.replace({"dagger.correction_rate": 0.0}),
+        LEARNT.replace({"dagger.correction_rate": 0.0}),
     ),
     "newest-only": (
         "only the newest tenth of the ticks from which the policy learns",
-        PRECISE.replace({"dagger.buffer_size": PRECISE.value("dagger.buffer_size") // 10}),
+        LEARNT.replace({"dagger.buffer_size": LEARNT.value("dagger.buffer_size") // 10}),
     ),
-    "shooting-teacher": (
-        "the shooting controller teaches, which need not learn",
-        PRECISE.replace(SHOOTING),
-    ),
-    "coarse-physics": ("physics at 1 ms in training", PRECISE.replace({"task.timestep": 1e-3})),
+    "coarse-physics": ("physics at 1 ms in training", LEARNT.replace({"task.timestep": 1e-3})),
 }
 """By name, what is different in words, and the recipe without one of its parts."""
