@@ -71,7 +71,7 @@ VARIANTS: dict[str, Callable[[mujoco.MjSpec], None] | None] = {
 
 @dataclass(frozen=True)
 class PhysicsStep:
-    """Let controllers hop at physics steps from 1 to 0.031 ms, each half of the one before."""
+    """Let controllers hop at physics steps from 0.5 to 0.031 ms, each half of the one before."""
 
     controllers: tuple[str, ...] = ("energy-shaping", "paper", "fast", "precise")
     """Whose hops are compared; a policy hops on the robot that it was trained on alone."""
@@ -79,11 +79,11 @@ class PhysicsStep:
     """Shipped names or paths of .toml files."""
     commands: tuple[float, ...] = (0.25, 0.30, 0.35)
     """Desired heights, m."""
-    coarsest: float = 1e-3
+    coarsest: float = 5e-4
     """First physics step, s."""
-    halvings: int = 5
+    halvings: int = 4
     """How often it is halved."""
-    repeats: int = 40
+    repeats: int = 24
     """Runs per command."""
     duration: float = 10.0
     """Of a run, s."""
@@ -144,7 +144,10 @@ class PhysicsStep:
         for number, command in enumerate(self.commands):
             mine = apexes[number * self.repeats : (number + 1) * self.repeats]
             errors = np.concatenate(mine) - command
-            medians = np.array([np.median(apex) for apex in mine if len(apex)])
+            medians, stds = (
+                np.array([of(apex) for apex in mine if len(apex)]) for of in (np.median, np.std)
+            )
+            root = max(len(medians), 1) ** 0.5
             rows.append(
                 {
                     "controller": name,
@@ -153,9 +156,8 @@ class PhysicsStep:
                     "command_m": command,
                     "median_error_m": float(np.median(errors)) if len(errors) else None,
                     "std_m": float(errors.std()) if len(errors) else None,
-                    "standard_error_m": float(medians.std() / max(len(medians), 1) ** 0.5)
-                    if len(medians)
-                    else None,
+                    "median_error_m_standard_error": float(medians.std() / root),
+                    "std_m_standard_error": float(stds.std() / root),
                     "hops": len(errors),
                 }
             )
@@ -192,9 +194,11 @@ def _apexes(time: Array, height: Array, rate: Array, clearance: Array) -> Array:
 def converged(
     rows: list[dict[str, Any]], controller: str | None = None, robot: Robot | None = None
 ) -> float | None:
-    """Return the coarsest step from which on halving changes no statistic by ``TOLERANCE``.
+    """Return the coarsest step from which on halving changes no statistic.
 
-    The finest step has nothing to be compared with; None if even the one before it moves.
+    A median or standard deviation changes by more than ``TOLERANCE`` and two standard errors of
+    the difference, runs being independent. The finest step has nothing to be compared with; None
+    if even the one before it moves.
     """
     chosen = [
         row
@@ -205,11 +209,21 @@ def converged(
     best = None
     for fine, coarse in itertools.pairwise(steps):
         one, other = ([r for r in chosen if r["timestep_s"] == s] for s in (coarse, fine))
-        moved = [_largest(one, other, name) for name in ("median_error_m", "std_m")]
-        if any(change is None or change > TOLERANCE for change in moved):
+        if any(
+            _moves(a, b, name)
+            for a, b in zip(one, other, strict=True)
+            for name in ("median_error_m", "std_m")
+        ):
             break
         best = coarse
     return best
+
+
+def _moves(one: dict[str, Any], other: dict[str, Any], name: str) -> bool:
+    if one[name] is None or other[name] is None:
+        return True
+    error = np.hypot(one[f"{name}_standard_error"], other[f"{name}_standard_error"])
+    return bool(abs(one[name] - other[name]) > max(TOLERANCE, 2 * error))
 
 
 def _largest(one: list[dict[str, Any]], other: list[dict[str, Any]], name: str) -> float | None:

@@ -4,7 +4,7 @@ from hopping_leg.robot import load_robot
 from studies.physics_step.run import PhysicsStep, _fits, converged
 
 
-def rows(*medians, std=0.001):
+def rows(*medians, std=0.001, error=1e-5):
     return [
         {
             "controller": "c",
@@ -12,6 +12,8 @@ def rows(*medians, std=0.001):
             "timestep_s": 1e-3 / 2**k,
             "median_error_m": m,
             "std_m": std,
+            "median_error_m_standard_error": error,
+            "std_m_standard_error": 1e-5,
         }
         for k, m in enumerate(medians)
     ]
@@ -22,6 +24,7 @@ def test_a_step_has_converged_if_all_finer_halvings_move_little():
     assert converged(rows(0.004, 0.004, 0.001, 0.0009)) == 2.5e-4
     assert converged(rows(0.004, 0.002, None, 0.0017)) is None
     assert converged(rows(0.004, 0.002)) is None
+    assert converged(rows(0.004, 0.002, error=0.001)) == 1e-3
 
 
 def test_a_policy_hops_on_its_own_robot_alone():
