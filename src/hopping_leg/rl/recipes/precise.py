@@ -41,10 +41,11 @@ LEARNT = recipe.Recipe(
 SHOOTING = {
     "teacher": "shooting",
     "task.action_torque": (6.0, 14.0),
-    "task.command_range": (0.21, 0.44),
+    "task.command_range": (0.21, 0.42),
     "task.command_skew": 1.0,
     "task.episode": 8.0,
     "steps": 6_000_000,
+    "eval_commands": (0.225, 0.26, 0.295, 0.33, 0.365, 0.40),
     "dagger_mixing_share": 0.2,
     "dagger.gradient_steps": 64,
     "dagger.batch_size": 2048,
