@@ -244,7 +244,7 @@ def teacher_of_run(run: Path, robot: Robot) -> Teacher:
     """Return the teacher as the newest checkpoint of a run has it.
 
     Args:
-        run: Folder of a run of ``precise`` or of a recipe made of it.
+        run: Folder of a run of ``adaptive`` or of another recipe whose teacher learns by PPO.
         robot: The leg that it was trained on.
 
     Raises:
@@ -256,10 +256,10 @@ def teacher_of_run(run: Path, robot: Robot) -> Teacher:
         raise UsageError(f"{run} holds no run with a checkpoint; train one with `hop train`.")
     config = json.loads(file.read_text(encoding="utf-8"))
     recipe = recipe_of(config["recipe"], config["options"]).fit(robot)
-    if recipe.distillation is None:
+    if recipe.distillation is None or recipe.distillation.teacher != "ppo":
         raise UsageError(
-            f"The run in {run} is of recipe '{recipe.name}', which has no teacher; take one of"
-            " 'precise' or 'adaptive'."
+            f"The run in {run} is of recipe '{recipe.name}', which has no teacher that learns; take"
+            " one of 'adaptive', or the controller shooting."
         )
     if config["robot_digest"] != robot.digest:
         raise UsageError(

@@ -16,7 +16,7 @@ from hopping_leg.robot import load_robot
 from studies.limits.run import teacher_of_run
 
 
-def stop_early(folder, name="precise"):
+def stop_early(folder, name="adaptive"):
     """Leave a run as it is after its first checkpoint; return its model."""
     recipe = change(get_recipe(name), ["num_envs=4"])
     run = RunFolder(folder, recipe, ROBOT, 3, None)
@@ -65,16 +65,18 @@ def test_what_has_no_teacher_is_refused(tmp_path):
     with pytest.raises(UsageError, match="no run with a checkpoint"):
         teacher_of_run(tmp_path, ROBOT)
     stop_early(tmp_path / "fast", "fast")
-    with pytest.raises(UsageError, match="no teacher"):
-        teacher_of_run(tmp_path / "fast", ROBOT)
-    stop_early(tmp_path / "precise")
+    stop_early(tmp_path / "precise", "precise")
+    for name in ("fast", "precise"):
+        with pytest.raises(UsageError, match="no teacher"):
+            teacher_of_run(tmp_path / name, ROBOT)
+    stop_early(tmp_path / "adaptive")
     with pytest.raises(UsageError, match="trained on legv2-paper"):
-        teacher_of_run(tmp_path / "precise", load_robot("legv2"))
+        teacher_of_run(tmp_path / "adaptive", load_robot("legv2"))
 
 
 def test_its_torques_can_err_as_an_imitators_do(tmp_path):
     model = stop_early(tmp_path)
-    task, recipe = model.env.task, get_recipe("precise")
+    task, recipe = model.env.task, get_recipe("adaptive")
     right, wrong = (
         Teacher(model.policy, ROBOT, recipe.task, teacher_action_noise)
         for teacher_action_noise in (0.0, 0.05)
