@@ -5,6 +5,7 @@ from typing import Any
 
 from hopping_leg.io import write_atomically
 from hopping_leg.rl.run_folder import read_result
+from hopping_leg.robot import TIMESTEP
 
 MISSED = 0.02
 """Median error beyond which a policy misses its command, m; the robustness suite's."""
@@ -40,7 +41,7 @@ One network from joint measurements to joint torques, for robot `{result["robot"
 - Versions: {versions}.
 
 Trials on the selection seeds {", ".join(map(str, selected["seeds"]))}, noise and delay on, physics
-step 0.5 ms, the first 2 s of each trial dropped. These seeds chose the policy; `hop evaluate
+step {1000 * TIMESTEP:g} ms, the first 2 s of each trial dropped. These seeds chose the policy; `hop evaluate
 {result["recipe"]}` judges it on others.
 
 {table(selected["trials"])}
