@@ -41,8 +41,8 @@ One network from joint measurements to joint torques, for robot `{result["robot"
 - Versions: {versions}.
 
 Trials on the selection seeds {", ".join(map(str, selected["seeds"]))}, noise and delay on, physics
-step {1000 * TIMESTEP:g} ms, the first 2 s of each trial dropped. These seeds chose the policy; `hop evaluate
-{result["recipe"]}` judges it on others.
+step {1000 * TIMESTEP:g} ms, the first 2 s of each trial dropped. These seeds chose the policy;
+`hop evaluate {result["recipe"]}` judges it on others.
 
 {table(selected["trials"])}
 {missed_commands(selected["trials"])}"""
