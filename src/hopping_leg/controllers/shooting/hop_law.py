@@ -1,9 +1,10 @@
 """A hop in a few numbers: the law that shooting plans with, and its simulation to the next apex.
 
 On the ground the foot stays below the hip while the leg presses it down with one force until it
-stops to shorten and with another until it has a certain length; in the air a joint PD holds the
-foot below the hip. The numbers of a hop are (landing force, push-off force, length at lift-off,
-length in flight), N and m; forces are those of the leg on the ground, lengths from hip to foot.
+stops to shorten and with another until the hip has a certain height; in the air a joint PD holds
+the foot below the hip. The numbers of a hop are (landing force, push-off force, height of the hip
+at lift-off less the foot's radius, length from hip to foot in flight), N and m; forces are those of
+the leg on the ground.
 """
 
 import math
@@ -12,6 +13,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, Record, Records
 from hopping_leg.sim.compiled import compiled, inlined
+from hopping_leg.sim.leg_physics import ROWS
 from hopping_leg.sim.stepper import COMMAND, send, step_leg
 
 NUMBERS = 4
@@ -135,7 +137,7 @@ def plan(
         dt: Physics step, s.
         ticks: Control periods at most.
     """
-    rows, past = np.empty((11, 5)), np.empty((0, 6))
+    rows, past = np.empty((ROWS, 5)), np.empty((0, 6))
     command, here, torque = np.zeros(COMMAND), np.empty(6), np.empty(2)
     memory = scratch[first]
     for k in range(first, last):

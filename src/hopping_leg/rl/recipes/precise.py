@@ -57,9 +57,6 @@ PRECISE = LEARNT.replace(SHOOTING)
 SEARCH_SPACE: search_space.SearchSpace = {
     "learning_rate": search_space.Real(2e-4, 4e-3, log=True),
     "student.hidden": search_space.OneOf((*search_space.LAYERS, (512, 256))),
-    "gamma": search_space.Real(0.97, 0.997),
-    "gae_lambda": search_space.Real(0.90, 0.99),
-    "teacher_share": search_space.Real(0.2, 0.7),
     "dagger_mixing_share": search_space.Real(0.0, 0.5),
 }
 
