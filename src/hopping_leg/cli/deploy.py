@@ -45,8 +45,7 @@ class Deploy:
     """A name, a file (.onnx, .toml, .parquet), or a Python class as FILE.py:CLASS."""
     transport: str
     """Path of an fdcanusb, interface:channel of python-can, or pi3hat."""
-    robot: str = "legv2-paper"
-    """A shipped robot or a .toml file; its table [hardware] says how the drives are wired."""
+    robot: options.OwnRobot = None
     command: float | None = None
     """Height to hop to, m; default: the middle of the policy's training, 0.30 for others."""
     schedule: str | None = None
@@ -69,7 +68,7 @@ class Deploy:
 
 def run(args: Deploy) -> None:
     """Check everything, ask, run, record."""
-    robot = load_robot(args.robot)
+    robot = load_robot(args.robot or registry.robot_of([args.controller]))
     robot.require_leg()
     done = _perform(args, robot, *_plan(args, robot))
     cause = done.outcome.supervisor.stop_cause

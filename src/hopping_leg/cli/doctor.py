@@ -23,7 +23,7 @@ from hopping_leg.deploy import preflight, safety_limits
 from hopping_leg.envs import HoppingEnv
 from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.identify.simulate import compile_replay
-from hopping_leg.robot import JOINTS, Robot, load_robot
+from hopping_leg.robot import DEFAULT_ROBOT, JOINTS, Robot, load_robot
 from hopping_leg.sim import CONTROL_RATE, compile_physics
 from hopping_leg.sim.compiled import FOLDER
 from hopping_leg.sim.mujoco_simulator import MujocoSimulator
@@ -52,7 +52,7 @@ class Doctor:
     transport: str | None = None
     """Path of an fdcanusb, interface:channel of python-can, or pi3hat; without one the
     installation is checked."""
-    robot: str = "legv2-paper"
+    robot: str = DEFAULT_ROBOT
     """A shipped robot or a .toml file; its table [hardware] says how the drives are wired."""
     write: bool = False
     """Write settings that are not as the robot's file asks, after asking."""
@@ -96,7 +96,7 @@ def run(args: Doctor) -> None:
 
 def compile_everything() -> None:
     """Compile what simulation, environment and identification need, or load it."""
-    robot = load_robot("legv2-paper")
+    robot = load_robot(DEFAULT_ROBOT)
     compile_physics()
     compile_replay()
     env = HoppingEnv(robot)

@@ -24,6 +24,7 @@ from rich.console import Console
 from hopping_leg import io, progress
 from hopping_leg.cli import options
 from hopping_leg.controllers import RolloutConfig
+from hopping_leg.controllers.registry import robot_of
 from hopping_leg.evaluate import Entry, EvaluationRun, evaluate, tables, trials
 from hopping_leg.evaluate.entries import load_entries
 from hopping_leg.evaluate.report import render_videos, write_report
@@ -38,7 +39,7 @@ class Conditions:
     controllers: tyro.conf.Positional[tuple[str, ...]]
     """Names (energy-shaping, paper, fast, ...), .onnx files, a quoted pattern of them, or Python
     classes as FILE.py:CLASS; LABEL=FILE chooses the name in all tables."""
-    robot: options.RobotFile = "legv2-paper"
+    robot: options.OwnRobot = None
     commands: options.Heights | None = None
     """Apex heights, m; default 0.25,0.30,0.35, scaled to the leg's length."""
     seeds: int = 5
@@ -61,7 +62,7 @@ class Conditions:
         """Return the controllers and how they are rolled out; a wrong option is a UsageError."""
         options.at_least(0, seed=self.seed)
         options.check_file(self.json)
-        robot = load_robot(self.robot)
+        robot = load_robot(self.robot or robot_of(self.controllers))
         noise = NoiseAndDelay() if self.noise else NO_NOISE
         setup = RolloutConfig(
             robot, noise, SoftLimits() if self.soft_limits else None,

@@ -21,7 +21,7 @@ import tyro
 
 from hopping_leg import errors, io
 from hopping_leg.cli import motors, options
-from hopping_leg.controllers.registry import load_policy
+from hopping_leg.controllers.registry import load_policy, robot_of
 from hopping_leg.deploy import hardware_trials, safety_limits
 from hopping_leg.robot import Robot, load_robot
 
@@ -41,8 +41,7 @@ class Finetune:
     """The twin that plays the real leg: a shipped robot or a .toml file."""
     transport: str | None = None
     """The drives of the real leg instead, as for `hop deploy`."""
-    robot: str = "legv2-paper"
-    """Model of the leg: the robot that the policy was trained on."""
+    robot: options.OwnRobot = None
     method: Literal["aim", "sac", "both"] = "both"
     """Method: correct the command, train the weights, or one after the other."""
     minutes: float = 10.0
@@ -69,7 +68,7 @@ def run(args: Finetune) -> None:
     from hopping_leg.rl.finetune.config import FinetuneConfig, StoppingRules, Task
     from hopping_leg.rl.finetune.finetuning import POLICY, finetune
 
-    policy, robot = load_policy(args.policy), load_robot(args.robot)
+    policy, robot = load_policy(args.policy), load_robot(args.robot or robot_of([args.policy]))
     _refuse(args, policy, robot)
     config = FinetuneConfig(
         method=args.method,

@@ -13,6 +13,7 @@ from rich.markup import escape
 from rich.table import Column, Table
 
 from hopping_leg.errors import UsageError
+from hopping_leg.robot import DEFAULT_ROBOT
 
 
 def parse_heights(text: str) -> tuple[float, ...]:
@@ -45,6 +46,14 @@ Names = Annotated[
 ]
 """Names given as ``hip.friction,knee.damping``."""
 RobotFile = Annotated[str, tyro.conf.arg(help="A shipped robot or the path of a .toml file.")]
+OwnRobot = Annotated[
+    str | None,
+    tyro.conf.arg(
+        help="A shipped robot or the path of a .toml file; default: the one that the first policy"
+        f" was trained on, else {DEFAULT_ROBOT}."
+    ),
+]
+"""The robot of a verb that is given controllers."""
 JsonFile = Annotated[
     Path | None, tyro.conf.arg(help="JSON file for every number, besides what is printed.")
 ]

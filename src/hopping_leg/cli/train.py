@@ -6,7 +6,7 @@ nothing had happened.
 
 Examples:
   hop train --recipe fast --minutes 5
-  hop train --recipe precise --parallel-seeds 2 --minutes 13.5 --steps 20000000
+  hop train --recipe precise --robot legv2
   hop train --recipe paper --seed 1 --out runs/mine
   hop train --recipe paper --seed 1 --out runs/mine --resume
   hop train --recipe fast --out runs/shared --log wandb
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from hopping_leg.cli.options import JsonFile, RobotFile, at_least
+from hopping_leg.cli.options import JsonFile, at_least
 from hopping_leg.io import write_json
 from hopping_leg.robot import load_robot
 
@@ -28,10 +28,11 @@ class Options:
     """What to train and where to keep it."""
 
     recipe: str = "fast"
-    """Recipe: `fast` for accurate hopping soon, `precise` for more accurate hopping later,
-    `adaptive` for one that corrects itself on legs that differ, `paper` for the paper's method; or
-    FILE.py:NAME, a recipe of your own."""
-    robot: RobotFile = "legv2-paper"
+    """Recipe: `fast` for accurate hopping soon, `precise` for more accurate hopping later, `paper`
+    for the paper's method; or FILE.py:NAME, a recipe of your own."""
+    robot: str | None = None
+    """A shipped robot or the path of a .toml file; default: legv2-paper for `paper`, else
+    legv2-identified."""
     seed: int = 0
     """Seed of weights, exploration, starts, noise and delay."""
     out: Path | None = None
@@ -57,10 +58,6 @@ class Options:
     """Control steps of experience, all legs together, instead of the recipe's."""
     threads: int = 1
     """Threads of the networks and the physics."""
-    parallel_seeds: int = 1
-    """Trainings that begin side by side, each with a seed and in a process of its own. As soon as
-    the recipe can tell how they will end, when their teachers are scored or else at the end, the
-    best goes on alone with the threads of all. Two trainings seldom fail both."""
     log: Literal["tensorboard", "wandb", "trackio"] = "tensorboard"
     """Logger besides TensorBoard; wandb and trackio have to be installed."""
     json: JsonFile = None
@@ -68,13 +65,13 @@ class Options:
 
 def run(args: Options) -> None:
     """Train a controller."""
-    from hopping_leg.rl.parallel_seeds import ParallelSeeds
     from hopping_leg.rl.recipes import change, get_recipe, randomise
     from hopping_leg.rl.run_folder import read_result
+    from hopping_leg.rl.train import train
 
     recipe = get_recipe(args.recipe)
     at_least(0, seed=args.seed)
-    at_least(1, threads=args.threads, parallel_seeds=args.parallel_seeds, steps=args.steps)
+    at_least(1, threads=args.threads, steps=args.steps)
     if args.steps is not None:
         recipe = recipe.replace(steps=args.steps)
     recipe = change(recipe, args.set)
@@ -85,17 +82,17 @@ def run(args: Options) -> None:
     recipe = recipe.replace(heights=args.heights)
     out = args.out or Path("runs") / f"{recipe.name}-seed{args.seed}"
     try:
-        trained = ParallelSeeds(
+        trained = train(
             recipe,
-            load_robot(args.robot),
+            load_robot(args.robot or recipe.robot),
             args.seed,
             out,
-            args.parallel_seeds,
+            resume=args.resume,
+            source=args.source,
             minutes=args.minutes,
             threads=args.threads,
             log=args.log,
-            source=args.source,
-        ).train(resume=args.resume)
+        )
     except KeyboardInterrupt:
         print(f"Stopped; the same command with --resume goes on in {out}.", file=sys.stderr)
         raise

@@ -29,14 +29,14 @@ from hopping_leg.cli.options import JsonFile, RobotFile, at_least, say, show_tab
 from hopping_leg.controllers.energy_shaping.tuning import Search, tune
 from hopping_leg.io import write_atomically, write_json
 from hopping_leg.rl.search_space import Tuning
-from hopping_leg.robot import load_robot
+from hopping_leg.robot import DEFAULT_ROBOT, load_robot
 
 
 @dataclass(frozen=True)
 class GainSearch:
     """Search the gains of energy shaping with CMA-ES."""
 
-    robot: RobotFile = "legv2-paper"
+    robot: RobotFile = DEFAULT_ROBOT
     start: str = "by-hand"
     """Gains to begin from: by-hand, energy-shaping (the shipped result) or a gain file's path."""
     search: Annotated[Search, tyro.conf.arg(name="")] = field(default_factory=Search)

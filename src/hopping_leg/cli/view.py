@@ -24,12 +24,12 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from hopping_leg.cli.options import say
+from hopping_leg.controllers.registry import robot_of
 from hopping_leg.errors import UsageError
 
 if TYPE_CHECKING:
     from hopping_leg.viewer.data_source import DataSource
 
-_ROBOT = "legv2-paper"
 _MOST_DETAIL = 4.0
 
 
@@ -40,7 +40,8 @@ class View:
     controllers: Annotated[tuple[str, ...], tyro.conf.Positional] = ("fast",)
     """One controller, or two side by side: shipped names, .onnx files or gain files."""
     robot: str | None = None
-    """A shipped robot or a .toml file; default legv2-paper, or the one that a trace names."""
+    """A shipped robot or a .toml file; default: the one that the first policy was trained on, or
+    that a trace names."""
     height: float = 0.30
     """Desired height at the start, m."""
     seed: int = 0
@@ -75,7 +76,7 @@ def run(args: View) -> None:
 
     viewer = Viewer(
         source,
-        args.robot or _ROBOT,
+        args.robot or robot_of(args.controllers),
         host=args.host,
         port=args.port,
         detail=scene.pixel_ratio() if args.detail is None else args.detail,
@@ -103,4 +104,6 @@ def _source(args: View) -> "DataSource":
         return ReplaySource(args.trace, args.robot)
     if args.box is not None:
         return RecorderSource(args.box, args.robot)
-    return LiveSimulation(args.controllers, args.robot or _ROBOT, args.height, args.seed)
+    return LiveSimulation(
+        args.controllers, args.robot or robot_of(args.controllers), args.height, args.seed
+    )

@@ -1,6 +1,6 @@
 """Controllers by name: energy shaping, shooting, policies, a user's policy, gain file or class."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import resources
 from pathlib import Path
@@ -8,7 +8,7 @@ from pathlib import Path
 from hopping_leg.controllers import energy_shaping, protocol, shooting, user_controllers
 from hopping_leg.controllers.policy import OtherRobot, Policy
 from hopping_leg.errors import PolicyError, UsageError, unknown_name
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import DEFAULT_ROBOT, Robot, shipped_robots
 from hopping_leg.sim import CONTROL_RATE
 
 ENERGY_SHAPING = "energy-shaping"
@@ -64,6 +64,18 @@ def load_policy(name_or_path: str | Path) -> Policy:
         unknown_name("controller", name, controller_names())
         + " Or give an .onnx file, or a Python class as path/to/file.py:CLASS."
     )
+
+
+def robot_of(controllers: Sequence[str]) -> str:
+    """Return the shipped robot that the first policy among controllers was trained on.
+
+    Without such a policy it is the default robot.
+    """
+    for name in controllers:
+        if name in shipped_policies() or (name.endswith(".onnx") and Path(name).is_file()):
+            robot = load_policy(name).card.robot
+            return robot if robot in shipped_robots() else DEFAULT_ROBOT
+    return DEFAULT_ROBOT
 
 
 def load_controller(

@@ -19,7 +19,7 @@ from hopping_leg.envs import rewards, task_config
 from hopping_leg.envs.paper_reward import paper_reward
 from hopping_leg.envs.task import HoppingTask, Step
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import Robot, build_model, load_robot
+from hopping_leg.robot import DEFAULT_ROBOT, Robot, build_model, load_robot
 from hopping_leg.sim import LegSimulator
 
 Image = npt.NDArray[np.uint8]
@@ -96,7 +96,7 @@ class HoppingEnv(gymnasium.Env[Array32, Array32]):
 
     def __init__(
         self,
-        robot: Robot | str = "legv2-paper",
+        robot: Robot | str = DEFAULT_ROBOT,
         options: task_config.TaskConfig = task_config.TaskConfig(),  # noqa: B008
         reward: rewards.Reward | None = None,
         render_mode: str | None = None,
@@ -156,7 +156,7 @@ class HoppingVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
     def __init__(
         self,
         num_envs: int = 1,
-        robot: Robot | str = "legv2-paper",
+        robot: Robot | str = DEFAULT_ROBOT,
         options: task_config.TaskConfig = task_config.TaskConfig(),  # noqa: B008
         reward: rewards.Reward | None = None,
         threads: int = 0,

@@ -121,8 +121,7 @@ class HoppingTask:
         self.legs = LegSimulator(
             robot, count, rate=options.rate, timestep=options.timestep, threads=threads
         )
-        if options.randomize_from_start:
-            self.randomize()
+        self.randomize()
         self.plant = Plant(self.legs, options.disturbance, options.soft_limits, noise)
         self.observation = make_observation(robot, options, count)
         self._scaling = sample_scaling(robot, options)
@@ -147,11 +146,7 @@ class HoppingTask:
         if not ranges or draw == self._draw:
             return
         rng = np.random.default_rng([self._draw_seed, draw])
-        drawn = randomization.sample(
-            self.robot, ranges, self.count, rng, self.options.randomize_probability
-        )
-        same = np.diff(np.floor(self.options.nominal_fraction * np.arange(self.count + 1))) > 0
-        variants = [self.robot if s else d for s, d in zip(same, drawn, strict=True)]
+        variants = randomization.sample(self.robot, ranges, self.count, rng)
         self.legs.set_robots(variants)
         self._numbers, self._draw = randomization.normalized(self.robot, variants, ranges), draw
 
@@ -305,7 +300,7 @@ class HoppingTask:
     def _draw_commands(self, count: int) -> Array:
         if self.options.command_range is not None:
             low, high = self.options.command_range
-            return low + (high - low) * self._rng.random(count) ** self.options.command_skew
+            return self._rng.uniform(low, high, count)
         return self._rng.choice(self.options.commands, count)
 
     def _draw_holds(self, count: int) -> IntArray:

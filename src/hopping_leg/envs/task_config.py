@@ -27,9 +27,6 @@ class TaskConfig:
     """Desired heights to draw from, m; the paper's three."""
     command_range: tuple[float, float] | None = None
     """Draw desired heights from this range instead, m."""
-    command_skew: float = 1.0
-    """Draw them as the range's lower end plus a share of its width, the share being a uniform
-    number to this power: above 1 low heights come more often."""
     command_resampling_time: tuple[float, float] | None = None
     """Shortest and longest time between new commands, s; none keeps one command per episode."""
     reset_distribution: ResetDistribution = "standing"
@@ -61,12 +58,6 @@ class TaskConfig:
     """Noise and delay; the paper trains with them."""
     randomised: tuple[Range, ...] = ()
     """Where each leg draws its own numbers instead of the robot's; none by default."""
-    randomize_probability: float = 1.0
-    """Probability with which a leg draws each of those numbers rather than has the robot's."""
-    randomize_from_start: bool = True
-    """Let every leg be the robot itself until ``HoppingTask.randomize``."""
-    nominal_fraction: float = 0.0
-    """Share of the legs that are the robot itself also where the others differ."""
     soft_limits: SoftLimits | None = field(default_factory=SoftLimits)
     """PD at the joint limits, added to the action's torque."""
 
@@ -82,15 +73,12 @@ class TaskConfig:
                     f"'{name}' is {pair} but must be two positive numbers, the smaller first."
                 )
         for name in (
-            "action_torque", "command_skew", "start_length", "episode", "velocity_scale", "rate",
+            "action_torque", "start_length", "episode", "velocity_scale", "rate",
             "timestep",
         ):  # fmt: skip
             value = getattr(self, name)
             if not all(0 < v < np.inf for v in np.atleast_1d(value)):
                 raise UsageError(f"'{name}' is {value} but must be positive and finite.")
-        for name in ("randomize_probability", "nominal_fraction"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise UsageError(f"'{name}' is {getattr(self, name)} but must lie between 0 and 1.")
         for name, valid in (
             ("observation", tuple(OBSERVATION_HISTORIES)),
             ("reset_distribution", get_args(ResetDistribution)),

@@ -33,9 +33,7 @@ One network from joint measurements to joint torques, for robot `{result["robot"
 
 - Training: {result["steps"]} control steps, {result["minutes"]:.1f} min of wall-clock time, physics
   step {1000 * task["timestep"]:g} ms.
-{parallel_seeds(result)}\
-{curriculum(result.get("curriculum", []))}\
-{teacher_scores(result.get("teacher_scores_m", []))}\
+{stages(result["stages"])}\
 - Selection: the policy after {selected["steps"]} steps ({selected["minutes"]:.1f} min), the best of
   {len(selected["finalists"])} finalists out of {len(result["history"])} snapshots.
 - Versions: {versions}.
@@ -48,38 +46,15 @@ step {1000 * TIMESTEP:g} ms, the first 2 s of each trial dropped. These seeds ch
 {missed_commands(selected["trials"])}"""
 
 
-def parallel_seeds(result: dict[str, Any]) -> str:
-    """Return a line on the trainings of which this was the best, if there were several."""
-    if "seed_scores" not in result:
-        return ""
-    rows = result["seed_scores"]
-    scores = ", ".join(f"{1000 * row['score_m']:.1f} mm (seed {row['seed']})" for row in rows)
-    chosen = rows[result["chosen_seed"]]["seed"]
-    return (
-        f"- Parallel seeds: the training with seed {chosen}, the best of {len(rows)} when they"
-        f" could be compared, less being better:\n  {scores}.\n"
+def stages(rows: list[dict[str, Any]]) -> str:
+    """Return lines on the stages of a distillation, if it was one."""
+    shown = "\n".join(
+        f"  - {row['name']}: {row['score']} {1000 * row['score_m']:.1f} mm"
+        f" after {row['seconds']:.0f} s, {'passed' if row['passed'] else '**not passed**'}"
+        f" (at most {1000 * row['must_score_m']:g} mm)"
+        for row in rows
     )
-
-
-def curriculum(stages: list[dict[str, Any]]) -> str:
-    """Return a line on who learnt until when, if there was more than one."""
-    shown = ", ".join(
-        f"{s['name']} until {100 * s['until']:.0f} %"
-        + (f" (accepted from {1000 * s['must_score']:g} mm)" if s["must_score"] else "")
-        for s in stages
-    )
-    return f"- Curriculum, at the latest: {shown} of the training.\n" if stages else ""
-
-
-def teacher_scores(scores: list[float]) -> str:
-    """Return a line on the teachers' scores, m, if there were any."""
-    numbers = ", ".join(f"{1000 * score:.1f}" for score in scores)
-    return (
-        f"- Evaluations of the teachers in order: {numbers} mm where they"
-        " did worst (less is better); who did best taught.\n"
-        if scores
-        else ""
-    )
+    return f"- Stages:\n{shown}\n" if rows else ""
 
 
 def missed_commands(trials: list[dict[str, Any]]) -> str:

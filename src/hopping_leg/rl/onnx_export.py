@@ -7,7 +7,7 @@ what remembers stands before the dense layers.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -79,22 +79,6 @@ def array_info(name: str, *shape: int) -> Any:  # noqa: ANN401
     return helper.make_tensor_value_info(name, TensorProto.FLOAT, ["n", *shape])
 
 
-class Memory(Protocol):
-    """A part in front of a policy's dense layers."""
-
-    @property
-    def size(self) -> int:
-        """Entries that are remembered."""
-        ...
-
-    def build(self, graph: Graph, x: str, inputs: int) -> str:
-        """Put it behind the normalised inputs, (n, inputs); return what the dense layers see.
-
-        The graph gets the values ``NEXT_MEMORY``.
-        """
-        ...
-
-
 @dataclass(frozen=True)
 class RecurrentUnit:
     """A gated recurrent unit with its gates reset, update and candidate in this order, as torch's.
@@ -112,7 +96,7 @@ class RecurrentUnit:
         """Entries k of its memory."""
         return int(self.of_memory.shape[1])
 
-    def build(self, graph: Graph, x: str, inputs: int) -> str:
+    def build(self, graph: Graph, x: str) -> str:
         """Show the dense layers what is remembered; ONNX orders gates update, reset, candidate."""
 
         def ordered(weights: Array) -> Array:
@@ -142,62 +126,13 @@ class RecurrentUnit:
 
 
 @dataclass(frozen=True)
-class CommandIntegrator:
-    """Memory that corrects a policy's command, see ``rl.distillation.adaptive_student``.
+class CommandMap:
+    """Correction of the command, linear between heights and constant beyond them."""
 
-    Remembers the correction at both ends of the range of commands and the delayed command, all as
-    the command is normalised, which must be the last input.
-    """
-
-    layers: Layers
-    """Layers, tanh, of the network that estimates the last hop's error from inputs and delayed
-    command, (n, inputs + 1)."""
-    rate: float
-    """Share of the error by which a tick changes the correction."""
-    most: float
-    """Largest estimated error, in the network's scale."""
-    farthest: float
-    """Largest correction."""
-    beyond: float
-    """Largest distance of the corrected command from the range of commands, -1 to 1."""
-    follow: float
-    """Share of its distance by which the delayed command follows in a tick."""
-    size: ClassVar[int] = 3
-
-    def build(self, graph: Graph, x: str, inputs: int) -> str:
-        """Show the dense layers the corrected command; names of nodes are those of policy files."""
-        apply, constant = graph.apply, graph.constant
-        sizes = constant("input_sizes", np.array([inputs - 1, 1], np.int64))
-        graph.add("Split", [x, sizes], ["samples", "asked"], axis=1)
-        graph.add(
-            "Split",
-            [MEMORY, constant("memory_sizes", np.array([2, 1], np.int64))],
-            ["ends", "late"],
-            axis=1,
-        )
-        across = constant("across", np.array([1], np.int64))
-        slopes, middle = constant("slopes", [[-0.5, 0.5]]), constant("middle", [0.5, 0.5])
-        leaning = apply("Gemm", ["asked", slopes, middle], "leaning")
-        shares = graph.clip(leaning, 0.0, 1.0, "shares", "shares_")
-        weighted = apply("Mul", ["ends", shares], "weighted")
-        aim = apply("ReduceSum", [weighted, across], "aim", keepdims=1)
-        bound = 1 + self.beyond
-        told = graph.clip(apply("Add", ["asked", aim], "aimed"), -bound, bound, "told", "told_")
-
-        noticed = apply("Concat", [x, "late"], "noticed", axis=1)
-        shown = graph.dense(noticed, self.layers, "tanh", "felt_")
-        felt = graph.clip(shown, -self.most, self.most, "felt", "felt_")
-        moved = apply("Mul", [felt, constant("rate", self.rate)], "moved")
-        squares = apply("Mul", [shares, shares], "squares")
-        both = apply("ReduceSum", [squares, across], "both", keepdims=1)
-        steps = apply("Mul", [apply("Div", [moved, both], "scaled"), shares], "steps")
-        moved_ends = apply("Sub", ["ends", steps], "moved_ends")
-        ends = graph.clip(moved_ends, -self.farthest, self.farthest, "next_ends", "ends_")
-        distance = apply("Sub", ["asked", "late"], "distance")
-        following = apply("Mul", [distance, constant("follow", self.follow)], "following")
-        late = apply("Add", ["late", following], "next_late")
-        apply("Concat", [ends, late], NEXT_MEMORY, axis=1)
-        return apply("Concat", ["samples", told], "told_inputs", axis=1)
+    heights: tuple[float, ...]
+    """Rising, m."""
+    shifts: tuple[float, ...]
+    """What is added to the command at these heights, m."""
 
 
 SQUASHES = ("tanh", "clip")
@@ -223,7 +158,7 @@ class Network:
     """Squash of the output, one of ``SQUASHES``."""
     bound: float = float("inf")
     """Bound of the last layer's output before the squash."""
-    memory: Memory | None = None
+    memory: RecurrentUnit | None = None
     """Memory in front of the dense layers."""
 
     def __post_init__(self) -> None:
@@ -250,7 +185,7 @@ def build_policy(network: Network, card: Card) -> bytes:
     x = apply("Mul", [x, constant("gain", network.gain)], "normalised")
     memory = network.memory
     if memory is not None:
-        x = memory.build(graph, x, len(network.offset))
+        x = memory.build(graph, x)
     x = graph.dense(x, network.layers, network.activation)
     bound = network.bound if network.squash == "tanh" else min(network.bound, 1.0)
     if np.isfinite(bound):
@@ -302,10 +237,41 @@ def read_network(content: bytes) -> Network:
     return Network(stored["offset"], stored["gain"], layers, names[hidden.pop()], squash, bound)
 
 
+def with_command_map(content: bytes, correction: CommandMap) -> bytes:
+    """Return a policy file whose command is corrected before anything else.
+
+    The shift is the first one and, for every height h, the change of its slope there times
+    max(command - h, 0).
+    """
+    heights, shifts = np.array(correction.heights), np.array(correction.shifts)
+    slopes = np.concatenate([[0.0], np.diff(shifts) / np.diff(heights), [0.0]])
+    model = onnx.load_from_string(content)
+    inner, graph = model.graph, Graph()
+    prefix = f"map_{sum(node.op_type == 'Unsqueeze' for node in inner.node)}_"
+    apply, constant = graph.apply, graph.constant
+    last = constant(f"{prefix}axis", np.array([-1], np.int64))
+    each = apply("Unsqueeze", ["command", last], f"{prefix}each")
+    above = apply("Sub", [each, constant(f"{prefix}heights", heights)], f"{prefix}above")
+    bends = constant(f"{prefix}bends", np.diff(slopes)[:, None])
+    bent = apply("MatMul", [apply("Relu", [above], f"{prefix}ramps"), bends], f"{prefix}bent")
+    shift = apply("Squeeze", [bent, last], f"{prefix}shift")
+    first = apply("Add", ["command", constant(f"{prefix}first", shifts[0])], f"{prefix}first_shift")
+    corrected = apply("Add", [first, shift], f"{prefix}command")
+    for node in inner.node:
+        node.input[:] = [corrected if name == "command" else name for name in node.input]
+    nodes = [*graph.nodes, *inner.node]
+    del inner.node[:]
+    inner.node.extend(nodes)
+    inner.initializer.extend(graph.weights)
+    onnx.checker.check_model(model, full_check=True)
+    mapped: bytes = model.SerializeToString(deterministic=True)
+    return mapped
+
+
 PREFIX = "hidden_"
 """Beginning of the names of hidden layers."""
 
-_LEARNT = ("weight_", "bias_", "gru_", "felt_weight_", "felt_bias_")
+_LEARNT = ("weight_", "bias_", "gru_")
 """Beginnings of the names of what is learnt."""
 
 

@@ -21,8 +21,8 @@ FIRST_SEED = 500
 FINAL_SEEDS = (501, 502, 503, 504)
 """Judge the best snapshots once more at the end."""
 
-DECIDING_SEEDS = (505, 506, 507, 508)
-"""Judge the policies of several seeds, each the best of its own training."""
+CALIBRATION_SEEDS = (505, 506, 507, 508)
+"""By whose hops a policy's command is corrected."""
 
 _SPACING = 0.01
 """Spacing of heights at which nothing between two others should be missed, m."""
@@ -36,8 +36,6 @@ _DISORDER = 0.1
 _UNRELIABLE = 0.01
 """Score for hops that are skipped or hit the ground at a command, however few, m."""
 
-_LEGS = 4
-_SECONDS = 10.0
 _PENALTY = 0.1
 """Score for every hop skipped and every contact of body and ground, per hop, m."""
 
@@ -69,17 +67,20 @@ def evaluate_policy(
     commands: tuple[float, ...],
     seeds: tuple[int, ...] = (FIRST_SEED,),
     rate: float = 200.0,
-    threads: int = 1,
+    threads: int = 0,
+    *,
+    legs: int = 4,
+    seconds: float = 10.0,
 ) -> list[CommandResult]:
     """Let a controller hop at fixed commands, m, rising, with noise and delay.
 
-    Each seed adds four legs per command; ``threads`` of 0 are one per core.
+    Each seed adds so many legs per command; ``threads`` of 0 are one per core.
     """
-    schedule = np.tile(np.repeat(commands, _LEGS), (round(_SECONDS * rate), 1))
+    schedule = np.tile(np.repeat(commands, legs), (round(seconds * rate), 1))
     setup = RolloutConfig(robot, rate=rate, threads=threads)
     runs = [rollout(controller, setup, schedule, seed) for seed in seeds]
     return [
-        _command_result(runs, command, range(index * _LEGS, (index + 1) * _LEGS), rate)
+        _command_result(runs, command, range(index * legs, (index + 1) * legs), rate)
         for index, command in enumerate(commands)
     ]
 
@@ -119,7 +120,7 @@ def as_rows(results: list[CommandResult]) -> list[dict[str, Any]]:
 
 
 def _command_result(runs: list[Rollout], command: float, legs: range, rate: float) -> CommandResult:
-    start = round(SETTLE * _SECONDS * rate)
+    start = round(SETTLE * len(runs[0].time))
     columns = ("height_m", "height_rate_m_s", "foot_clearance_m")
     hops: list[HopMeasurement] = []
     contacts, lowest = 0, np.inf

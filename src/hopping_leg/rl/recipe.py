@@ -8,10 +8,11 @@ from typing import Any, Self
 import numpy as np
 
 from hopping_leg import envs, io
-from hopping_leg.controllers import shooting
-from hopping_leg.rl import algorithms, onnx_export, sb3_env, sb3_policies
-from hopping_leg.rl.distillation.distillation import Distillation
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.rl.distillation.dagger import Dagger, DaggerConfig
+from hopping_leg.rl.distillation.students import StudentConfig
+from hopping_leg.rl.learner import Learner
+from hopping_leg.rl.sac import NetworkConfig, SACConfig
+from hopping_leg.robot import DEFAULT_ROBOT, Robot
 
 HEIGHT = 0.30
 """Straight height of the leg that the recipes' lengths are meant for, m."""
@@ -19,7 +20,7 @@ HEIGHT = 0.30
 WEIGHT_MOMENT = 0.548
 """Its moving mass times its straight height, kg m: what hop torques grow with."""
 
-_PARTS = ("algorithm", "network", "schedule", "selection", "distillation")
+_PARTS = ("algorithm", "network", "schedule", "selection")
 """Parts whose options are named without the part."""
 
 
@@ -32,7 +33,7 @@ class Schedule:
     steps: int
     """Control steps of experience in all, summed over the environments."""
     log_every: int
-    """Episodes (SAC) or updates (PPO) between two entries in the TensorBoard log."""
+    """Episodes (SAC) or rollouts (distillation) between two entries in the TensorBoard log."""
     checkpoint_seconds: float = 60.0
     """Time between checkpoints."""
 
@@ -47,6 +48,8 @@ class SelectionConfig:
     """Share of the training before which no snapshot is evaluated."""
     eval_commands: tuple[float, ...] = (0.25, 0.30, 0.35)
     """Heights of those evaluations, m."""
+    calibrations: int = 0
+    """How often the selected policy's command is corrected by its hops' mean errors."""
 
 
 @dataclass(frozen=True)
@@ -57,18 +60,18 @@ class Recipe:
     """As in policy files."""
     task: envs.TaskConfig
     """The learning problem."""
-    reward: envs.ApexRewardConfig | envs.PaperRewardConfig
-    """Weights of the reward's terms."""
-    algorithm: algorithms.PPOConfig | algorithms.SACConfig
-    """What learns, with its hyper-parameters; the teacher's where there is a distillation."""
-    network: algorithms.NetworkConfig
-    """Sizes of its networks."""
+    algorithm: SACConfig | DaggerConfig
+    """What learns, with its hyper-parameters."""
+    network: NetworkConfig | StudentConfig
+    """Sizes of its networks: of actor and critic, or of the student."""
     schedule: Schedule
     """How much of what."""
     selection: SelectionConfig
     """How the policy is chosen."""
-    distillation: Distillation | None = None
-    """Teacher and student, instead of a policy that learns by the algorithm itself."""
+    reward: envs.ApexRewardConfig | envs.PaperRewardConfig | None = None
+    """Weights of the reward's terms; a student needs none."""
+    robot: str = DEFAULT_ROBOT
+    """The robot that it is meant for, unless another is named."""
     heights: tuple[float, float] | None = None
     """Lowest and highest desired height, m, on whatever leg; none takes the task's, which grow with
     the leg."""
@@ -88,7 +91,7 @@ class Recipe:
         """Yield the name of every option and where it is.
 
         Those of task and reward are named with the part, as ``reward.jerk``; of the others only
-        those of a part's part, as ``dagger.batch_size``.
+        those of a part's part, as ``teacher.taper``.
         """
         for part in ("task", "reward", *_PARTS):
             config = getattr(self, part)
@@ -109,59 +112,26 @@ class Recipe:
             found = getattr(found, part)
         return found
 
-    def make_env(self, robot: Robot, seed: int, threads: int = 1) -> sb3_env.TaskVecEnv:
-        """Build the training environment."""
+    def make_learner(self, robot: Robot, seed: int, threads: int = 1) -> Learner:
+        """Build the algorithm on its environments, untrained."""
         rng, count = np.random.default_rng(seed), self.schedule.num_envs
         task = envs.HoppingTask(robot, count, self.task, self.make_reward(robot), rng, threads)
-        computed = self.distillation is not None and self.distillation.teacher == "shooting"
-        teacher = shooting.Shooting(robot, rate=self.task.rate) if computed else None
-        return sb3_env.TaskVecEnv(task, privileged=self.network.privileged_critic, teacher=teacher)
+        if isinstance(self.algorithm, DaggerConfig):
+            assert isinstance(self.network, StudentConfig), "a distillation has a student"
+            return Dagger(task, self.algorithm, self.network, seed)
+        assert isinstance(self.network, NetworkConfig), "SAC has actor and critics"
+        return self.algorithm.make_learner(task, self.network, seed)
 
     def make_reward(self, robot: Robot) -> envs.Reward:
         """Build the reward."""
+        if self.reward is None:
+            return envs.Reward(self.reward_terms)
         if isinstance(self.reward, envs.PaperRewardConfig):
             length = self.task.start_length
             reward = envs.paper_reward(robot, dataclasses.replace(self.reward, rest_length=length))
         else:
             reward = envs.apex_reward(robot, self.reward, self.task.rate)
         return reward.with_terms(*self.reward_terms) if self.reward_terms else reward
-
-    def make_model(self, env: sb3_env.TaskVecEnv, seed: int) -> Any:  # noqa: ANN401
-        """Build the untrained stable-baselines3 model, a subclass of ``AtBoundary``."""
-        if self.distillation is None:
-            return self.algorithm.make_model(env, self.network, seed)
-        commands = self.selection.eval_commands
-        return self.distillation.make_model(env, self._ppo, self.network, commands, seed)
-
-    def anneal(self, model: Any, env: sb3_env.TaskVecEnv, share: float) -> None:  # noqa: ANN401
-        """Adapt to the share of the training that is done, 0 to 1.
-
-        Called before every rollout, also of a resumed training: depends on ``share`` alone.
-        """
-        if self.distillation is not None:
-            self.distillation.anneal(model, env, share, self._ppo)
-            return
-        env.task.reward.anneal(share)
-        self.algorithm.anneal(model, share)
-
-    def early_score(self, model: Any) -> float | None:  # noqa: ANN401
-        """Return how bad a training is likely to end, m; None as long as that is unknown."""
-        return self.distillation.early_score(model) if self.distillation else None
-
-    def extra_results(self, model: Any) -> dict[str, Any]:  # noqa: ANN401
-        """Return what else the result of a finished training tells, as JSON values."""
-        return self.distillation.extra_results(model) if self.distillation else {}
-
-    def actor(self, model: Any, env: sb3_env.TaskVecEnv) -> onnx_export.Network:  # noqa: ANN401
-        """Return the deterministic actor as it stands."""
-        if self.distillation is not None:
-            return self.distillation.network(model, env)
-        return sb3_policies.network_of(model, env.task.observation)
-
-    @property
-    def _ppo(self) -> algorithms.PPOConfig:
-        assert isinstance(self.algorithm, algorithms.PPOConfig), "a teacher learns by PPO"
-        return self.algorithm
 
     def fit(self, robot: Robot) -> Self:
         """Return the recipe with heights, lengths and torques scaled to a robot.
@@ -175,13 +145,14 @@ class Recipe:
             UsageError: Those heights are no range of heights.
         """
         grown = self._grow(robot)
-        if grown.heights is None:
-            return grown
-        task = dataclasses.replace(grown.task, command_range=grown.heights)
-        low, high = task.command_bounds
+        return grown if grown.heights is None else grown.within(*grown.heights)
+
+    def within(self, low: float, high: float) -> Self:
+        """Return the recipe with other lowest and highest desired heights, m."""
+        task = dataclasses.replace(self.task, command_range=(low, high))
         edge = 0.1 * (high - low)
-        commands = np.linspace(low + edge, high - edge, len(grown.selection.eval_commands))
-        return grown.replace(
+        commands = np.linspace(low + edge, high - edge, len(self.selection.eval_commands))
+        return self.replace(
             task=task, eval_commands=tuple(float(_round(height)) for height in commands)
         )
 

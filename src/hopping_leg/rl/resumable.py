@@ -1,4 +1,4 @@
-"""stable-baselines3 algorithms that can be stopped and continued without a trace.
+"""Soft actor-critic of stable-baselines3 that can be stopped and continued without a trace.
 
 The state is taken at the entry of ``collect_rollouts``: after the gradient steps, before the next
 exploration noise is drawn. Continuing from there is the same as never having stopped, bit by bit.
@@ -11,136 +11,139 @@ from typing import Any
 
 import numpy as np
 import torch
-from stable_baselines3 import PPO, SAC
-from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3 import SAC
 
+from hopping_leg.rl import sb3_policies
 from hopping_leg.rl.checkpoint import Tree
+from hopping_leg.rl.learner import RecentHops
+from hopping_leg.rl.onnx_export import Network
 from hopping_leg.rl.sb3_env import TaskVecEnv
 
 _COUNTERS = ("num_timesteps", "_episode_num", "_n_updates", "_current_progress_remaining")
 _REPLAY = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 
 
-class AtBoundary:
-    """Mixin: calls back at the boundary and lets a clock hasten the schedules.
-
-    Attributes:
-        on_boundary: Called between the gradient steps and the next rollout.
-        remaining: Returns the share of the budget that is left, 1 to 0; the learning rate follows
-            this or the share of steps left, whichever is smaller.
-    """
+class ResumableSAC(SAC):  # type: ignore[misc]
+    """Soft actor-critic on a ``TaskVecEnv``, a ``Learner``."""
 
     on_boundary: Callable[[], None] | None = None
     remaining: Callable[[], float] | None = None
+    env: TaskVecEnv
     _current_progress_remaining: float
+
+    @property
+    def recent_hops(self) -> RecentHops:
+        """The latest hops."""
+        return self.env.recent_hops
+
+    @property
+    def share(self) -> float:
+        """Share of the training that is done, 0 to 1."""
+        return 1 - float(self._current_progress_remaining)
+
+    def train_until(self, steps: int, callback: Callable[[], bool], log_interval: int) -> None:
+        """Learn until so many control steps are done in all, or until the callback says no."""
+        self.learn(
+            steps - self.num_timesteps,
+            callback=lambda *_: callback(),
+            log_interval=log_interval,
+            reset_num_timesteps=self.num_timesteps == 0,
+        )
 
     def collect_rollouts(self, *args: Any, **kwargs: Any) -> Any:  # noqa: ANN401
         """Collect a rollout as usual, after the callback."""
+        for name, mean in self.env.take_reward_terms().items():
+            self.logger.record_mean(f"reward/{name}", mean)
+        self.env.task.reward.anneal(self.share)
         if self.on_boundary is not None:
             self.on_boundary()
-        return super().collect_rollouts(*args, **kwargs)  # type: ignore[misc]
-
-    def own_state(self) -> Tree:
-        """Return what an algorithm of this project's own remembers beside the library's."""
-        return {}
-
-    def restore_own(self, state: Tree) -> None:
-        """Go on from an ``own_state``."""
+        return super().collect_rollouts(*args, **kwargs)
 
     def _update_current_progress_remaining(self, steps: int, total: int) -> None:
-        super()._update_current_progress_remaining(steps, total)  # type: ignore[misc]
+        super()._update_current_progress_remaining(steps, total)
         if self.remaining is not None:
             left = self._current_progress_remaining
             self._current_progress_remaining = min(left, self.remaining())
 
+    def network(self) -> Network:
+        """Return the deterministic actor as it stands."""
+        parts = [self.actor.latent_pi, self.actor.mu]
+        return sb3_policies.dense_network(parts, self.env.task.observation, "tanh")
 
-class ResumableSAC(AtBoundary, SAC):  # type: ignore[misc]
-    """Soft actor-critic."""
+    def state(self) -> Tree:
+        """Return everything needed to continue exactly, its environment included."""
+        return {
+            **learner_state(self),
+            "env": self.env.state(),
+            "last_observation": self._last_obs,
+            "last_episode_starts": self._last_episode_starts,
+            "episodes": [{"r": e["r"], "l": e["l"], "t": e["t"]} for e in self.ep_info_buffer],
+            "random": _random_state(self),
+            "replay": _replay_state(self.replay_buffer),
+        }
+
+    def restore(self, state: Tree) -> None:
+        """Bring a freshly built learner of the same recipe to a ``state``."""
+        self.env.restore(state["env"])
+        restore_learner(self, state)
+        self._last_obs = state["last_observation"]
+        self._last_episode_starts = state["last_episode_starts"]
+        self.ep_info_buffer = deque(state["episodes"], maxlen=self._stats_window_size)
+        self.ep_success_buffer: deque[Any] = deque(maxlen=self._stats_window_size)
+        buffer, replay = self.replay_buffer, state["replay"]
+        for name, values in replay["arrays"].items():
+            getattr(buffer, name)[: len(values)] = values
+        buffer.pos, buffer.full = replay["pos"], replay["full"]
+        _restore_random(self, state["random"])
 
 
-class ResumablePPO(AtBoundary, PPO):  # type: ignore[misc]
-    """Proximal policy optimisation."""
-
-
-def state_of(model: BaseAlgorithm) -> Tree:
-    """Return everything needed to continue a model exactly, its environment included."""
-    env: TaskVecEnv = model.env
-    tree: Tree = {
-        **learner_state(model),
-        "env": env.state(),
-        "last_observation": model._last_obs,
-        "last_episode_starts": model._last_episode_starts,
-        "episodes": [{"r": e["r"], "l": e["l"], "t": e["t"]} for e in model.ep_info_buffer],
-        "random": _random_state(model),
-        "own": model.own_state(),
-    }
-    if isinstance(model, SAC):
-        tree["replay"] = _replay_state(model.replay_buffer)
-    return tree
-
-
-def learner_state(model: BaseAlgorithm) -> Tree:
+def learner_state(model: SAC) -> Tree:
     """Return networks, optimisers and counters alone: no environment, experience or randomness."""
     tree: Tree = {
-        "policy": _to_numpy(model.policy.state_dict()),
-        "optimizers": [_to_numpy(o.state_dict()) for o in _optimizers(model)],
+        "policy": to_numpy(model.policy.state_dict()),
+        "optimizers": [to_numpy(o.state_dict()) for o in _optimizers(model)],
         "counters": {name: getattr(model, name) for name in _COUNTERS},
     }
-    if isinstance(model, SAC) and model.log_ent_coef is not None:
+    if model.log_ent_coef is not None:
         tree["log_ent_coef"] = model.log_ent_coef.detach().numpy().copy()
     return tree
 
 
-def restore(model: BaseAlgorithm, tree: Tree) -> None:
-    """Bring a freshly built model of the same recipe to a ``state_of``.
-
-    Call ``learn`` with ``reset_num_timesteps=False`` afterwards.
-    """
-    model.env.restore(tree["env"])
-    restore_learner(model, tree)
-    model._last_obs = tree["last_observation"]
-    model._last_episode_starts = tree["last_episode_starts"]
-    model.ep_info_buffer = deque(tree["episodes"], maxlen=model._stats_window_size)
-    model.ep_success_buffer = deque(maxlen=model._stats_window_size)
-    if "replay" in tree:
-        buffer, replay = model.replay_buffer, tree["replay"]
-        for name, values in replay["arrays"].items():
-            getattr(buffer, name)[: len(values)] = values
-        buffer.pos, buffer.full = replay["pos"], replay["full"]
-    model.restore_own(tree["own"])
-    _restore_random(model, tree["random"])
-
-
-def restore_learner(model: BaseAlgorithm, tree: Tree) -> None:
+def restore_learner(model: SAC, tree: Tree) -> None:
     """Bring a model to a ``learner_state``."""
-    model.policy.load_state_dict(_to_torch(tree["policy"]))
+    model.policy.load_state_dict(to_torch(tree["policy"]))
     if "log_ent_coef" in tree:
         model.log_ent_coef.data.copy_(torch.from_numpy(tree["log_ent_coef"]))
     for optimizer, state in zip(_optimizers(model), tree["optimizers"], strict=True):
-        state["state"] = {int(key): _to_torch(value) for key, value in state["state"].items()}
-        optimizer.load_state_dict(state)
+        load_optimizer(optimizer, state)
     for name, value in tree["counters"].items():
         setattr(model, name, value)
 
 
-def _optimizers(model: BaseAlgorithm) -> list[torch.optim.Optimizer]:
-    if isinstance(model, SAC):
-        own = [model.actor.optimizer, model.critic.optimizer]
-        return own + ([model.ent_coef_optimizer] if model.ent_coef_optimizer is not None else [])
-    return [model.policy.optimizer]
+def _optimizers(model: SAC) -> list[torch.optim.Optimizer]:
+    own = [model.actor.optimizer, model.critic.optimizer]
+    return own + ([model.ent_coef_optimizer] if model.ent_coef_optimizer is not None else [])
 
 
-def _to_numpy(node: Any) -> Any:  # noqa: ANN401
+def load_optimizer(optimizer: torch.optim.Optimizer, state: Tree) -> None:
+    """Bring an optimizer to a ``to_numpy`` of its state."""
+    slots = {int(key): to_torch(value) for key, value in state["state"].items()}
+    optimizer.load_state_dict({**state, "state": slots})
+
+
+def to_numpy(node: Any) -> Any:  # noqa: ANN401
+    """Return nested containers with arrays in the place of tensors."""
     if isinstance(node, dict):
-        return {key: _to_numpy(value) for key, value in node.items()}
+        return {key: to_numpy(value) for key, value in node.items()}
     if isinstance(node, list | tuple):
-        return [_to_numpy(value) for value in node]
+        return [to_numpy(value) for value in node]
     return node.detach().cpu().numpy().copy() if isinstance(node, torch.Tensor) else node
 
 
-def _to_torch(node: Any) -> Any:  # noqa: ANN401
+def to_torch(node: Any) -> Any:  # noqa: ANN401
+    """Return a nested dictionary with tensors in the place of arrays."""
     if isinstance(node, dict):
-        return {key: _to_torch(value) for key, value in node.items()}
+        return {key: to_torch(value) for key, value in node.items()}
     return torch.from_numpy(node.copy()) if isinstance(node, np.ndarray) else node
 
 
@@ -150,7 +153,7 @@ def _replay_state(buffer: Any) -> Tree:  # noqa: ANN401
     return {"pos": buffer.pos, "full": buffer.full, "arrays": arrays}
 
 
-def _random_state(model: BaseAlgorithm) -> Tree:
+def _random_state(model: SAC) -> Tree:
     kind, keys, position, has_gauss, gauss = np.random.get_state(legacy=True)  # noqa: NPY002
     version, words, gauss_next = random.getstate()
     return {
@@ -161,7 +164,7 @@ def _random_state(model: BaseAlgorithm) -> Tree:
     }
 
 
-def _restore_random(model: BaseAlgorithm, state: Tree) -> None:
+def _restore_random(model: SAC, state: Tree) -> None:
     torch.set_rng_state(torch.from_numpy(state["torch"]))
     np.random.set_state(tuple(state["numpy"]))  # noqa: NPY002
     version, words, gauss_next = state["python"]

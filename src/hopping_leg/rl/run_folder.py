@@ -13,7 +13,7 @@ from hopping_leg.robot.parameters import Robot
 
 _LIBRARIES = ("hopping-leg", "mujoco", "numpy", "onnxruntime", "stable-baselines3", "torch")
 
-_ASKED = ["recipe", "robot_digest", "seed", "parallel_seeds", "minutes_budget", "source", "options"]
+_ASKED = ["recipe", "robot_digest", "seed", "minutes_budget", "source", "options"]
 """What a run must have been asked for alike to go on."""
 
 
@@ -28,7 +28,6 @@ class RunFolder:
         seed: int,
         minutes: float | None,
         source: Path | None = None,
-        parallel_seeds: int = 1,
     ) -> None:
         self.path, self._source = path, source
         self._defaults = as_stored(asdict(recipes.RECIPES.get(recipe.name, recipe)))
@@ -41,7 +40,6 @@ class RunFolder:
                 "seed": seed,
                 "minutes_budget": minutes,
                 "source": str(source) if source else None,
-                "parallel_seeds": parallel_seeds,
                 "versions": library_versions(),
             }
         )
@@ -68,8 +66,6 @@ class RunFolder:
             words += ["--source", config["source"]]
         if config["minutes_budget"] is not None:
             words += ["--minutes", f"{config['minutes_budget']:g}"]
-        if config["parallel_seeds"] > 1:
-            words += ["--parallel-seeds", str(config["parallel_seeds"])]
         return " ".join([*words, *recipes.words_of(config["recipe"], config["options"])])
 
     def snapshot(self, steps: int) -> Path:
@@ -109,7 +105,6 @@ class RunFolder:
         stored = read_json(self.path / "config.json")
         # A run from before an option existed was asked for what is its default.
         _complete(stored.get("options", {}), self._defaults)
-        stored.setdefault("parallel_seeds", 1)
         check_same(self.path, stored, {key: self.config[key] for key in _ASKED})
 
 

@@ -1,6 +1,6 @@
-"""An actor that sees what the robot measures, and a critic that sees the true state.
+"""SAC whose actor sees what the robot measures and whose critics see the true state.
 
-Only in training: the critic is thrown away afterwards. ``TaskVecEnv`` with ``privileged`` joins
+Only in training: the critics are thrown away afterwards. ``TaskVecEnv`` with ``privileged`` joins
 both to one observation, actor's part first.
 """
 
@@ -9,9 +9,7 @@ from typing import Any
 
 import gymnasium
 import torch
-from stable_baselines3 import SAC
-from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.policies import ActorCriticPolicy, ContinuousCritic
+from stable_baselines3.common.policies import ContinuousCritic
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.sac.policies import Actor, SACPolicy
 from torch import nn
@@ -22,70 +20,11 @@ from hopping_leg.errors import UsageError
 from hopping_leg.rl.onnx_export import Network
 
 
-class _Split(nn.Module):
-    """Separate networks for the two parts of an observation, as stable-baselines3 wants them."""
-
-    def __init__(
-        self,
-        actor: slice | list[int],
-        critic: slice,
-        inputs: int,
-        sizes: dict[str, list[int]],
-        activation: type[nn.Module],
-    ) -> None:
-        super().__init__()
-        self._actor, self._critic = actor, critic
-        self.policy_net = dense(_width(actor, inputs), sizes["pi"], activation)
-        self.value_net = dense(_width(critic, inputs), sizes["vf"], activation)
-        self.latent_dim_pi, self.latent_dim_vf = sizes["pi"][-1], sizes["vf"][-1]
-
-    def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return the last hidden layers of actor and critic."""
-        return self.forward_actor(features), self.forward_critic(features)
-
-    def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
-        """Return the actor's last hidden layer."""
-        hidden: torch.Tensor = self.policy_net(features[:, self._actor])
-        return hidden
-
-    def forward_critic(self, features: torch.Tensor) -> torch.Tensor:
-        """Return the critic's last hidden layer."""
-        hidden: torch.Tensor = self.value_net(features[:, self._critic])
-        return hidden
-
-
-class AsymmetricPolicy(ActorCriticPolicy):  # type: ignore[misc]
-    """PPO policy whose actor sees the first ``actor_size`` entries and whose critic the others.
-
-    The actor sees the entries ``actor_sees`` instead where they are given.
-    """
-
-    def __init__(
-        self,
-        *args: Any,  # noqa: ANN401
-        actor_size: int,
-        actor_sees: list[int] | None = None,
-        **kwargs: Any,  # noqa: ANN401
-    ) -> None:
-        self._actor_sees = actor_sees or slice(actor_size)
-        self._critic_sees = slice(actor_size, None)
-        super().__init__(*args, **kwargs)
-
-    def _build_mlp_extractor(self) -> None:
-        self.mlp_extractor = _Split(
-            self._actor_sees,
-            self._critic_sees,
-            self.features_dim,
-            self.net_arch,
-            self.activation_fn,
-        )
-
-
 class _Columns(BaseFeaturesExtractor):  # type: ignore[misc]
     """Passes on some entries of an observation."""
 
     def __init__(self, space: gymnasium.spaces.Box, columns: slice) -> None:
-        super().__init__(space, _width(columns, space.shape[0]))
+        super().__init__(space, len(range(space.shape[0])[columns]))
         self._columns = columns
 
     def forward(self, observation: torch.Tensor) -> torch.Tensor:
@@ -111,11 +50,6 @@ class AsymmetricSACPolicy(SACPolicy):  # type: ignore[misc]
         return super().make_critic(_Columns(self.observation_space, slice(self._actor_size, None)))
 
 
-def _width(part: slice | list[int], inputs: int) -> int:
-    """Return how many of so many entries a part has."""
-    return len(part) if isinstance(part, list) else len(range(inputs)[part])
-
-
 def dense(inputs: int, hidden: list[int], activation: type[nn.Module]) -> nn.Sequential:
     """Return hidden layers, each with its activation."""
     layers: list[nn.Module] = []
@@ -126,14 +60,6 @@ def dense(inputs: int, hidden: list[int], activation: type[nn.Module]) -> nn.Seq
 
 
 _NAMES = {nn.ReLU: "relu", nn.Tanh: "tanh", nn.ELU: "elu"}
-
-
-def network_of(model: BaseAlgorithm, observation: Observation) -> Network:
-    """Return the actor of SAC or PPO with the task's normalisation; ``UsageError`` if not dense."""
-    if isinstance(model, SAC):
-        return dense_network([model.actor.latent_pi, model.actor.mu], observation, "tanh")
-    policy = model.policy
-    return dense_network([policy.mlp_extractor.policy_net, policy.action_net], observation, "clip")
 
 
 def dense_network(parts: Sequence[nn.Module], observation: Observation, squash: str) -> Network:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import tyro
 
 from hopping_leg.errors import UsageError
+from hopping_leg.robot import DEFAULT_ROBOT
 
 if TYPE_CHECKING:
     from hopping_leg.rl.recipe import Recipe
@@ -84,7 +85,7 @@ class Tuning:
     """SQLite file, or URL of another database; default: runs/tune/RECIPE.db."""
     out: Path | None = None
     """Folder of the trainings, trials.json and the figures; default: runs/tune/RECIPE."""
-    robot: str = "legv2-paper"
+    robot: str = DEFAULT_ROBOT
     """A shipped robot or the path of a .toml file."""
     trials: int = 50
     """Trials of the finished study, summed over all processes."""

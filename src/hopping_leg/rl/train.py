@@ -13,8 +13,10 @@ from rich.progress import TextColumn, TimeRemainingColumn
 from hopping_leg import errors, io
 from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.progress import LiveProgress
-from hopping_leg.rl import loggers, onnx_export, policy_evaluation, resumable, run_folder
+from hopping_leg.rl import loggers, onnx_export, policy_evaluation, run_folder, stages
+from hopping_leg.rl.calibration import calibrate
 from hopping_leg.rl.checkpoint import write_checkpoint
+from hopping_leg.rl.learner import RecentHops
 from hopping_leg.rl.model_card import write_card
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.robot.parameters import Robot
@@ -28,13 +30,13 @@ class TrainingProgress(LiveProgress):
         self._title = title
         self._first_steps: int | None = None
 
-    def update(self, share: float, steps: int, hops: int, error: float, best: str) -> None:
-        """Show the share that is done, 0 to 1, and the latest mean |apex - command|, m."""
+    def update(self, share: float, steps: int, hops: RecentHops, best: str) -> None:
+        """Show the share that is done, 0 to 1, and how accurate the latest hops are."""
         if self._first_steps is None:
             self._first_steps = steps
-        note = f"{hops} hops"
-        if math.isfinite(error):
-            note += f" · apex error {1000 * error:.0f} mm"
+        note = f"{hops.count} hops"
+        if math.isfinite(hops.mean_error):
+            note += f" · apex error {1000 * hops.mean_error:.0f} mm"
         if steps > self._first_steps:
             note += f" · {(steps - self._first_steps) / max(self.passed, 1e-9):.0f} steps/s"
         note += best
@@ -71,7 +73,6 @@ def train(
     quiet: bool = False,
     log: loggers.Log = "tensorboard",
     on_snapshot: Callable[[int, float], None] = lambda _steps, _score: None,
-    on_early_score: Callable[[float, float], None] | None = None,
 ) -> Trained:
     """Train a controller, scaled to the robot's size; leave policy, card and history in ``out``.
 
@@ -91,29 +92,11 @@ def train(
         quiet: Show no progress.
         log: Who gets the curves besides TensorBoard.
         on_snapshot: Called with steps and score, m, of every snapshot; may raise to end it.
-        on_early_score: Called once, as soon as the recipe can tell how bad the training is likely
-            to end, with that in m and the minutes so far, after a checkpoint; may raise to end it.
 
     Raises:
         UsageError: ``out`` holds a run that cannot be continued so, or ``log`` lacks a package.
         RobotError: The robot has effects that training does not simulate.
     """
-    check(robot, minutes, log)
-    torch.set_num_threads(max(threads, 1))
-    recipe = recipe.fit(robot)
-    folder = run_folder.RunFolder(out, recipe, robot, seed, minutes, source)
-    tree = folder.begin(resume=resume)
-    trainer = Trainer(recipe, robot, seed, folder, minutes, threads)
-    trainer.model.set_logger(loggers.make_logger(folder.path, log, folder.config))
-    trainer.on_snapshot, trainer.on_early_score = on_snapshot, on_early_score
-    if tree is not None:
-        trainer.restore(tree)
-    with TrainingProgress(f"{recipe.name} seed {seed}", quiet=quiet) as progress:
-        return trainer.run(progress)
-
-
-def check(robot: Robot, minutes: float | None, log: loggers.Log) -> None:
-    """Refuse what cannot be trained before anything is written, raising as ``train`` does."""
     loggers.check_log(log)
     if minutes is not None and not 0 < minutes < float("inf"):
         raise errors.UsageError(f"--minutes is {minutes:g} but must be positive.")
@@ -123,6 +106,19 @@ def check(robot: Robot, minutes: float | None, log: loggers.Log) -> None:
             " believed of it, the robot that its file extends or one from `hop identify`, and"
             " judge the policy on it with `hop evaluate`."
         )
+    began = time.monotonic()
+    torch.set_num_threads(max(threads, 1))
+    recipe, worst_score = stages.within_reach(recipe.fit(robot), robot)
+    folder = run_folder.RunFolder(out, recipe, robot, seed, minutes, source)
+    tree = folder.begin(resume=resume)
+    trainer = Trainer(recipe, robot, seed, folder, minutes, threads, began)
+    trainer.end_stage(worst_score)
+    trainer.learner.set_logger(loggers.make_logger(folder.path, log, folder.config))
+    trainer.on_snapshot = on_snapshot
+    if tree is not None:
+        trainer.restore(tree)
+    with TrainingProgress(f"{recipe.name} seed {seed}", quiet=quiet) as progress:
+        return trainer.run(progress)
 
 
 class Trainer:
@@ -136,22 +132,23 @@ class Trainer:
         folder: run_folder.RunFolder,
         minutes: float | None,
         threads: int,
+        began: float,
     ) -> None:
         self.recipe, self.robot, self.seed, self.folder = recipe, robot, seed, folder
         self._seconds = float("inf") if minutes is None else 60 * minutes
-        self.env = recipe.make_env(robot, seed, threads)
-        self.model = recipe.make_model(self.env, seed)
-        self.model.on_boundary = self._at_boundary
+        self.learner = recipe.make_learner(robot, seed, threads)
+        self.learner.on_boundary = self._at_boundary
         if minutes is not None:
-            self.model.remaining = lambda: max(0.0, 1 - self.elapsed / self._seconds)
+            self.learner.remaining = lambda: max(0.0, 1 - self.elapsed / self._seconds)
         self.selection = Selection(recipe, robot, folder)
-        self._restored = False
+        self._stages = stages.stages_of(recipe)
+        self.stages: list[dict[str, Any]] = []
+        """How the stages of a distillation ended so far, as JSON values."""
         self._earlier = 0.0
-        self._began = self._saved = time.monotonic()
+        self._began, self._saved = began, time.monotonic()
         self._shown = 0.0
         self._progress: TrainingProgress | None = None
         self.on_snapshot: Callable[[int, float], None] = lambda _steps, _score: None
-        self.on_early_score: Callable[[float, float], None] | None = None
 
     @property
     def elapsed(self) -> float:
@@ -160,37 +157,37 @@ class Trainer:
 
     def restore(self, tree: dict[str, Any]) -> None:
         """Go on from a checkpoint, of this run or of the shorter one that it begins with."""
-        resumable.restore(self.model, tree["model"])
-        self.selection.rows = tree["history"]
+        self.learner.restore(tree["learner"])
+        self.selection.rows, self.stages = tree["history"], tree["stages"]
         self._earlier = tree["elapsed"]
-        self._restored = True
         self._began = time.monotonic()
-        done = self.model.num_timesteps
-        self.model._update_current_progress_remaining(done, self.recipe.schedule.steps)
 
     def run(self, progress: TrainingProgress) -> Trained:
         """Learn until steps or time are used up; write the selected policy."""
         self._progress = progress
-        model, recipe = self.model, self.recipe
-        if self.elapsed < self._seconds and model.num_timesteps < recipe.schedule.steps:
-            model.learn(
-                recipe.schedule.steps - model.num_timesteps,
-                callback=lambda *_: self.tick(),
-                log_interval=recipe.schedule.log_every,
-                reset_num_timesteps=not self._restored,
-            )
+        learner, recipe = self.learner, self.recipe
+        if self.elapsed < self._seconds and learner.num_timesteps < recipe.schedule.steps:
+            learner.train_until(recipe.schedule.steps, self.tick, recipe.schedule.log_every)
         self._evaluate()
-        model.logger.close()
+        learner.logger.close()
         self._show(force=True)
-        content, results = self.selection.choose()
-        minutes, steps = self.elapsed / 60, int(model.num_timesteps)
+        content, selected = self.selection.choose()
+        self.end_stage(selected["worst_score_m"])
+        if recipe.selection.calibrations:
+            content = calibrate(
+                content, self.robot, recipe.task.command_bounds, recipe.selection.calibrations,
+                recipe.task.rate,
+            )  # fmt: skip
+            selected |= self.selection.final(content)
+            self.end_stage(selected["worst_score_m"])
+        minutes, steps = self.elapsed / 60, int(learner.num_timesteps)
         result = {
             "command": self.folder.command,
             "minutes": minutes,
             "steps": steps,
-            "selected": results,
+            "selected": selected,
             "history": self.selection.rows,
-            **recipe.extra_results(model),
+            "stages": self.stages,
         }
         self.folder.write("result.json", {**self.folder.config, **result})
         write_card(self.folder.path)
@@ -203,35 +200,32 @@ class Trainer:
         return self.elapsed < self._seconds
 
     def _at_boundary(self) -> None:
-        share = 1 - self.model._current_progress_remaining
-        for name, mean in self.env.take_reward_terms().items():
-            self.model.logger.record_mean(f"reward/{name}", mean)
-        self.recipe.anneal(self.model, self.env, share)
-        self._tell_early_score()
-        due = self.model.num_timesteps >= self.selection.next_at
-        if due and share >= self.recipe.selection.eval_start:
+        due = self.learner.num_timesteps >= self.selection.next_at
+        if due and self.learner.share >= self.recipe.selection.eval_start:
             self._evaluate()
+        if len(self.stages) == 1 and self.learner.share >= self._stages[1].until:
+            self.end_stage(self.learner.recent_hops.mean_error)
         if time.monotonic() - self._saved >= self.recipe.schedule.checkpoint_seconds:
             self.checkpoint()
 
-    def _tell_early_score(self) -> None:
-        early_score, tell = self.recipe.early_score(self.model), self.on_early_score
-        if early_score is not None and tell is not None:
-            self.on_early_score = None
-            self.checkpoint()
-            tell(early_score, self.elapsed / 60)
+    def end_stage(self, score: float) -> None:
+        """Note how the present stage of a distillation ended."""
+        if self._stages:
+            stage = self._stages[len(self.stages)]
+            self.stages.append(stage.ended(score, self.elapsed))
 
     def checkpoint(self) -> None:
         """Write a checkpoint; only at a boundary does it continue exactly."""
         tree = {
-            "model": resumable.state_of(self.model),
+            "learner": self.learner.state(),
             "history": self.selection.rows,
+            "stages": self.stages,
             "elapsed": self.elapsed,
         }
-        write_checkpoint(self.folder.checkpoints, self.model.num_timesteps, tree)
+        write_checkpoint(self.folder.checkpoints, self.learner.num_timesteps, tree)
         self._saved = time.monotonic()
 
-    def policy_content(self) -> bytes:
+    def _content(self) -> bytes:
         """Return the deterministic policy as it stands, as a policy file."""
         recipe, robot = self.recipe, self.robot
         low, high = recipe.task.command_bounds
@@ -246,16 +240,15 @@ class Trainer:
             robot_digest=robot.digest,
             rate=recipe.task.rate,
             seed=self.seed,
-            steps=int(self.model.num_timesteps),
+            steps=int(self.learner.num_timesteps),
             versions=self.folder.config["versions"],
         )
-        return onnx_export.build_policy(recipe.actor(self.model, self.env), card)
+        return onnx_export.build_policy(self.learner.network(), card)
 
     def _evaluate(self) -> None:
-        steps = int(self.model.num_timesteps)
-        content = self.policy_content()
-        row = self.selection.add(steps, self.elapsed / 60, content)
-        logger = self.model.logger
+        steps = int(self.learner.num_timesteps)
+        row = self.selection.add(steps, self.elapsed / 60, self._content())
+        logger = self.learner.logger
         logger.record("trial/score_m", row["score_m"])
         for trial in row["trials"]:
             at = f"trial/{trial['command_m']:.2f}"
@@ -270,10 +263,10 @@ class Trainer:
         if self._progress is None or (now - self._shown < SHOWN_EVERY and not force):
             return
         self._shown = now
-        steps = int(self.model.num_timesteps)
+        steps = int(self.learner.num_timesteps)
         share = max(steps / self.recipe.schedule.steps, self.elapsed / self._seconds)
         self._progress.update(
-            min(share, 1.0), steps, self.env.hops, self.env.apex_error, self.selection.describe()
+            min(share, 1.0), steps, self.learner.recent_hops, self.selection.describe()
         )
 
 
@@ -301,7 +294,7 @@ class Selection:
         row = {
             "steps": steps,
             "minutes": minutes,
-            **self._trials(content, (policy_evaluation.FIRST_SEED,)),
+            **self.trials(content),
         }
         self.rows.append(row)
         return row
@@ -312,11 +305,15 @@ class Selection:
         finals = []
         for row in ranked:
             content = self._folder.snapshot(row["steps"]).read_bytes()
-            again = self._trials(content, policy_evaluation.FINAL_SEEDS)
-            finals.append(({"steps": row["steps"], "minutes": row["minutes"], **again}, content))
+            tried = {"steps": row["steps"], "minutes": row["minutes"], **self.final(content)}
+            finals.append((tried, content))
         best, content = min(finals, key=lambda final: float(final[0]["score_m"]))
         scores = [{"steps": row["steps"], "score_m": row["score_m"]} for row, _ in finals]
         return content, {**best, "finalists": scores, "seeds": list(policy_evaluation.FINAL_SEEDS)}
+
+    def final(self, content: bytes) -> dict[str, Any]:
+        """Try a policy file on the seeds that judge the best."""
+        return self.trials(content, policy_evaluation.FINAL_SEEDS)
 
     def describe(self) -> str:
         """Return what to show of the best snapshot so far, or nothing."""
@@ -325,7 +322,10 @@ class Selection:
         best = min(self.rows, key=lambda row: float(row["score_m"]))
         return f" · best snapshot {1000 * best['score_m']:.0f} mm"
 
-    def _trials(self, content: bytes, seeds: tuple[int, ...]) -> dict[str, Any]:
+    def trials(
+        self, content: bytes, seeds: tuple[int, ...] = (policy_evaluation.FIRST_SEED,)
+    ) -> dict[str, Any]:
+        """Return score, m, and trials of a policy file, as JSON values."""
         recipe = self._recipe
         policy = Policy(content, "snapshot", recipe.name)
         results = policy_evaluation.evaluate_policy(
@@ -333,5 +333,6 @@ class Selection:
         )
         return {
             "score_m": policy_evaluation.score(results),
+            "worst_score_m": max(map(policy_evaluation.command_score, results)),
             "trials": policy_evaluation.as_rows(results),
         }

@@ -28,6 +28,7 @@ from hopping_leg.robot.model_mismatch import (
 from hopping_leg.robot.parameters import JOINTS, Contact, Joint, Link, Robot
 from hopping_leg.robot.robot_checks import check_physics, numbers
 from hopping_leg.robot.robot_files import (
+    DEFAULT_ROBOT,
     doubts,
     load_robot,
     load_tree,
@@ -40,6 +41,7 @@ from hopping_leg.robot.urdf import to_urdf
 
 __all__ = [
     "COARSE_TIMESTEP",
+    "DEFAULT_ROBOT",
     "GRAVITY",
     "JOINTS",
     "NO_MISMATCH",

@@ -20,6 +20,9 @@ from hopping_leg.robot.robot_checks import (
     unfit_numbers,
 )
 
+DEFAULT_ROBOT = "legv2-identified"
+"""The best-supported robot: the leg as its own recordings tell it."""
+
 _SHIPPED = resources.files("hopping_leg.robot") / "robots"
 
 _log = logging.getLogger(__name__)

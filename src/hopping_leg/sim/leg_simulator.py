@@ -86,6 +86,8 @@ class LegSimulator(Simulator):
                 f"Commands that are {latest * 1e3:g} ms late do not fit a control period of"
                 f" {self.period * 1e3:g} ms; at most {stepper.COMMANDS - 1} may be under way."
             )
+        self.robots = tuple(robots)
+        """What each leg is."""
         self.table = table
         self._jitters = bool(table["command_jitter"].any())
         self._noisy = bool(table["sensor_noise"].any())

@@ -151,11 +151,8 @@ def sample(
     ranges: Sequence[Range],
     count: int,
     rng: np.random.Generator,
-    probability: float = 1.0,
 ) -> tuple[Robot, ...]:
     """Return ``count`` variants of a robot, each with its own numbers, drawn range by range.
-
-    A number is drawn with a probability and the robot's own otherwise.
 
     Raises:
         UsageError: A range's number may not differ from leg to leg.
@@ -169,8 +166,7 @@ def sample(
         variant = robot
         for spread in ranges:
             value = spread.sample(rng, attrgetter(spread.path)(robot))
-            if probability == 1 or rng.random() < probability:
-                variant = replace_at(variant, spread.path, value)
+            variant = replace_at(variant, spread.path, value)
         check_physics(variant, f"variant {number} of {robot.name}")
         variants.append(variant)
     return tuple(variants)

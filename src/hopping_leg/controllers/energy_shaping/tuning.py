@@ -156,9 +156,6 @@ def from_unit(point: Array, base: ShapingGains) -> ShapingGains:
     return dataclasses.replace(base, **dict(zip(SPACE, values.tolist(), strict=True)))
 
 
-COMMANDS = (0.22, 0.25, 0.30, 0.35, 0.40)
-"""Heights that a candidate is tried at, m."""
-
 FIRST_GAINS = (0.85, 1.0, 1.15)
 """Factors on k0, one run each: the gain update must find its way from all of them."""
 
@@ -180,6 +177,8 @@ class Search:
     """First step size, as a share of each gain's range."""
     flight: float = 0.0
     """Share of the time in the air that is asked for at every height; less costs."""
+    commands: tuple[float, ...] = (0.22, 0.25, 0.30, 0.35, 0.40)
+    """Heights that a candidate is tried at, m: those that the leg's motors reach."""
     threads: int = 0
     """Physics threads, 0 for one per core."""
 
@@ -192,25 +191,31 @@ class Search:
             raise errors.UsageError("--seconds must lie between 3 and 600, --step between 0 and 1.")
         if not 0 <= self.flight < 1:
             raise errors.UsageError("--flight is a share of the time, from 0 to below 1, e.g. 0.5.")
+        if len(self.commands) < 3 or not all(c > 0 for c in self.commands):
+            raise errors.UsageError("A search needs at least three --commands, heights in m.")
 
 
 def evaluate(
-    candidates: list[ShapingGains], config: RolloutConfig, seconds: float, seed: int
+    candidates: list[ShapingGains],
+    config: RolloutConfig,
+    commands: tuple[float, ...],
+    seconds: float,
+    seed: int,
 ) -> list[list[CommandScore]]:
-    """Return each candidate's scores at ``COMMANDS``, over all first gains, in one rollout."""
+    """Return each candidate's scores at the commands, m, over all first gains, in one rollout."""
     firsts = len(FIRST_GAINS)
-    runs = len(COMMANDS) * firsts
+    runs = len(commands) * firsts
     fields = [field.name for field in dataclasses.fields(ShapingGains)]
     stacked = {n: np.repeat([getattr(c, n) for c in candidates], runs) for n in fields}
-    stacked["k0"] = stacked["k0"] * np.tile(FIRST_GAINS, len(candidates) * len(COMMANDS))
-    command = np.tile(np.repeat(COMMANDS, firsts), len(candidates))
+    stacked["k0"] = stacked["k0"] * np.tile(FIRST_GAINS, len(candidates) * len(commands))
+    command = np.tile(np.repeat(commands, firsts), len(candidates))
     controller = EnergyShaping(config.robot, ShapingGains(**stacked), ROBUST, rate=config.rate)
     ticks = round(seconds * config.rate)
     run = rollout(controller, config, np.tile(command, (ticks, 1)), seed)
     return [
         [
             score(run, c, slice(first, first + firsts))
-            for c, first in zip(COMMANDS, range(i, i + runs, firsts), strict=True)
+            for c, first in zip(commands, range(i, i + runs, firsts), strict=True)
         ]
         for i in range(0, len(candidates) * runs, runs)
     ]
@@ -246,9 +251,14 @@ def search(
             costs = known[generation]
         else:
             candidates = [from_unit(np.asarray(p), start) for p in points]
-            scores = evaluate(candidates, config, options.seconds, generation % _LAST_SEED)
+            scores = evaluate(
+                candidates, config, options.commands, options.seconds, generation % _LAST_SEED
+            )
             costs = [cost(s, options.flight) for s in scores]
-            entry = {"seed": seed, "flight": options.flight, "costs": costs}
+            entry = {
+                "seed": seed, "flight": options.flight, "commands": options.commands,
+                "costs": costs,
+            }  # fmt: skip
             with log.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(entry) + "\n")
         strategy.tell(points, costs)
@@ -279,9 +289,11 @@ def tune(
     first = scale_gains(found.gains, load_robot(found.robot), robot)
     pair = [first, search(first, config, options, seed, out / "log.jsonl", report)]
     for noise, i in itertools.product(range(2), range(2)):
-        tried = evaluate([pair[i]] * 4, config, options.seconds, noise)
+        tried = evaluate([pair[i]] * 4, config, options.commands, options.seconds, noise)
         pair[i] = calibrated(pair[i], list(itertools.chain(*tried)))
-    scores = [evaluate([g], config, 2 * options.seconds, _LAST_SEED)[0] for g in pair]
+    scores = [
+        evaluate([g], config, options.commands, 2 * options.seconds, _LAST_SEED)[0] for g in pair
+    ]
     costs = [cost(s, options.flight) for s in scores]
     better = pair[1] if costs[1] < costs[0] else pair[0]
     save_gains(out / "gains.toml", GainFile(robot_name, _command(start, options, seed), better))
@@ -301,8 +313,12 @@ def _command(start: str, options: Search, seed: int) -> str:
     """Return the command that searches so, what goes without saying left out."""
     words = ["hop tune energy-shaping", f"--start {start}", f"--seed {seed}"]
     usual = vars(Search()) | {"threads": options.threads}
-    words += [f"--{n} {value}" for n, value in vars(options).items() if value != usual[n]]
+    words += [f"--{n} {_word(value)}" for n, value in vars(options).items() if value != usual[n]]
     return " ".join(words)
+
+
+def _word(value: object) -> str:
+    return " ".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
 def _read_log(log: Path, options: Search, seed: int) -> list[list[float]]:
@@ -313,11 +329,13 @@ def _read_log(log: Path, options: Search, seed: int) -> list[list[float]]:
     lines = log.read_text(encoding="utf-8").splitlines(True)
     whole = [line for line in lines if line[-2:] == "}\n"]
     for entry in map(json.loads, whole):
-        found = entry["seed"], len(entry["costs"]), entry.get("flight", 0.0)
-        if found != (seed, options.population, options.flight):
+        commands = tuple(entry.get("commands", Search().commands))
+        found = entry["seed"], len(entry["costs"]), entry.get("flight", 0.0), commands
+        if found != (seed, options.population, options.flight, options.commands):
             raise errors.UsageError(
-                f"{log} belongs to a search with seed {found[0]}, population {found[1]} and flight"
-                f" {found[2]:g}; repeat with those or choose another --out."
+                f"{log} belongs to a search with seed {found[0]}, population {found[1]}, flight"
+                f" {found[2]:g} and commands {_word(commands)}; repeat with those or choose another"
+                " --out."
             )
         known.append(entry["costs"])
     io.write_atomically(log, "".join(whole).encode())

@@ -1,10 +1,10 @@
 """The shooting controller: knows the true state and plans on the stepper."""
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, fields, replace
 
 import numpy as np
 
-from hopping_leg.arrays import Array, IntArray
+from hopping_leg.arrays import Array
 from hopping_leg.controllers.protocol import Measurement
 from hopping_leg.controllers.shooting import hop_law
 from hopping_leg.errors import UsageError
@@ -12,53 +12,68 @@ from hopping_leg.robot import GRAVITY, Robot
 from hopping_leg.sim import CONTROL_RATE, LegSimulator, Simulator, stepper
 from hopping_leg.sim.leg_table import leg_table
 
-_WEIGHTS = (0.2, 14.0)
-"""Least and greatest push-off force over the weight."""
-
 _TICKS = 200
 """Control periods after which a simulated hop is given up."""
 
-_TRIES = 8
-"""Simulations per push and control period at most."""
+_FIRST_PUSH = 2.5
+"""Push-off force with which planning begins, over the weight."""
+
+_TRIES, _TOLERANCE = 5, 1e-4
+"""Simulations per push and control period at most, and error of the apex that is good enough, m."""
 
 
 @dataclass(frozen=True)
 class HopShape:
-    """What a hop is like beside its push-off force; lengths are shares of the stretched leg's."""
+    """What hops are like, on any leg: see ``hop_law`` for the units.
 
-    flight_length: float = 0.66
-    """From hip to foot in flight."""
-    clearance: float = 0.15
+    The defaults have the least scatter, on the shipped legs, where the controller sees the state two
+    control periods late and errs about velocities as a policy does (``studies.shooting``).
+    """
+
+    flight_length: float = 0.71
+    """Length from hip to foot in flight."""
+    clearance: float = 0.18
     """Least gap between the foot in flight and the ground at the apex."""
-    stroke: float = 0.34
-    """By how much the leg shortens on landing."""
-    least_force: float = 2.0
-    """Least force on landing, over the weight."""
-    liftoff: float = 0.74
-    """Height of the hip above the ground, less the foot, at which the push ends: with a longer leg
-    the knee would be too fast for its motor."""
-    least_push: float = 0.1
+    squat: float = 0.58
+    """Height of the hip, less the foot's radius, at which landing ends."""
+    squat_per_drop: float = 0.12
+    """By how much lower it ends per height that the leg falls."""
+    liftoff: float = 0.81
+    """Height of the hip at which the push ends at most: with a longer leg the knee would be too
+    fast for its motor."""
+    least_push: float = 0.09
     """What the lowest hops end the push above the length in flight."""
-    taper: float = 0.1
+    liftoff_per_drop: float = 0.17
+    """How much further hops end it per height that they fall."""
+    taper: float = 0.18
     """Way over which the push fades."""
-    sideways: tuple[float, float] = (200.0, 5.0)
-    """Stiffness, N/m, and damping, N s/m, that keep the foot below the hip on the ground."""
-    hip: tuple[float, float] = (10.0, 0.3)
-    """Stiffness, N m/rad, and damping, N m s/rad, of the hip in flight."""
-    knee: tuple[float, float] = (8.0, 0.25)
-    """Of the knee."""
-    slew: float = 4.0
-    """By how much a torque may change in a control period, N m."""
+    braking: float = 0.87
+    """Deceleration of the landing from which on the leg brakes, over that of the whole way."""
+    most_landing: float = 6.5
+    """Largest force on landing."""
+    lean_from: float = 3.0
+    """Push-off force beyond which the foot also pushes forward."""
+    lean: float = 0.05
+    """By how much of the force, per force beyond that."""
+    most_lean: float = 0.2
+    """Largest share of the force with which it does."""
+    sideways_stiffness: float = 3.2
+    """Stiffness that keeps the foot below the hip on the ground."""
+    sideways_damping: float = 0.5
+    """Damping of the same."""
+    hip_stiffness: float = 2.6
+    """Stiffness of the hip in flight."""
+    hip_damping: float = 0.34
+    """Damping of the same."""
+    knee_stiffness: float = 1.5
+    """Stiffness of the knee in flight."""
+    knee_damping: float = 0.44
+    """Damping of the same."""
+    slew: float = 0.83
+    """By how much a torque may change in a control period."""
 
-    def hops(self, robot: Robot, command: Array) -> Array:
-        """Return the numbers of hops to heights, m, (n, 4), the push-off force a first guess."""
-        reach = robot.thigh.length + robot.shank.length
-        foot, weight = robot.foot.radius, robot.mass * GRAVITY
-        flight = np.minimum(self.flight_length * reach, command - foot - self.clearance * reach)
-        drop = np.maximum(command - foot - flight, 0.0)
-        landing = np.maximum(1 + drop / (self.stroke * reach), self.least_force) * weight
-        liftoff = np.minimum(flight + self.least_push * reach + drop / 8, self.liftoff * reach)
-        return np.stack([landing, 1.2 * landing, liftoff, flight], axis=1)
+
+_SHAPE = np.dtype([(field.name, np.float64) for field in fields(HopShape)])
 
 
 class Shooting:
@@ -66,7 +81,8 @@ class Shooting:
 
     Everything but the push-off force follows from the command. While a leg pushes, the force is the
     one with which a simulation of the hop's rest, on the leg's true parameters, ends at the
-    commanded apex; it is found anew in every control period.
+    commanded apex; it is found anew in every control period. Legs that differ are planned for each
+    as it is, but with a rigid transmission.
 
     Args:
         robot: The leg.
@@ -85,14 +101,8 @@ class Shooting:
         rate: float = CONTROL_RATE,
         timestep: float = 1e-3,
     ) -> None:
-        self.robot, self.shape, self.timestep = robot, shape or HopShape(), timestep
-        reach = robot.thigh.length + robot.shank.length
-        shape = self.shape
-        self._settings = np.array(
-            [shape.taper * reach, *shape.sideways, *shape.hip, *shape.knee, shape.slew]
-        )
-        self._limits = np.array(_WEIGHTS) * robot.mass * GRAVITY
-        self._steps = round(1 / (rate * timestep))
+        self.robot, self.timestep, self._steps = robot, timestep, round(1 / (rate * timestep))
+        self._shapes = np.array([astuple(shape or HopShape())], _SHAPE)
 
     def watch(self, legs: Simulator) -> None:
         """Take the legs, live.
@@ -108,10 +118,10 @@ class Shooting:
         """Forget everything; the next measurement has ``count`` rows."""
         self._phase = np.full(count, float(hop_law.LANDING))
         self._torque = np.zeros((count, 2))
-        self._hops = np.full((count, hop_law.NUMBERS), np.nan)
-        self._command = np.full(count, np.nan)
         self._scratch = np.zeros(count, stepper.MEMORY)
-        self._table = leg_table([self.robot] * count, self.timestep)
+        self._hops = np.zeros(count, hop_law.HOP)
+        self._hops["push"] = _FIRST_PUSH * self.robot.mass * GRAVITY
+        self._known: tuple[Robot, ...] = ()
 
     def act(self, measurement: Measurement) -> Array:
         """Return joint torques, N m, (n, 2)."""
@@ -120,49 +130,37 @@ class Shooting:
     def torque(self, command: Array) -> Array:
         """Return joint torques for desired apexes, m, (n,), in the true state, N m, (n, 2)."""
         legs = self._legs
-        changed = command != self._command
-        if changed.any():
-            push = self._hops[:, 1].copy()
-            self._hops[changed] = self.shape.hops(self.robot, command[changed])
-            self._hops[:, 1] = np.where(np.isfinite(push), push, self._hops[:, 1])
-            self._command = command.copy()
+        if legs.robots is not self._known:
+            self._known = legs.robots
+            self._table = leg_table([_rigid(robot) for robot in legs.robots], self.timestep)
         state = np.ascontiguousarray(legs.state)
-        hop_law.set_phases(self._table, state, self._phase, self._hops)
         acceleration, motor = legs.solution
         legs.in_parallel(
-            lambda first, last: hop_law.plan(
-                self._table, self._settings, state, acceleration, motor, self._phase, command,
-                self._hops, self._torque, self._limits, self._scratch, first, last, _TRIES,
+            lambda first, last: hop_law.act(
+                self._table, self._shapes, state, acceleration, motor, self._phase, command,
+                self._hops, self._torque, self._scratch, first, last, _TRIES, _TOLERANCE,
                 self._steps, self.timestep, _TICKS,
             )
         )  # fmt: skip
-        hop_law.set_torques(
-            self._table, self._settings, state, self._phase, self._hops, self._torque
-        )
         return self._torque.copy()
-
-    def begin(self, rows: IntArray) -> None:
-        """Let some legs begin anew, from rest."""
-        self._torque[rows] = 0.0
-
-    def take_applied(self, torque: Array) -> None:
-        """Take what was commanded instead of what ``torque`` returned, N m, (n, 2)."""
-        self._torque[:] = torque
 
     def state(self) -> dict[str, Array]:
         """Return what is remembered from tick to tick."""
-        return {
-            "phase": self._phase.copy(),
-            "torque": self._torque.copy(),
-            "hops": self._hops.copy(),
-            "command": self._command.copy(),
-        }
+        push: Array = self._hops["push"]
+        return {"phase": self._phase.copy(), "push": push.copy()}
 
     def restore(self, state: dict[str, Array]) -> None:
         """Go on from a ``state``."""
-        self._phase[:], self._torque[:] = state["phase"], state["torque"]
-        self._hops[:], self._command[:] = state["hops"], state["command"]
+        self._phase[:], self._hops["push"] = state["phase"], state["push"]
 
     def internals(self) -> dict[str, Array]:
         """Return the phase and the push-off force, N."""
-        return {"phase": self._phase, "push_force_n": self._hops[:, 1]}
+        return {"phase": self._phase, "push_force_n": self._hops["push"]}
+
+
+def _rigid(robot: Robot) -> Robot:
+    """Return a robot without elastic transmissions, whose springs need a finer physics step."""
+    reality = robot.reality
+    hip = replace(reality.hip, stiffness=None, backlash=0.0)
+    knee = replace(reality.knee, stiffness=None, backlash=0.0)
+    return replace(robot, reality=replace(reality, hip=hip, knee=knee))

@@ -1,10 +1,11 @@
 """A hop in a few numbers: the law that shooting plans with, and its simulation to the next apex.
 
-On the ground the foot stays below the hip while the leg presses it down with one force until it
-stops to shorten and with another until the hip has a certain height; in the air a joint PD holds
-the foot below the hip. The numbers of a hop are (landing force, push-off force, height of the hip
-at lift-off less the foot's radius, length from hip to foot in flight), N and m; forces are those of
-the leg on the ground.
+In the air a joint PD holds the foot below the hip. On the ground the foot stays below the hip while
+the leg presses it down: first so that the hip stops at a certain height, then with one force until
+the hip has the height of lift-off, where it has faded. A push of large force leans: the foot also
+pushes forward, which only the rail bears, so that the hip's motor stretches the leg with the
+knee's. Numbers are those of any leg: lengths are shares of the stretched leg's length L, forces of
+the weight W, times of sqrt(L / g).
 """
 
 import math
@@ -16,81 +17,110 @@ from hopping_leg.sim.compiled import compiled, inlined
 from hopping_leg.sim.leg_physics import ROWS
 from hopping_leg.sim.stepper import COMMAND, send, step_leg
 
-NUMBERS = 4
-"""Numbers of a hop."""
-
 FLIGHT, LANDING, PUSH = 0, 1, 2
 """Phases: in the air, on the ground before and after the leg stops to shorten."""
+
+HOP = np.dtype([(name, np.float64) for name in ("flight", "squat", "liftoff", "stop", "push")])
+"""Numbers of one hop: length from hip to foot in flight, heights of the hip above the foot's centre
+at which landing ends and at which the push ends, all m, deceleration from which on the leg brakes,
+m/s2, push-off force, N."""
 
 LIFTED = 0.01
 """Gap between foot and ground with which a leg is in the air, whatever its length, m."""
 
-STRETCHED = 0.97
-"""Share of the stretched length at which a push ends in any case."""
-
-SETTINGS = (
-    "taper", "sideways_stiffness", "sideways_damping", "hip_stiffness", "hip_damping",
-    "knee_stiffness", "knee_damping", "slew",
-)  # fmt: skip
-"""What is the same in all hops: length over which the push fades, m, stiffness, N/m, and damping,
-N s/m, of the foot below the hip, joint PD in flight, N m/rad and N m s/rad, and by how much a
-torque may change in a control period, N m."""
+_STRETCHED = 0.97  # share of the stretched length at which a push ends in any case
+_FALL = 0.3  # force over the weight with which a leg sinks until it has to brake
+_LEAST_STROKE = 0.08  # of a landing, over the stretched length
+_LEAST_PUSH, _MOST_PUSH = 0.2, 14.0  # push-off force over the weight
+_REST = 0.02  # speed of the hip below which a landing ends, m/s
+_LATE = 0.6  # share of the push's way below which a landing may end
 
 
 @inlined
-def next_phase(p: Record, state: Array, hop: Array, phase: int) -> int:
+def shape_hop(p: Record, shape: Record, command: float, hop: Record) -> None:
+    """Set the numbers of a hop to a height, m; the push-off force stays."""
+    length = p.thigh_length + p.shank_length
+    above = command - p.foot_radius
+    hop.flight = min(shape.flight_length * length, above - shape.clearance * length)
+    drop = max(above - hop.flight, 0.0)
+    hop.liftoff = min(
+        hop.flight + shape.least_push * length + shape.liftoff_per_drop * drop,
+        shape.liftoff * length,
+    )
+    squat = shape.squat * length - shape.squat_per_drop * drop
+    hop.squat = min(squat, min(hop.flight, hop.liftoff) - _LEAST_STROKE * length)
+    hop.stop = shape.braking * p.gravity * drop / max(hop.flight - hop.squat, 0.02 * length)
+
+
+@inlined
+def next_phase(p: Record, state: Array, hop: Record, phase: int) -> int:
     """Return the phase of the hop in a state."""
-    s1, c1 = math.sin(state[1]), math.cos(state[1])
-    s12, c12 = math.sin(state[1] + state[2]), math.cos(state[1] + state[2])
-    down = p.thigh_length * c1 + p.shank_length * c12
-    rate = -p.thigh_length * s1 * state[4] - p.shank_length * s12 * (state[4] + state[5])
-    gap = state[0] - down - p.foot_radius
+    down = p.thigh_length * math.cos(state[1]) + p.shank_length * math.cos(state[1] + state[2])
+    height = state[0] - p.foot_radius
     if phase == FLIGHT:
-        return LANDING if gap <= 0 and state[3] < 0 else FLIGHT
-    stretched = down >= STRETCHED * (p.thigh_length + p.shank_length)
-    if gap > LIFTED or (phase == PUSH and (state[0] - p.foot_radius >= hop[2] or stretched)):
+        return LANDING if height <= down and state[3] < 0 else FLIGHT
+    stretched = down >= _STRETCHED * (p.thigh_length + p.shank_length)
+    if height - down > LIFTED or (phase == PUSH and (height >= hop.liftoff or stretched)):
         return FLIGHT
-    if phase == LANDING and rate > 0:
+    low = height < hop.liftoff - _LATE * (hop.liftoff - hop.squat)
+    if phase == LANDING and low and (state[3] > -_REST or height <= hop.squat):
         return PUSH
     return phase
 
 
 @inlined
-def law(p: Record, settings: Array, state: Array, hop: Array, phase: int, torque: Array) -> None:
-    """Change ``torque`` (2,), that of the period before, to what a phase of the hop asks for."""
+def law(p: Record, shape: Record, state: Array, hop: Record, phase: int, torque: Array) -> None:
+    """Change ``torque`` (2,), what the motors give, to what a phase of the hop asks for."""
+    l1, l2 = p.thigh_length, p.shank_length
+    length, weight = l1 + l2, p.mass * p.gravity
+    time = math.sqrt(length / p.gravity)
     s1, c1 = math.sin(state[1]), math.cos(state[1])
     s12, c12 = math.sin(state[1] + state[2]), math.cos(state[1] + state[2])
     if phase == FLIGHT:
         # Inverse kinematics of the foot below the hip, knee behind.
-        l1, l2, length = p.thigh_length, p.shank_length, hop[3]
-        knee = -math.acos(
-            min(max((length * length - l1 * l1 - l2 * l2) / (2 * l1 * l2), -1.0), 1.0)
-        )
+        cosine = (hop.flight * hop.flight - l1 * l1 - l2 * l2) / (2 * l1 * l2)
+        knee = -math.acos(min(max(cosine, -1.0), 1.0))
         hip = -math.atan2(l2 * math.sin(knee), l1 + l2 * math.cos(knee))
-        hip_torque = settings[3] * (hip - state[1]) - settings[4] * state[4]
-        knee_torque = settings[5] * (knee - state[2]) - settings[6] * state[5]
+        hip_torque = shape.hip_stiffness * (hip - state[1]) - shape.hip_damping * time * state[4]
+        knee_torque = (
+            shape.knee_stiffness * (knee - state[2]) - shape.knee_damping * time * state[5]
+        )
+        hip_torque, knee_torque = hip_torque * weight * length, knee_torque * weight * length
     else:
-        forward = p.thigh_length * s1 + p.shank_length * s12
-        down = p.thigh_length * c1 + p.shank_length * c12
+        forward, down = l1 * s1 + l2 * s12, l1 * c1 + l2 * c12
         w12 = state[4] + state[5]
-        forward_rate = p.thigh_length * c1 * state[4] + p.shank_length * c12 * w12
-        force = hop[0]
+        forward_rate = l1 * c1 * state[4] + l2 * c12 * w12
         if phase == PUSH:
-            force = hop[1] * min(max((hop[2] + p.foot_radius - state[0]) / settings[0], 0.0), 1.0)
-        sideways = -settings[1] * forward - settings[2] * forward_rate
+            rest = (hop.liftoff + p.foot_radius - state[0]) / (shape.taper * length)
+            force = hop.push * min(max(rest, 0.0), 1.0)
+            large = max(hop.push / weight - shape.lean_from, 0.0)
+            leaning = force * min(shape.lean * large, shape.most_lean)
+        else:
+            # Constant deceleration to rest at the squat; a leg that is slower than it sinks.
+            way = max(state[0] - p.foot_radius - hop.squat, 0.01 * length)
+            rate = min(state[3], 0.0)
+            slowing = rate * rate / (2 * way)
+            force = _FALL * weight
+            if slowing >= hop.stop:
+                force = weight * min(1 + slowing / p.gravity, shape.most_landing)
+            leaning = 0.0
+        sideways = -shape.sideways_stiffness * forward / length
+        sideways -= shape.sideways_damping * forward_rate * time / length
+        sideways = sideways * weight - leaning
         hip_torque = -force * forward + sideways * down
-        knee_torque = -force * p.shank_length * s12 + sideways * p.shank_length * c12
+        knee_torque = -force * l2 * s12 + sideways * l2 * c12
+    slew = shape.slew * weight * length
     for joint in range(2):
         wanted = hip_torque if joint == 0 else knee_torque
         limit = p.torque_limit[joint]
         wanted = min(max(wanted, -limit), limit)
-        torque[joint] = min(max(wanted, torque[joint] - settings[7]), torque[joint] + settings[7])
+        torque[joint] = min(max(wanted, torque[joint] - slew), torque[joint] + slew)
 
 
 @inlined
 def apex_of(
-    p: Record, settings: Array, state: Array, memory: Record, past: Array, rows: Array,
-    hop: Array, phase: int, torque: Array, command: Array, steps: int, dt: float, ticks: int,
+    p: Record, shape: Record, state: Array, memory: Record, past: Array, rows: Array,
+    hop: Record, phase: int, torque: Array, command: Array, steps: int, dt: float, ticks: int,
 ) -> float:  # fmt: skip
     """Return the height of the next apex after a lift-off, NaN if none comes; all but p changes."""
     pushed = phase != FLIGHT
@@ -98,7 +128,7 @@ def apex_of(
         phase = next_phase(p, state, hop, phase)
         if phase != FLIGHT:
             pushed = True
-        law(p, settings, state, hop, phase, torque)
+        law(p, shape, state, hop, phase, torque)
         command[0], command[1] = torque[0], torque[1]
         send(memory, command, 0.0)
         height, rate = state[0], state[3]
@@ -111,62 +141,69 @@ def apex_of(
 
 
 @compiled
-def plan(
-    table: Records, settings: Array, state: Array, acceleration: Array, motor: Array,
-    phases: Array, commands: Array, hops: Array, torques: Array, limits: Array, scratch: Records,
-    first: int, last: int, tries: int, steps: int, dt: float, ticks: int,
+def act(
+    table: Records, shapes: Records, state: Array, acceleration: Array, motor: Array,
+    phases: Array, commands: Array, hops: Records, torques: Array, scratch: Records,
+    first: int, last: int, tries: int, tolerance: float, steps: int, dt: float, ticks: int,
 ) -> None:  # fmt: skip
-    """Find the push-off force of legs that push, by regula falsi on the height of the next apex.
+    """Set phases and torques of legs; plan those that push.
+
+    The push-off force is the one whose simulated apex is the command, found by regula falsi.
 
     Args:
-        table: Rows of the planning model.
-        settings: See ``SETTINGS``.
+        table: Rows of the planning model, (n,).
+        shapes: The shape of all hops, (1,).
         state: True states, (n, 6).
         acceleration: Present accelerations, where the solver begins, (n, 3).
         motor: What the motors give, N m, (n, 2).
-        phases: Phase of each leg, (n,).
+        phases: Phase of each leg, (n,); set.
         commands: Apex heights, m, (n,).
-        hops: Numbers of the hops, (n, 4); the second is renewed.
-        torques: Torques of the period before, (n, 2).
-        limits: Least and greatest force, N, (2,).
+        hops: Numbers of the hops, (n,); set.
+        torques: What to command, N m, (n, 2); set.
         scratch: One record of memory per thread; the one of number ``first`` is used.
         first: First leg.
         last: Leg before which to stop.
-        tries: Simulations at most.
+        tries: Simulations per push and control period at most.
+        tolerance: Error of the apex that is good enough, m.
         steps: Physics steps per control period.
         dt: Physics step, s.
-        ticks: Control periods at most.
+        ticks: Control periods of a simulation at most.
     """
     rows, past = np.empty((ROWS, 5)), np.empty((0, 6))
     command, here, torque = np.zeros(COMMAND), np.empty(6), np.empty(2)
-    memory = scratch[first]
+    memory, shape = scratch[first], shapes[0]
     for k in range(first, last):
+        p, hop = table[k], hops[k]
+        for i in range(2):
+            torques[k, i] = motor[k, i]
+        shape_hop(p, shape, commands[k], hop)
+        phases[k] = next_phase(p, state[k], hop, int(phases[k]))
         if phases[k] != PUSH:
+            law(p, shape, state[k], hop, int(phases[k]), torques[k])
             continue
-        low, high, low_error, high_error = limits[0], limits[1], np.nan, np.nan
-        force = hops[k, 1]
-        best, best_error = force, np.inf
-        p = table[k]
-        way = hops[k, 2] + p.foot_radius - state[k, 0]
-        step = p.mass * p.gravity / max(way, 0.01) / 2
+        weight = p.mass * p.gravity
+        least, most = _LEAST_PUSH * weight, _MOST_PUSH * weight
+        low, high, low_error, high_error = least, most, np.nan, np.nan
+        best, best_error = hop.push, np.inf
+        way = hop.liftoff + p.foot_radius - state[k, 0]
+        step = weight / max(way, 0.03 * (p.thigh_length + p.shank_length)) / 2
         for _ in range(tries):
-            hops[k, 1] = force
+            force = hop.push
             for i in range(6):
                 here[i] = state[k, i]
             for i in range(2):
-                torque[i] = torques[k, i]
+                torque[i] = motor[k, i]
                 memory.motor_torque[i] = motor[k, i]
             for i in range(3):
                 memory.acceleration[i] = acceleration[k, i]
             memory.waiting = 0
             apex = apex_of(
-                p, settings, here, memory, past, rows, hops[k], PUSH, torque, command,
-                steps, dt, ticks,
-            )  # fmt: skip
+                p, shape, here, memory, past, rows, hop, PUSH, torque, command, steps, dt, ticks
+            )
             error = apex - commands[k] if apex == apex else -1.0
             if abs(error) < best_error:
                 best, best_error = force, abs(error)
-            if best_error < 2e-5:
+            if best_error < tolerance:
                 break
             if error > 0:
                 high, high_error = force, error
@@ -174,27 +211,12 @@ def plan(
                 low, low_error = force, error
             if high_error == high_error and low_error == low_error:
                 share = low_error / (low_error - high_error)
-                force = low + min(max(share, 0.1), 0.9) * (high - low)
+                hop.push = low + min(max(share, 0.1), 0.9) * (high - low)
             else:
                 # The work of the push over the rest of the leg's way lifts the weight.
                 step *= 2
-                force = min(max(force - step * error, limits[0]), limits[1])
-            if force == best and (force == limits[0] or force == limits[1]):
+                hop.push = min(max(force - step * error, least), most)
+            if hop.push == best and not least < best < most:
                 break
-        hops[k, 1] = best
-
-
-@compiled
-def set_phases(table: Records, state: Array, phases: Array, hops: Array) -> None:
-    """Set all legs' phases, (n,), in their states, (n, 6)."""
-    for k in range(len(state)):
-        phases[k] = next_phase(table[k], state[k], hops[k], int(phases[k]))
-
-
-@compiled
-def set_torques(
-    table: Records, settings: Array, state: Array, phases: Array, hops: Array, torques: Array
-) -> None:
-    """Set all legs' torques, N m, (n, 2), from those of the period before."""
-    for k in range(len(state)):
-        law(table[k], settings, state[k], hops[k], int(phases[k]), torques[k])
+        hop.push = best
+        law(p, shape, state[k], hop, PUSH, torques[k])

@@ -7,14 +7,14 @@ from typing import Any, Literal, get_args, get_type_hints
 
 from hopping_leg.controllers.user_controllers import load_user_object
 from hopping_leg.errors import UsageError, unknown_name
-from hopping_leg.rl.distillation.distillation import StudentConfig
+from hopping_leg.rl.distillation.students import StudentConfig
 from hopping_leg.rl.recipe import Recipe
-from hopping_leg.rl.recipes import adaptive, fast, paper, precise
+from hopping_leg.rl.recipes import fast, paper, precise
 from hopping_leg.rl.search_space import SearchSpace
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES, Range
 
 RECIPES: Mapping[str, Recipe] = {
-    recipe.name: recipe for recipe in (fast.FAST, paper.PAPER, precise.PRECISE, adaptive.ADAPTIVE)
+    recipe.name: recipe for recipe in (fast.FAST, paper.PAPER, precise.PRECISE)
 }
 """Every recipe that ``hop train`` knows."""
 
@@ -25,9 +25,6 @@ SPACES: Mapping[str, SearchSpace] = {
 }
 """Recipe to what ``hop tune`` searches."""
 
-VARIANTS = {"fast": fast.VARIANTS, "precise": precise.VARIANTS}
-"""Recipe to itself with one part taken away at a time."""
-
 Randomise = Literal["none", "twins", "surprises"]
 """Ranges from which each leg in training draws its own numbers."""
 
@@ -37,11 +34,11 @@ _RANGES: dict[Randomise, tuple[Range, ...]] = {
     "surprises": WIDE_RANGES,
 }
 
-_OF_TASK = ("task.command_skew", "task.fall_penalty")
+_OF_TASK = ("task.fall_penalty", "task.timestep")
 """Numbers of a task that ``--set`` changes; most go with the robot's size or have options of their
 own."""
 
-_TEXTS = {"student.memory": get_args(get_type_hints(StudentConfig)["memory"])}
+_TEXTS = {"memory": get_args(get_type_hints(StudentConfig)["memory"])}
 """Options that are one of some words."""
 
 _SWITCH = {"true": True, "1": True, "false": False, "0": False}

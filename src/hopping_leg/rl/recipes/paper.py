@@ -5,7 +5,7 @@ episode and what the critics see are chosen here.
 """
 
 from hopping_leg.envs import PaperRewardConfig, TaskConfig
-from hopping_leg.rl import algorithms, recipe
+from hopping_leg.rl import recipe, sac
 from hopping_leg.rl.search_space import OneOf, Real, SearchSpace
 
 _LAYERS = OneOf(((128, 128), (256, 256), (256, 256, 128, 128)))
@@ -19,10 +19,11 @@ PAPER = recipe.Recipe(
         fall_penalty=20.0,
     ),
     reward=PaperRewardConfig(),
-    algorithm=algorithms.SACConfig(),
-    network=algorithms.NetworkConfig(actor=(256, 256, 128, 128), critic=(256, 256, 128, 128)),
+    algorithm=sac.SACConfig(),
+    network=sac.NetworkConfig(actor=(256, 256, 128, 128), critic=(256, 256, 128, 128)),
     schedule=recipe.Schedule(num_envs=16, steps=240_000, log_every=32),
     selection=recipe.SelectionConfig(eval_every=8_000),
+    robot="legv2-paper",
 )
 
 SEARCH_SPACE: SearchSpace = {

@@ -1,0 +1,230 @@
+"""Distillation: a student hops while a teacher says what it would do (DAgger, Ross et al. 2011).
+
+What a policy has to remember makes reinforcement learning slow. A teacher that sees the true state
+has nothing to remember, and imitating it is regression, which bears any memory. The student
+collects the states, so that it learns the way back from its own errors; at first the teacher acts
+in its stead now and then. A rollout and the gradient steps on those before it run side by side.
+"""
+
+import copy
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+import torch
+from stable_baselines3.common.logger import Logger
+
+from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.controllers.shooting import HopShape, Shooting
+from hopping_leg.envs.task import HoppingTask
+from hopping_leg.rl.checkpoint import Tree
+from hopping_leg.rl.distillation.buffer import Rollout, RolloutBuffer
+from hopping_leg.rl.distillation.students import Student, StudentConfig
+from hopping_leg.rl.learner import RecentHops
+from hopping_leg.rl.onnx_export import Network
+from hopping_leg.rl.resumable import load_optimizer, to_numpy, to_torch
+from hopping_leg.rl.schedules import cosine
+from hopping_leg.sim import LegSimulator
+
+
+class Teacher(Protocol):
+    """Says what to do in the true state of simulated legs."""
+
+    def watch(self, legs: LegSimulator) -> None:
+        """Take the legs, live."""
+        ...
+
+    def reset(self, count: int) -> None:
+        """Forget everything; there are ``count`` legs."""
+        ...
+
+    def torque(self, command: Array) -> Array:
+        """Return joint torques for desired apexes, m, (n,), N m, (n, 2)."""
+        ...
+
+    def state(self) -> dict[str, Array]:
+        """Return what is remembered from tick to tick."""
+        ...
+
+    def restore(self, state: dict[str, Array]) -> None:
+        """Go on from a ``state``."""
+        ...
+
+
+@dataclass(frozen=True)
+class DaggerConfig:
+    """Numbers of a distillation."""
+
+    learning_rate: float = 1e-3
+    """Learning rate of Adam at the start; falls along a cosine to a fiftieth."""
+    n_steps: int = 64
+    """Control steps of a rollout, each environment."""
+    buffer_size: int = 1_300_000
+    """Control steps from which the student learns, the newest."""
+    gradient_steps: int = 16
+    """Gradient steps per rollout."""
+    batch_size: int = 4096
+    """Control steps per gradient step."""
+    mixing_share: float = 0.15
+    """Share of the training over which the teacher acts ever less in the student's stead."""
+    teacher: HopShape = field(default_factory=HopShape)
+    """What the hops of the shooting controller, the teacher, are like."""
+
+    def make_teacher(self, task: HoppingTask) -> Teacher:
+        """Build the teacher."""
+        return Shooting(task.robot, self.teacher, rate=task.options.rate)
+
+
+class Dagger:
+    """A distillation, a ``Learner``.
+
+    Everything random follows from the seed, on any number of cores.
+
+    Attributes:
+        on_boundary: Called before every rollout.
+        remaining: Returns the share of the budget that is left, 1 to 0; the schedules follow this
+            or the share of steps left, whichever is smaller.
+    """
+
+    on_boundary: Callable[[], None] | None = None
+    remaining: Callable[[], float] | None = None
+    logger: Logger
+
+    def __init__(
+        self, task: HoppingTask, config: DaggerConfig, network: StudentConfig, seed: int
+    ) -> None:
+        torch.manual_seed(seed)
+        self.task, self.config = task, config
+        self.student = network.make(task.observation.size)
+        self.optimizer = torch.optim.Adam(self.student.parameters(), lr=config.learning_rate)
+        self.teacher = config.make_teacher(task)
+        self.teacher.watch(task.legs)
+        self.num_timesteps = 0
+        self.recent_hops = RecentHops()
+        self._actor: Student = copy.deepcopy(self.student)
+        size = config.n_steps * task.count
+        self._buffer = RolloutBuffer(
+            config.buffer_size // size, config.n_steps, task.count, task.observation.size,
+            self.student.memory_size,
+        )  # fmt: skip
+        self._draws = torch.Generator().manual_seed(seed)
+        self._mixing = np.random.default_rng([seed, 1])
+        self._full = np.array(task.options.action_torque)
+        self._left = 1.0
+        self._begin(task.reset())
+
+    def _begin(self, observation: Any) -> None:  # noqa: ANN401
+        self.teacher.reset(self.task.count)
+        self._seen = observation
+        self._begun: BoolArray = np.ones(self.task.count, np.bool_)
+        self._memory = torch.zeros(self.task.count, self.student.memory_size)
+        self._label = self._teach()
+
+    def set_logger(self, logger: Logger) -> None:
+        """Set where the curves go."""
+        self.logger = logger
+
+    def train_until(self, steps: int, callback: Callable[[], bool], log_interval: int) -> None:
+        """Learn until so many control steps are done in all, or until the callback says no."""
+        rollouts = 0
+        with ThreadPoolExecutor(1, thread_name_prefix="rollout") as beside:
+            while self.num_timesteps < steps and callback():
+                self._left = 1 - self.num_timesteps / steps
+                if self.remaining is not None:
+                    self._left = min(self._left, self.remaining())
+                if self.on_boundary is not None:
+                    self.on_boundary()
+                self._actor.load_state_dict(self.student.state_dict())
+                rollout = beside.submit(self._collect)
+                self._train()
+                self._buffer.add(rollout.result(), self.task.legs.command_delay_ticks)
+                self.num_timesteps += self.config.n_steps * self.task.count
+                rollouts += 1
+                if rollouts % log_interval == 0:
+                    self.logger.record("rollout/apex_error_m", self.recent_hops.mean_error)
+                    self.logger.dump(self.num_timesteps)
+
+    @property
+    def share(self) -> float:
+        """Share of the training that is done, 0 to 1."""
+        return 1 - self._left
+
+    @property
+    def mixing(self) -> float:
+        """Chance that the teacher acts for the student, leg by leg and tick by tick."""
+        return max(0.0, 1 - self.share / self.config.mixing_share)
+
+    def _collect(self) -> Rollout:
+        memory = self._memory.numpy().copy()
+        ticks = [self._step() for _ in range(self.config.n_steps)]
+        observations, labels, begun = (np.stack(parts) for parts in zip(*ticks, strict=True))
+        return Rollout(observations, labels, begun, memory)
+
+    def _step(self) -> tuple[Any, Any, BoolArray]:
+        seen, label, begun = self._seen, self._label, self._begun
+        with torch.no_grad():
+            fresh = torch.from_numpy(~begun)[:, None]
+            action, self._memory = self._actor(torch.from_numpy(seen), self._memory * fresh)
+        taught = self._mixing.random(len(begun)) < self.mixing
+        step = self.task.step(np.where(taught[:, None], label, action.numpy()))
+        self.recent_hops.add(step.apex_error)
+        self._seen, self._begun = step.observation, step.terminated | step.truncated
+        self._label = self._teach()
+        return seen, label, begun
+
+    def _teach(self) -> Any:  # noqa: ANN401
+        torque = self.teacher.torque(self.task.command)
+        return (torque / self._full).clip(-1, 1).astype(np.float32)
+
+    def _train(self) -> None:
+        if not self._buffer.added:
+            return
+        for group in self.optimizer.param_groups:
+            group["lr"] = self.config.learning_rate * cosine(self._left)
+        losses = [self._gradient_step() for _ in range(self.config.gradient_steps)]
+        self.logger.record("train/loss", float(np.mean(losses)))
+
+    def _gradient_step(self) -> float:
+        loss = self.student.loss(self._buffer, self.config.batch_size, self._draws)
+        self.optimizer.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(self.student.parameters(), 1.0)
+        self.optimizer.step()
+        return loss.item()
+
+    def network(self) -> Network:
+        """Return the student as it stands."""
+        return self.student.network(self.task.observation)
+
+    def state(self) -> Tree:
+        """Return everything needed to continue exactly, environments included."""
+        return {
+            "student": to_numpy(self.student.state_dict()),
+            "optimizer": to_numpy(self.optimizer.state_dict()),
+            "buffer": self._buffer.state(),
+            "task": self.task.state(),
+            "teacher": self.teacher.state(),
+            "begun": self._begun,
+            "memory": self._memory.numpy(),
+            "label": self._label,
+            "draws": self._draws.get_state().numpy(),
+            "mixing": self._mixing.bit_generator.state,
+            "steps": self.num_timesteps,
+            "recent_hops": self.recent_hops.state(),
+        }
+
+    def restore(self, state: Tree) -> None:
+        """Go on from a ``state``."""
+        self.student.load_state_dict(to_torch(state["student"]))
+        load_optimizer(self.optimizer, state["optimizer"])
+        self._buffer.restore(state["buffer"])
+        self._seen = self.task.restore(state["task"])
+        self.teacher.restore(state["teacher"])
+        self._begun, self._label = state["begun"], state["label"]
+        self._memory = torch.from_numpy(state["memory"])
+        self._draws.set_state(torch.from_numpy(state["draws"]))
+        self._mixing.bit_generator.state = state["mixing"]
+        self.num_timesteps = state["steps"]
+        self.recent_hops.restore(state["recent_hops"])
