@@ -1,5 +1,6 @@
 import pytest
 
+from hopping_leg.controllers.registry import robot_of
 from hopping_leg.robot import load_robot
 from studies.physics_step.run import PhysicsStep, _fits, converged
 
@@ -28,7 +29,7 @@ def test_a_step_has_converged_if_all_finer_halvings_move_little():
 
 
 def test_a_policy_hops_on_its_own_robot_alone():
-    assert _fits("precise", load_robot("legv2-paper"))
+    assert _fits("precise", load_robot(robot_of(["precise"])))
     assert not _fits("precise", load_robot("legv1"))
     assert _fits("energy-shaping", load_robot("legv1"))
 

@@ -26,8 +26,8 @@ CHEAP = ["--steps", "1", "--repeats", "1", "--commands", "0.3"]
         (["--jobs", "0"], "--jobs is 0"),
         (["--seconds", "1"], "too short"),
         (["--steps", "0"], "at least 1"),
-        (["--recipe", "adaptiv"], "Did you mean 'adaptive'"),
-        (["--set", "reward.tale=0"], "Did you mean 'reward.tail'"),
+        (["--recipe", "precis"], "Did you mean 'precise'"),
+        (["--recipe", "paper", "--set", "reward.jerks=0"], "Did you mean 'reward.jerk'"),
     ],
 )
 def test_bad_options_are_a_sentence_before_anything_runs(tmp_path, capsys, words, says):

@@ -137,7 +137,7 @@ class HoppingTask:
         self._tick = 0
         self._end = np.empty(count, np.int64)
         self._switch = np.full(count, np.iinfo(np.int64).max)
-        self._last, self._rises = np.zeros((count, 2)), np.zeros(count, np.bool_)
+        self.last_action, self._rises = np.zeros((count, 2)), np.zeros(count, np.bool_)
         self.reset()
 
     def randomize(self, draw: int = 1) -> None:
@@ -180,11 +180,11 @@ class HoppingTask:
         apex, apex_height, apex_error = self._apexes(height_before)
         reward, terms = self.reward(
             rewards.Transition(
-                legs.state, self.command, taken, self._last,
+                legs.state, self.command, taken, self.last_action,
                 apex, apex_height, legs.foot_clearance,
             )
         )  # fmt: skip
-        self._last = taken
+        self.last_action = taken
         return self._next(reward, terms, apex_error, apex_height)
 
     def _apexes(self, height_before: Array) -> tuple[BoolArray, Array, Array]:
@@ -213,7 +213,7 @@ class HoppingTask:
             "tick": self._tick,
             "end": self._end.copy(),
             "switch": self._switch.copy(),
-            "last_action": self._last.copy(),
+            "last_action": self.last_action.copy(),
             "rises": self._rises.copy(),
             "rng": self._rng.bit_generator.state,
             "reward": self.reward.state(),
@@ -228,7 +228,7 @@ class HoppingTask:
         self._tick = int(state["tick"])
         self._end[:] = state["end"]
         self._switch[:] = state["switch"]
-        self._last, self._rises = np.array(state["last_action"]), np.array(state["rises"])
+        self.last_action, self._rises = np.array(state["last_action"]), np.array(state["rises"])
         self._rng.bit_generator.state = state["rng"]
         self.reward.restore(state["reward"])
         self.observation.restore(state["observation"])
@@ -260,7 +260,7 @@ class HoppingTask:
             truncated = truncated & ~terminated
             ended = truncated | terminated
         self._samples = self.plant.samples(self.command)
-        self.observation.advance(self._samples, self.plant.channel, self._last)
+        self.observation.advance(self._samples, self.plant.channel, self.last_action)
         observation = self.observation.view(self._samples)
         final_observation = final_privileged = None
         height = self.legs.height.copy()
@@ -280,7 +280,7 @@ class HoppingTask:
         height, q = self._reset_sampler.draw(self.command[rows], self._rng)
         self.legs.place(rows, height, q)
         self._end[rows] = self._tick + self._horizon
-        self._last[rows], self._rises[rows] = 0.0, False
+        self.last_action[rows], self._rises[rows] = 0.0, False
         self.reward.reset(rows)
         if self.options.command_resampling_time is not None:
             self._switch[rows] = self._tick + self._draw_holds(count)

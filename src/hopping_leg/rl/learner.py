@@ -48,6 +48,7 @@ class Learner(Protocol):
     Attributes:
         num_timesteps: Control steps of experience so far.
         recent_hops: The latest hops.
+        seconds: Time spent on each part.
         share: Share of the training that is done, 0 to 1.
         logger: Where the curves go.
         on_boundary: Called before every rollout: a state taken there continues exactly.
@@ -56,6 +57,7 @@ class Learner(Protocol):
     """
 
     num_timesteps: int
+    seconds: dict[str, float]
     on_boundary: Callable[[], None] | None
     remaining: Callable[[], float] | None
 

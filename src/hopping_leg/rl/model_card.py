@@ -34,8 +34,7 @@ One network from joint measurements to joint torques, for robot `{result["robot"
 - Training: {result["steps"]} control steps, {result["minutes"]:.1f} min of wall-clock time, physics
   step {1000 * task["timestep"]:g} ms.
 {stages(result["stages"])}\
-- Selection: the policy after {selected["steps"]} steps ({selected["minutes"]:.1f} min), the best of
-  {len(selected["finalists"])} finalists out of {len(result["history"])} snapshots.
+{selection(result)}\
 - Versions: {versions}.
 
 Trials on the selection seeds {", ".join(map(str, selected["seeds"]))}, noise and delay on, physics
@@ -55,6 +54,18 @@ def stages(rows: list[dict[str, Any]]) -> str:
         for row in rows
     )
     return f"- Stages:\n{shown}\n" if rows else ""
+
+
+def selection(result: dict[str, Any]) -> str:
+    """Return lines on how the policy was chosen, if there were several to choose from."""
+    selected = result["selected"]
+    if "finalists" not in selected:
+        return ""
+    return (
+        f"- Selection: the policy after {selected['steps']} steps ({selected['minutes']:.1f} min),"
+        f" the best of\n  {len(selected['finalists'])} finalists out of {len(result['history'])}"
+        " snapshots.\n"
+    )
 
 
 def missed_commands(trials: list[dict[str, Any]]) -> str:

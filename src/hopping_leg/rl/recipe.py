@@ -114,8 +114,12 @@ class Recipe:
 
     def make_learner(self, robot: Robot, seed: int, threads: int = 1) -> Learner:
         """Build the algorithm on its environments, untrained."""
-        rng, count = np.random.default_rng(seed), self.schedule.num_envs
-        task = envs.HoppingTask(robot, count, self.task, self.make_reward(robot), rng, threads)
+        rng, count, options = np.random.default_rng(seed), self.schedule.num_envs, self.task
+        if isinstance(self.algorithm, DaggerConfig):
+            low, high = options.command_bounds
+            beyond = (low, high + self.algorithm.headroom)
+            options = dataclasses.replace(options, command_range=beyond)
+        task = envs.HoppingTask(robot, count, options, self.make_reward(robot), rng, threads)
         if isinstance(self.algorithm, DaggerConfig):
             assert isinstance(self.network, StudentConfig), "a distillation has a student"
             return Dagger(task, self.algorithm, self.network, seed)

@@ -5,6 +5,7 @@ exploration noise is drawn. Continuing from there is the same as never having st
 """
 
 import random
+import time
 from collections import deque
 from collections.abc import Callable
 from typing import Any
@@ -29,6 +30,7 @@ class ResumableSAC(SAC):  # type: ignore[misc]
     on_boundary: Callable[[], None] | None = None
     remaining: Callable[[], float] | None = None
     env: TaskVecEnv
+    seconds: dict[str, float]
     _current_progress_remaining: float
 
     @property
@@ -41,6 +43,10 @@ class ResumableSAC(SAC):  # type: ignore[misc]
         """Share of the training that is done, 0 to 1."""
         return 1 - float(self._current_progress_remaining)
 
+    def _setup_model(self) -> None:
+        super()._setup_model()
+        self.seconds = {"rollouts": 0.0, "gradient steps": 0.0}
+
     def train_until(self, steps: int, callback: Callable[[], bool], log_interval: int) -> None:
         """Learn until so many control steps are done in all, or until the callback says no."""
         self.learn(
@@ -50,6 +56,12 @@ class ResumableSAC(SAC):  # type: ignore[misc]
             reset_num_timesteps=self.num_timesteps == 0,
         )
 
+    def train(self, *args: Any, **kwargs: Any) -> None:  # noqa: ANN401
+        """Take gradient steps as usual."""
+        began = time.monotonic()
+        super().train(*args, **kwargs)
+        self.seconds["gradient steps"] += time.monotonic() - began
+
     def collect_rollouts(self, *args: Any, **kwargs: Any) -> Any:  # noqa: ANN401
         """Collect a rollout as usual, after the callback."""
         for name, mean in self.env.take_reward_terms().items():
@@ -57,7 +69,10 @@ class ResumableSAC(SAC):  # type: ignore[misc]
         self.env.task.reward.anneal(self.share)
         if self.on_boundary is not None:
             self.on_boundary()
-        return super().collect_rollouts(*args, **kwargs)
+        began = time.monotonic()
+        collected = super().collect_rollouts(*args, **kwargs)
+        self.seconds["rollouts"] += time.monotonic() - began
+        return collected
 
     def _update_current_progress_remaining(self, steps: int, total: int) -> None:
         super()._update_current_progress_remaining(steps, total)

@@ -2,7 +2,8 @@
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -144,6 +145,8 @@ class Trainer:
         self._stages = stages.stages_of(recipe)
         self.stages: list[dict[str, Any]] = []
         """How the stages of a distillation ended so far, as JSON values."""
+        self.seconds: dict[str, float] = {"before the first rollout": time.monotonic() - began}
+        """Time spent on each part since the run began or was resumed."""
         self._earlier = 0.0
         self._began, self._saved = began, time.monotonic()
         self._shown = 0.0
@@ -171,6 +174,26 @@ class Trainer:
         self._evaluate()
         learner.logger.close()
         self._show(force=True)
+        with self._timed("selection and calibration"):
+            content, selected = self._finish()
+        minutes, steps = self.elapsed / 60, int(learner.num_timesteps)
+        result = {
+            "command": self.folder.command,
+            "minutes": minutes,
+            "steps": steps,
+            "selected": selected,
+            "history": self.selection.rows,
+            "stages": self.stages,
+            "seconds": self.seconds | learner.seconds,
+        }
+        self.folder.write("result.json", {**self.folder.config, **result})
+        write_card(self.folder.path)
+        io.write_atomically(self.folder.policy, content)
+        return Trained(self.folder.policy, minutes, steps)
+
+    def _finish(self) -> tuple[bytes, dict[str, Any]]:
+        """Return the selected policy, calibrated, and how it hops, as JSON values."""
+        recipe = self.recipe
         content, selected = self.selection.choose()
         self.end_stage(selected["worst_score_m"])
         if recipe.selection.calibrations:
@@ -180,19 +203,13 @@ class Trainer:
             )  # fmt: skip
             selected |= self.selection.final(content)
             self.end_stage(selected["worst_score_m"])
-        minutes, steps = self.elapsed / 60, int(learner.num_timesteps)
-        result = {
-            "command": self.folder.command,
-            "minutes": minutes,
-            "steps": steps,
-            "selected": selected,
-            "history": self.selection.rows,
-            "stages": self.stages,
-        }
-        self.folder.write("result.json", {**self.folder.config, **result})
-        write_card(self.folder.path)
-        io.write_atomically(self.folder.policy, content)
-        return Trained(self.folder.policy, minutes, steps)
+        return content, selected
+
+    @contextmanager
+    def _timed(self, name: str) -> Iterator[None]:
+        began = time.monotonic()
+        yield
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.monotonic() - began
 
     def tick(self) -> bool:
         """Show the progress; return whether there is time left."""
@@ -247,7 +264,8 @@ class Trainer:
 
     def _evaluate(self) -> None:
         steps = int(self.learner.num_timesteps)
-        row = self.selection.add(steps, self.elapsed / 60, self._content())
+        with self._timed("snapshots"):
+            row = self.selection.add(steps, self.elapsed / 60, self._content())
         logger = self.learner.logger
         logger.record("trial/score_m", row["score_m"])
         for trial in row["trials"]:
@@ -301,6 +319,9 @@ class Selection:
 
     def choose(self) -> tuple[bytes, dict[str, Any]]:
         """Return the best policy file and its row, with the scores of all finalists."""
+        if len(self.rows) == 1 and self._recipe.selection.calibrations:
+            content = self._folder.snapshot(self.rows[0]["steps"]).read_bytes()
+            return content, {**self.rows[0], "seeds": list(policy_evaluation.FINAL_SEEDS)}
         ranked = sorted(self.rows, key=lambda row: float(row["score_m"]))[:FINALISTS]
         finals = []
         for row in ranked:

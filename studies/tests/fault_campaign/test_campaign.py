@@ -3,6 +3,7 @@ import json
 
 import pytest
 
+from hopping_leg.controllers.registry import robot_of
 from hopping_leg.deploy import loop
 from hopping_leg.deploy.drive_link import Action, DriveCommand
 from hopping_leg.errors import UsageError
@@ -72,7 +73,7 @@ def test_unknown_families_are_named():
 
 
 def test_a_trial_is_exact_and_the_mishap_the_same_for_all_controllers():
-    case = Case("drive fault", "energy-shaping", "legv2-paper", 0, 0)
+    case = Case("drive fault", "energy-shaping", robot_of(["fast"]), 0, 0)
     first, again = play_case(case), play_case(case)
     other = play_case(dataclasses.replace(case, controller="fast"))
     assert comparable([first]) == comparable([again])
@@ -116,7 +117,7 @@ def test_an_unsafe_host_is_found_out(monkeypatch, torque, word):
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_trial_of_each_family_is_safe(family):
     for controller in ("precise", "energy-shaping"):
-        row = play_case(Case(family, controller, "legv2-paper", 1, 0))
+        row = play_case(Case(family, controller, robot_of([controller]), 1, 0))
         assert row["problems"] == [], row
         assert row["began"] is not None
 

@@ -26,50 +26,50 @@ _TRIES, _TOLERANCE = 5, 1e-4
 class HopShape:
     """What hops are like, on any leg: see ``hop_law`` for the units.
 
-    The defaults have the least scatter, on the shipped legs, where the controller sees the state two
-    control periods late and errs about velocities as a policy does (``studies.shooting``).
+    The defaults have the least scatter, on the shipped legs, of a controller that sees the state
+    late and errs about velocities as a policy does (``studies.shooting``).
     """
 
-    flight_length: float = 0.71
+    flight_length: float = 0.68
     """Length from hip to foot in flight."""
-    clearance: float = 0.18
+    clearance: float = 0.2
     """Least gap between the foot in flight and the ground at the apex."""
-    squat: float = 0.58
+    squat: float = 0.61
     """Height of the hip, less the foot's radius, at which landing ends."""
-    squat_per_drop: float = 0.12
+    squat_per_drop: float = 0.26
     """By how much lower it ends per height that the leg falls."""
     liftoff: float = 0.81
     """Height of the hip at which the push ends at most: with a longer leg the knee would be too
     fast for its motor."""
-    least_push: float = 0.09
+    least_push: float = 0.12
     """What the lowest hops end the push above the length in flight."""
-    liftoff_per_drop: float = 0.17
+    liftoff_per_drop: float = 0.13
     """How much further hops end it per height that they fall."""
-    taper: float = 0.18
+    taper: float = 0.16
     """Way over which the push fades."""
-    braking: float = 0.87
+    braking: float = 0.81
     """Deceleration of the landing from which on the leg brakes, over that of the whole way."""
-    most_landing: float = 6.5
+    most_landing: float = 7.12
     """Largest force on landing."""
-    lean_from: float = 3.0
+    lean_from: float = 2.0
     """Push-off force beyond which the foot also pushes forward."""
-    lean: float = 0.05
+    lean: float = 0.093
     """By how much of the force, per force beyond that."""
-    most_lean: float = 0.2
+    most_lean: float = 0.22
     """Largest share of the force with which it does."""
-    sideways_stiffness: float = 3.2
+    sideways_stiffness: float = 3.24
     """Stiffness that keeps the foot below the hip on the ground."""
-    sideways_damping: float = 0.5
+    sideways_damping: float = 0.47
     """Damping of the same."""
-    hip_stiffness: float = 2.6
+    hip_stiffness: float = 2.44
     """Stiffness of the hip in flight."""
-    hip_damping: float = 0.34
+    hip_damping: float = 0.5
     """Damping of the same."""
-    knee_stiffness: float = 1.5
+    knee_stiffness: float = 1.35
     """Stiffness of the knee in flight."""
     knee_damping: float = 0.44
     """Damping of the same."""
-    slew: float = 0.83
+    slew: float = 0.9
     """By how much a torque may change in a control period."""
 
 
@@ -133,8 +133,7 @@ class Shooting:
         if legs.robots is not self._known:
             self._known = legs.robots
             self._table = leg_table([_rigid(robot) for robot in legs.robots], self.timestep)
-        state = np.ascontiguousarray(legs.state)
-        acceleration, motor = legs.solution
+        state, acceleration, motor = self.look()
         legs.in_parallel(
             lambda first, last: hop_law.act(
                 self._table, self._shapes, state, acceleration, motor, self._phase, command,
@@ -143,6 +142,14 @@ class Shooting:
             )
         )  # fmt: skip
         return self._torque.copy()
+
+    def look(self) -> tuple[Array, Array, Array]:
+        """Return what plans begin with: state, (n, 6), accelerations, (n, 3), and torques, (n, 2).
+
+        Torques are what the motors give, N m.
+        """
+        acceleration, motor = self._legs.solution
+        return self._legs.state.copy(), acceleration, motor
 
     def state(self) -> dict[str, Array]:
         """Return what is remembered from tick to tick."""

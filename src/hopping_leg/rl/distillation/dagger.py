@@ -7,6 +7,7 @@ in its stead now and then. A rollout and the gradient steps on those before it r
 """
 
 import copy
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -69,6 +70,8 @@ class DaggerConfig:
     """Control steps per gradient step."""
     mixing_share: float = 0.15
     """Share of the training over which the teacher acts ever less in the student's stead."""
+    headroom: float = 0.01
+    """By how much training goes beyond the highest command, m: calibrated commands may lie there."""
     teacher: HopShape = field(default_factory=HopShape)
     """What the hops of the shooting controller, the teacher, are like."""
 
@@ -90,7 +93,6 @@ class Dagger:
 
     on_boundary: Callable[[], None] | None = None
     remaining: Callable[[], float] | None = None
-    logger: Logger
 
     def __init__(
         self, task: HoppingTask, config: DaggerConfig, network: StudentConfig, seed: int
@@ -101,8 +103,11 @@ class Dagger:
         self.optimizer = torch.optim.Adam(self.student.parameters(), lr=config.learning_rate)
         self.teacher = config.make_teacher(task)
         self.teacher.watch(task.legs)
+        self.logger = Logger(None, [])
         self.num_timesteps = 0
         self.recent_hops = RecentHops()
+        self.seconds = {"rollouts": 0.0, "gradient steps": 0.0}
+        """Time spent on each; they run side by side."""
         self._actor: Student = copy.deepcopy(self.student)
         size = config.n_steps * task.count
         self._buffer = RolloutBuffer(
@@ -157,9 +162,11 @@ class Dagger:
         return max(0.0, 1 - self.share / self.config.mixing_share)
 
     def _collect(self) -> Rollout:
+        began = time.monotonic()
         memory = self._memory.numpy().copy()
         ticks = [self._step() for _ in range(self.config.n_steps)]
         observations, labels, begun = (np.stack(parts) for parts in zip(*ticks, strict=True))
+        self.seconds["rollouts"] += time.monotonic() - began
         return Rollout(observations, labels, begun, memory)
 
     def _step(self) -> tuple[Any, Any, BoolArray]:
@@ -181,10 +188,12 @@ class Dagger:
     def _train(self) -> None:
         if not self._buffer.added:
             return
+        began = time.monotonic()
         for group in self.optimizer.param_groups:
             group["lr"] = self.config.learning_rate * cosine(self._left)
         losses = [self._gradient_step() for _ in range(self.config.gradient_steps)]
         self.logger.record("train/loss", float(np.mean(losses)))
+        self.seconds["gradient steps"] += time.monotonic() - began
 
     def _gradient_step(self) -> float:
         loss = self.student.loss(self._buffer, self.config.batch_size, self._draws)

@@ -18,7 +18,7 @@ PRECISE = recipe.Recipe(
     task=replace(FAST.task, observation="dated-long"),
     algorithm=DaggerConfig(),
     network=StudentConfig(),
-    schedule=recipe.Schedule(num_envs=256, steps=9_000_000, log_every=16),
+    schedule=recipe.Schedule(num_envs=256, steps=7_000_000, log_every=16),
     selection=FAST.selection,
 )
 
@@ -28,22 +28,3 @@ SEARCH_SPACE: SearchSpace = {
     "mixing_share": Real(0.0, 0.5),
     "gradient_steps": OneOf((8, 16, 32)),
 }
-
-VARIANTS = {
-    "recipe": ("the recipe", PRECISE),
-    "recurrent": (
-        "50 ms of samples and a gated recurrent unit instead of 0.7 s",
-        PRECISE.replace({"task.observation": "dated", "memory": "gru"}),
-    ),
-    "short-past": (
-        "50 ms of samples instead of 0.7 s",
-        PRECISE.replace({"task.observation": "dated"}),
-    ),
-    "three-samples": (
-        "the paper's three samples, which do not tell their age",
-        PRECISE.replace({"task.observation": "three-samples"}),
-    ),
-    "no-calibration": ("the command as it is", PRECISE.replace(calibrations=0)),
-    "no-help": ("a student that hops alone from the start", PRECISE.replace(mixing_share=1e-9)),
-}
-"""By name, what is different in words, and the recipe without one of its parts."""

@@ -1,0 +1,23 @@
+"""What hops shall the teacher show, and how high does it reach?"""
+
+RESULTS = (
+    "python -m studies.shooting reach --json studies/shooting/results/reach.json",
+    "python -m studies.shooting search --json studies/shooting/results/search.json",
+)
+
+TABLES = (
+    (
+        "table",
+        "reach.json",
+        "rows",
+        "robot",
+        "command_m=command, m",
+        "median_error_m*1000=error, mm",
+        "std_m*1000=std, mm",
+        "flight_fraction*100=flight, %",
+        "rms_hip_torque_nm=hip RMS, N m",
+        "mean_power_w=power, W",
+        "peak_knee_speed_rad_s=knee at most, rad/s",
+    ),
+    ("table", "search.json", "shape", "name=number", "shipped", "found"),
+)

@@ -1,0 +1,211 @@
+"""From scratch to accurate hopping: accuracy over wall-clock time, and what the time is spent on.
+
+A distillation is trained anew for every budget, since its schedules end with the budget; of the
+others, which may be stopped at any time, snapshots of one training are judged. Times are whole:
+building the networks, evaluations and calibration are in them. All policies are judged on seeds
+that chose nothing, at the heights that they were trained for.
+"""
+
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from rich.console import Console
+from rich.table import Table
+
+from hopping_leg.controllers.policy import Policy
+from hopping_leg.evaluate.result_files import ResultCache
+from hopping_leg.evaluate.runner import software_versions
+from hopping_leg.figure_style import COLOURS, panels, styled, to_svg
+from hopping_leg.io import write_atomically
+from hopping_leg.rl.policy_evaluation import CommandResult, evaluate_policy
+from hopping_leg.rl.recipes import RECIPES
+from hopping_leg.rl.run_folder import read_result
+from hopping_leg.rl.train import train
+from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot
+from studies.time_to_accuracy import sb3
+
+JUDGING_SEEDS = (1000, 1001)
+"""Seeds of noise and delay that chose nothing."""
+
+BUDGETS = {"fast": (0.25, 0.5, 1.0, 2.0), "precise": (1.0, 2.0, 4.0, 6.0)}
+"""Minutes of the trainings of a distillation."""
+
+_SPACING = 0.02
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class TimeToAccuracy:
+    """Train recipes and stable-baselines3's algorithms from scratch; judge them over time."""
+
+    recipes: tuple[str, ...] = ("fast", "precise", "paper", *sb3.ALGORITHMS)
+    """Recipes, and sb3-ppo and sb3-sac."""
+    seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
+    """One training each."""
+    robot: str = DEFAULT_ROBOT
+    """A shipped name or the path of a .toml file."""
+    minutes: float = 6.0
+    """Time of stable-baselines3's algorithms."""
+    out: Path = Path("runs/time_to_accuracy")
+    """Where the trainings are kept: finished ones are not repeated, killed ones go on."""
+    figure: Path | None = None
+    """Draw the curves to this .svg file."""
+    json: Path | None = None
+    """Write every number to this file."""
+
+    def measure(self) -> dict[str, Any]:
+        """Run it, print a table, return every number."""
+        console = Console()
+        cache = ResultCache(self.out / "judged", console.print)
+        rows: list[Row] = []
+        spent: list[Row] = []
+        for recipe in self.recipes:
+            for seed in self.seeds:
+                asked = {"robot": load_robot(self.robot).digest, "minutes": self.minutes}
+                asked |= {"options": repr(RECIPES.get(recipe)), "budgets": BUDGETS.get(recipe)}
+                found = cache.load_or_run(
+                    f"{recipe}-{seed}",
+                    f"{recipe}, seed {seed}",
+                    asked,
+                    lambda recipe=recipe, seed=seed: self._train(recipe, seed),  # type: ignore[misc]
+                )
+                rows += [{"recipe": recipe, "seed": seed, **row} for row in found["rows"]]
+                spent += [{"recipe": recipe, "seed": seed, **found["spent"]}]
+        summary = summarise(rows)
+        table = Table("recipe", "seconds", "error, mm", "worst seed", "std, mm", "skipped")
+        for row in summary:
+            keys = ("mean_error_m", "worst_seed_mean_error_m", "mean_std_m")
+            cells = [_mm(row[key]) for key in keys]
+            table.add_row(row["recipe"], f"{row['seconds']:.0f}", *cells, str(row["skipped_hops"]))
+        console.print(table)
+        if self.figure is not None:
+            write_atomically(self.figure, to_svg(draw(rows)))
+        return {
+            "robot": self.robot,
+            "rows": rows,
+            "summary": summary,
+            "spent": _mean_spent(spent),
+            "judging_seeds": JUDGING_SEEDS,
+            "versions": software_versions(),
+        }
+
+    def _train(self, recipe: str, seed: int) -> dict[str, Any]:
+        """Train and judge; return rows over time, and what the last training spent time on."""
+        if recipe in sb3.ALGORITHMS:
+            found = sb3.learn(recipe, self.robot, seed, self.minutes, snapshots=12, threads=2)
+            rows = [
+                {"seconds": s.seconds, "steps": s.steps, **self._judge(s.content)} for s in found
+            ]
+            return {"rows": rows, "spent": {}}
+        rows, result = [], {}
+        for minutes in BUDGETS.get(recipe, (None,)):
+            folder = self.out / f"{recipe}-{seed}" / f"{minutes or 'whole'}"
+            if not (folder / "policy.onnx").exists():
+                made = RECIPES[recipe].replace(steps=10**9) if minutes else RECIPES[recipe]
+                robot = load_robot(self.robot)
+                train(made, robot, seed, folder, minutes=minutes, resume=folder.exists())
+            result = read_result(folder)
+            if minutes is not None:
+                policies = [(60 * result["minutes"], result["steps"], folder / "policy.onnx")]
+            else:
+                snapshots = (folder / "snapshots").glob("*.onnx")
+                times = {row["steps"]: 60 * row["minutes"] for row in result["history"]}
+                policies = [(times[int(f.stem)], int(f.stem), f) for f in sorted(snapshots)]
+            for seconds, steps, file in policies:
+                judged = self._judge(file.read_bytes())
+                rows.append({"seconds": seconds, "steps": steps, **judged})
+        return {"rows": rows, "spent": result["seconds"]}
+
+    def _judge(self, content: bytes) -> Row:
+        return judge(Policy(content, "policy", "policy"), load_robot(self.robot))
+
+
+def judge(policy: Policy, robot: Robot) -> Row:
+    """Return the accuracy of a policy every 2 cm of its range, or at the heights of the paper."""
+    low, high = max(policy.card.command_low, 0.22), policy.card.command_high
+    heights = tuple(np.arange(low, high + 1e-6, _SPACING).round(3).tolist())
+    if (low, high) == (0.25, 0.35):
+        heights = (0.25, 0.30, 0.35)
+    return over_commands(evaluate_policy(policy, robot, heights, JUDGING_SEEDS))
+
+
+def over_commands(results: list[CommandResult]) -> Row:
+    """Return accuracy over the commands; where a policy does not hop, the command is its error."""
+    errors = [abs(r.median_error_m) if r.hops else r.command_m for r in results]
+    return {
+        "commands": len(results),
+        "mean_abs_median_error_m": float(np.mean(errors)),
+        "worst_abs_median_error_m": float(np.max(errors)),
+        "mean_std_m": float(np.mean([r.std_m for r in results if r.hops] or [0.0])),
+        "skipped_hops": sum(r.skipped_hops for r in results),
+        "body_contact_ticks": sum(r.body_contact_ticks for r in results),
+    }
+
+
+def summarise(rows: list[Row]) -> list[Row]:
+    """Return means over seeds for every recipe and point in time, in order."""
+    numbered = [
+        {**row, "point": point}
+        for _, group in groupby(rows, key=lambda row: (row["recipe"], row["seed"]))
+        for point, row in enumerate(group)
+    ]
+    names = list(dict.fromkeys(row["recipe"] for row in rows))
+    found = []
+    for name in names:
+        own = [row for row in numbered if row["recipe"] == name]
+        for point in sorted({row["point"] for row in own}):
+            there = [row for row in own if row["point"] == point]
+            errors = [row["mean_abs_median_error_m"] for row in there]
+            found.append(
+                {
+                    "recipe": name,
+                    "seconds": float(np.mean([row["seconds"] for row in there])),
+                    "runs": len(there),
+                    "mean_error_m": float(np.mean(errors)),
+                    "worst_seed_mean_error_m": float(np.max(errors)),
+                    "mean_std_m": float(np.mean([row["mean_std_m"] for row in there])),
+                    "skipped_hops": sum(row["skipped_hops"] for row in there),
+                }
+            )
+    return found
+
+
+def _mean_spent(spent: list[Row]) -> list[Row]:
+    """Return the mean time of every part of a recipe's last training."""
+    found = []
+    for name in dict.fromkeys(row["recipe"] for row in spent):
+        own = [row for row in spent if row["recipe"] == name]
+        for part in (key for key in own[0] if key not in ("recipe", "seed")):
+            seconds = float(np.mean([row[part] for row in own]))
+            found.append({"recipe": name, "part": part, "seconds": seconds})
+    return found
+
+
+@styled
+def draw(rows: list[Row]) -> Figure:
+    """Draw error and scatter over time, a line per seed."""
+    figure, axes = panels(2)
+    names = list(dict.fromkeys(row["recipe"] for row in rows))
+    keys = ("mean_abs_median_error_m", "mean_std_m")
+    for (axis,), key, title in zip(axes, keys, ("mean |error|, mm", "mean std, mm"), strict=True):
+        for name, colour in zip(names, COLOURS, strict=False):
+            own = [row for row in rows if row["recipe"] == name]
+            for number, seed in enumerate(dict.fromkeys(row["seed"] for row in own)):
+                line = [row for row in own if row["seed"] == seed]
+                axis.plot(
+                    [row["seconds"] for row in line], [1e3 * row[key] for row in line], ".-",
+                    color=colour, lw=0.8, label=name if number == 0 else None,
+                )  # fmt: skip
+        axis.set(xscale="log", yscale="log", ylabel=title)
+    axes[0][0].legend(ncol=len(names))
+    axes[-1][0].set_xlabel("wall-clock time, s")
+    return figure
+
+
+def _mm(metres: float) -> str:
+    return f"{1e3 * metres:.1f}"
