@@ -43,9 +43,8 @@ with the most words counts."""
 SECONDS = {
     "hopping_leg.evaluate.trials.FIXED_SECONDS": 3.0,
     "hopping_leg.evaluate.trials.STEP_SECONDS": 2.0,
-    "hopping_leg.rl.policy_evaluation._SECONDS": 0.5,
 }
-"""Lengths of the paper's trials and of those that select a policy, which have no option."""
+"""Lengths of the paper's trials, which have no option."""
 
 ELSEWHERE = {
     "hop finetune": "minutes even when small: tests/cli/test_finetune.py",

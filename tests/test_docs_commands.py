@@ -24,8 +24,11 @@ from tests.cli.emulated import put_behind
 from tests.doc_pages import PAGES, ROOT, blocks, indented_commands, inline_commands, with_files
 from tests.doc_world import BEFORE, ELSEWHERE, INTERRUPTED, REFUSED, SECONDS, furnish, shorten
 
-for extra in ("moteus", "optuna", "torch", "viser"):
-    pytest.importorskip(extra)
+pytest.importorskip("moteus")
+pytest.importorskip("optuna")
+pytest.importorskip("torch")
+pytest.importorskip("viser")
+from tests.rl.learners import try_briefly
 
 WORK = 60
 """Time of the processor that a command may take, s; a longer one wants an entry in
@@ -96,6 +99,7 @@ def test_commands_and_snippets_work_in_their_order(page, tmp_path, monkeypatch, 
     monkeypatch.setenv("MPLBACKEND", "agg")
     for name, seconds in SECONDS.items():
         monkeypatch.setattr(name, seconds)
+    try_briefly(monkeypatch)
     furnish(page)
     names = {"__name__": page}
     exec(BEFORE.get(page, ""), names)

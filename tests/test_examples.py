@@ -8,6 +8,8 @@ import nbformat
 import pytest
 from nbclient import NotebookClient
 
+from tests.rl.learners import try_briefly
+
 EXAMPLES = Path(__file__).parent.parent / "examples"
 SCRIPTS = pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda p: p.stem)
 NOTEBOOKS = pytest.mark.parametrize(
@@ -22,7 +24,7 @@ def test_every_example_runs(path, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "agg")
     if path.stem in ARGUMENTS:
-        monkeypatch.setattr("hopping_leg.rl.policy_evaluation._SECONDS", 0.5)
+        try_briefly(monkeypatch)
     monkeypatch.setattr(sys, "argv", [str(path), *ARGUMENTS.get(path.stem, [])])
     runpy.run_path(str(path), run_name="__main__")
     assert capsys.readouterr().out

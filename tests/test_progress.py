@@ -1,9 +1,10 @@
-import math
 import time
 
+import numpy as np
 import pytest
 
 from hopping_leg.progress import LiveProgress, minutes
+from hopping_leg.rl.learner import RecentHops
 from hopping_leg.rl.train import TrainingProgress
 from hopping_leg.sim_to_real.jobs import Board
 
@@ -30,15 +31,16 @@ def test_quiet_work_and_a_bar_leave_the_lines_out(capsys, option):
 
 
 def test_a_training_tells_only_what_it_knows(capsys, monkeypatch):
-    now = 0.0
+    now, hops = 0.0, RecentHops()
     monkeypatch.setattr(time, "monotonic", lambda: now)
     with TrainingProgress("fast seed 0") as progress:
-        progress.update(0.0, 0, 0, math.nan, "")
+        progress.update(0.0, 0, hops, "")
         now = 60.0
-        progress.update(0.5, 1200, 7, 0.012, " · best snapshot 9 mm")
+        hops.add(np.array([0.012, np.nan, -0.012]))
+        progress.update(0.5, 1200, hops, " · best snapshot 9 mm")
     assert capsys.readouterr().err == (
         "fast seed 0 0 % · 0 hops\n"
-        "fast seed 0 50 % · 7 hops · apex error 12 mm · 20 steps/s · best snapshot 9 mm\n"
+        "fast seed 0 50 % · 2 hops · apex error 12 mm · 20 steps/s · best snapshot 9 mm\n"
     )
 
 

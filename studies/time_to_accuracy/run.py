@@ -1,9 +1,9 @@
 """From scratch to accurate hopping: accuracy over wall-clock time, and what the time is spent on.
 
-A distillation is trained anew for every budget, since its schedules end with the budget; of the
-others, which may be stopped at any time, snapshots of one training are judged. Times are whole:
+A distillation is trained anew for every share of its steps, since its schedules end with them; of
+the others, which may be stopped at any time, snapshots of one training are judged. Times are whole:
 building the networks, evaluations and calibration are in them. All policies are judged on seeds
-that chose nothing, at the heights that they were trained for.
+that chose nothing, at the heights and on the robot that they were trained for.
 """
 
 from dataclasses import dataclass
@@ -31,8 +31,8 @@ from studies.time_to_accuracy import sb3
 JUDGING_SEEDS = (1000, 1001)
 """Seeds of noise and delay that chose nothing."""
 
-BUDGETS = {"fast": (0.25, 0.5, 1.0, 2.0), "precise": (1.0, 2.0, 4.0, 6.0)}
-"""Minutes of the trainings of a distillation."""
+SHARES = {"fast": (0.25, 0.5, 1.0), "precise": (0.25, 1.0)}
+"""Shares of the recipe's steps of the trainings of a distillation."""
 
 _SPACING = 0.02
 
@@ -47,8 +47,8 @@ class TimeToAccuracy:
     """Recipes, and sb3-ppo and sb3-sac."""
     seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
     """One training each."""
-    robot: str = DEFAULT_ROBOT
-    """A shipped name or the path of a .toml file."""
+    robot: str | None = None
+    """A shipped name or the path of a .toml file; by default each recipe's own."""
     minutes: float = 6.0
     """Time of stable-baselines3's algorithms."""
     out: Path = Path("runs/time_to_accuracy")
@@ -66,8 +66,8 @@ class TimeToAccuracy:
         spent: list[Row] = []
         for recipe in self.recipes:
             for seed in self.seeds:
-                asked = {"robot": load_robot(self.robot).digest, "minutes": self.minutes}
-                asked |= {"options": repr(RECIPES.get(recipe)), "budgets": BUDGETS.get(recipe)}
+                asked = {"robot": self._robot(recipe).digest, "minutes": self.minutes}
+                asked |= {"options": repr(RECIPES.get(recipe)), "shares": SHARES.get(recipe)}
                 found = cache.load_or_run(
                     f"{recipe}-{seed}",
                     f"{recipe}, seed {seed}",
@@ -86,7 +86,7 @@ class TimeToAccuracy:
         if self.figure is not None:
             write_atomically(self.figure, to_svg(draw(rows)))
         return {
-            "robot": self.robot,
+            "robots": {name: self._robot(name).name for name in self.recipes},
             "rows": rows,
             "summary": summary,
             "spent": _mean_spent(spent),
@@ -96,33 +96,38 @@ class TimeToAccuracy:
 
     def _train(self, recipe: str, seed: int) -> dict[str, Any]:
         """Train and judge; return rows over time, and what the last training spent time on."""
+        robot = self._robot(recipe)
         if recipe in sb3.ALGORITHMS:
-            found = sb3.learn(recipe, self.robot, seed, self.minutes, snapshots=12, threads=2)
+            found = sb3.learn(recipe, robot, seed, self.minutes, snapshots=12)
             rows = [
-                {"seconds": s.seconds, "steps": s.steps, **self._judge(s.content)} for s in found
+                {"seconds": s.seconds, "steps": s.steps, **_judge(s.content, robot)} for s in found
             ]
             return {"rows": rows, "spent": {}}
-        rows, result = [], {}
-        for minutes in BUDGETS.get(recipe, (None,)):
-            folder = self.out / f"{recipe}-{seed}" / f"{minutes or 'whole'}"
+        rows, result, whole = [], {}, RECIPES[recipe]
+        for share in SHARES.get(recipe, (1.0,)):
+            folder = self.out / f"{recipe}-{seed}" / f"{share:g}"
             if not (folder / "policy.onnx").exists():
-                made = RECIPES[recipe].replace(steps=10**9) if minutes else RECIPES[recipe]
-                robot = load_robot(self.robot)
-                train(made, robot, seed, folder, minutes=minutes, resume=folder.exists())
+                made = whole.replace(steps=int(share * whole.schedule.steps))
+                train(made, robot, seed, folder, resume=folder.exists())
             result = read_result(folder)
-            if minutes is not None:
+            if recipe in SHARES:
                 policies = [(60 * result["minutes"], result["steps"], folder / "policy.onnx")]
             else:
                 snapshots = (folder / "snapshots").glob("*.onnx")
                 times = {row["steps"]: 60 * row["minutes"] for row in result["history"]}
                 policies = [(times[int(f.stem)], int(f.stem), f) for f in sorted(snapshots)]
             for seconds, steps, file in policies:
-                judged = self._judge(file.read_bytes())
+                judged = _judge(file.read_bytes(), robot)
                 rows.append({"seconds": seconds, "steps": steps, **judged})
         return {"rows": rows, "spent": result["seconds"]}
 
-    def _judge(self, content: bytes) -> Row:
-        return judge(Policy(content, "policy", "policy"), load_robot(self.robot))
+    def _robot(self, recipe: str) -> Robot:
+        usual = RECIPES[recipe].robot if recipe in RECIPES else DEFAULT_ROBOT
+        return load_robot(self.robot or usual)
+
+
+def _judge(content: bytes, robot: Robot) -> Row:
+    return judge(Policy(content, "policy", "policy"), robot)
 
 
 def judge(policy: Policy, robot: Robot) -> Row:

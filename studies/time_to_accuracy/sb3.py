@@ -14,7 +14,7 @@ from hopping_leg.envs import TaskConfig
 from hopping_leg.envs.observation import make_observation
 from hopping_leg.rl.onnx_export import build_policy
 from hopping_leg.rl.sb3_policies import dense_network
-from hopping_leg.robot import load_robot
+from hopping_leg.robot import Robot
 
 ALGORITHMS = {"sb3-ppo": (PPO, 8), "sb3-sac": (SAC, 1)}
 """Algorithm and number of environments by name."""
@@ -29,11 +29,9 @@ class Snapshot:
     content: bytes
 
 
-def learn(
-    name: str, robot: str, seed: int, minutes: float, snapshots: int, threads: int
-) -> list[Snapshot]:
-    """Train for so many minutes; return policies at equal intervals, judging time not counted."""
-    torch.set_num_threads(threads)
+def learn(name: str, robot: Robot, seed: int, minutes: float, snapshots: int) -> list[Snapshot]:
+    """Train for so many minutes on two threads; return policies at equal intervals."""
+    torch.set_num_threads(2)
     algorithm, count = ALGORITHMS[name]
     began = time.monotonic()
     env = make_vec_env("HoppingLeg-v0", n_envs=count, seed=seed, env_kwargs={"robot": robot})
@@ -45,7 +43,7 @@ def learn(
 
 class _Keep(BaseCallback):  # type: ignore[misc]
     def __init__(
-        self, name: str, robot: str, seed: int, began: float, minutes: float, snapshots: int
+        self, name: str, robot: Robot, seed: int, began: float, minutes: float, snapshots: int
     ) -> None:
         super().__init__()
         self._name, self._robot, self._seed = name, robot, seed
@@ -60,9 +58,9 @@ class _Keep(BaseCallback):  # type: ignore[misc]
         return passed < self._last
 
 
-def policy_file(model: BaseAlgorithm, name: str, robot_name: str, seed: int) -> bytes:
+def policy_file(model: BaseAlgorithm, name: str, robot: Robot, seed: int) -> bytes:
     """Return the policy file of a model trained on the environment's own defaults."""
-    robot, task = load_robot(robot_name), TaskConfig()
+    task = TaskConfig()
     if isinstance(model, SAC):
         parts, squash = [model.actor.latent_pi, model.actor.mu], "tanh"
     else:

@@ -12,12 +12,14 @@ import pytest
 
 from hopping_leg.cli import main
 from hopping_leg.controllers.joint_pd import JointGains
+from hopping_leg.controllers.registry import load_policy
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.identify.excitation import load_excitation
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.trace import Trace
 from tests.cli.emulated import put_behind, write_sine
 
+FAST = load_policy("fast").card
 RUN = ["deploy", "energy-shaping", "--transport", "/dev/leg", "--seconds", "0.3"]
 
 
@@ -72,8 +74,8 @@ def test_a_fault_is_a_sentence_and_an_exit_code(emulate, tmp_path, refused):
     [
         (["fasst"], "Did you mean 'fast'"),
         (["missing.onnx"], "Cannot read policy file"),
-        (["fast", "--command", "0.6"], "from 0.22 to 0.40 m"),
-        (["fast", "--robot", "legv2"], "was trained on robot 'legv2-paper'"),
+        (["fast", "--command", "0.6"], f"from {FAST.command_low:.2f} to {FAST.command_high:.2f} m"),
+        (["fast", "--robot", "legv2"], f"was trained on robot '{FAST.robot}'"),
         (["energy-shaping", "--schedule", "0.3"], "is no step of a schedule"),
         (["energy-shaping", "--schedule", "0.3:2", "--command", "0.3"], "exclude each other"),
         (["energy-shaping", "--command", "1.0"], "outside of what"),

@@ -8,6 +8,7 @@ import pytest
 from hopping_leg.cli import main
 from hopping_leg.cli.finetune import guard_of, line
 from hopping_leg.robot import load_robot
+from tests.rl.learners import EVERY, learner, policy_file
 
 
 @pytest.mark.parametrize(
@@ -23,11 +24,18 @@ from hopping_leg.robot import load_robot
         (["fast", "--on", "twin", "--trial-seconds", "600"], "trial of 600"),
         (["fast", "--on", "nobody"], "nobody"),
         (["energy-shaping", "--on", "twin"], "energy-shaping"),
-        (["adaptive", "--on", "twin"], "without one, e.g. precise"),
     ],
 )
 def test_what_has_no_meaning_is_refused_in_a_sentence(words, sentence, refused, tmp_path):
     refused(["finetune", *words, "--out", tmp_path / "run"], sentence)
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_policy_that_remembers_is_refused(refused, tmp_path):
+    recipe, file = EVERY["gru"], tmp_path / "gru.onnx"
+    file.write_bytes(policy_file(recipe, learner(recipe)).content)
+    words = ["finetune", file, "--on", "twin", "--commands", "0.25,0.35"]
+    refused([*words, "--out", tmp_path / "run"], "without one, e.g. precise")
     assert not (tmp_path / "run").exists()
 
 

@@ -22,11 +22,11 @@ SETUP = RolloutConfig(load_robot("legv2-paper"), threads=1)
 
 def scores(shift=0.0, scale=1.0, **changed):
     usual = tuning.CommandScore(0.3, 0.3, 0.002, 2.0, 0.4, 0.03, 0.08)
-    medians = {c: 0.3 + shift + scale * (c - 0.3) for c in tuning.COMMANDS}
+    medians = {c: 0.3 + shift + scale * (c - 0.3) for c in tuning.Search().commands}
     return [replace(usual, **{"command": c, "median": m} | changed) for c, m in medians.items()]
 
 
-def fake_evaluate(candidates, setup, seconds, seed):
+def fake_evaluate(candidates, setup, commands, seconds, seed):
     return [scores(std=abs(g.exponent - 1.0) + 0.001) for g in candidates]
 
 
@@ -72,15 +72,34 @@ def test_log_of_another_search_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(tuning, "evaluate", fake_evaluate)
     log = tmp_path / "log.jsonl"
     searched(GAINS, log, 1)
-    for other in ({"seed": 4}, {"flight": 0.5}):
-        with pytest.raises(UsageError, match=r"seed 3, .* flight 0;"):
+    for other in ({"seed": 4}, {"flight": 0.5}, {"commands": (0.2, 0.3, 0.4)}):
+        with pytest.raises(UsageError, match=r"seed 3, .* flight 0 and commands 0.22 .* 0.4;"):
             searched(GAINS, log, 1, **other)
 
 
 def test_candidates_are_judged_side_by_side():
     useless = replace(GAINS, k0=0.3, exponent=0.0)
-    good, bad = tuning.evaluate([GAINS, useless], SETUP, 3.5, 0)
+    commands = (0.25, 0.30, 0.35)
+    good, bad = tuning.evaluate([GAINS, useless], SETUP, commands, 3.5, 0)
     assert cost(good) < cost(bad)
+    assert tuple(score.command for score in good) == commands
+
+
+def test_candidates_are_tried_at_the_heights_that_are_asked_for(tmp_path, monkeypatch):
+    asked = []
+
+    def evaluate(candidates, setup, commands, seconds, seed):
+        asked.append(commands)
+        return fake_evaluate(candidates, setup, commands, seconds, seed)
+
+    monkeypatch.setattr(tuning, "evaluate", evaluate)
+    search = tuning.Search(generations=1, population=4, commands=(0.2, 0.3, 0.4))
+    tuning.tune(SETUP.robot, "legv2-paper", "by-hand", search, 0, tmp_path, lambda *_: None)
+    assert set(asked) == {(0.2, 0.3, 0.4)}
+    assert "--commands 0.2 0.3 0.4" in load_gains(tmp_path / "gains.toml").source
+    for wrong in ((0.2, 0.3), (0.2, 0.3, -0.4)):
+        with pytest.raises(UsageError, match="at least three --commands"):
+            tuning.Search(commands=wrong)
 
 
 ROBOT = load_robot("legv2-paper")

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hopping_leg.controllers import RolloutConfig, rollout
-from hopping_leg.controllers.registry import load_controller
+from hopping_leg.controllers.registry import load_controller, robot_of
 from hopping_leg.deploy.drive_link import Action, DriveMode, Reply
 from hopping_leg.deploy.safety_limits import hopping_limits, recording_limits
 from hopping_leg.deploy.stop_reasons import Counts, Operator, Reason, SupervisorInput, find_cause
@@ -216,11 +216,12 @@ PAPER_LEG = load_robot("legv2-paper")
 
 @pytest.mark.parametrize("name", ["fast", "energy-shaping"])
 def test_who_hops_as_trained_is_not_stopped_for_it(name):
-    limits = hopping_limits(PAPER_LEG, 200.0)
+    leg = load_robot(robot_of([name]))
+    limits = hopping_limits(leg, 200.0)
     commands = np.tile([0.25, 0.30, 0.35], (800, 1))
     run = rollout(
-        load_controller(name, PAPER_LEG),
-        RolloutConfig(PAPER_LEG, NO_NOISE, threads=1),
+        load_controller(name, leg),
+        RolloutConfig(leg, NO_NOISE, threads=1),
         commands,
         seed=0,
     )

@@ -9,7 +9,7 @@ from gymnasium.vector import AutoresetMode
 
 from hopping_leg import ENV_ID
 from hopping_leg.envs import HoppingTask, TaskConfig, paper_reward
-from hopping_leg.robot import load_robot
+from hopping_leg.robot import DEFAULT_ROBOT, load_robot
 from hopping_leg.sim import NO_NOISE
 
 SHORT = TaskConfig(episode=0.1)
@@ -55,7 +55,7 @@ def test_rewards_are_explained_in_info():
 def test_vector_env_is_the_batched_task():
     vector = gymnasium.make_vec(ENV_ID, num_envs=5, options=SHORT, threads=1)
     observation, _ = vector.reset(seed=11)
-    robot = load_robot("legv2-paper")
+    robot = load_robot(DEFAULT_ROBOT)
     rng, _ = gymnasium.utils.seeding.np_random(11)
     task = HoppingTask(robot, 5, SHORT, paper_reward(robot), np.random.default_rng(0), 1)
     np.testing.assert_array_equal(observation, task.reseed(rng))

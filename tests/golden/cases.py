@@ -20,7 +20,12 @@ from onnx import numpy_helper
 
 from hopping_leg.cli import main
 from hopping_leg.controllers import RolloutConfig, rollout
-from hopping_leg.controllers.registry import load_controller, load_policy, shipped_policies
+from hopping_leg.controllers.registry import (
+    load_controller,
+    load_policy,
+    robot_of,
+    shipped_policies,
+)
 from hopping_leg.envs import (
     ApexRewardConfig,
     HoppingTask,
@@ -136,49 +141,39 @@ for _reward in REWARDS:
 
 @case("task-range", 1e-4)
 def task_range(folder: Path) -> Values:
-    """The start near the apex and a range of commands, as the fast recipe trains."""
-    return _task("dated", "apex", command_range=(0.22, 0.4), command_skew=1.5, timestep=1e-3)
+    """A range of commands at a coarse physics step."""
+    return _task("dated", "apex", command_range=(0.22, 0.4), timestep=1e-3)
 
 
-# fmt: off
+_STUDENT = ["n_steps=32", "batch_size=64", "gradient_steps=4", "mixing_share=0.5"]
 RECIPES = {
-    "paper": ["learning_starts=64", "gradient_steps=4", "batch_size=32"],
-    "fast": ["batch_size=64"],
-    "precise": ["batch_size=64", "teacher_share=0.5", "teachers=2", "dagger.gradient_steps=4"],
-    "adaptive": [
-        "batch_size=64",
-        "teacher_share=0.5",
-        "dagger.gradient_steps=4",
-        "nominal_share=0.5",
-        "randomizations=2",
-    ],
-    "recurrent": [
-        "batch_size=64", "teacher_share=0.5", "teachers=1", "n_epochs=4", "task.command_skew=1",
-        "student.memory=gru", "dagger.gradient_steps=4", "dagger.batch_size=64",
-    ],
+    "paper": ["train_freq=32", "learning_starts=64", "gradient_steps=4", "batch_size=32"],
+    "fast": _STUDENT,
+    "precise": [*_STUDENT, "task.timestep=0.0005"],
+    "surprised": [*_STUDENT, "calibrations=1"],
+    "recurrent": [*_STUDENT, "memory=gru"],
 }
+"""What makes a training of a recipe short: a few rollouts of four legs."""
+
 MADE = {
-    "recurrent": ("--recipe", "precise", "--observation", "dated", "--heights", 0.2, 0.42),
+    "surprised": ("--recipe", "fast", "--randomise", "surprises", "--heights", 0.25, 0.3),
+    "recurrent": ("--recipe", "precise", "--observation", "dated", "--heights", 0.25, 0.3),
 }
-# fmt: on
-"""What makes a training of a recipe short: two rollouts, of teacher and student each."""
 
 
 def _trained(folder: Path, recipe: str) -> Values:
-    """Return weights of a training's snapshots and policy, and the scores of its trials."""
-    rollouts = 4 if "teacher_share=0.5" in RECIPES[recipe] else 2
-    rollout = "train_freq=32" if recipe == "paper" else "n_steps=32"
-    numbers = ["num_envs=4", rollout, "eval_every=64", "eval_start=0.5", *RECIPES[recipe]]
+    """Return weights of a training's snapshots and policy, and scores of its trials and stages."""
+    numbers = ["num_envs=4", "eval_every=64", "eval_start=0.5", *RECIPES[recipe]]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(policy_evaluation, "_SECONDS", 0.5)
+        patch.setitem(policy_evaluation.evaluate_policy.__kwdefaults__, "seconds", 0.5)
         hop(
-            "train", *MADE.get(recipe, ("--recipe", recipe)), "--seed", 3, "--threads", 1,
-            "--out", folder / "run",
-            "--steps", 128 * rollouts, "--set", *numbers,
+            "train", *MADE.get(recipe, ("--recipe", recipe)),
+            "--seed", 3, "--threads", 1, "--out", folder / "run",
+            "--steps", 256 if recipe == "paper" else 512, "--set", *numbers,
         )  # fmt: skip
     files = [*sorted((folder / "run" / "snapshots").iterdir()), folder / "run" / "policy.onnx"]
     told = json.loads((folder / "run" / "result.json").read_text())
-    scores = [row["score_m"] for row in told["history"]] + told.get("teacher_scores_m", [])
+    scores = [row["score_m"] for row in [*told["history"], *told["stages"]]]
     return [np.array(scores, float), *(w for file in files for w in _weights(file))]
 
 
@@ -271,11 +266,12 @@ def _wire() -> Iterator[list[bytes]]:
         yield frames
 
 
-def _deployed(folder: Path, controller: str, **start: object) -> Values:
+def _deployed(folder: Path, controller: str, robot: str) -> Values:
     """Return every byte between host and emulated drives in virtual time, and the trace."""
     with pytest.MonkeyPatch.context() as patch, _wire() as frames:
-        lockstep = put_behind(patch, **start)
+        lockstep = put_behind(patch, robot=robot, seed=4)
         words = ["--schedule", "0.25:0.2,0.3:0.3", "--yes", "--out", folder / "run"]
+        words += ["--robot", robot]
         hop("deploy", controller, "--transport", "/dev/leg", "--seconds", "0.5", *words)
     (trace,) = (folder / "run").glob("*.parquet")
     assert len(frames) > 1000
@@ -283,9 +279,9 @@ def _deployed(folder: Path, controller: str, **start: object) -> Values:
     return [wire, np.array(lockstep.truth), *_columns(trace)]
 
 
-for _controller in ("energy-shaping", "fast"):
+for _controller, _robot in (("energy-shaping", "legv2-paper"), ("fast", robot_of(["fast"]))):
     case(f"deploy-{_controller}", 1e-2, needs="moteus")(
-        lambda folder, controller=_controller: _deployed(folder, controller, seed=4)
+        lambda folder, controller=_controller, robot=_robot: _deployed(folder, controller, robot)
     )
 
 for _robot in ("legv1", "legv2", "legv2-paper", "twin"):

@@ -4,64 +4,52 @@ import torch
 from stable_baselines3.common.logger import configure
 
 from hopping_leg.controllers.policy import Card, Policy
+from hopping_leg.rl import policy_evaluation
 from hopping_leg.rl.onnx_export import build_policy
-from hopping_leg.rl.recipe import Recipe
-from hopping_leg.rl.recipes.adaptive import ADAPTIVE
 from hopping_leg.rl.recipes.fast import FAST
 from hopping_leg.rl.recipes.paper import PAPER
-from hopping_leg.rl.recipes.precise import GRU, LEARNT, PRECISE
-from hopping_leg.rl.resumable import ResumablePPO
-from hopping_leg.robot import load_robot
+from hopping_leg.robot import COARSE_TIMESTEP, DEFAULT_ROBOT, load_robot
 from hopping_leg.sim.randomization import WIDE_RANGES
 
-ROBOT = load_robot("legv2-paper")
+ROBOT = load_robot(DEFAULT_ROBOT)
 TINY = PAPER.replace(
     steps=1200, learning_starts=300, eval_every=10**9, actor=(8, 8), critic=(8, 8), num_envs=2,
     gradient_steps=4, batch_size=16,
 )  # fmt: skip
-SMALL = {
-    "steps": 768, "num_envs": 4, "n_steps": 32, "batch_size": 64, "actor": (8, 8), "critic": (8, 8),
-}  # fmt: skip
-STUDENT = {
-    "student.hidden": (8, 8), "student.error_hidden": (8, 8), "student.size": 8,
-    "teacher_share": 0.4, "dagger.buffer_size": 200, "dagger.gradient_steps": 4,
-    "dagger.batch_size": 64,
-}  # fmt: skip
-TINY_FAST = FAST.replace(SMALL)
-TINY_LEARNT = LEARNT.replace(SMALL | STUDENT, eval_commands=(0.3,), teachers=3)
-TINY_GRU = LEARNT.replace(GRU | SMALL | STUDENT | {"dagger.buffer_size": 400})
-TINY_PRECISE = PRECISE.replace(SMALL | STUDENT)
-TINY_ADAPTIVE = ADAPTIVE.replace(SMALL | STUDENT)
-
-
-class TinyPPO(Recipe):
-    def make_model(self, env, seed):
-        return ResumablePPO(
-            "MlpPolicy", env, n_steps=32, batch_size=32, n_epochs=2, use_sde=True, seed=seed,
-            learning_rate=lambda left: 1e-3 * left, policy_kwargs={"net_arch": [8]}, device="cpu",
-        )  # fmt: skip
-
-
-TINY_PPO = TinyPPO(**vars(PAPER.replace(steps=640, privileged_critic=False, num_envs=2)))
+TINY_FAST = FAST.replace(
+    {"task.timestep": COARSE_TIMESTEP, "task.observation": "dated"},
+    num_envs=4, steps=768, n_steps=16, buffer_size=320, gradient_steps=4, batch_size=64,
+    hidden=(8, 8), size=8, mixing_share=0.4, calibrations=1, heights=(0.28, 0.32),
+    eval_commands=(0.28, 0.32),
+)  # fmt: skip
 EVERY = {
-    "sac": TINY, "ppo": TINY_PPO, "fast": TINY_FAST, "learnt": TINY_LEARNT,
-    "recurrent": TINY_GRU, "adaptive": TINY_ADAPTIVE,
-    "precise": TINY_PRECISE,
-    "surprised": TINY_LEARNT.replace({"task.randomised": WIDE_RANGES}),
-}  # fmt: skip
+    "sac": TINY,
+    "window": TINY_FAST,
+    "gru": TINY_FAST.replace(memory="gru"),
+    "surprised": TINY_FAST.replace({"task.randomised": WIDE_RANGES}),
+}
 
 
-def learner(recipe, seed=3):
+def learner(recipe, seed=3, robot=ROBOT):
     torch.set_num_threads(1)
-    env = recipe.make_env(ROBOT, seed)
-    model = recipe.make_model(env, seed)
-    model.set_logger(configure(None, []))
-    return model
+    made = recipe.make_learner(robot, seed)
+    made.set_logger(configure(None, []))
+    return made
 
 
-def policy_file(recipe, model):
-    """Return the policy that a recipe exports of a model."""
+def learn(made, steps):
+    made.train_until(steps, lambda: True, 10**9)
+    return made
+
+
+def policy_file(recipe, made):
+    """Return the policy that a learner exports."""
     task = recipe.task
     about = task.observation, *task.command_bounds, task.action_torque
     card = Card("test", *about, ROBOT.name, ROBOT.digest, task.rate)
-    return Policy(build_policy(recipe.actor(model, model.env), card), "memory", "test")
+    return Policy(build_policy(made.network(), card), "memory", "test")
+
+
+def try_briefly(monkeypatch):
+    """Let trials of policies take half a second."""
+    monkeypatch.setitem(policy_evaluation.evaluate_policy.__kwdefaults__, "seconds", 0.5)

@@ -1,15 +1,25 @@
+"""What was stopped goes on as if nothing had happened, and nothing else is taken for it."""
+
 import json
 
 import numpy as np
 import pytest
 import torch
 
+from hopping_leg.envs import Reward
 from hopping_leg.errors import UsageError
-from hopping_leg.rl import policy_evaluation
 from hopping_leg.rl import train as module
 from hopping_leg.rl.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
-from hopping_leg.rl.resumable import restore, state_of
-from tests.rl.learners import EVERY, ROBOT, TINY, learner
+from tests.rl.learners import (
+    EVERY,
+    ROBOT,
+    TINY,
+    TINY_FAST,
+    learn,
+    learner,
+    policy_file,
+    try_briefly,
+)
 
 
 def disturb_all_generators():
@@ -19,29 +29,28 @@ def disturb_all_generators():
 
 @pytest.mark.parametrize("recipe", EVERY.values(), ids=EVERY)
 def test_resuming_equals_never_having_stopped(recipe, tmp_path):
-    straight = learner(recipe)
-    trees = []
+    straight, trees = learner(recipe), []
 
     def keep():
         if straight.num_timesteps >= recipe.schedule.steps * 2 // 3 and not trees:
-            trees.append(write_checkpoint(tmp_path, straight.num_timesteps, state_of(straight)))
+            trees.append(write_checkpoint(tmp_path, straight.num_timesteps, straight.state()))
 
-    def boundary(model):
-        recipe.anneal(model, model.env, 1 - model._current_progress_remaining)
-
-    straight.on_boundary = lambda: (boundary(straight), keep())
-    straight.learn(recipe.schedule.steps)
+    straight.on_boundary = keep
+    learn(straight, recipe.schedule.steps)
     disturb_all_generators()
     # Which legs there are is drawn from the seed; all else comes from the checkpoint.
     resumed = learner(recipe, seed=3 if recipe.task.randomised else 99)
-    resumed.on_boundary = lambda: boundary(resumed)
-    restore(resumed, read_checkpoint(trees[0]))
+    resumed.restore(read_checkpoint(trees[0]))
     assert 0 < resumed.num_timesteps < recipe.schedule.steps
-    resumed.learn(recipe.schedule.steps - resumed.num_timesteps, reset_num_timesteps=False)
+    learn(resumed, recipe.schedule.steps)
     assert resumed.num_timesteps == straight.num_timesteps
-    before, after = straight.policy.state_dict(), resumed.policy.state_dict()
-    assert all(torch.equal(before[name], after[name]) for name in before)
-    assert np.array_equal(straight._last_obs, resumed._last_obs)
+    assert policy_file(recipe, resumed).content == policy_file(recipe, straight).content
+    ends = [
+        write_checkpoint(tmp_path / n, 0, m.state()) for n, m in (("a", straight), ("b", resumed))
+    ]
+    with np.load(ends[0] / "arrays.npz") as one, np.load(ends[1] / "arrays.npz") as other:
+        assert one.files == other.files
+        assert all(np.array_equal(one[name], other[name], equal_nan=True) for name in one.files)
 
 
 def test_only_whole_checkpoints_count_and_two_are_kept(tmp_path):
@@ -73,7 +82,7 @@ def test_no_checkpoint_holds_a_pickle(tmp_path):
 
 
 def test_a_run_is_never_overwritten_or_mixed(tmp_path, monkeypatch):
-    monkeypatch.setattr(policy_evaluation, "_SECONDS", 0.5)
+    try_briefly(monkeypatch)
     out = tmp_path / "run"
     recipe = TINY.replace(steps=64, eval_every=32, learning_starts=32)
     done = module.train(recipe, ROBOT, 0, out, quiet=True)
@@ -85,18 +94,43 @@ def test_a_run_is_never_overwritten_or_mixed(tmp_path, monkeypatch):
 
 
 def test_a_run_can_begin_where_another_stopped(tmp_path, monkeypatch):
-    monkeypatch.setattr(policy_evaluation, "_SECONDS", 0.5)
+    try_briefly(monkeypatch)
     first, second = tmp_path / "first", tmp_path / "second"
     recipe = TINY.replace(steps=128, eval_every=64, learning_starts=32, checkpoint_seconds=0)
     module.train(recipe, ROBOT, 0, first, quiet=True)
     with pytest.raises(UsageError, match="no checkpoint"):
         module.train(recipe, ROBOT, 0, second, source=tmp_path, quiet=True)
     longer = recipe.replace(steps=256, learning_rate=1e-4)
-    shares = []
-    monkeypatch.setattr(type(longer), "anneal", lambda *args: shares.append(args[-1]))
+    shares, anneal = [], Reward.anneal
+    monkeypatch.setattr(
+        Reward, "anneal", lambda reward, share: (shares.append(share), anneal(reward, share))
+    )
     trained = module.train(longer, ROBOT, 0, second, source=first, quiet=True)
     assert trained.steps == 256
-    assert shares == [0.25, 0.5, 0.75], "of the longer training, not of the one that is over"
+    assert shares[-3:] == [0.25, 0.5, 0.75], "of the longer training, not of the one that is over"
     history = json.loads((second / "result.json").read_text())["history"]
     assert min(row["steps"] for row in history) >= 64
     assert f"--source {first}" in (second / "model_card.md").read_text()
+
+
+class KilledError(Exception):
+    pass
+
+
+def test_a_distillation_that_was_killed_ends_with_the_same_policy(tmp_path, monkeypatch):
+    try_briefly(monkeypatch)
+    recipe = TINY_FAST.replace(eval_every=192, checkpoint_seconds=0)
+
+    def kill(steps, _):
+        if steps >= 384:
+            raise KilledError
+
+    whole = module.train(recipe, ROBOT, 0, tmp_path / "whole", quiet=True)
+    with pytest.raises(KilledError):
+        module.train(recipe, ROBOT, 0, tmp_path / "cut", quiet=True, on_snapshot=kill)
+    cut = module.train(recipe, ROBOT, 0, tmp_path / "cut", quiet=True, resume=True)
+    assert cut.policy.read_bytes() == whole.policy.read_bytes()
+    results = [json.loads((tmp_path / n / "result.json").read_text()) for n in ("whole", "cut")]
+    one, other = ([(s["name"], s["score_m"]) for s in r["stages"]] for r in results)
+    assert one == other
+    assert len(one) == 4

@@ -13,12 +13,13 @@ import pytest
 from hopping_leg.cli import main
 from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.figure_style import to_svg
-from hopping_leg.rl import policy_evaluation, tuning
+from hopping_leg.rl import tuning
 from hopping_leg.rl.recipes import RECIPES, SPACES
 from hopping_leg.rl.search_space import Tuning, defaults
 from hopping_leg.rl.tuning import open_study, tune
 from hopping_leg.rl.tuning_figures import FIGURES
 from tests.clusters import local
+from tests.rl.learners import try_briefly
 
 
 @pytest.fixture
@@ -148,7 +149,7 @@ def test_figures_are_drawn_from_the_numbers_alone(small, trained):
 
 @pytest.mark.slow
 def test_command_line_trains_and_leaves_everything(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(policy_evaluation, "_SECONDS", 0.5)
+    try_briefly(monkeypatch)
     out, study = tmp_path / "out", tmp_path / "deep" / "study.db"
     words = ["tune", "fast", "--trials", "2", "--steps", "256", "--snapshots", "2"]
     words += ["--set", "num_envs=2", "--study", str(study), "--out", str(out)]
@@ -172,7 +173,7 @@ SHARED = """
 from hopping_leg.cli import main
 from hopping_leg.rl import policy_evaluation
 
-policy_evaluation._SECONDS = 0.5
+policy_evaluation.evaluate_policy.__kwdefaults__["seconds"] = 0.5
 if __name__ == "__main__":
     raise SystemExit(main({words!r}))
 """
@@ -198,7 +199,7 @@ def test_a_ray_cluster_works_on_a_study(tmp_path, monkeypatch):
     def judge_briefly():
         from hopping_leg.rl import policy_evaluation
 
-        policy_evaluation._SECONDS = 0.5
+        policy_evaluation.evaluate_policy.__kwdefaults__["seconds"] = 0.5
 
     monkeypatch.chdir(tmp_path)
     words = [*BRIEF, "--study", "study.db", "--out", "out", "--ray", "local"]

@@ -169,7 +169,7 @@ def worst_difference(robots, ticks, timestep=5e-4, *, fixed_base=False, seed=0):
 def randomised(name, count, seed=0, **reality):
     ranges = IDENTIFIABLE_RANGES + tuple(r for r in WIDE_RANGES if "reality" not in r.path)
     base = with_reality(load_robot(name), **reality) if reality else load_robot(name)
-    robots = sample(base, ranges + FURTHER, count, np.random.default_rng(seed), 0.5)
+    robots = sample(base, ranges + FURTHER, count, np.random.default_rng(seed))
     return [with_strong_motors(with_joints(robot, torque_gain=1.0)) for robot in robots]
 
 

@@ -101,7 +101,7 @@ def test_legs_may_surprise_around_whatever_is_believed(tmp_path):
 
 def test_a_study_can_change_the_recipe_but_for_its_steps(tmp_path):
     one = study(
-        tmp_path, ["cad"], recipe="adaptive", changes=("task.fall_penalty=0.7", "steps=3"), steps=5
+        tmp_path, ["cad"], recipe="paper", changes=("task.fall_penalty=0.7", "steps=3"), steps=5
     )
     recipe = TrainPolicy(one, one.twins[0], one.methods[0], 0).recipe()
     assert recipe.task.fall_penalty == 0.7

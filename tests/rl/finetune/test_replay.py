@@ -45,11 +45,11 @@ def truth(run):
 
 def environment(run):
     """Return observations and rewards of the environment on the same actions."""
-    card = POLICY.card
+    card, network = POLICY.card, read_network(POLICY.content)
+    middle, half = network.offset[-1], 1 / network.gain[-1]
     options = TaskConfig(
         observation=card.layout, action_torque=card.torque_scale, commands=(COMMAND,),
-        command_range=(card.command_low, card.command_high), disturbance=NO_NOISE,
-        episode=60.0,
+        command_range=(middle - half, middle + half), disturbance=NO_NOISE, episode=60.0,
     )  # fmt: skip
     _, reward = writer()
     task = HoppingTask(ROBOT, 1, options, reward, np.random.default_rng(0), 1, autoreset=False)

@@ -5,14 +5,14 @@ import dataclasses
 import numpy as np
 
 from hopping_leg.controllers.hardware_trial import HardwareTrial, measured_table
-from hopping_leg.controllers.registry import load_policy
+from hopping_leg.controllers.registry import load_policy, robot_of
 from hopping_leg.rl.finetune.apex_estimate import ApexEstimator, ContactConfig, ContactEstimator
 from hopping_leg.rl.finetune.config import FinetuneConfig, StoppingRules
 from hopping_leg.rl.finetune.learner import SacConfig
 from hopping_leg.robot import GRAVITY, kinematics, load_robot
 from hopping_leg.trace import Trace
 
-ROBOT = load_robot("legv2-paper")
+ROBOT = load_robot(robot_of(["fast"]))
 POLICY = load_policy("fast")
 PERIOD = 0.005
 CONTACT = ContactConfig(num_envs=4, seconds=3.0, steps=20, batch_size=64, hidden=(8,))

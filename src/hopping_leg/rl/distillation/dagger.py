@@ -71,7 +71,7 @@ class DaggerConfig:
     mixing_share: float = 0.15
     """Share of the training over which the teacher acts ever less in the student's stead."""
     headroom: float = 0.01
-    """By how much training goes beyond the highest command, m: calibrated commands may lie there."""
+    """How far training goes beyond the highest command, m: calibrated commands may lie there."""
     teacher: HopShape = field(default_factory=HopShape)
     """What the hops of the shooting controller, the teacher, are like."""
 

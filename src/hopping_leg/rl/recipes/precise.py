@@ -5,8 +5,6 @@ push, so that nothing has to be found by trial and error. Longer, wider and on m
 ``fast``.
 """
 
-from dataclasses import replace
-
 from hopping_leg.rl import recipe
 from hopping_leg.rl.distillation.dagger import DaggerConfig
 from hopping_leg.rl.distillation.students import StudentConfig
@@ -15,7 +13,7 @@ from hopping_leg.rl.search_space import LAYERS, OneOf, Real, SearchSpace
 
 PRECISE = recipe.Recipe(
     name="precise",
-    task=replace(FAST.task, observation="dated-long"),
+    task=FAST.task,
     algorithm=DaggerConfig(),
     network=StudentConfig(),
     schedule=recipe.Schedule(num_envs=256, steps=7_000_000, log_every=16),

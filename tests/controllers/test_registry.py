@@ -1,0 +1,53 @@
+"""Without a robot's name, a controller hops on the one that it was trained on."""
+
+import dataclasses
+
+import onnx
+import pytest
+from onnx import helper
+
+from hopping_leg.controllers.policy import METADATA_KEY
+from hopping_leg.controllers.registry import load_policy, robot_of, shipped_policies
+from hopping_leg.robot import DEFAULT_ROBOT, load_robot, shipped_robots
+
+OTHER = next(name for name in shipped_robots() if name.startswith("leg") and name != DEFAULT_ROBOT)
+
+
+@pytest.fixture
+def made_on(tmp_path):
+    """Return a function that writes a policy file of a robot."""
+    policy = load_policy("paper")
+    model = onnx.load_from_string(policy.content)
+
+    def write(robot):
+        path = tmp_path / f"{robot}.onnx"
+        card = dataclasses.replace(policy.card, robot=robot)
+        helper.set_model_props(model, {METADATA_KEY: card.to_json()})
+        path.write_bytes(model.SerializeToString())
+        return str(path)
+
+    return write
+
+
+@pytest.mark.parametrize("name", shipped_policies())
+def test_a_shipped_policy_fits_the_shipped_robot_that_it_was_trained_on(name):
+    robot = robot_of([name])
+    assert robot in shipped_robots()
+    load_policy(name).check_robot(load_robot(robot), load_policy(name).card.rate, other="refuse")
+
+
+def test_the_first_policy_decides(made_on):
+    first, second = made_on(OTHER), made_on(DEFAULT_ROBOT)
+    assert robot_of([first]) == robot_of(["energy-shaping", first, second]) == OTHER
+    assert robot_of([second, first]) == DEFAULT_ROBOT
+
+
+@pytest.mark.parametrize(
+    "controllers", [[], ["energy-shaping"], ["shooting"], ["nobody"], ["missing.onnx", "my.toml"]]
+)
+def test_who_was_not_trained_hops_on_the_default_robot(controllers):
+    assert robot_of(controllers) == DEFAULT_ROBOT
+
+
+def test_a_robot_that_is_not_shipped_gives_the_default_one(made_on):
+    assert robot_of([made_on("my-leg")]) == DEFAULT_ROBOT
