@@ -2,7 +2,8 @@
 
 A page may hold ``{{ table(...) }}``, ``{{ value(...) }}``, ``{{ robot(...) }}``,
 ``{{ usage(...) }}`` and the like; a missing file or entry stops the build, so no page can show a
-number that no longer exists. ``results/STUDY/FILE`` on the site is ``studies/STUDY/results/FILE``
+number that no longer exists. Where a study has stored nothing yet, ``{{ tables(...) }}`` and
+``{{ training(...) }}`` say so. ``results/STUDY/FILE`` on the site is ``studies/STUDY/results/FILE``
 or a figure of the study. mkdocs puts this folder on the path while it loads this hook.
 """
 
@@ -40,16 +41,10 @@ def example(file: str) -> str:
     return (ROOT / "examples" / file).read_text(encoding="utf-8").rstrip()
 
 
-def page(file: str, title: str) -> str:
-    """Return a link to a page of this site, or its bare title where there is none."""
-    return f"[{title}]({file})" if (Path(__file__).parent / file).is_file() else title
-
-
 MACROS = {
     **macros_results.MACROS,
     **macros_package.MACROS,
     "example": example,
-    "page": page,
     "usage": usage,
     "verbs": list(cli.VERBS),
 }

@@ -8,7 +8,7 @@ import math
 import textwrap
 from typing import Any
 
-from macros_results import grid, number
+from macros_results import grid, not_stored, number, read, stored, table
 from studies.fault_campaign.families import FAMILIES
 
 from hopping_leg.cli.robots import derived
@@ -40,8 +40,17 @@ def trace_columns() -> str:
     return grid(["column", "unit", "meaning"], rows)
 
 
-def hyperparameters(recipe: str, base: str | None = None) -> str:
-    """Return the options of a recipe, or those that differ from another's, as a table."""
+def hyperparameters(
+    recipe: str, base: str | None = None, *, part: str = "", without: str = " "
+) -> str:
+    """Return the options of a recipe as a table.
+
+    Args:
+        recipe: Its name.
+        base: Leave out what this recipe has alike.
+        part: Show only options whose names begin so.
+        without: Show no options whose names begin so.
+    """
     from hopping_leg.rl.recipes import get_recipe
 
     shown, usual = get_recipe(recipe), get_recipe(base) if base else None
@@ -49,6 +58,8 @@ def hyperparameters(recipe: str, base: str | None = None) -> str:
     rows = []
     for name, path in shown.paths():
         found, owner = shown.value(name), shown
+        if not name.startswith(part) or name.startswith(without):
+            continue
         if name in theirs and usual is not None and usual.value(name) == found:
             continue
         for part in path.split(".")[:-1]:
@@ -75,6 +86,18 @@ def _meaning(kind: type, name: str) -> str:
     return ""
 
 
+def stages(recipe: str) -> str:
+    """Return the stages of a distillation and what each has to reach as a table."""
+    from hopping_leg.rl.recipes import get_recipe
+    from hopping_leg.rl.stages import stages_of
+
+    rows = [
+        [one.name, f"{100 * one.until:g} %", one.score, f"{1000 * one.must_score:g}"]
+        for one in stages_of(get_recipe(recipe))
+    ]
+    return grid(["stage", "until", "score", "at most, mm"], rows)
+
+
 def search_space(recipe: str) -> str:
     """Return what `hop tune` searches of a recipe as a table."""
     from hopping_leg.rl.recipes import SPACES, get_recipe
@@ -89,6 +112,26 @@ def search_space(recipe: str) -> str:
             where = "{low:g} to {high:g}".format(**values) + (", log" if values["log"] else "")
         rows.append([f"`{name}`", where, str(found.stored(shipped.value(name)))])
     return grid(["number", "searched", "recipe"], rows)
+
+
+def searched(file: str, figures: dict[str, str]) -> str:
+    """Return the trials and figures of a search, if its space is still that of the recipe.
+
+    Args:
+        file: Name of the result.
+        figures: File of a figure to its title.
+    """
+    from hopping_leg.rl.recipes import SPACES
+
+    study = file.split("/")[0]
+    content = read(file) if stored(file) else {"space": {}}
+    if set(content["space"]) != set(SPACES.get(content.get("recipe"), {"": None})):
+        return not_stored(study)
+    names = [f"params.{name}={name}" for name in content["space"]]
+    rows = table(file, "trials", "number=trial", "score_m*1000=score, mm", *names, state="complete")
+    return rows + "".join(
+        f"\n![{title}](results/{study}/{name})\n" for name, title in figures.items()
+    )
 
 
 def twin_ranges() -> str:
@@ -145,6 +188,8 @@ MACROS = {
     "robot": robot,
     "robustness_axes": robustness_axes,
     "search_space": search_space,
+    "searched": searched,
+    "stages": stages,
     "trace_columns": trace_columns,
     "twin_ranges": twin_ranges,
 }

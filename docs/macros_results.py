@@ -3,7 +3,9 @@
 A result is named ``STUDY/FILE``, e.g. ``speed/env.json``.
 """
 
+import contextlib
 import dataclasses
+import importlib
 import json
 from dataclasses import astuple
 from pathlib import Path
@@ -123,32 +125,90 @@ def _rows(file: str, path: str, where: dict[str, Any]) -> list[dict[str, Any]]:
     return rows
 
 
-def curve(file: str, path: str, key: str, axis: str, by: str, factor: float = 1000.0) -> str:
-    """Return a learning curve as an inline figure: a key over minutes, a line for each group.
+def stored(file: str, path: str = "", **where: Any) -> bool:  # noqa: ANN401
+    """Return whether a result is there and holds something at a path, with these entries."""
+    study, name = file.split("/")
+    if not (STUDIES / study / "results" / name).is_file():
+        return False
+    try:
+        found = pick(read(file), path)
+        return any(all(r[k] == v for k, v in where.items()) for r in found) if where else bool(found)
+    except (LookupError, TypeError):
+        return False
+
+
+def tables(study: str) -> str:
+    """Return the tables of a study's README, of the results that are stored in today's form."""
+    parts = []
+    for macro, file, *words in importlib.import_module(f"studies.{study}").TABLES:
+        where = words.pop() if isinstance(words[-1], dict) else {}
+        if stored(f"{study}/{file}"):
+            with contextlib.suppress(LookupError, TypeError):
+                parts.append(MACROS[macro](f"{study}/{file}", *words, **where))
+    return "\n".join(parts) or not_stored(study)
+
+
+def limits(study: str) -> str:
+    """Return the section Limits of a study's README."""
+    text = (STUDIES / study / "README.md").read_text(encoding="utf-8")
+    return text.partition("\n## Limits\n")[2].partition("\n## ")[0].strip()
+
+
+def not_stored(study: str) -> str:
+    """Return what stands in place of results that are not there."""
+    return f"No results are stored here; `python -m studies.{study} --results` measures them.\n"
+
+
+def training(recipe: str) -> str:
+    """Return accuracy over the time of a recipe's trainings: a table and a learning curve."""
+    file = "time_to_accuracy/time_to_accuracy.json"
+    if not stored(file, "summary", recipe=recipe):
+        return not_stored("time_to_accuracy")
+    titles = (
+        "seconds=after, s",
+        "runs=trainings",
+        "mean_error_m*1000=error, mm",
+        "worst_seed_mean_error_m*1000=error of the worst training, mm",
+        "mean_std_m*1000=std, mm",
+        "skipped_hops=skipped hops",
+    )
+    rows = _rows(file, "summary", {"recipe": recipe})
+    columns = [Column.parse(title) for title in titles]
+    cells = [[column.cell(row) for column in columns] for row in rows]
+    shown = cells if len(cells) <= _MOST_POINTS else cells[-1:]
+    lines = curve(file, "rows", "mean_abs_median_error_m", "mean |error|, mm", recipe=recipe)
+    return f"{grid([column.title for column in columns], shown)}\n\n{lines}{origin(file)}"
+
+
+_MOST_POINTS = 4
+"""Points in time that a table of a training shows; of more, the last."""
+
+
+def curve(file: str, path: str, key: str, axis: str, **where: Any) -> str:  # noqa: ANN401
+    """Return a learning curve as an inline figure: a length over time, a line for each seed.
 
     Args:
         file: Name of the result.
         path: Dotted path of the records, in order of time.
-        key: What is drawn, times ``factor``, on a logarithmic axis.
+        key: What is drawn, in m, on a logarithmic axis in mm.
         axis: Label of that axis.
-        by: Key that tells the lines apart.
-        factor: Turns m into mm.
+        where: Draw only records with these entries.
     """
     figure, ((axes,),) = figure_style.panels(1, height=3.0)
-    records = _rows(file, path, {})
-    for index, group in enumerate(dict.fromkeys(r[by] for r in records)):
-        mine = [r for r in records if r[by] == group and r[key] is not None]
-        line = [abs(r[key]) * factor for r in mine]
+    records = _rows(file, path, where)
+    for index, seed in enumerate(dict.fromkeys(r["seed"] for r in records)):
+        mine = [r for r in records if r["seed"] == seed]
         axes.plot(
-            [r["minutes"] for r in mine],
-            line,
+            [r["seconds"] / 60 for r in mine],
+            [1000 * r[key] for r in mine],
+            ".-",
             color=figure_style.colour(index),
-            label=f"{by} {group}",
+            label=f"seed {seed}",
         )
     axes.set(yscale="log", xlabel="wall-clock time, min", ylabel=axis)
     axes.legend()
     svg = figure_style.to_svg(figure).decode()
-    return svg[svg.index("<svg") :].replace("\n", "") + "\n" + origin(file)
+    return svg[svg.index("<svg") :].replace("\n", "") + "\n"
 
 
 def entries(file: str) -> str:
@@ -334,6 +394,7 @@ MACROS = {
     "commands": commands(),
     "curve": curve,
     "entries": entries,
+    "limits": limits,
     "one": one,
     "percentiles": percentiles,
     "pictures": pictures,
@@ -341,6 +402,9 @@ MACROS = {
     "precision": precision,
     "recoveries": recoveries,
     "separation": separation,
+    "stored": stored,
     "table": table,
+    "tables": tables,
+    "training": training,
     "value": value,
 }
