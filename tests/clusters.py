@@ -4,13 +4,16 @@ import contextlib
 import tempfile
 from pathlib import Path
 
+import pytest
+
+NONE = "Ray is not installed (extra 'cluster')"
 _LOCK = Path(tempfile.gettempdir()) / "hopping-leg-tests-ray.lock"
 
 
 @contextlib.contextmanager
 def local(**options):
     """Join a Ray of two CPUs on this machine for a while."""
-    import ray
+    ray = pytest.importorskip("ray", reason=NONE)
     from filelock import FileLock
 
     with FileLock(_LOCK):
@@ -25,7 +28,7 @@ def local(**options):
 @contextlib.contextmanager
 def two_machines():
     """Run what is to Ray two machines of one CPU each; give their address."""
-    import ray
+    ray = pytest.importorskip("ray", reason=NONE)
     from filelock import FileLock
     from ray.cluster_utils import Cluster
 

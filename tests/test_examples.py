@@ -11,7 +11,6 @@ from nbclient import NotebookClient
 from tests.rl.learners import try_briefly
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
-SCRIPTS = pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda p: p.stem)
 NOTEBOOKS = pytest.mark.parametrize(
     "path", sorted((EXAMPLES / "notebooks").glob("*.ipynb")), ids=lambda p: p.stem
 )
@@ -19,8 +18,9 @@ ARGUMENTS = {"train_your_own": ["16384"], "custom_reward": ["16384"]}
 """What makes the long ones short."""
 
 
-@SCRIPTS
-def test_every_example_runs(path, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda p: p.stem)
+def test_every_example_fits_a_screen_and_runs(path, tmp_path, monkeypatch, capsys):
+    assert len(path.read_text().splitlines()) <= 60
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "agg")
     if path.stem in ARGUMENTS:
@@ -32,11 +32,6 @@ def test_every_example_runs(path, tmp_path, monkeypatch, capsys):
         monkeypatch.setattr("hopping_leg.rl.train.Trainer", None)
         runpy.run_path(str(path), run_name="__main__")
         assert "finished" in capsys.readouterr().out
-
-
-@SCRIPTS
-def test_every_example_fits_a_screen(path):
-    assert len(path.read_text().splitlines()) <= 60
 
 
 @NOTEBOOKS

@@ -2,34 +2,23 @@
 
 import ast
 import graphlib
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 import hopping_leg
+from tests.extras import TRAINING, run_without
 
 ROOT = Path(hopping_leg.__file__).parent
 ORDER = ["foundation", "robot", "sim", "controllers", "identify", "envs", "rl"]
 ORDER += ["deploy", "emulator", "evaluate", "sim_to_real", "viewer", "cli"]
 FOUNDATION = {"", "arrays", "cma_strategy", "errors", "figure_style", "hop_detection"}
 FOUNDATION |= {"html_page", "io", "progress", "trace", "workers"}
-TRAINING = {"torch", "stable_baselines3", "onnx", "tensorboard"}
 BESIDE = {("viewer", "rl"), ("emulator", "rl")}
 BESIDE |= {("deploy", room) for room in ("sim", "identify", "envs", "rl")}
 BESIDE |= {("evaluate", room) for room in ("identify", "envs", "rl", "deploy", "emulator")}
 """Later rooms that still must not use these earlier ones: neither evaluation, viewer nor robot
 needs torch, and what drives the robot knows nothing of a simulation."""
-
-BLOCK = """
-import sys
-class Block:
-    def find_spec(self, name, *_):
-        if name.split(".")[0] in {0!r}:
-            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
-sys.meta_path.insert(0, Block())
-"""
 
 MODULES = sorted(ROOT.rglob("*.py"))
 
@@ -86,27 +75,9 @@ def test_no_files_import_each_other_in_a_circle():
     graphlib.TopologicalSorter(graph).prepare()
 
 
-def run_without_training_extra(code):
-    """Run code in a fresh interpreter in which nothing of the training extra can be imported."""
-    return subprocess.run(
-        [sys.executable, "-c", BLOCK.format(sorted(TRAINING)) + code],
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
-
-
 def test_everything_but_learning_imports_without_the_training_extra():
     names = [dotted(path) for path in MODULES]
     names = [n for n in names if not n.endswith(".__main__") and room(n) != "rl"]
     code = f"import importlib\nfor name in {names}: importlib.import_module(name)"
-    result = run_without_training_extra(code)
+    result = run_without(TRAINING, code)
     assert result.returncode == 0, result.stderr
-
-
-def test_training_without_the_extra_gets_a_sentence():
-    code = "from hopping_leg.cli import main; raise SystemExit(main(['train']))"
-    result = run_without_training_extra(code)
-    assert result.returncode == 2
-    assert "hopping-leg[train]" in result.stderr
-    assert "Traceback" not in result.stderr

@@ -24,21 +24,18 @@ VALUES = st.recursive(
 )  # fmt: skip
 
 
-def test_json_has_null_where_there_is_no_number(tmp_path):
+def test_json_has_null_where_there_is_no_number_and_a_folder_is_no_file(tmp_path):
     file = tmp_path / "deep" / "x.json"
     io.write_json(file, {"a": [math.nan, 1.5, (math.inf,)], "b": None})
     assert json.loads(file.read_text()) == {"a": [None, 1.5, [None]], "b": None}
+    with pytest.raises(TraceError):
+        io.write_json(tmp_path, {})
 
 
 @given(VALUES)
 def test_what_json_knows_comes_back(value):
     assert io.plain(value) == value
     assert json.loads(io.json_text(value)) == value
-
-
-def test_a_folder_is_no_file(tmp_path):
-    with pytest.raises(TraceError):
-        io.write_json(tmp_path, {})
 
 
 @dataclass(frozen=True)

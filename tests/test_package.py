@@ -38,8 +38,10 @@ def test_the_source_archive_holds_what_is_installed_and_what_is_to_be_read(archi
         if path.is_file() and "__pycache__" not in path.parts
     }
     assert {Path(name).suffix for name in inside} >= {".py", ".toml", ".xml", ".onnx", ".j2"}
+    assert "src/hopping_leg/py.typed" in inside
     inside.add("src/hopping_leg.pth")
-    read = {"README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md", "constraints.txt", "Makefile"}
+    read = {"README.md", "CITATION.cff", "CHANGELOG.md", "constraints.txt", "Makefile"}
+    read |= set(PROJECT["license-files"])
     read |= {str(path.relative_to(ROOT)) for path in (ROOT / "studies").rglob("*.py")}
     examples = {f"examples/{path.name}" for path in (ROOT / "examples").glob("*.*")}
     assert not (inside | read | examples) - set(archive)
@@ -50,17 +52,6 @@ def test_the_source_archive_holds_nothing_large_and_no_run(archive):
     assert not {name: size for name, size in archive.items() if size > LARGEST}
     top = {name.partition("/")[0] for name in archive}
     assert not top & {"runs", "build", "site", ".venv", "MUJOCO_LOG.TXT"}
-
-
-def test_studies_are_not_installed():
-    wheel = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["hatch"]["build"]
-    assert wheel["targets"]["wheel"]["packages"] == ["src/hopping_leg"]
-
-
-def test_types_and_licence_are_handed_out():
-    assert (Path(hopping_leg.__file__).parent / "py.typed").is_file()
-    assert PROJECT["license"] == "BSD-3-Clause"
-    assert all((ROOT / name).is_file() for name in PROJECT["license-files"])
 
 
 def test_doctor_knows_every_extra():

@@ -14,7 +14,7 @@ import pytest
 
 from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.workers import ProcessWorkers, RayWorkers, map_rows
-from tests.clusters import local, two_machines
+from tests.clusters import NONE, local, two_machines
 
 
 def double(number):
@@ -101,31 +101,23 @@ def wait_for(happened):
 
 
 @pytest.mark.slow
-def test_a_cluster_gives_results_in_order_and_errors_as_they_were_raised():
-    pytest.importorskip("ray", reason="Ray is not installed (extra 'cluster')")
+def test_a_cluster_does_the_same_and_a_worker_that_dies_begins_again(tmp_path):
     with local():
         cluster = RayWorkers("local")
         check_contract(cluster)
         assert cluster.elsewhere == []
-
-
-@pytest.mark.slow
-def test_a_worker_that_dies_begins_again(tmp_path):
-    pytest.importorskip("ray", reason="Ray is not installed (extra 'cluster')")
-    with local():
         assert RayWorkers().map(die_once, [(tmp_path / "mark",)]) == ["lived"]
 
 
 @pytest.mark.slow
 def test_an_address_is_joined():
-    pytest.importorskip("ray", reason="Ray is not installed (extra 'cluster')")
     with two_machines() as address:
         assert RayWorkers(address).count == 2
 
 
 @pytest.mark.parametrize("address", ["127.0.0.1:1", "ray://127.0.0.1:1"])
 def test_where_no_cluster_answers_there_is_a_sentence_at_once(address):
-    ray = pytest.importorskip("ray", reason="Ray is not installed (extra 'cluster')")
+    ray = pytest.importorskip("ray", reason=NONE)
     ray.shutdown()
     with pytest.raises(UsageError, match=rf"no Ray cluster at {address}: .*; start one"):
         RayWorkers(address)

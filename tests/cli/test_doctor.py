@@ -1,10 +1,8 @@
-import subprocess
-import sys
-
 import pytest
 
 from hopping_leg.cli import main
 from hopping_leg.cli.doctor import PURPOSES, missing_requirements
+from tests.extras import TRAINING, run_without
 
 
 def test_what_is_missing_or_too_old_is_named_unless_for_another_platform():
@@ -41,20 +39,10 @@ def test_drives_cannot_be_changed_without_a_transport(refused):
 
 
 OPTIONAL = [
-    *("torch", "stable_baselines3", "onnx", "tensorboard", "optuna", "sqlalchemy", "ray"),
+    *(*TRAINING, "optuna", "sqlalchemy", "ray"),
     *("moteus", "can", "serial", "msgpack", "pybullet", "viser", "playwright"),
 ]
 HARDWARE = "pip install 'hopping-leg[hardware]'"
-WITHOUT_EXTRAS = """
-import sys
-class Block:
-    def find_spec(self, name, *_):
-        if name.split(".")[0] in {0!r}:
-            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
-sys.meta_path.insert(0, Block())
-from hopping_leg.cli import main
-raise SystemExit(main({1!r}))
-"""
 
 
 @pytest.mark.parametrize(
@@ -63,6 +51,7 @@ raise SystemExit(main({1!r}))
         (["doctor"], 0, "hardware: "),
         (["--tyro-print-completion", "bash"], 0, "emulate"),
         (["emulate", "--kinds"], 0, "late_reply"),
+        (["train"], 2, "pip install 'hopping-leg[train]'"),
         (["emulate"], 2, HARDWARE),
         (["doctor", "--transport", "/dev/null"], 2, HARDWARE),
         (["deploy", "energy-shaping", "--transport", "/dev/null"], 2, HARDWARE),
@@ -70,8 +59,8 @@ raise SystemExit(main({1!r}))
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
 def test_the_core_says_what_there_is_and_which_extra_a_verb_needs(words, exit_code, said):
-    code = WITHOUT_EXTRAS.format(OPTIONAL, words)
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    code = f"from hopping_leg.cli import main\nraise SystemExit(main({words!r}))"
+    done = run_without(OPTIONAL, code)
     assert done.returncode == exit_code, done.stderr
     assert said in (done.stderr if exit_code else done.stdout)
     assert "Traceback" not in done.stderr

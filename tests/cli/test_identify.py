@@ -158,7 +158,7 @@ def test_bad_input_is_one_sentence_and_overwrites_nothing(words, sentence, tmp_p
     given = [tmp_path / w if w.endswith(files) else w for w in words]
     out = [] if "--out" in words else ["--out", tmp_path / "leg.toml"]
     refused(["identify", *given, *out, "--folder", tmp_path / "run"], sentence)
-    assert {p.name: p.read_bytes() for p in tmp_path.iterdir() if p.is_file()} == before
+    assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before, "no new folder either"
 
 
 def test_warnings_of_recordings_are_shown(tmp_path, capsys):

@@ -91,7 +91,7 @@ def test_a_multisine_starts_and_ends_at_rest_in_its_posture():
     )
 
 
-def test_the_file_keeps_every_target(tmp_path):
+def test_the_file_keeps_every_target_and_another_file_is_none(tmp_path):
     for track in (False, True):
         first = make_excitation(LAB, ROBOT, track_velocity=track)
         first.save(tmp_path / "excitation.parquet")
@@ -102,9 +102,6 @@ def test_the_file_keeps_every_target(tmp_path):
         assert (back.rig, back.rate, back.robot) == ("fixed-base", 200.0, "legv2")
         assert back.digest == first.digest
         assert back.description == first.description
-
-
-def test_other_files_are_no_excitations(tmp_path):
     Trace(swinging()).save(tmp_path / "trace.parquet")
     with pytest.raises(TraceError, match="is no excitation"):
         load_excitation(tmp_path / "trace.parquet")

@@ -64,7 +64,7 @@ def test_a_share_judges_a_generation_and_the_whole_only_the_last_ones():
 
 
 @pytest.mark.parametrize("shares", [(), SHARES], ids=["whole", "shares"])
-def test_a_killed_cma_es_resumes_exactly(tmp_path, shares):
+def test_a_killed_cma_es_resumes_exactly_from_its_own_checkpoint_alone(tmp_path, shares):
     options, file = CmaOptions(20, population=6), tmp_path / "state.json"
     whole = cma_es(sum_of_shares, TWO, options, seed=1, shares=shares)
     broken = [killed(share, 2) for share in shares]
@@ -82,10 +82,6 @@ def test_a_killed_cma_es_resumes_exactly(tmp_path, shares):
     np.testing.assert_array_equal(resumed.vector, whole.vector)
     with pytest.raises(UsageError, match="belongs to a search with other"):
         cma_es(sum_of_shares, TWO, options, seed=2, checkpoint=file)
-
-
-def test_a_foreign_checkpoint_is_refused(tmp_path):
-    file = tmp_path / "state.json"
     file.write_text("[]")
     with pytest.raises(UsageError, match="no checkpoint"):
         least_squares(bowl, TWO, checkpoint=file)

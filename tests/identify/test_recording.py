@@ -1,4 +1,3 @@
-import contextlib
 import dataclasses
 import gzip
 import hashlib
@@ -18,6 +17,10 @@ from hopping_leg.identify.recording import load_recording, make_recording
 from hopping_leg.identify.recording_format import COLUMNS, PAIRS
 from hopping_leg.robot import load_robot
 from tests.identify.runs import METADATA, RECORDINGS, SIDECAR, needs_recordings, swinging, write_run
+
+POSITIONS = ["hip_position_rad", "knee_position_rad"]
+VELOCITIES = ["hip_velocity_rad_s", "knee_velocity_rad_s"]
+COMMANDS = ["hip_position_command_rad", "knee_position_command_rad"]
 
 
 def test_a_clean_run_is_read_without_a_word(tmp_path):
@@ -136,80 +139,61 @@ FIELDS = st.one_of(
     st.sampled_from(["", "nan", "inf", "-0", "1e400", "5e-324", "true", "STAGING", '"', " 3 "]),
     st.text(string.printable, max_size=6),
 )
-
-
-def read(path):
-    """Check what a person would read: the refusal, or the warnings."""
-    try:
-        sentences = load_recording(path).warnings
-    except HoppingLegError as error:
-        sentences = [str(error)]
-    for sentence in sentences:
-        assert sentence.startswith(str(path.parent))
-        assert sentence.endswith((".", "?"))
+NUMBERS = st.floats(-3, 3) | st.sampled_from([float("inf"), float("nan"), 5e-324, 0.0])
 
 
 @st.composite
 def tables(draw):
+    """Draw a table of known columns with anything in them."""
     importer = draw(st.sampled_from([*IMPORTERS.values(), None]))
     names = draw(st.lists(st.sampled_from(KNOWN), max_size=6, unique=True))
     names = [*(importer.columns if importer else ()), *names]
     names = draw(st.permutations(sorted(set(names)))) or ["t"]
-    rows = draw(st.integers(0, 4))
-    lines = [[draw(FIELDS) for _ in names] for _ in range(rows)]
-    repeat = draw(st.sampled_from([1, 1, 12]))
-    return "\n".join(",".join(line) for line in [names, *lines * repeat])
+    lines = [[draw(FIELDS) for _ in names] for _ in range(draw(st.integers(0, 4)))]
+    return [names, *lines * draw(st.sampled_from([1, 1, 12]))]
 
 
-@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(content=st.one_of(st.binary(max_size=60), tables().map(str.encode)), sidecar=st.booleans())
-def test_random_tables(tmp_path, content, sidecar):
-    path, beside = tmp_path / "run.csv", tmp_path / "run.toml"
-    path.write_bytes(content)
-    with contextlib.suppress(FileNotFoundError):
-        beside.unlink()
-    if sidecar:
-        beside.write_text(SIDECAR)
-    read(path)
+@st.composite
+def runs(draw):
+    """Draw a table of numbers in the order of time."""
+    columns = sorted(set(COLUMNS) - {"time_s", "row"})
+    columns = draw(st.lists(st.sampled_from(columns), max_size=8, unique=True))
+    values = draw(st.lists(NUMBERS, min_size=5, max_size=5))
+    rows = range(draw(st.integers(25, 40)))
+    cells = [[values[(row * 7 + i) % 5] for i in range(len(columns))] for row in rows]
+    return [["time_s", *columns], *(list(map(repr, [row / 200, *cells[row]])) for row in rows)]
 
 
-@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(
-    data=st.data(),
-    rows=st.integers(25, 40),
-    columns=st.lists(st.sampled_from(sorted(COLUMNS)), min_size=1, max_size=8, unique=True),
-)
-def test_random_numbers_in_time_order(tmp_path, data, rows, columns):
-    columns = [c for c in columns if c not in ("time_s", "row")]
-    number = st.floats(-3, 3) | st.sampled_from([float("inf"), float("nan"), 5e-324, 0.0])
-    lines = ["time_s," + ",".join(columns)]
-    values = data.draw(st.lists(number, min_size=5, max_size=5))
-    for row in range(rows):
-        fields = [repr(values[(row * 7 + i) % 5]) for i in range(len(columns))]
-        lines.append(f"{row / 200}," + ",".join(fields))
-    path = tmp_path / "run.csv"
-    path.write_text("\n".join(lines).replace(",\n", "\n").rstrip(","))
-    path.with_suffix(".toml").write_text(SIDECAR)
-    read(path)
-
-
-@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(sidecar=st.text(max_size=40) | st.sampled_from(["columns = {}", "rig = 3", "[rig]"]))
-def test_random_sidecars(tmp_path, sidecar):
-    path = tmp_path / "run.csv"
-    path.write_text("time_s,hip_position_rad\n0,1\n")
-    path.with_suffix(".toml").write_text(sidecar, encoding="utf-8")
-    read(path)
-
-
-@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(cut=st.integers(0, 400), at=st.integers(0, 400), byte=st.integers(0, 255))
-def test_damaged_gzip(tmp_path, cut, at, byte):
+@st.composite
+def damaged(draw):
+    """Draw a packed table with a wrong byte that ends early."""
     whole = bytearray(gzip.compress(b"t,pos\n" + b"1.0,2.0\n" * 200, mtime=0))
-    whole[at % len(whole)] = byte
-    path = tmp_path / "run.csv.gz"
-    path.write_bytes(bytes(whole[: len(whole) - cut % len(whole)]))
-    read(path)
+    whole[draw(st.integers(0, len(whole) - 1))] = draw(st.integers(0, 255))
+    return bytes(whole[: draw(st.integers(1, len(whole)))])
+
+
+CSV = (tables() | runs()).map(lambda lines: "\n".join(map(",".join, lines)).encode())
+SIDECARS = st.sampled_from([None, SIDECAR, "columns = {}", "rig = 3", "[rig]"])
+
+
+@settings(max_examples=230, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    file=st.tuples(st.just("run.csv"), CSV | st.binary(max_size=60))
+    | st.tuples(st.just("run.csv.gz"), damaged()),
+    sidecar=SIDECARS | st.text(max_size=40),
+)
+def test_whatever_stands_in_a_file_is_read_or_refused_in_a_sentence(tmp_path, file, sidecar):
+    (tmp_path / file[0]).write_bytes(file[1])
+    (tmp_path / "run.toml").unlink(missing_ok=True)
+    if sidecar is not None:
+        (tmp_path / "run.toml").write_text(sidecar, encoding="utf-8")
+    try:
+        sentences = load_recording(tmp_path / file[0]).warnings
+    except HoppingLegError as error:
+        sentences = [str(error)]
+    for sentence in sentences:
+        assert sentence.startswith(str(tmp_path))
+        assert sentence.endswith((".", "?"))
 
 
 FILES = sorted(RECORDINGS.glob("*/*.csv.gz"))
@@ -329,28 +313,24 @@ def test_a_command_of_zeros_is_kept():
     assert load(recording.trace.table, onboard="zoh").warnings == ()
 
 
-def test_first_rows_of_sleeping_sensors_are_left_out():
+@pytest.mark.parametrize(
+    ("change", "metadata", "said", "left"),
+    [
+        ({"hip_position_rad": (slice(0, 4), 0.0)}, {}, "rows 0 to 3", 596),  # a sleeping sensor
+        ({"hip_command_nm": (1, 15.0)}, {}, "rows 0 to 3", 596),  # a command that did nothing
+        ({"hip_command_nm": (1, 15.0), "hip_torque_nm": (2, 14.0)}, {}, None, 600),
+        ({}, {"startup_rows": 3}, "rows 0 to 2", 597),
+    ],
+)
+def test_startup_rows_are_left_out_once(change, metadata, said, left):
     table = swinging()
-    for column in ("hip_position_rad", "knee_position_rad"):
-        table = set_rows(table, column, slice(0, 4), 0.0)
-    recording = load(table)
-    assert "rows 0 to 3 are start-up rows" in one_warning(recording)
-    assert len(recording) == 596
-
-
-def test_first_commands_that_were_not_applied_are_left_out():
-    table = set_rows(swinging(), "hip_command_nm", 1, 15.0)
-    recording = load(table)
-    assert "rows 0 to 3 are start-up rows" in one_warning(recording)
-    assert "hip_command_nm" in one_warning(recording)
-    applied = set_rows(table, "hip_torque_nm", 2, 14.0)
-    assert load(applied).warnings == ()
-
-
-def test_stated_startup_rows_are_left_out_once():
-    recording = load(swinging(), startup_rows=3)
-    assert "rows 0 to 2 are start-up rows" in one_warning(recording)
-    assert recording.time[0] == pytest.approx(0.015)
+    for column, (rows, value) in change.items():
+        for name in POSITIONS if column in POSITIONS else [column]:
+            table = set_rows(table, name, rows, value)
+    recording = load(table, **metadata)
+    assert len(recording) == left
+    assert recording.time[0] == pytest.approx((600 - left) / 200)
+    assert recording.warnings == () if said is None else said in one_warning(recording)
 
 
 def test_jitter_and_sparse_values_are_normal():
@@ -384,9 +364,6 @@ def test_what_cannot_be_used_is_refused(table, sentence):
         load(table)
 
 
-POSITIONS = ["hip_position_rad", "knee_position_rad"]
-VELOCITIES = ["hip_velocity_rad_s", "knee_velocity_rad_s"]
-COMMANDS = ["hip_position_command_rad", "knee_position_command_rad"]
 DEGREES = 180 / np.pi
 
 
@@ -420,28 +397,11 @@ def test_a_velocity_that_is_no_derivative_is_left_out(factor):
     assert np.isfinite(recording.array("velocity")[:, 0]).all()
 
 
-def stalled():
-    time = swinging()["time_s"].to_numpy().copy()
-    time[200:] += 0.02
-    return swinging().with_columns(time_s=time)
-
-
-def of_another_time():
-    velocity = np.roll(swinging()["knee_velocity_rad_s"].to_numpy(), 60)
-    return swinging().with_columns(knee_velocity_rad_s=velocity)
-
-
-@pytest.mark.parametrize(
-    ("table", "sentence"),
-    [
-        (stalled(), "before row 200"),
-        (scaled(swinging(), [*POSITIONS, *VELOCITIES, *COMMANDS], 0.159), "not in revolutions"),
-        (of_another_time(), "is not the derivative"),
-        (swinging().drop(POSITIONS[1], VELOCITIES[1]), f"'{POSITIONS[1]}' was not recorded"),
-    ],
-)
-def test_what_is_strange_is_said_once(table, sentence):
-    assert sentence in one_warning(load(table))
+def test_what_was_not_recorded_or_is_in_revolutions_is_said_once():
+    missing, turned = POSITIONS[1], [*POSITIONS, *VELOCITIES, *COMMANDS]
+    alone = load(swinging().drop(missing, VELOCITIES[1]))
+    assert f"'{missing}' was not recorded" in one_warning(alone)
+    assert "not in revolutions" in one_warning(load(scaled(swinging(), turned, 0.159)))
 
 
 def test_quantised_positions_still_have_their_velocity():

@@ -194,8 +194,6 @@ def test_two_processes_share_a_study(tmp_path):
 
 @pytest.mark.slow
 def test_a_ray_cluster_works_on_a_study(tmp_path, monkeypatch):
-    pytest.importorskip("ray", reason="Ray is not installed (extra 'cluster')")
-
     def judge_briefly():
         from hopping_leg.rl import policy_evaluation
 
