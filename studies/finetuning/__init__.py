@@ -1,7 +1,7 @@
 """What does continued training on a leg bring?"""
 
 RESULTS = (
-    "python -m studies.finetuning --twins 1 2 --seeds 0 1 --minutes 5 --figure "
+    "python -m studies.finetuning --twins 0 1 2 3 --seeds 0 1 --minutes 4 --figure "
     "studies/finetuning/figures/finetuning.svg --json "
     "studies/finetuning/results/finetuning.json",
 )
@@ -12,7 +12,7 @@ TABLES = (
         "finetuning.json",
         "rows",
         "twin",
-        "method",
+        "policy",
         "policies",
         "median_abs_error_m*1000=error, mm",
         "best_m*1000=best",

@@ -1,14 +1,14 @@
-"""Continued training measured: methods on twins, several seeds, judged on seeds that chose nothing.
+"""Continued training measured: on twins, with several seeds, judged on seeds that chose nothing.
 
-The policy at the start and the one that each run chose hop on the twin once more, without
-exploration, at heights between those of the checks, too; there the true apexes count.
+The policy at the start and the one that each run chose hop on the twin once more, at heights
+between those of the trials, too; there the true apexes count.
 """
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,11 +24,18 @@ from hopping_leg.controllers.registry import load_policy
 from hopping_leg.errors import UsageError
 from hopping_leg.figure_style import WIDTH, colour, styled
 from hopping_leg.io import write_atomically, write_json
-from hopping_leg.rl.finetune.config import FinetuneConfig, Method, Task
-from hopping_leg.rl.finetune.finetuning import POLICY, RESULT, Row, finetune
+from hopping_leg.rl.finetune.finetuning import (
+    POLICY,
+    RESULT,
+    FinetuneConfig,
+    Row,
+    StoppingRules,
+    Task,
+    finetune,
+)
 from hopping_leg.rl.finetune.simulated import Guard, SimulatedTrials
 from hopping_leg.rl.finetune.trial_data import score
-from hopping_leg.robot import Robot, load_robot
+from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot
 from hopping_leg.sim.randomization import draw_twin
 
 FIRST_JUDGE = 1000
@@ -37,8 +44,8 @@ FIRST_JUDGE = 1000
 _SECONDS = 5.0
 """At each height in a judging trial."""
 
-START = "start"
-"""Stands for the method of the policy before it was continued."""
+START, CONTINUED = "start", "continued"
+"""The policy before and after."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +55,6 @@ class Study:
     policy: Policy
     believed: Robot
     twins: tuple[Robot, ...]
-    methods: tuple[Method, ...]
     seeds: tuple[int, ...]
     options: FinetuneConfig
     guard: Guard
@@ -75,39 +81,37 @@ def measure(study: Study, on_progress: Callable[[str], None]) -> dict[str, Any]:
         on_progress(f"{study.policy.name} on {twin.name}")
         judged += _judge(study, twin, study.policy, START, None)
         for seed in study.seeds:
-            for method in study.methods:
-                where = {"twin": twin.name, "method": method, "seed": seed}
-                result = _run(study, twin, method, seed, on_progress)
-                curves += [{**where, **_point(row)} for row in result["outings"]]
-                runs.append({**where, **_ending(result)})
-                path = _folder(study, twin, method, seed) / POLICY
-                judged += _judge(study, twin, Policy.load(path), method, seed)
+            where = {"twin": twin.name, "seed": seed}
+            result = _run(study, twin, seed, on_progress)
+            curves += [{**where, **_point(row)} for row in result["trials"]]
+            runs.append({**where, **_ending(result)})
+            path = _folder(study, twin, seed) / POLICY
+            judged += _judge(study, twin, Policy.load(path), CONTINUED, seed)
     return {
         "policy": study.policy.name,
         "believed": study.believed.name,
         "judge_seeds": [FIRST_JUDGE, FIRST_JUDGE + study.judges - 1],
-        "rows": [_pooled(twin.name, m, judged) for twin in study.twins
-                 for m in (START, *study.methods)],
+        "rows": [_pooled(twin.name, which, judged) for twin in study.twins
+                 for which in (START, CONTINUED)],
         "runs": runs,
         "judged": judged,
         "curves": curves,
     }  # fmt: skip
 
 
-def _folder(study: Study, twin: Robot, method: str, seed: int) -> Path:
-    return study.folder / f"{twin.name}-{method}-seed{seed}"
+def _folder(study: Study, twin: Robot, seed: int) -> Path:
+    return study.folder / f"{twin.name}-seed{seed}"
 
 
 def _run(
-    study: Study, twin: Robot, method: Method, seed: int, on_progress: Callable[[str], None]
+    study: Study, twin: Robot, seed: int, on_progress: Callable[[str], None]
 ) -> dict[str, Any]:
-    folder = _folder(study, twin, method, seed)
+    folder = _folder(study, twin, seed)
     if not (folder / POLICY).exists():
-        span = (min(study.options.commands), max(study.options.commands))
         finetune(
-            Task(study.policy, study.believed, span, seed),
+            Task(study.policy, study.believed, seed),
             SimulatedTrials(twin, study.guard),
-            replace(study.options, method=method),
+            study.options,
             folder,
             resume=True,
             pretraining=study.folder / "pretraining",
@@ -119,9 +123,9 @@ def _run(
     return result
 
 
-def _judge(study: Study, twin: Robot, policy: Policy, method: str, seed: int | None) -> list[Row]:
+def _judge(study: Study, twin: Robot, policy: Policy, which: str, seed: int | None) -> list[Row]:
     """Return true errors of a policy at every height and judging seed; kept in a file."""
-    name = f"{twin.name}-{method}" + ("" if seed is None else f"-seed{seed}")
+    name = f"{twin.name}-{which}" + ("" if seed is None else f"-seed{seed}")
     asked = {"policy": policy.digest, "twin": twin.digest, "commands": list(study.eval_commands),
              "judges": study.judges}  # fmt: skip
     path = study.folder / "judged" / f"{name}.json"
@@ -138,7 +142,7 @@ def _judge(study: Study, twin: Robot, policy: Policy, method: str, seed: int | N
         rows += [
             {
                 "twin": twin.name,
-                "method": method,
+                "policy": which,
                 "seed": seed,
                 "judge": judge,
                 "command_m": command,
@@ -152,9 +156,9 @@ def _judge(study: Study, twin: Robot, policy: Policy, method: str, seed: int | N
     return rows
 
 
-def _pooled(twin: str, method: str, judged: list[Row]) -> Row:
+def _pooled(twin: str, which: str, judged: list[Row]) -> Row:
     """Return one row over seeds, judges and heights."""
-    mine = [row for row in judged if (row["twin"], row["method"]) == (twin, method)]
+    mine = [row for row in judged if (row["twin"], row["policy"]) == (twin, which)]
     seeds = list(dict.fromkeys(row["seed"] for row in mine))
     errors = [
         float(np.mean([row["median_abs_error_m"] for row in mine if row["seed"] == seed]))
@@ -162,7 +166,7 @@ def _pooled(twin: str, method: str, judged: list[Row]) -> Row:
     ]
     return {
         "twin": twin,
-        "method": method,
+        "policy": which,
         "policies": len(seeds),
         "median_abs_error_m": float(np.median(errors)),
         "best_m": min(errors),
@@ -173,7 +177,7 @@ def _pooled(twin: str, method: str, judged: list[Row]) -> Row:
 
 
 def _point(row: Row) -> Row:
-    names = ("outing", "kind", "minutes", "error_m", "true_error_m", "rolled_back")
+    names = ("trial", "minutes", "error_m", "true_error_m", "rolled_back")
     return {**{name: row[name] for name in names}, "ended_early": bool(row["complaint"])}
 
 
@@ -183,25 +187,23 @@ def _ending(result: dict[str, Any]) -> Row:
         "why_it_ended": result["why_it_ended"],
         "ended_early": result["safety"]["ended_early"],
         "rolled_back": result["safety"]["rolled_back"],
-        "first_estimated_error_m": result["first_check"]["error_m"],
-        "best_estimated_error_m": result["best_check"]["error_m"],
+        "first_estimated_error_m": result["first_trial"]["error_m"],
+        "best_estimated_error_m": result["best_trial"]["error_m"],
     }
 
 
 @dataclass(frozen=True)
 class Finetune:
-    """Continue a policy's training on drawn twins by every method; judge it on other seeds."""
+    """Continue a policy's training on drawn twins; judge it on other seeds."""
 
     policy: str = "fast"
     """A shipped policy or an .onnx file."""
-    robot: str = "legv2-paper"
+    robot: str = DEFAULT_ROBOT
     """What is believed of the leg; the twins are drawn around it."""
     twins: tuple[int, ...] = (0, 1)
     """Seeds of the twins."""
-    methods: tuple[Literal["aim", "sac", "both"], ...] = ("aim", "sac", "both")
-    """What is learnt."""
     seeds: tuple[int, ...] = (0, 1, 2)
-    """Of the runs, one of each method and twin each."""
+    """Of the runs, one of each twin."""
     minutes: float = 10.0
     """Robot time of a run at most."""
     judges: int = 3
@@ -216,12 +218,11 @@ class Finetune:
     def measure(self) -> dict[str, Any]:
         """Run it, print a table, return every number."""
         from hopping_leg.figure_style import to_svg
-        from hopping_leg.rl.finetune.config import FinetuneConfig, StoppingRules
 
         at_least(1, judges=self.judges)
         at_least(0, **{f"seeds {seed}": seed for seed in (*self.seeds, *self.twins)})
-        if not (self.twins and self.methods and self.seeds):
-            raise UsageError("--twins, --methods and --seeds each need at least one entry.")
+        if not (self.twins and self.seeds):
+            raise UsageError("--twins and --seeds each need at least one entry.")
         policy, robot = load_policy(self.policy), load_robot(self.robot)
         console = Console()
         result = measure(
@@ -229,7 +230,6 @@ class Finetune:
                 policy,
                 robot,
                 tuple(draw_twin(seed, self.robot).robot for seed in self.twins),
-                self.methods,
                 self.seeds,
                 FinetuneConfig(stopping_rules=StoppingRules(minutes=self.minutes)),
                 guard_of(robot, policy.card.rate),
@@ -245,69 +245,49 @@ class Finetune:
 
 
 def _print(console: Console, result: dict[str, Any]) -> None:
-    table = Table("twin", "method", "|error|, mm", "best seed", "worst seed", "ended early")
+    table = Table("twin", "policy", "|error|, mm", "best seed", "worst seed", "ended early")
     for row in result["rows"]:
         numbers = [mm(row[key]) for key in ("median_abs_error_m", "best_m", "worst_m")]
-        table.add_row(row["twin"], row["method"], *numbers, str(row["ended_early"]))
+        table.add_row(row["twin"], row["policy"], *numbers, str(row["ended_early"]))
     console.print(table)
 
 
 _TOP = 0.97
-"""Where crosses are drawn, of the panel's height; those of later methods a little lower."""
+"""Where crosses are drawn, of the panel's height."""
 
 
 @styled
 def draw_finetuning(result: dict[str, Any]) -> Figure:
-    """Draw the true error of every check, one panel per twin, one colour per method.
+    """Draw the true error of every trial, one panel per twin, a line per seed.
 
     Args:
-        result: What the study measured; estimated errors are drawn as dots, checks
-            that were ended early, which have no error, as crosses at the top.
+        result: What the study measured; estimated errors are drawn as dots, trials that were
+            ended early, which have no error, as crosses at the top.
     """
-    curves = [row for row in result["curves"] if row["kind"] == "check"]
+    curves = result["curves"]
     twins = list(dict.fromkeys(row["twin"] for row in curves))
-    methods = list(dict.fromkeys(row["method"] for row in curves))
     figure = Figure(figsize=(WIDTH, 3.2), layout="constrained")
     panels = figure.subplots(1, len(twins), sharey=True, squeeze=False)[0]
     for panel, twin in zip(panels, twins, strict=True):
-        for index, method in enumerate(methods):
-            mine = [r for r in curves if (r["twin"], r["method"]) == (twin, method)]
-            _draw(panel, mine, method, index)
+        _draw(panel, [row for row in curves if row["twin"] == twin])
         panel.set_title(twin)
         panel.set_xlabel("robot time / min")
         panel.margins(y=0.12)
     panels[0].set_ylim(bottom=0)
     panels[0].set_ylabel("median |apex − command| / mm")
-    panels[0].legend()
     return figure
 
 
-def _draw(panel: Axes, rows: list[dict[str, Any]], method: str, index: int) -> None:
-    """Draw a line per seed, a dot per estimate and a cross per check that was ended early."""
-    for number, seed in enumerate(dict.fromkeys(row["seed"] for row in rows)):
-        mine = [row for row in rows if row["seed"] == seed]
+def _draw(panel: Axes, rows: list[dict[str, Any]]) -> None:
+    """Draw a line per seed, a dot per estimate and a cross per trial that was ended early."""
+    for index, seed in enumerate(dict.fromkeys(row["seed"] for row in rows)):
+        mine, shade = [row for row in rows if row["seed"] == seed], colour(index)
         whole = [row for row in mine if not row["ended_early"]]
         minutes = [row["minutes"] for row in whole]
-        panel.plot(
-            minutes,
-            [1e3 * row["true_error_m"] for row in whole],
-            color=colour(index),
-            linewidth=1.2,
-            label=method if number == 0 else None,
-        )
-        panel.plot(
-            minutes,
-            [1e3 * row["error_m"] for row in whole],
-            ".",
-            color=colour(index),
-            markersize=4,
-        )
+        panel.plot(minutes, [1e3 * r["true_error_m"] for r in whole], color=shade, linewidth=1.2)
+        panel.plot(minutes, [1e3 * r["error_m"] for r in whole], ".", color=shade, markersize=4)
         ended = [row["minutes"] for row in mine if row["ended_early"]]
         panel.plot(
-            ended,
-            [_TOP - 0.03 * index] * len(ended),
-            "x",
-            color=colour(index),
-            markersize=4,
+            ended, [_TOP] * len(ended), "x", color=shade, markersize=4,
             transform=panel.get_xaxis_transform(),
-        )
+        )  # fmt: skip

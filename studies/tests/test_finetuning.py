@@ -32,15 +32,15 @@ def seeds(monkeypatch):
     return used
 
 
-def test_a_study_measures_every_method_and_is_not_repeated(tmp_path, seeds):
+def test_a_study_pools_its_runs_and_is_not_repeated(tmp_path, seeds):
     twin = dataclasses.replace(load_robot("twin"), name="other")
     options = dataclasses.replace(
         OPTIONS, stopping_rules=dataclasses.replace(OPTIONS.stopping_rules, minutes=0.15)
     )
-    study = Study(POLICY, ROBOT, (twin,), ("aim",), (0, 1), options, WIDE, tmp_path,
+    study = Study(POLICY, ROBOT, (twin,), (0, 1), options, WIDE, tmp_path,
                   eval_commands=(0.26, 0.34), judges=2)  # fmt: skip
     result = measure(study, lambda _: None)
-    assert [row["method"] for row in result["rows"]] == ["start", "aim"]
+    assert [row["policy"] for row in result["rows"]] == ["start", "continued"]
     assert [row["policies"] for row in result["rows"]] == [1, 2]
     for row in result["rows"]:
         np.testing.assert_allclose(row["median_abs_error_m"], 0.02, atol=1e-9)

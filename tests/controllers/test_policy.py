@@ -11,7 +11,7 @@ from onnx import TensorProto, helper
 from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.controllers.registry import load_controller, load_policy
 from hopping_leg.errors import PolicyError, UsageError
-from hopping_leg.rl.onnx_export import Network, build_policy, save_policy
+from hopping_leg.rl.onnx_export import Network, build_policy
 from hopping_leg.robot import load_robot
 from hopping_leg.sim.channel import Measurement
 
@@ -66,7 +66,7 @@ def test_policy_computes_what_the_weights_say(activation, squash):
 
 def test_card_survives_the_file_and_same_weights_give_the_same_bytes(tmp_path):
     path = tmp_path / "a.onnx"
-    save_policy(path, network(), CARD)
+    path.write_bytes(build_policy(network(), CARD))
     assert Policy.load(path).card == CARD
     assert Policy.load(path).name == "a"
     assert path.read_bytes() == build_policy(network(), CARD)
@@ -125,7 +125,7 @@ def test_missing_file_and_unknown_name(tmp_path):
 
 def test_another_robot_is_refused_or_named(tmp_path, caplog):
     path = tmp_path / "a.onnx"
-    save_policy(path, network(), CARD)
+    path.write_bytes(build_policy(network(), CARD))
     other = dataclasses.replace(ROBOT, base=dataclasses.replace(ROBOT.base, mass=2.0))
     with pytest.raises(PolicyError, match="trained on robot 'legv2-paper'"):
         load_controller(path, other, other="refuse")

@@ -35,7 +35,7 @@ from hopping_leg.deploy.drive_link import DriveMode, FaultCode
 from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
 from hopping_leg.emulator.faults import KINDS, load_faults
 from hopping_leg.emulator.mode_machine import Notice
-from hopping_leg.robot.parameters import JOINTS
+from hopping_leg.robot import DEFAULT_ROBOT, JOINTS
 
 if TYPE_CHECKING:
     from hopping_leg.emulator.drive import EmulatedDrive
@@ -48,7 +48,7 @@ _STATUS_PERIOD = 0.2  # s
 class Emulate:
     """What is emulated and how the host reaches it."""
 
-    robot: str = "legv2"
+    robot: str = DEFAULT_ROBOT
     """A shipped robot or a .toml file; its [reality] stands behind the wire, too."""
     start_pose: str = "stand"
     """stand, crouch, stretch, zero (straight down), or joint angles as HIP,KNEE in rad."""

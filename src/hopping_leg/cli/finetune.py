@@ -1,21 +1,20 @@
 """Continue a policy's training on the real leg, or on a twin that plays it.
 
 The robot is reached through trials of some seconds alone, and nothing is known of it but what its
-joints measure: heights are reckoned from the time in the air. First a correction of the commanded
-height is learnt, two numbers, then the network's weights go on by soft actor-critic, beside the
-believed robot's experience. A policy that became worse is rolled back to the best; the run stops
-when hops are accurate, when nothing improves, or when the minutes of robot time are used up. A
-killed run goes on with --resume.
+joints measure: heights are reckoned from the time in the air. After every trial the policy's
+command is corrected by what its hops missed, at each height. A policy that became worse is rolled
+back to the best; the run stops when hops are accurate, when nothing improves, or when the minutes
+of robot time are used up. A killed run goes on with --resume.
 
 Examples:
-  hop finetune fast --on twin --minutes 3 --method aim
+  hop finetune fast --on twin --minutes 3
   hop finetune fast --on my_twin.toml --seed 1 --out runs/finetuned --json finetuned.json
   hop finetune fast --robot my_leg.toml --transport /dev/fdcanusb --minutes 5
 """
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import tyro
 
@@ -42,18 +41,16 @@ class Finetune:
     transport: str | None = None
     """The drives of the real leg instead, as for `hop deploy`."""
     robot: options.OwnRobot = None
-    method: Literal["aim", "sac", "both"] = "both"
-    """Method: correct the command, train the weights, or one after the other."""
     minutes: float = 10.0
     """Longest time on the robot."""
     commands: options.Heights = (0.25, 0.30, 0.35)
-    """Heights of the checks, m; explorations hop between the lowest and the highest."""
+    """Heights of every trial, m."""
     trial_seconds: float = 15.0
     """Length of a trial, s."""
     tolerance: float = 0.004
-    """Error that is good enough, on two checks in a row, m."""
+    """Error that is good enough, on two trials in a row, m."""
     seed: int = 0
-    """Seed of exploration, commands, batches and a twin's noise."""
+    """Seed of a twin's noise."""
     out: Path = Path("runs/finetune")
     """The run's folder."""
     resume: bool = False
@@ -65,20 +62,23 @@ class Finetune:
 
 def run(args: Finetune) -> None:
     """Continue the training, say how it went."""
-    from hopping_leg.rl.finetune.config import FinetuneConfig, StoppingRules, Task
-    from hopping_leg.rl.finetune.finetuning import POLICY, finetune
+    from hopping_leg.rl.finetune.finetuning import (
+        POLICY,
+        FinetuneConfig,
+        StoppingRules,
+        Task,
+        finetune,
+    )
 
     policy, robot = load_policy(args.policy), load_robot(args.robot or robot_of([args.policy]))
     _refuse(args, policy, robot)
     config = FinetuneConfig(
-        method=args.method,
         commands=tuple(sorted(args.commands)),
         trial_seconds=args.trial_seconds,
         stopping_rules=StoppingRules(minutes=args.minutes, tolerance=args.tolerance),
     )
-    span = (min(args.commands), max(args.commands))
     result = finetune(
-        Task(policy, robot, span, args.seed),
+        Task(policy, robot, args.seed),
         _trial_robot(args, robot, policy.card.rate),
         config,
         args.out,
@@ -95,8 +95,7 @@ def line(row: dict[str, Any]) -> str:
     true = f", in truth {1e3 * row['true_error_m']:.1f} mm" if "true_error_m" in row else ""
     back = "Rolled back to the best." if row["rolled_back"] else ""
     said = (
-        f"{row['minutes']:.2f} min, {row['kind']}: error {1e3 * row['error_m']:.1f} mm{true},"
-        f" {row['hops']} hops."
+        f"{row['minutes']:.2f} min: error {1e3 * row['error_m']:.1f} mm{true}, {row['hops']} hops."
     )
     return " ".join(filter(None, (said, row["complaint"], back)))
 
@@ -126,11 +125,6 @@ def _refuse(args: Finetune, policy: "Policy", robot: Robot) -> None:
             " leg with --on, and the robot that its file extends with --robot."
         )
     policy.check_robot(robot)
-    if policy.remembers:
-        raise errors.UsageError(
-            f"{policy.name} carries a memory from tick to tick, which is not learnt further here;"
-            " name a policy without one, e.g. precise."
-        )
     low, high = policy.card.command_low, policy.card.command_high
     for command in args.commands:
         if not low <= command <= high:

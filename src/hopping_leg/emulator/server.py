@@ -17,7 +17,7 @@ from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.ports import DEFAULT_CHANNELS, CanPort, Port, PtyPort
 from hopping_leg.emulator.robot import EmulatedRobot
 from hopping_leg.errors import UsageError, unknown_name
-from hopping_leg.robot import Robot, kinematics, load_robot
+from hopping_leg.robot import DEFAULT_ROBOT, Robot, kinematics, load_robot
 
 _LENGTHS = {"stand": 0.69, "crouch": 0.5, "stretch": 0.93}
 """Named poses: leg length over the straight leg's, foot below the hip."""
@@ -32,7 +32,7 @@ _PTY = "pty"  # A serial terminal, as an fdcanusb's
 class EmulatorConfig:
     """What is emulated and how it begins."""
 
-    robot: str = "legv2"
+    robot: str = DEFAULT_ROBOT
     """A shipped robot or a .toml file; its [reality] holds."""
     pose: str = "stand"
     """One of POSES or joint angles as 'HIP,KNEE' in rad."""

@@ -1,4 +1,4 @@
-"""Policy files: ONNX graphs built from numpy weights, and read back.
+"""Policy files: ONNX graphs built from numpy weights.
 
 Graph: inputs (flattened, joined) -> (x - offset) * gain -> dense layers -> squash -> torque scale;
 what remembers stands before the dense layers.
@@ -6,7 +6,6 @@ what remembers stands before the dense layers.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ import numpy.typing as npt
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-from hopping_leg import errors, io
+from hopping_leg import errors
 from hopping_leg.arrays import Array
 from hopping_leg.controllers.observation_history import make_observation_history
 from hopping_leg.controllers.policy import MEMORY, METADATA_KEY, NEXT_MEMORY, Card
@@ -209,36 +208,8 @@ def build_policy(network: Network, card: Card) -> bytes:
     return content
 
 
-def save_policy(path: Path, network: Network, card: Card) -> None:
-    """Write a policy file; an existing one is replaced only once the new one is complete."""
-    io.write_atomically(path, build_policy(network, card))
-
-
-def read_network(content: bytes) -> Network:
-    """Return a policy file's actor; ``PolicyError`` if it was made elsewhere or remembers."""
-    graph = onnx.load_from_string(content).graph
-    if MEMORY in (given.name for given in graph.input):
-        raise errors.PolicyError(
-            "The policy remembers; only weights of one that does not can be read."
-        )
-    stored = {w.name: numpy_helper.to_array(w).astype(np.float64) for w in graph.initializer}
-    hidden = {node.op_type for node in graph.node if node.output[0].startswith("hidden_")}
-    names = {operator: name for name, operator in ACTIVATIONS.items()}
-    count = sum(name.startswith("weight_") for name in stored)
-    if not {"offset", "gain", "weight_0"} <= stored.keys() or len(hidden & names.keys()) != 1:
-        raise errors.PolicyError(
-            "The policy's graph has no dense layers as `hop train` writes them."
-        )
-    layers: list[tuple[Array, Array]] = [
-        (stored[f"weight_{i}"].T.copy(), stored[f"bias_{i}"]) for i in range(count)
-    ]
-    squash = "tanh" if graph.node[-2].op_type == "Tanh" else "clip"
-    bound = stored["most"].item() if "most" in stored else float("inf")
-    return Network(stored["offset"], stored["gain"], layers, names[hidden.pop()], squash, bound)
-
-
-def with_command_map(content: bytes, correction: CommandMap) -> bytes:
-    """Return a policy file whose command is corrected before anything else.
+def with_command_map(content: bytes, correction: CommandMap, card: Card | None = None) -> bytes:
+    """Return a policy file whose command is corrected before anything else, if asked with a card.
 
     The shift is the first one and, for every height h, the change of its slope there times
     max(command - h, 0).
@@ -263,43 +234,8 @@ def with_command_map(content: bytes, correction: CommandMap) -> bytes:
     del inner.node[:]
     inner.node.extend(nodes)
     inner.initializer.extend(graph.weights)
+    if card is not None:
+        helper.set_model_props(model, {METADATA_KEY: card.to_json()})
     onnx.checker.check_model(model, full_check=True)
     mapped: bytes = model.SerializeToString(deterministic=True)
     return mapped
-
-
-PREFIX = "hidden_"
-"""Beginning of the names of hidden layers."""
-
-_LEARNT = ("weight_", "bias_", "gru_")
-"""Beginnings of the names of what is learnt."""
-
-
-def expose_hidden(content: bytes, shuffle: int | None = None) -> bytes:
-    """Return a policy's graph with its hidden layers as further outputs, in order.
-
-    With ``shuffle``, a seed, the entries of weights and biases of every hidden layer and of what
-    fills the memory change places: a network of the same size that has learnt nothing. Raises
-    ``PolicyError`` where the graph names no hidden layer and remembers nothing.
-    """
-    model = onnx.load_from_string(content)
-    graph = model.graph
-    names = [name for node in graph.node for name in node.output if name.startswith(PREFIX)]
-    inside = [*names, *(given.name for given in graph.output if given.name == NEXT_MEMORY)]
-    if not inside:
-        raise errors.PolicyError(
-            "The policy's graph names no hidden layer; export it with `hop train`."
-        )
-    if shuffle is not None:
-        rng = np.random.default_rng(shuffle)
-        last = max(i for i, node in enumerate(graph.node) if set(inside) & set(node.output))
-        hidden = {i for node in graph.node[: last + 1] for i in node.input}
-        for stored in graph.initializer:
-            if stored.name in hidden and stored.name.startswith(_LEARNT):
-                values = numpy_helper.to_array(stored)
-                mixed = rng.permutation(values.ravel()).reshape(values.shape)
-                stored.CopyFrom(numpy_helper.from_array(mixed, stored.name))
-    for name in names:
-        graph.output.append(helper.make_tensor_value_info(name, TensorProto.FLOAT, ["n", None]))
-    extended: bytes = model.SerializeToString(deterministic=True)
-    return extended

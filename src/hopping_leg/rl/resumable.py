@@ -87,8 +87,10 @@ class ResumableSAC(SAC):  # type: ignore[misc]
 
     def state(self) -> Tree:
         """Return everything needed to continue exactly, its environment included."""
-        return {
-            **learner_state(self),
+        tree = {
+            "policy": to_numpy(self.policy.state_dict()),
+            "optimizers": [to_numpy(o.state_dict()) for o in _optimizers(self)],
+            "counters": {name: getattr(self, name) for name in _COUNTERS},
             "env": self.env.state(),
             "last_observation": self._last_obs,
             "last_episode_starts": self._last_episode_starts,
@@ -96,11 +98,20 @@ class ResumableSAC(SAC):  # type: ignore[misc]
             "random": _random_state(self),
             "replay": _replay_state(self.replay_buffer),
         }
+        if self.log_ent_coef is not None:
+            tree["log_ent_coef"] = self.log_ent_coef.detach().numpy().copy()
+        return tree
 
     def restore(self, state: Tree) -> None:
         """Bring a freshly built learner of the same recipe to a ``state``."""
         self.env.restore(state["env"])
-        restore_learner(self, state)
+        self.policy.load_state_dict(to_torch(state["policy"]))
+        if "log_ent_coef" in state:
+            self.log_ent_coef.data.copy_(torch.from_numpy(state["log_ent_coef"]))
+        for optimizer, tree in zip(_optimizers(self), state["optimizers"], strict=True):
+            load_optimizer(optimizer, tree)
+        for name, value in state["counters"].items():
+            setattr(self, name, value)
         self._last_obs = state["last_observation"]
         self._last_episode_starts = state["last_episode_starts"]
         self.ep_info_buffer = deque(state["episodes"], maxlen=self._stats_window_size)
@@ -110,29 +121,6 @@ class ResumableSAC(SAC):  # type: ignore[misc]
             getattr(buffer, name)[: len(values)] = values
         buffer.pos, buffer.full = replay["pos"], replay["full"]
         _restore_random(self, state["random"])
-
-
-def learner_state(model: SAC) -> Tree:
-    """Return networks, optimisers and counters alone: no environment, experience or randomness."""
-    tree: Tree = {
-        "policy": to_numpy(model.policy.state_dict()),
-        "optimizers": [to_numpy(o.state_dict()) for o in _optimizers(model)],
-        "counters": {name: getattr(model, name) for name in _COUNTERS},
-    }
-    if model.log_ent_coef is not None:
-        tree["log_ent_coef"] = model.log_ent_coef.detach().numpy().copy()
-    return tree
-
-
-def restore_learner(model: SAC, tree: Tree) -> None:
-    """Bring a model to a ``learner_state``."""
-    model.policy.load_state_dict(to_torch(tree["policy"]))
-    if "log_ent_coef" in tree:
-        model.log_ent_coef.data.copy_(torch.from_numpy(tree["log_ent_coef"]))
-    for optimizer, state in zip(_optimizers(model), tree["optimizers"], strict=True):
-        load_optimizer(optimizer, state)
-    for name, value in tree["counters"].items():
-        setattr(model, name, value)
 
 
 def _optimizers(model: SAC) -> list[torch.optim.Optimizer]:

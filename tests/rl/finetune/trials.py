@@ -7,8 +7,7 @@ import numpy as np
 from hopping_leg.controllers.hardware_trial import HardwareTrial, measured_table
 from hopping_leg.controllers.registry import load_policy, robot_of
 from hopping_leg.rl.finetune.apex_estimate import ApexEstimator, ContactConfig, ContactEstimator
-from hopping_leg.rl.finetune.config import FinetuneConfig, StoppingRules
-from hopping_leg.rl.finetune.learner import SacConfig
+from hopping_leg.rl.finetune.finetuning import FinetuneConfig, StoppingRules
 from hopping_leg.robot import GRAVITY, kinematics, load_robot
 from hopping_leg.trace import Trace
 
@@ -17,10 +16,8 @@ POLICY = load_policy("fast")
 PERIOD = 0.005
 CONTACT = ContactConfig(num_envs=4, seconds=3.0, steps=20, batch_size=64, hidden=(8,))
 OPTIONS = FinetuneConfig(
-    method="both", commands=(0.25, 0.35), trial_seconds=4.0, hold=2.0, explorations=1,
-    correction_minutes=0.1, believed_seconds=32.0, first_steps=2, steps_per_tick=0.004,
-    critics_first=0, stopping_rules=StoppingRules(minutes=0.4, patience=50, margin=10.0),
-    learner=SacConfig(critic=(8,), batch_size=16, buffer_size=4000), contact=CONTACT,
+    commands=(0.25, 0.35), trial_seconds=4.0, contact=CONTACT,
+    stopping_rules=StoppingRules(minutes=0.4, patience=50, margin=10.0),
 )  # fmt: skip
 
 

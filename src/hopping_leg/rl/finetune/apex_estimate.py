@@ -18,13 +18,13 @@ import numpy as np
 import torch
 from torch import nn
 
-from hopping_leg.arrays import Array, BoolArray
+from hopping_leg.arrays import Array
 from hopping_leg.controllers.energy_shaping.equations import flight_time_apex
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.rollout import Rollout
 from hopping_leg.hop_detection import find_hops
 from hopping_leg.rl import checkpoint, run_folder
-from hopping_leg.rl.finetune import command_correction, simulated, trial_data
+from hopping_leg.rl.finetune import simulated, trial_data
 from hopping_leg.robot import JOINTS, Robot, kinematics
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, TWIN_RANGES, Range, sample
 
@@ -187,6 +187,10 @@ _NEAR = 0.06
 """Largest distance of an estimated apex from the true one that is taken for the same, s."""
 
 
+_ROUNDS, _ALIKE = 30, 1e-3
+"""Of reweighting, and the deviation below which all points weigh the same, m."""
+
+
 class ApexEstimator:
     """Estimates a leg's heights; flight time gives ``drag``, m, too much: constant and slope."""
 
@@ -194,29 +198,26 @@ class ApexEstimator:
         self.robot, self.contact = robot, contact
         self.drag = np.zeros(2) if drag is None else drag
 
-    def __call__(self, data: trial_data.TrialData) -> trial_data.ApexEstimate:
-        """Return the heights of trials."""
+    def __call__(self, data: trial_data.TrialData) -> list[Array]:
+        """Return tick and height of every apex of each trial, m, (hops, 2)."""
         air = self.contact.airborne(data)
-        filled = data.filled()
-        q, qd = filled[..., 0:2], filled[..., 2:4]
-        height = kinematics.stance_height(self.robot, q)
-        rate = kinematics.foot_velocity(self.robot, q, qd)[..., 0]
-        flying = np.zeros(height.shape, np.bool_)
-        apexes = []
-        for leg in range(height.shape[1]):
-            found = [
-                self._fly(height[:, leg], rate[:, leg], flying[:, leg], begin, end, data.period)
-                for begin, end in _flights(air[:, leg], data.period)
-            ]
-            apexes.append(np.array(found).reshape(-1, 2))
-        return trial_data.ApexEstimate(height, rate, flying, apexes)
+        height = kinematics.stance_height(self.robot, data.filled()[..., :2])
+        return [
+            np.array(
+                [
+                    self._apex(height[:, leg], begin, end, data.period)
+                    for begin, end in _flights(air[:, leg], data.period)
+                ]
+            ).reshape(-1, 2)
+            for leg in range(height.shape[1])
+        ]
 
     def calibrate(self, run: Rollout) -> None:
         """Learn the drag from legs of which the truth is known: a witnessed run of many."""
         estimated = self(trial_data.TrialData.of(simulated.traces_of(run)))
         near = round(_NEAR / (run.time[1] - run.time[0]))
         pairs = []
-        for leg, found in enumerate(estimated.apexes):
+        for leg, found in enumerate(estimated):
             columns = ("height_m", "height_rate_m_s", "foot_clearance_m")
             hops = find_hops(*(run.data[name][:, leg] for name in columns))
             if not len(found) or not len(hops.tick):
@@ -225,23 +226,14 @@ class ApexEstimator:
             same = np.abs(found[nearest, 0] - hops.tick) <= near
             pairs.append(np.stack([found[nearest, 1], hops.apex], axis=1)[same])
         reckoned, true = np.concatenate(pairs).T
-        self.drag = self.drag + command_correction.robust_line(reckoned, reckoned - true)
+        self.drag = self.drag + _robust_line(reckoned, reckoned - true)
 
-    def _fly(
-        self, height: Array, rate: Array, flying: BoolArray, begin: float, end: float, period: float
-    ) -> tuple[float, float]:
-        """Write one flight into a trial's arrays; return tick and height of its apex."""
-        ticks = np.arange(len(height))
-        ends = np.interp([begin, end], ticks, height)
-        lasted = np.array([(end - begin) * period])
-        raw = float(flight_time_apex(ends[:1], ends[1:], lasted)[0])
-        apex = max(raw - float(self.drag @ [1.0, raw]), ends.max())
-        inside = slice(int(np.ceil(begin)), int(np.floor(end)) + 1)
-        share = (ticks[inside] - begin) / (end - begin)
-        bulge, lean = 4 * (apex - ends.mean()), ends[1] - ends[0]
-        height[inside] = ends[0] + lean * share + bulge * share * (1 - share)
-        rate[inside] = (lean + bulge * (1 - 2 * share)) / lasted[0]
-        flying[inside] = True
+    def _apex(self, height: Array, begin: float, end: float, period: float) -> tuple[float, float]:
+        """Return tick and height of a flight's apex; heights of standing on the foot, (ticks,)."""
+        ends = np.interp([begin, end], np.arange(len(height)), height)
+        raw = float(flight_time_apex(ends[:1], ends[1:], np.array([(end - begin) * period]))[0])
+        apex = max(raw - float(self.drag @ [1.0, raw]), float(ends.max()))
+        lean, bulge = ends[1] - ends[0], 4 * (apex - ends.mean())
         top = begin + (end - begin) * np.clip(0.5 + lean / (2 * max(bulge, 1e-9)), 0, 1)
         return round(float(top)), apex
 
@@ -265,3 +257,13 @@ def _flights(air: Array, period: float) -> list[tuple[float, float]]:
 def _crossing(air: Array, tick: int) -> float:
     """Return where a line between a tick and the next is zero, ticks."""
     return float(tick + air[tick] / (air[tick] - air[tick + 1]))
+
+
+def _robust_line(x: Array, y: Array) -> Array:
+    """Return constant and slope of the line of least absolute deviations, (2,)."""
+    columns, weight = np.stack([np.ones_like(x), x], axis=1), np.ones_like(y)
+    for _ in range(_ROUNDS):
+        weighted = columns * weight[:, None]
+        line = np.linalg.solve(weighted.T @ columns, weighted.T @ y)
+        weight = 1 / np.maximum(np.abs(y - columns @ line), _ALIKE)
+    return np.asarray(line)

@@ -1,27 +1,28 @@
-"""Continue a policy's training on a robot: trials, checks, learning, the best one kept.
+"""Continue a policy's training on a robot: trials, corrections of the command, the best one kept.
 
-A check is a trial without exploration at fixed heights; its error, as estimated from the joints,
-decides what is best, what is rolled back and when to stop. Checks take robot time like any trial.
-All randomness follows from seed and number of the trial, so that a run that was killed goes on
-exactly: networks and optimisers from a checkpoint, experience from the trials' traces.
+Every trial hops through the same heights. Its error, as estimated from the joints, decides what is
+best, what is rolled back and when to stop. All randomness follows from seed and number of the
+trial, and all that is learnt from the rows of the trials, so that a run that was killed goes on
+exactly.
 """
 
-from collections.abc import Callable
-from dataclasses import asdict, replace
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from hopping_leg.controllers import command_schedule, hardware_trial, protocol
+from hopping_leg.arrays import Array
+from hopping_leg.controllers import hardware_trial
+from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.policy import Policy
-from hopping_leg.envs import apex_reward
+from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically, write_json
-from hopping_leg.rl import checkpoint, onnx_export, run_folder
-from hopping_leg.rl.finetune import command_correction, config, learner, replay
-from hopping_leg.rl.finetune.apex_estimate import prepare
-from hopping_leg.rl.finetune.trial_data import Score, TrialData, estimated, score, settled
-from hopping_leg.trace import Trace
+from hopping_leg.rl import onnx_export, run_folder
+from hopping_leg.rl.finetune import apex_estimate
+from hopping_leg.rl.finetune.trial_data import Score, TrialData, estimated, score
+from hopping_leg.robot.parameters import Robot
 
 RESULT = "finetune.json"
 POLICY = "policy.onnx"
@@ -30,44 +31,126 @@ Row = dict[str, Any]
 """Result of a trial, as JSON values."""
 
 
+@dataclass(frozen=True)
+class StoppingRules:
+    """When to stop and when to roll back; errors are those estimated of trials."""
+
+    minutes: float = 10.0
+    """Robot time at most."""
+    tolerance: float = 0.004
+    """Error that is good enough, on two trials in a row, m."""
+    margin: float = 0.01
+    """Error above the best at which a policy is rolled back to it, m."""
+    confirm: int = 2
+    """Trials in a row that must be so bad: a few hops scatter."""
+    gain: float = 0.0005
+    """Less of an improvement counts for none, m."""
+    patience: int = 8
+    """Trials without an improvement after which the training ends."""
+
+    def rolled_back(self, errors: Sequence[float]) -> bool:
+        """Tell whether the last errors of trials, m, are too bad beside the best."""
+        latest = errors[-self.confirm :]
+        return len(latest) == self.confirm and min(latest) > min(errors) + self.margin
+
+    def reason(self, errors: Sequence[float], minutes: float, following: float) -> str:
+        """Return why to stop after errors of trials, m; empty for a next trial of minutes."""
+        if len(errors) > 1 and max(errors[-2:]) <= self.tolerance:
+            return f"The error is within {1e3 * self.tolerance:g} mm."
+        if minutes + following > self.minutes + 1e-9:
+            return f"The {self.minutes:g} minutes of robot time are used up."
+        before, since = errors[: -self.patience], errors[-self.patience :]
+        if before and min(since) > min(before) - self.gain:
+            return f"Nothing improved in the last {self.patience} trials."
+        return ""
+
+
+@dataclass(frozen=True)
+class FinetuneConfig:
+    """Continued training on a robot."""
+
+    commands: tuple[float, ...] = (0.25, 0.30, 0.35)
+    """Heights of every trial, m, rising."""
+    trial_seconds: float = 15.0
+    """Length of a trial, s."""
+    rate: float = 0.6
+    """Share of a trial's errors that is corrected."""
+    largest_shift: float = 0.05
+    """Largest correction of the command, m."""
+    stopping_rules: StoppingRules = field(default_factory=StoppingRules)
+    """When it ends."""
+    contact: apex_estimate.ContactConfig = field(default_factory=apex_estimate.ContactConfig)
+    """How contact is learnt in simulation."""
+
+    def __post_init__(self) -> None:
+        if len(set(self.commands)) < 2:
+            raise UsageError(
+                f"Commands {self.commands} are too few to correct by; give at least two heights."
+            )
+        if not 2 * len(self.commands) <= self.trial_seconds <= 60:
+            raise UsageError(
+                f"A trial of {self.trial_seconds:g} s does not suit {len(self.commands)} commands;"
+                f" give {2 * len(self.commands)} to 60 s."
+            )
+        if not 0 < self.stopping_rules.minutes <= 600:
+            raise UsageError(
+                f"'minutes' is {self.stopping_rules.minutes:g} but must lie in 0 to 600."
+            )
+
+    @property
+    def schedule(self) -> CommandSchedule:
+        """The heights of a trial, each for as long."""
+        each = self.trial_seconds / len(self.commands)
+        return CommandSchedule(tuple((command, each) for command in self.commands))
+
+
+@dataclass(frozen=True)
+class Task:
+    """What goes on learning."""
+
+    policy: Policy
+    """The one to go on from."""
+    robot: Robot
+    """The believed leg."""
+    seed: int
+    """Seed of everything."""
+
+
 class Finetuning:
-    """One continued training, see ``finetune``."""
+    """One continued training, see ``finetune``; ``rows`` are the trials so far."""
 
     def __init__(
         self,
-        task: config.Task,
+        task: Task,
         robot: hardware_trial.TrialRobot,
-        options: config.FinetuneConfig,
+        options: FinetuneConfig,
         folder: Path,
         pretraining: Path | None = None,
         on_trial: Callable[[Row], None] = lambda _: None,
     ) -> None:
         self._task, self._robot, self._options, self._folder = task, robot, options, folder
         self._on_trial = on_trial
-        self._estimator = prepare(
+        self._estimator = apex_estimate.prepare(
             task.policy, task.robot, options.contact, pretraining or folder / "pretraining"
         )
-        self._network = onnx_export.read_network(task.policy.content)
-        self._correction = command_correction.LinearCommandCorrection(*task.commands)
-        self._learner: learner.Learner | None = None
-        self._best = self._origin = (self._network, self._correction)
-        self._explored = 0
+        self._file = folder / "trials" / "rows.json"
         self.rows: list[Row] = []
+        if self._file.exists():
+            self.rows = run_folder.read_json(self._file)["rows"]
 
     def run(self) -> tuple[bytes, str]:
         """Go on until a rule ends it; return the best policy's file and why it ended."""
-        self._restore()
         while not (reason := self._reason()):
-            check = self._check_is_due()
             number = len(self.rows)
-            schedule = self._schedule(number, check=check)
-            controller = self._controller(number, check=check)
-            trial = self._robot.hop(controller, schedule, self._seed(number, 0))
-            trial.trace.save(self._trace(number))
-            self._evaluate(trial, schedule, check=check)
-            self._checkpoint()
+            policy = Policy(self._content(self._shifts), "the policy in training", "policy")
+            seed = int(np.random.SeedSequence((self._task.seed, number)).generate_state(1)[0])
+            trial = self._robot.hop(policy, self._options.schedule, seed)
+            trial.trace.save(self._folder / "trials" / f"{number:04d}.parquet")
+            self.rows.append(self._judged(trial))
+            write_json(self._file, {"rows": self.rows})
             self._on_trial(self.rows[-1])
-        return self._content(*self._best), reason
+        best = min(self.rows, key=lambda row: float(row["error_m"]), default=None)
+        return self._content(best["shifts_m"] if best else self._shifts), reason
 
     @property
     def minutes(self) -> float:
@@ -75,140 +158,47 @@ class Finetuning:
         return float(self.rows[-1]["minutes"]) if self.rows else 0.0
 
     @property
-    def _errors(self) -> list[float]:
-        return [row["error_m"] for row in self.rows if row["kind"] == "check"]
-
-    def _errors_since(self) -> list[float]:
-        """Return the best error and those of the checks since a policy was rolled back, m."""
-        checks = [row for row in self.rows if row["kind"] == "check"]
-        rolled_back = [index for index, row in enumerate(checks) if row["rolled_back"]]
-        first = rolled_back[-1] + 1 if rolled_back else 0
-        return [min(self._errors), *(row["error_m"] for row in checks[first:])]
+    def _shifts(self) -> list[float]:
+        """What the next trial adds to the command at each height, m."""
+        return self.rows[-1]["next_shifts_m"] if self.rows else [0.0] * len(self._options.commands)
 
     def _reason(self) -> str:
-        o = self._options
-        return o.stopping_rules.reason(self._errors, self.minutes, o.trial_seconds / 60)
+        errors, o = [row["error_m"] for row in self.rows], self._options
+        return o.stopping_rules.reason(errors, self.minutes, o.trial_seconds / 60)
 
-    def _learns_weights(self) -> bool:
-        method, first = self._options.method, self._options.correction_minutes
-        return method == "sac" or (method == "both" and self.minutes >= first)
-
-    def _check_is_due(self) -> bool:
-        latest = [row["kind"] for row in self.rows[-self._options.explorations :]]
-        return not self._learns_weights() or "check" not in latest
-
-    def _schedule(self, number: int, *, check: bool) -> command_schedule.CommandSchedule:
-        o, rng = self._options, np.random.default_rng((self._task.seed, number, 1))
-        if check:
-            each = o.trial_seconds / len(o.commands)
-            return command_schedule.CommandSchedule(
-                tuple((command, each) for command in o.commands)
-            )
-        sampled = rng.uniform(*self._task.commands, round(o.trial_seconds / o.hold))
-        return command_schedule.CommandSchedule(
-            tuple((float(command), o.hold) for command in sampled)
-        )
-
-    def _controller(self, number: int, *, check: bool) -> protocol.Controller:
-        content = self._content(self._network, self._correction)
-        if check:
-            return Policy(content, "the policy in training", self._task.policy.name)
-        assert self._learner is not None
-        rng = np.random.default_rng((self._task.seed, number, 2))
-        card = self._task.policy.card
-        return replay.ExploringPolicy(
-            content, card, self._learner.spread, self._options.sde_sample_freq, rng
-        )
-
-    def _evaluate(
-        self,
-        trial: hardware_trial.HardwareTrial,
-        schedule: command_schedule.CommandSchedule,
-        *,
-        check: bool,
-    ) -> None:
-        """Score and record a trial, and learn from it."""
-        data = TrialData.of([trial.trace])
-        estimate = self._estimator(data)
-        apexes = estimated(trial, estimate)
-        judged = score(apexes, schedule, trial.complaint)
+    def _judged(self, trial: hardware_trial.HardwareTrial) -> Row:
+        """Return the row of a trial, with what follows from it."""
+        o, shifts = self._options, self._shifts
+        apexes = estimated(trial, self._estimator(TrialData.of([trial.trace]))[0])
+        judged = score(apexes, o.schedule, trial.complaint)
         row: Row = {
-            "outing": len(self.rows),
-            "kind": "check" if check else "exploration",
+            "trial": len(self.rows),
             "minutes": self.minutes + trial.seconds / 60,
             "complaint": trial.complaint,
-            "aim_m": list(self._correction.shift),
+            "shifts_m": list(shifts),
             **_numbers(judged, ""),
         }
         if trial.truth is not None:
-            row |= _numbers(score(trial.truth, schedule, trial.complaint), "true_")
-        row["rolled_back"] = False
-        self.rows.append(row)
-        if check or trial.complaint:
-            self._keep_best_or_roll_back(row)
-        if self._learns_weights():
-            self._learn(trial, len(data.command), explored=not check)
-        elif not row["rolled_back"]:
-            counted = settled(apexes, schedule)
-            errors, options = counted[:, 2] - counted[:, 1], self._options.correction
-            self._correction = self._correction.updated(counted[:, 1], errors, options)
+            row |= _numbers(score(trial.truth, o.schedule, trial.complaint), "true_")
+        best = min([*self.rows, row], key=lambda row: float(row["error_m"]))
+        row["rolled_back"] = best is not row and (
+            bool(trial.complaint) or o.stopping_rules.rolled_back(self._errors_since(row))
+        )
+        row["next_shifts_m"] = list(best["shifts_m"])
+        if not row["rolled_back"]:
+            errors = np.array([judged.offsets[c] if judged.hops_at[c] else 0.0 for c in o.commands])
+            wanted: Array = np.array(shifts) - o.rate * errors
+            row["next_shifts_m"] = wanted.clip(-o.largest_shift, o.largest_shift).tolist()
+        return row
 
-    def _keep_best_or_roll_back(self, row: Row) -> None:
-        check = row["kind"] == "check"
-        if check and row["error_m"] <= min(self._errors):
-            self._best = (self._network, self._correction)
-        elif row["complaint"] or self._options.stopping_rules.rolled_back(self._errors_since()):
-            row["rolled_back"] = True
-            self._network, self._correction = self._best
-            if self._learner is not None:
-                self._learner.set_actor(self._network)
+    def _errors_since(self, row: Row) -> list[float]:
+        """Return the best error and those of the trials since a policy was rolled back, m."""
+        rows = [*self.rows, row]
+        rolled_back = [index for index, row in enumerate(self.rows) if row["rolled_back"]]
+        first = rolled_back[-1] + 1 if rolled_back else 0
+        return [min(r["error_m"] for r in rows), *(r["error_m"] for r in rows[first:])]
 
-    def _learn(self, trial: hardware_trial.HardwareTrial, ticks: int, *, explored: bool) -> None:
-        if self._learner is None:
-            self._network, self._correction = self._best
-            taught = self._begin_learning()
-            taught.learn(self._options.first_steps, self._seed(0, 5), critics_only=True)
-        else:
-            taught = self._learner
-            self._keep(taught, trial.trace, bool(trial.complaint))
-        self._explored += explored
-        steps = round(self._options.steps_per_tick * ticks)
-        first = self._explored <= self._options.critics_first
-        taught.learn(steps, self._seed(len(self.rows), 3), critics_only=first)
-        self._network = taught.network()
-
-    def _keep(self, taught: learner.Learner, trace: Trace, ended: bool) -> None:
-        data = TrialData.of([trace])
-        taught.keep(self._writer()(data, self._estimator(data), ended=ended))
-
-    def _begin_learning(self) -> learner.Learner:
-        """Make a learner that knows the believed robot and every trial so far."""
-        o, task = self._options, self._task
-        self._origin = (self._network, self._correction)
-        hidden = len(self._network.layers[-1][0][0])
-        spread = np.full((hidden, 2), np.exp(o.learner.log_std))
-        rng = np.random.default_rng((task.seed, 4))
-        content = self._content(self._network, self._correction)
-        explorer = replay.ExploringPolicy(content, task.policy.card, spread, o.sde_sample_freq, rng)
-        rows = replay.believed_rows(
-            task.robot, task.commands, task.seed,
-            explorer, self._estimator, self._writer(), o.believed_seconds,
-        )  # fmt: skip
-        self._learner = taught = learner.Learner(self._network, rows, o.learner, task.seed)
-        for row in self.rows:
-            self._keep(taught, Trace.load(self._trace(row["outing"])), bool(row["complaint"]))
-        return taught
-
-    def _writer(self) -> replay.TransitionWriter:
-        o, card = self._options, self._task.policy.card
-        reward = apex_reward(self._task.robot, o.reward, card.rate)
-        reward.anneal(1.0)
-        scaled = self._correction.applied(self._network, card)
-        return replay.TransitionWriter(card, scaled, self._task.robot, reward, o.penalty)
-
-    def _content(
-        self, network: onnx_export.Network, correction: command_correction.LinearCommandCorrection
-    ) -> bytes:
+    def _content(self, shifts: Sequence[float]) -> bytes:
         policy = self._task.policy
         card = replace(
             policy.card,
@@ -216,51 +206,8 @@ class Finetuning:
             seed=self._task.seed,
             steps=policy.card.steps + round(60 * self.minutes * policy.card.rate),
         )
-        return onnx_export.build_policy(correction.applied(network, card), card)
-
-    def _seed(self, number: int, purpose: int) -> int:
-        sequence = np.random.SeedSequence((self._task.seed, number, purpose))
-        return int(sequence.generate_state(1)[0])
-
-    def _trace(self, number: int) -> Path:
-        return self._folder / "outings" / f"{number:04d}.parquet"
-
-    def _checkpoint(self) -> None:
-        tree: checkpoint.Tree = {
-            "rows": self.rows,
-            "explored": self._explored,
-            "now": _as_tree(self._network, self._correction),
-            "best": _as_tree(*self._best),
-            "origin": _as_tree(*self._origin),
-            "learner": None if self._learner is None else self._learner.state(),
-        }
-        checkpoint.write_checkpoint(self._folder / "checkpoints", len(self.rows), tree)
-
-    def _restore(self) -> None:
-        """Go on from the newest checkpoint, if there is one."""
-        found = checkpoint.list_checkpoints(self._folder / "checkpoints")
-        if not found:
-            return
-        tree = checkpoint.read_checkpoint(found[-1])
-        self.rows, self._explored = tree["rows"], tree["explored"]
-        if tree["learner"] is not None:
-            self._network, self._correction = self._from_tree(tree["origin"])
-            self._begin_learning().restore(tree["learner"])
-        self._network, self._correction = self._from_tree(tree["now"])
-        self._best = self._from_tree(tree["best"])
-
-    def _from_tree(
-        self, tree: checkpoint.Tree
-    ) -> tuple[onnx_export.Network, command_correction.LinearCommandCorrection]:
-        layers = [(np.array(weight), np.array(bias)) for weight, bias in tree["layers"]]
-        a, b = tree["shift"]
-        return replace(self._network, layers=layers), replace(self._correction, shift=(a, b))
-
-
-def _as_tree(
-    network: onnx_export.Network, correction: command_correction.LinearCommandCorrection
-) -> checkpoint.Tree:
-    return {"layers": [list(layer) for layer in network.layers], "shift": list(correction.shift)}
+        command_map = onnx_export.CommandMap(self._options.commands, tuple(shifts))
+        return onnx_export.with_command_map(policy.content, command_map, card)
 
 
 def _numbers(judged: Score, prefix: str) -> Row:
@@ -275,9 +222,9 @@ def _numbers(judged: Score, prefix: str) -> Row:
 
 
 def finetune(
-    task: config.Task,
+    task: Task,
     robot: hardware_trial.TrialRobot,
-    options: config.FinetuneConfig,
+    options: FinetuneConfig,
     out: Path,
     *,
     resume: bool = False,
@@ -321,38 +268,40 @@ def finetune(
 
 def summary(rows: list[Row], reason: str) -> dict[str, Any]:
     """Return what a finished run comes to, as JSON values."""
-    checks = [row for row in rows if row["kind"] == "check"]
-    best = min(checks, key=lambda row: float(row["error_m"])) if checks else None
     return {
         "why_it_ended": reason,
         "minutes": rows[-1]["minutes"] if rows else 0.0,
-        "best_check": best,
-        "first_check": checks[0] if checks else None,
+        "first_trial": rows[0] if rows else None,
+        "best_trial": min(rows, key=lambda row: float(row["error_m"])) if rows else None,
         "safety": {
             "ended_early": sum(bool(row["complaint"]) for row in rows),
             "complaints": sorted({row["complaint"] for row in rows if row["complaint"]}),
             "rolled_back": sum(row["rolled_back"] for row in rows),
         },
-        "outings": rows,
+        "trials": rows,
     }
 
 
 def card(result: dict[str, Any]) -> str:
     """Return the model card of a finished run, as Markdown, from its ``finetune.json``."""
-    best, first = result["best_check"], result["first_check"]
+    best, first = result["best_trial"], result["first_trial"]
     lines = [
         f"# Policy `{result['policy']}`, continued on `{result['on']}`\n",
         f"Source: policy `{result['policy']}` ({result['policy_digest']}), believed robot"
-        f" `{result['robot']}` ({result['robot_digest']}), seed {result['seed']}, method"
-        f" `{result['options']['method']}`.\n",
-        f"- Robot time: {result['minutes']:.1f} min in {len(result['outings'])} trials."
+        f" `{result['robot']}` ({result['robot_digest']}), seed {result['seed']}.\n",
+        f"- Robot time: {result['minutes']:.1f} min in {len(result['trials'])} trials."
         f" {result['why_it_ended']}",
         f"- Ended early: {result['safety']['ended_early']}; rolled back:"
         f" {result['safety']['rolled_back']}.",
     ]
     if best:
-        lines.append(
-            f"- Median |apex - command| as estimated from the joints: {1e3 * first['error_m']:.1f}"
-            f" mm on the first check, {1e3 * best['error_m']:.1f} mm on the best, which chose it."
+        shifts = ", ".join(
+            f"{1e3 * shift:+.1f} mm at {row['command_m']:g} m"
+            for shift, row in zip(best["shifts_m"], best["by_command"], strict=True)
         )
+        lines += [
+            f"- Median |apex - command| as estimated from the joints: {1e3 * first['error_m']:.1f}"
+            f" mm in the first trial, {1e3 * best['error_m']:.1f} mm in the best, which chose it.",
+            f"- The command is shifted by {shifts}, linear between.",
+        ]
     return "\n".join(lines) + "\n"

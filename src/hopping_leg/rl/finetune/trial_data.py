@@ -1,14 +1,13 @@
 """What trials measured, what is estimated of their hops, and how well those met the commands."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from hopping_leg.arrays import Array, BoolArray, IntArray
+from hopping_leg.arrays import Array
 from hopping_leg.controllers import command_schedule, hardware_trial
 from hopping_leg.errors import TraceError
-from hopping_leg.sim.channel import SAMPLES, Measurement
 from hopping_leg.trace import Trace
 
 
@@ -22,8 +21,6 @@ class TrialData:
     """Joint velocities, rad/s, (ticks, n, 2)."""
     torque: Array
     """Measured joint torques, N m, (ticks, n, 2)."""
-    asked: Array
-    """Torques that the controller asked for, N m, (ticks, n, 2)."""
     command: Array
     """Desired height, m, (ticks, n)."""
     period: float
@@ -34,10 +31,13 @@ class TrialData:
         """Return equally long traces as arrays; ``TraceError`` without columns or samples."""
         joints = {
             name: np.stack(
-                [np.stack([t.column(column) for column in columns], axis=1) for t in traces],
+                [
+                    np.stack([t.column(c) for c in hardware_trial.MEASURED[name]], axis=1)
+                    for t in traces
+                ],
                 axis=1,
             )
-            for name, columns in hardware_trial.MEASURED.items()
+            for name in ("q", "qd", "torque")
         }
         if np.isnan(joints["q"]).all(axis=(0, 2)).any():
             raise TraceError("A trace of a trial holds no sample of the joints; it tells nothing.")
@@ -58,48 +58,12 @@ class TrialData:
         held: Array = np.take_along_axis(joined, np.where(last < 0, first, last), axis=0)
         return held
 
-    def measurements(self) -> Iterator[Measurement]:
-        """Yield what the controller saw at every tick: the newest samples, each with its age."""
-        newest = self._newest()
-        legs = np.arange(self.command.shape[1])[:, None]
-        for tick, chosen in enumerate(newest):
-            at = (chosen, legs)
-            age = np.maximum(tick - chosen, 0) * self.period
-            yield Measurement(self.q[at], self.qd[at], self.command[at], age)
-
-    def _newest(self) -> IntArray:
-        """Return the ticks of the newest samples of both joints, newest first, (ticks, n, 3)."""
-        whole = np.isfinite(self.q).all(axis=-1) & np.isfinite(self.qd).all(axis=-1)
-        arrived = np.where(whole, np.arange(self.ticks)[:, None], -1)
-        last = np.maximum.accumulate(arrived, axis=0)
-        first = np.argmax(whole, axis=0)
-        chosen = [np.maximum(last, first)]
-        for _ in range(SAMPLES - 1):
-            before = np.take_along_axis(last, np.maximum(chosen[-1] - 1, 0), axis=0)
-            usable = (chosen[-1] > 0) & (before >= 0)
-            chosen.append(np.where(usable, before, chosen[-1]))
-        return np.stack(chosen, axis=-1)
-
 
 SETTLING = 1.0
 """Time after a new command whose hops do not count, s."""
 
 _FALLEN = 1.0
 """Error of a trial that was ended early, m."""
-
-
-@dataclass(frozen=True)
-class ApexEstimate:
-    """Estimated motion of the base in n trials."""
-
-    height: Array
-    """Height of the base, m, (ticks, n)."""
-    rate: Array
-    """Vertical velocity of the base, m/s, (ticks, n)."""
-    flying: BoolArray
-    """Whether the foot was in the air, (ticks, n)."""
-    apexes: list[Array]
-    """Per trial tick and height of every apex, m, (hops, 2)."""
 
 
 @dataclass(frozen=True)
@@ -110,18 +74,22 @@ class Score:
     """Command to the median |apex - command|, m; the command itself without hops."""
     offsets: dict[float, float]
     """Command to the median of apex - command, m."""
-    hops: int
-    """Hops that counted."""
+    hops_at: dict[float, int]
+    """Command to its hops that counted."""
     error: float
     """Mean of ``by_command``, or one metre where the trial was ended early."""
 
+    @property
+    def hops(self) -> int:
+        """Hops that counted."""
+        return sum(self.hops_at.values())
 
-def estimated(trial: hardware_trial.HardwareTrial, estimate: ApexEstimate) -> Array:
-    """Return time, command and estimated height of a trial's apexes, s, m, m, (hops, 3)."""
-    tick, height = estimate.apexes[0].T
-    rows = tick.astype(np.int64)
+
+def estimated(trial: hardware_trial.HardwareTrial, apexes: Array) -> Array:
+    """Return time, command and height, s, m, m, (hops, 3), of apexes of tick and height."""
+    rows = apexes[:, 0].astype(np.int64)
     time, command = (trial.trace.column(name) for name in ("time_s", "command_m"))
-    return np.stack([time[rows] - time[0], command[rows], height], axis=1)
+    return np.stack([time[rows] - time[0], command[rows], apexes[:, 1]], axis=1)
 
 
 def settled(apexes: Array, schedule: command_schedule.CommandSchedule) -> Array:
@@ -137,10 +105,11 @@ def score(apexes: Array, schedule: command_schedule.CommandSchedule, complaint: 
     A complaint says why the trial was ended early, if it was.
     """
     counted = settled(apexes, schedule)
-    errors, offsets = {}, {}
+    errors, offsets, hops = {}, {}, {}
     for command in sorted(set(schedule.heights)):
         off = counted[np.isclose(counted[:, 1], command), 2] - command
+        hops[command] = len(off)
         errors[command] = float(np.median(np.abs(off))) if len(off) else command
         offsets[command] = float(np.median(off)) if len(off) else -command
     error = _FALLEN if complaint else float(np.mean(list(errors.values())))
-    return Score(errors, offsets, len(counted), error)
+    return Score(errors, offsets, hops, error)
