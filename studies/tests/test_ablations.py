@@ -1,55 +1,162 @@
-"""All variants train as long, and one that does not hop says so."""
+"""Variants differ from the recipe in one part, train as long, and are judged alike."""
 
+import json
+
+import numpy as np
 import pytest
 
-from hopping_leg.rl.recipes import VARIANTS
-from studies.ablations import run as bench
+pytest.importorskip("torch", reason="the extra 'train' is not installed")
+
+import torch
+from tests.rl.learners import ROBOT, TINY_FAST, learn, learner, try_briefly
+
+from hopping_leg.errors import UsageError
+from hopping_leg.rl.recipes.precise import PRECISE
+from studies.ablations import ppo
+from studies.ablations import run as module
+from studies.ablations.run import VARIANTS, Ablation, distilled, taught_by_ppo
+
+ROLLOUT = TINY_FAST.algorithm.n_steps * TINY_FAST.schedule.num_envs
+PPO_ROLLOUT = 64 * TINY_FAST.schedule.num_envs
 
 
-def row(command, error, skipped):
-    hops = {"command_m": command, "median_error_m": error, "std_m": error and 0.004}
-    return {**hops, "skipped_hops": skipped, "body_contacts": 1}
-
-
-def trained_to(*rows, exams=()):
-    """Return what a training comes to."""
-    run = {"seed": 0, "minutes": 1.0, "teacher_scores_m": list(exams), "selected": list(rows)}
-    return {"rows": list(rows), "runs": [run]}
-
-
-def test_all_variants_train_as_long_and_are_summed_up(monkeypatch, tmp_path, robot):
+@pytest.fixture
+def tiny(monkeypatch):
+    """Let `precise` be small and its trials short; return the numbers of its trainings."""
+    monkeypatch.setattr(module, "PRECISE", TINY_FAST)
+    try_briefly(monkeypatch)
     trained = []
 
-    def train(recipe, _robot, out, **_options):
-        trained.append((out.name, recipe.schedule.steps))
-        hops = None if out.name == "no-event" else -0.003
-        return trained_to(row(0.25, 0.001, 0), row(0.35, hops, 2), exams=[0.004])
+    def noted(recipe, robot, seed):
+        trained.append((recipe.value("hidden"), recipe.schedule.steps, seed))
+        return distilled(recipe, robot, seed)
 
-    monkeypatch.setattr(bench, "bench_training", train)
-    result = bench.bench_ablation("fast", robot, tmp_path, steps=1000)
-    assert trained == [(name, 1000) for name in VARIANTS["fast"]]
-    found = {variant["variant"]: variant for variant in result["variants"]}
-    assert found["recipe"]["worst_abs_median_error_m"] == pytest.approx(0.003)
-    assert found["recipe"]["mean_abs_median_error_m"] == pytest.approx(0.002)
-    assert (found["recipe"]["skipped_hops"], found["recipe"]["body_contacts"]) == (2, 2)
-    assert (found["recipe"]["seed"], found["recipe"]["teacher_scores_m"]) == (0, [0.004])
-    assert found["no-event"]["mean_abs_median_error_m"] is None
+    for name in ("recipe", "small"):
+        meaning, changes, _ = VARIANTS[name]
+        monkeypatch.setitem(VARIANTS, name, (meaning, changes, noted))
+    return trained
 
 
-def test_named_variants_alone_train_in_the_order_of_all(monkeypatch, tmp_path, robot):
-    trained = []
-
-    def train(_recipe, _robot, out, **_options):
-        trained.append(out.name)
-        return trained_to(row(0.25, 0.001, 0))
-
-    monkeypatch.setattr(bench, "bench_training", train)
-    bench.bench_ablation("fast", robot, tmp_path, steps=1000, variants=["no-event", "recipe"])
-    assert trained == ["recipe", "no-event"]
-    with pytest.raises(bench.UsageError, match=r"variant of fast 'no-events'.*'no-event'"):
-        bench.bench_ablation("fast", robot, tmp_path, steps=1000, variants=["no-events"])
+def weights(network):
+    return [np.concatenate([w.ravel(), b]) for w, b in network.layers]
 
 
-def test_a_recipe_without_ablations_is_refused(tmp_path, robot):
-    with pytest.raises(bench.UsageError, match=r"'paper'.*fast"):
-        bench.bench_ablation("paper", robot, tmp_path, steps=1000)
+def test_variants_differ_from_the_recipe_and_from_each_other_in_what_they_name():
+    made = [(PRECISE.replace(changes), train) for _, changes, train in VARIANTS.values()]
+    assert len({repr(variant) for variant in made}) == len(VARIANTS)
+    assert made[0] == (PRECISE, distilled)
+    for (recipe, _), (_, changes, _) in zip(made, VARIANTS.values(), strict=True):
+        differing = {n for n, _ in PRECISE.paths() if recipe.value(n) != PRECISE.value(n)}
+        assert differing == set(changes)
+
+
+def test_every_variant_trains_as_long_with_every_seed_and_once(tiny, tmp_path):
+    study = Ablation(("small", "recipe"), (0, 1), 2 * ROLLOUT, ROBOT.name, tmp_path)
+    found = study.measure()
+    own = TINY_FAST.value("hidden")
+    assert tiny == [(hidden, 2 * ROLLOUT, seed) for hidden in ((64, 64), own) for seed in (0, 1)]
+    assert [(r["variant"], r["seed"]) for r in found["rows"]] == [
+        ("small", 0), ("small", 1), ("recipe", 0), ("recipe", 1),
+    ]  # fmt: skip
+    assert [row["runs"] for row in found["variants"]] == [2, 2]
+    again = study.measure()
+    assert json.dumps(again) == json.dumps(found)
+    assert len(tiny) == 4
+
+
+def test_a_variant_is_summed_up_over_seeds_its_worst_height_being_that_of_any():
+    keys = ("mean_abs_median_error_m", "worst_abs_median_error_m", "mean_std_m", "skipped_hops")
+    runs = {
+        "a": [(0.002, 0.010, 0.004, 3), (0.004, 0.006, 0.006, 1)],
+        "b": [(0.1, 0.2, 0.3, 0)],
+    }
+    rows = [
+        {"variant": name, "meaning": f"{name}!", "body_contact_ticks": 1}
+        | dict(zip(keys, numbers, strict=True))
+        for name, trained in runs.items()
+        for numbers in trained
+    ]
+    first, second = module._over_seeds(rows)
+    assert (first["variant"], first["meaning"], first["runs"]) == ("a", "a!", 2)
+    assert [first[key] for key in keys] == pytest.approx([0.003, 0.010, 0.005, 4])
+    assert first["body_contact_ticks"] == 2
+    assert second["runs"] == 1
+
+
+def test_an_unknown_variant_is_a_sentence_before_anything_is_trained(tiny, tmp_path):
+    with pytest.raises(UsageError, match=r"variant 'smal'.*'small'"):
+        Ablation(("recipe", "smal"), out=tmp_path).measure()
+    assert not tiny
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_student_hops_alone_after_the_first_rollout_without_help():
+    made = learner(TINY_FAST.replace(VARIANTS["no-help"][1]))
+    shares = []
+    made.on_boundary = lambda: shares.append(made.mixing)
+    learn(made, 3 * ROLLOUT)
+    assert shares == [1, 0, 0]
+
+
+@pytest.fixture(scope="module")
+def teachers():
+    """Return two teachers of one seed and one of another."""
+    torch.set_num_threads(1)
+    return [ppo.learn_teacher(TINY_FAST, ROBOT, seed, 2 * PPO_ROLLOUT) for seed in (0, 0, 1)]
+
+
+def test_a_teacher_that_learns_acts_by_the_true_state_and_its_seed(teachers):
+    task = learner(TINY_FAST).task
+    first, same, other = (make(task).torque(task.command) for make in teachers)
+    assert first.shape == (task.count, 2)
+    assert (np.abs(first) <= task.options.action_torque).all()
+    np.testing.assert_array_equal(first, same)
+    assert not np.allclose(first, other)
+    task.legs.height += 0.05
+    assert not np.allclose(teachers[0](task).torque(task.command), first)
+
+
+def test_the_student_of_a_teacher_that_learnt_is_another_than_that_of_shooting():
+    recipe = TINY_FAST.replace(steps=PPO_ROLLOUT)
+    taught, shot = (weights(way(recipe, ROBOT, 0)) for way in (taught_by_ppo, distilled))
+    assert [len(layer) for layer in taught] == [len(layer) for layer in shot]
+    assert not np.allclose(taught[-1], shot[-1])
+
+
+def test_refinement_begins_at_the_students_weights_and_leaves_them():
+    made = learn(learner(TINY_FAST), 2 * ROLLOUT)
+    student = weights(made.network())
+    begun, gone_on = (
+        weights(ppo.refine(made, TINY_FAST, ROBOT, 0, steps)) for steps in (0, PPO_ROLLOUT)
+    )
+    for ours, theirs, later in zip(begun, student, gone_on, strict=True):
+        np.testing.assert_allclose(ours, theirs, atol=1e-6)
+        assert not np.allclose(later, theirs, atol=1e-6)
+
+
+def test_the_actor_sees_its_own_inputs_alone_and_the_critic_the_others():
+    split = ppo._Split(5, 12, [8, 8])
+    seen, other = torch.randn(3, 12), torch.randn(3, 12)
+    other[:, :5] = seen[:, :5]
+    assert torch.equal(split.forward_actor(seen), split.forward_actor(other))
+    assert not torch.equal(split.forward_critic(seen), split.forward_critic(other))
+    changed = torch.cat([other[:, :5], seen[:, 5:]], dim=1)
+    assert torch.equal(split.forward_critic(seen), split.forward_critic(changed))
+
+
+def test_an_episode_of_a_teacher_ends_in_the_state_in_which_it_was():
+    env = ppo._TrueState(ppo._task(TINY_FAST.replace({"task.episode": 0.05}), ROBOT, 0))
+    first = env.reset()
+    assert first.shape == (TINY_FAST.schedule.num_envs, *env.observation_space.shape)
+    ended = 0
+    for _ in range(12):
+        before = env.task.privileged().copy()
+        seen, _, done, infos = env.step(np.zeros((env.num_envs, 2), np.float32))
+        for leg in np.flatnonzero(done):
+            last = infos[leg]["terminal_observation"]
+            assert last.shape == env.observation_space.shape
+            np.testing.assert_array_equal(last[: env.seen], last[env.seen :])
+            moved = np.abs(last[: env.seen - 2] - before[leg]).max()
+            assert moved < np.abs(last - seen[leg]).max()
+            ended += 1
+    assert ended >= env.num_envs

@@ -48,16 +48,12 @@ step {1000 * TIMESTEP:g} ms, the first 2 s of each trial dropped. These seeds ch
 def stages(rows: list[dict[str, Any]]) -> str:
     """Return lines on the stages of a distillation, if it was one."""
     shown = "\n".join(
-        f"  - {row['name']}: {row['score']} {_mm(row['score_m'])}"
+        f"  - {row['name']}: {row['score']} {_mm(row['score_m'])} mm"
         f" after {row['seconds']:.0f} s, {'passed' if row['passed'] else '**not passed**'}"
         f" (at most {1000 * row['must_score_m']:g} mm)"
         for row in rows
     )
     return f"- Stages:\n{shown}\n" if rows else ""
-
-
-def _mm(score: float | None) -> str:
-    return "unknown without a hop" if score is None else f"{1000 * score:.1f} mm"
 
 
 def selection(result: dict[str, Any]) -> str:

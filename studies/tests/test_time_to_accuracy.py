@@ -1,0 +1,176 @@
+"""Accuracy over time: what counts, what is kept, and that a snapshot is the policy as it stood."""
+
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch", reason="the extra 'train' is not installed")
+
+from stable_baselines3 import PPO, SAC
+from tests.rl.learners import ROBOT, TINY, TINY_FAST, try_briefly
+
+from hopping_leg.controllers.policy import Policy
+from hopping_leg.envs import HoppingEnv
+from hopping_leg.rl.policy_evaluation import CommandResult
+from hopping_leg.rl.recipes import RECIPES
+from studies.time_to_accuracy import run as module
+from studies.time_to_accuracy import sb3
+from studies.time_to_accuracy.run import SHARES, TimeToAccuracy, draw, over_commands, summarise
+
+KEYS = {
+    "recipe",
+    "seed",
+    "seconds",
+    "steps",
+    "mean_abs_median_error_m",
+    "mean_std_m",
+    "worst_abs_median_error_m",
+    "skipped_hops",
+}
+
+
+def hops(command, error, std=0.002, count=9, skipped=0):
+    return CommandResult(command, error, std, count, 2.0, 0.5, skipped, 1, 0.15)
+
+
+def row(recipe, seed, seconds, error, skipped=0):
+    numbers = {"mean_abs_median_error_m": error, "mean_std_m": error / 2, "skipped_hops": skipped}
+    return {"recipe": recipe, "seed": seed, "seconds": seconds, **numbers}
+
+
+def test_errors_count_by_magnitude_and_faults_add_up():
+    found = over_commands([hops(0.25, -0.004, skipped=2), hops(0.3, 0.002, std=0.006)])
+    assert found["commands"] == 2
+    assert found["mean_abs_median_error_m"] == pytest.approx(0.003)
+    assert found["worst_abs_median_error_m"] == pytest.approx(0.004)
+    assert found["mean_std_m"] == pytest.approx(0.004)
+    assert (found["skipped_hops"], found["body_contact_ticks"]) == (2, 2)
+
+
+def test_a_height_without_hops_is_off_by_that_height():
+    still = hops(0.35, math.nan, math.nan, 0)
+    found = over_commands([hops(0.25, 0.001), still])
+    assert found["worst_abs_median_error_m"] == pytest.approx(0.35)
+    assert found["mean_std_m"] == pytest.approx(0.002)
+    assert over_commands([still])["mean_std_m"] == 0.0
+
+
+def test_points_in_time_are_averaged_over_seeds_in_their_order():
+    rows = [
+        row("b", 0, 10, 0.2),
+        row("b", 0, 20, 0.1, 3),
+        row("b", 1, 12, 0.4),
+        row("b", 1, 24, 0.3, 4),
+        row("a", 0, 5, 0.5),
+    ]
+    first, second, other = summarise(rows)
+    assert [(r["recipe"], r["runs"]) for r in (first, second, other)] == [
+        ("b", 2), ("b", 2), ("a", 1),
+    ]  # fmt: skip
+    assert (first["seconds"], second["seconds"], other["seconds"]) == (11, 22, 5)
+    assert first["mean_error_m"] == pytest.approx(0.3)
+    assert second["worst_seed_mean_error_m"] == pytest.approx(0.3)
+    assert second["mean_std_m"] == pytest.approx(0.1)
+    assert second["skipped_hops"] == 7
+
+
+def test_shares_grow_to_the_whole_recipe():
+    for name, shares in SHARES.items():
+        assert name in RECIPES
+        assert list(shares) == sorted(set(shares))
+        assert 0 < shares[0] < shares[-1] == 1
+
+
+def test_every_seed_is_a_line_and_every_recipe_a_colour():
+    rows = [row(name, seed, t, 0.1) for name in "ab" for seed in (0, 1) for t in (1, 2, 3)]
+    for axes in draw(rows).axes:
+        lines = axes.get_lines()
+        assert [len(line.get_xdata()) for line in lines] == [3] * 4
+        colours = [line.get_color() for line in lines]
+        assert colours[0] == colours[1] != colours[2] == colours[3]
+
+
+@pytest.mark.parametrize(("name", "algorithm"), [("sb3-ppo", PPO), ("sb3-sac", SAC)])
+def test_a_policy_file_of_stable_baselines3_acts_as_its_model_does(name, algorithm):
+    env = HoppingEnv(ROBOT)
+    model = algorithm("MlpPolicy", env, seed=0, device="cpu")
+    policy = Policy(sb3.policy_file(model, name, ROBOT, 0), name, name)
+    assert policy.card.robot == ROBOT.name
+    seen, _ = env.reset(seed=0)
+    policy.reset(1)
+    actions = []
+    for _ in range(20):
+        actions.append(model.predict(seen, deterministic=True)[0])
+        torque = policy.act(env.task.measurement)[0]
+        np.testing.assert_allclose(torque, actions[-1] * policy.card.torque_scale, atol=1e-4)
+        seen, *_ = env.step(np.random.default_rng(0).uniform(-1, 1, 2).astype(np.float32))
+    assert np.ptp(actions) > 1e-3
+
+
+def test_snapshots_of_stable_baselines3_come_at_equal_times_until_the_minutes_are_over():
+    found = sb3.learn("sb3-ppo", ROBOT, 0, minutes=0.02, snapshots=3)
+    assert len(found) == 3
+    for number, snapshot in enumerate(found, start=1):
+        assert 0.4 * number <= snapshot.seconds < 0.4 * number + 0.5
+        assert Policy(snapshot.content, "snapshot", "s").card.steps == snapshot.steps
+    assert 0 < found[0].steps < found[1].steps < found[2].steps
+
+
+@pytest.fixture
+def tiny(monkeypatch, tmp_path):
+    """Return what makes a study of small recipes in a folder; ``trained`` are their trainings."""
+    monkeypatch.setattr(
+        module, "RECIPES", {"fast": TINY_FAST, "paper": TINY.replace(eval_every=400)}
+    )
+    monkeypatch.setattr(module, "SHARES", {"fast": (0.5, 1.0)})
+    try_briefly(monkeypatch)
+    train = module.train
+
+    def counted(recipe, robot, seed, folder, **options):
+        if len(make.trained) == make.killed_after:
+            raise KeyboardInterrupt
+        make.trained.append((recipe.name, seed, recipe.schedule.steps))
+        return train(recipe, robot, seed, folder, quiet=True, **options)
+
+    def make(*recipes, seeds=(0,)):
+        return TimeToAccuracy(recipes, seeds, robot=ROBOT.name, out=tmp_path).measure()
+
+    make.trained, make.killed_after = [], None
+    monkeypatch.setattr(module, "train", counted)
+    return make
+
+
+def test_a_distillation_is_trained_anew_for_every_share_of_its_steps_and_once(tiny):
+    steps = TINY_FAST.schedule.steps
+    found = tiny("fast")
+    assert tiny.trained == [(TINY_FAST.name, 0, steps // 2), (TINY_FAST.name, 0, steps)]
+    assert [row["steps"] for row in found["rows"]] == [steps // 2, steps]
+    assert all(row.keys() >= KEYS for row in found["rows"])
+    assert {row["part"] for row in found["spent"]} >= {"rollouts", "gradient steps"}
+    assert found["robots"] == {"fast": ROBOT.name}
+    assert tiny("fast") == found
+    assert len(tiny.trained) == 2
+
+
+def test_a_study_that_was_killed_goes_on(tiny):
+    tiny.killed_after = 1
+    with pytest.raises(KeyboardInterrupt):
+        tiny("fast")
+    tiny.killed_after = None
+    rows = tiny("fast", seeds=(0, 1))["rows"]
+    steps = TINY_FAST.schedule.steps
+    assert [(seed, count) for _, seed, count in tiny.trained] == [
+        (0, steps // 2), (0, steps), (1, steps // 2), (1, steps),
+    ]  # fmt: skip
+    assert [row["seed"] for row in rows] == [0, 0, 1, 1]
+
+
+def test_of_a_recipe_without_shares_every_snapshot_is_judged(tiny):
+    rows = tiny("paper")["rows"]
+    assert len(tiny.trained) == 1
+    assert [row["steps"] for row in rows] == sorted({row["steps"] for row in rows})
+    assert len(rows) >= 2
+    times = [row["seconds"] for row in rows]
+    assert 0 < times[0] < times[-1]
+    assert times == sorted(times)
