@@ -26,12 +26,8 @@ def filled(name: str) -> str:
 def _tables(name: str) -> str:
     if (docs := str(ROOT / "docs")) not in sys.path:
         sys.path.append(docs)
-    macros = importlib.import_module("macros_results").MACROS
-    parts = []
-    for macro, file, *words in importlib.import_module(f"studies.{name}").TABLES:
-        where = words.pop() if isinstance(words[-1], dict) else {}
-        parts.append(macros[macro](f"{name}/{file}", *words, **where))
-    return "\n".join(parts).replace(f"(results/{name}/", "(results/")
+    tables: str = importlib.import_module("macros_results").tables(name)
+    return tables.replace(f"(results/{name}/", "(results/")
 
 
 def write(name: str) -> None:

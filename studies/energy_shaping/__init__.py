@@ -2,10 +2,8 @@
 
 RESULTS = (
     "python -m studies.energy_shaping --json studies/energy_shaping/results/energy_shaping.json",
-    "hop tune energy-shaping --start energy-shaping --flight 0.52 --generations 40 "
-    "--population 16 --step 0.2 --out runs/flying-0",
-    "hop tune energy-shaping --start runs/flying-0/gains.toml --seed 1 --flight 0.52 "
-    "--generations 40 --population 16 --step 0.1 --out runs/flying --json "
+    "hop tune energy-shaping --start energy-shaping-legv2-identified --flight 0.5 --generations 40 "
+    "--population 16 --commands 0.22 0.25 0.29 0.33 0.36 --out runs/flying --json "
     "studies/energy_shaping/results/flying.json",
 )
 

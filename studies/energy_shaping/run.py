@@ -24,7 +24,7 @@ from hopping_leg.evaluate.metrics import (
     measure,
     pooled_apexes,
 )
-from hopping_leg.robot import Robot, load_robot
+from hopping_leg.robot import DEFAULT_ROBOT, TIMESTEP, Robot, load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, NoiseAndDelay
 from hopping_leg.trace import Trace
 
@@ -33,9 +33,6 @@ COMMANDS = (0.25, 0.30, 0.35)
 
 RANGE = (0.22, 0.25, 0.28, 0.30, 0.32, 0.35, 0.38, 0.40)
 """Heights over which the baseline is to hold, m."""
-
-FIRST_SEED = 1000
-"""Seeds from here on have tuned nothing."""
 
 
 @dataclass(frozen=True)
@@ -110,19 +107,19 @@ def _ablations(tuned: EnergyShaping, robot: Robot) -> list[Case]:
 
 
 def _changed_legs(tuned: EnergyShaping, robot: Robot) -> list[Case]:
-    stiff = load_robot("legv2").contact
+    soft = load_robot("legv2-paper").contact
     rail = robot.rail
-    other = load_robot("legv2")
+    others = [load_robot(name) for name in ("legv2", "legv2-paper")]
     return [
         Case("tuned, 20 % more mass", tuned, _heavier(robot, 0.2)),
         Case("tuned, 20 % less mass", tuned, _heavier(robot, -0.2)),
-        Case("tuned, stiff floor", tuned, replace(robot, contact=stiff)),
+        Case("tuned, soft floor", tuned, replace(robot, contact=soft)),
         Case(
             "tuned, three times the rail friction",
             tuned,
             replace(robot, rail=replace(rail, friction=3 * rail.friction)),
         ),
-        Case("tuned, leg legv2", tuned_energy_shaping(other), other),
+        *(Case(f"tuned, leg {leg.name}", tuned_energy_shaping(leg), leg) for leg in others),
     ]
 
 
@@ -131,31 +128,62 @@ def _heavier(robot: Robot, share: float) -> Robot:
     return replace(robot, base=base)
 
 
-def run(
-    seed: int = 0,
-    *,
-    runs: int = 6,
-    seconds: float = 12.0,
-    threads: int = 0,
-    on_case: Callable[[int, int], None] | None = None,
-) -> dict[str, Any]:
-    """Try every case on the leg the gains were found on.
+@dataclass(frozen=True)
+class Baseline:
+    """Judge energy shaping: the printed law, the tuned one, what each part is worth."""
+
+    robot: str = DEFAULT_ROBOT
+    """A shipped name or the path of a .toml file."""
+    runs: int = 6
+    """Realisations of noise and delay per command."""
+    duration: float = 12.0
+    """Of a run, s; the first 2 s do not count."""
+    seed: int = 1000
+    """Of noise and delay; those from 1000 on have tuned nothing."""
+    threads: int = 0
+    """Threads of the physics, 0 for all cores; results do not depend on it."""
+    json: Path | None = None
+    """Write every number to this file."""
+
+    def measure(self) -> dict[str, Any]:
+        """Run it, print a table, return every number."""
+        at_least(1, runs=self.runs)
+        at_least(0, threads=self.threads, seed=self.seed)
+        if not 4 <= self.duration <= 600:
+            raise UsageError(f"--duration is {self.duration} s but must lie between 4 and 600 s.")
+        with Progress(transient=True) as bar:
+            task = bar.add_task("hopping", total=None)
+            result = run(self, lambda done, total: bar.update(task, completed=done, total=total))
+        table = Table("case", "median error, mm", "std, mm", "hops/s", "skipped", "body contacts")
+        for row in result["cases"]:
+            sizes = [row["mean_abs_median_error_m"], row["mean_std_m"]]
+            numbers = ["-" if x is None else f"{1e3 * x:.1f}" for x in sizes]
+            numbers += [
+                f"{row['hop_rate_hz']:.2f}",
+                f"{row['skipped_hops']}",
+                f"{row['body_contacts']}",
+            ]
+            table.add_row(row["case"], *numbers)
+        Console().print(table)
+        return result
+
+
+def run(study: Baseline, on_case: Callable[[int, int], None] | None = None) -> dict[str, Any]:
+    """Try every case.
 
     Args:
-        seed: Counted from the first that has tuned nothing.
-        runs: Realisations of noise and delay per command.
-        seconds: Of a run, the first 2 s of which do not count.
-        threads: Physics threads, 0 for one per core.
+        study: On which leg, how often and how long.
         on_case: Called with (cases done, cases in all).
 
     Returns:
         ``cases``, one record each; ``commands``, one record per case and command;
         ``estimators``, errors of the apex estimates.
     """
-    todo = cases(load_robot("legv2-paper"))
+    robot = load_robot(study.robot)
+    todo, runs = cases(robot), study.runs
     overall, single, estimators = [], [], []
     for index, case in enumerate(todo):
-        traces = _hop(case, FIRST_SEED + seed, runs, seconds, threads)
+        traces = _hop(case, study)
         rows = [
             _row(case, c, [measure(t)[0] for t in traces[i * runs : (i + 1) * runs]])
             for i, c in enumerate(case.commands)
@@ -167,23 +195,25 @@ def run(
         if on_case is not None:
             on_case(index + 1, len(todo))
     return {
-        "seed": FIRST_SEED + seed,
+        "robot": robot.name,
+        "seed": study.seed,
         "runs_per_command": runs,
-        "exponent": float(tuned_energy_shaping(load_robot("legv2-paper")).gains.exponent),
-        "seconds": seconds,
+        "exponent": float(tuned_energy_shaping(robot).gains.exponent),
+        "seconds": study.duration,
+        "timestep_s": TIMESTEP,
         "cases": overall,
         "commands": single,
         "estimators": estimators,
     }
 
 
-def _hop(case: Case, seed: int, runs: int, seconds: float, threads: int) -> list[Trace]:
+def _hop(case: Case, study: Baseline) -> list[Trace]:
     """Return one trace per command and run, commands in the outer order."""
     controller = case.controller
     rate = 1 / controller.period
-    setup = RolloutConfig(case.robot, case.disturbance, rate=rate, threads=threads)
-    commands = np.tile(np.repeat(case.commands, runs), (round(seconds * rate), 1))
-    run = rollout(controller, setup, commands, seed)
+    setup = RolloutConfig(case.robot, case.disturbance, rate=rate, threads=study.threads)
+    commands = np.tile(np.repeat(case.commands, study.runs), (round(study.duration * rate), 1))
+    run = rollout(controller, setup, commands, study.seed)
     return [run.trace(leg) for leg in range(commands.shape[1])]
 
 
@@ -248,47 +278,3 @@ def _estimators(case: Case, traces: Sequence[Trace]) -> list[dict[str, Any]]:
 def _estimating(trace: Trace, column: str) -> Trace:
     table = trace.table.with_columns(pl.col(column).alias(ESTIMATED_APEX))
     return Trace(table, trace.header)
-
-
-@dataclass(frozen=True)
-class Baseline:
-    """Judge energy shaping: the printed law, the tuned one, what each part is worth."""
-
-    runs: int = 6
-    """Realisations of noise and delay per command."""
-    duration: float = 12.0
-    """Of a run, s; the first 2 s do not count."""
-    seed: int = 0
-    """Of noise and delay; no seed of the benchmark has tuned anything."""
-    threads: int = 0
-    """Threads of the physics, 0 for all cores; results do not depend on it."""
-    json: Path | None = None
-    """Write every number to this file."""
-
-    def measure(self) -> dict[str, Any]:
-        """Run it, print a table, return every number."""
-        at_least(1, runs=self.runs)
-        at_least(0, threads=self.threads, seed=self.seed)
-        if not 4 <= self.duration <= 600:
-            raise UsageError(f"--duration is {self.duration} s but must lie between 4 and 600 s.")
-        with Progress(transient=True) as bar:
-            task = bar.add_task("hopping", total=None)
-            result = run(
-                self.seed,
-                runs=self.runs,
-                seconds=self.duration,
-                threads=self.threads,
-                on_case=lambda done, total: bar.update(task, completed=done, total=total),
-            )
-        table = Table("case", "median error, mm", "std, mm", "hops/s", "skipped", "body contacts")
-        for row in result["cases"]:
-            sizes = [row["mean_abs_median_error_m"], row["mean_std_m"]]
-            numbers = ["-" if x is None else f"{1e3 * x:.1f}" for x in sizes]
-            numbers += [
-                f"{row['hop_rate_hz']:.2f}",
-                f"{row['skipped_hops']}",
-                f"{row['body_contacts']}",
-            ]
-            table.add_row(row["case"], *numbers)
-        Console().print(table)
-        return result

@@ -20,6 +20,7 @@ from rich.table import Table
 
 from hopping_leg.cli.options import Heights, at_least, mm
 from hopping_leg.controllers import RolloutConfig
+from hopping_leg.controllers.registry import robot_of
 from hopping_leg.errors import PhysicsError
 from hopping_leg.evaluate.entries import load_entries
 from hopping_leg.evaluate.result import Summary
@@ -75,37 +76,61 @@ WORLDS = (
 RATES = ((400.0, 1), (400.0, 3), (400.0, 6), (CONTROL_RATE, 10))
 """Control rate, Hz, and physics steps in a control period, tried on PyBullet's rigid ground."""
 
+RATED = "energy-shaping"
+"""Controller that tries the rates."""
+
 
 @dataclass(frozen=True)
-class EnginesStudy:
-    """What is compared."""
+class Engines:
+    """Let controllers hop in PyBullet as well, without retraining; needs the extra `bullet`."""
 
-    robot: Robot
-    controllers: Sequence[str]
-    """Names or policy files."""
-    rated: str = "energy-shaping"
-    """Controller that tries the rates."""
-    commands: Sequence[float] | None = None
-    """Desired heights, m; the paper's by default."""
+    controllers: tuple[str, ...] = (RATED, "fast", "precise", "paper")
+    """Names or .onnx files."""
+    robot: str | None = None
+    """A shipped name or the path of a .toml file; default: that on which each policy was trained,
+    else legv2-identified."""
+    commands: Heights | None = None
+    """Apex heights, m; default 0.25,0.30,0.35, scaled to the leg's length."""
     seeds: int = 2
     """Realisations of noise and delay per command."""
     seed: int = 1000
+    """All of them follow from it; choose one that selected nothing."""
     timestep: float = TIMESTEP
     """Physics step, s."""
-    worlds: Sequence[World] = WORLDS
-    rates: Sequence[tuple[float, int]] = RATES
+    workers: int = 2
+    """Processes that share the work; the numbers do not depend on it."""
+    json: Path | None = None
+    """Write every number to this file."""
+
+    def measure(self) -> dict[str, Any]:
+        """Run it, print a table, return every number."""
+        at_least(1, seeds=self.seeds, workers=self.workers)
+        at_least(0, seed=self.seed)
+        with Progress(transient=True) as bar:
+            task = bar.add_task("hopping", total=None)
+            result = bench_engines(
+                self, on_done=lambda done, total: bar.update(task, completed=done, total=total)
+            )
+        _print(result)
+        return result
+
+    def leg(self, controller: str) -> Robot:
+        """Return the robot on which a controller hops."""
+        return load_robot(self.robot or robot_of([controller]))
 
 
 def bench_engines(
-    study: EnginesStudy,
-    workers: int = 1,
+    study: Engines,
+    worlds: Sequence[World] = WORLDS,
+    rates: Sequence[tuple[float, int]] = RATES,
     on_done: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> dict[str, Any]:
     """Let all controllers hop in all worlds, and drop the leg in each.
 
     Args:
         study: What is compared.
-        workers: Processes that share the work; the numbers do not depend on it.
+        worlds: Where.
+        rates: Control rates and physics steps in a control period.
         on_done: Called with (parts done, parts in all).
 
     Returns:
@@ -114,12 +139,12 @@ def bench_engines(
         ``rates``.
     """
     import_pybullet()
-    places = list(itertools.product(study.worlds, study.controllers))
-    with ProcessWorkers(workers) as pool:
+    places = list(itertools.product(worlds, study.controllers))
+    with ProcessWorkers(study.workers) as pool:
         hops = [pool.submit(_hop_timed, study, *place) for place in places]
-        rates = [pool.submit(_rate, study, *rate) for rate in study.rates]
-        drops = [pool.submit(_drop, study, world) for world in study.worlds]
-        parts: list[Future[Any]] = [*hops, *rates, *drops]
+        tried = [pool.submit(_rate, study, *rate) for rate in rates]
+        drops = [pool.submit(_drop, study, world) for world in worlds]
+        parts: list[Future[Any]] = [*hops, *tried, *drops]
         for done, part in enumerate(as_completed(parts), 1):
             part.result()
             on_done(done, len(parts))
@@ -127,21 +152,20 @@ def bench_engines(
     return {
         "rows": [_row(world, row) for world, _, summary, _ in summaries for row in summary],
         "worlds": [
-            _judge(world, name, summary) | {"cpu_s_per_s": cost}
+            _judge(world, name, summary) | {"robot": study.leg(name).name, "cpu_s_per_s": cost}
             for world, name, summary, cost in summaries
         ],
         "drops": [part.result() for part in drops],
-        "rates": [part.result() for part in rates],
+        "rates": [part.result() for part in tried],
         "bar_m": BAR,
         "seeds": study.seeds,
         "seed": study.seed,
         "timestep_s": study.timestep,
-        "robot": study.robot.name,
         "versions": software_versions("pybullet"),
     }
 
 
-def _hop_timed(study: EnginesStudy, world: World, name: str) -> tuple[list[Summary], float]:
+def _hop_timed(study: Engines, world: World, name: str) -> tuple[list[Summary], float]:
     """Return what the hops were like, and the processor's time per simulated time of one leg."""
     started = time.process_time()
     summary = _hop(study, world, name)
@@ -149,14 +173,15 @@ def _hop_timed(study: EnginesStudy, world: World, name: str) -> tuple[list[Summa
 
 
 def _hop(
-    study: EnginesStudy,
+    study: Engines,
     world: World,
     name: str,
     rate: float = CONTROL_RATE,
     timestep: float | None = None,
 ) -> list[Summary]:
+    robot = study.leg(name)
     setup = RolloutConfig(
-        study.robot,
+        robot,
         engine=world.engine,
         ground=world.ground,
         rate=rate,
@@ -164,7 +189,7 @@ def _hop(
         threads=1,
     )
     judged = evaluate(
-        load_entries([name], study.robot, rate),
+        load_entries([name], robot, rate),
         setup,
         commands=study.commands,
         repeats=study.seeds,
@@ -199,11 +224,10 @@ def _judge(world: World, name: str, summary: Sequence[Summary]) -> dict[str, Any
     }
 
 
-def _drop(study: EnginesStudy, world: World) -> dict[str, Any]:
+def _drop(study: Engines, world: World) -> dict[str, Any]:
     """Drop the leg from 0.1 m with its joints held at 1 kHz; return how deep the foot sinks."""
-    setup = on_floor(
-        RolloutConfig(study.robot, engine=world.engine, ground=world.ground), world.floor
-    )
+    robot = study.leg(RATED)
+    setup = on_floor(RolloutConfig(robot, engine=world.engine, ground=world.ground), world.floor)
     legs = make_simulator(
         setup.robot,
         1,
@@ -213,8 +237,8 @@ def _drop(study: EnginesStudy, world: World) -> dict[str, Any]:
         timestep=min(study.timestep, 1e-3),
         threads=1,
     )
-    reach = study.robot.thigh.length + study.robot.shank.length
-    posture = joint_angles(study.robot, np.array([0.7 * reach, 0.0]))
+    reach = robot.thigh.length + robot.shank.length
+    posture = joint_angles(robot, np.array([0.7 * reach, 0.0]))
     legs.stand(slice(None), posture, clearance=0.1)
     gaps = []
     for _ in range(1500):
@@ -229,68 +253,17 @@ def _drop(study: EnginesStudy, world: World) -> dict[str, Any]:
     }
 
 
-def _rate(study: EnginesStudy, rate: float, substeps: int) -> dict[str, Any]:
+def _rate(study: Engines, rate: float, substeps: int) -> dict[str, Any]:
     """Try a control rate and physics steps in PyBullet, where the paper had energy shaping."""
     world = World(f"PyBullet, {rate:g} Hz", "pybullet", "rigid")
-    row = {"controller": study.rated, "rate_hz": rate, "physics_hz": rate * substeps}
+    row = {"controller": RATED, "rate_hz": rate, "physics_hz": rate * substeps}
     shown = ("largest_median_error_m", "mean_std_m", "skipped_hops")
     try:
-        summary = _hop(study, world, study.rated, rate, 1 / (rate * substeps))
+        summary = _hop(study, world, RATED, rate, 1 / (rate * substeps))
     except PhysicsError:
         return row | dict.fromkeys(shown)
-    judged = _judge(world, study.rated, summary)
+    judged = _judge(world, RATED, summary)
     return row | {name: judged[name] for name in shown}
-
-
-@dataclass(frozen=True)
-class Engines:
-    """Let controllers hop in PyBullet as well, without retraining; needs the extra `bullet`."""
-
-    controllers: tuple[str, ...] = (
-        "energy-shaping",
-        "fast",
-        "precise",
-        "adaptive",
-        "recurrent",
-        "paper",
-    )
-    """Names or .onnx files."""
-    robot: str = "legv2-paper"
-    """A shipped name or the path of a .toml file."""
-    commands: Heights | None = None
-    """Apex heights, m; default 0.25,0.30,0.35, scaled to the leg's length."""
-    seeds: int = 2
-    """Realisations of noise and delay per command."""
-    seed: int = 1000
-    """All of them follow from it; choose one that selected nothing."""
-    timestep: float = TIMESTEP
-    """Physics step, s."""
-    workers: int = 2
-    """Processes that share the work; the numbers do not depend on it."""
-    json: Path | None = None
-    """Write every number to this file."""
-
-    def measure(self) -> dict[str, Any]:
-        """Run it, print a table, return every number."""
-        at_least(1, seeds=self.seeds, workers=self.workers)
-        at_least(0, seed=self.seed)
-        study = EnginesStudy(
-            load_robot(self.robot),
-            controllers=self.controllers,
-            commands=self.commands,
-            seeds=self.seeds,
-            seed=self.seed,
-            timestep=self.timestep,
-        )
-        with Progress(transient=True) as bar:
-            task = bar.add_task("hopping", total=None)
-            result = bench_engines(
-                study,
-                self.workers,
-                lambda done, total: bar.update(task, completed=done, total=total),
-            )
-        _print(result)
-        return result
 
 
 def _print(result: dict[str, Any]) -> None:

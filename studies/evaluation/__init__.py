@@ -1,18 +1,82 @@
 """Results of `hop evaluate`, `hop robustness` and `hop skills` for the shipped controllers."""
 
+_EVERY_CM = ",".join(f"{0.22 + 0.01 * step:.2f}" for step in range(21))
+"""Heights from 0.22 to 0.42 m."""
+
+_BASELINES = "energy-shaping energy-shaping-flying"
+
+
+def _trials(controllers: str, name: str, options: str) -> str:
+    return (
+        f"hop evaluate {controllers} --no-video {options} --json studies/evaluation/results/{name}"
+    )
+
+
+def _precise(policy: str, name: str, options: str = "") -> str:
+    options = f"--seeds 5 --floor soft --commands {_EVERY_CM} {options}".strip()
+    return _trials(f"{policy} {_BASELINES}", f"{name}.json", options)
+
+
+def _other(robot: str) -> tuple[str, str]:
+    """Return the commands that train `precise` on another robot and evaluate it there."""
+    run = f"runs/precise-{robot}"
+    return (
+        f"test -e {run}/policy.onnx || "
+        f"hop train --recipe precise --robot {robot} --resume --out {run}",
+        _precise(f"precise={run}/policy.onnx", f"precise_{robot}", f"--robot {robot}"),
+    )
+
+
+_ELSEWHERE = ("legv2", "legv2-paper")
+"""Robots on which `precise` is trained, too."""
+
 RESULTS = (
-    "hop evaluate fast precise adaptive paper energy-shaping energy-shaping-literal "
-    "--seeds 10 --no-video --traces runs/results/traces --json "
-    "studies/evaluation/results/evaluation.json",
+    _trials(
+        f"fast precise {_BASELINES} energy-shaping-literal", "evaluation.json",
+        "--seeds 10 --floor soft --traces runs/results/traces",
+    ),
     "hop report figures runs/results/traces/*.parquet --out studies/evaluation/figures",
-    "hop evaluate precise adaptive recurrent energy-shaping energy-shaping-flying --seeds "
-    "5 --floor soft --no-video --commands "
-    "0.22,0.23,0.24,0.25,0.26,0.27,0.28,0.29,0.3,0.31,0.32,0.33,0.34,0.35,0.36,0.37,0.38,0.39,0.4 "
-    "--json studies/evaluation/results/precise.json",
-    "hop robustness energy-shaping energy-shaping-literal fast precise adaptive recurrent "
-    "paper --seeds 3 --out runs/results/robustness --json "
-    "studies/evaluation/results/robustness.json",
+    _trials(f"paper {_BASELINES} energy-shaping-literal", "paper.json", "--seeds 10"),
+    _precise("precise", "precise"),
+    _precise("precise", "precise_fine_step", "--timestep 3.125e-05"),
+    _precise("precise", "precise_no_soft_limits", "--no-soft-limits"),
+    *(command for robot in _ELSEWHERE for command in _other(robot)),
+    f"hop robustness fast precise {_BASELINES} energy-shaping-literal --seeds 3 --out "
+    "runs/results/robustness --json studies/evaluation/results/robustness.json",
     "cp runs/results/robustness/robustness.svg studies/evaluation/figures",
-    "hop skills fast precise adaptive paper energy-shaping --json "
+    f"hop robustness paper {_BASELINES} --seeds 3 --out runs/results/paper_robustness --json "
+    "studies/evaluation/results/paper_robustness.json",
+    "hop skills fast precise energy-shaping --floor soft --json "
     "studies/evaluation/results/skills.json",
+    "hop skills paper energy-shaping --json studies/evaluation/results/paper_skills.json",
+)  # fmt: skip
+
+_LOAD = (
+    "command_m*1000=command, mm",
+    "median_error_m*1000=error, mm",
+    "std_m*1000=std, mm",
+    "flight_fraction*100=flight, %",
+    "rms_hip_torque_nm=RMS hip, N m",
+    "torque_reversals_hz=reversals, 1/s",
+    "outside_limits_fraction*100=outside limits, %",
+    "peak_knee_speed_rad_s=knee speed, rad/s",
+    "stop_contacts=stop contacts",
+    "mean_power_w=power, W",
+    "peak_regeneration_w=peak regeneration, W",
+    "bus_voltage_rise_v=bus rise, V",
+    "thermal_minutes=limited after, min",
+)
+
+TABLES = (
+    ("table", "evaluation.json", "summary", "controller", *_LOAD),
+    ("table", "paper.json", "summary", "controller", *_LOAD),
+    ("precision", "precise.json", 0.42),
+    *(
+        ("table", "precise.json", "summary", *_LOAD, {"controller": name})
+        for name in ("precise", *_BASELINES.split())
+    ),
+    *(
+        ("precision", f"precise_{name}.json", 0.42)
+        for name in ("fine_step", "no_soft_limits", *_ELSEWHERE)
+    ),
 )

@@ -23,7 +23,7 @@ from rich.table import Table
 
 from hopping_leg.cli.options import at_least
 from hopping_leg.errors import UsageError, unknown_name
-from hopping_leg.robot import Robot, load_robot
+from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot
 from hopping_leg.workers import ProcessWorkers
 from studies.fault_campaign.case import Case, Result
 from studies.fault_campaign.families import FAMILIES
@@ -50,7 +50,7 @@ class Campaign:
 
     controllers: tuple[str, ...] = ("fast", "energy-shaping")
     """Names or files."""
-    robot: str = "legv2-paper"
+    robot: str = DEFAULT_ROBOT
     """Name or file of the leg behind the wire."""
     families: tuple[str, ...] = tuple(FAMILIES)
     """Of the faults."""
@@ -245,7 +245,7 @@ class Faults:
     """Of moments, values and drives."""
     controllers: tuple[str, ...] = ("fast", "energy-shaping")
     """Shipped names or files."""
-    robot: str = "legv2-paper"
+    robot: str = DEFAULT_ROBOT
     """The leg behind the wire: a shipped name or the path of a .toml file."""
     families: tuple[str, ...] = ()
     """Families of faults; default: all."""

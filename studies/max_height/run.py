@@ -6,10 +6,10 @@ length. CMA-ES looks for what keeps hopping highest. It is a lower bound of what
 possible and an upper one of what a policy, which must also be accurate, can be asked for.
 """
 
-import functools
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ from hopping_leg.cma_strategy import seeded_strategy
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.result_files import ResultCache
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
-from hopping_leg.robot import JOINTS, Robot, load_robot
+from hopping_leg.robot import DEFAULT_ROBOT, JOINTS, Robot, load_robot
 from hopping_leg.robot.kinematics import foot_position, joint_angles
 from hopping_leg.sim import LegSimulator
 
@@ -55,15 +55,17 @@ _STEP = 0.3
 
 
 @dataclass(frozen=True)
-class ReachStudy:
-    """What is searched and for how long."""
+class Reach:
+    """Search for the highest lasting hops within torques, with the true state and no noise."""
 
-    robot: Robot
-    torques: tuple[tuple[float, float], ...]
+    robot: str = DEFAULT_ROBOT
+    """A shipped name or the path of a .toml file."""
+    torques: tuple[tuple[float, float], ...] = ((6, 6), (8, 18), (10, 20))
     """Largest torques of hip and knee, N m at the joints, one search each, which begins with what
-    the one before found."""
-    generations: int = 150
-    """Generations of CMA-ES."""
+    the one before found: what `paper` and the other recipes may ask for, and the motors' limit of
+    leg V2."""
+    generations: int = 100
+    """Of CMA-ES, for each pair."""
     population: int = 32
     """Candidates per generation."""
     seconds: float = 5.0
@@ -71,11 +73,43 @@ class ReachStudy:
     seed: int = 0
     """Of the search."""
     threads: int = 0
-    """Of the physics, 0 for one per core."""
+    """Threads of the physics, 0 for all cores; results do not depend on it."""
+    folder: Path = Path("runs/bench-reach")
+    """Where what was found for a pair is kept; it is not searched again."""
+    json: Path | None = None
+    """Write every number to this file."""
+
+    def measure(self) -> dict[str, Any]:
+        """Run it, print a table, return every number."""
+        at_least(1, generations=self.generations)
+        at_least(4, population=self.population)
+        at_least(0, threads=self.threads, seed=self.seed)
+        if not self.torques or not all(t > 0 for pair in self.torques for t in pair):
+            raise UsageError("--torques must be pairs of positive torques, N m; e.g. 6 6 10 20.")
+        with Progress(transient=True) as bar:
+            task = bar.add_task("searching", total=None)
+            result = measure_reach(
+                self,
+                ResultCache(self.folder),
+                lambda done, total: bar.update(task, completed=done, total=total),
+            )
+        table = Table("hip, N m", "knee, N m", "apex, m", "hops/s", "rms hip", "rms knee", "hits")
+        for row in result["rows"]:
+            limits = [f"{row[f'{joint}_limit_nm']:g}" for joint in JOINTS]
+            names = ("apex_m", "hop_rate_hz", "rms_hip_torque_nm", "rms_knee_torque_nm")
+            cells = [f"{row[name]:.3g}" for name in names]
+            table.add_row(*limits, *cells, str(row["body_contacts"]))
+        Console().print(table)
+        return result
+
+    @cached_property
+    def leg(self) -> Robot:
+        """The robot."""
+        return load_robot(self.robot)
 
 
 def measure_reach(
-    study: ReachStudy, cache: ResultCache, on_done: Callable[[int, int], None] | None = None
+    study: Reach, cache: ResultCache, on_done: Callable[[int, int], None] | None = None
 ) -> dict[str, Any]:
     """Search for the highest lasting hops within each pair of torques.
 
@@ -100,13 +134,13 @@ def measure_reach(
             "{:g}-{:g}".format(*limit),
             "{:g} and {:g} N m".format(*limit),
             _asked(study, limit, first),
-            functools.partial(_find, study, limit, first, functools.partial(say, earlier)),
+            partial(_find, study, limit, first, partial(say, earlier)),
         )
         way, before = np.array(found["way"]), limit
         rows.append(found["row"])
     return {
         "rows": rows,
-        "robot": study.robot.name,
+        "robot": study.leg.name,
         "generations": study.generations,
         "population": study.population,
         "seed": study.seed,
@@ -114,9 +148,9 @@ def measure_reach(
     }
 
 
-def _asked(study: ReachStudy, limit: Array, first: Array) -> dict[str, Any]:
+def _asked(study: Reach, limit: Array, first: Array) -> dict[str, Any]:
     return {
-        "robot": study.robot.digest,
+        "robot": study.leg.digest,
         "limit": limit.tolist(),
         "first": first.tolist(),
         "generations": study.generations,
@@ -127,7 +161,7 @@ def _asked(study: ReachStudy, limit: Array, first: Array) -> dict[str, Any]:
 
 
 def _find(
-    study: ReachStudy, limit: Array, first: Array, on_done: Callable[[int], None]
+    study: Reach, limit: Array, first: Array, on_done: Callable[[int], None]
 ) -> dict[str, Any]:
     """Return the best way to push within a limit and how it hops, as JSON values."""
     way = _search(study, limit, first, on_done)
@@ -140,7 +174,7 @@ def _with_limit(way: Array, before: Array, limit: Array) -> Array:
     return np.append(way[0], np.clip(0.5 + torques, 0, 1).ravel())
 
 
-def _search(study: ReachStudy, limit: Array, start: Array, on_done: Callable[[int], None]) -> Array:
+def _search(study: Reach, limit: Array, start: Array, on_done: Callable[[int], None]) -> Array:
     """Return the best way to push that was found, no worse than the first, (size,)."""
     strategy = seeded_strategy(start, _STEP, [0.0, 1.0], study.population, study.seed)
     (first,) = hop(study, start[None], limit)
@@ -155,7 +189,7 @@ def _search(study: ReachStudy, limit: Array, start: Array, on_done: Callable[[in
     return found
 
 
-def _row(study: ReachStudy, way: Array, limit: Array) -> dict[str, Any]:
+def _row(study: Reach, way: Array, limit: Array) -> dict[str, Any]:
     (trial,) = hop(study, way[None], limit)
     return {
         "hip_limit_nm": float(limit[0]),
@@ -193,7 +227,7 @@ class Trial:
         return self.apex - 0.01 * self.contacts
 
 
-def hop(study: ReachStudy, ways: Array, limit: Array) -> list[Trial]:
+def hop(study: Reach, ways: Array, limit: Array) -> list[Trial]:
     """Let legs hop, each in its way.
 
     Args:
@@ -202,7 +236,7 @@ def hop(study: ReachStudy, ways: Array, limit: Array) -> list[Trial]:
             and knee and the rising hip and knee; 0 to 1, (n, 1 + 4 knots).
         limit: Largest torques of hip and knee, N m, (2,).
     """
-    robot, count = study.robot, len(ways)
+    robot, count = study.leg, len(ways)
     straight = robot.thigh.length + robot.shank.length
     legs = LegSimulator(robot, count, threads=study.threads)
     legs.stand(slice(None), joint_angles(robot, np.array([_START * straight, 0.0])))
@@ -263,59 +297,3 @@ def _interpolate(share: Array, rising: BoolArray, length: Array) -> Array:
     now = share[rows, rising.astype(np.int64)]
     result: Array = now[rows, :, lower] * (1 - rest) + now[rows, :, lower + 1] * rest
     return result
-
-
-@dataclass(frozen=True)
-class Reach:
-    """Search for the highest lasting hops within torques, with the true state and no noise."""
-
-    robot: str = "legv2-paper"
-    """A shipped name or the path of a .toml file."""
-    torques: tuple[tuple[float, float], ...] = ((6, 6), (6, 12), (10, 20))
-    """Limits of hip and knee, N m at the joints: what the policies may ask for, the rated torque
-    of the qdd100 behind its belt, and the motors' limit in the robot file of leg V2."""
-    generations: int = 100
-    """Of CMA-ES, for each pair."""
-    population: int = 32
-    """Candidates per generation."""
-    seed: int = 0
-    """Of the search."""
-    threads: int = 0
-    """Threads of the physics, 0 for all cores; results do not depend on it."""
-    folder: Path = Path("runs/bench-reach")
-    """Where what was found for a pair is kept; it is not searched again."""
-    json: Path | None = None
-    """Write every number to this file."""
-
-    def measure(self) -> dict[str, Any]:
-        """Run it, print a table, return every number."""
-        from hopping_leg.evaluate.result_files import ResultCache
-
-        at_least(1, generations=self.generations)
-        at_least(4, population=self.population)
-        at_least(0, threads=self.threads, seed=self.seed)
-        if not self.torques or not all(t > 0 for pair in self.torques for t in pair):
-            raise UsageError("--torques must be pairs of positive torques, N m; e.g. 6 6 10 20.")
-        study = ReachStudy(
-            load_robot(self.robot),
-            self.torques,
-            generations=self.generations,
-            population=self.population,
-            seed=self.seed,
-            threads=self.threads,
-        )
-        with Progress(transient=True) as bar:
-            task = bar.add_task("searching", total=None)
-            result = measure_reach(
-                study,
-                ResultCache(self.folder),
-                lambda done, total: bar.update(task, completed=done, total=total),
-            )
-        table = Table("hip, N m", "knee, N m", "apex, m", "hops/s", "rms hip", "rms knee", "hits")
-        for row in result["rows"]:
-            limits = [f"{row[f'{joint}_limit_nm']:g}" for joint in JOINTS]
-            names = ("apex_m", "hop_rate_hz", "rms_hip_torque_nm", "rms_knee_torque_nm")
-            cells = [f"{row[name]:.3g}" for name in names]
-            table.add_row(*limits, *cells, str(row["body_contacts"]))
-        Console().print(table)
-        return result

@@ -305,9 +305,8 @@ class Experiment:
     four; or all that can foretell."""
     seeds: tuple[int, ...] = (0,)
     """Seeds of the trainings, one of each method and twin each."""
-    recipe: str = "adaptive"
-    """Recipe by which policies are trained, as in `hop train`; `fast` is the quicker one, but
-    corrects nothing of what no fit can find."""
+    recipe: str = Study.recipe
+    """Recipe by which policies are trained, as in `hop train`."""
     set: tuple[str, ...] = ()
     """Numbers of the recipe to change, as in `hop train`; not its steps."""
     steps: int = Study.steps

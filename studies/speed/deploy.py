@@ -35,7 +35,7 @@ from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.metrics import START_SECONDS
 from hopping_leg.hop_detection import BOUNCE, FLIGHT_CLEARANCE, find_hops
-from hopping_leg.robot import Robot, SoftLimits, kinematics, load_robot
+from hopping_leg.robot import DEFAULT_ROBOT, Robot, SoftLimits, kinematics, load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, SoftLimiter
 from hopping_leg.trace import Trace
 from studies.shared import host
@@ -113,25 +113,32 @@ _COLUMNS = {
 
 
 @dataclass(frozen=True)
-class Study:
-    """What is measured.
-
-    Attributes:
-        controller: Name or file.
-        robot: Name or file; stands on both sides of the wire.
-        minutes: Of hopping in real time.
-        seconds: Of hopping at each height in virtual time and in process, s.
-        heights: Commands, m.
-    """
+class Deploy:
+    """Run a controller against emulated drives: ticks and wake-ups in real time, hop heights."""
 
     controller: str = "fast"
-    robot: str = "legv2-paper"
+    """A name, an .onnx file or a gain file."""
+    robot: str = DEFAULT_ROBOT
+    """A shipped name or the path of a .toml file; stands on both sides of the wire."""
     minutes: float = 10.0
+    """Of hopping in real time, through all heights in turn."""
     seconds: float = 15.0
-    heights: tuple[float, ...] = HEIGHTS
+    """Of hopping at each height in virtual time and in process."""
+    json: Path | None = None
+    """Write every number to this file."""
+
+    def measure(self) -> dict[str, Any]:
+        """Run it, print a table, return every number."""
+        for name, value, least in (("minutes", self.minutes, 0.05), ("seconds", self.seconds, 3.0)):
+            if not least <= value <= 600:
+                raise UsageError(f"--{name} is {value:g} but must lie between {least:g} and 600.")
+        console = Console()
+        result = bench_deploy(self, lambda words: console.print(f"{words} ..."))
+        _print(console, result)
+        return result
 
 
-def bench_deploy(study: Study, on_progress: Callable[[str], None]) -> dict[str, Any]:
+def bench_deploy(study: Deploy, on_progress: Callable[[str], None]) -> dict[str, Any]:
     """Measure ticks, wake-ups and heights.
 
     Args:
@@ -157,7 +164,7 @@ def bench_deploy(study: Study, on_progress: Callable[[str], None]) -> dict[str, 
     return result
 
 
-def _real_time(study: Study, robot: Robot, on_progress: Callable[[str], None]) -> dict[str, Any]:
+def _real_time(study: Deploy, robot: Robot, on_progress: Callable[[str], None]) -> dict[str, Any]:
     """Hop in real time until the minutes are over; start again after a stop."""
     wanted, done = 60 * study.minutes, 0.0
     traces: list[Trace] = []
@@ -168,8 +175,8 @@ def _real_time(study: Study, robot: Robot, on_progress: Callable[[str], None]) -
         on_progress(f"{(wanted - done) / 60:.1f} minutes in real time")
         with EmulatorProcess(EmulatorConfig(robot=study.robot)) as emulator, _folder() as folder:
             link, truth = MoteusLink(robot, opener(str(emulator.path))), Truth()
-            part = (wanted - done) / len(study.heights)
-            schedule = CommandSchedule(tuple((height, part) for height in study.heights))
+            part = (wanted - done) / len(HEIGHTS)
+            schedule = CommandSchedule(tuple((height, part) for height in HEIGHTS))
             sequence = _sequence(study, robot, schedule, wanted - done)
             performance = _perform(
                 link,
@@ -194,17 +201,17 @@ def _real_time(study: Study, robot: Robot, on_progress: Callable[[str], None]) -
         **_ticks(traces),
         "real_time_heights": [
             {"command_m": height, "apex_m": _median([a for c, a in rows if c == height])}
-            for height in study.heights
+            for height in HEIGHTS
         ],
     }
 
 
 def _heights(
-    study: Study, robot: Robot, on_progress: Callable[[str], None]
+    study: Deploy, robot: Robot, on_progress: Callable[[str], None]
 ) -> list[dict[str, float | None]]:
     """Compare the median apex through the wire with that in process, at every height."""
     found = []
-    for height in study.heights:
+    for height in HEIGHTS:
         on_progress(f"{height:g} m through the wire and in process")
         plain, wired = _in_process(study, robot, height), _in_lockstep(study, robot, height)
         error = None if plain is None or wired is None else wired / plain - 1
@@ -219,7 +226,7 @@ def _heights(
     return found
 
 
-def _in_process(study: Study, robot: Robot, height: float) -> float | None:
+def _in_process(study: Deploy, robot: Robot, height: float) -> float | None:
     controller = load_controller(study.controller, robot)
     commands = np.full((round(study.seconds * CONTROL_RATE), 1), height)
     trace = rollout(controller, RolloutConfig(robot, NO_NOISE), commands, seed=0).trace(0)
@@ -232,7 +239,7 @@ def _in_process(study: Study, robot: Robot, height: float) -> float | None:
     return _median(hops.apex[counted])
 
 
-def _in_lockstep(study: Study, robot: Robot, height: float) -> float | None:
+def _in_lockstep(study: Deploy, robot: Robot, height: float) -> float | None:
     lockstep = Lockstep(EmulatorConfig(robot=study.robot).build())
     schedule = CommandSchedule(((height, study.seconds),))
     sequence = _sequence(study, robot, schedule, study.seconds)
@@ -247,7 +254,7 @@ def _in_lockstep(study: Study, robot: Robot, height: float) -> float | None:
 
 
 def _sequence(
-    study: Study, robot: Robot, schedule: CommandSchedule, seconds: float
+    study: Deploy, robot: Robot, schedule: CommandSchedule, seconds: float
 ) -> MotionSequence:
     controller = load_controller(study.controller, robot)
     limiter = SoftLimiter(robot, SoftLimits())
@@ -304,33 +311,6 @@ def _median(values: list[float] | Array) -> float | None:
 def _folder() -> Iterator[Path]:
     with tempfile.TemporaryDirectory() as folder:
         yield Path(folder)
-
-
-@dataclass(frozen=True)
-class Deploy:
-    """Run a controller against emulated drives: ticks and wake-ups in real time, hop heights."""
-
-    controller: str = "fast"
-    """A name, an .onnx file or a gain file."""
-    robot: str = "legv2-paper"
-    """A shipped name or the path of a .toml file."""
-    minutes: float = 10.0
-    """Of hopping in real time, through all heights in turn."""
-    seconds: float = 15.0
-    """Of hopping at each height where heights are compared."""
-    json: Path | None = None
-    """Write every number to this file."""
-
-    def measure(self) -> dict[str, Any]:
-        """Run it, print a table, return every number."""
-        for name, value, least in (("minutes", self.minutes, 0.05), ("seconds", self.seconds, 3.0)):
-            if not least <= value <= 600:
-                raise UsageError(f"--{name} is {value:g} but must lie between {least:g} and 600.")
-        console = Console()
-        study = Study(self.controller, self.robot, self.minutes, self.seconds)
-        result = bench_deploy(study, lambda words: console.print(f"{words} ..."))
-        _print(console, result)
-        return result
 
 
 def _print(console: Console, result: dict[str, Any]) -> None:

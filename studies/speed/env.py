@@ -22,7 +22,7 @@ from rich.table import Table
 from hopping_leg.arrays import Array
 from hopping_leg.cli.options import at_least
 from hopping_leg.envs import HoppingEnv, HoppingTask, TaskConfig, paper_reward
-from hopping_leg.robot import COARSE_TIMESTEP, Robot, build_model, load_robot
+from hopping_leg.robot import COARSE_TIMESTEP, DEFAULT_ROBOT, build_model, load_robot
 from hopping_leg.robot.kinematics import joint_angles
 from hopping_leg.sim import LegSimulator
 from studies.shared import Timed, host, interleave, median_ratio
@@ -38,10 +38,11 @@ _STIFFNESS, _DAMPING = 40.0, 1.0
 
 
 @dataclass(frozen=True)
-class EnvBenchmark:
-    """What is timed, and how long."""
+class Env:
+    """Time the environment against bare physics and Gymnasium's Hopper-v5."""
 
-    robot: Robot
+    robot: str = DEFAULT_ROBOT
+    """A shipped name or the path of a .toml file."""
     count: int = 512
     """Legs of the batched environment."""
     ticks: int = 50
@@ -51,10 +52,24 @@ class EnvBenchmark:
     repeats: int = 15
     """Rounds; medians over them are reported."""
     threads: int = 0
-    """Of batched environment and batched physics alike, 0 for one per core."""
-    timestep: float = 5e-4
+    """Of the batched environment and the batched physics alike, 0 for one per core."""
+    timestep: float = COARSE_TIMESTEP
     """Physics step, s."""
     seed: int = 0
+    """Of noise and delay."""
+    json: Path | None = None
+    """Write every number to this file."""
+
+    def measure(self) -> dict[str, Any]:
+        """Run it, print a table, return every number."""
+        at_least(1, count=self.count, repeats=self.repeats)
+        at_least(1, ticks=self.ticks, single_ticks=self.single_ticks)
+        at_least(0, threads=self.threads, seed=self.seed)
+        with Progress(transient=True) as bar:
+            task = bar.add_task("timing", total=self.repeats)
+            result = bench_env(self, lambda done, _: bar.update(task, completed=done))
+        _print("Environment with noise and delay", result)
+        return result
 
 
 @dataclass(frozen=True)
@@ -73,7 +88,7 @@ class Motion:
 
 
 def bench_env(
-    benchmark: EnvBenchmark, on_repeat: Callable[[int, int], None] | None = None
+    benchmark: Env, on_repeat: Callable[[int, int], None] | None = None
 ) -> dict[str, Any]:
     """Time everything in one run, alternating.
 
@@ -106,13 +121,13 @@ def bench_env(
     }
 
 
-def _substeps(benchmark: EnvBenchmark) -> int:
+def _substeps(benchmark: Env) -> int:
     return round(1 / (_options(benchmark).rate * benchmark.timestep))
 
 
-def _setup(benchmark: EnvBenchmark) -> dict[str, Any]:
+def _setup(benchmark: Env) -> dict[str, Any]:
     return {
-        "robot": benchmark.robot.name,
+        "robot": load_robot(benchmark.robot).name,
         "legs": benchmark.count,
         "threads": benchmark.threads,
         "repeats": benchmark.repeats,
@@ -122,8 +137,8 @@ def _setup(benchmark: EnvBenchmark) -> dict[str, Any]:
     }
 
 
-def _options(benchmark: EnvBenchmark) -> TaskConfig:
-    limits = benchmark.robot.of_joints("torque_limit")
+def _options(benchmark: Env) -> TaskConfig:
+    limits = load_robot(benchmark.robot).of_joints("torque_limit")
     return TaskConfig(
         action_torque=(float(limits[0]), float(limits[1])),
         timestep=benchmark.timestep,
@@ -131,9 +146,9 @@ def _options(benchmark: EnvBenchmark) -> TaskConfig:
     )
 
 
-def _functions(benchmark: EnvBenchmark) -> tuple[Mapping[str, Timed], Mapping[str, int]]:
+def _functions(benchmark: Env) -> tuple[Mapping[str, Timed], Mapping[str, int]]:
     """Return what is timed and how many control periods of one leg each call simulates."""
-    robot, options = benchmark.robot, _options(benchmark)
+    robot, options = load_robot(benchmark.robot), _options(benchmark)
     rng = np.random.default_rng(benchmark.seed)
     reward = paper_reward(robot)
     task = HoppingTask(robot, benchmark.count, options, reward, rng, benchmark.threads)
@@ -225,44 +240,6 @@ def _run_hopper(leg: Any, ticks: int) -> None:  # noqa: ANN401
     leg.reset()
     for action in leg.np_random.uniform(-1, 1, (ticks, 3)):
         leg.step(action)
-
-
-@dataclass(frozen=True)
-class Env:
-    """Time the environment against bare physics and Gymnasium's Hopper-v5."""
-
-    robot: str = "legv2-paper"
-    """A shipped name or the path of a .toml file."""
-    count: int = 512
-    """Legs of the batched environment."""
-    repeats: int = 15
-    """Rounds; medians over them are reported."""
-    threads: int = 0
-    """Of the batched environment and the batched physics alike, 0 for one per core."""
-    timestep: float = COARSE_TIMESTEP
-    """Physics step, s."""
-    seed: int = 0
-    """Of noise and delay."""
-    json: Path | None = None
-    """Write every number to this file."""
-
-    def measure(self) -> dict[str, Any]:
-        """Run it, print a table, return every number."""
-        at_least(1, count=self.count, repeats=self.repeats)
-        at_least(0, threads=self.threads, seed=self.seed)
-        benchmark = EnvBenchmark(
-            load_robot(self.robot),
-            count=self.count,
-            repeats=self.repeats,
-            threads=self.threads,
-            timestep=self.timestep,
-            seed=self.seed,
-        )
-        with Progress(transient=True) as bar:
-            task = bar.add_task("timing", total=self.repeats)
-            result = bench_env(benchmark, lambda done, _: bar.update(task, completed=done))
-        _print("Environment with noise and delay", result)
-        return result
 
 
 def _print(title: str, result: dict[str, Any]) -> None:

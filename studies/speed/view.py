@@ -15,14 +15,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+import tyro
 from PIL import Image
+from rich.console import Console
+from rich.table import Table
 
 from hopping_leg.arrays import Array
+from hopping_leg.cli.options import at_least
 from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically
+from hopping_leg.robot import DEFAULT_ROBOT
 from hopping_leg.viewer import scene
 from hopping_leg.viewer.live_leg import LiveSimulation
 from hopping_leg.viewer.viewer import FRAME_RATE, Viewer
@@ -38,13 +43,6 @@ from studies.speed.browser import (
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
-from typing import Annotated
-
-import tyro
-from rich.console import Console
-from rich.table import Table
-
-from hopping_leg.cli.options import at_least
 
 _SETTLE_SECONDS = 3.0
 _PATIENCE = 60.0
@@ -75,17 +73,44 @@ _NOTE_KEY = """() => addEventListener("keydown", () => {
 
 
 @dataclass(frozen=True)
-class ViewBenchmark:
-    """What is measured, and how long."""
+class View:
+    """Drive the viewer's page in a Chromium without a screen; needs extra `view`, playwright."""
 
-    controllers: tuple[str, ...] = ("fast",)
-    robot: str = "legv2-paper"
+    controllers: Annotated[tuple[str, ...], tyro.conf.Positional] = ("fast",)
+    """One, or two side by side: names, .onnx or gain files."""
+    robot: str = DEFAULT_ROBOT
+    """A shipped name or the path of a .toml file."""
     seconds: float = 20.0
     """Of watching."""
     commands: int = 40
     """Changes of the height by the slider."""
     picture: Path | None = None
-    """Where to leave a picture of the page."""
+    """Write a picture of the page to this file (.png)."""
+    json: Path | None = None
+    """Write every number to this file."""
+
+    def measure(self) -> dict[str, Any]:
+        """Run it, print a table, return every number."""
+        at_least(1, commands=self.commands)
+        if not 1 <= self.seconds <= 600:
+            raise UsageError(f"--seconds is {self.seconds:g} but must lie between 1 and 600.")
+        console = Console()
+        result = bench_view(self, lambda words: console.print(f"{words} ..."))
+        table = Table("measured", "value")
+        for watched in (result, result["small_window"]):
+            width, height = watched["window"]
+            table.add_row(
+                f"frames per second, window of {width} x {height}",
+                f"{watched['frames_per_s']:.1f}",
+            )
+        table.add_row("poses sent per second", f"{result['pictures_sent_per_s']:.1f}")
+        table.add_row("simulated over real time", f"{result['real_time']:.3f}")
+        latency = result["latency_ms"]
+        table.add_row("slider to command, median, ms", f"{latency['median']:.0f}")
+        table.add_row("slider to command, longest, ms", f"{latency['most']:.0f}")
+        table.add_row("from the command to the first hop, s", f"{result['start_s']:.1f}")
+        console.print(table)
+        return result
 
 
 class _Noting(LiveSimulation):
@@ -102,9 +127,7 @@ class _Noting(LiveSimulation):
             self.reached = (self.height, time.time())
 
 
-def bench_view(
-    benchmark: ViewBenchmark, tell: Callable[[str], None] = lambda _: None
-) -> dict[str, Any]:
+def bench_view(benchmark: View, tell: Callable[[str], None] = lambda _: None) -> dict[str, Any]:
     """Measure everything.
 
     Args:
@@ -158,7 +181,7 @@ def bench_view(
     }
 
 
-def _start_seconds(browser: "Browser", benchmark: ViewBenchmark) -> float:
+def _start_seconds(browser: "Browser", benchmark: View) -> float:
     """Return the time from the command to the first finished hop on the page, s."""
     command = [sys.executable, "-m", "hopping_leg.cli", "view", *benchmark.controllers]
     command += ["--robot", benchmark.robot, "--port", "0", "--no-browser"]
@@ -239,47 +262,3 @@ def _latencies(page: "Page", live: _Noting, count: int) -> Array:
         taken[number] = 1e3 * live.reached[1] - page.evaluate("window.pressed")
         page.wait_for_timeout(150)
     return taken
-
-
-@dataclass(frozen=True)
-class View:
-    """Drive the viewer's page in a Chromium without a screen; needs extra `view`, playwright."""
-
-    controllers: Annotated[tuple[str, ...], tyro.conf.Positional] = ("fast",)
-    """One, or two side by side: names, .onnx or gain files."""
-    robot: str = "legv2-paper"
-    """A shipped name or the path of a .toml file."""
-    seconds: float = 20.0
-    """Of watching."""
-    commands: int = 40
-    """Changes of the height by the slider."""
-    picture: Path | None = None
-    """Write a picture of the page to this file (.png)."""
-    json: Path | None = None
-    """Write every number to this file."""
-
-    def measure(self) -> dict[str, Any]:
-        """Run it, print a table, return every number."""
-        at_least(1, commands=self.commands)
-        if not 1 <= self.seconds <= 600:
-            raise UsageError(f"--seconds is {self.seconds:g} but must lie between 1 and 600.")
-        console = Console()
-        benchmark = ViewBenchmark(
-            self.controllers, self.robot, self.seconds, self.commands, self.picture
-        )
-        result = bench_view(benchmark, lambda words: console.print(f"{words} ..."))
-        table = Table("measured", "value")
-        for watched in (result, result["small_window"]):
-            width, height = watched["window"]
-            table.add_row(
-                f"frames per second, window of {width} x {height}",
-                f"{watched['frames_per_s']:.1f}",
-            )
-        table.add_row("poses sent per second", f"{result['pictures_sent_per_s']:.1f}")
-        table.add_row("simulated over real time", f"{result['real_time']:.3f}")
-        latency = result["latency_ms"]
-        table.add_row("slider to command, median, ms", f"{latency['median']:.0f}")
-        table.add_row("slider to command, longest, ms", f"{latency['most']:.0f}")
-        table.add_row("from the command to the first hop, s", f"{result['start_s']:.1f}")
-        console.print(table)
-        return result

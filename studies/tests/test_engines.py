@@ -4,7 +4,7 @@ from types import SimpleNamespace
 import pytest
 
 from hopping_leg.controllers import RolloutConfig
-from hopping_leg.controllers.registry import load_controller
+from hopping_leg.controllers.registry import load_controller, robot_of
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Entry, evaluate
 from hopping_leg.evaluate.trials import on_floor
@@ -12,7 +12,7 @@ from hopping_leg.robot import load_robot
 from studies.engines.run import (
     BAR,
     WORLDS,
-    EnginesStudy,
+    Engines,
     World,
     _judge,
     bench_engines,
@@ -80,19 +80,12 @@ def test_a_controller_hops_in_pybullet_as_it_is():
 def test_the_benchmark_has_a_row_for_every_world_and_command():
     pytest.importorskip("pybullet", reason="needs the extra 'bullet'")
     worlds = (World("here", "mujoco"), World("there", "pybullet", "rigid"))
-    study = EnginesStudy(
-        ROBOT,
-        controllers=("fast",),
-        commands=(0.3,),
-        seeds=1,
-        timestep=2.5e-3,
-        worlds=worlds,
-        rates=(),
-    )
-    result = bench_engines(study)
+    study = Engines(("fast",), commands=(0.3,), seeds=1, timestep=2.5e-3, workers=1)
+    result = bench_engines(study, worlds, rates=())
     assert [(row["world"], row["command_m"]) for row in result["rows"]] == [
         ("here", 0.3),
         ("there", 0.3),
     ]
+    assert {row["robot"] for row in result["worlds"]} == {robot_of(["fast"])}
     here, there = result["drops"]
     assert here["deepest_sink_m"] > 0.03 > 1e-3 > there["deepest_sink_m"]

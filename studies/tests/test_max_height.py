@@ -1,15 +1,12 @@
 import numpy as np
 
 from hopping_leg.evaluate.result_files import ResultCache
-from hopping_leg.robot import load_robot
-from studies.max_height.run import KNOTS, ReachStudy, _interpolate, flight_tops, measure_reach
-
-ROBOT = load_robot("legv2-paper")
+from studies.max_height.run import KNOTS, Reach, _interpolate, flight_tops, measure_reach
 
 
 def study(*torques, **options):
     small = {"generations": 4, "population": 8, "seconds": 2.0, "threads": 1}
-    return ReachStudy(ROBOT, torques, **(small | options))
+    return Reach("legv2-paper", torques, **(small | options))
 
 
 def test_the_highest_point_of_each_whole_flight_counts_once():

@@ -4,7 +4,7 @@ import pytest
 from hopping_leg.envs import HoppingTask, TaskConfig, paper_reward
 from hopping_leg.robot import load_robot
 from studies.shared import interleave
-from studies.speed.env import EnvBenchmark, bench_env, record
+from studies.speed.env import Env, bench_env, record
 
 ROBOT = load_robot("legv2-paper")
 
@@ -31,8 +31,7 @@ def test_the_recorded_motion_repeats():
 
 def test_every_promised_number_is_there():
     pytest.importorskip("imageio")
-    tiny = EnvBenchmark(ROBOT, count=8, ticks=5, single_ticks=5, repeats=2, threads=1)
-    result = bench_env(tiny)
+    result = bench_env(Env(count=8, ticks=5, single_ticks=5, repeats=2, threads=1))
     names = {
         "batched_env_steps_per_s",
         "single_env_step_s",

@@ -8,14 +8,14 @@ from PIL import Image
 
 from studies.shared import main
 from studies.speed import browser
-from studies.speed.view import View, ViewBenchmark, bench_view
+from studies.speed.view import View, bench_view
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(browser.find_chromium() is None, reason="there is no Chromium here")
 def test_everything_is_measured_through_the_real_page(tmp_path):
     picture = tmp_path / "page.png"
-    result = bench_view(ViewBenchmark(seconds=2.0, commands=3, picture=picture))
+    result = bench_view(View(seconds=2.0, commands=3, picture=picture))
     latency = result["latency_ms"]
     assert 0 < latency["median"] <= latency["p95"] <= latency["most"]
     for watched in (result, result["small_window"]):
