@@ -62,8 +62,8 @@ def hyperparameters(
             continue
         if name in theirs and usual is not None and usual.value(name) == found:
             continue
-        for part in path.split(".")[:-1]:
-            owner = getattr(owner, part)
+        for step in path.split(".")[:-1]:
+            owner = getattr(owner, step)
         if name == "task.randomised":
             found = [r.path for r in found]
         elif dataclasses.is_dataclass(found):

@@ -132,9 +132,18 @@ def stored(file: str, path: str = "", **where: Any) -> bool:  # noqa: ANN401
         return False
     try:
         found = pick(read(file), path)
-        return any(all(r[k] == v for k, v in where.items()) for r in found) if where else bool(found)
+        rows = found if where else []
+        return any(all(r[k] == v for k, v in where.items()) for r in rows) if where else bool(found)
     except (LookupError, TypeError):
         return False
+
+
+def latest(file: str, path: str, by: str, *columns: str) -> str:
+    """Return the last of a list of records for each value of a key as a table."""
+    rows = {row[by]: row for row in _rows(file, path, {})}
+    shown = [Column.parse(text) for text in (by, *columns)]
+    cells = [[column.cell(row) for column in shown] for row in rows.values()]
+    return grid([column.title for column in shown], cells) + origin(file)
 
 
 def tables(study: str) -> str:
@@ -394,6 +403,7 @@ MACROS = {
     "commands": commands(),
     "curve": curve,
     "entries": entries,
+    "latest": latest,
     "limits": limits,
     "one": one,
     "percentiles": percentiles,

@@ -1,4 +1,4 @@
-"""A reward term of your own: the recipe `fast` with a price on every torque.
+"""A reward term of your own: the recipe `paper` with a price on every torque.
 
 Train it as ``hop train --recipe examples/custom_reward.py:QUIET``, or run this file as ``python
 examples/custom_reward.py [STEPS]``; the default shows that every part works.
@@ -11,7 +11,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.envs import RewardTerm, Transition
-from hopping_leg.rl.recipes.fast import FAST
+from hopping_leg.rl.recipes.paper import PAPER
 from hopping_leg.rl.train import train
 from hopping_leg.robot import load_robot
 
@@ -21,14 +21,14 @@ def squared_torque(transition: Transition) -> Array:
     return np.sum(np.square(transition.action), axis=1)
 
 
-QUIET = FAST.replace(name="quiet", reward_terms=(RewardTerm("torque", -0.02, squared_torque),))
+QUIET = PAPER.replace(name="quiet", reward_terms=(RewardTerm("torque", -0.02, squared_torque),))
 
 if __name__ == "__main__":
-    steps = int(sys.argv[1]) if len(sys.argv) > 1 else 200_000
+    steps = int(sys.argv[1]) if len(sys.argv) > 1 else 8_000
     folder = Path(f"runs/quiet-{steps}")
-    recipe = QUIET.replace(steps=steps, n_steps=32, eval_start=0.0)
+    recipe = QUIET.replace(steps=steps)
     if (folder / "policy.onnx").exists():
         print(f"{folder} holds a finished training; delete it to train again.")
     else:
-        trained = train(recipe, load_robot("legv2-paper"), 0, folder, resume=folder.exists())
+        trained = train(recipe, load_robot(recipe.robot), 0, folder, resume=folder.exists())
         print(f"{trained.steps} steps in {trained.minutes:.1f} minutes: {trained.policy}")

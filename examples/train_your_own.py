@@ -18,7 +18,7 @@ from hopping_leg.robot import load_robot
 
 steps = int(sys.argv[1]) if len(sys.argv) > 1 else 200_000
 leg = load_robot(str(Path(__file__).parent / "my_leg.toml"))
-recipe = FAST.replace(steps=steps, n_steps=32, eval_start=0.0)
+recipe = FAST.replace(steps=steps)
 folder = Path(f"runs/my_leg-{steps}")
 file = folder / "policy.onnx"
 if file.exists():
@@ -28,6 +28,6 @@ else:
     print(f"{trained.steps} steps in {trained.minutes:.1f} minutes: {file}")
 
 policy = load_controller(str(file), leg)
-run = rollout(policy, RolloutConfig(leg), np.full((1000, 4), recipe.task.commands[1]), seed=0)
+run = rollout(policy, RolloutConfig(leg), np.full((1000, 4), 0.30), seed=0)
 height = run.data["height_m"][400:]
 print(f"base between {height.min():.3f} and {height.max():.3f} m")
