@@ -20,6 +20,7 @@ from importlib.util import find_spec
 import pytest
 
 from hopping_leg.cli import VERBS, main, read_options
+from hopping_leg.controllers.registry import robot_of
 from tests.cli.emulated import put_behind
 from tests.doc_pages import PAGES, ROOT, blocks, indented_commands, inline_commands, with_files
 from tests.doc_world import BEFORE, ELSEWHERE, INTERRUPTED, REFUSED, SECONDS, furnish, shorten
@@ -157,7 +158,7 @@ def run_hop(words, monkeypatch):
         return
     with monkeypatch.context() as patch:
         if "--transport" in words:
-            robot = words[words.index("--robot") + 1] if "--robot" in words else "legv2-paper"
+            robot = words[words.index("--robot") + 1] if "--robot" in words else robot_of(words)
             put_behind(patch, robot=robot, pose="zero" if "--home" in words else "stand")
         if command in INTERRUPTED:
             patch.setattr("hopping_leg.rl.train.Trainer.tick", interrupt)
