@@ -49,6 +49,7 @@ class ResumableSAC(SAC):  # type: ignore[misc]
 
     def train_until(self, steps: int, callback: Callable[[], bool], log_interval: int) -> None:
         """Learn until so many control steps are done in all, or until the callback says no."""
+        self._update_current_progress_remaining(self.num_timesteps, steps)
         self.learn(
             steps - self.num_timesteps,
             callback=lambda *_: callback(),
