@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from rich.console import Console
 from rich.table import Table
 
@@ -138,6 +139,7 @@ class Ablation:
 
 
 def _judged(recipe: Recipe, robot: Robot, seed: int, train: Train) -> Row:
+    torch.set_num_threads(1)
     network = train(recipe, robot, seed)
     low, high = recipe.task.command_bounds
     card = Card(

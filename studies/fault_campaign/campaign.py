@@ -4,7 +4,6 @@ Finished trials are kept in a file, one JSON line each, and are not repeated.
 """
 
 import json
-import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -49,16 +48,17 @@ class Campaign:
     """
 
     controllers: tuple[str, ...] = ("fast", "energy-shaping")
-    """Names or files."""
+    """Shipped names or files."""
     robot: str = DEFAULT_ROBOT
-    """Name or file of the leg behind the wire."""
+    """The leg behind the wire: a shipped name or the path of a .toml file."""
     families: tuple[str, ...] = tuple(FAMILIES)
-    """Of the faults."""
+    """Families of faults."""
     repeats: int = 100
-    """Random moments of each family."""
+    """Random moments of each family, for each controller."""
     live: int = 10
-    """Repeats in real time of families in ``LIVE``, which measure reactions."""
+    """Of them in real time, of the families that show in an answer: they measure reactions."""
     seed: int = 0
+    """Of moments, values and drives."""
 
     def __post_init__(self) -> None:
         for name in self.families:
@@ -230,25 +230,13 @@ def _robot(name: str) -> Robot:
 
 
 @dataclass(frozen=True)
-class Faults:
+class Faults(Campaign):
     """Let everything go wrong that can, at random moments of the hop cycle; count what is unsafe.
 
     Trials run in virtual time behind the emulated wire and are exact; some run in real time, too,
     and measure how soon the host reacts, fairly on an idle computer only. Interrupted, it goes on.
     """
 
-    repeats: int = 100
-    """Random moments of each family, for each controller."""
-    live: int | None = None
-    """Of them in real time, of the families that show in an answer; default: every tenth."""
-    seed: int = 0
-    """Of moments, values and drives."""
-    controllers: tuple[str, ...] = ("fast", "energy-shaping")
-    """Shipped names or files."""
-    robot: str = DEFAULT_ROBOT
-    """The leg behind the wire: a shipped name or the path of a .toml file."""
-    families: tuple[str, ...] = ()
-    """Families of faults; default: all."""
     workers: int = 0
     """Processes, 0 for one per core; results do not depend on it."""
     out: Path = Path("runs/bench-faults")
@@ -259,19 +247,11 @@ class Faults:
     def measure(self) -> dict[str, Any]:
         """Run it, print a table, return every number."""
         at_least(1, repeats=self.repeats)
-        at_least(0, seed=self.seed, workers=self.workers, live=self.live or 0)
-        campaign = Campaign(
-            controllers=self.controllers,
-            robot=self.robot,
-            families=self.families or tuple(FAMILIES),
-            repeats=self.repeats,
-            live=math.ceil(self.repeats / 10) if self.live is None else self.live,
-            seed=self.seed,
-        )
+        at_least(0, seed=self.seed, workers=self.workers, live=self.live)
         with Progress(console=Console(stderr=True)) as bar:
             task = bar.add_task("trials", total=None)
             result = run_campaign(
-                campaign,
+                self,
                 self.out,
                 workers=self.workers,
                 on_trial=lambda done, total, unsafe: bar.update(

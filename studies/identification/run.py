@@ -125,7 +125,7 @@ _VARIABLE = "HOPPING_LEG_RECORDINGS"
 
 
 @dataclass(frozen=True)
-class Identify:
+class Identify(Study):
     """Identify known twins and real recordings; compare searches, mujoco.sysid and plain loops.
 
     Each result is kept; interrupted, the same command goes on.
@@ -133,28 +133,8 @@ class Identify:
 
     parts: tuple[str, ...] = ()
     """Of synthetic, throughput, coverage, mujoco-sysid, paper-size and recordings; default: all."""
-    searches: tuple[str, ...] = ("least-squares", "cma", "two-pass")
-    """Of known twins and of recordings of the paper's size."""
     recordings: Path | None = None
     """Folder with real recordings; default: the environment's HOPPING_LEG_RECORDINGS, if set."""
-    seconds: float = 16.0
-    """Of each recording of a known twin."""
-    generations: int = 100
-    """Of CMA-ES, in each pass."""
-    population: int = 16
-    """Candidates of a generation."""
-    repeats: int = 5
-    """Rounds of the timing."""
-    throughput_seconds: float = 240.0
-    """Of each recording that is timed; the paper's are of 240 s."""
-    paper_seconds: float = 240.0
-    """Of each recording of the paper's size."""
-    arms: int = 120
-    """Independent arms whose truth intervals have to hold."""
-    threads: int = 2
-    """Of the fits; results do not depend on it."""
-    seed: int = 0
-    """Of CMA-ES."""
     out: Path = Path("runs/bench-identify")
     """Where results are kept; finished parts are not repeated, killed fits go on."""
     json: Path | None = None
@@ -172,22 +152,10 @@ class Identify:
                     f"--{name.replace('_', '-')} is {getattr(self, name):g} but must lie between"
                     f" {least} and 3600."
                 )
-        study = Study(
-            self.seconds,
-            self.generations,
-            self.population,
-            self.repeats,
-            self.throughput_seconds,
-            self.paper_seconds,
-            self.arms,
-            self.threads,
-            self.seed,
-            self.searches,
-        )
         console = Console()
         with _Progress(console) as progress:
             result = bench_identify(
-                study,
+                self,
                 FitCache(self.out, progress.begin, progress.report),
                 parts=self.parts or PARTS,
                 recordings=self.recordings or _recordings(),

@@ -19,22 +19,23 @@ class Study:
     """Sizes and efforts."""
 
     seconds: float = 16.0
-    """Of each recording of the known twin."""
+    """Of each recording of a known twin."""
     generations: int = 100
     """Of CMA-ES, in each pass."""
     population: int = 16
     """Candidates of a generation, also where throughput is measured."""
     repeats: int = 5
     """Rounds of the throughput's timing."""
-    throughput_seconds: float = 60.0
-    """Of each of the two recordings on which throughput is measured."""
+    throughput_seconds: float = 240.0
+    """Of each recording that is timed; the paper's are of 240 s."""
     paper_seconds: float = 240.0
-    """Of each of the two recordings of the paper's size."""
+    """Of each recording of the paper's size."""
     arms: int = 120
     """Independent arms whose truth intervals have to hold."""
     threads: int = 2
-    """Worker threads of all fits."""
+    """Of the fits; results do not depend on it."""
     seed: int = 0
+    """Of CMA-ES."""
     searches: tuple[str, ...] = ("least-squares", "cma", "two-pass")
     """Of known twins and of recordings of the paper's size; those that a case has."""
 

@@ -206,6 +206,7 @@ class Search:
         cache = ResultCache(self.out)
         with ProcessWorkers(0) as workers, Progress() as progress:
             task = progress.add_task("searching", total=self.generations)
+            legs = {name: load_robot(name).digest for name in self.robots}
             for generation in range(self.generations):
                 points = strategy.ask()
                 shapes = [from_unit(np.asarray(point)) for point in points]
@@ -213,7 +214,7 @@ class Search:
                 found = cache.load_or_run(
                     f"generation-{generation}",
                     f"generation {generation}",
-                    {"shapes": [asdict(shape) for shape in shapes], "robots": self.robots},
+                    {"shapes": [asdict(shape) for shape in shapes], "robots": legs},
                     lambda tasks=tasks: {"costs": workers.map(cost, tasks)},  # type: ignore[misc]
                 )
                 costs = np.reshape(found["costs"], (len(shapes), -1)).mean(axis=1).tolist()
