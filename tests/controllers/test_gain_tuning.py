@@ -17,7 +17,8 @@ from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot
 
 GAINS = load_gains().gains
-SETUP = RolloutConfig(load_robot("legv2-paper"), threads=1)
+ROBOT = load_robot("legv2-paper")
+SETUP = RolloutConfig(ROBOT, threads=1)
 
 
 def scores(shift=0.0, scale=1.0, **changed):
@@ -102,28 +103,22 @@ def test_candidates_are_tried_at_the_heights_that_are_asked_for(tmp_path, monkey
             tuning.Search(commands=wrong)
 
 
-ROBOT = load_robot("legv2-paper")
-
-
 def test_gains_survive_a_file(tmp_path):
     stored = GainFile("legv2", 'a "quoted" search', ShapingGains(k0=1.25, exponent=0.5))
     save_gains(tmp_path / "g.toml", stored)
     assert load_gains(tmp_path / "g.toml") == stored
 
 
-def test_a_leg_gets_the_gains_that_were_tuned_on_it():
+def test_a_leg_gets_the_gains_that_were_tuned_on_it_and_they_say_how():
     for name in ("energy-shaping", "energy-shaping-flying"):
-        own = tuned_energy_shaping(load_robot("legv2"), gains=name)
-        assert own.gains == load_gains(f"{name}-legv2").gains
-        assert own.name == name
-        assert load_gains(f"{name}-legv2").robot == "legv2"
-
-
-@pytest.mark.parametrize("name", ["energy-shaping", "by-hand"])
-def test_shipped_gains_name_their_leg_and_source(name):
-    found = load_gains(name)
-    assert load_robot(found.robot).mass > 0
-    assert found.source
+        own, stored = (
+            tuned_energy_shaping(load_robot("legv2"), gains=name),
+            load_gains(f"{name}-legv2"),
+        )
+        assert (own.name, own.gains) == (name, stored.gains)
+        assert stored.robot == "legv2"
+        assert stored.source
+    assert load_robot(load_gains("by-hand").robot).mass > 0
 
 
 @pytest.mark.parametrize(

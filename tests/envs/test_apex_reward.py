@@ -3,22 +3,11 @@
 import numpy as np
 import pytest
 
-from hopping_leg.envs import ApexRewardConfig, Transition, apex_reward
+from hopping_leg.envs import ApexRewardConfig, apex_reward
 from hopping_leg.robot import load_robot
+from tests.envs.transitions import transition
 
 CONFIG = ApexRewardConfig()
-
-
-def transition(height, rate, *, command=0.3, clearance=0.05, apex=False):
-    return Transition(
-        state=np.array([[height, 0.7, -1.4, rate, 0.0, 0.0]]),
-        command=np.array([command]),
-        action=np.zeros((1, 2)),
-        last_action=np.zeros((1, 2)),
-        apex=np.array([apex]),
-        apex_height=np.array([height]),
-        measure_clearance=lambda: np.array([clearance]),
-    )
 
 
 def make(config=CONFIG):

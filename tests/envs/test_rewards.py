@@ -14,11 +14,11 @@ from hopping_leg.envs import (
     Reward,
     RewardTerm,
     TaskConfig,
-    Transition,
     paper_reward,
 )
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot
+from tests.envs.transitions import transition
 
 ROBOT = load_robot("legv2-paper")
 
@@ -96,23 +96,6 @@ LOWER, UPPER = ROBOT.of_joints("lower"), ROBOT.of_joints("upper")
 SPEED = ROBOT.of_joints("no_load_speed")
 REST = 0.2 + ROBOT.foot.radius
 PRINTED = PaperRewardConfig()
-
-
-def transition(
-    height=0.3, rate=0.0, q=(0.7, -1.4), qd=(0.0, 0.0), command=0.3, action=(0, 0), last=(0, 0)
-):
-    def row(value):
-        return np.array([value], dtype=float)
-
-    return Transition(
-        state=row((height, *q, rate, *qd)),
-        command=row(command),
-        action=row(action),
-        last_action=row(last),
-        apex=np.array([False]),
-        apex_height=row(np.nan),
-        measure_clearance=lambda: row(0.0),
-    )
 
 
 def terms_of(config=PRINTED, **state):

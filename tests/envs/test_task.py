@@ -184,21 +184,16 @@ def test_a_restart_shows_nothing_of_the_last_episode():
     assert not np.allclose(step.final_observation, fresh)
 
 
-def fall_apart(draws):
-    """Let legs change; return how high each is after a push each time, (draws, legs)."""
+def test_a_draw_makes_the_same_legs_again_and_another_one_others():
     one = task(TaskConfig(randomised=WIDE_RANGES), count=6)
     heights = []
-    for draw in draws:
+    for draw in (1, 2, 1):
         one.randomize(draw)
         one.legs.stand(slice(None), [0.7, -1.4], 0.05)
         for _ in range(40):
             one.legs.step(np.full((6, 2), [1.0, -3.0]))
         heights.append(one.legs.height.copy())
-    return np.array(heights)
-
-
-def test_a_draw_makes_the_same_legs_again_and_another_one_others():
-    first, second, again = fall_apart([1, 2, 1])
+    first, second, again = heights
     np.testing.assert_array_equal(first, again)
     assert len(set(first)) == 6
     assert (first != second).all()

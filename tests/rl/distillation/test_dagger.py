@@ -8,6 +8,7 @@ import torch
 
 from hopping_leg.controllers.shooting import Shooting
 from hopping_leg.rl.distillation.dagger import DaggerConfig
+from hopping_leg.sim import leg_simulator
 from tests.rl.learners import EVERY, ROBOT, TINY_FAST, learn, learner, policy_file
 
 ROLLOUT = TINY_FAST.algorithm.n_steps * TINY_FAST.schedule.num_envs
@@ -47,7 +48,8 @@ def trained(recipe, seed, threads=1):
 
 
 @pytest.mark.parametrize("name", ["window", "gru"])
-def test_the_seed_alone_decides(name):
+def test_the_seed_alone_decides_on_any_number_of_threads(name, monkeypatch):
+    monkeypatch.setattr(leg_simulator, "_STEPS_PER_THREAD", 1)
     recipe = EVERY[name].replace(steps=6 * ROLLOUT)
     first = trained(recipe, 0)
     torch.rand(10)
