@@ -26,11 +26,13 @@ def ask(page, path, body=None, **headers):
         return reply.read()
 
 
-def test_the_page_is_there_and_tells_the_height(running):
-    page, _, _ = running
+def test_the_page_tells_the_height_and_its_button_stops_the_leg(running):
+    page, _, stops = running
     assert b"<input" in ask(page, "/")
     state = json.loads(ask(page, "/height"))
     assert state == {"height": 0.30, "low": 0.22, "high": 0.40, "stopping": False}
+    assert json.loads(ask(page, "/stop", {}))["stopping"]
+    assert stops == ["stop"]
 
 
 @pytest.mark.parametrize(
@@ -42,35 +44,24 @@ def test_the_slider_moves_the_height_within_its_range(running, asked, given):
     assert state["height"] == given == height.at(0.0)
 
 
-def test_the_button_stops_the_leg(running):
-    page, _, stops = running
-    assert json.loads(ask(page, "/stop", {}))["stopping"]
-    assert stops == ["stop"]
-
-
 @pytest.mark.parametrize(
-    ("body", "headers", "status"),
+    ("path", "body", "headers", "status"),
     [
-        ({"height": 0.35}, {"Origin": "http://elsewhere.example"}, 403),
-        ({"height": 0.35}, {"Host": "elsewhere.example"}, 403),
-        ({"height": "high"}, {}, 400),
-        ({"height": True}, {}, 400),
-        ([0.35], {}, 400),
+        ("/height", {"height": 0.35}, {"Origin": "http://elsewhere.example"}, 403),
+        ("/height", {"height": 0.35}, {"Host": "elsewhere.example"}, 403),
+        ("/height", {"height": "high"}, {}, 400),
+        ("/height", {"height": True}, {}, 400),
+        ("/height", [0.35], {}, 400),
+        ("/height.json", None, {}, 404),
     ],
 )
-def test_others_and_nonsense_change_nothing(running, body, headers, status):
+def test_others_and_nonsense_change_nothing(running, path, body, headers, status):
     page, height, stops = running
     with pytest.raises(urllib.error.HTTPError) as refusal:
-        ask(page, "/height", body, **headers)
+        ask(page, path, body, **headers)
     assert refusal.value.code == status
     assert height.at(0.0) == 0.30
     assert not stops
-
-
-@pytest.mark.parametrize("path", ["/nothing", "/height.json"])
-def test_there_is_nothing_else(running, path):
-    with pytest.raises(urllib.error.HTTPError, match="404"):
-        ask(running[0], path)
 
 
 def test_a_port_that_is_taken_is_said_before_anything_moves(running):

@@ -172,16 +172,6 @@ def test_one_sample_stands_for_the_past_and_there_is_none_without_both_joints():
     np.testing.assert_allclose(seen.q[0], [[1, 2]] * 3)
 
 
-def test_the_parts_of_a_sequence_follow_each_other():
-    timing = SequenceTiming(hop=10, rise=2, settle=0.5, sink=1.5)
-    times = [0, 1.9, 2, 2.4, 2.5, 12.4, 12.5, 13.9, 14.0, 99]
-    parts = [timing.phase(t)[0] for t in times]
-    assert parts == [
-        *(Part.RISE, Part.RISE, Part.SETTLE, Part.SETTLE, Part.HOP),
-        *(Part.HOP, Part.SINK, Part.SINK, Part.DONE, Part.DONE),
-    ]
-
-
 @given(st.integers(1, 3000), st.floats(0, 1e6))
 def test_a_hop_of_some_ticks_lasts_so_many_wherever_time_began(ticks, began):
     timing = SequenceTiming(hop=ticks / 200, rise=0.4, settle=0.1)

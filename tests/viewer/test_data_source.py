@@ -14,6 +14,7 @@ from hopping_leg.trace import Trace
 from hopping_leg.viewer.data_source import RecorderSource, ReplaySource
 from hopping_leg.viewer.tracks import FIELDS, Track, load_track, trace_rows
 
+ROBOT = load_robot("legv2-paper")
 COLUMNS = ("time_s", "command_m", "hip_position_rad", "knee_position_rad", "hip_torque_nm")
 
 
@@ -84,24 +85,19 @@ def test_a_run_is_shown_as_it_grows_until_it_is_over(tmp_path):
 
 
 def test_what_hop_deploy_records_is_shown_with_the_estimate_of_the_controller(tmp_path):
-    robot = load_robot("legv2-paper")
-    names = columns(load_controller("energy-shaping", robot))
-    writer = FlightRecorder(
-        tmp_path / f"es-1{SUFFIX}", names, {"robot": robot.name, "controller": "es"}
-    )
-    row = dict.fromkeys(names, 0.0) | {
-        "hip_position_rad": 0.7,
-        "knee_position_rad": -1.4,
-        "knee_torque_nm": 3.0,
-        "estimated_height_m": 0.33,
-        "phase": 1.0,
-    }
-    writer.row(list(row.values()))
+    names = columns(load_controller("energy-shaping", ROBOT))
+    header = {"robot": ROBOT.name, "controller": "es"}
+    writer = FlightRecorder(tmp_path / f"es-1{SUFFIX}", names, header)
+    seen = {"hip_position_rad": 0.7, "knee_position_rad": -1.4, "knee_torque_nm": 3.0}
+    for tick, estimate in enumerate((float("nan"), 0.33)):
+        told = {"time_s": tick / 200, "estimated_height_m": estimate, "phase": 1.0}
+        writer.row(list((dict.fromkeys(names, 0.0) | seen | told).values()))
     writer.close()
     follow = RecorderSource(tmp_path)
     follow.advance(1.0)
     (track,) = follow.tracks
-    assert track.moment(follow.now)[0] == 0.33
+    standing = kinematics.stance_height(ROBOT, np.array([0.7, -1.4]))
+    assert [track.moment(tick / 200)[0] for tick in (0, 1)] == [pytest.approx(standing), 0.33]
     assert track.latest("knee_torque_nm", follow.now) == 3.0
     assert track.latest("phase", follow.now) == 1.0
     assert "estimate" in track.note
@@ -196,9 +192,6 @@ def test_what_cannot_be_replayed_is_refused(tmp_path):
         ReplaySource((stored(tmp_path / "p.parquet", robot="doublependulum"),))
 
 
-ROBOT = load_robot("legv2-paper")
-
-
 def rows(count, **given):
     values = np.zeros((len(FIELDS), count))
     for name, entry in given.items():
@@ -267,15 +260,6 @@ def test_a_simulated_trace_is_shown_as_recorded(simulated, tmp_path):
     _, apexes = track.apexes(1.5, 1.5)
     assert len(apexes)
     assert np.all(apexes > 0.2)
-
-
-def test_an_estimate_stands_in_for_the_height():
-    trace = hardware_trace(estimated_height_m=[0.31, np.nan])
-    _, values, note = trace_rows(trace, ROBOT)
-    height = values[FIELDS.index("height_m")]
-    assert height[0] == 0.31
-    assert height[1] == pytest.approx(kinematics.stance_height(ROBOT, np.array([0.8, -1.6])))
-    assert "estimate" in note
 
 
 @pytest.mark.parametrize(

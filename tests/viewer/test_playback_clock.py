@@ -53,21 +53,15 @@ def test_a_pause_leaves_no_debt():
     assert clock.due(0.004) == 0.0
 
 
-@pytest.fixture
-def linux(monkeypatch):
-    monkeypatch.setattr("sys.platform", "linux")
-
-
 @pytest.mark.parametrize("device", ["dri/renderD128", "nvidia0", "dxg"])
-def test_a_device_that_draws_is_seen(device, tmp_path, linux):
-    assert not scene.has_gpu(tmp_path)
+def test_a_device_that_draws_is_seen_and_other_systems_always_have_one(
+    device, tmp_path, monkeypatch
+):
+    for system in ("darwin", "linux"):
+        monkeypatch.setattr("sys.platform", system)
+        assert scene.has_gpu(tmp_path) == (system == "darwin")
     (tmp_path / device).parent.mkdir(exist_ok=True)
     (tmp_path / device).touch()
-    assert scene.has_gpu(tmp_path)
-
-
-def test_other_systems_always_have_one(tmp_path, monkeypatch):
-    monkeypatch.setattr("sys.platform", "darwin")
     assert scene.has_gpu(tmp_path)
 
 
