@@ -1,6 +1,9 @@
 """What is each part of a distillation worth, and what do other teachers teach?"""
 
-RESULTS = ("python -m studies.ablations --json studies/ablations/results/precise.json",)
+RESULTS = (
+    "python -m studies.ablations --seeds 0 1 --steps 2000000 --json "
+    "studies/ablations/results/precise.json",
+)
 
 TABLES = (
     (

@@ -37,6 +37,20 @@ def test_commands_are_verbs_or_studies(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
+def test_what_a_command_reads_an_earlier_one_has_made(name):
+    made: list[str] = []
+    for command in results(name):
+        words = shlex.split(command.rpartition("||")[2])
+        marks = [k for k, word in enumerate(words) if word in ("--out", "--traces", "--folder")]
+        written = {words[k + 1] for k in marks}
+        for word in words:
+            path = word.rpartition("=")[2]
+            if path.startswith("runs/") and Path(path).suffix and path not in written:
+                assert any(path == file or path.startswith(f"{file}/") for file in made), path
+        made += written
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_tables_of_a_readme_are_those_of_its_stored_results(name):
     pytest.importorskip("mkdocs", reason="the extra 'docs' is not installed")
     assert readmes.filled(name) == (ROOT / "studies" / name / "README.md").read_text()

@@ -1,7 +1,8 @@
 """What does a search over the numbers of `fast` find?"""
 
 RESULTS = (
-    "hop tune fast --trials 12 --steps 1000000 --workers 2 --json studies/tuning/results/fast.json",
+    "hop tune fast --trials 20 --steps 500000 --workers 2 --out runs/tune/fast --json "
+    "studies/tuning/results/fast.json",
     "cp runs/tune/fast/*.svg studies/tuning/figures",
 )
 
