@@ -58,7 +58,7 @@ def refined(recipe: Recipe, robot: Robot, seed: int) -> Network:
 
 VARIANTS: dict[str, tuple[str, dict[str, Any], Train]] = {
     "recipe": ("the recipe", {}, distilled),
-    "recurrent": (
+    "gru": (
         "50 ms of samples and a gated recurrent unit instead of 0.7 s",
         {"task.observation": "dated", "memory": "gru"},
         distilled,

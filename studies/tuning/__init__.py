@@ -3,7 +3,7 @@
 RESULTS = (
     "hop tune fast --trials 20 --steps 500000 --workers 2 --out runs/tune/fast --json "
     "studies/tuning/results/fast.json",
-    "cp runs/tune/fast/*.svg studies/tuning/figures",
+    "mkdir -p studies/tuning/figures && cp runs/tune/fast/*.svg studies/tuning/figures",
 )
 
 TABLES = (
