@@ -16,6 +16,7 @@ from hopping_leg.controllers.registry import load_policy
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.identify.excitation import load_excitation
 from hopping_leg.identify.recording import load_recording
+from hopping_leg.robot import DEFAULT_ROBOT
 from hopping_leg.trace import Trace
 from tests.cli.emulated import put_behind, write_sine
 
@@ -37,6 +38,7 @@ def test_deploy_checks_runs_and_leaves_a_trace(emulate, tmp_path, capsys):
     assert "The sequence is over." in out
     assert file.name in out
     trace = Trace.load(file)
+    assert trace.header["robot"] == DEFAULT_ROBOT, "as no policy was trained on another"
     assert trace.header["drives"]["knee"]["homed"] == "yes"
     assert set(np.unique(trace.column("command_m"))) == {0.25, 0.3}
     assert [drive.machine.mode for drive in lockstep.robot.drives] == [0, 0]

@@ -5,7 +5,9 @@ import pytest
 
 from hopping_leg.cli import main
 from hopping_leg.cli.evaluate import Evaluate
+from hopping_leg.controllers.registry import load_policy
 from hopping_leg.evaluate.runner import setup_conditions
+from hopping_leg.robot import DEFAULT_ROBOT
 from hopping_leg.trace import Trace
 from tests.evaluate.test_comparison import TRAINING
 
@@ -55,10 +57,6 @@ def test_bad_input_is_one_sentence(spring, refused, words, sentence):
     refused(["evaluate", "spring", *words], sentence)
 
 
-def test_an_axis_that_is_none_is_one_sentence(spring, refused):
-    refused(["robustness", "spring", "--axes", "wind"], "There is no axis 'wind'")
-
-
 def test_robustness_leaves_numbers_figure_and_what_goes_on(spring, tmp_path, capsys):
     out, file = tmp_path / "kept", tmp_path / "robustness.json"
     words = ["robustness", "spring", "--commands", "0.3", "--seeds", "2", "--axes", "pushes"]
@@ -104,3 +102,16 @@ def test_soft_limits_may_be_left_out(on):
     _, setup = Evaluate(("energy-shaping",), soft_limits=on).load()
     assert (setup.soft_limits is not None) == on
     assert (setup_conditions(setup)["soft_limits"] is not None) == on
+
+
+@pytest.mark.parametrize(
+    ("controllers", "given", "robot"),
+    [
+        (("energy-shaping",), None, DEFAULT_ROBOT),
+        (("energy-shaping", "paper"), None, load_policy("paper").card.robot),
+        (("paper",), "legv2", "legv2"),
+    ],
+)
+def test_the_leg_is_that_of_the_first_policy_unless_another_is_named(controllers, given, robot):
+    _, setup = Evaluate(controllers, robot=given).load()
+    assert setup.robot.name == robot

@@ -183,17 +183,14 @@ def test_the_papers_trials(robot):
     assert np.allclose(sequence.commands(200.0)[[0, 999, 1000, 2999]], [0.25, 0.25, 0.30, 0.35])
 
 
-def test_heights_scale_with_the_leg(robot):
+def test_heights_scale_with_the_leg_and_lie_within_its_reach(robot):
     thigh = dataclasses.replace(robot.thigh, length=0.45)
     longer = dataclasses.replace(robot, thigh=thigh)
     assert scaled(COMMANDS, robot) == COMMANDS
     assert scaled(COMMANDS, longer) == pytest.approx((0.5, 0.6, 0.7))
-
-
-@pytest.mark.parametrize("height", [0.05, 3.0, float("nan"), -0.3])
-def test_heights_out_of_reach_are_refused(robot, height):
-    with pytest.raises(UsageError, match="out of reach of legv2-paper"):
-        paper_trials(robot, [0.3, height])
+    for height in (0.05, 3.0, float("nan"), -0.3):
+        with pytest.raises(UsageError, match="out of reach of legv2-paper"):
+            paper_trials(robot, [0.3, height])
 
 
 def test_a_trial_outside_a_range_does_not_fit(robot):

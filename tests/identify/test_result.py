@@ -43,23 +43,22 @@ def test_intervals_hold_their_values():
     np.testing.assert_allclose(np.diag(tree["correlations"]["matrix"]), 1.0)
 
 
-def test_what_does_not_exist_is_null():
-    known = dataclasses.replace(identified().identifiability, half_width=np.array([np.inf, 1.0]))
-    tree = as_json(dataclasses.replace(identified(), identifiability=known))
-    assert tree["parameters"][0]["interval_high"] is None
-    assert json.loads(json.dumps(tree, allow_nan=False)) == tree
-
-
-def test_without_a_closed_loop_its_pairs_are_null_and_nobody_tells_of_it():
+def test_what_does_not_exist_is_null_and_nobody_tells_of_it():
     nothing = dict.fromkeys(("closed_loop_position", "closed_loop_torque"), (np.nan, np.nan))
     found, names = identified(), ("validation", "start_validation")
     known = {when: dataclasses.replace(getattr(found, when), **nothing) for when in names}
-    tree = as_json(dataclasses.replace(found, **known))
+    certain = dataclasses.replace(found.identifiability, half_width=np.array([np.inf, 1.0]))
+    tree = as_json(dataclasses.replace(found, **known, identifiability=certain))
+    assert json.loads(json.dumps(tree, allow_nan=False)) == tree
+    assert tree["parameters"][0]["interval_high"] is None
     assert tree["validation"]["closed_loop_position_rms_rad"] == [None, None]
     assert tree["validation"]["closed_loop_torque_rms_nm"] == [None, None]
     assert [row["error"] for row in tree["quality"]] == [
         f"position, predicted {horizon} s ahead" for horizon in ("0.2", "0.5", "1")
     ]
+    mute = dataclasses.replace(found.validation, closed_loop_torque=(np.nan, np.nan))
+    text = str(quality_table(dataclasses.replace(found, validation=mute)))
+    assert text.count('<td class="">-</td>') == 2
 
 
 @pytest.fixture
@@ -150,13 +149,6 @@ def test_only_the_papers_leg_is_held_against_the_paper():
     start = dataclasses.replace(found.start, robot=load_robot("legv1"))
     text = str(parameter_table(dataclasses.replace(found, start=start)))
     assert "Table I" not in text
-
-
-def test_where_nothing_was_measured_there_is_a_dash():
-    found = identified()
-    validation = dataclasses.replace(found.validation, closed_loop_torque=(np.nan, np.nan))
-    text = str(quality_table(dataclasses.replace(found, validation=validation)))
-    assert text.count('<td class="">-</td>') == 2
 
 
 def test_the_fit_lies_on_what_was_measured():

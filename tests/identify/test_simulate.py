@@ -137,7 +137,7 @@ def test_a_stiff_drive_does_not_depend_on_the_step():
 RUN = record(LEG, swing(3.0))
 
 
-def test_windows_tile_a_recording():
+def test_windows_tile_a_recording_and_a_part_says_which_seconds_it_is():
     windows = cut([RUN], 0.5)
     rows = [r for w in windows for r in range(w.start, w.start + w.length)]
     assert rows == list(range(len(RUN)))
@@ -145,6 +145,9 @@ def test_windows_tile_a_recording():
     assert (window.start, window.length, window.unscored) == (0, 600, 20)
     with pytest.raises(RecordingError, match="too short for windows of 5 s"):
         cut([RUN], 5.0)
+    run = part(RUN, 200, 400)
+    assert run.name.endswith("1.0-2.0 s")
+    np.testing.assert_array_equal(run.array("position"), RUN.array("position")[200:400])
 
 
 def test_dealt_windows_are_all_there_and_every_share_is_spread_over_them():
@@ -177,12 +180,6 @@ def test_a_short_recording_gives_its_last_quarter():
     assert fit.time[-1] < held.time[0]
     with pytest.raises(RecordingError, match=r"5 s, but 5\.34 s are needed.*--validate"):
         hold_out([record(LEG, swing(5.0))], 4.0, np.random.default_rng(0))
-
-
-def test_a_part_says_which_seconds_it_is():
-    run = part(LONG, 200, 400)
-    assert run.name.endswith("1.0-2.0 s")
-    np.testing.assert_array_equal(run.array("position"), LONG.array("position")[200:400])
 
 
 WRONG = TRUE.replace({"hip.friction": 0.4})

@@ -67,18 +67,12 @@ MISTAKES = {
 }
 
 
-@pytest.mark.parametrize("name", [*shipped_robots(), EXAMPLE])
-def test_every_robot_loads_and_compiles(name):
-    model = build_model(load_robot(name))
-    assert model.nv == 3
-    assert model.nu == 2
-
-
 def test_a_file_may_change_only_what_differs():
     mine, parent = load_robot(EXAMPLE), load_robot("legv2-paper")
     assert mine.shank.length != parent.shank.length
     assert mine.thigh.inertia == parent.thigh.inertia
     assert mine.digest != parent.digest
+    assert build_model(mine).nv == 3
 
 
 def test_a_pendulum_swings_freely_but_cannot_hop():
@@ -187,12 +181,6 @@ def test_what_a_drive_may_leave_out_changes_a_robot_only_where_it_is_stated(name
     for stated, same in ((neutral, True), (value, False)):
         hip = dataclasses.replace(robot.hip, **{name: stated})
         assert (dataclasses.replace(robot, hip=hip).digest == robot.digest) == same
-
-
-def test_shipped_legs_are_what_the_simulator_for_training_knows():
-    assert load_robot("legv2").reality == NO_MISMATCH
-    assert load_robot("legv2-paper").reality.neutral
-    assert not load_robot("twin").reality.neutral
 
 
 def extended(folder, part, **entries):

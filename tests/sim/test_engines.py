@@ -38,18 +38,6 @@ def test_energy_is_conserved_without_friction(make):
     np.testing.assert_allclose(energy(legs), before, atol=0.03)
 
 
-def test_free_fall_follows_the_parabola(make):
-    legs = make(FRICTIONLESS, 1)
-    legs.place(slice(None), 3.0, np.array([0.4, -1.0]))
-    for tick in range(1, 61):
-        legs.step(np.zeros((1, 2)))
-        time = tick * legs.period
-        # Semi-implicit Euler falls by g t dt / 2 more than the continuous leg.
-        fall = GRAVITY * time * (time + legs.timestep) / 2
-        np.testing.assert_allclose(legs.height, 3.0 - fall, atol=1e-9)
-        np.testing.assert_allclose(legs.height_rate, -GRAVITY * time, atol=1e-9)
-
-
 def test_drop_on_the_rail_follows_friction_and_damping(make):
     """A straight leg falls as a point mass: m v' = -m g + Fc - b v, the closed form beside it."""
     legs = make(PAPER, 1)

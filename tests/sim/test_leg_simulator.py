@@ -303,9 +303,6 @@ def test_what_cannot_be_is_refused():
         make_legs(with_reality(hip=DriveMismatch(backlash=0.01)))
 
 
-LEG = load_robot("legv2")
-
-
 def perturbed(legs, force=0.0, ground=0.0, ticks=40, **later):
     count = legs.count
     plan = Perturbation(
@@ -319,7 +316,7 @@ def perturbed(legs, force=0.0, ground=0.0, ticks=40, **later):
 
 
 def test_a_push_changes_the_base_speed_by_impulse_over_mass():
-    frictionless = without_friction(LEG)
+    frictionless = without_friction(CAD)
     pushed, free = (make_legs(frictionless, 1) for _ in range(2))
     force, ticks = 20.0, 4
     perturber = perturbed(pushed, force)
@@ -336,7 +333,7 @@ def test_a_push_changes_the_base_speed_by_impulse_over_mass():
 
 @pytest.mark.parametrize("rise", [0.03, -0.03])
 def test_ground_steps_shift_floor_and_clearance_once_the_foot_is_clear(rise):
-    legs = make_legs(LEG, 2)
+    legs = make_legs(CAD, 2)
     legs.stand(slice(None), POSTURE, np.array([0.05, 0.0]))
     height, clearance = legs.height.copy(), legs.foot_clearance()
     perturber = perturbed(legs, ground=rise)
@@ -352,9 +349,9 @@ def test_ground_steps_shift_floor_and_clearance_once_the_foot_is_clear(rise):
 
 
 def test_legs_become_others_at_the_stated_tick():
-    heavy = dataclasses.replace(LEG, base=dataclasses.replace(LEG.base, mass=2 * LEG.base.mass))
-    changed, plain = (make_legs(LEG, 2) for _ in range(2))
-    perturber = perturbed(changed, later=(LEG, heavy), change=10)
+    heavy = dataclasses.replace(CAD, base=dataclasses.replace(CAD.base, mass=2 * CAD.base.mass))
+    changed, plain = (make_legs(CAD, 2) for _ in range(2))
+    perturber = perturbed(changed, later=(CAD, heavy), change=10)
     for legs in (changed, plain):
         legs.stand(slice(None), POSTURE)
     for tick in range(20):

@@ -3,7 +3,6 @@
 import dataclasses
 import json
 
-import numpy as np
 import polars as pl
 import pytest
 from studies.sim_to_real.run import EFFECTS, HopWithout
@@ -20,6 +19,7 @@ from hopping_leg.sim_to_real import stages
 from hopping_leg.sim_to_real.stages import HopOnTwin, IdentifyTwin, RecordTwin, TrainPolicy
 from hopping_leg.sim_to_real.transfer import fit_row, fits, hops, trainings
 from hopping_leg.trace import Trace
+from tests.controllers.test_rollout import Constant
 from tests.identify.twin import record, swing
 from tests.sim_to_real.studies import study
 
@@ -150,20 +150,8 @@ def test_a_twin_is_met_with_its_own_effects_alone():
 
 
 def test_a_leg_that_never_hops_errs_by_the_distance_from_standing(tmp_path):
-    class Limp:
-        name = "limp"
-
-        def reset(self, count):
-            self.count = count
-
-        def act(self, measurement):
-            return np.zeros((self.count, 2))
-
-        def internals(self):
-            return {}
-
     one = study(tmp_path, commands=(0.3,), repeats=1)
-    (row,) = stages.hop(Limp(), load_robot("legv2-paper"), one)
+    (row,) = stages.hop(Constant([0.0, 0.0]), load_robot("legv2-paper"), one)
     standing = RolloutConfig(load_robot("legv2-paper")).standing_length + 0.01
     assert row["motionless"]
     assert row["median_error_m"] == pytest.approx(standing - 0.3, abs=1e-3)

@@ -175,15 +175,11 @@ def test_other_parameters_are_told(tmp_path):
     assert "other parameters" in ReplaySource((other,)).notices[0]
 
 
-def test_an_unknown_robot_asks_for_its_file(tmp_path):
+def test_what_cannot_be_replayed_is_refused_and_an_unknown_robot_asks_for_its_file(tmp_path):
     path = stored(tmp_path / "a.parquet", robot="mine")
+    assert ReplaySource((path,), "legv1").tracks[0].robot.name == "legv1"
     with pytest.raises(RobotError, match="--robot"):
         ReplaySource((path,))
-    assert ReplaySource((path,), "legv1").tracks[0].robot.name == "legv1"
-
-
-def test_what_cannot_be_replayed_is_refused(tmp_path):
-    path = stored(tmp_path / "a.parquet")
     with pytest.raises(UsageError, match="one, or two"):
         ReplaySource((path,) * 3)
     with pytest.raises(TraceError, match="no trace file"):

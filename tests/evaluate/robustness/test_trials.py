@@ -50,9 +50,12 @@ def test_levels_and_moderate_ranges_lie_around_the_neutral_level(robot, axis):
     assert LegSimulator(robot, len(altered), robots=[case.robot for case in altered]).count
 
 
-def test_the_leaderboards_axes_are_among_them():
+def test_the_leaderboards_axes_are_among_them_and_unknown_ones_are_one_sentence(robot):
     assert {axis.leaderboard for axis in AXES} - {""} == LEADERBOARD
     assert axis_names()[-1] == JOINT
+    assert len(plan(robot, NOMINAL).trials) == 4
+    with pytest.raises(UsageError, match=r"no axis 'wind'.*pushes"):
+        plan(robot, "wind")
 
 
 @pytest.mark.parametrize("axis", ["pushes", "torque-noise", "ground-steps", JOINT])
@@ -103,9 +106,3 @@ def test_controllers_meet_the_same_and_leave_it_as_it_was(setup, robot, spring):
     assert run_axis(spring, setup, made) == first
     weak = dataclasses.replace(made, seed=made.seed + 1)
     assert run_axis(spring, setup, weak) != first
-
-
-def test_unknown_axes_are_one_sentence(robot):
-    with pytest.raises(UsageError, match=r"no axis 'wind'.*pushes"):
-        plan(robot, "wind")
-    assert len(plan(robot, NOMINAL).trials) == 4

@@ -29,15 +29,6 @@ def learn(one, make_rollout, steps, batch=TICKS * LEGS):
     return loss.item()
 
 
-def test_what_a_recurrent_student_does_depends_on_what_it_saw_before():
-    one, seen = student("gru", size=8), torch.ones(LEGS, 2)
-    first, memory = one(seen, torch.zeros(LEGS, 8))
-    second, _ = one(seen, memory)
-    assert (first - second).abs().min() > 1e-3
-    again, _ = one(seen, torch.zeros(LEGS, 8))
-    torch.testing.assert_close(again, first)
-
-
 def test_learning_sees_what_acting_saw():
     """The loss against its own actions is zero, whatever it remembered before the rollout."""
     one, rng = student("gru", size=8), np.random.default_rng(0)
