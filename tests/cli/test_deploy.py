@@ -94,20 +94,6 @@ def test_bad_input_is_refused_before_anything_is_armed(emulate, tmp_path, refuse
     assert not out.exists()
 
 
-@pytest.mark.parametrize(
-    ("transport", "sentence"),
-    [
-        ("/dev/none", "There is no serial port /dev/none"),
-        ("usb", "There is no transport 'usb'"),
-        ("socketcn:can0", "python-can has no interface 'socketcn'"),
-        ("pi3hat", "moteus-pi3hat"),
-        ("/dev/null", "Cannot open the adapter"),
-    ],
-)
-def test_a_transport_that_is_none_is_a_sentence(refused, transport, sentence):
-    refused(["doctor", "--transport", transport], sentence)
-
-
 def test_doctor_says_what_is_wrong_and_puts_it_right(emulate, capsys):
     emulate(configured=False, homed=False)
     words = ["doctor", "--transport", "/dev/leg", "--yes"]
@@ -171,18 +157,26 @@ def test_the_emulator_tells_faults_and_changes_of_mode(tmp_path, capsys):
     assert "fault: a joint's angle is wrong from now on (hip)" in capsys.readouterr().out
 
 
+EMULATE, TRANSPORT = ["emulate", "--seconds", "0"], ["doctor", "--transport"]
+
+
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["--robot", "doublependulum"], "cannot hop"),
-        (["--start-pose", "1,2,3"], "There is no pose '1,2,3'"),
-        (["--faults", "none.toml"], "no fault script none.toml"),
-        (["--seed", "-1"], "--seed is -1"),
-        (["--channel", "x"], "A channel is for CAN buses"),
+        ([*EMULATE, "--robot", "doublependulum"], "cannot hop"),
+        ([*EMULATE, "--start-pose", "1,2,3"], "There is no pose '1,2,3'"),
+        ([*EMULATE, "--faults", "none.toml"], "no fault script none.toml"),
+        ([*EMULATE, "--seed", "-1"], "--seed is -1"),
+        ([*EMULATE, "--channel", "x"], "A channel is for CAN buses"),
+        ([*TRANSPORT, "/dev/none"], "There is no serial port /dev/none"),
+        ([*TRANSPORT, "usb"], "There is no transport 'usb'"),
+        ([*TRANSPORT, "socketcn:can0"], "python-can has no interface 'socketcn'"),
+        ([*TRANSPORT, "pi3hat"], "moteus-pi3hat"),
+        ([*TRANSPORT, "/dev/null"], "Cannot open the adapter"),
     ],
 )
-def test_a_wrong_option_of_the_emulator_is_one_sentence(refused, words, sentence):
-    refused(["emulate", "--seconds", "0", *words], sentence)
+def test_a_wrong_option_or_transport_is_one_sentence(refused, words, sentence):
+    refused(words, sentence)
 
 
 @pytest.mark.parametrize("rig", ["fixed-base", "rail"])

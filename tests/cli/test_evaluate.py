@@ -44,6 +44,7 @@ def test_one_folder_receives_numbers_report_and_traces(spring, tmp_path, capsys,
     [
         (["--commands", "0.5"], "trained for 0.29 to 0.31 m"),
         (["--commands", "high"], "not a list of heights"),
+        (["--commands", "0.2,,0.3"], "metres separated by commas"),
         (["--seed", "-1"], "--seed is -1"),
         (["--robot", "legv9"], "There is no robot 'legv9'"),
         (["--threads", "-1"], "'threads' is -1"),

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from hopping_leg import cli
 from hopping_leg.cli import main
-from hopping_leg.cli.options import Heights, command_line, parse_heights, verb_of
+from hopping_leg.cli.options import Heights, command_line, verb_of
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import load_robot, load_tree, numbers, shipped_robots
 
@@ -217,9 +217,3 @@ def test_defaults_and_what_changes_no_number_are_left_out_and_names_are_tyros(ca
     with pytest.raises(SystemExit):
         tyro.cli(Options | TwoWords, args=["--help"])
     assert "two-words" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize("text", ["", "high", "0.2,,0.3", "0.2;0.3"])
-def test_other_texts_are_no_heights(text):
-    with pytest.raises(UsageError, match="separated by commas"):
-        parse_heights(text)

@@ -109,10 +109,6 @@ def test_a_killed_quick_run_goes_on_and_says_that_its_numbers_mean_nothing(tmp_p
     evaluation = json.loads((folder / "evaluation.json").read_text())
     assert {row["controller"] for row in evaluation["summary"]} >= {"energy-shaping"}
     transfer = json.loads((folder / "transfer.json").read_text())
-    assert {row["method"] for row in transfer["trials"]} == {
-        "identified",
-        "cad",
-        "energy-shaping",
-    }
+    assert {row["method"] for row in transfer["trials"]} == {"identified", "cad", "energy-shaping"}
     assert evaluation["notes"][0] == transfer["notes"][0] == NOTHING_MEANT
     assert NOTHING_MEANT in (folder / "report.html").read_text()

@@ -220,10 +220,7 @@ def test_who_hops_as_trained_is_not_stopped_for_it(name):
     limits = hopping_limits(leg, 200.0)
     commands = np.tile([0.25, 0.30, 0.35], (800, 1))
     run = rollout(
-        load_controller(name, leg),
-        RolloutConfig(leg, NO_NOISE, threads=1),
-        commands,
-        seed=0,
+        load_controller(name, leg), RolloutConfig(leg, NO_NOISE, threads=1), commands, seed=0
     )
     sides = zip(JOINTS, limits.lower, limits.upper, limits.braking, strict=True)
     for joint, lower, upper, braking in sides:

@@ -69,11 +69,6 @@ def test_the_client_drives_the_leg_with_checksums(emulator):
     assert after.q != before.q
 
 
-def test_a_wrong_start_is_told_to_the_parent():
-    with pytest.raises(UsageError, match="There is no pose 'handstand'"):
-        EmulatorProcess(EmulatorConfig(pose="handstand"))
-
-
 def test_a_plug_comes_back_under_the_same_name(tmp_path):
     async def ask(transport, drives):
         return (await drives[0].query()).id
@@ -121,13 +116,15 @@ def test_the_client_drives_the_leg_over_udp():
         assert emulator.state().time > 0
 
 
-def test_interfaces_that_cannot_be_opened_are_named():
+def test_interfaces_that_cannot_be_opened_are_named_and_the_parent_is_told_of_a_wrong_start():
     with pytest.raises(UsageError, match="There is no interface 'usb'"):
         EmulatorConfig(interface="usb").open()
     with pytest.raises(UsageError, match="Cannot open socketcan 'nowhere0'"):
         EmulatorConfig(interface="socketcan", channel="nowhere0").open()
     with pytest.raises(UsageError, match="a CAN bus has a channel"):
         EmulatorConfig(interface="udp_multicast", link="/tmp/leg").open()
+    with pytest.raises(UsageError, match="There is no pose 'handstand'"):
+        EmulatorProcess(EmulatorConfig(pose="handstand"))
 
 
 def lockstep(checksums=True, **start):

@@ -131,8 +131,7 @@ def test_every_term_is_as_printed(height, rate, q, qd, command, action, last):
 
 
 @pytest.mark.parametrize(
-    ("barrier", "expected"),
-    [("step", math.exp(0.05)), ("printed", 1 - math.exp(0.05))],
+    ("barrier", "expected"), [("step", math.exp(0.05)), ("printed", 1 - math.exp(0.05))]
 )
 def test_the_height_barrier_as_printed_rewards_overshoot_and_the_step_does_not(barrier, expected):
     config = PaperRewardConfig(barrier=barrier)

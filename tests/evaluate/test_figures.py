@@ -106,15 +106,12 @@ def figure():
 
 
 @pytest.mark.parametrize(("width", "points"), [("column", 7), ("page", 8)])
-def test_a_printed_figure_has_its_width_and_readable_text(figure, width, points):
+def test_a_printed_figure_has_its_width_readable_text_and_its_legend_inside(figure, width, points):
     fit_width(figure, width)
     assert figure.get_figwidth() == INCHES[width]
     assert figure.axes[0].xaxis.label.get_fontsize() == pytest.approx(points)
     assert [t.get_text() for t in figure.legends[0].get_texts()] == ["one", "two", "three", "four"]
-
-
-def test_the_legend_stays_inside_a_column(figure):
-    encode(figure, "pdf", "column")
+    encode(figure, "pdf", width)
     box = figure.legends[0].get_window_extent()
     assert 0 <= box.x0 < box.x1 <= figure.bbox.width
 

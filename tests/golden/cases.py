@@ -26,13 +26,7 @@ from hopping_leg.controllers.registry import (
     robot_of,
     shipped_policies,
 )
-from hopping_leg.envs import (
-    ApexRewardConfig,
-    HoppingTask,
-    TaskConfig,
-    apex_reward,
-    paper_reward,
-)
+from hopping_leg.envs import ApexRewardConfig, HoppingTask, TaskConfig, apex_reward, paper_reward
 from hopping_leg.rl import policy_evaluation
 from hopping_leg.robot import load_robot
 from tests.cli.emulated import put_behind

@@ -14,8 +14,7 @@ def test_every_case_is_stored():
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=[pytest.mark.slow] if c.slow else []) for n, c in CASES.items()],
+    "name", [pytest.param(n, marks=[pytest.mark.slow] if c.slow else []) for n, c in CASES.items()]
 )
 def test_behaviour_is_unchanged(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -223,21 +223,15 @@ def test_what_recordings_can_tell_is_fitted_and_what_is_known_is_kept(recordings
     assert kept not in names
 
 
-def test_doubtful_gains_are_where_the_search_begins():
-    plan = make_plan([FIXED.with_metadata(gains_exact=False)], LEG)
-    assert plan.start.get("drive.knee.stiffness") == FIXED.metadata.stiffness[1]
-
-
-def test_windows_are_short_where_nothing_holds_the_leg():
+def test_a_plan_has_short_windows_where_nothing_holds_the_leg_and_begins_at_doubtful_gains():
     closed, opened = (make_plan([r], LEG).window for r in (FIXED, TORQUES))
     assert opened < closed
     assert make_plan([FIXED, STANDING], LEG).window <= 0.25
-
-
-def test_the_paper_counts_positions_only():
-    plan = make_plan([FIXED, STANDING], LEG, search="two-pass")
-    assert (plan.scoring.torque, plan.scoring.robust) == (None, None)
-    assert "thigh.inertia" in plan.parameters.names
+    doubtful = make_plan([FIXED.with_metadata(gains_exact=False)], LEG)
+    assert doubtful.start.get("drive.knee.stiffness") == FIXED.metadata.stiffness[1]
+    papers = make_plan([FIXED, STANDING], LEG, search="two-pass")
+    assert (papers.scoring.torque, papers.scoring.robust) == (None, None)
+    assert "thigh.inertia" in papers.parameters.names
 
 
 def test_a_motor_is_not_believed_slower_than_its_joint_was_seen():

@@ -151,15 +151,12 @@ def test_a_recipe_of_ones_own_is_named_by_its_file(tmp_path):
         get_recipe(f"{file}:Path")
 
 
-def test_the_papers_leg_keeps_the_recipe():
-    assert get_recipe("paper").fit(load_robot("legv2-paper")) == get_recipe("paper")
-
-
 @pytest.mark.parametrize("name", ["paper", "fast", "precise"])
 @every_leg
 def test_every_shipped_leg_can_stand_and_reach_its_heights_or_those_asked_for(robot, name):
     recipe = get_recipe(name)
     fitted, asked = recipe.fit(robot), recipe.replace(heights=(0.21, 0.47)).fit(robot)
+    assert (name, robot.name) != ("paper", "legv2-paper") or fitted == recipe
     low, high = fitted.task.command_bounds
     assert 0.55 * robot.straight_height < low < high < 1.55 * robot.straight_height
     assert asked.task.command_bounds == (0.21, 0.47)

@@ -74,28 +74,22 @@ def test_a_fit_belongs_to_its_recordings(identified, tmp_path, monkeypatch):
         assert job.done
 
 
-def test_no_method_trains_on_what_the_twin_alone_knows(tmp_path):
-    one = study(tmp_path, ("cad", "table-1", "randomised", "truth"))
+def test_no_method_but_the_truth_trains_on_what_the_twin_alone_knows(tmp_path):
+    names = ("cad", "table-1", "randomised", "truth", "cad-surprises")
+    one = study(tmp_path, (*names, "identified", "identified-surprises"))
     twin = one.twins[0]
-    cad, paper, mixed, truth = (TrainPolicy(one, twin, method, 0) for method in one.methods)
-    assert cad.robot == mixed.robot == load_robot("legv2")
+    trains = [TrainPolicy(one, twin, method, 0) for method in one.methods]
+    cad, paper, mixed, truth, surprising, *_ = trains
+    assert cad.robot == mixed.robot == surprising.robot == load_robot("legv2")
     assert paper.robot == load_robot("legv2-paper")
+    assert cad.recipe().task.randomised == ()
     assert mixed.recipe().task.randomised == IDENTIFIABLE_RANGES
+    assert surprising.recipe().task.randomised == WIDE_RANGES
     assert truth.robot.reality.only_delays
     assert truth.robot.rail == twin.robot.rail
     assert truth.robot.reality.latency.command == twin.robot.reality.latency.command
-
-
-def test_legs_may_surprise_around_whatever_is_believed(tmp_path):
-    one = study(tmp_path, ("cad", "cad-surprises", "identified", "identified-surprises"))
-    twin = one.twins[0]
-    cad, surprising, *_ = trains = [TrainPolicy(one, twin, method, 0) for method in one.methods]
-    assert cad.robot == surprising.robot
-    assert cad.recipe().task.randomised == ()
-    assert surprising.recipe().task.randomised == WIDE_RANGES
-    assert len({one.training(twin, train.method, 0) for train in trains}) == 4
-    fit, shared = (one.fitted(twin, method) for method in one.methods[2:])
-    assert fit == shared
+    assert len({one.training(twin, train.method, 0) for train in trains}) == len(trains)
+    assert one.fitted(twin, one.methods[-1]) == one.fitted(twin, one.methods[-2])
     assert [job.name for job in fits(one)] == [f"identify {t.name}, identified" for t in one.twins]
 
 

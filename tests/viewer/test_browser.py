@@ -11,14 +11,7 @@ pytest.importorskip("viser", reason="the extra 'view' is not installed")
 pytest.importorskip("playwright", reason="playwright is not installed")
 
 from PIL import Image
-from studies.speed.browser import (
-    PATIENCE,
-    chromium,
-    find_chromium,
-    new_page,
-    running,
-    wait_for_leg,
-)
+from studies.speed.browser import PATIENCE, chromium, find_chromium, new_page, running, wait_for_leg
 
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.controllers.rollout import RolloutConfig, rollout

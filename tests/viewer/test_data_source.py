@@ -229,17 +229,13 @@ def test_a_bounded_track_keeps_its_newest_rows_in_order():
     np.testing.assert_array_equal(unbounded.time, np.arange(10000.0))
 
 
-def test_a_moment_between_rows_lies_between_them():
+def test_a_moment_lies_between_its_rows_and_samples_outside_of_them_are_unknown():
     track = Track("x", ROBOT)
-    track.extend(np.array([0.0, 1.0]), rows(2, height_m=[0.2, 0.4], knee_position_rad=[-1, -2]))
-    height, q = track.moment(0.25)
+    given = {"height_m": [0.2, 0.4], "knee_position_rad": [-1, -2], "command_m": [0.3, 0.4]}
+    track.extend(np.array([1.0, 2.0]), rows(2, **given))
+    height, q = track.moment(1.25)
     assert height == pytest.approx(0.25)
     np.testing.assert_allclose(q, [0.0, -1.25])
-
-
-def test_samples_outside_the_rows_are_unknown():
-    track = Track("x", ROBOT)
-    track.extend(np.array([1.0, 2.0]), rows(2, command_m=[0.3, 0.4]))
     found = track.sample(np.array([0.9, 1.0, 1.9, 2.0, 2.1]))["command_m"]
     np.testing.assert_array_equal(found, [np.nan, 0.3, 0.3, 0.4, np.nan])
     assert track.latest("command_m", 5.0) == 0.4
