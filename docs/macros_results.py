@@ -108,12 +108,19 @@ def pivot(file: str, path: str, row: str, column: str, cell: str, **where: Any) 
         cell: How a record's entries are shown, e.g. ``{score:.0%}``.
         where: Show only records with these entries.
     """
-    cells = {(r[row], r[column]): cell.format(**r) for r in _rows(file, path, where)}
+    cells = {(r[row], r[column]): _formatted(cell, r) for r in _rows(file, path, where)}
     titles = list(dict.fromkeys(title for _, title in cells))
     lines = [
         [str(key), *(cells[key, t] for t in titles)] for key in dict.fromkeys(k for k, _ in cells)
     ]
     return grid([row, *map(str, titles)], lines) + origin(file)
+
+
+def _formatted(cell: str, row: dict[str, Any]) -> str:
+    try:
+        return cell.format(**row)
+    except TypeError:  # a number that does not exist
+        return number(None)
 
 
 def _rows(file: str, path: str, where: dict[str, Any]) -> list[dict[str, Any]]:
@@ -350,6 +357,8 @@ def one(
 ) -> str:
     """Return one number of the record in a list that has these entries, times a factor."""
     (row,) = _rows(file, path, where)
+    if row[key] is None:
+        return number(None)
     return (
         f"{row[key] * factor:+.{digits}f}" if "error" in key else f"{row[key] * factor:.{digits}f}"
     )
@@ -359,6 +368,8 @@ def separation(file: str, controller: str) -> str:
     """Return how neighbouring commands of a controller differ, the least distinct pair of them."""
     (found,) = _rows(file, "neighbours", {"controller": controller})
     pairs = found["neighbours"]
+    if any(pair[name] is None for pair in pairs for name in ("p", "pooled_p", "cliffs_delta")):
+        return "not all commands gave hops"
     p, pooled = (max(pair[name] for pair in pairs) for name in ("p", "pooled_p"))
     delta = min(pairs, key=lambda pair: pair["cliffs_delta"])
     interval = f"{delta['cliffs_delta_low']:.2f} to {delta['cliffs_delta_high']:.2f}"
