@@ -132,8 +132,8 @@ def _row(method: str, kind: str, jobs: Sequence[HopOnTwin]) -> dict[str, Any]:
 
 
 HOPPERS = ("fast", ENERGY_SHAPING)
-"""What hops are foretold of: the policy that corrects itself least, so that its apexes tell most of
-the leg, and energy shaping, which no simulation has trained."""
+"""What hops are foretold of: a policy, which no hop corrects, so that its apexes tell most of the
+leg, and energy shaping, which no simulation has trained."""
 
 
 @dataclass(frozen=True)

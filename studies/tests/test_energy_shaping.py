@@ -1,5 +1,7 @@
 """Parts of energy shaping are taken away one at a time, on one leg and with one noise."""
 
+import pytest
+
 from hopping_leg.robot import DEFAULT_ROBOT, load_robot
 from studies.energy_shaping import run as module
 from studies.energy_shaping.run import COMMANDS, RANGE, Baseline, cases
@@ -44,6 +46,21 @@ def test_the_tuned_case_tells_of_more_heights_and_of_its_estimates(monkeypatch):
     assert used["estimate"] == "as used"
     assert abs(used["mean_m"]) < abs(raw["mean_m"])
     assert found == measured(monkeypatch, "tuned")
+
+
+def test_errors_are_those_of_the_papers_heights_and_faults_those_of_all():
+    nothing = {"hop_rate_hz": 2.0, "min_base_height_m": 0.1, "body_contacts": 1, "hops": 5}
+    rows = [
+        {"command_m": c, "median_error_m": c - 0.27, "std_m": c / 10, "skipped_hops": 1} | nothing
+        for c in RANGE
+    ]
+    rows[-2] |= {"hops": 0, "std_m": None}
+    found = module._summary(cases(ROBOT)[0], rows)
+    assert found["mean_abs_median_error_m"] == pytest.approx((0.02 + 0.03 + 0.08) / 3)
+    assert found["worst_median_error_m"] == pytest.approx(0.08)
+    assert found["mean_std_m"] == pytest.approx(0.03)
+    assert (found["skipped_hops"], found["body_contacts"]) == (len(RANGE), len(RANGE))
+    assert found["commands_without_hops"] == 1
 
 
 def test_a_senseless_duration_is_refused(capsys):

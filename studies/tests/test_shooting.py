@@ -132,4 +132,14 @@ def test_a_search_that_was_killed_ends_as_one_that_was_not(brief, tmp_path, monk
     tried.clear()
     assert search("cut") == whole
     assert len(tried) == 4 + 2, "of the first generation nothing is tried again"
-    assert len({shape for _, shape, _ in tried}) == 4 + 2
+    tried.clear()
+    assert search("cut") == whole
+    assert len(tried) == 2, "of a finished search only the judgement"
+
+
+def test_a_search_goes_where_costs_are_low(brief, tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "cost", lambda _name, shape, _seed: abs(shape.squat - 0.5))
+    found = Search((ROBOT.name,), 12, population=8, out=tmp_path).measure()
+    (squat,) = (row for row in found["shape"] if row["name"] == "squat")
+    assert abs(squat["found"] - 0.5) < 0.3 * abs(squat["shipped"] - 0.5)
+    assert found["costs_mm"]["found"] < found["costs_mm"]["shipped"]
