@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.table import Table
 
 from hopping_leg.cli.options import at_least
-from hopping_leg.controllers.policy import Card, Policy
+from hopping_leg.controllers.policy import Card
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.evaluate.result_files import ResultCache
 from hopping_leg.evaluate.runner import software_versions
@@ -150,7 +150,7 @@ def _judged(recipe: Recipe, robot: Robot, seed: int, train: Train) -> Row:
     rounds = recipe.selection.calibrations
     if rounds:
         content = calibrate(content, robot, (low, high), rounds, recipe.task.rate)
-    return judge(Policy(content, "policy", "policy"), robot)
+    return judge(content, robot)
 
 
 def _over_seeds(rows: list[Row]) -> list[Row]:

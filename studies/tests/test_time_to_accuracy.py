@@ -1,6 +1,8 @@
 """Accuracy over time: what counts, what is kept, and that a snapshot is the policy as it stood."""
 
+import itertools
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -108,13 +110,16 @@ def test_a_policy_file_of_stable_baselines3_acts_as_its_model_does(name, algorit
     assert np.ptp(actions) > 1e-3
 
 
-def test_snapshots_of_stable_baselines3_come_at_equal_times_until_the_minutes_are_over():
-    found = sb3.learn("sb3-ppo", ROBOT, 0, minutes=0.02, snapshots=3)
-    assert len(found) == 3
-    for number, snapshot in enumerate(found, start=1):
-        assert 0.4 * number <= snapshot.seconds < 0.4 * number + 0.5
+def test_snapshots_of_stable_baselines3_come_at_equal_times_until_the_minutes_are_over(monkeypatch):
+    """On a clock of which every step of the environments takes a 64th of a second."""
+    clock = itertools.count(5.0, 1 / 64)
+    monkeypatch.setattr(sb3, "time", SimpleNamespace(monotonic=lambda: next(clock)))
+    found = sb3.learn("sb3-ppo", ROBOT, 0, minutes=0.75 / 60, snapshots=3)
+    assert [snapshot.seconds for snapshot in found] == [0.25, 0.5, 0.75]
+    _, legs = sb3.ALGORITHMS["sb3-ppo"]
+    assert [snapshot.steps for snapshot in found] == [16 * legs, 32 * legs, 48 * legs]
+    for snapshot in found:
         assert Policy(snapshot.content, "snapshot", "s").card.steps == snapshot.steps
-    assert 0 < found[0].steps < found[1].steps < found[2].steps
 
 
 @pytest.fixture

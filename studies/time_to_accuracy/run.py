@@ -100,7 +100,7 @@ class TimeToAccuracy:
         if recipe in sb3.ALGORITHMS:
             found = sb3.learn(recipe, robot, seed, self.minutes, snapshots=12)
             rows = [
-                {"seconds": s.seconds, "steps": s.steps, **_judge(s.content, robot)} for s in found
+                {"seconds": s.seconds, "steps": s.steps, **judge(s.content, robot)} for s in found
             ]
             return {"rows": rows, "spent": {}}
         rows, result, whole = [], {}, RECIPES[recipe]
@@ -117,7 +117,7 @@ class TimeToAccuracy:
                 times = {row["steps"]: 60 * row["minutes"] for row in result["history"]}
                 policies = [(times[int(f.stem)], int(f.stem), f) for f in sorted(snapshots)]
             for seconds, steps, file in policies:
-                judged = _judge(file.read_bytes(), robot)
+                judged = judge(file.read_bytes(), robot)
                 rows.append({"seconds": seconds, "steps": steps, **judged})
         return {"rows": rows, "spent": result["seconds"]}
 
@@ -126,12 +126,9 @@ class TimeToAccuracy:
         return load_robot(self.robot or usual)
 
 
-def _judge(content: bytes, robot: Robot) -> Row:
-    return judge(Policy(content, "policy", "policy"), robot)
-
-
-def judge(policy: Policy, robot: Robot) -> Row:
-    """Return the accuracy of a policy every 2 cm of its range, or at the heights of the paper."""
+def judge(content: bytes, robot: Robot) -> Row:
+    """Return the accuracy of a policy file every 2 cm of its range, or at the paper's heights."""
+    policy = Policy(content, "policy", "policy")
     low, high = max(policy.card.command_low, 0.22), policy.card.command_high
     heights = tuple(np.arange(low, high + 1e-6, _SPACING).round(3).tolist())
     if (low, high) == (0.25, 0.35):
