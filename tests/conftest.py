@@ -13,3 +13,33 @@ def learners_log_where_tests_do(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SB3_LOGDIR", str(tmp_path_factory.mktemp("logs")))
         yield
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """A browser without a screen."""
+    pytest.importorskip("viser", reason="the extra 'view' is not installed")
+    pytest.importorskip("playwright", reason="playwright is not installed")
+    from studies.speed.browser import chromium, find_chromium
+
+    if find_chromium() is None:
+        pytest.skip("there is no Chromium on this computer")
+    with chromium() as running:
+        yield running
+
+
+@pytest.fixture
+def page(browser):
+    """An empty page; in the end nothing may have been complained of or loaded from afar."""
+    from studies.speed.browser import new_page
+
+    complaints, far = [], []
+    page = new_page(browser)
+    page.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("requestfailed", lambda request: complaints.append(request.url))
+    page.on("request", lambda r: far.append(r.url) if "127.0.0.1" not in r.url else None)
+    yield page
+    page.close()
+    assert complaints == []
+    assert [url for url in far if not url.startswith(("data:", "blob:"))] == []

@@ -7,12 +7,11 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from html.parser import HTMLParser
-from pathlib import Path
 from urllib.parse import unquote, urljoin, urlsplit
 
 import pytest
 
-from tests.doc_pages import PAGES, ROOT
+from tests.doc_pages import DOCS, PAGES, ROOT
 from tests.evaluate.test_metrics import GOOD
 
 CLICKS = 2
@@ -62,7 +61,7 @@ def inside(address: str, page: Page) -> Iterator[tuple[str, str]]:
 
 
 @pytest.mark.slow
-def test_no_link_inside_the_site_is_dead(site):
+def test_no_link_inside_the_site_is_dead_and_every_page_is_two_clicks_away(site):
     folder, pages = site
     dead = []
     for address, page in pages.items():
@@ -73,11 +72,6 @@ def test_no_link_inside_the_site_is_dead(site):
             elif known and anchor and anchor not in known.anchors:
                 dead.append(f"{address} -> {path}#{anchor}")
     assert not dead
-
-
-@pytest.mark.slow
-def test_every_page_is_two_clicks_from_the_front_page(site):
-    _, pages = site
     assert len(pages) >= len(PAGES) - 1  # the README is no page of the site
     reached = {"/"}
     for _ in range(CLICKS):
@@ -97,9 +91,6 @@ def test_links_elsewhere_are_well_formed_and_named_files_exist(page):
             assert re.fullmatch(r"[a-z0-9-]+(\.[a-z0-9-]+)+", target.netloc), link
         elif page == "README":
             assert (ROOT / target.path).exists(), link
-
-
-DOCS = Path(__file__).parent.parent / "docs"
 
 
 @pytest.fixture

@@ -10,17 +10,17 @@ from pathlib import Path
 import pytest
 
 import hopping_leg
+from tests.doc_pages import DOCS
 
 pytest.importorskip("torch")
-
-ROOT = Path(__file__).parent.parent
-PAGE = (ROOT / "docs" / "how-to-change-it.md").read_text(encoding="utf-8")
+PAGE = (DOCS / "how-to-change-it.md").read_text(encoding="utf-8")
 CHANGES = re.findall(r"^## (.*?)\n(.*?)(?=^## |\Z)", PAGE, re.DOTALL | re.MULTILINE)
 BLOCK = re.compile(r'^```(?:python|toml) title="(.*?)"\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 COMMAND = re.compile(r"^```sh\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
 SHORT = {
-    "train": "--steps 512 --set num_envs=8 n_steps=32 batch_size=64 log_every=1",
+    "train": "--steps 512 --heights 0.28 0.32"
+    " --set num_envs=8 n_steps=32 batch_size=64 log_every=1 calibrations=1",
     "evaluate": "--commands 0.3 --seeds 1 --floor soft --no-video",
     "robustness": "--commands 0.3 --seeds 1",
 }
@@ -35,33 +35,36 @@ SAYS = {
 """What the commands of a change print, where that shows it."""
 
 
-def carry_out(title, text, source):
-    """Write a block to its file, or to the end of a file of the package."""
-    file, _, place = title.partition(" ")
-    assert place in ("", "at the end")
-    path = source / Path(file).relative_to("src/hopping_leg") if place else Path(file)
-    code = path.read_text(encoding="utf-8") + "\n\n" if place else ""
-    path.write_text(code + text, encoding="utf-8")
+@pytest.fixture(scope="module")
+def copied(tmp_path_factory):
+    """A copy of the package, into which every change goes; it compiles its physics anew."""
+    folder = tmp_path_factory.mktemp("package")
+    shutil.copytree(Path(hopping_leg.__file__).parent, folder / "hopping_leg")
+    return folder
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "section"), CHANGES, ids=[name for name, _ in CHANGES])
-def test_the_change_works_as_the_page_says(name, section, tmp_path, monkeypatch):
+def test_the_change_works_as_the_page_says(name, section, tmp_path, monkeypatch, request):
     monkeypatch.chdir(tmp_path)
-    blocks = BLOCK.findall(section)
+    blocks, source = BLOCK.findall(section), Path(hopping_leg.__file__).parents[1]
     assert blocks
-    package = Path(hopping_leg.__file__).parent
-    if any(title.startswith("src/") for title, _ in blocks):  # a copy compiles its physics anew
-        package = shutil.copytree(package, tmp_path / "package" / "hopping_leg")
     for title, text in blocks:
-        carry_out(title, text, package)
+        file, _, place = title.partition(" ")
+        assert place in ("", "at the end")
+        if place:
+            source = request.getfixturevalue("copied")
+            file = source / Path(file).relative_to("src")
+            text = f"{file.read_text(encoding='utf-8')}\n\n{text}"
+        Path(file).write_text(text, encoding="utf-8")
     said = ""
     for command in "".join(COMMAND.findall(section)).splitlines():
         hop, verb, *words = command.split()
         assert hop == "hop"
+        words += SHORT.get(verb, "").split()
         done = subprocess.run(
-            [sys.executable, "-m", "hopping_leg.cli", verb, *words, *SHORT.get(verb, "").split()],
-            env={**os.environ, "PYTHONPATH": str(package.parent)},
+            [sys.executable, "-m", "hopping_leg.cli", verb, *words],
+            env={**os.environ, "PYTHONPATH": str(source)},
             capture_output=True,
             text=True,
         )

@@ -11,8 +11,8 @@ import pytest
 
 import hopping_leg
 from hopping_leg.cli.doctor import PURPOSES
+from tests.doc_pages import ROOT
 
-ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 LARGEST = 1_000_000
 

@@ -59,21 +59,28 @@ def test_processes_give_results_in_order_and_errors_as_they_were_raised():
 
 
 _KILLED = """
-import sys, time
+import time
+from pathlib import Path
 from hopping_leg.workers import ProcessWorkers
+
+def work(mark):
+    Path(mark).touch()
+    time.sleep(300.0)
+
 if __name__ == "__main__":
     with ProcessWorkers(2) as workers:
-        workers.map(time.sleep, [(300.0,)] * 2)
+        workers.map(work, [("first",), ("second",)])
 """
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
 def test_processes_end_with_who_began_them(tmp_path, how):
-    script = tmp_path / "script.py"
-    script.write_text(_KILLED)
-    process = subprocess.Popen([sys.executable, str(script)], stderr=subprocess.DEVNULL)
-    wait_for(lambda: len(children(process.pid)) >= 3)  # multiprocessing's own, and two workers
+    (tmp_path / "script.py").write_text(_KILLED)
+    words = [sys.executable, "script.py"]
+    process = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.DEVNULL)
+    wait_for(lambda: (tmp_path / "first").exists() and (tmp_path / "second").exists())
     begun = children(process.pid)
+    assert len(begun) >= 2
     process.send_signal(how)
     process.wait(60)
     wait_for(lambda: not any(Path(f"/proc/{child}/cmdline").exists() for child in begun))

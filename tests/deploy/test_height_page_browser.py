@@ -2,27 +2,15 @@
 
 import pytest
 
-pytest.importorskip("viser", reason="the extra 'view' is not installed")
-pytest.importorskip("playwright", reason="playwright is not installed")
-
-from studies.speed.browser import chromium, find_chromium, new_page
-
 from hopping_leg.deploy.height_page import HeightPage
 from hopping_leg.deploy.keyboard import LiveHeight
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(find_chromium() is None, reason="there is no Chromium on this computer"),
-]
 
-
-def test_slider_and_button_do_what_they_say():
-    height, stops, complaints = LiveHeight(0.30, (0.22, 0.40)), [], []
+@pytest.mark.slow
+def test_slider_and_button_do_what_they_say(page):
+    height, stops = LiveHeight(0.30, (0.22, 0.40)), []
     served = HeightPage(height, 0)
-    with served.serve(lambda: stops.append("stop")), chromium() as browser:
-        page = new_page(browser)
-        page.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
-        page.on("pageerror", lambda error: complaints.append(str(error)))
+    with served.serve(lambda: stops.append("stop")):
         page.goto(served.address)
         page.get_by_text("0.30").wait_for()
         slider = page.get_by_role("slider", name="height in m")
@@ -37,5 +25,3 @@ def test_slider_and_button_do_what_they_say():
         page.get_by_role("button", name="Stop the leg").click()
         page.get_by_text("Stopping.").wait_for()
         assert stops == ["stop"]
-        page.close()
-    assert complaints == []

@@ -103,9 +103,8 @@ def test_the_observation_is_the_papers_or_a_chosen_one():
 @pytest.mark.parametrize(
     "words",
     [
-        "import gymnasium; gymnasium.make('HoppingLeg-v0')",
+        "import gymnasium as g; g.make('HoppingLeg-v0'); g.make('hopping_leg:HoppingLeg-v0')",
         "import hopping_leg, gymnasium; gymnasium.make_vec('HoppingLeg-v0', num_envs=2)",
-        "import gymnasium; gymnasium.make('hopping_leg:HoppingLeg-v0')",
     ],
 )
 def test_gymnasium_knows_it_imported_or_not(words):

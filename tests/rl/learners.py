@@ -22,12 +22,12 @@ TINY_FAST = FAST.replace(
     hidden=(8, 8), size=8, mixing_share=0.4, calibrations=1, heights=(0.28, 0.32),
     eval_commands=(0.28, 0.32),
 )  # fmt: skip
-EVERY = {
-    "sac": TINY,
+STUDENTS = {
     "window": TINY_FAST,
     "gru": TINY_FAST.replace(memory="gru"),
     "surprised": TINY_FAST.replace({"task.randomised": WIDE_RANGES}),
 }
+EVERY = {"sac": TINY, **STUDENTS}
 
 
 def learner(recipe, seed=3, robot=ROBOT):

@@ -1,4 +1,4 @@
-"""Policy files: written and read back, their command corrected, their hidden layers shown."""
+"""Policy files: their command corrected, in whatever layout, with and without a memory."""
 
 import itertools
 
@@ -26,13 +26,13 @@ def shapes(layout):
     return make_observation_history(layout, 0.005).shapes
 
 
-def made(layout, hidden=(8,), *, remembers=False):
+def made(layout, *, remembers=False):
     """Return the file of a policy that depends on every input, and on its command the most."""
     rng = np.random.default_rng(0)
     sizes = {name: int(np.prod(shape)) for name, shape in shapes(layout).items()}
     total = sum(sizes.values())
     gain = np.concatenate([np.full(k, 5.0 if n == "command" else 0.5) for n, k in sizes.items()])
-    wide = [MEMORY if remembers else total, *hidden, 2]
+    wide = [MEMORY if remembers else total, 8, 2]
     layers = [
         (rng.normal(size=(b, a)) / np.sqrt(a), rng.normal(0, 0.1, b))
         for a, b in itertools.pairwise(wide)

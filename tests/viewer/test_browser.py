@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 pytest.importorskip("viser", reason="the extra 'view' is not installed")
-pytest.importorskip("playwright", reason="playwright is not installed")
 
 from PIL import Image
-from studies.speed.browser import PATIENCE, chromium, find_chromium, new_page, running, wait_for_leg
+from studies.speed.browser import PATIENCE, running, wait_for_leg
 
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.controllers.rollout import RolloutConfig, rollout
@@ -22,32 +21,8 @@ from hopping_leg.viewer.live_leg import LiveSimulation
 from hopping_leg.viewer.panels import HEIGHT_STEP, KEY_STEP
 from hopping_leg.viewer.viewer import Viewer
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(find_chromium() is None, reason="there is no Chromium on this computer"),
-]
+pytestmark = pytest.mark.slow
 ROBOT = "legv2-paper"
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as browser:
-        yield browser
-
-
-@pytest.fixture
-def page(browser):
-    """Return an empty page; in the end nothing may have been complained of or loaded from afar."""
-    complaints, far = [], []
-    page = new_page(browser)
-    page.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.on("requestfailed", lambda request: complaints.append(request.url))
-    page.on("request", lambda r: far.append(r.url) if "127.0.0.1" not in r.url else None)
-    yield page
-    page.close()
-    assert complaints == []
-    assert [url for url in far if not url.startswith(("data:", "blob:"))] == []
 
 
 def until(condition):

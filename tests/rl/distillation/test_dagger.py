@@ -9,7 +9,7 @@ import torch
 from hopping_leg.controllers.shooting import Shooting
 from hopping_leg.rl.distillation.dagger import DaggerConfig
 from hopping_leg.sim import leg_simulator
-from tests.rl.learners import EVERY, ROBOT, TINY_FAST, learn, learner, policy_file
+from tests.rl.learners import ROBOT, STUDENTS, TINY_FAST, learn, learner, policy_file
 
 ROLLOUT = TINY_FAST.algorithm.n_steps * TINY_FAST.schedule.num_envs
 FULL = np.array(TINY_FAST.task.action_torque)
@@ -50,18 +50,21 @@ def trained(recipe, seed, threads=1):
 @pytest.mark.parametrize("name", ["window", "gru"])
 def test_the_seed_alone_decides_on_any_number_of_threads(name, monkeypatch):
     monkeypatch.setattr(leg_simulator, "_STEPS_PER_THREAD", 1)
-    recipe = EVERY[name].replace(steps=6 * ROLLOUT)
+    recipe = STUDENTS[name].replace(steps=6 * ROLLOUT)
     first = trained(recipe, 0)
     torch.rand(10)
     assert trained(recipe, 0, threads=2) == first
     assert trained(recipe, 1) != first
 
 
-@pytest.mark.parametrize("name", ["window", "gru", "surprised"])
-def test_a_policy_file_acts_on_measurements_as_the_student_did(name):
+PAPERS = TINY_FAST.replace({"task.observation": "three-samples"})
+
+
+@pytest.mark.parametrize("recipe", [*STUDENTS.values(), PAPERS], ids=[*STUDENTS, "three samples"])
+def test_a_policy_file_acts_on_measurements_as_the_student_did(recipe):
     """Through ends of episodes, after which nothing is remembered; the true state is not asked."""
     changes = {"task.episode": 0.1, "task.random_episode_start": False, "mixing_share": 1e-9}
-    recipe = EVERY[name].replace(changes, n_steps=50)
+    recipe = recipe.replace(changes, n_steps=50)
     made = learner(recipe)
     file, task = policy_file(recipe, made), made.task
     asked, measured, step = [], [], task.step
@@ -145,10 +148,3 @@ def test_the_student_comes_nearer_to_its_teacher():
     made = learn(learner(TINY_FAST), TINY_FAST.schedule.steps)
     losses = [made._gradient_step() for _ in range(200)]
     assert np.mean(losses[-20:]) < 0.7 * np.mean(losses[:20])
-
-
-def test_the_papers_observation_can_be_taught_too():
-    recipe = TINY_FAST.replace({"task.observation": "three-samples"}, steps=2 * ROLLOUT)
-    made = learn(learner(recipe), recipe.schedule.steps)
-    assert made.network().layers[0][0].shape == (8, 15)
-    assert np.isfinite(made.logger.name_to_value["train/loss"])
