@@ -49,7 +49,7 @@ class Reproduce:
     """Seed of the trainings; the evaluation's seeds follow from another number."""
     twin: str | None = None
     """Robot file of the leg that plays the real one; default: one that is drawn."""
-    steps: int = 3_000_000
+    steps: int = 400_000
     """Control steps of experience of each training, fewer than the recipe's to save time."""
     jobs: int = 2
     """Recordings, trainings or trials at the same time; take the number of cores."""

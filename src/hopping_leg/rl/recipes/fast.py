@@ -1,4 +1,8 @@
-"""The fast recipe: accurate hopping soon, by imitation of the shooting controller."""
+"""The fast recipe: accurate hopping soon, by imitation of the shooting controller.
+
+Rollouts are short and gradient steps many: a student has to meet the states in which it stands
+still soon.
+"""
 
 from hopping_leg.envs import TaskConfig
 from hopping_leg.rl import recipe
@@ -17,9 +21,9 @@ FAST = recipe.Recipe(
         episode=8.0,
         random_episode_start=True,
     ),
-    algorithm=DaggerConfig(),
+    algorithm=DaggerConfig(learning_rate=2e-3, n_steps=32, gradient_steps=32, batch_size=2048),
     network=StudentConfig(hidden=(128, 64)),
-    schedule=recipe.Schedule(num_envs=256, steps=2_000_000, log_every=8),
+    schedule=recipe.Schedule(num_envs=256, steps=1_200_000, log_every=8),
     selection=recipe.SelectionConfig(
         eval_every=10**9,
         eval_commands=(0.22, 0.26, 0.30, 0.34, 0.38, 0.42),
