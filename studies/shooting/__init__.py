@@ -2,7 +2,8 @@
 
 RESULTS = (
     "python -m studies.shooting reach --json studies/shooting/results/reach.json",
-    "python -m studies.shooting search --json studies/shooting/results/search.json",
+    "python -m studies.shooting search --generations 20 --population 10 --json "
+    "studies/shooting/results/search.json",
 )
 
 TABLES = (
