@@ -2,8 +2,8 @@
 
 RESULTS = (
     "python -m studies.energy_shaping --json studies/energy_shaping/results/energy_shaping.json",
-    "hop tune energy-shaping --start energy-shaping-legv2-identified --flight 0.5 --generations 40 "
-    "--population 16 --commands 0.22 0.25 0.29 0.33 0.36 --out runs/flying --json "
+    "hop tune energy-shaping --start energy-shaping-flying-legv2 --flight 0.5 --generations 80 "
+    "--population 20 --step 0.08 --commands 0.22 0.25 0.29 0.33 0.36 --out runs/flying --json "
     "studies/energy_shaping/results/flying.json",
 )
 
