@@ -32,7 +32,7 @@ SHORTER = {
     "hop excite multisine": {"--duration": "10"},
     "hop identify": {"--parameters": "hip.friction,knee.friction"},
     "hop record --transport": {"--yes": None},
-    "hop train": {"--steps": "1"},
+    "hop train": {"--steps": "1", "--heights": "0.28 0.32"},
     "hop tune": {"--trials": "1", "--steps": "1", "--workers": "1", "--snapshots": "1"},
     "hop tune energy-shaping": {"--generations": "1", "--population": "4", "--seconds": "3"},
     "hop view": {"--no-browser": None, "--port": "0", "--seconds": "0.5"},
@@ -77,7 +77,7 @@ def shorten(words: list[str]) -> list[str]:
     if not fitting:
         return words
     for flag, value in SHORTER[max(fitting, key=lambda key: len(key.split()))].items():
-        words = [*_without(words, flag), flag, *([] if value is None else [value])]
+        words = [*_without(words, flag), flag, *(value or "").split()]
     return words
 
 
