@@ -177,8 +177,9 @@ def not_stored(study: str) -> str:
 
 def training(recipe: str) -> str:
     """Return accuracy over the time of a recipe's trainings: a table and a learning curve."""
-    file = "time_to_accuracy/time_to_accuracy.json"
-    if not stored(file, "summary", recipe=recipe):
+    files = [f"time_to_accuracy/{kind}.json" for kind in ("distillation", "reinforcement_learning")]
+    file = next((file for file in files if stored(file, "summary", recipe=recipe)), None)
+    if file is None:
         return not_stored("time_to_accuracy")
     titles = (
         "seconds=after, s",

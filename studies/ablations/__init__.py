@@ -1,7 +1,7 @@
 """What is each part of a distillation worth, and what do other teachers teach?"""
 
 RESULTS = (
-    "python -m studies.ablations --seeds 0 1 --steps 2000000 --json "
+    "python -m studies.ablations --seeds 0 1 --steps 1000000 --json "
     "studies/ablations/results/precise.json",
 )
 

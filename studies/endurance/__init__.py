@@ -1,7 +1,7 @@
 """Does a controller hop for ten minutes on emulated drives without the supervisor ending it?"""
 
 RESULTS = (
-    "python -m studies.endurance --controllers precise fast energy-shaping "
+    "python -m studies.endurance --controllers precise "
     "--json studies/endurance/results/endurance.json",
 )
 

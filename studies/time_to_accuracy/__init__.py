@@ -1,30 +1,32 @@
 """How long does it take from scratch to accurate hopping?"""
 
-RESULTS = (
-    "python -m studies.time_to_accuracy --json "
-    "studies/time_to_accuracy/results/time_to_accuracy.json --figure "
-    "studies/time_to_accuracy/figures/time_to_accuracy.svg",
+_RESULTS, _FIGURES = (f"studies/time_to_accuracy/{kind}" for kind in ("results", "figures"))
+
+RESULTS = tuple(
+    f"python -m studies.time_to_accuracy --recipes {recipes} --seeds {seeds} --json "
+    f"{_RESULTS}/{name}.json --figure {_FIGURES}/{name}.svg"
+    for name, recipes, seeds in (
+        ("distillation", "fast precise", "0 1 2 3 4"),
+        ("reinforcement_learning", "paper sb3-ppo sb3-sac", "0 1"),
+    )
 )
 
-TABLES = (
-    (
-        "table",
-        "time_to_accuracy.json",
-        "summary",
-        "recipe",
-        "seconds=seconds",
-        "runs",
-        "worst_seed_mean_error_m*1000=error of the worst seed, mm",
-        "mean_error_m*1000=error, mm",
-        "mean_std_m*1000=std, mm",
-        "skipped_hops=skipped hops",
-    ),
-    (
-        "table",
-        "time_to_accuracy.json",
-        "spent",
-        "recipe",
-        "part",
-        "seconds",
-    ),
+TABLES = tuple(
+    table
+    for name in ("distillation", "reinforcement_learning")
+    for table in (
+        (
+            "table",
+            f"{name}.json",
+            "summary",
+            "recipe",
+            "seconds=seconds",
+            "runs",
+            "worst_seed_mean_error_m*1000=error of the worst seed, mm",
+            "mean_error_m*1000=error, mm",
+            "mean_std_m*1000=std, mm",
+            "skipped_hops=skipped hops",
+        ),
+        ("table", f"{name}.json", "spent", "recipe", "part", "seconds"),
+    )
 )
