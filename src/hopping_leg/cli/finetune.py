@@ -62,23 +62,17 @@ class Finetune:
 
 def run(args: Finetune) -> None:
     """Continue the training, say how it went."""
-    from hopping_leg.rl.finetune.finetuning import (
-        POLICY,
-        FinetuneConfig,
-        StoppingRules,
-        Task,
-        finetune,
-    )
+    from hopping_leg.rl.finetune import finetuning
 
     policy, robot = load_policy(args.policy), load_robot(args.robot or robot_of([args.policy]))
     _refuse(args, policy, robot)
-    config = FinetuneConfig(
+    config = finetuning.FinetuneConfig(
         commands=tuple(sorted(args.commands)),
         trial_seconds=args.trial_seconds,
-        stopping_rules=StoppingRules(minutes=args.minutes, tolerance=args.tolerance),
+        stopping_rules=finetuning.StoppingRules(minutes=args.minutes, tolerance=args.tolerance),
     )
-    result = finetune(
-        Task(policy, robot, args.seed),
+    result = finetuning.finetune(
+        finetuning.Task(policy, robot, args.seed),
         _trial_robot(args, robot, policy.card.rate),
         config,
         args.out,
@@ -87,7 +81,7 @@ def run(args: Finetune) -> None:
     )
     if args.json is not None:
         io.write_json(args.json, result)
-    options.say(f"{result['why_it_ended']} Policy: {args.out / POLICY}")
+    options.say(f"{result['why_it_ended']} Policy: {args.out / finetuning.POLICY}")
 
 
 def line(row: dict[str, Any]) -> str:

@@ -16,16 +16,7 @@ import tyro
 
 from hopping_leg.cli.options import say, show_table
 from hopping_leg.io import write_json
-from hopping_leg.robot import (
-    Robot,
-    build_model,
-    doubts,
-    load_robot,
-    load_tree,
-    numbers,
-    robot_from_tree,
-    shipped_robots,
-)
+from hopping_leg.robot import Robot, build_model, numbers, robot_files
 
 Target = tyro.conf.Positional[str]
 
@@ -59,14 +50,17 @@ class Check:
 def run(args: List | Show | Check) -> None:
     """List, show or check robots."""
     if isinstance(args, List):
-        robots = [load_robot(name) for name in shipped_robots()]
+        robots = [robot_files.load_robot(name) for name in robot_files.shipped_robots()]
         if args.json:
             write_json(args.json, [{"name": r.name, **derived(r)} for r in robots])
         for robot in robots:
             print(f"{robot.name:<12}  {robot.description}\n{'':<12}  {_summary(robot)}")
     elif isinstance(args, Show):
-        tree = load_tree(args.robot)
-        robot, doubted = robot_from_tree(tree, args.robot), doubts(args.robot)
+        tree = robot_files.load_tree(args.robot)
+        robot, doubted = (
+            robot_files.robot_from_tree(tree, args.robot),
+            robot_files.doubts(args.robot),
+        )
         if args.json:
             facts = {**asdict(robot), "derived": derived(robot), "doubts": doubted}
             write_json(args.json, facts)
@@ -78,7 +72,8 @@ def run(args: List | Show | Check) -> None:
         show_table(("number", "value", "unit", "source"), rows, title)
         say(*doubted)
     else:
-        robot, doubted = robot_from_tree(load_tree(args.robot), args.robot), doubts(args.robot)
+        robot = robot_files.robot_from_tree(robot_files.load_tree(args.robot), args.robot)
+        doubted = robot_files.doubts(args.robot)
         build_model(robot)
         print(f"{args.robot} is a valid robot: {robot.name} ({_summary(robot)}).")
         say(*(f"But {doubt}" for doubt in doubted))

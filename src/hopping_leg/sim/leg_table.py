@@ -6,13 +6,7 @@ import numpy as np
 
 from hopping_leg.arrays import Records
 from hopping_leg.errors import RobotError
-from hopping_leg.robot import GRAVITY, JOINTS, Joint, Robot
-from hopping_leg.robot.model import (
-    FRICTION_IMPEDANCE,
-    FRICTION_TIME_CONSTANT,
-    STOP_IMPEDANCE,
-    STOP_TIME_CONSTANT,
-)  # fmt: skip
+from hopping_leg.robot import GRAVITY, JOINTS, Joint, Robot, model
 
 SENSORS = ("position", "velocity", "torque")
 """What each joint's sensors measure; columns of readings are (hip, knee) of each in turn."""
@@ -145,11 +139,11 @@ def _set_ground(row: Records, robot: Robot, timestep: float) -> None:
     )
     row["ground_friction"] = max(friction, _LEAST_FRICTION)
     row["contact_stiffness"], row["contact_damping"] = _spring(time, ratio, timestep)
-    row["stop_stiffness"], row["stop_damping"] = _spring(STOP_TIME_CONSTANT, 1.0, timestep)
+    row["stop_stiffness"], row["stop_damping"] = _spring(model.STOP_TIME_CONSTANT, 1.0, timestep)
 
 
 def _spring(
-    time: float, ratio: float, timestep: float, impedance: float = STOP_IMPEDANCE[1]
+    time: float, ratio: float, timestep: float, impedance: float = model.STOP_IMPEDANCE[1]
 ) -> tuple[float, float]:
     """Return stiffness and damping of MuJoCo's ``solref``, which no step may outrun."""
     time = max(time, 2 * timestep)
@@ -176,11 +170,11 @@ def _set_softness(row: Records, robot: Robot, timestep: float) -> None:
     joints = inverse.diagonal()[1:]
     row["joint_softness"] = joints
     rotors = np.where(row["elastic"] > 0, 1 / np.maximum(row["armature"], 1e-12), joints)
-    impedance = FRICTION_IMPEDANCE[0]
+    impedance = model.FRICTION_IMPEDANCE[0]
     hold = impedance / (1 - impedance)
     row["friction_stiffness"] = hold / rotors
     row["rail_friction_stiffness"] = hold / inverse[0, 0] if inverse[0, 0] else 1.0
-    _, row["friction_damping"] = _spring(FRICTION_TIME_CONSTANT, 1.0, timestep, impedance)
+    _, row["friction_damping"] = _spring(model.FRICTION_TIME_CONSTANT, 1.0, timestep, impedance)
 
 
 def _set_drives(row: Records, robot: Robot, timestep: float) -> None:

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hopping_leg.rl.checkpoint import read_checkpoint, write_checkpoint
-from hopping_leg.rl.distillation.buffer import Rollout, RolloutBuffer, shift_labels
+from hopping_leg.rl.distillation.buffer import LabelledRollout, RolloutBuffer, shift_labels
 
 TICKS, LEGS = 4, 3
 PROMPT = np.zeros(LEGS, np.int64)
@@ -25,7 +25,7 @@ def rollout(number, begun=()):
     for place in begun:
         starts[place] = True
     memory = np.arange(LEGS, dtype=np.float32)[:, None] + 1
-    return Rollout(seen, seen.copy(), starts, memory)
+    return LabelledRollout(seen, seen.copy(), starts, memory)
 
 
 def draws():

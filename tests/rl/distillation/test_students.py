@@ -3,7 +3,7 @@
 import numpy as np
 import torch
 
-from hopping_leg.rl.distillation.buffer import Rollout, RolloutBuffer
+from hopping_leg.rl.distillation.buffer import LabelledRollout, RolloutBuffer
 from hopping_leg.rl.distillation.students import StudentConfig
 
 LEGS, TICKS = 5, 6
@@ -45,7 +45,7 @@ def test_learning_sees_what_acting_saw():
                     torch.from_numpy(now), memory * torch.from_numpy(~new)[:, None]
                 )
                 acted.append(action.numpy())
-        held.add(Rollout(seen, np.stack(acted), begun, before), PROMPT)
+        held.add(LabelledRollout(seen, np.stack(acted), begun, before), PROMPT)
         loss = one.loss(held, TICKS * LEGS, torch.Generator().manual_seed(0))
         assert loss.item() < 1e-6, "labels are kept in half precision"
     with torch.no_grad():
@@ -63,7 +63,7 @@ def test_a_recurrent_student_learns_to_repeat_what_is_no_longer_seen():
         seen[0, :, 0], labels[:] = number, number[:, None]
         begun = np.zeros((TICKS, LEGS), bool)
         begun[0] = True
-        return Rollout(seen, labels, begun, np.zeros((LEGS, 8), np.float32))
+        return LabelledRollout(seen, labels, begun, np.zeros((LEGS, 8), np.float32))
 
     assert learn(student("gru", size=8), shown_once, 300) < 0.05
 
@@ -75,6 +75,8 @@ def test_a_window_student_learns_what_it_is_shown():
         seen = rng.uniform(-1, 1, (TICKS, LEGS, 2)).astype(np.float32)
         labels = seen[..., :1] * [1.0, -1.0]
         nothing = np.zeros((TICKS, LEGS))
-        return Rollout(seen, labels.astype(np.float32), nothing > 0, nothing[0][:, None][:, :0])
+        return LabelledRollout(
+            seen, labels.astype(np.float32), nothing > 0, nothing[0][:, None][:, :0]
+        )
 
     assert learn(student("window", hidden=(16,)), product, 300, batch=100) < 0.02

@@ -9,7 +9,7 @@ from hopping_leg.arrays import Array32, BoolArray, IntArray
 from hopping_leg.rl.checkpoint import Tree
 
 
-class Rollout(NamedTuple):
+class LabelledRollout(NamedTuple):
     """Some control periods of n environments."""
 
     observations: Array32
@@ -61,7 +61,7 @@ class RolloutBuffer:
         """Rollouts held."""
         return min(self.added, len(self._labels))
 
-    def add(self, rollout: Rollout, delay: IntArray) -> None:
+    def add(self, rollout: LabelledRollout, delay: IntArray) -> None:
         """Keep a rollout in the place of the oldest.
 
         What is commanded acts ``delay`` ticks later, (n,): the label of a tick is what the teacher

@@ -21,7 +21,7 @@ from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.controllers.shooting import HopShape, Shooting
 from hopping_leg.envs.task import HoppingTask
 from hopping_leg.rl.checkpoint import Tree
-from hopping_leg.rl.distillation.buffer import Rollout, RolloutBuffer
+from hopping_leg.rl.distillation.buffer import LabelledRollout, RolloutBuffer
 from hopping_leg.rl.distillation.students import Student, StudentConfig
 from hopping_leg.rl.learner import RecentHops
 from hopping_leg.rl.onnx_export import Network
@@ -161,13 +161,13 @@ class Dagger:
         """Chance that the teacher acts for the student, leg by leg and tick by tick."""
         return max(0.0, 1 - self.share / self.config.mixing_share)
 
-    def _collect(self) -> Rollout:
+    def _collect(self) -> LabelledRollout:
         began = time.monotonic()
         memory = self._memory.numpy().copy()
         ticks = [self._step() for _ in range(self.config.n_steps)]
         observations, labels, begun = (np.stack(parts) for parts in zip(*ticks, strict=True))
         self.seconds["rollouts"] += time.monotonic() - began
-        return Rollout(observations, labels, begun, memory)
+        return LabelledRollout(observations, labels, begun, memory)
 
     def _step(self) -> tuple[Any, Any, BoolArray]:
         seen, label, begun = self._seen, self._label, self._begun
