@@ -11,7 +11,7 @@ import torch
 from tests.rl.learners import ROBOT, TINY_FAST, learn, learner, try_briefly
 
 from hopping_leg.errors import UsageError
-from hopping_leg.rl.recipes.precise import PRECISE
+from hopping_leg.rl.recipes.fast import FAST
 from studies.ablations import ppo
 from studies.ablations import run as module
 from studies.ablations.run import VARIANTS, Ablation, distilled, taught_by_ppo
@@ -22,8 +22,8 @@ PPO_ROLLOUT = 64 * TINY_FAST.schedule.num_envs
 
 @pytest.fixture
 def tiny(monkeypatch):
-    """Let `precise` be small and its trials short; return the numbers of its trainings."""
-    monkeypatch.setattr(module, "PRECISE", TINY_FAST)
+    """Let `fast` be small and its trials short; return the numbers of its trainings."""
+    monkeypatch.setattr(module, "FAST", TINY_FAST)
     try_briefly(monkeypatch)
     trained = []
 
@@ -42,11 +42,11 @@ def weights(network):
 
 
 def test_variants_differ_from_the_recipe_and_from_each_other_in_what_they_name():
-    made = [(PRECISE.replace(changes), train) for _, changes, train in VARIANTS.values()]
+    made = [(FAST.replace(changes), train) for _, changes, train in VARIANTS.values()]
     assert len({repr(variant) for variant in made}) == len(VARIANTS)
-    assert made[0] == (PRECISE, distilled)
+    assert made[0] == (FAST, distilled)
     for (recipe, _), (_, changes, _) in zip(made, VARIANTS.values(), strict=True):
-        differing = {n for n, _ in PRECISE.paths() if recipe.value(n) != PRECISE.value(n)}
+        differing = {n for n, _ in FAST.paths() if recipe.value(n) != FAST.value(n)}
         assert differing == set(changes)
 
 
