@@ -57,7 +57,8 @@ def test_a_python_class_is_deployed_and_stopped_by_name(emulate, tmp_path, capsy
         "class Mine:\n    def __init__(self, robot, rate): pass\n    def reset(self, count): pass\n"
         f"    def act(self, measurement): return {answer}\n"
     )
-    words = [RUN[0], f"{file}:Mine", *RUN[2:], "--yes", "--out", str(tmp_path / "run")]
+    words = [RUN[0], f"{file}:Mine", *RUN[2:], "--robot", "legv2-paper", "--yes"]
+    words += ["--out", str(tmp_path / "run")]
     assert main(words) == (2 if says else 0)
     assert says is None or says in capsys.readouterr().err
     (trace,) = (tmp_path / "run").glob("*.parquet")

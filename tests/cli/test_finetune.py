@@ -52,11 +52,11 @@ def test_a_trials_line_says_what_happened():
 
 @pytest.mark.slow
 def test_a_run_leaves_policy_card_and_numbers(tmp_path, monkeypatch, capsys):
-    from hopping_leg.rl.finetune import finetuning
-    from hopping_leg.rl.finetune.apex_estimate import ContactConfig, prepare
+    from hopping_leg.rl.finetune import apex_estimate
 
-    few = ContactConfig(num_envs=4, seconds=3.0, steps=50, hidden=(8,))
-    monkeypatch.setattr(finetuning, "prepare", lambda p, r, _, folder: prepare(p, r, few, folder))
+    few = apex_estimate.ContactConfig(num_envs=4, seconds=3.0, steps=50, hidden=(8,))
+    prepare = apex_estimate.prepare
+    monkeypatch.setattr(apex_estimate, "prepare", lambda p, r, _, to: prepare(p, r, few, to))
     out, numbers = tmp_path / "run", tmp_path / "finetune.json"
     words = ["finetune", "fast", "--on", "twin", "--minutes", "0.4"]
     words += ["--trial-seconds", "10", "--out", str(out), "--json", str(numbers)]

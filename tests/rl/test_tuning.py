@@ -152,7 +152,7 @@ def test_command_line_trains_and_leaves_everything(tmp_path, capsys, monkeypatch
     try_briefly(monkeypatch)
     out, study = tmp_path / "out", tmp_path / "deep" / "study.db"
     words = ["tune", "fast", "--trials", "2", "--steps", "256", "--snapshots", "2"]
-    words += ["--set", "num_envs=2", "--study", str(study), "--out", str(out)]
+    words += ["--set", "num_envs=2", "calibrations=1", "--study", str(study), "--out", str(out)]
     assert main(words) == 0
     data = json.loads((out / "trials.json").read_text())
     assert [trial["state"] for trial in data["trials"]] == ["complete", "complete"]
@@ -167,7 +167,7 @@ def test_command_line_trains_and_leaves_everything(tmp_path, capsys, monkeypatch
 
 
 BRIEF = [
-    "tune", "fast", "--trials", "3", "--steps", "128", "--snapshots", "1", "--set", "num_envs=2",
+    "tune", "paper", "--trials", "3", "--steps", "128", "--snapshots", "1", "--set", "num_envs=2",
 ]  # fmt: skip
 SHARED = """
 from hopping_leg.cli import main
