@@ -51,6 +51,12 @@ def test_the_stiff_floor_is_the_engines_own():
     assert on_floor(bullet, "soft") == bullet
 
 
+def test_a_policy_hops_on_its_own_robot_unless_one_is_named():
+    for name in ("fast", "paper", "energy-shaping"):
+        assert Engines().leg(name).name == robot_of([name])
+    assert Engines(robot="legv1").leg("fast").name == "legv1"
+
+
 def test_a_ground_that_the_engine_lacks_is_refused():
     with pytest.raises(UsageError, match="pybullet"):
         RolloutConfig(ROBOT, ground="rigid")
@@ -80,12 +86,12 @@ def test_a_controller_hops_in_pybullet_as_it_is():
 def test_the_benchmark_has_a_row_for_every_world_and_command():
     pytest.importorskip("pybullet", reason="needs the extra 'bullet'")
     worlds = (World("here", "mujoco"), World("there", "pybullet", "rigid"))
-    study = Engines(("fast",), commands=(0.3,), seeds=1, timestep=2.5e-3, workers=1)
+    study = Engines(("fast",), ROBOT.name, (0.3,), seeds=1, timestep=2.5e-3, workers=1)
     result = bench_engines(study, worlds, rates=())
     assert [(row["world"], row["command_m"]) for row in result["rows"]] == [
         ("here", 0.3),
         ("there", 0.3),
     ]
-    assert {row["robot"] for row in result["worlds"]} == {robot_of(["fast"])}
+    assert {row["robot"] for row in result["worlds"]} == {ROBOT.name}
     here, there = result["drops"]
     assert here["deepest_sink_m"] > 0.03 > 1e-3 > there["deepest_sink_m"]
