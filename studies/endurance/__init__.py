@@ -1,7 +1,7 @@
 """Does a controller hop for ten minutes on emulated drives without the supervisor ending it?"""
 
 RESULTS = (
-    "python -m studies.endurance --controllers precise "
+    "python -m studies.endurance --controllers precise --commands 0.22 0.26 0.38 0.42 "
     "--json studies/endurance/results/endurance.json",
 )
 
