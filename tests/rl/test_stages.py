@@ -6,10 +6,12 @@ import math
 
 import pytest
 
+from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import UsageError
 from hopping_leg.rl import stages
 from hopping_leg.rl.policy_evaluation import CommandResult
 from hopping_leg.rl.recipes import RECIPES
+from hopping_leg.rl.run_folder import RunFolder
 from hopping_leg.rl.train import train
 from tests.rl.learners import ROBOT, TINY_FAST, try_briefly
 
@@ -96,3 +98,15 @@ def test_a_training_tells_how_its_stages_ended(tmp_path, monkeypatch):
     assert rows[3]["score_m"] == result["selected"]["worst_score_m"]
     card = (tmp_path / "model_card.md").read_text()
     assert all(f"  - {row['name']}: {row['score']}" in card for row in rows)
+
+
+def test_a_run_is_known_by_what_was_asked_and_its_card_says_what_is_in_reach(tmp_path, monkeypatch):
+    def within_reach(recipe, robot):
+        return recipe.replace({"task.command_range": (0.28, 0.30)}, eval_commands=(0.29,)), 0.001
+
+    try_briefly(monkeypatch)
+    monkeypatch.setattr(stages, "within_reach", within_reach)
+    trained = train(TINY_FAST, ROBOT, 0, tmp_path, quiet=True)
+    RunFolder(tmp_path, TINY_FAST.fit(ROBOT), ROBOT, 0, None).check_same()
+    card = Policy.load(trained.policy).card
+    assert (card.command_low, card.command_high) == (0.28, 0.30)
