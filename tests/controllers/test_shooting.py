@@ -12,6 +12,7 @@ from hopping_leg.controllers.registry import load_controller
 from hopping_leg.controllers.shooting import HopShape, Shooting, hop_law
 from hopping_leg.errors import UsageError
 from hopping_leg.hop_detection import find_hops
+from hopping_leg.io import replace_at
 from hopping_leg.robot import GRAVITY, load_robot
 from hopping_leg.sim import LegSimulator, leg_simulator
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, sample
@@ -51,6 +52,12 @@ def hopped(request):
 
 def test_every_hop_is_as_high_as_asked_under_noise(hopped):
     check_apexes(hopped[1], HEIGHTS)
+
+
+@pytest.mark.parametrize("latency", [0.0012, 0.0035, 0.0049])
+def test_commands_that_arrive_late_within_a_period_are_planned_with(latency):
+    robot = replace_at(ROBOT, "reality.latency.command", latency)
+    check_apexes(hop(robot, HEIGHTS[::3]), HEIGHTS[::3])
 
 
 def test_hops_are_calm_and_the_foot_alone_touches_the_ground(hopped):

@@ -122,20 +122,24 @@ def apex_of(
     p: Record, shape: Record, state: Array, memory: Record, past: Array, rows: Array,
     hop: Record, phase: int, torque: Array, command: Array, steps: int, dt: float, ticks: int,
 ) -> float:  # fmt: skip
-    """Return the height of the next apex after a lift-off, NaN if none comes; all but p changes."""
-    pushed = phase != FLIGHT
+    """Return the height of the next apex after a lift-off, NaN if none comes; all but p changes.
+
+    Commands arrive late by the latency beyond whole control periods: whoever commands through
+    those asks for what is to be given when they are over.
+    """
+    pushed, period = phase != FLIGHT, steps * dt
+    late = p.command_latency - math.floor(p.command_latency / period + 1e-9) * period
     for _ in range(ticks):
         phase = next_phase(p, state, hop, phase)
         if phase != FLIGHT:
             pushed = True
         law(p, shape, state, hop, phase, torque)
         command[0], command[1] = torque[0], torque[1]
-        send(memory, command, 0.0)
+        send(memory, command, late)
         height, rate = state[0], state[3]
         step_leg(p, state, memory, past, rows, 0.0, steps, dt)
         if pushed and phase == FLIGHT and rate > 0 and state[3] <= 0:
             # Between two ticks the base moves on a parabola.
-            period = steps * dt
             return height + rate * rate * period / (2 * max(rate - state[3], 1e-9))
     return np.nan
 
@@ -193,7 +197,7 @@ def act(
                 here[i] = state[k, i]
             for i in range(2):
                 torque[i] = motor[k, i]
-                memory.motor_torque[i] = motor[k, i]
+                memory.motor_torque[i] = memory.command[i] = motor[k, i]
             for i in range(3):
                 memory.acceleration[i] = acceleration[k, i]
             memory.waiting = 0
