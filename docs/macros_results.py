@@ -417,6 +417,7 @@ MACROS = {
     "entries": entries,
     "latest": latest,
     "limits": limits,
+    "not_stored": not_stored,
     "one": one,
     "percentiles": percentiles,
     "pictures": pictures,

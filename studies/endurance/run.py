@@ -27,7 +27,6 @@ from hopping_leg.deploy.motion_sequence import (
 )
 from hopping_leg.deploy.preflight import check_drives, require_fit
 from hopping_leg.deploy.safety_limits import hopping_limits
-from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.evaluate.result_files import ResultCache
@@ -127,7 +126,7 @@ def hop(name: str, robot_name: str, command: float, minutes: float, seed: int) -
     return {
         "controller": controller.name,
         "command_m": command,
-        "reason": Reason(done.outcome.supervisor.stop_cause.reason).name.lower(),
+        "reason": done.outcome.supervisor.stop_cause.reason.name.lower(),
         "seconds": float(in_hop.sum() / CONTROL_RATE),
         "hops": len(hops.apex),
         "skipped_hops": hops.skipped,

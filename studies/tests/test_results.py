@@ -21,12 +21,10 @@ def words_of(command):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_result_is_made_by_a_command_of_the_study(name):
+def test_what_is_stored_is_made_by_a_command_of_the_study(name):
     made = {file: command for command in results(name) if (file := stored_file(command))}
-    stored = {path.relative_to(ROOT) for path in ROOT.glob(f"studies/{name}/results/*")}
-    assert stored == set(made)
-    for file, command in made.items():
-        assert json.loads((ROOT / file).read_text())["command"] == command
+    for path in ROOT.glob(f"studies/{name}/results/*"):
+        assert json.loads(path.read_text())["command"] == made.get(path.relative_to(ROOT))
 
 
 @pytest.mark.parametrize("name", NAMES)
