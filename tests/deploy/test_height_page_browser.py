@@ -25,3 +25,4 @@ def test_slider_and_button_do_what_they_say(page):
         page.get_by_role("button", name="Stop the leg").click()
         page.get_by_text("Stopping.").wait_for()
         assert stops == ["stop"]
+        page.close()
