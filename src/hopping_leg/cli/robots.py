@@ -14,8 +14,7 @@ from typing import Any
 
 import tyro
 
-from hopping_leg.cli.options import say, show_table
-from hopping_leg.io import write_json
+from hopping_leg.cli.options import save_json, say, show_table
 from hopping_leg.robot import (
     Robot,
     build_model,
@@ -60,16 +59,12 @@ def run(args: List | Show | Check) -> None:
     """List, show or check robots."""
     if isinstance(args, List):
         robots = [load_robot(name) for name in shipped_robots()]
-        if args.json:
-            write_json(args.json, [{"name": r.name, **derived(r)} for r in robots])
         for robot in robots:
             print(f"{robot.name:<12}  {robot.description}\n{'':<12}  {_summary(robot)}")
+        save_json(args.json, [{"name": r.name, **derived(r)} for r in robots])
     elif isinstance(args, Show):
         tree = load_tree(args.robot)
         robot, doubted = robot_from_tree(tree, args.robot), doubts(args.robot)
-        if args.json:
-            facts = {**asdict(robot), "derived": derived(robot), "doubts": doubted}
-            write_json(args.json, facts)
         rows = [(p, f"{e['value']:g}", e["unit"], e["source"]) for p, e in numbers(tree)]
         for path, value in derived(robot).items():
             shown = f"{value:g}" if isinstance(value, float) else value
@@ -77,6 +72,8 @@ def run(args: List | Show | Check) -> None:
         title = f"{robot.name}: {robot.description}"
         show_table(("number", "value", "unit", "source"), rows, title)
         say(*doubted)
+        facts = {**asdict(robot), "derived": derived(robot), "doubts": doubted}
+        save_json(args.json, facts)
     else:
         robot, doubted = robot_from_tree(load_tree(args.robot), args.robot), doubts(args.robot)
         build_model(robot)

@@ -8,7 +8,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.result import SCHEMA, Evaluation
-from hopping_leg.io import write_json
+from hopping_leg.io import parse_json, write_json
 
 _EVALUATION, _TRAINING = "evaluation.json", "result.json"
 _WHAT = (
@@ -93,12 +93,9 @@ def _read(label: str, path: Path) -> StoredRun:
 
 def _load(path: Path) -> dict[str, Any]:
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise UsageError(f"{path} is not readable as JSON; {_WHAT}.") from error
-    if not isinstance(content, dict):
-        raise UsageError(f"{path} is not a run; {_WHAT}.")
-    return content
+        return parse_json(path.read_bytes(), str(path))
+    except UsageError as error:
+        raise UsageError(f"{error} For a run, {_WHAT}.") from error
 
 
 def _evaluation(content: dict[str, Any], path: Path) -> Evaluation:

@@ -16,7 +16,9 @@ import numpy as np
 from hopping_leg.controllers import command_schedule, hardware_trial, protocol
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.envs import apex_reward
+from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically, write_json
+from hopping_leg.locks import hold_folder
 from hopping_leg.rl import checkpoint, onnx_export, run_folder
 from hopping_leg.rl.finetune import command_correction, config, learner, replay
 from hopping_leg.rl.finetune.apex_estimate import prepare
@@ -301,22 +303,23 @@ def finetune(
             "options": asdict(options),
         }
     )
-    if run_folder.is_new(out, resume=resume):
-        write_json(out / "config.json", asked)
-    else:
-        run_folder.check_same(out, run_folder.read_json(out / "config.json"), asked)
-        run_folder.refuse_finished(out / POLICY)
-    finetuning = Finetuning(task, robot, options, out, pretraining, on_trial)
-    content, reason = finetuning.run()
-    result = {
-        **asked,
-        **summary(finetuning.rows, reason),
-        "versions": run_folder.library_versions(),
-    }
-    write_json(out / RESULT, result)
-    write_atomically(out / "model_card.md", card(result).encode())
-    write_atomically(out / POLICY, content)
-    return result
+    with hold_folder(out, UsageError):
+        if run_folder.is_new(out, resume=resume):
+            write_json(out / "config.json", asked)
+        else:
+            run_folder.check_same(out, run_folder.read_json(out / "config.json"), asked)
+            run_folder.refuse_finished(out / POLICY)
+        finetuning = Finetuning(task, robot, options, out, pretraining, on_trial)
+        content, reason = finetuning.run()
+        result = {
+            **asked,
+            **summary(finetuning.rows, reason),
+            "versions": run_folder.library_versions(),
+        }
+        write_json(out / RESULT, result)
+        write_atomically(out / "model_card.md", card(result).encode())
+        write_atomically(out / POLICY, content)
+        return result
 
 
 def summary(rows: list[Row], reason: str) -> dict[str, Any]:

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-import onnxruntime
 
 from hopping_leg.arrays import Array, Array32
 from hopping_leg.controllers import observation_history, policy, protocol
+from hopping_leg.controllers.onnx_session import open_session
 from hopping_leg.envs import Reward
 from hopping_leg.envs.rewards import Transition
 from hopping_leg.rl.finetune import apex_estimate, simulated, trial_data
@@ -35,11 +35,7 @@ class ExploringPolicy:
     ) -> None:
         self.name = f"exploring {card.recipe}"
         self._layout = observation_history.make_observation_history(card.layout, 1 / card.rate)
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = options.inter_op_num_threads = 1
-        self._session = onnxruntime.InferenceSession(
-            expose_hidden(content), options, providers=["CPUExecutionProvider"]
-        )
+        self._session = open_session(expose_hidden(content), self.name)
         hidden = [o.name for o in self._session.get_outputs() if o.name.startswith(PREFIX)]
         self._wanted = ["torque", hidden[-1]]
         self._scale = np.array(card.torque_scale)
