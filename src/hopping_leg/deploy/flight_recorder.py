@@ -196,9 +196,10 @@ class FlightRecorderTail:
 
     def _read_header(self, data: bytes) -> None:
         first = parse_json(data, f"{self.path}: the header", errors.TraceError)
-        names, header = first.get("columns"), first.get("header")
-        known = isinstance(names, list) and all(isinstance(name, str) for name in names)
-        if not (known and len({*names}) == len(names) > 0 and isinstance(header, dict)):
+        names: Any = first.get("columns")
+        header: Any = first.get("header")
+        named = isinstance(names, list) and names and all(isinstance(n, str) for n in names)
+        if not (named and len({*names}) == len(names) and isinstance(header, dict)):
             raise errors.TraceError(f"{self.path} is damaged: its header names no columns.")
         self.columns, self.header = tuple(names), header
 

@@ -157,14 +157,14 @@ def _finish(
 ) -> Performance:
     """Write the trace; the flight recording goes once the trace on the disk holds all of it."""
     complaint, kept = "", recorder.path
-    if recorder.error is not None:
-        notices += (f"The flight recorder could not write for a time: {recorder.error}.",)
     if recorder.lost:
         complaint = f"{recorder.lost} entries of the record are lost ({recorder.error})."
     try:
         trace = flight_recorder.recover(kept)
-        if complaint:
-            trace.header["events"].append({"record": complaint})
+        if recorder.error is not None:
+            notice = f"The flight recorder could not write for a time: {recorder.error}."
+            notices += (notice,)
+            trace.header["events"].append({"record": complaint or notice})
         trace.save(path)
         whole = Trace.load(path).table.height == recorder.rows
     except (TraceError, OSError) as error:

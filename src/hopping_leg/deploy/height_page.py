@@ -140,7 +140,7 @@ class HeightPage:
             def _own(self) -> bool:
                 """Tell whether it is the page that asks, not another site that names this one."""
                 host = self.headers.get("Host")
-                known = host in (f"{name}:{page._server.server_port}" for name in _NAMES)
+                known = host in [f"{name}:{page._server.server_port}" for name in _NAMES]
                 return known and self.headers.get("Origin", f"http://{host}") == f"http://{host}"
 
             def _answer(self, status: int, content: bytes, kind: str) -> None:

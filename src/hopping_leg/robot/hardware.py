@@ -91,6 +91,10 @@ def contradictions(hardware: Hardware) -> Iterator[str]:
             yield f"{at}.sign' is {servo.sign:g} but must be 1 or -1."
     if hardware.hip.id == hardware.knee.id:
         yield f"'hardware.hip.id' and 'hardware.knee.id' are both {hardware.hip.id:g}."
+    low, high = hardware.voltage_low, hardware.voltage_high
+    if low >= high:
+        at = "'hardware.voltage"
+        yield f"{at}_low' ({low:g} V) must lie below {at}_high' ({high:g})."
     for path, value, unit, least, most, source in (
         ("watchdog", hardware.watchdog, "s", *WATCHDOG),
         ("temperature_limit", hardware.temperature_limit, "deg C", *TEMPERATURE),
@@ -104,7 +108,3 @@ def contradictions(hardware: Hardware) -> Iterator[str]:
                 f"'hardware.{path}' is {value:g} {unit} but must lie between {least:g} and"
                 f" {most:g}: {source}."
             )
-    low, high = hardware.voltage_low, hardware.voltage_high
-    if low >= high:
-        at = "'hardware.voltage"
-        yield f"{at}_low' ({low:g} V) must lie below {at}_high' ({high:g})."

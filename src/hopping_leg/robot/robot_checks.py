@@ -151,6 +151,9 @@ def _contradictions(robot: Robot) -> Iterator[str]:
             )
     for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
         yield from _above(f"{name}.com", link.com, f"{name}.length", link.length, "m")
+    for name in _STOPS if robot.kind == "leg" else ():
+        if abs(stop := attrgetter(name)(robot)) > 2 * math.pi:
+            yield f"'{name}' is {stop:g} rad but no leg's joint turns more than once, 6.28 rad."
     if robot.kind not in KINDS:
         yield f"'kind': {unknown_name('kind of robot', robot.kind, KINDS)}"
     if robot.kind == "leg" and (robot.knee.lower < -math.pi or robot.knee.upper > 0):

@@ -163,7 +163,7 @@ class LivePanel:
 
     def _controllers(self) -> None:
         try:
-            names = (chosen(self._first, self._names),)
+            names: tuple[str, ...] = (chosen(self._first, self._names),)
             if self._second.value != NOBODY:
                 names += (chosen(self._second, self._names),)
             self._live.set_controllers(names)
