@@ -66,12 +66,12 @@ def parse_json(
     content: bytes | str, origin: str, error: type[HoppingLegError] = UsageError
 ) -> Tree:
     """Return the object that JSON holds; ``error`` says that it is damaged or no object."""
-    return _parse(json.loads, content, origin, "JSON", error)
+    return _parse(json.loads, content, origin, "readable as JSON", error)
 
 
 def parse_toml(content: bytes, origin: str, error: type[HoppingLegError] = UsageError) -> Tree:
     """Return the tables that TOML holds; ``error`` says where it is damaged."""
-    return _parse(lambda text: tomllib.loads(text.decode()), content, origin, "TOML", error)
+    return _parse(lambda text: tomllib.loads(text.decode()), content, origin, "valid TOML", error)
 
 
 def _parse(
@@ -84,7 +84,7 @@ def _parse(
     try:
         tree = read(content)
     except (ValueError, RecursionError) as problem:
-        raise error(f"{origin} is not valid {form}: {one_line(problem)}.") from problem
+        raise error(f"{origin} is not {form}: {one_line(problem)}.") from problem
     if not isinstance(tree, dict):
         raise error(f"{origin} holds {one_line(tree)} but must hold a table with names.")
     return tree
@@ -92,7 +92,11 @@ def _parse(
 
 def one_line(value: object, most: int = 120) -> str:
     """Return a value as a text for a message: one line, and not a long one."""
-    text = " ".join((str(value) if isinstance(value, BaseException) else repr(value)).split())
+    try:
+        text = str(value) if isinstance(value, BaseException) else repr(value)
+    except (ValueError, RecursionError):  # a number of too many digits, or nested too deeply
+        text = f"a value of type {type(value).__name__}"
+    text = " ".join(text.split())
     return (text if len(text) <= most else f"{text[:most]}...").rstrip(".")
 
 
@@ -238,8 +242,9 @@ def _read(
 
 def is_number(value: object) -> bool:
     """Tell whether a value is a finite number and no truth value."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return number and math.isfinite(cast(float, value))
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return math.isfinite(value) if isinstance(value, float) else abs(value) < 1 << 1023
 
 
 def _form(kind: Any, choices: tuple[str, ...]) -> str:  # noqa: ANN401

@@ -34,7 +34,7 @@ class Lock:
             raise error(f"Cannot open {path}: {problem.strerror}.") from problem
         try:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            others = list(_holders(path)) if path.is_char_device() else []
+            others = list(_holders(path)) if os.isatty(self._descriptor) else []
         except BlockingIOError:
             others = list(_holders(path)) or ["another process, or this one"]
         if others:

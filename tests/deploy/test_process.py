@@ -114,30 +114,45 @@ def test_the_end_of_the_input_stops(emulator, tmp_path):
 def test_a_second_signal_ends_the_process_within_a_second(emulator, tmp_path, condition):
     file = tmp_path / "stuck.py"
     file.write_text(STUCK.format(condition=condition))
-    process, box = deploy(emulator, tmp_path, controller=f"{file}:Stuck")
-    time.sleep(2.6)  # it has risen, and hops
-    process.send_signal(signal.SIGTERM)
-    time.sleep(0.1)
-    began = time.monotonic()
-    process.send_signal(signal.SIGTERM)
-    _, error = process.communicate(timeout=60)
-    assert time.monotonic() - began < (1.5 if process.returncode == 2 else 60)
+    error = "was stopped"
+    while "was stopped" in error:  # by a busy computer, before it hung
+        process, box = deploy(emulator, tmp_path / "run", controller=f"{file}:Stuck")
+        time.sleep(2.6)  # it has risen, and hops
+        process.send_signal(signal.SIGTERM)
+        time.sleep(0.1)
+        began = time.monotonic()
+        process.send_signal(signal.SIGTERM)
+        _, error = process.communicate(timeout=60)
+    assert time.monotonic() - began < 1.5
     assert process.returncode == 2, error
     assert "Traceback" not in error
     time.sleep(0.3)
     assert DriveMode.POSITION not in emulator.state().modes
-    assert recover(box if box.exists() else box.with_suffix(".parquet")).table.height > BEGUN
+    assert recover(box).table.height > BEGUN
 
 
-def test_a_second_host_is_refused_and_the_first_one_loses_nothing(emulator, tmp_path):
-    process, _ = deploy(emulator, tmp_path)
-    words = ["doctor", "--transport", str(emulator.path), "--robot", "legv2-paper"]
-    second = subprocess.run(
-        [sys.executable, "-m", "hopping_leg.cli", *words], capture_output=True, text=True
-    )
+HOST = """
+import sys, time
+from hopping_leg.deploy.moteus_link import MoteusLink
+from hopping_leg.deploy.transport import opener
+from hopping_leg.robot import load_robot
+link = MoteusLink(load_robot("legv2-paper"), opener(sys.argv[1]))
+print("open", flush=True)
+time.sleep(600)
+"""
+
+
+@pytest.mark.parametrize("interface", ["pty", "udp_multicast"])
+def test_a_second_host_is_refused_with_the_name_of_the_first(emulator, interface):
+    path = emulator.path if interface == "pty" else "udp_multicast:239.74.163.99"
+    words = ["doctor", "--transport", str(path), "--robot", "legv2-paper"]
+    code = [sys.executable, "-c", HOST, str(path)]
+    with subprocess.Popen(code, stdout=subprocess.PIPE, text=True) as first:
+        assert first.stdout.readline() == "open\n"
+        second = subprocess.run(
+            [sys.executable, "-m", "hopping_leg.cli", *words], capture_output=True, text=True
+        )
+        first.kill()
     assert second.returncode == 2
-    assert f"in use by process {process.pid} (" in second.stderr
+    assert f"{path} is in use by process {first.pid} (" in second.stderr
     assert second.stderr.count("\n") == 1
-    assert process.poll() is None
-    process.send_signal(signal.SIGINT)
-    process.communicate(timeout=60)

@@ -90,13 +90,14 @@ class Card:
         Raises:
             PolicyError: It is of another schema, incomplete or damaged.
         """
-        values = parse_json(text, f"{origin}: its policy card", PolicyError)
-        schema = values.pop("schema", None)
-        if schema != SCHEMA:
-            raise PolicyError(
-                f"{origin} has policy schema {schema}; this version reads schema {SCHEMA}."
-            )
-        return read_dataclass(Card, values, f"{origin}: its policy card", error=PolicyError)
+        try:
+            values = parse_json(text, "it", PolicyError)
+            schema = values.pop("schema", None)
+            if schema != SCHEMA:
+                raise PolicyError(f"it is of schema {schema}; this version reads schema {SCHEMA}.")
+            return read_dataclass(Card, values, "it", error=PolicyError)
+        except PolicyError as error:
+            raise PolicyError(f"{origin} has a damaged policy card: {error}") from error
 
 
 class Policy:
