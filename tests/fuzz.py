@@ -76,14 +76,16 @@ class Kind:
         self.files, self.name, self.read, self.text, self.seal = files, name, read, text, seal
         self.content = files[name] if content is None else content
 
+    def write(self, folder, content):
+        """Write all files, one of them from this content."""
+        for name, whole in {**self.files, self.name: self.seal(content)}.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(whole)
+
     def run(self, folder, seed):
         """Read the file of a seed; return what is wrong with how that ended, or nothing."""
         rng = np.random.default_rng(seed)
-        for name, content in self.files.items():
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            (folder / name).write_bytes(content)
-        content = self.seal(mutate(self.content, rng, text=self.text))
-        (folder / self.name).write_bytes(content)
+        self.write(folder, mutate(self.content, rng, text=self.text))
         signal.alarm(SECONDS)
         try:
             self.read(folder / self.name)
@@ -116,10 +118,11 @@ def _with_card(content, card):
     return model.SerializeToString()
 
 
-def _native(header):
+def _native(header, table=None):
     from hopping_leg.parquet import to_parquet
 
-    return to_parquet(_table(), {"hopping_leg": header.decode("latin-1").replace("\0", " ")})
+    text = header.decode("latin-1").replace("\0", " ")
+    return to_parquet(_table() if table is None else table, {"hopping_leg": text})
 
 
 def _table():
@@ -209,8 +212,10 @@ def _traces(form):
     if form == "excitation":
         excitation = make_excitation(Multisine(duration=12.0), load_robot("legv2"))
         files = _written(lambda folder: excitation.save(folder / "run.parquet"))
-        header = pl.read_parquet_metadata(io.BytesIO(files["run.parquet"]))["hopping_leg"].encode()
-        return Kind(files, "run.parquet", load_excitation, content=header, seal=_native)
+        whole = io.BytesIO(files["run.parquet"])
+        header = pl.read_parquet_metadata(whole)["hopping_leg"].encode()
+        seal = functools.partial(_native, table=pl.read_parquet(whole))
+        return Kind(files, "run.parquet", load_excitation, content=header, seal=seal)
     recording = {"rig": "fixed-base", "rate_hz": 200.0, "robot": "legv2", "source": "made up"}
     header = json.dumps({"schema": 1, "events": [], "recording": recording}).encode()
     files = {"run.parquet": _native(header)}
@@ -297,19 +302,23 @@ def _results(form):
     from tests.evaluate.test_comparison import TRAINING
 
     def read(path):
-        (run,) = read_runs([str(path)])
-        if run.evaluation is not None:
-            print_evaluation(plain_console(quiet=True), run.evaluation)
-        set_beside([run])
+        runs = read_runs([str(path), str(path.with_name("other.json"))])
+        if runs[0].evaluation is not None:
+            print_evaluation(plain_console(quiet=True), runs[0].evaluation)
+        set_beside(runs)
 
     if form == "training":
-        return Kind({"result.json": json.dumps(TRAINING).encode()}, "result.json", read)
+        return Kind(
+            dict.fromkeys(("a.json", "other.json"), json.dumps(TRAINING).encode()), "a.json", read
+        )
     stored = Path(__file__).parents[1] / "studies" / "evaluation" / "results" / "evaluation.json"
     content = json.loads(stored.read_bytes())
     for name in ("summary", "sequence", "ladder", "distributions", "staircase", "neighbours"):
         content[name] = content[name][:3]
     content["secondary"] = None
-    return Kind({"evaluation.json": json.dumps(content).encode()}, "evaluation.json", read)
+    return Kind(
+        dict.fromkeys(("a.json", "other.json"), json.dumps(content).encode()), "a.json", read
+    )
 
 
 KINDS = {
@@ -344,6 +353,8 @@ def main(name, count, first=0):
 
     signal.signal(signal.SIGALRM, too_long)
     with tempfile.TemporaryDirectory() as folder:
+        kind.write(Path(folder) / "files", kind.content)
+        kind.read(Path(folder) / "files" / kind.name)  # what is not mutated is read
         for seed in range(first, count):
             print(f"begin {seed}", flush=True)
             wrong = kind.run(Path(folder) / "files", (zlib.crc32(name.encode()), seed))

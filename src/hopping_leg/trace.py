@@ -52,13 +52,16 @@ class Trace:
         """Return a column as floats, (ticks,).
 
         Raises:
-            TraceError: The trace has no such column.
+            TraceError: The trace has no such column, or it holds no numbers.
         """
         if name not in self.table.columns:
             raise TraceError(
                 f"The trace has no column '{name}'; it has: {', '.join(self.table.columns)}."
             )
-        return self.table[name].to_numpy().astype(np.float64)
+        try:
+            return self.table[name].to_numpy().astype(np.float64)
+        except (TypeError, ValueError) as error:
+            raise TraceError(f"The trace's column '{name}' holds no numbers.") from error
 
     def save(self, path: Path) -> None:
         """Write the trace; an existing file is replaced only once the new one is complete."""

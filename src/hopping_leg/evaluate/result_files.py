@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, is_dataclass
 from pathlib import Path
+from types import UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
 from hopping_leg.errors import UsageError
@@ -126,9 +127,16 @@ def _filled(kind: Any, value: Any) -> Any:  # noqa: ANN401
     if is_dataclass(kind) and isinstance(value, dict):
         hints = get_type_hints(kind)
         return kind(**{name: _filled(hints[name], entry) for name, entry in value.items()})  # type: ignore[operator]
-    if get_origin(kind) is list and isinstance(value, list):
+    if isinstance(kind, UnionType):
+        return value if value is None else _filled(get_args(kind)[0], value)
+    plain = get_origin(kind) or kind
+    if kind is float:
+        plain, value = (int, float), float("nan") if value is None else value
+    if not isinstance(value, plain):
+        raise TypeError(f"{value!r} is no {kind}")
+    if plain is list and get_args(kind):
         return [_filled(get_args(kind)[0], entry) for entry in value]
-    return float("nan") if kind is float and value is None else value
+    return value
 
 
 @dataclass(frozen=True)
