@@ -1,6 +1,5 @@
 import errno
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -76,10 +75,12 @@ def test_a_killed_process_leaves_what_it_recorded(tmp_path):
     words = [sys.executable, "-c", WRITER, str(path)]
     with subprocess.Popen(words, stdout=subprocess.DEVNULL) as process:
         deadline = time.monotonic() + 60
-        while not path.exists() or not path.stat().st_size or len(read_recording(path)[1]) < 50:
-            assert time.monotonic() < deadline, "rows reach the file only when it is closed"
-            time.sleep(0.01)
-        os.kill(process.pid, signal.SIGKILL)
+        try:
+            while not path.exists() or not path.stat().st_size or len(read_recording(path)[1]) < 50:
+                assert time.monotonic() < deadline, "rows reach the file only when it is closed"
+                time.sleep(0.01)
+        finally:
+            process.kill()
     found = recover(path).column("hip_position_rad")
     assert len(found) >= 50
     np.testing.assert_array_equal(found, np.arange(len(found)))

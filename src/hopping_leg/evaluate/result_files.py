@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass, field, is_dataclass
 from pathlib import Path
 from types import UnionType
 from typing import Any, get_args, get_origin, get_type_hints
@@ -119,7 +119,18 @@ def evaluation_from(content: dict[str, Any]) -> Evaluation:
     fields = {k: v for k, v in content.items() if k not in ("schema", "secondary")}
     fields["secondary"] = secondary and evaluation_from(secondary)
     evaluation: Evaluation = _filled(Evaluation, fields)
+    _filled(list[_Apexes], evaluation.distributions)
+    _ = [evaluation.conditions[name] for name in ("robot", "floor", "seeds", "seed")]
     return evaluation
+
+
+@dataclass(frozen=True)
+class _Apexes:
+    """An entry of an evaluation's distributions."""
+
+    controller: str
+    command_m: float
+    apexes_m: list[float] = field(default_factory=list)
 
 
 def _filled(kind: Any, value: Any) -> Any:  # noqa: ANN401
