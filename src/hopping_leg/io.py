@@ -224,7 +224,8 @@ def _read(
     if get_origin(kind) is Literal or choices:
         valid = choices or args
         if not isinstance(value, str | int) or value not in valid:
-            raise error(f"{subject}: {unknown_name('value', str(value), map(str, valid))}")
+            named = value if isinstance(value, str) else one_line(value)
+            raise error(f"{subject}: {unknown_name('value', named, map(str, valid))}")
         return value
     if get_origin(kind) is tuple and isinstance(value, list | tuple):
         kinds = [args[0]] * len(value) if args[-1] is Ellipsis else list(args)

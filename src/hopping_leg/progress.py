@@ -100,6 +100,10 @@ class ShareProgress(progress.Progress):
         task = known[label] if label in known else self.add_task(label, total=1.0)
         self.update(task, completed=share)
 
+    def show_tick(self, label: str, ticks: int, done: int, _: object) -> None:
+        """Show how many of so many ticks are done."""
+        self.show(label, done / ticks)
+
 
 def minutes(seconds: float) -> str:
     """Return a duration as m:ss."""

@@ -81,7 +81,11 @@ class Trace:
             raise TraceError(f"There is no trace file {path}.") from error
         except OSError as error:
             raise TraceError(f"Cannot read the trace {path}: {error.strerror}.") from error
-        table, metadata = read_parquet(content, str(path), TraceError)
+        return Trace.of(*read_parquet(content, str(path), TraceError), path)
+
+    @staticmethod
+    def of(table: pl.DataFrame, metadata: dict[str, str], path: Path) -> "Trace":
+        """Return the trace that a Parquet file's table and metadata hold, as ``load`` does."""
         if "hopping_leg" not in metadata:
             raise TraceError(
                 f"{path} is a Parquet file but not a trace;"

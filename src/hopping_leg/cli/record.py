@@ -80,7 +80,7 @@ def run(args: Record) -> None:
         return
     with ShareProgress() as bar:
         for number, (stem, excitation) in enumerate(loaded):
-            show = partial(_show_tick, bar, stem, len(excitation))
+            show = partial(bar.show_tick, stem, len(excitation))
             recording = play_excitation.play(
                 excitation,
                 robot,
@@ -94,10 +94,6 @@ def run(args: Record) -> None:
             recording.save(file)
             options.say_written(file)
             options.say(*(f"  {warning}" for warning in recording.warnings))
-
-
-def _show_tick(bar: ShareProgress, stem: str, ticks: int, done: int, _: object) -> None:
-    bar.show(stem, done / ticks)
 
 
 def _record_motors(

@@ -22,7 +22,7 @@ from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.errors import RecordingError, UsageError, unknown_name
 from hopping_leg.identify import importers, recording_checks, unit_checks
 from hopping_leg.identify.recording_format import COLUMNS, PAIRS, RecordingMetadata, float_column
-from hopping_leg.io import parse_json, parse_toml, read_dataclass
+from hopping_leg.io import parse_toml, read_dataclass
 from hopping_leg.parquet import read_parquet
 from hopping_leg.trace import Trace
 
@@ -229,8 +229,7 @@ def sidecar_path(path: Path) -> Path:
 def _native(path: Path, content: bytes) -> tuple[pl.DataFrame, dict[str, Any]]:
     table, metadata = read_parquet(content, str(path), RecordingError)
     if "hopping_leg" in metadata:
-        header = parse_json(metadata["hopping_leg"], f"{path}: its header", RecordingError)
-        return table, header
+        return table, dict(Trace.of(table, metadata, path).header)
     kinds = {c: pl.String if COLUMNS.get(c) is pl.String else pl.Float64 for c in table.columns}
     return _cast(table, kinds, str(path)), {}
 
