@@ -3,9 +3,17 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+_LONGEST = 1000
+
 
 class HoppingLegError(Exception):
     """Base of every error that the command line prints as one sentence."""
+
+    def __str__(self) -> str:
+        """Return one printable line, whatever a file or a user put into it."""
+        line = " ".join(super().__str__().split())
+        line = "".join(c if c.isprintable() else "?" for c in line)
+        return line if len(line) <= _LONGEST else f"{line[: _LONGEST // 2]}...{line[-200:]}"
 
 
 class RobotError(HoppingLegError):

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import platform
+import tomllib
 import types
 from collections.abc import Callable
 from importlib import metadata
@@ -59,6 +60,44 @@ def write_json(path: Path, value: object) -> None:
 def json_text(value: object) -> str:
     """Return a value as readable JSON, see ``plain``."""
     return f"{json.dumps(plain(value), indent=1, allow_nan=False)}\n"
+
+
+def parse_json(
+    content: bytes | str, origin: str, error: type[HoppingLegError] = UsageError
+) -> Tree:
+    """Return the object that JSON holds; ``error`` says that it is damaged or no object."""
+    return _parse(json.loads, content, origin, "readable as JSON", error)
+
+
+def parse_toml(content: bytes, origin: str, error: type[HoppingLegError] = UsageError) -> Tree:
+    """Return the tables that TOML holds; ``error`` says where it is damaged."""
+    return _parse(lambda text: tomllib.loads(text.decode()), content, origin, "valid TOML", error)
+
+
+def _parse(
+    read: Callable[[Any], Any],
+    content: object,
+    origin: str,
+    form: str,
+    error: type[HoppingLegError],
+) -> Tree:
+    try:
+        tree = read(content)
+    except (ValueError, RecursionError) as problem:
+        raise error(f"{origin} is not {form}: {one_line(problem)}.") from problem
+    if not isinstance(tree, dict):
+        raise error(f"{origin} holds {one_line(tree)} but must hold a table with names.")
+    return tree
+
+
+def one_line(value: object, most: int = 120) -> str:
+    """Return a value as a text for a message: one line, and not a long one."""
+    try:
+        text = str(value) if isinstance(value, BaseException) else repr(value)
+    except (ValueError, RecursionError):  # a number of too many digits, or nested too deeply
+        text = f"a value of type {type(value).__name__}"
+    text = " ".join(text.split())
+    return (text if len(text) <= most else f"{text[:most]}...").rstrip(".")
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401
@@ -134,7 +173,7 @@ def read_dataclass(
         HoppingLegError: Naming the field and what was valid; ``error`` unless ``kind`` raised it.
     """
     if not isinstance(tree, dict):
-        raise error(f"{origin}: '{path or origin}' must be a table, not {tree!r}.")
+        raise error(f"{origin}: '{path or origin}' must be a table, not {one_line(tree)}.")
     specs: dict[str, Field] = {f.name: f for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
     hints = get_type_hints(kind)
     for key in tree:
@@ -184,8 +223,9 @@ def _read(
         return None if value is None else _read(value, args[0], choices, subject, error)
     if get_origin(kind) is Literal or choices:
         valid = choices or args
-        if value not in valid:
-            raise error(f"{subject}: {unknown_name('value', str(value), map(str, valid))}")
+        if not isinstance(value, str | int) or value not in valid:
+            named = value if isinstance(value, str) else one_line(value)
+            raise error(f"{subject}: {unknown_name('value', named, map(str, valid))}")
         return value
     if get_origin(kind) is tuple and isinstance(value, list | tuple):
         kinds = [args[0]] * len(value) if args[-1] is Ellipsis else list(args)
@@ -196,13 +236,16 @@ def _read(
         return float(cast(float, value))
     elif kind in _FORMS and isinstance(value, kind) and (kind is bool) == isinstance(value, bool):
         return value
-    raise error(f"{subject} is {value!r} but must be {_form(kind, choices)}.")
+    if get_origin(kind) is dict and isinstance(value, dict):
+        return value
+    raise error(f"{subject} is {one_line(value)} but must be {_form(kind, choices)}.")
 
 
 def is_number(value: object) -> bool:
     """Tell whether a value is a finite number and no truth value."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return number and math.isfinite(cast(float, value))
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return math.isfinite(value) if isinstance(value, float) else abs(value) < 1 << 1023
 
 
 def _form(kind: Any, choices: tuple[str, ...]) -> str:  # noqa: ANN401
@@ -215,7 +258,7 @@ def _form(kind: Any, choices: tuple[str, ...]) -> str:  # noqa: ANN401
     if get_origin(kind) is tuple:
         pair = args == (float, float)
         return "a pair [hip, knee] of numbers" if pair else f"a list of {len(args)}"
-    if dataclasses.is_dataclass(kind):
+    if dataclasses.is_dataclass(kind) or get_origin(kind) is dict:
         return "a table"
     return _FORMS.get(kind, "a finite number")
 

@@ -5,7 +5,8 @@ from types import TracebackType
 from typing import Self
 
 from rich import progress
-from rich.console import Console
+
+from hopping_leg.terminal import plain_console
 
 _LINE_SECONDS = 60.0
 
@@ -32,15 +33,15 @@ class LiveProgress:
         lines: bool | None = None,
         first_line: float = 0.0,
     ) -> None:
-        self._console = Console(stderr=True, quiet=quiet)
+        self._console = plain_console(stderr=True, quiet=quiet)
         self._lines = not self._console.is_terminal if lines is None else lines
         self._bar = progress.Progress(
-            progress.TextColumn("{task.description}"),
+            progress.TextColumn("{task.description}", markup=False),
             progress.BarColumn(bar_width=20),
             progress.TextColumn("{task.percentage:>3.0f} %"),
             progress.TimeElapsedColumn(),
             *columns,
-            progress.TextColumn("{task.fields[note]}"),
+            progress.TextColumn("{task.fields[note]}", markup=False),
             console=self._console,
             disable=self._lines,
         )
@@ -56,7 +57,7 @@ class LiveProgress:
     def _line(self, text: str) -> None:
         """Write a line now, where lines are written."""
         if self._lines:
-            self._console.print(text, soft_wrap=True, highlight=False)
+            self._console.print(text, soft_wrap=True)
 
     def _line_if_due(self, text: str) -> None:
         """Write a line, where lines are written and the last one was long ago."""
@@ -84,12 +85,12 @@ class ShareProgress(progress.Progress):
 
     def __init__(self) -> None:
         super().__init__(
-            progress.TextColumn("{task.description}"),
+            progress.TextColumn("{task.description}", markup=False),
             progress.BarColumn(),
             progress.TextColumn("{task.percentage:>3.0f}%"),
             progress.TimeElapsedColumn(),
             progress.TimeRemainingColumn(),
-            console=Console(stderr=True),
+            console=plain_console(stderr=True),
         )
 
     def show(self, label: str, share: float, about: str = "") -> None:
@@ -98,6 +99,10 @@ class ShareProgress(progress.Progress):
         known = {task.description: task.id for task in self.tasks}
         task = known[label] if label in known else self.add_task(label, total=1.0)
         self.update(task, completed=share)
+
+    def show_tick(self, label: str, ticks: int, done: int, _: object) -> None:
+        """Show how many of so many ticks are done."""
+        self.show(label, done / ticks)
 
 
 def minutes(seconds: float) -> str:

@@ -3,7 +3,6 @@
 Stored as Parquet with the header in the file's metadata; nothing is ever unpickled.
 """
 
-import io
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,7 +13,8 @@ import polars as pl
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import TraceError
-from hopping_leg.io import write_atomically
+from hopping_leg.io import parse_json, write_atomically
+from hopping_leg.parquet import read_parquet, to_parquet
 
 SCHEMA = 1
 """Version of the layout, stored in every header."""
@@ -52,20 +52,21 @@ class Trace:
         """Return a column as floats, (ticks,).
 
         Raises:
-            TraceError: The trace has no such column.
+            TraceError: The trace has no such column, or it holds no numbers.
         """
         if name not in self.table.columns:
             raise TraceError(
                 f"The trace has no column '{name}'; it has: {', '.join(self.table.columns)}."
             )
-        return self.table[name].to_numpy().astype(np.float64)
+        try:
+            return self.table[name].to_numpy().astype(np.float64)
+        except (TypeError, ValueError) as error:
+            raise TraceError(f"The trace's column '{name}' holds no numbers.") from error
 
     def save(self, path: Path) -> None:
         """Write the trace; an existing file is replaced only once the new one is complete."""
         header = json.dumps({"schema": SCHEMA, **self.header}, sort_keys=True)
-        buffer = io.BytesIO()
-        self.table.write_parquet(buffer, metadata={"hopping_leg": header})
-        write_atomically(path, buffer.getvalue())
+        write_atomically(path, to_parquet(self.table, {"hopping_leg": header}))
 
     @staticmethod
     def load(path: Path) -> "Trace":
@@ -75,18 +76,22 @@ class Trace:
             TraceError: The file is missing, truncated, foreign or of another schema.
         """
         try:
-            text = pl.read_parquet_metadata(path).get("hopping_leg")
-            table = pl.read_parquet(path)
+            content = path.read_bytes()
         except FileNotFoundError as error:
             raise TraceError(f"There is no trace file {path}.") from error
-        except (pl.exceptions.PolarsError, OSError) as error:
-            raise TraceError(f"{path} is not a readable Parquet file: {error}.") from error
-        if text is None:
+        except OSError as error:
+            raise TraceError(f"Cannot read the trace {path}: {error.strerror}.") from error
+        return Trace.of(*read_parquet(content, str(path), TraceError), path)
+
+    @staticmethod
+    def of(table: pl.DataFrame, metadata: dict[str, str], path: Path) -> "Trace":
+        """Return the trace that a Parquet file's table and metadata hold, as ``load`` does."""
+        if "hopping_leg" not in metadata:
             raise TraceError(
                 f"{path} is a Parquet file but not a trace;"
                 " record one with `hop evaluate --traces DIR`."
             )
-        header = json.loads(text)
+        header = parse_json(metadata["hopping_leg"], f"{path}: its header", TraceError)
         schema = header.pop("schema", None)
         if schema != SCHEMA:
             raise TraceError(

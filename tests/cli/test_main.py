@@ -1,8 +1,12 @@
+import dataclasses
 import errno
 import importlib.util
 import json
+import os
+import re
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -18,8 +22,17 @@ from hypothesis import strategies as st
 
 from hopping_leg import cli
 from hopping_leg.cli import main
-from hopping_leg.cli.options import Heights, command_line, verb_of
+from hopping_leg.cli.options import (
+    Heights,
+    check_outputs,
+    command_line,
+    going_on,
+    say,
+    show_table,
+    verb_of,
+)
 from hopping_leg.errors import UsageError
+from hopping_leg.progress import LiveProgress, ShareProgress
 from hopping_leg.robot import load_robot, load_tree, numbers, shipped_robots
 
 
@@ -217,3 +230,105 @@ def test_defaults_and_what_changes_no_number_are_left_out_and_names_are_tyros(ca
     with pytest.raises(SystemExit):
         tyro.cli(Options | TwoWords, args=["--help"])
     assert "two-words" in capsys.readouterr().out
+
+
+def hop(words, folder, **environment):
+    """Run `hop` in a process of its own, in a folder that is its temporary one, too."""
+    return subprocess.run(
+        [sys.executable, "-m", "hopping_leg.cli", *words],
+        capture_output=True,
+        cwd=folder,
+        env={**os.environ, "TMPDIR": str(folder), **environment},
+    )
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_what_a_terminal_cannot_encode_is_replaced(tmp_path, encoding):
+    folder = tmp_path / "\u03c4"
+    folder.mkdir()
+    words = ["export", "policy", "fast", "--out", str(folder / "fast.onnx")]
+    done = hop(words, tmp_path, PYTHONIOENCODING=encoding)
+    assert done.returncode == 0, done.stderr
+    assert f"Wrote {tmp_path}/?/fast.onnx" in done.stdout.decode(encoding)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [folder.name], "onnxruntime, mujoco"
+
+
+def test_mujoco_writes_no_log_into_the_users_folder(tmp_path):
+    code = (
+        "import mujoco; from hopping_leg.robot import build_model, load_robot;"
+        "model = build_model(load_robot('legv2')); data = mujoco.MjData(model);"
+        "data.qacc[:] = data.qvel[:] = float('nan'); mujoco.mj_step(model, data)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True)
+    assert b"Nan" in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_tables_keep_their_values_on_narrow_terminals(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
+    assert main(["robots", "show", "legv2"]) == 0
+    shown = capsys.readouterr().out.split()
+    for path, entry in numbers(load_tree("legv2")):
+        assert path in shown
+        assert f"{entry['value']:g}" in shown
+
+
+@pytest.mark.parametrize("text", ["[red]run[/red]", "[/]", "a :smile: b", "[link=x]"])
+def test_no_text_of_a_user_is_taken_for_markup(capsys, text):
+    show_table(("name", text), [(text, 1)], text)
+    say(text)
+    with ShareProgress() as bar:
+        bar.show(text, 0.5)
+    with TrainingProgressLike(text) as progress:
+        progress.note(text)
+    captured = capsys.readouterr()
+    assert captured.out.count(text) == 4
+    assert captured.err.count(text) >= 2
+
+
+class TrainingProgressLike(LiveProgress):
+    def note(self, text):
+        self._line(text)
+
+
+@pytest.mark.parametrize("option", ["json", "out", "report", "traces", "folder"])
+@pytest.mark.parametrize("place", ["file/x.json", "closed/x.json"])
+def test_places_for_results_are_tried_before_the_work(tmp_path, monkeypatch, option, place):
+    (tmp_path / "file").write_text("")
+    (tmp_path / "closed").mkdir()
+    allowed = os.access
+    monkeypatch.setattr(
+        os, "access", lambda path, mode: "closed" not in str(path) and allowed(path, mode)
+    )
+    kind = dataclasses.make_dataclass("Kind", [(option, Path)], frozen=True)
+    with pytest.raises(UsageError, match=f"--{option} .* cannot be written there"):
+        check_outputs(kind(tmp_path / place))
+    check_outputs(kind(tmp_path / "new" / "x.json"))
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize("words", [["export", "policy", "fast"], ["robots", "list"]])
+def test_a_result_that_cannot_be_written_is_still_printed(capsys, words):
+    assert main([*words, "--json", "/dev/full"]) == 2
+    captured = capsys.readouterr()
+    assert "No space left" in captured.err
+    assert json.loads(captured.out[re.search(r"^[\[{]$", captured.out, re.M).start() :])
+
+
+def test_sigterm_ends_a_verb_as_ctrl_c_does_and_says_how_to_go_on(monkeypatch, capsys):
+    def run(args: int) -> None:
+        with going_on("the same command goes on."):
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(10)
+
+    monkeypatch.setattr(cli.importlib, "import_module", lambda _: SimpleNamespace(run=run))
+    assert main(["robots", "1"]) == cli.TERMINATED
+    assert "Stopped; the same command goes on." in capsys.readouterr().err
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+
+
+@given(st.text() | st.binary().map(lambda data: data.decode(errors="surrogateescape")))
+def test_an_error_is_one_printable_line_whatever_is_in_it(text):
+    said = str(UsageError(f"'{text * 50}' is wrong."))
+    assert said.isprintable()
+    assert len(said) < 1300

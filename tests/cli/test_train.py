@@ -1,9 +1,15 @@
+import errno
 import json
+from pathlib import Path
 
 import pytest
 
 from hopping_leg import cli
-from hopping_leg.rl import recipes
+from hopping_leg.errors import TraceError, UsageError
+from hopping_leg.locks import hold_folder
+from hopping_leg.rl import checkpoint, recipes
+from hopping_leg.rl.run_folder import RunFolder
+from hopping_leg.robot import load_robot
 from tests.rl.learners import TINY, try_briefly
 
 
@@ -58,3 +64,43 @@ def test_a_folder_with_other_things_is_left_alone(tmp_path, refused):
     (tmp_path / "thesis.tex").write_text("years of work")
     refused(["train", "--out", tmp_path], "holds no run")
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{", '{"options": 3}', "[" * 5000, "\xff"])
+def test_a_broken_config_is_one_sentence(tiny, tmp_path, refused, content):
+    (tmp_path / "config.json").write_text(content, encoding="latin-1")
+    refused(["train", "--recipe", "tiny", "--out", tmp_path, "--resume"], "config.json")
+
+
+def test_a_full_disk_leaves_no_half_checkpoint_and_names_the_next_command(
+    tiny, tmp_path, refused, monkeypatch
+):
+    def full(_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(checkpoint.os, "fsync", full)
+    with pytest.raises(TraceError, match="No space left on device; nothing was changed"):
+        checkpoint.write_checkpoint(tmp_path / "checkpoints", 7, {"steps": 7})
+    assert not list((tmp_path / "checkpoints").iterdir())
+    words = ["train", "--recipe", "tiny", "--out", tmp_path / "run"]
+    refused(words, f"the same command with --resume goes on in {tmp_path / 'run'}.")
+
+
+def test_a_source_is_the_same_by_any_path(tiny, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "link").symlink_to(tmp_path)
+    recipe, robot = recipes.get_recipe("tiny"), load_robot(TINY.robot)
+
+    def folder(source):
+        return RunFolder(tmp_path / "run", recipe, robot, 0, None, source)
+
+    folder(Path("first")).write("config.json", folder(Path("first")).config)
+    folder(tmp_path / "first").check_same()
+    folder(tmp_path / "link" / ".." / tmp_path.name / "first").check_same()
+    with pytest.raises(UsageError, match="another source"):
+        folder(Path("second")).check_same()
+
+
+def test_a_folder_in_which_a_training_goes_on_is_refused(tiny, tmp_path, refused):
+    with hold_folder(tmp_path / "run", UsageError):
+        refused(["train", "--recipe", "tiny", "--out", tmp_path / "run"], "is in use by")

@@ -1,9 +1,8 @@
+import errno
 import os
-import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -76,28 +75,84 @@ def test_a_killed_process_leaves_what_it_recorded(tmp_path):
     words = [sys.executable, "-c", WRITER, str(path)]
     with subprocess.Popen(words, stdout=subprocess.DEVNULL) as process:
         deadline = time.monotonic() + 60
-        while not path.exists() or not path.stat().st_size or len(read_recording(path)[1]) < 50:
-            assert time.monotonic() < deadline, "rows reach the file only when it is closed"
-            time.sleep(0.01)
-        os.kill(process.pid, signal.SIGKILL)
+        try:
+            while not path.exists() or not path.stat().st_size or len(read_recording(path)[1]) < 50:
+                assert time.monotonic() < deadline, "rows reach the file only when it is closed"
+                time.sleep(0.01)
+        finally:
+            process.kill()
     found = recover(path).column("hip_position_rad")
     assert len(found) >= 50
     np.testing.assert_array_equal(found, np.arange(len(found)))
 
 
-def test_a_full_disk_never_stops_the_loop(tmp_path):
-    if not Path("/dev/full").exists():
-        pytest.skip("no /dev/full")
+class Disk:
+    """Takes so many bytes of each write as ``takes`` says, all if it is None; 0 is a full disk."""
+
+    def __init__(self, monkeypatch):
+        self.takes, self._write = None, os.write
+        monkeypatch.setattr("hopping_leg.deploy.flight_recorder.os.write", self)
+
+    def __call__(self, file, data):
+        takes = len(data) if self.takes is None else self.takes
+        if takes == 0:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return self._write(file, bytes(data[:takes]))
+
+
+def test_a_full_disk_never_stops_the_loop_and_once_there_is_room_nothing_is_missing(
+    tmp_path, monkeypatch
+):
+    disk = Disk(monkeypatch)
     box = FlightRecorder(tmp_path / "a.blackbox", COLUMNS, {})
-    full = os.open("/dev/full", os.O_WRONLY)
-    os.dup2(full, box._file)
-    start = time.monotonic()
+    for tick in range(300):
+        disk.takes = {100: 7, 150: 0, 250: None}.get(tick, disk.takes)
+        began = time.monotonic()
+        box.row([float(tick), 0.0, 0.0])
+        assert time.monotonic() - began < 0.5
+        time.sleep(0.001)
+    box.close()
+    assert (box.rows, box.lost) == (300, 0)
+    assert "No space" in box.error
+    np.testing.assert_array_equal(recover(box.path).column("time_s"), np.arange(300))
+
+
+def test_what_a_full_disk_never_takes_is_counted(tmp_path, monkeypatch):
+    disk = Disk(monkeypatch)
+    box = FlightRecorder(tmp_path / "a.blackbox", COLUMNS, {})
+    box.row([0.0, 0.0, 0.0])
+    while not read_recording(box.path)[1].size:
+        time.sleep(0.01)
+    disk.takes = 0
+    for _ in range(9):
+        box.row([0.0, 0.0, 0.0])
+    box.close()
+    assert box.lost == 9
+    assert len(read_recording(box.path)[1]) == 1
+
+
+def test_what_waits_for_a_full_disk_takes_no_more_memory_than_is_said(tmp_path, monkeypatch):
+    disk = Disk(monkeypatch)
+    monkeypatch.setattr("hopping_leg.deploy.flight_recorder._WAITING", 1000)
+    box = FlightRecorder(tmp_path / "a.blackbox", COLUMNS, {})
+    disk.takes = 0
     for _ in range(100):
         box.row([0.0, 0.0, 0.0])
-    assert time.monotonic() - start < 1
+    while not box._queue.empty():
+        time.sleep(0.01)
+    disk.takes = None
     box.close()
-    os.close(full)
-    assert "No space" in box.error
+    kept = len(read_recording(box.path)[1])
+    assert 0 < kept <= 1000 / 33
+    assert box.lost == 100 - kept
+
+
+@pytest.mark.parametrize("takes", [0, 20])
+def test_a_recording_that_cannot_begin_is_refused(tmp_path, monkeypatch, takes):
+    Disk(monkeypatch).takes = takes
+    with pytest.raises(TraceError, match="Cannot write"):
+        FlightRecorder(tmp_path / "a.blackbox", COLUMNS, {})
+    assert not list(tmp_path.iterdir())
 
 
 def test_foreign_and_missing_files_get_a_sentence(path):

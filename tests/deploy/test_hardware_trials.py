@@ -1,6 +1,11 @@
 """Host and emulated drives in lockstep: the real client, the real frames, no clock on the wall."""
 
 import contextlib
+import errno
+import itertools
+import os
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -9,6 +14,8 @@ from numba.core import event
 from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.registry import load_controller, load_policy
 from hopping_leg.deploy.drive_info import configure, home, inspect
+from hopping_leg.deploy.drive_link import BRAKE
+from hopping_leg.deploy.flight_recorder import recover
 from hopping_leg.deploy.hardware_trials import DeployedRobot, header_of, perform
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
 from hopping_leg.deploy.preflight import check_drives, require_fit, required_settings
@@ -17,11 +24,11 @@ from hopping_leg.deploy.supervisor import State
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.emulator.virtual_time import Lockstep
-from hopping_leg.errors import HardwareError
+from hopping_leg.errors import HardwareError, TraceError
 from hopping_leg.robot import SoftLimits, load_robot
 from hopping_leg.sim import SoftLimiter
 from hopping_leg.trace import Trace
-from tests.deploy.fakes import Still
+from tests.deploy.fakes import POSES, SHORT, FakeClock, FakeLink, Still
 
 LEG = load_robot("legv2-paper")
 LIMITS = hopping_limits(LEG, 200.0)
@@ -210,3 +217,112 @@ def test_a_stop_by_the_supervisor_comes_back_as_a_complaint(emulated, tmp_path, 
         trial = robot.hop(Still(fail_after=ticks), SCHEDULE, 1)
         assert "error" in trial.complaint
         assert len(trial.trace.table) <= ticks + 1
+
+
+class Clock(FakeClock):
+    """Moves on its own while a controller does not return."""
+
+    def now(self):
+        self.time += 1e-9 if self.stuck is None else 0.1
+        return self.time
+
+    stuck = None
+
+
+def fake_run(tmp_path, controller, monkeypatch=None, **options):
+    clock = Clock()
+    link = FakeLink(clock)
+    link.trouble = ""
+    sequence = MotionSequence(
+        controller, CommandSchedule(((0.3, 100.0),)), POSES, SoftLimiter(LEG, SoftLimits()), SHORT
+    )
+    header = header_of(LEG, controller, 200.0)
+    options = {"clock": clock, "realtime": False, **options}
+    limits = hopping_limits(load_robot("legv2"), 200.0)
+    return (
+        link,
+        clock,
+        lambda: perform(link, sequence, limits, tmp_path / "run.parquet", header, **options),
+    )
+
+
+@pytest.mark.parametrize("method", ["act", "internals"])
+def test_a_controller_that_never_returns_is_left_and_the_drives_brake(tmp_path, method):
+    controller, release = Still(), threading.Event()
+    link, clock, run = fake_run(tmp_path, controller)
+    names = controller.internals()
+
+    def never(*_):
+        if controller.calls or method == "act":
+            clock.stuck = True
+            release.wait(60)
+        return names
+
+    setattr(controller, method, never)
+    began = time.monotonic()
+    with pytest.raises(HardwareError, match=r"did not return .*run\.blackbox` shows"):
+        run()
+    assert time.monotonic() - began < 30
+    assert link.told[-1] == BRAKE
+    release.set()
+    time.sleep(0.2)
+    assert link.told[-1] == BRAKE
+    assert recover(tmp_path / "run.blackbox").table.height > 50
+
+
+def test_the_flight_recording_goes_only_once_the_trace_is_whole(tmp_path, monkeypatch):
+    box, trace = tmp_path / "run.blackbox", tmp_path / "run.parquet"
+    _, _, run = fake_run(tmp_path, Still())
+    save = Trace.save
+
+    def cut(self, path):
+        save(Trace(self.table.head(10), self.header), path)
+
+    monkeypatch.setattr(Trace, "save", cut)
+    assert f"{box} is kept" in run().complaint
+    assert box.exists()
+    box.unlink()
+    monkeypatch.setattr(Trace, "save", save)
+    done = run()
+    assert (done.complaint, box.exists()) == ("", False)
+    assert Trace.load(trace).table.height == done.outcome.ticks
+
+
+def test_a_trace_that_cannot_be_written_names_the_stop_and_the_next_command(tmp_path, monkeypatch):
+    def full(self, path):
+        raise TraceError("Cannot write it: No space left on device.")
+
+    monkeypatch.setattr(Trace, "save", full)
+    _, _, run = fake_run(tmp_path, Still(fail_after=20))
+    with pytest.raises(TraceError, match=r"raised an error.*No space.*blackbox` writes"):
+        run()
+    assert recover(tmp_path / "run.blackbox").table.height > 50
+
+
+@pytest.mark.parametrize("room_again", [True, False])
+def test_what_the_recorder_cannot_write_is_told_and_in_the_trace(tmp_path, monkeypatch, room_again):
+    write, writes = os.write, itertools.count()
+
+    def full(file, data):
+        number = next(writes)
+        if number > 100 and not (room_again and number > 150):
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return write(file, data)
+
+    monkeypatch.setattr("hopping_leg.deploy.flight_recorder.os.write", full)
+    _, clock, run = fake_run(tmp_path, Still())
+    wait = clock.wait_until
+    clock.wait_until = lambda deadline: time.sleep(0.002) or wait(deadline)
+    done = run()
+    assert any("could not write for a time" in notice for notice in done.notices)
+    assert any("No space" in event.get("record", "") for event in done.trace.header["events"])
+    assert ("are lost" in done.complaint) is not room_again
+    assert (tmp_path / "run.blackbox").exists() is not room_again
+    assert (done.trace.table.height == done.outcome.ticks) is room_again
+
+
+def test_a_loop_that_ran_slowly_is_told(tmp_path):
+    _, clock, run = fake_run(tmp_path, Still())
+    clock.hiccups = {round(100.005 + 0.005 * tick, 4): 0.012 for tick in range(20, 220, 20)}
+    notices = run().notices
+    assert any("instead of 200 Hz: this computer was late" in notice for notice in notices)

@@ -1,13 +1,14 @@
-"""The height that the operator changes, by keys or by the page's slider; only its own page may."""
+"""The height that the operator changes by the page's slider; only its own page may."""
 
 import json
+import socket
 import urllib.error
 import urllib.request
 
 import pytest
 
 from hopping_leg.deploy.height_page import HeightPage
-from hopping_leg.deploy.keyboard import LiveHeight, handle_key
+from hopping_leg.deploy.keyboard import LiveHeight
 from hopping_leg.errors import UsageError
 
 
@@ -64,25 +65,37 @@ def test_others_and_nonsense_change_nothing(running, path, body, headers, status
     assert not stops
 
 
+@pytest.mark.parametrize(
+    "body",
+    [b"[" * 900, b'{"height": 1' + b"0" * 400 + b"}", b'{"height": ' + b"9" * 980 + b"}", b"\xff"],
+)
+@pytest.mark.parametrize("length", [None, "-1", "9" * 5000, "1e3", "2000"])
+def test_what_is_too_large_or_no_request_is_answered_400_and_without_a_word(
+    running, capfd, body, length
+):
+    page, height, _ = running
+    host, port = page.address.removeprefix("http://").split(":")
+    head = f"POST /height HTTP/1.0\r\nHost: {host}:{port}\r\n"
+    head += f"Content-Length: {len(body) if length is None else length}\r\n\r\n"
+    with socket.create_connection((host, int(port)), 10) as client:
+        client.sendall(head.encode() + body)
+        client.shutdown(socket.SHUT_WR)
+        assert client.recv(100).startswith(b"HTTP/1.0 400")
+    assert height.at(0.0) == 0.30
+    assert capfd.readouterr().err == ""
+
+
+def test_no_page_may_show_it_in_a_frame_nor_read_it_under_another_name(running):
+    page = running[0]
+    with urllib.request.urlopen(page.address, timeout=5) as reply:
+        assert reply.headers["X-Frame-Options"] == "DENY"
+    with pytest.raises(urllib.error.HTTPError, match="403"):
+        ask(page, "/height", Host="elsewhere.example")
+
+
 def test_a_port_that_is_taken_is_said_before_anything_moves(running):
     page, height, _ = running
     with pytest.raises(UsageError, match="give a free one"):
         HeightPage(height, int(page.address.rsplit(":", 1)[1]))
     with pytest.raises(UsageError, match="give a free one"):
         HeightPage(height, 70000)
-
-
-def test_keys_raise_lower_and_stop():
-    height, stops = LiveHeight(0.30, (0.25, 0.35)), []
-    for _ in range(3):
-        handle_key(b"+", height, lambda: stops.append(1))
-    assert height.at(0) == pytest.approx(0.33)
-    for _ in range(20):
-        handle_key(b"\x1b[B", height, lambda: stops.append(1))
-    assert height.at(0) == 0.25
-    assert handle_key(b"x", height, lambda: stops.append(1)) == ""
-    assert handle_key(b"+", None, lambda: stops.append(1)) == ""
-    assert not stops
-    for key in (b" ", b"q", b"\n"):
-        assert handle_key(key, height, lambda: stops.append(1)) == "stopping"
-    assert len(stops) == 3

@@ -4,6 +4,7 @@ import itertools
 import math
 import os
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,12 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hopping_leg.deploy import realtime
-from hopping_leg.deploy.drive_link import BRAKE, STOP, Action, Reply
+from hopping_leg.deploy.drive_link import BRAKE, STOP, Action, DriveMode, Reply
 from hopping_leg.deploy.flight_recorder import recover
-from hopping_leg.deploy.loop import SampleBuffer
+from hopping_leg.deploy.loop import SampleBuffer, columns
 from hopping_leg.deploy.motion_sequence import Part, SequenceTiming, hopping_poses
 from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.supervisor import State
+from hopping_leg.errors import ControllerError
 from hopping_leg.robot import kinematics, load_robot, shipped_robots
 from tests.deploy.fakes import LEG, POSES, FakeClock, FakeLink, Still, make_loop
 
@@ -84,6 +86,83 @@ def test_a_controller_that_fails_damps_the_leg_and_its_words_are_kept(
     events = trace.header["events"]
     assert [e["controller_error"] for e in events if "controller_error" in e] == said
     assert np.isfinite([out.torque for out in link.told]).all()
+
+
+def raiser(error):
+    def fail(*_):
+        raise error
+
+    return fail
+
+
+@pytest.mark.parametrize(
+    ("internals", "says"),
+    [
+        (raiser(ArithmeticError("lost")), "ArithmeticError: lost"),
+        (raiser(SystemExit("bye")), "SystemExit: bye"),
+        (raiser(KeyboardInterrupt()), "KeyboardInterrupt"),
+        (lambda: {"other": np.zeros(1)}, "'internals' of controller 'still' names ['other']"),
+        (lambda: {"calls": np.array(["many"])}, "ValueError"),
+        (lambda: None, "TypeError"),
+    ],
+)
+def test_a_controller_that_fails_in_what_it_wants_recorded_brakes_too(tmp_path, internals, says):
+    controller = Still()
+    loop, link, box = make_loop(tmp_path, controller)
+    controller.internals = internals
+    outcome = loop.run()
+    box.close()
+    assert outcome.supervisor.stop_cause.reason is Reason.CONTROLLER_FAILED
+    (said,) = (e["controller_error"] for e in box_events(box) if "controller_error" in e)
+    assert says in said
+    assert link.told[-1] == STOP
+
+
+@pytest.mark.parametrize("method", ["act", "reset"])
+def test_a_controller_that_wants_to_exit_ends_the_run_and_not_the_process(tmp_path, method):
+    controller = Still()
+    loop, _, box = make_loop(tmp_path, controller)
+    setattr(controller, method, raiser(SystemExit()))
+    assert loop.run().supervisor.stop_cause.reason is Reason.CONTROLLER_FAILED
+    box.close()
+
+
+def test_a_controller_may_not_name_a_column_of_the_loop(tmp_path):
+    controller = Still()
+    controller.internals = lambda: {"hip_mode": np.zeros(1)}
+    with pytest.raises(ControllerError, match="'hip_mode', which every run has"):
+        columns(controller)
+
+
+def box_events(box):
+    return recover(box.path).header["events"]
+
+
+@pytest.mark.parametrize(("each", "reason"), [(0.012, Reason.CONTROLLER_SLOW), (0.0, None)])
+def test_a_loop_whose_every_second_tick_is_late_is_stopped_by_name(tmp_path, each, reason):
+    clock, controller = FakeClock(), Still()
+    act = controller.act
+
+    def slow(measurement):
+        clock.time += each if controller.calls % 2 else 0.0
+        return act(measurement)
+
+    controller.act = slow
+    outcome, _, _ = run(tmp_path, controller, link=FakeLink(clock))
+    assert outcome.supervisor.stop_cause.reason is (reason or Reason.FINISHED)
+    assert outcome.skipped <= 10
+
+
+def test_late_ticks_that_are_this_computers_are_not_called_the_drives_timeout(tmp_path):
+    clock = FakeClock()
+    clock.hiccups = {round(100.005 + 0.005 * 150, 4): 0.018}
+    link = FakeLink(clock)
+    timeout = int(DriveMode.TIMEOUT)
+    link.alter = lambda tick, _, reply: replace(reply, mode=timeout) if tick == 150 else reply
+    outcome, _, _ = run(tmp_path, link=link)
+    cause = outcome.supervisor.stop_cause
+    assert cause.reason is Reason.LOOP_STALLED
+    assert "watchdog tripped, 18.0 ms late; end other programs" in str(cause)
 
 
 def test_a_silent_drive_ends_the_run_and_the_loop_keeps_its_pace(tmp_path):

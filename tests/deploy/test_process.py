@@ -31,13 +31,13 @@ def emulator():
         yield running
 
 
-def deploy(emulator, folder):
-    words = ["deploy", "energy-shaping", "--transport", str(emulator.path), "--seconds", "20"]
+def deploy(emulator, folder, *, controller="energy-shaping", stdin=subprocess.DEVNULL):
+    words = ["deploy", controller, "--transport", str(emulator.path), "--seconds", "20"]
     process = subprocess.Popen(
         [sys.executable, "-m", "hopping_leg.cli", *words, "--yes", "--out", str(folder)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
-        stdin=subprocess.DEVNULL,
+        stdin=stdin,
         text=True,
     )
     for _ in range(3000):
@@ -78,3 +78,81 @@ def test_an_interrupted_host_brakes_stops_and_says_so(emulator, tmp_path):
     assert states[-1] == State.STOPPED
     time.sleep(0.2)
     assert emulator.state().modes == (0, 0)
+
+
+STUCK = """
+import time
+class Stuck:
+    def __init__(self, robot, rate): self.begun = None
+    def reset(self, count): pass
+    def act(self, measurement):
+        self.begun = self.begun or time.monotonic()
+        while {condition}: pass
+        return [[0.0, 0.0]]
+"""
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP"])
+def test_every_signal_stops_as_sigterm_does(emulator, tmp_path, name):
+    process, box = deploy(emulator, tmp_path)
+    process.send_signal(getattr(signal, name))
+    _, error = process.communicate(timeout=60)
+    assert process.returncode in (0, 2)
+    assert "Traceback" not in error
+    assert Trace.load(box.with_suffix(".parquet")).column("state")[-1] == State.STOPPED
+
+
+def test_the_end_of_the_input_stops(emulator, tmp_path):
+    process, box = deploy(emulator, tmp_path, stdin=subprocess.PIPE)
+    process.stdin.close()
+    process.wait(timeout=60)
+    trace = Trace.load(box.with_suffix(".parquet"))
+    assert trace.column("state")[-1] == State.STOPPED
+
+
+@pytest.mark.parametrize("condition", ["True", "time.monotonic() < self.begun + 0.3"])
+def test_a_second_signal_ends_the_process_within_a_second(emulator, tmp_path, condition):
+    file = tmp_path / "stuck.py"
+    file.write_text(STUCK.format(condition=condition))
+    error = "was stopped"
+    while "was stopped" in error:  # by a busy computer, before it hung
+        process, box = deploy(emulator, tmp_path / "run", controller=f"{file}:Stuck")
+        time.sleep(2.6)  # it has risen, and hops
+        process.send_signal(signal.SIGTERM)
+        time.sleep(0.1)
+        began = time.monotonic()
+        process.send_signal(signal.SIGTERM)
+        _, error = process.communicate(timeout=60)
+    assert time.monotonic() - began < 1.5
+    assert process.returncode == 2, error
+    assert "Traceback" not in error
+    time.sleep(0.3)
+    assert DriveMode.POSITION not in emulator.state().modes
+    assert recover(box).table.height > BEGUN
+
+
+HOST = """
+import sys, time
+from hopping_leg.deploy.moteus_link import MoteusLink
+from hopping_leg.deploy.transport import opener
+from hopping_leg.robot import load_robot
+link = MoteusLink(load_robot("legv2-paper"), opener(sys.argv[1]))
+print("open", flush=True)
+time.sleep(600)
+"""
+
+
+@pytest.mark.parametrize("interface", ["pty", "udp_multicast"])
+def test_a_second_host_is_refused_with_the_name_of_the_first(emulator, interface):
+    path = emulator.path if interface == "pty" else "udp_multicast:239.74.163.99"
+    words = ["doctor", "--transport", str(path), "--robot", "legv2-paper"]
+    code = [sys.executable, "-c", HOST, str(path)]
+    with subprocess.Popen(code, stdout=subprocess.PIPE, text=True) as first:
+        assert first.stdout.readline() == "open\n"
+        second = subprocess.run(
+            [sys.executable, "-m", "hopping_leg.cli", *words], capture_output=True, text=True
+        )
+        first.kill()
+    assert second.returncode == 2
+    assert f"{path} is in use by process {first.pid} (" in second.stderr
+    assert second.stderr.count("\n") == 1

@@ -181,7 +181,7 @@ def test_a_script_is_read(tmp_path):
         ('[[fault]]\nkind = "configuration"\nname = "servo.x"', "There is no drive setting"),
         ('[[fault]]\nkind = "unplug"\nphase = "noon"', "There is no fault phase 'noon'"),
         ("x = 1", "must hold tables"),
-        ("[[fault", "not a readable TOML"),
+        ("[[fault", "is not valid TOML"),
         (None, "no fault script"),
     ],
 )

@@ -3,6 +3,7 @@ import logging
 import pytest
 
 from hopping_leg import cli
+from hopping_leg.errors import RobotError
 from hopping_leg.robot import doubts, load_robot, load_tree, numbers, robot_text, shipped_robots
 
 EXAMPLE = "examples/my_leg.toml"
@@ -107,3 +108,27 @@ def test_a_command_says_doubts_once_on_stderr_and_check_says_them_all(tmp_path, 
     for verb in ("check", "show"):
         assert cli.main(["robots", verb, file]) == 0
         assert doubts(file)[0] in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("path", "valid", "beyond", "unit", "source"),
+    [
+        ("hardware.watchdog", 0.1, 0.11, "s", "default_timeout_s"),
+        ("hardware.watchdog", 0.002, 0.001, "s", "default_timeout_s"),
+        ("hardware.temperature_limit", 75.0, 76.0, "deg C", "trip at 75"),
+        ("hardware.voltage_high", 46.0, 46.5, "V", "trip at 46"),
+        ("hardware.voltage_low", 10.0, 9.0, "V", "from 10 V"),
+        ("hardware.knee.max_current", 100.0, 101.0, "A", "r4"),
+        ("hip.motor.peak_torque", 47.0, 48.0, "N m", "max_current"),
+        ("knee.motor.no_load_speed", 76.0, 78.0, "rad/s", "voltage_high"),
+        ("hip.stop_upper", 6.2, 6.4, "rad", "turns more than once"),
+    ],
+)
+def test_no_file_moves_a_limit_beyond_what_the_hardware_holds(
+    tmp_path, path, valid, beyond, unit, source
+):
+    load_robot(written(tmp_path / "leg.toml", {path: (valid, unit)}))
+    for value in (beyond, 1e3 * beyond if beyond > valid else 1e-3 * beyond):
+        with pytest.raises(RobotError, match=source) as refusal:
+            load_robot(written(tmp_path / "leg.toml", {path: (value, unit)}))
+        assert f"'{path}'" in str(refusal.value)

@@ -12,14 +12,17 @@ import errno
 import importlib
 import inspect
 import io
+import signal
 import sys
+import threading
 import types
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import version
 from typing import Annotated, Any, Union, get_type_hints
 
 import tyro
 
+from hopping_leg import terminal
 from hopping_leg.errors import HoppingLegError, UsageError, unknown_name
 
 VERBS = {
@@ -48,11 +51,36 @@ _CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes)
 
 FAILED = 2
 INTERRUPTED = 130
+TERMINATED = 143
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line, by default the process's own; return the exit code."""
-    return guard(lambda: _dispatch(list(sys.argv[1:] if arguments is None else arguments)))
+    terminal.accept_any_text()
+    with _interrupted_by_sigterm():
+        return guard(lambda: _dispatch(list(sys.argv[1:] if arguments is None else arguments)))
+
+
+class _Terminated(KeyboardInterrupt):
+    """SIGTERM came."""
+
+
+@contextlib.contextmanager
+def _interrupted_by_sigterm() -> Iterator[None]:
+    """Let SIGTERM end a verb as Ctrl-C does, with what it says of how to go on."""
+
+    def end(*_: object) -> None:
+        raise _Terminated
+
+    default = signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    if not default or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 def guard(program: Callable[[], int]) -> int:
@@ -62,9 +90,9 @@ def guard(program: Callable[[], int]) -> int:
         return program()
     except HoppingLegError as error:
         sentence = str(error)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         sentence = "Interrupted; finished files are whole and nothing was half-written."
-        code = INTERRUPTED
+        code = TERMINATED if isinstance(stop, _Terminated) else INTERRUPTED
     except BrokenPipeError:
         sys.stderr.close()
         return FAILED
@@ -81,7 +109,8 @@ def guard(program: Callable[[], int]) -> int:
             f"This needs {error.name}, which comes with the extra '{extra}':"
             f" pip install 'hopping-leg[{extra}]'."
         )
-    print(f"hop: {sentence}", file=sys.stderr)
+    with contextlib.suppress(OSError, ValueError):  # the terminal may be gone
+        print(f"hop: {sentence}", file=sys.stderr)
     return code
 
 
@@ -107,8 +136,12 @@ def _dispatch(arguments: list[str]) -> int:
         return _print_completion(*rest[:1])
     if verb not in VERBS:
         raise UsageError(unknown_name("verb", verb, VERBS) + " Try `hop --help`.")
-    module, options = _load_verb(verb)
-    module.run(read_options(options, f"hop {verb}", inspect.getdoc(module), rest))
+    module, kind = _load_verb(verb)
+    from hopping_leg.cli.options import check_outputs
+
+    args = read_options(kind, f"hop {verb}", inspect.getdoc(module), rest)
+    check_outputs(args)
+    module.run(args)
     return 0
 
 

@@ -1,8 +1,9 @@
 """Run a controller on the real leg, or on `hop emulate`.
 
 The drives are checked first; the leg is armed only when all is well and you agree. It rises to the
-start pose, hops, sinks down and stops. Space, Enter, q, Ctrl-C and SIGTERM stop it at once, and a
-stop stays until you call this again. Everything is recorded, also when the process is killed:
+start pose, hops, sinks down and stops. Any key but those for the height stops it at once, as do
+Ctrl-C, SIGTERM and the end of the terminal; a second signal brakes and leaves. A stop stays until
+you call this again. Everything is recorded, also when the process is killed:
 `hop report figures` reads the trace, or the flight recording that a killed run leaves behind.
 
 CONTROLLER is a name (fast, paper, energy-shaping), a policy (.onnx), a gain file (.toml), a Python
@@ -22,19 +23,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import tyro
-from rich.console import Console
 
 from hopping_leg.cli import motors, options
 from hopping_leg.controllers import command_schedule, joint_pd, policy, protocol, registry
 from hopping_leg.deploy import hardware_trials, height_page, keyboard, safety_limits, stop_reasons
 from hopping_leg.deploy.loop import ControlLoop
 from hopping_leg.deploy.motion_sequence import MotionSequence, SequenceTiming, hopping_poses
-from hopping_leg.errors import HardwareError, UsageError
+from hopping_leg.errors import HardwareError, PolicyError, TraceError, UsageError
 from hopping_leg.identify.excitation import load_excitation
 from hopping_leg.robot import Robot, SoftLimits, load_robot
 from hopping_leg.sim import CONTROL_RATE, SoftLimiter
 
 _SECONDS = 10.0
+_MOST_SHARE = 0.5  # Of a control period that a policy may take
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,21 @@ def run(args: Deploy) -> None:
     options.say_written(done.path)
     if cause.reason not in (stop_reasons.Reason.FINISHED, stop_reasons.Reason.OPERATOR_STOP):
         errors = [event.get("controller_error", "") for event in done.trace.header["events"]]
-        raise HardwareError(" ".join([f"The leg was stopped: {cause}", *filter(None, errors)]))
+        words = [f"The leg was stopped: {cause}", *errors, _emulated(args, cause), done.complaint]
+        raise HardwareError(" ".join(filter(None, words)))
+    if done.complaint:
+        raise TraceError(done.complaint)
+
+
+def _emulated(args: Deploy, cause: stop_reasons.Cause) -> str:
+    """Return where to look if drives did not answer that run on this computer."""
+    silent = (stop_reasons.Reason.REPLIES_MISSING, stop_reasons.Reason.DRIVE_TIMEOUT)
+    terminal = Path(args.transport).resolve().is_relative_to("/dev/pts")
+    return (
+        "If this computer was late, `hop emulate` says by how much."
+        if terminal and cause.reason in silent
+        else ""
+    )
 
 
 def _plan(
@@ -97,6 +112,11 @@ def _plan(
             args.controller, robot, other="warn" if args.other_robot else "refuse"
         )
         rate, seconds = CONTROL_RATE, _SECONDS
+        if isinstance(controller, policy.Policy) and controller.seconds > _MOST_SHARE / rate:
+            raise PolicyError(
+                f"{args.controller} takes {controller.seconds * 1e3:.1f} ms of a control period of"
+                f" {1e3 / rate:g} ms on this computer; make it smaller, or end other programs."
+            )
     valid = command_schedule.command_range(controller, robot)
     if args.schedule is not None:
         schedule = command_schedule.CommandSchedule.parse(args.schedule)
@@ -137,7 +157,7 @@ def _perform(
     @contextlib.contextmanager
     def beside(loop: ControlLoop) -> Iterator[None]:
         with contextlib.ExitStack() as operator:
-            operator.enter_context(keyboard.keys(height, loop.stop, Console().print))
+            operator.enter_context(keyboard.keys(height, loop.stop, options.say))
             if page is not None:
                 operator.enter_context(page.serve(loop.stop))
             yield

@@ -39,9 +39,10 @@ from hopping_leg.robot import DEFAULT_ROBOT, JOINTS
 
 if TYPE_CHECKING:
     from hopping_leg.emulator.drive import EmulatedDrive
-    from hopping_leg.emulator.robot import EmulatedRobot
+    from hopping_leg.emulator.server import Server
 
 _STATUS_PERIOD = 0.2  # s
+_RECENTLY = 1.0  # Before the drives stopped, s
 
 
 @dataclass(frozen=True)
@@ -107,8 +108,9 @@ def run(args: Emulate) -> None:
             sys.stdout.flush()
             if args.realtime and prefer_this_thread() is not None:
                 say("Without real-time priority the drives may answer late under load.")
-            server, display = Server(robot, port), _Display(robot)
-            server.on_turn = lambda: display.renew(server.lost)
+            server = Server(robot, port)
+            display = _Display(server)
+            server.on_turn = display.renew
             with uninterrupted():
                 server.run(lambda: bool(over) or robot.time >= seconds)
             display.end()
@@ -138,21 +140,21 @@ def _ending_signals() -> Iterator[list[int]]:
 class _Display:
     """Events on lines of their own; the state on a line that is renewed, on a terminal only."""
 
-    def __init__(self, robot: "EmulatedRobot") -> None:
-        self._robot = robot
-        self._modes = [drive.machine.mode for drive in robot.drives]
+    def __init__(self, server: "Server") -> None:
+        self._server, self._robot = server, server.robot
+        self._modes = [drive.machine.mode for drive in self._robot.drives]
         self._faults_shown = 0
         self._live = sys.stdout.isatty()
         self._due = time.monotonic()
 
-    def renew(self, lost: float) -> None:
-        """Show what is new; ``lost`` is the time that could not be simulated, s."""
+    def renew(self) -> None:
+        """Show what is new."""
         clear = "\r\x1b[K" if self._live else ""
         for line in self._events():
             print(f"{clear}{line}", flush=True)
         if self._live and time.monotonic() >= self._due:
             self._due = time.monotonic() + _STATUS_PERIOD
-            print(f"{clear}{self._status(lost)}", end="", flush=True)
+            print(f"{clear}{self._status(self._server.lost)}", end="", flush=True)
 
     def end(self) -> None:
         if self._live:
@@ -166,15 +168,23 @@ class _Display:
             who = "" if fault.kind == "unplug" else f" ({fault.drive})"
             yield f"{begun:7.3f} s  fault: {KINDS[fault.kind].text}{who}"
         self._faults_shown = len(log)
+        before = self._modes.copy()
         for joint, drive in enumerate(robot.drives):
             mode = drive.machine.mode
-            if mode is not self._modes[joint]:
+            if mode is not before[joint]:
                 self._modes[joint] = mode
                 why, code = "", drive.machine.fault
                 if mode is DriveMode.FAULT:
                     known = [kind(code) for kind in (FaultCode, Notice) if code in set(kind)]
                     why = f": {known[0].name.lower().replace('_', ' ') if known else 'unknown'}"
                 yield f"{robot.time:7.3f} s  {JOINTS[joint]}: {_mode_text(drive)}{why}"
+        late = self._server.latest(_RECENTLY)
+        if late and DriveMode.POSITION in before and DriveMode.POSITION not in self._modes:
+            yield (
+                f"{robot.time:7.3f} s  this computer was late, by {late * 1e3:.0f} ms: the drives"
+                " stood still so long; end other programs, or permit real-time priority (rtprio in"
+                " /etc/security/limits.conf)"
+            )
 
     def _status(self, lost: float) -> str:
         robot = self._robot

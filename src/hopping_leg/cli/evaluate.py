@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import Literal
 
 import tyro
-from rich.console import Console
 
 from hopping_leg import io, progress
 from hopping_leg.cli import options
@@ -30,6 +29,7 @@ from hopping_leg.evaluate.entries import load_entries
 from hopping_leg.evaluate.report import render_videos, write_report
 from hopping_leg.robot import TIMESTEP, SoftLimits, load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, Engine, NoiseAndDelay
+from hopping_leg.terminal import plain_console
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,6 @@ class Conditions:
     def load(self) -> tuple[list[Entry], RolloutConfig]:
         """Return the controllers and how they are rolled out; a wrong option is a UsageError."""
         options.at_least(0, seed=self.seed)
-        options.check_file(self.json)
         robot = load_robot(self.robot or robot_of(self.controllers))
         noise = NoiseAndDelay() if self.noise else NO_NOISE
         setup = RolloutConfig(
@@ -100,16 +99,12 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
             report=args.report or args.out / "report.html",
             traces=args.traces or args.out / "traces",
         )
-    options.check_file(args.report)
-    if args.traces:
-        args.traces.mkdir(parents=True, exist_ok=True)
     entries, setup = args.load()
     judged = _judge(entries, replace(setup, engine=args.engine), args)
     notes = [*notes, *judged.evaluation.notes]
     judged = replace(judged, evaluation=replace(judged.evaluation, command=command, notes=notes))
-    if args.json:
-        io.write_atomically(args.json, judged.evaluation.dumps())
-    tables.print_evaluation(Console(), judged.evaluation)
+    tables.print_evaluation(plain_console(), judged.evaluation)
+    options.save_json(args.json, judged.evaluation.to_json())
     if args.traces:
         trials.save_traces(judged.runs, args.traces)
     if args.report:

@@ -17,11 +17,10 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 
-from hopping_leg.cli.options import JsonFile, RobotFile, say, show_table
+from hopping_leg.cli.options import JsonFile, RobotFile, save_json, say, show_table
 from hopping_leg.identify import feasibility, recording_format
 from hopping_leg.identify import paper_excitation as paper
 from hopping_leg.identify.excitation import RATE, Excitation, Multisine, Template, make_excitation
-from hopping_leg.io import write_json
 from hopping_leg.robot import Robot, load_robot
 
 
@@ -92,14 +91,13 @@ def run(
     )
     excitation.save(args.out)
     facts = _facts(excitation, robot)
-    if args.json:
-        write_json(args.json, facts)
     show_table(
         ("", "hip", "knee"),
         [(name, *(f"{x:.3g}" for x in pair)) for name, pair in facts["largest"].items()],
         f"{args.out}: {len(excitation)} targets for {robot.name}",
     )
     say(*excitation.description.split("; "))
+    save_json(args.json, facts)
 
 
 def _template(

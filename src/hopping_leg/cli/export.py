@@ -13,9 +13,9 @@ from typing import Annotated
 
 import tyro
 
-from hopping_leg.cli.options import JsonFile, RobotFile, say_written, show_table
+from hopping_leg.cli.options import JsonFile, RobotFile, save_json, say_written, show_table
 from hopping_leg.controllers.registry import load_policy
-from hopping_leg.io import write_atomically, write_json
+from hopping_leg.io import write_atomically
 from hopping_leg.robot import load_robot, to_urdf
 
 
@@ -45,8 +45,7 @@ def run(args: Urdf | Annotated[PolicyCommand, tyro.conf.subcommand(name="policy"
         policy = load_policy(args.policy)
         facts = {**asdict(policy.card), "digest": policy.digest, "inputs": policy.inputs}
         show_table(("entry", "value"), facts.items(), f"policy {policy.name}")
-        if args.json:
-            write_json(args.json, facts)
+        save_json(args.json, facts)
         content = policy.content
     else:
         content = to_urdf(load_robot(args.robot)).encode()

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import tyro
 
-from hopping_leg import errors, io
+from hopping_leg import errors
 from hopping_leg.cli import motors, options
 from hopping_leg.controllers.registry import load_policy, robot_of
 from hopping_leg.deploy import hardware_trials, safety_limits
@@ -71,17 +71,17 @@ def run(args: Finetune) -> None:
         trial_seconds=args.trial_seconds,
         stopping_rules=finetuning.StoppingRules(minutes=args.minutes, tolerance=args.tolerance),
     )
-    result = finetuning.finetune(
-        finetuning.Task(policy, robot, args.seed),
-        _trial_robot(args, robot, policy.card.rate),
-        config,
-        args.out,
-        resume=args.resume,
-        on_trial=lambda row: options.say(line(row)),
-    )
-    if args.json is not None:
-        io.write_json(args.json, result)
+    with options.going_on(f"the same command with --resume goes on in {args.out}."):
+        result = finetuning.finetune(
+            finetuning.Task(policy, robot, args.seed),
+            _trial_robot(args, robot, policy.card.rate),
+            config,
+            args.out,
+            resume=args.resume,
+            on_trial=lambda row: options.say(line(row)),
+        )
     options.say(f"{result['why_it_ended']} Policy: {args.out / finetuning.POLICY}")
+    options.save_json(args.json, result)
 
 
 def line(row: dict[str, Any]) -> str:

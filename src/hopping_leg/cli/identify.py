@@ -12,8 +12,6 @@ Examples:
 """
 
 import math
-import os
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,7 +19,15 @@ import tyro
 from rich.table import Column
 
 from hopping_leg import errors, io
-from hopping_leg.cli.options import JsonFile, Names, command_line, say, show_table
+from hopping_leg.cli.options import (
+    JsonFile,
+    Names,
+    command_line,
+    going_on,
+    save_json,
+    say,
+    show_table,
+)
 from hopping_leg.identify import optimizers, plan, recording, result
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.report import write_fit_report
@@ -112,29 +118,24 @@ def run(args: Identify) -> None:
             say(f"{use}: {about}, {seconds:.4g} s at {rate:g} Hz, {source}")
             say(*(f"  {warning}" for warning in r.warnings))
     folder = args.folder or Path("runs") / f"identify-{args.out.stem}"
-    try:
-        with FitProgress() as progress:
-            identified = identify(
-                recordings,
-                robot,
-                validate=judges,
-                options=options,
-                folder=folder,
-                resume=args.resume,
-                seed=args.seed,
-                report=progress.update,
-            )
-    except KeyboardInterrupt:
-        how = f"the same command goes on in {folder}, with --resume or without."
-        print(f"Stopped; {how}", file=sys.stderr)
-        raise
+    how = f"the same command goes on in {folder}, with --resume or without."
+    with going_on(how), FitProgress() as progress:
+        identified = identify(
+            recordings,
+            robot,
+            validate=judges,
+            options=options,
+            folder=folder,
+            resume=args.resume,
+            seed=args.seed,
+            report=progress.update,
+        )
     result.save_robot(identified, args.out, origin)
     command = command_line("hop identify", args, ("folder", "resume", "threads", "ray"))
-    if args.json:
-        io.write_json(args.json, {"command": command, **result.as_json(identified)})
+    _show(identified)
+    save_json(args.json, {"command": command, **result.as_json(identified)})
     if args.report:
         io.write_atomically(args.report, write_fit_report(identified, command, args.threads))
-    _show(identified)
     say(*(f"{_FILES[name]}: {path}" for name, path in outputs))
 
 
@@ -162,9 +163,6 @@ def _check_outputs(args: Identify, origin: str, outputs: list[tuple[str, Path]])
             raise errors.UsageError(f"--{name} {path} would replace an input; give another file.")
         if path.is_dir():
             raise errors.UsageError(f"--{name} {path} is a folder; give a file.")
-        parent = next(p for p in path.resolve().parents if p.exists())
-        if not (parent.is_dir() and os.access(parent, os.W_OK)):
-            raise errors.UsageError(f"--{name} {path} cannot be written there; give another place.")
 
 
 def _show(identified: result.Identified) -> None:

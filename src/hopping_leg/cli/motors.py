@@ -5,13 +5,14 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from hopping_leg.cli.options import say
 from hopping_leg.deploy import preflight, safety_limits
 from hopping_leg.errors import UsageError
 from hopping_leg.robot.parameters import JOINTS, Robot
+from hopping_leg.terminal import print_table
 
 if TYPE_CHECKING:
     from hopping_leg.deploy.moteus_link import MoteusLink
@@ -61,10 +62,10 @@ def show(findings: Sequence[preflight.Finding]) -> None:
     table = Table("check", *JOINTS)
     found = {(f.check, f.joint): f for f in findings}
     for name in dict.fromkeys(f.check for f in findings):
-        cells = []
+        cells: list[Text] = []
         for joint in range(len(JOINTS)):
             f = found.get((name, joint))
-            cells.append(f"[red]{f.found}[/red]" if f and f.complaint else f.found if f else "")
+            cells.append(Text(f.found if f else "", "red" if f and f.complaint else ""))
         table.add_row(name, *cells)
-    Console().print(table)
+    print_table(table)
     say(*(f"- {f.complaint[0].upper()}{f.complaint[1:]}" for f in findings if f.complaint))

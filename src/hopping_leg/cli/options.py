@@ -1,19 +1,22 @@
 """What verbs share: types and checks of options, the command behind a result, printed tables."""
 
+import contextlib
 import dataclasses
+import os
 import re
 import shlex
+import sys
 from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_type_hints
 
 import tyro
-from rich.console import Console
-from rich.markup import escape
 from rich.table import Column, Table
 
-from hopping_leg.errors import UsageError
+from hopping_leg import io
+from hopping_leg.errors import TraceError, UsageError
 from hopping_leg.robot import DEFAULT_ROBOT
+from hopping_leg.terminal import plain_console, print_table
 
 
 def parse_heights(text: str) -> tuple[float, ...]:
@@ -67,12 +70,51 @@ def at_least(least: int, **values: int | None) -> None:
             raise UsageError(f"--{flag} is {value} but must be {least} or more.")
 
 
-def check_file(path: Path | None) -> None:
-    """Make the folder of a file that will be written; a folder instead is a UsageError."""
-    if path:
-        if path.is_dir():
-            raise UsageError(f"{path} is a folder; name a file.")
-        path.parent.mkdir(parents=True, exist_ok=True)
+_FILES, _FOLDERS = ("json", "report"), ("out", "traces", "folder")  # Options that name results
+
+
+def check_outputs(args: Any) -> None:  # noqa: ANN401
+    """Refuse places where no result can be written, before any time is spent on it."""
+    for field in dataclasses.fields(args) if dataclasses.is_dataclass(args) else ():
+        name, path = field.name, getattr(args, field.name)
+        check_outputs(path)
+        if name not in (*_FILES, *_FOLDERS) or not isinstance(path, Path):
+            continue
+        if name in _FILES and path.is_dir():
+            raise UsageError(f"--{name} {path} is a folder; give a file.")
+        whole = path.resolve()
+        place = next(p for p in (whole, *whole.parents) if p.exists())
+        if place == whole and place.is_file():
+            place = place.parent  # a file is replaced
+        if (place != whole and not place.is_dir()) or not os.access(place, os.W_OK):
+            raise UsageError(f"--{name} {path} cannot be written there; give another place.")
+
+
+def save_json(path: Path | None, value: object) -> None:
+    """Write a result if a file was named; print it if it cannot be written after all."""
+    try:
+        if path is not None:
+            io.write_json(path, value)
+    except TraceError:
+        say(io.json_text(value))
+        raise
+
+
+@contextlib.contextmanager
+def going_on(how: str) -> Iterator[None]:
+    """Say how to go on where work is interrupted, or something cannot be written."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        with contextlib.suppress(OSError):  # the terminal may be gone
+            print(f"Stopped; {how}", file=sys.stderr)
+        raise
+    except OSError as error:
+        where = f" {error.filename}" if error.filename else ""
+        why = error.strerror or error
+        raise TraceError(f"Cannot use{where}: {why}; once that is mended, {how}") from error
+    except TraceError as error:
+        raise TraceError(f"{error} Once that is mended, {how}") from error
 
 
 def mm(metres: float | None) -> str:
@@ -83,7 +125,7 @@ def mm(metres: float | None) -> str:
 def say(*lines: object) -> None:
     """Print lines as they are, unwrapped and without markup."""
     for line in lines:
-        Console().print(str(line), soft_wrap=True, highlight=False, markup=False)
+        plain_console().print(str(line), soft_wrap=True)
 
 
 def say_written(*paths: Path | None) -> None:
@@ -95,10 +137,10 @@ def show_table(
     columns: Iterable[Column | str], rows: Iterable[Iterable[object]], title: str | None = None
 ) -> None:
     """Print a table of cells as they are, without markup."""
-    table = Table(*columns, title=title and escape(title))
+    table = Table(*columns, title=title)
     for row in rows:
-        table.add_row(*(escape(str(cell)) for cell in row))
-    Console().print(table)
+        table.add_row(*map(str, row))
+    print_table(table)
 
 
 KEPT = frozenset({"out", "folder", "figure", "resume", "jobs", "ray"})

@@ -13,12 +13,11 @@ Examples:
 """
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import tyro
-from rich.console import Console
-from rich.progress import Progress
 
 from hopping_leg.cli import motors, options
 from hopping_leg.controllers import command_schedule, joint_pd
@@ -27,6 +26,7 @@ from hopping_leg.deploy.motion_sequence import MotionSequence, Poses, SequenceTi
 from hopping_leg.errors import HardwareError, UsageError
 from hopping_leg.identify import play_excitation, recording_format
 from hopping_leg.identify.excitation import Excitation, load_excitation
+from hopping_leg.progress import ShareProgress
 from hopping_leg.robot import TIMESTEP, Robot, load_robot, parent_robot
 
 
@@ -78,9 +78,9 @@ def run(args: Record) -> None:
     if args.transport is not None:
         _record_motors(args, args.transport, robot, loaded, believed, gains)
         return
-    with Progress(console=Console(stderr=True)) as bar:
+    with ShareProgress() as bar:
         for number, (stem, excitation) in enumerate(loaded):
-            task = bar.add_task(stem, total=len(excitation))
+            show = partial(bar.show_tick, stem, len(excitation))
             recording = play_excitation.play(
                 excitation,
                 robot,
@@ -88,7 +88,7 @@ def run(args: Record) -> None:
                 seed=args.seed + number,
                 gains=gains,
                 timestep=args.timestep,
-                on_tick=lambda done, _, task=task: bar.update(task, completed=done),  # type: ignore[misc]
+                on_tick=show,
             )
             file = args.out / f"{robot.name}-{stem}.parquet"
             recording.save(file)
@@ -136,11 +136,13 @@ def _record_motors(
                 limits,
                 hardware_trials.new_path(args.out / "traces", name),
                 header,
-                beside=lambda loop: keyboard.keys(None, loop.stop, Console().print),
+                beside=lambda loop: keyboard.keys(None, loop.stop, options.say),
             )
             cause = done.outcome.supervisor.stop_cause
-            if cause.reason is not stop_reasons.Reason.FINISHED:
-                raise HardwareError(f"{name} was stopped: {cause} Its trace is {done.path}.")
+            if cause.reason is not stop_reasons.Reason.FINISHED or done.complaint:
+                raise HardwareError(
+                    f"{name} was stopped: {cause} {done.complaint} Its trace is {done.path}."
+                )
             file = args.out / f"{robot.name}-{name}.parquet"
             recording = play_excitation.recording_of(
                 done.trace, excitation, believed=believed, gains=gains, name=file.name

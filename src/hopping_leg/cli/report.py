@@ -21,7 +21,7 @@ from pathlib import Path
 import tyro
 
 from hopping_leg import errors, figure_style, io
-from hopping_leg.cli.options import JsonFile, check_file, say, say_written
+from hopping_leg.cli.options import JsonFile, save_json, say, say_written
 from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.evaluate import aggregation, comparison, report, result_files, runner, trials
 from hopping_leg.evaluate.video import Animation, fixed_traces, render_video
@@ -67,8 +67,6 @@ def run(args: Figures | Page) -> None:
 
 
 def _write(args: Page) -> None:
-    check_file(args.out)
-    check_file(args.json)
     runs = result_files.read_runs(args.runs)
     if len(runs) == 1 and (evaluation := runs[0].evaluation):
         traces = sorted(runs[0].traces.glob("*.parquet")) if runs[0].traces else []
@@ -83,8 +81,7 @@ def _write(args: Page) -> None:
         numbers = {"command": command, **compared.to_json()}
         say(*compared.notes)
     io.write_atomically(args.out, page)
-    if args.json:
-        io.write_json(args.json, numbers)
+    save_json(args.json, numbers)
     say_written(args.out, args.json)
 
 

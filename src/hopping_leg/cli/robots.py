@@ -14,8 +14,7 @@ from typing import Any
 
 import tyro
 
-from hopping_leg.cli.options import say, show_table
-from hopping_leg.io import write_json
+from hopping_leg.cli.options import save_json, say, show_table
 from hopping_leg.robot import Robot, build_model, numbers, robot_files
 
 Target = tyro.conf.Positional[str]
@@ -51,19 +50,15 @@ def run(args: List | Show | Check) -> None:
     """List, show or check robots."""
     if isinstance(args, List):
         robots = [robot_files.load_robot(name) for name in robot_files.shipped_robots()]
-        if args.json:
-            write_json(args.json, [{"name": r.name, **derived(r)} for r in robots])
         for robot in robots:
             print(f"{robot.name:<12}  {robot.description}\n{'':<12}  {_summary(robot)}")
+        save_json(args.json, [{"name": r.name, **derived(r)} for r in robots])
     elif isinstance(args, Show):
         tree = robot_files.load_tree(args.robot)
         robot, doubted = (
             robot_files.robot_from_tree(tree, args.robot),
             robot_files.doubts(args.robot),
         )
-        if args.json:
-            facts = {**asdict(robot), "derived": derived(robot), "doubts": doubted}
-            write_json(args.json, facts)
         rows = [(p, f"{e['value']:g}", e["unit"], e["source"]) for p, e in numbers(tree)]
         for path, value in derived(robot).items():
             shown = f"{value:g}" if isinstance(value, float) else value
@@ -71,6 +66,8 @@ def run(args: List | Show | Check) -> None:
         title = f"{robot.name}: {robot.description}"
         show_table(("number", "value", "unit", "source"), rows, title)
         say(*doubted)
+        facts = {**asdict(robot), "derived": derived(robot), "doubts": doubted}
+        save_json(args.json, facts)
     else:
         robot = robot_files.robot_from_tree(robot_files.load_tree(args.robot), args.robot)
         doubted = robot_files.doubts(args.robot)

@@ -12,12 +12,11 @@ Examples:
 from dataclasses import dataclass
 from pathlib import Path
 
-from rich.console import Console
-
 from hopping_leg import figure_style, io, progress
 from hopping_leg.cli import evaluate, options
 from hopping_leg.evaluate import figures, result_files, tables
 from hopping_leg.evaluate.robustness.suite import make_suite, run_suite
+from hopping_leg.terminal import plain_console
 
 
 @dataclass(frozen=True)
@@ -39,7 +38,7 @@ def run(args: Robustness) -> None:
         found = run_suite(entries, suite, result_files.ResultCache(args.out), bar.show)
     result = {"command": options.command_line("hop robustness", args), **found}
     file, figure = args.json or args.out / "robustness.json", args.out / "robustness.svg"
-    io.write_json(file, result)
+    tables.print_robustness(plain_console(), result)
+    options.save_json(file, result)
     io.write_atomically(figure, figure_style.to_svg(figures.draw_robustness(result)))
-    tables.print_robustness(Console(), result)
     options.say_written(file, figure)

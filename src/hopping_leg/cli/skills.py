@@ -8,12 +8,11 @@ Examples:
 from dataclasses import dataclass
 from typing import Literal
 
-from rich.console import Console
-
-from hopping_leg import io, progress
+from hopping_leg import progress
 from hopping_leg.cli import evaluate, options
 from hopping_leg.evaluate.skills.suite import run_skills
 from hopping_leg.evaluate.tables import print_skills
+from hopping_leg.terminal import plain_console
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,6 @@ def run(args: Skills) -> None:
             on_progress=bar.show,
         )
     result = {"command": options.command_line("hop skills", args), **found}
-    print_skills(Console(), result)
-    if args.json:
-        io.write_json(args.json, result)
-        options.say_written(args.json)
+    print_skills(plain_console(), result)
+    options.save_json(args.json, result)
+    options.say_written(args.json)

@@ -13,13 +13,11 @@ Examples:
   hop evaluate runs/mine/policy.onnx
 """
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from hopping_leg.cli.options import JsonFile, at_least
-from hopping_leg.io import write_json
+from hopping_leg.cli.options import JsonFile, at_least, going_on, save_json
 from hopping_leg.robot import load_robot
 
 
@@ -81,7 +79,7 @@ def run(args: Options) -> None:
         recipe = recipe.replace({"task.observation": args.observation})
     recipe = recipe.replace(heights=args.heights)
     out = args.out or Path("runs") / f"{recipe.name}-seed{args.seed}"
-    try:
+    with going_on(f"the same command with --resume goes on in {out}."):
         trained = train(
             recipe,
             load_robot(args.robot or recipe.robot),
@@ -93,10 +91,6 @@ def run(args: Options) -> None:
             threads=args.threads,
             log=args.log,
         )
-    except KeyboardInterrupt:
-        print(f"Stopped; the same command with --resume goes on in {out}.", file=sys.stderr)
-        raise
-    if args.json:
-        write_json(args.json, read_result(trained.policy.parent))
     print(trained.policy.with_name("model_card.md").read_text(encoding="utf-8"))
     print(f"Policy: {trained.policy}\nJudge it: hop evaluate {trained.policy}")
+    save_json(args.json, read_result(trained.policy.parent))

@@ -25,9 +25,9 @@ from typing import Annotated, Any
 import tyro
 from rich.progress import Progress
 
-from hopping_leg.cli.options import JsonFile, RobotFile, at_least, say, show_table
+from hopping_leg.cli.options import JsonFile, RobotFile, at_least, save_json, say, show_table
 from hopping_leg.controllers.energy_shaping.tuning import Search, tune
-from hopping_leg.io import write_atomically, write_json
+from hopping_leg.io import write_atomically
 from hopping_leg.rl.search_space import Tuning
 from hopping_leg.robot import DEFAULT_ROBOT, load_robot
 
@@ -100,8 +100,7 @@ def _tune_gains(args: GainSearch) -> None:
     )
     gains = args.out / "gains.toml"
     say(f"Gains: {gains}; use: hop evaluate {gains}")
-    if args.json is not None:
-        write_json(args.json, tuned)
+    save_json(args.json, tuned)
 
 
 def _tune_recipe(args: RecipeSearch) -> None:
@@ -113,11 +112,11 @@ def _tune_recipe(args: RecipeSearch) -> None:
     at_least(1, workers=args.workers)
     out = args.tuning.folder
     result = tune_recipe(args.tuning, args.workers, args.ray)
-    for file in filter(None, (out / "trials.json", args.json)):
-        write_json(file, result)
+    _show(result)
+    for file in (out / "trials.json", args.json):
+        save_json(file, result)
     for name, draw in FIGURES.items():
         write_atomically(out / f"{name}.svg", to_svg(draw(result)))
-    _show(result)
     say(f"Wrote {out}/trials.json and the figures beside it.")
 
 

@@ -51,7 +51,8 @@ class View:
     box: Path | None = None
     """A flight recording to follow instead, or a folder whose newest one is followed."""
     host: str = "127.0.0.1"
-    """Address of this computer to serve at; 0.0.0.0 lets everyone in the network look and steer."""
+    """Address of this computer to serve at; 0.0.0.0 lets everyone in the network look and steer who
+    has the address with its token."""
     port: int = 8080
     """Port to serve at; if it is in use, the next free one."""
     detail: float | None = None

@@ -12,11 +12,12 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-import onnxruntime
 
 from hopping_leg.arrays import Array
 from hopping_leg.controllers.observation_history import ObservationHistory, make_observation_history
+from hopping_leg.controllers.onnx_session import measure_session, open_session
 from hopping_leg.errors import PolicyError, UsageError
+from hopping_leg.io import parse_json, read_dataclass
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.sim.channel import Measurement
 
@@ -35,6 +36,7 @@ OtherRobot = Literal["refuse", "warn", "accept"]
 
 _log = logging.getLogger(__name__)
 _ROUNDING = 1e-9
+_MOST_RATE = 1e4  # Hz
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,19 @@ class Card:
     versions: dict[str, str] = field(default_factory=dict)
     """Versions of the libraries that trained it."""
 
+    def __post_init__(self) -> None:
+        hip, knee = self.torque_scale
+        for name, holds in (
+            ("rate", 1 <= self.rate <= _MOST_RATE),
+            ("command_low", 0 < self.command_low <= self.command_high),
+            ("torque_scale", min(hip, knee) > 0),
+        ):
+            if not holds:
+                raise PolicyError(
+                    f"'{name}' of its card is {getattr(self, name)}, which no policy has; export"
+                    " the policy again."
+                )
+
     def to_json(self) -> str:
         """Return the card as stored in the file."""
         return json.dumps({"schema": SCHEMA, **asdict(self)}, sort_keys=True)
@@ -76,16 +91,13 @@ class Card:
             PolicyError: It is of another schema, incomplete or damaged.
         """
         try:
-            values = json.loads(text)
-            schema = values.pop("schema")
+            values = parse_json(text, "it", PolicyError)
+            schema = values.pop("schema", None)
             if schema != SCHEMA:
-                raise PolicyError(
-                    f"{origin} has policy schema {schema}; this version reads schema {SCHEMA}."
-                )
-            hip, knee = values.pop("torque_scale")
-            return Card(**values, torque_scale=(float(hip), float(knee)))
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
-            raise PolicyError(f"{origin} has a damaged policy card: {error}.") from error
+                raise PolicyError(f"it is of schema {schema}; this version reads schema {SCHEMA}.")
+            return read_dataclass(Card, values, "it", error=PolicyError)
+        except PolicyError as error:
+            raise PolicyError(f"{origin} has a damaged policy card: {error}") from error
 
 
 class Policy:
@@ -93,15 +105,16 @@ class Policy:
 
     Attributes:
         digest: First 16 hex digits of the file's SHA-256.
+        seconds: How long it takes for one leg on this computer, s.
 
     Raises:
-        PolicyError: The content is no policy file that this version can run.
+        PolicyError: The content is no policy file that this version can run, or never returns.
     """
 
     def __init__(self, content: bytes, origin: str, name: str) -> None:
         self.name, self.origin, self.content = name, origin, content
         self.digest = hashlib.sha256(content).hexdigest()[:16]
-        self._session = _open(content, origin)
+        self._session = open_session(content, origin)
         text = self._session.get_modelmeta().custom_metadata_map.get(METADATA_KEY)
         if text is None:
             raise PolicyError(
@@ -110,6 +123,8 @@ class Policy:
         self.card = Card.from_json(text, origin)
         self._layout = make_observation_history(self.card.layout, 1 / self.card.rate)
         self._memory_size = _check_signature(self._session, self._layout, origin)
+        memory = {MEMORY: (self._memory_size,)} if self.remembers else {}
+        self.seconds = measure_session(self._session, self._layout.shapes | memory, origin)
         self.reset(0)
 
     @staticmethod
@@ -202,25 +217,13 @@ class Policy:
         return {}
 
 
-def _open(content: bytes, origin: str) -> Any:  # noqa: ANN401
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = 1
-    options.inter_op_num_threads = 1
-    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-    options.log_severity_level = 4
-    try:
-        return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
-    except Exception as error:  # onnxruntime raises many unrelated types
-        raise PolicyError(
-            f"{origin} is not a readable ONNX file: truncated, damaged or of another kind."
-        ) from error
-
-
 def _check_signature(session: Any, layout: ObservationHistory, origin: str) -> int:  # noqa: ANN401
     """Check a graph's inputs and outputs; return the entries of its memory, 0 if it has none."""
     found = {i.name: tuple(i.shape[1:]) for i in session.get_inputs()}
     outputs = [tuple(o.shape[1:]) for o in session.get_outputs()]
     memory = found.pop(MEMORY, ())
+    if memory and not isinstance(memory[0], int):
+        raise PolicyError(f"{origin} has a memory of unknown size {memory}.")
     if found != layout.shapes or outputs != ([(2,), memory] if memory else [(2,)]):
         raise PolicyError(
             f"{origin} takes {found} and gives {outputs}, but layout '{layout.name}' takes"

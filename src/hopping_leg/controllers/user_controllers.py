@@ -269,7 +269,7 @@ def attempt(origin: str, work: Callable[[], T], failure: str = "failed") -> T:
         return work()
     except HoppingLegError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         last = traceback.extract_tb(error.__traceback__)[-1]
         where = f"{Path(last.filename).name}, line {last.lineno}"
         raise ControllerError(

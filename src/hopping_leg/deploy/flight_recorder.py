@@ -3,15 +3,18 @@
 A file of frames, each ``kind, length, content, CRC-32``: one header (JSON), rows of floats, events
 (JSON). The loop only puts a frame into a queue; a thread writes it at once. When the process is
 killed, all but the very last frames are in the file, and a frame that was cut off is left out.
+What a full disk refuses waits in memory until there is room, so that nothing is left out.
 """
 
 import contextlib
+import errno
 import json
 import os
 import queue
 import struct
 import threading
 import zlib
+from collections import deque
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -21,6 +24,7 @@ import polars as pl
 
 from hopping_leg import errors, trace
 from hopping_leg.arrays import Array
+from hopping_leg.io import parse_json
 
 _HEADER, _ROW, _EVENT = range(3)  # Kinds of frames
 
@@ -30,7 +34,8 @@ SUFFIX = ".blackbox"
 _MAGIC = b"HOPBOX1\n"  # What every file begins with
 _FRAME = struct.Struct("<BI")
 _CRC = struct.Struct("<I")
-_SYNC_SECONDS = 1.0
+_SYNC_TICKS = 200
+_WAITING = 1 << 26  # Most that waits in memory for a full disk, bytes: a quarter of an hour
 _LARGEST = 1 << 24  # Content that no frame exceeds, bytes; a length beyond it is damage
 
 
@@ -42,27 +47,41 @@ class FlightRecorder:
         columns: Names of the rows' values.
         header: Facts about the run, JSON.
 
+    Attributes:
+        rows: How many were recorded.
+        lost: How many frames are not in the file; known once it is closed.
+        error: What the disk said last when it refused something, None if it never did.
+
     Raises:
         TraceError: The file exists or cannot be created.
     """
 
     def __init__(self, path: Path, columns: Sequence[str], header: dict[str, Any]) -> None:
         self.path, self.columns = path, tuple(columns)
+        self.rows = self.lost = 0
         self.error: str | None = None
         self._row = struct.Struct(f"<{len(self.columns)}d")
+        facts = {"columns": self.columns, "header": header}
+        first = _MAGIC + _frame(_HEADER, json.dumps(facts).encode())
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
         except OSError as error:
             raise errors.TraceError(f"Cannot create {path}: {error.strerror}.") from error
-        first = json.dumps({"columns": self.columns, "header": header}).encode()
-        os.write(self._file, _MAGIC + _frame(_HEADER, first))
+        try:
+            if os.write(self._file, first) < len(first):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError as error:
+            os.close(self._file)
+            path.unlink()
+            raise errors.TraceError(f"Cannot write {path}: {error.strerror}.") from error
         self._queue: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._write, name="black-box", daemon=True)
         self._thread.start()
 
     def row(self, values: Sequence[float]) -> None:
         """Record a tick; ``values`` are in the order of ``columns``."""
+        self.rows += 1
         self._queue.put(_frame(_ROW, self._row.pack(*values)))
 
     def event(self, **facts: Any) -> None:  # noqa: ANN401
@@ -76,29 +95,36 @@ class FlightRecorder:
         os.close(self._file)
 
     def _write(self) -> None:
-        """Write frames as they come; after an error, e.g. a full disk, drop them."""
-        unsynced = 0
-        while True:
-            content = self._queue.get()
-            parts: list[bytes] = []
-            while content is not None:
-                parts.append(content)
+        """Write frames as they come; those that the disk refuses wait, in their order."""
+        waiting: deque[bytes] = deque()
+        size = unsynced = begun = 0
+        last = False
+        while not last:
+            frame = self._queue.get()
+            while frame is not None:
+                if size + len(frame) > _WAITING:
+                    self.lost += 1
+                else:
+                    waiting.append(frame)
+                    size += len(frame)
                 try:
-                    content = self._queue.get_nowait()
+                    frame = self._queue.get_nowait()
                 except queue.Empty:
                     break
-            last = content is None
+            last = frame is None
             try:
-                if parts and self.error is None:
-                    os.write(self._file, b"".join(parts))
-                    unsynced += len(parts)
-                if unsynced and (last or unsynced >= 200 * _SYNC_SECONDS):
+                while waiting:
+                    written = os.write(self._file, waiting[0][begun:])
+                    begun, size = begun + written, size - written
+                    if begun == len(waiting[0]):
+                        waiting.popleft()
+                        begun, unsynced = 0, unsynced + 1
+                if last or unsynced >= _SYNC_TICKS:
                     os.fsync(self._file)
                     unsynced = 0
             except OSError as error:
                 self.error = f"{self.path}: {error.strerror}"
-            if last:
-                return
+        self.lost += len(waiting)
 
 
 class FlightRecorderTail:
@@ -155,15 +181,27 @@ class FlightRecorderTail:
         found = []
         for kind, data, end in _frames(content, at):
             at = end
-            if kind == _HEADER:
-                first = json.loads(data)
-                self.columns, self.header = tuple(first["columns"]), first["header"]
-            elif kind == _ROW:
+            if kind == _HEADER and not self.columns:
+                self._read_header(data)
+            elif kind == _ROW and len(data) == 8 * len(self.columns) > 0:
                 found.append(data)
+            elif kind == _EVENT and self.columns:
+                self.events.append(parse_json(data, f"{self.path}: an event", errors.TraceError))
             else:
-                self.events.append(json.loads(data))
+                raise errors.TraceError(
+                    f"{self.path} is damaged: it holds a frame of no known kind."
+                )
         self._rest = content[at:]
         return np.frombuffer(b"".join(found), "<f8").reshape(len(found), len(self.columns))
+
+    def _read_header(self, data: bytes) -> None:
+        first = parse_json(data, f"{self.path}: the header", errors.TraceError)
+        names: Any = first.get("columns")
+        header: Any = first.get("header")
+        named = isinstance(names, list) and names and all(isinstance(n, str) for n in names)
+        if not (named and len({*names}) == len(names) and isinstance(header, dict)):
+            raise errors.TraceError(f"{self.path} is damaged: its header names no columns.")
+        self.columns, self.header = tuple(names), header
 
     def close(self) -> None:
         """Close the file."""

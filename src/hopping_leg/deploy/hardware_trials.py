@@ -1,9 +1,12 @@
 """Hardware trials: a run from a checked link to a trace on disk, and the legs that make them."""
 
+import atexit
 import concurrent.futures
 import datetime
+import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
@@ -19,7 +22,7 @@ from hopping_leg.deploy import drive_link, flight_recorder, safety_limits, stop_
 from hopping_leg.deploy.loop import ControlLoop, LoopOutcome, columns
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
 from hopping_leg.deploy.realtime import Clock, RealClock, keeping_time
-from hopping_leg.errors import HardwareError
+from hopping_leg.errors import HardwareError, TraceError
 from hopping_leg.io import safe_file_name, versions
 from hopping_leg.robot import Robot, SoftLimits
 from hopping_leg.trace import Trace
@@ -28,6 +31,15 @@ if TYPE_CHECKING:
     from hopping_leg.deploy.moteus_link import MoteusLink
 
 _PACKAGES = ("hopping-leg", "numpy", "onnxruntime", "moteus", "python-can")
+_STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGHUP, signal.SIGTSTP)
+_LOOK_EVERY = 0.05  # s
+_PATIENCE = 0.5
+"""How long a controller may take before the leg is left to the drives' brakes, s."""
+
+_BRAKES = 3  # Times that the drives are told to brake then
+_LAST_SECONDS = 0.6  # After a second signal, for the record; then the process ends
+_FAILED = 2  # Exit code
+_FULL_RATE = 0.98  # Share of the ticks below which a run is said to have been slow
 _CODES: dict[str, type[Enum]] = {
     "state": supervisor.State,
     "part": Part,
@@ -44,7 +56,9 @@ class Performance:
     trace: Trace
     path: Path
     notices: tuple[str, ...]
-    """What the computer did not permit."""
+    """What the computer did not permit, and what it did too late."""
+    complaint: str
+    """Why the record may not be whole, or nothing."""
 
 
 def perform(
@@ -58,20 +72,21 @@ def perform(
     realtime: bool = True,
     beside: Callable[[ControlLoop], AbstractContextManager[None]] = lambda _: nullcontext(),
 ) -> Performance:
-    """Arm, run a sequence, stop; SIGINT and SIGTERM stop it as the operator would.
+    """Arm, run a sequence, stop; a signal stops it as the operator would, a second one ends it.
 
     Args:
         link: To drives that were found fit.
         sequence: What the leg does.
         limits: The supervisor's limits.
-        path: File of the trace; the flight recording lies beside it as long as the run lasts.
+        path: File of the trace; the flight recording lies beside it until the trace is complete.
         header: Header of the trace.
         clock: None takes the computer's.
         realtime: Ask for priority and locked memory.
         beside: Makes what is open while the loop runs, e.g. a keyboard that stops it.
 
     Raises:
-        TraceError: The flight recording cannot be written.
+        TraceError: The flight recording cannot be created, or the trace cannot be written.
+        HardwareError: The controller did not return, or a second signal ended the run.
     """
     recording = path.with_suffix(flight_recorder.SUFFIX)
     recorder = flight_recorder.FlightRecorder(recording, columns(sequence.controller), header)
@@ -79,21 +94,91 @@ def perform(
     notices: tuple[str, ...] = ()
     try:
         with (
-            _stopped_by_signals(loop),
+            _stop_signals(loop) as signals,
             beside(loop),
             keeping_time(realtime=realtime) as notices,
-            concurrent.futures.ThreadPoolExecutor(1, "control-loop") as threads,
         ):
-            # Signals reach this thread while it waits for the loop's.
-            outcome = threads.submit(loop.run).result()
+            outcome = _run(loop, signals, recording)
     finally:
         if link.trouble:
             recorder.event(link_trouble=link.trouble)
         recorder.close()
-    trace = flight_recorder.recover(recording)
-    trace.save(path)
-    recording.unlink()
-    return Performance(outcome, trace, path, notices)
+    notices += tuple(_pace(outcome, 1 / limits.period))
+    return _finish(outcome, recorder, path, notices)
+
+
+def _run(loop: ControlLoop, signals: list[int], recording: Path) -> LoopOutcome:
+    """Run the loop in a thread of its own; this one takes the signals, and brakes if need be."""
+    done: concurrent.futures.Future[LoopOutcome] = concurrent.futures.Future()
+
+    def run() -> None:
+        try:
+            done.set_result(loop.run())
+        except BaseException as error:
+            done.set_exception(error)
+
+    threading.Thread(target=run, name="control-loop", daemon=True).start()
+    while not concurrent.futures.wait([done], _LOOK_EVERY).done:
+        why = "A second signal ended the run" if len(signals) > 1 else ""
+        if loop.waited > _PATIENCE:
+            why = f"The controller did not return within {_PATIENCE:g} s"
+        if why:
+            for _ in range(_BRAKES):
+                loop.abandon()
+                time.sleep(_LOOK_EVERY / 2)
+            # What never returns must not keep the process.
+            atexit.register(lambda: None if done.done() else os._exit(_FAILED))
+            if len(signals) > 1:
+                ending = threading.Timer(_LAST_SECONDS, os._exit, (_FAILED,))
+                ending.daemon = True
+                ending.start()
+            raise HardwareError(
+                f"{why}: the drives were told to brake. `hop report figures {recording}` shows what"
+                " was recorded."
+            )
+    return done.result()
+
+
+def _pace(outcome: LoopOutcome, rate: float) -> Iterator[str]:
+    """Yield a sentence if the loop ran markedly slower than it should."""
+    share = outcome.ticks / max(outcome.ticks + outcome.skipped, 1)
+    if share < _FULL_RATE:
+        yield (
+            f"The loop ran at {rate * share:.0f} instead of {rate:g} Hz: this computer was late;"
+            " end other programs, or permit real-time priority."
+        )
+
+
+def _finish(
+    outcome: LoopOutcome,
+    recorder: flight_recorder.FlightRecorder,
+    path: Path,
+    notices: tuple[str, ...],
+) -> Performance:
+    """Write the trace; the flight recording goes once the trace on the disk holds all of it."""
+    complaint, kept = "", recorder.path
+    if recorder.lost:
+        complaint = f"{recorder.lost} entries of the record are lost ({recorder.error})."
+    try:
+        trace = flight_recorder.recover(kept)
+        if recorder.error is not None:
+            notice = f"The flight recorder could not write for a time: {recorder.error}."
+            notices += (notice,)
+            trace.header["events"].append({"record": complaint or notice})
+        trace.save(path)
+        whole = Trace.load(path).table.height == recorder.rows
+    except (TraceError, OSError) as error:
+        raise TraceError(
+            f"The run is over: {outcome.supervisor.stop_cause} {error} All that was recorded is in"
+            f" {kept}; once there is room, `hop report figures {kept}` writes the trace."
+        ) from error
+    if whole and not complaint:
+        kept.unlink()
+    elif not complaint:
+        complaint = f"{path} does not hold all {recorder.rows} ticks."
+    if complaint:
+        complaint += f" The flight recording {kept} is kept."
+    return Performance(outcome, trace, path, notices, complaint)
 
 
 def header_of(
@@ -132,19 +217,27 @@ def new_path(folder: Path, name: str) -> Path:
 
 
 @contextmanager
-def _stopped_by_signals(loop: ControlLoop) -> Iterator[None]:
-    """Let SIGINT and SIGTERM stop the leg; outside of the main thread there are none."""
+def _stop_signals(loop: ControlLoop) -> Iterator[list[int]]:
+    """Let signals stop the leg, and collect them; outside of the main thread there are none."""
+    came: list[int] = []
     if threading.current_thread() is not threading.main_thread():
-        yield
+        yield came
         return
-    before = {s: signal.getsignal(s) for s in (signal.SIGINT, signal.SIGTERM)}
+
+    def stop(number: int, _: object) -> None:
+        came.append(number)
+        loop.stop()
+
+    before = {number: signal.getsignal(number) for number in _STOP_SIGNALS}
+    if before[signal.SIGHUP] is signal.SIG_IGN:  # under nohup no terminal is to be missed
+        del before[signal.SIGHUP]
     for number in before:
-        signal.signal(number, lambda *_: loop.stop())
+        signal.signal(number, stop)
     try:
-        yield
+        yield came
     finally:
         for number, handler in before.items():
-            signal.signal(number, handler)
+            signal.signal(number, handler or signal.SIG_DFL)
 
 
 @dataclass(frozen=True)
@@ -210,7 +303,8 @@ class DeployedRobot:
         )
         if hopped.height < self.rate:
             raise HardwareError(f"The leg was stopped before it hopped: {cause}")
-        complaint = "" if cause.reason is stop_reasons.Reason.FINISHED else str(cause)
+        finished = cause.reason is stop_reasons.Reason.FINISHED
+        complaint = done.complaint if finished else f"{cause} {done.complaint}".strip()
         return hardware_trial.HardwareTrial(
             Trace(hopped, done.trace.header), table.height / self.rate, complaint
         )

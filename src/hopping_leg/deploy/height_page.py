@@ -11,7 +11,9 @@ from hopping_leg.deploy.keyboard import LiveHeight
 from hopping_leg.errors import UsageError
 
 _HOST = "127.0.0.1"
-_LONGEST = 1000  # Bytes of a request's body that are read
+_NAMES = (_HOST, "localhost")
+_LONGEST = 1000  # Bytes that a request's body may have
+_PATIENCE = 5.0  # s
 _PAGE = """<!doctype html>
 <html lang="en"><meta charset="utf-8"><title>Hopping leg</title>
 <link rel="icon" href="data:,">
@@ -45,6 +47,11 @@ setInterval(() => { if (document.activeElement !== slider) send("/height"); }, 1
 """
 
 
+class _QuietServer(ThreadingHTTPServer):
+    def handle_error(self, *_: object) -> None:
+        """Say nothing, e.g. of a browser that went away: the terminal belongs to the operator."""
+
+
 class HeightPage:
     """Serves the page on this computer alone; port 0 takes a free one.
 
@@ -56,7 +63,7 @@ class HeightPage:
         self._height, self._stopping = height, False
         self._stop: Callable[[], None] | None = None
         try:
-            self._server = ThreadingHTTPServer((_HOST, port), self._handler())
+            self._server = _QuietServer((_HOST, port), self._handler())
         except (OSError, OverflowError) as error:
             raise UsageError(
                 f"The page cannot be served at port {port} ({error}); give a free one, or 0."
@@ -90,7 +97,10 @@ class HeightPage:
         wanted = asked.get("height")
         if path != "/height" or isinstance(wanted, bool) or not isinstance(wanted, int | float):
             return False
-        self._height.set(float(wanted))
+        try:
+            self._height.set(float(wanted))
+        except OverflowError:
+            return False
         return True
 
     def _state(self) -> bytes:
@@ -102,8 +112,12 @@ class HeightPage:
         page = self
 
         class Handler(BaseHTTPRequestHandler):
+            timeout = _PATIENCE
+
             def do_GET(self) -> None:
-                if self.path == "/":
+                if not self._own():
+                    self._answer(403, b"", "text/plain")
+                elif self.path == "/":
                     self._answer(200, _PAGE.encode(), "text/html; charset=utf-8")
                 elif self.path == "/height":
                     self._answer(200, page._state(), "application/json")
@@ -111,24 +125,30 @@ class HeightPage:
                     self._answer(404, b"", "text/plain")
 
             def do_POST(self) -> None:
-                """Act, unless another site sent the browser here."""
-                length = self.headers.get("Content-Length", "")
-                body = self.rfile.read(min(int(length), _LONGEST) if length.isdecimal() else 0)
-                own = self.headers.get("Host") == page.address.removeprefix("http://")
-                if not own or self.headers.get("Origin", page.address) != page.address:
+                if not self._own():
                     self._answer(403, b"", "text/plain")
                     return
-                try:
-                    asked = json.loads(body or b"{}")
-                except ValueError:
-                    asked = None
+                asked: object = None
+                # What is no number, not JSON, too long or nested too deeply changes nothing.
+                with contextlib.suppress(ValueError, RecursionError, TimeoutError):
+                    length = int(self.headers.get("Content-Length", "0"))
+                    if 0 <= length <= _LONGEST:
+                        asked = json.loads(self.rfile.read(length) or b"{}")
                 done = isinstance(asked, dict) and page._act(self.path, asked)
                 self._answer(200 if done else 400, page._state(), "application/json")
+
+            def _own(self) -> bool:
+                """Tell whether it is the page that asks, not another site that names this one."""
+                host = self.headers.get("Host")
+                known = host in [f"{name}:{page._server.server_port}" for name in _NAMES]
+                return known and self.headers.get("Origin", f"http://{host}") == f"http://{host}"
 
             def _answer(self, status: int, content: bytes, kind: str) -> None:
                 self.send_response(status)
                 self.send_header("Content-Type", kind)
                 self.send_header("Content-Length", str(len(content)))
+                self.send_header("X-Frame-Options", "DENY")
+                self.send_header("Content-Security-Policy", "frame-ancestors 'none'")
                 self.end_headers()
                 self.wfile.write(content)
 

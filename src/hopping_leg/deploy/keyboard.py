@@ -1,9 +1,11 @@
-"""The operator's keys: heights up and down, stop."""
+"""The operator's keys: heights up and down; any other key, or the end of all input, stops."""
 
 import contextlib
 import math
 import os
+import re
 import select
+import stat
 import sys
 import termios
 import threading
@@ -13,9 +15,9 @@ from collections.abc import Callable, Iterator
 from hopping_leg.controllers.command_schedule import Range
 
 _STEP = 0.01  # Change of the commanded height by one key, m
-_UP = (b"+", b"k", b"\x1b[A")
-_DOWN = (b"-", b"j", b"\x1b[B")
-_STOP = (b" ", b"q", b"\x1b", b"\r", b"\n")
+_UP = (b"+", b"k", b"\x1b[A", b"\x1bOA")
+_DOWN = (b"-", b"j", b"\x1b[B", b"\x1bOB")
+_KEY = re.compile(rb"\x1b[\[O][AB]|.", re.DOTALL)
 _PATIENCE = 0.1
 
 
@@ -41,46 +43,67 @@ class LiveHeight:
         return self.set(self._height + by)
 
 
-def handle_key(key: bytes, height: LiveHeight | None, stop: Callable[[], None]) -> str:
-    """Do what a key asks for; return what to show the operator.
+def handle_keys(data: bytes, height: LiveHeight | None, stop: Callable[[], None]) -> str:
+    """Do what keys ask for that arrived together; return what to show the operator.
 
+    Whatever is no key for the height stops the leg, and so does no data: the end of input.
     ``height`` is None where a schedule commands.
     """
-    if key in _STOP:
+    pressed = _KEY.findall(data)
+    if not pressed or not {*pressed} <= {*_UP, *_DOWN}:
         stop()
         return "stopping"
-    if height is not None and key in _UP + _DOWN:
-        return f"height {height.change(_STEP if key in _UP else -_STEP):.2f} m"
-    return ""
+    if height is None:
+        return ""
+    return f"height {height.change(sum(_STEP if k in _UP else -_STEP for k in pressed)):.2f} m"
 
 
 @contextlib.contextmanager
 def keys(
     height: LiveHeight | None, stop: Callable[[], None], show: Callable[[str], None]
 ) -> Iterator[None]:
-    """Listen to the keyboard in a thread; do nothing where there is no terminal.
+    """Listen to a terminal or pipe in a thread; do nothing where standard input is neither.
 
     ``height`` is None where a schedule commands; ``show`` shows the operator a line.
     """
-    if not sys.stdin.isatty():
+    try:
+        descriptor = sys.stdin.fileno()
+        kind = os.fstat(descriptor).st_mode
+    except (AttributeError, ValueError, OSError):  # closed from the start, or replaced
         yield
         return
-    descriptor = sys.stdin.fileno()
-    before = termios.tcgetattr(descriptor)
+    terminal = os.isatty(descriptor)
+    if not (terminal or stat.S_ISFIFO(kind) or stat.S_ISSOCK(kind)):
+        yield
+        return
     over = threading.Event()
 
     def listen() -> None:
-        while not over.is_set():
-            ready, _, _ = select.select([descriptor], [], [], _PATIENCE)
-            if ready and (words := handle_key(os.read(descriptor, 8), height, stop)):
+        data = b"begun"
+        while data and not over.is_set():
+            try:
+                if not select.select([descriptor], [], [], _PATIENCE)[0]:
+                    continue
+                data = os.read(descriptor, 1024)
+            except (OSError, ValueError):
+                data = b""  # the terminal is gone, or the input was closed
+            words = handle_keys(data, height, stop)
+            with contextlib.suppress(OSError, ValueError):
                 show(words)
 
     thread = threading.Thread(target=listen, name="keyboard", daemon=True)
-    tty.setcbreak(descriptor)
+    before = termios.tcgetattr(descriptor) if terminal else None
+    if terminal:
+        tty.setcbreak(descriptor)
+        attributes = termios.tcgetattr(descriptor)
+        attributes[0] &= ~termios.IXON  # else Ctrl-S would hold up what is shown, and the keys
+        termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
     thread.start()
     try:
         yield
     finally:
         over.set()
-        thread.join()
-        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+        thread.join(10 * _PATIENCE)
+        if before is not None:
+            with contextlib.suppress(termios.error):
+                termios.tcsetattr(descriptor, termios.TCSADRAIN, before)

@@ -7,6 +7,7 @@ frame costs one tick at most and the drives' watchdogs are fed twice a tick.
 
 import math
 import threading
+import traceback
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from hopping_leg.deploy import flight_recorder, realtime, safety_limits, stop_re
 from hopping_leg.deploy.drive_link import BRAKE, STOP, DriveCommand, DriveLink, Exchange, Reply
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceStep
 from hopping_leg.deploy.supervisor import State, SupervisorState, supervise
+from hopping_leg.errors import ControllerError
 from hopping_leg.robot.parameters import JOINTS
 
 REPLY_SHARE = 0.7
@@ -36,9 +38,19 @@ _DRIVE_COLUMNS = (
 
 
 def columns(controller: Controller) -> tuple[str, ...]:
-    """Return the columns of a run's recording; the controller's own come last."""
+    """Return the columns of a run's recording; the controller's own come last.
+
+    Raises:
+        ControllerError: It names one of the loop's for its own.
+    """
     drives = tuple(f"{joint}_{name}" for name in _DRIVE_COLUMNS for joint in JOINTS)
-    return (*_LOOP, *_TIMES, *drives, *_internal_names(controller))
+    names, own = (*_LOOP, *_TIMES, *drives), _internal_names(controller)
+    if taken := sorted({*names} & {*own}):
+        raise ControllerError(
+            f"'internals' of controller '{controller.name}' names '{taken[0]}', which every run"
+            " has; choose another name."
+        )
+    return (*names, *own)
 
 
 def _internal_names(controller: Controller) -> list[str]:
@@ -116,10 +128,21 @@ class ControlLoop:
         self._samples = SampleBuffer(limits.period)
         self._internals = _internal_names(sequence.controller)
         self._stop, self._complaint = threading.Event(), ""
+        self._asked, self._took, self._abandoned = math.inf, 0.0, False
+
+    @property
+    def waited(self) -> float:
+        """How long the controller has kept the loop waiting, s; any thread may ask."""
+        return max(self._clock.now() - self._asked, 0.0)
 
     def stop(self) -> None:
         """Ask for a stop on the operator's behalf; may be called from anywhere."""
         self._stop.set()
+
+    def abandon(self) -> None:
+        """Brake from another thread; if the controller returns after all, the loop only ends."""
+        self._abandoned = True
+        self._link.send(BRAKE)
 
     def run(self) -> LoopOutcome:
         """Arm, run the sequence, damp, stop; return when the drives have been told to stop."""
@@ -150,7 +173,8 @@ class ControlLoop:
         exchange = self._link.exchange(held, until)
         replied = clock.now()
         self._remember(tick, deadline, exchange)
-        step = self._step(tick, deadline)
+        took = self._took
+        step, internals = self._step(tick, deadline, over=state.state > State.RUNNING)
         arms = state.state is State.DISARMED and tick >= _WARM_TICKS
         operator = stop_reasons.Operator.ARM if arms else stop_reasons.Operator.NOTHING
         seen = stop_reasons.SupervisorInput(
@@ -160,6 +184,7 @@ class ControlLoop:
             None if self._complaint else step.torque,
             stop_reasons.Operator.STOP if self._stop.is_set() else operator,
             self._sequence.finished,
+            took,
         )
         after, outgoing = supervise(self._limits, state, seen)
         if outgoing != held:
@@ -168,13 +193,14 @@ class ControlLoop:
         if after.state is not state.state:
             self._note(after, deadline - start)
         timings = (woke - deadline, replied - woke, sent - replied, sent - deadline, skipped)
-        self._record(deadline - start, step, after, outgoing, exchange, timings)
+        self._record(deadline - start, step, internals, after, outgoing, exchange, timings)
         return after, outgoing
 
     def _record(
         self,
         time: float,
         step: SequenceStep,
+        internals: list[float],
         after: SupervisorState,
         outgoing: DriveCommand,
         exchange: Exchange,
@@ -187,13 +213,7 @@ class ControlLoop:
         for replies, names in ((fresh, _MEASURED), (last, _DRIVE)):
             values += [getattr(reply, name, math.nan) for name in names for reply in replies]
         values += [float(reply is not None) for reply in fresh]
-        values += (*step.controller, *outgoing.torque)
-        if step.phase is Part.HOP and not self._complaint:
-            internals = self._sequence.controller.internals()
-            values += [float(internals[name][0]) for name in self._internals]
-        else:
-            values += [math.nan] * len(self._internals)
-        self._recorder.row(values)
+        self._recorder.row([*values, *step.controller, *outgoing.torque, *internals])
 
     def _remember(self, tick: int, deadline: float, exchange: Exchange) -> None:
         for joint, reply in enumerate(exchange.replies):
@@ -204,16 +224,38 @@ class ControlLoop:
             if ago > 0:
                 self._samples.put(tick - ago, joint, reply)
 
-    def _step(self, tick: int, time: float) -> SequenceStep:
-        """Ask the sequence; an error of the controller becomes a complaint, never a crash."""
+    def _step(self, tick: int, time: float, *, over: bool) -> tuple[SequenceStep, list[float]]:
+        """Ask the sequence and what the controller wants recorded; an error is a complaint.
+
+        Once the run is ``over`` nothing is asked any more.
+        """
         command = self._sequence.command(time)
-        if not self._complaint:
-            try:
-                return self._sequence.step(time, self._samples.measurement(tick, command))
-            except Exception as error:
-                self._complaint = f"{type(error).__name__}: {error}"
-                self._recorder.event(time_s=time, controller_error=self._complaint)
-        return SequenceStep((0.0, 0.0), command, Part.DONE)
+        unknown = [math.nan] * len(self._internals)
+        if over or self._complaint:
+            return SequenceStep((0.0, 0.0), command, Part.DONE), unknown
+        self._asked = self._clock.now()
+        try:
+            step = self._sequence.step(time, self._samples.measurement(tick, command))
+            return step, self._read_internals() if step.phase is Part.HOP else unknown
+        except BaseException as error:  # also SystemExit: nothing but the supervisor ends a run
+            self._complaint = traceback.format_exception_only(error)[-1].strip()
+            if isinstance(error, ControllerError):
+                self._complaint = str(error)
+            self._recorder.event(time_s=time, controller_error=self._complaint)
+            return SequenceStep((0.0, 0.0), command, Part.DONE), unknown
+        finally:
+            self._took, self._asked = self.waited, math.inf
+            if self._abandoned:
+                raise SystemExit
+
+    def _read_internals(self) -> list[float]:
+        found = self._sequence.controller.internals()
+        if sorted(found) != self._internals:
+            raise ControllerError(
+                f"'internals' of controller '{self._sequence.controller.name}' names"
+                f" {sorted(found)} but named {self._internals} at first; always name the same."
+            )
+        return [float(np.ravel(found[name])[0]) for name in self._internals]
 
     def _note(self, state: SupervisorState, time: float) -> None:
         """Record a transition; begin the sequence with it."""

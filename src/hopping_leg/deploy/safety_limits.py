@@ -47,7 +47,7 @@ class SafetyLimits:
     """Ticks in a row without a reply that are tolerated: as many as the drives' watchdog lets the
     host miss."""
     overrun_ticks: int = 4
-    """Ticks in a row that begin more than a period late and are tolerated."""
+    """Ticks that begin more than a period late and are tolerated, see ``Counts.overruns``."""
     stall: float = 0.02
     """Lateness of a single tick beyond which the loop stood still, s."""
     arming_time: float = 0.5

@@ -1,4 +1,4 @@
-"""Which adapter: the path of an fdcanusb, a python-can interface, or a pi3hat."""
+"""Which adapter, for one host at a time: path of an fdcanusb, python-can interface, or pi3hat."""
 
 import argparse
 import asyncio
@@ -10,6 +10,7 @@ import can
 from moteus import FdcanusbDevice, PythonCanDevice, Transport
 from moteus.transport_factory import get_transport_factories
 
+from hopping_leg import locks
 from hopping_leg.errors import HardwareError, UsageError
 
 Opener = Callable[[], Any]
@@ -28,11 +29,16 @@ class TolerantFdcanusb(FdcanusbDevice):  # type: ignore[misc]
     word; an adapter that is gone wakes the event loop forever; and a closed port stays registered
     with the loop, so that the next one with its number never reads.
 
-    Must be made inside of a running event loop.
+    Must be made inside of a running event loop; raises HardwareError where the port is in use.
     """
 
     def __init__(self, path: str) -> None:
-        super().__init__(path)
+        self._lock = locks.Lock(Path(path), path, HardwareError)
+        try:
+            super().__init__(path)
+        except BaseException:
+            self._lock.close()
+            raise
         self._loop = asyncio.get_running_loop()
         self._descriptor: int | None = self._serial.fd
         self._loop.add_reader(self._serial.fd, self._read)
@@ -66,6 +72,7 @@ class TolerantFdcanusb(FdcanusbDevice):  # type: ignore[misc]
         """Give the port back; another may be opened after it."""
         self._abandon()
         super().close()
+        self._lock.close()
 
 
 def opener(name: str) -> Opener:
@@ -75,7 +82,7 @@ def opener(name: str) -> Opener:
         UsageError: It names no transport.
     """
     if name == "pi3hat":
-        return _open_pi3hat
+        return lambda: _alone("pi3hat", _open_pi3hat)
     if "/" in name:
         if not Path(name).exists():
             raise UsageError(f"There is no serial port {name}; give {_FORMS}.")
@@ -86,7 +93,27 @@ def opener(name: str) -> Opener:
     if interface not in can.VALID_INTERFACES:
         valid = ", ".join(sorted(can.VALID_INTERFACES))
         raise UsageError(f"python-can has no interface '{interface}'; it has: {valid}.")
-    return lambda: Transport([PythonCanDevice(interface=interface, channel=channel, fd=True)])
+    return lambda: _alone(
+        name, lambda: [PythonCanDevice(interface=interface, channel=channel, fd=True)]
+    )
+
+
+def _alone(name: str, make: Callable[[], Any]) -> Any:  # noqa: ANN401
+    """Return a transport of devices that no other host of this computer uses until it is closed."""
+    lock = locks.named_lock(f"host-{name}", name, HardwareError)
+    try:
+        transport = Transport(make())
+    except BaseException:
+        lock.close()
+        raise
+    close = transport.close
+
+    def give_back() -> None:
+        close()
+        lock.close()
+
+    transport.close = give_back
+    return transport
 
 
 def _open_pi3hat() -> Any:  # noqa: ANN401
@@ -94,7 +121,7 @@ def _open_pi3hat() -> Any:  # noqa: ANN401
         if factory.name == "pi3hat":
             parser = argparse.ArgumentParser()
             factory.add_args(parser)
-            return Transport(factory(parser.parse_args([])))
+            return factory(parser.parse_args([]))
     raise HardwareError(
         "The pi3hat needs moteus-pi3hat, which exists for the Raspberry Pi alone:"
         " pip install 'hopping-leg[pi3hat]'."

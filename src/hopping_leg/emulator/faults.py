@@ -13,7 +13,6 @@ duration = 0.1
 """
 
 import math
-import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Protocol
@@ -22,7 +21,7 @@ import numpy as np
 
 from hopping_leg.emulator import frames, settings
 from hopping_leg.errors import UsageError, unknown_name
-from hopping_leg.io import read_dataclass
+from hopping_leg.io import parse_toml, read_dataclass
 from hopping_leg.robot.parameters import JOINTS
 
 if TYPE_CHECKING:
@@ -337,11 +336,12 @@ def load_faults(path: Path) -> tuple[Fault, ...]:
         UsageError: The file is missing, no TOML, or says something that has no meaning.
     """
     try:
-        tree = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = path.read_bytes()
     except FileNotFoundError as error:
         raise UsageError(f"There is no fault script {path}.") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        raise UsageError(f"{path} is not a readable TOML file: {error}.") from error
+    except OSError as error:
+        raise UsageError(f"Cannot read the fault script {path}: {error.strerror}.") from error
+    tree = parse_toml(content, str(path))
     entries = tree.pop("fault", None)
     if tree or not isinstance(entries, list):
         raise UsageError(f"{path} must hold tables [[fault]] and nothing else.")

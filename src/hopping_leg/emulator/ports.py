@@ -12,6 +12,7 @@ from pathlib import Path
 
 import can
 
+from hopping_leg import locks
 from hopping_leg.emulator.frames import Frame, LineProtocol, QueuedReply, received_line
 from hopping_leg.errors import UsageError
 
@@ -23,10 +24,17 @@ class PtyPort:
     """The adapter's end of a serial line.
 
     The terminal is also offered under the path ``link``, which outlives a pulled plug.
+
+    Raises:
+        UsageError: Another emulator has the link, or it is a file of another kind.
     """
 
     def __init__(self, link: Path | None = None) -> None:
-        self._link = link
+        self._link, self._lock = link, None
+        if link is not None:
+            self._lock = locks.named_lock(f"emulator-{link.absolute()}", str(link), UsageError)
+            if link.exists() and not link.is_symlink():
+                raise UsageError(f"{link} is there and no link to a terminal; give another --link.")
         self.plug_in()
 
     def __str__(self) -> str:
@@ -62,7 +70,12 @@ class PtyPort:
         os.close(self._slave)
         self._master = self._slave = -1
 
-    close = unplug
+    def close(self) -> None:
+        """Take the terminal away for good."""
+        if self.plugged:
+            self.unplug()
+        if self._lock is not None:
+            self._lock.close()
 
     def fileno(self) -> int:
         """Return the descriptor to wait for; -1 while unplugged."""
@@ -105,12 +118,13 @@ class CanPort:
     """One node on a CAN-FD bus that speaks for both drives; see ``DEFAULT_CHANNELS``.
 
     Raises:
-        UsageError: The bus cannot be opened.
+        UsageError: The bus cannot be opened, or has drives already.
     """
 
     def __init__(self, interface: str = "udp_multicast", channel: str | None = None) -> None:
         self.interface = interface
         self.channel = channel or DEFAULT_CHANNELS[interface]
+        self._lock = locks.named_lock(f"emulator-{self}", f"{self}", UsageError)
         self._bus: can.BusABC | None = None
         self.plug_in()
 
@@ -138,7 +152,10 @@ class CanPort:
             self._bus.shutdown()
             self._bus = None
 
-    close = unplug
+    def close(self) -> None:
+        """Leave it for good."""
+        self.unplug()
+        self._lock.close()
 
     def fileno(self) -> int:
         """Return the descriptor to wait for; -1 while unplugged."""

@@ -2,13 +2,14 @@
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass, field, is_dataclass
 from pathlib import Path
+from types import UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.result import SCHEMA, Evaluation
-from hopping_leg.io import write_json
+from hopping_leg.io import parse_json, write_json
 
 _EVALUATION, _TRAINING = "evaluation.json", "result.json"
 _WHAT = (
@@ -93,12 +94,9 @@ def _read(label: str, path: Path) -> StoredRun:
 
 def _load(path: Path) -> dict[str, Any]:
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise UsageError(f"{path} is not readable as JSON; {_WHAT}.") from error
-    if not isinstance(content, dict):
-        raise UsageError(f"{path} is not a run; {_WHAT}.")
-    return content
+        return parse_json(path.read_bytes(), str(path))
+    except UsageError as error:
+        raise UsageError(f"{error} For a run, {_WHAT}.") from error
 
 
 def _evaluation(content: dict[str, Any], path: Path) -> Evaluation:
@@ -121,7 +119,18 @@ def evaluation_from(content: dict[str, Any]) -> Evaluation:
     fields = {k: v for k, v in content.items() if k not in ("schema", "secondary")}
     fields["secondary"] = secondary and evaluation_from(secondary)
     evaluation: Evaluation = _filled(Evaluation, fields)
+    _filled(list[_Apexes], evaluation.distributions)
+    _ = [evaluation.conditions[name] for name in ("robot", "floor", "seeds", "seed")]
     return evaluation
+
+
+@dataclass(frozen=True)
+class _Apexes:
+    """An entry of an evaluation's distributions."""
+
+    controller: str
+    command_m: float
+    apexes_m: list[float] = field(default_factory=list)
 
 
 def _filled(kind: Any, value: Any) -> Any:  # noqa: ANN401
@@ -129,9 +138,16 @@ def _filled(kind: Any, value: Any) -> Any:  # noqa: ANN401
     if is_dataclass(kind) and isinstance(value, dict):
         hints = get_type_hints(kind)
         return kind(**{name: _filled(hints[name], entry) for name, entry in value.items()})  # type: ignore[operator]
-    if get_origin(kind) is list and isinstance(value, list):
+    if isinstance(kind, UnionType):
+        return value if value is None else _filled(get_args(kind)[0], value)
+    plain = get_origin(kind) or kind
+    if kind is float:
+        plain, value = (int, float), float("nan") if value is None else value
+    if not isinstance(value, plain):
+        raise TypeError(f"{value!r} is no {kind}")
+    if plain is list and get_args(kind):
         return [_filled(get_args(kind)[0], entry) for entry in value]
-    return float("nan") if kind is float and value is None else value
+    return value
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from hopping_leg.evaluate.acceptance import acceptance_lines
 from hopping_leg.evaluate.result import Comparison, Estimator, Evaluation, Group, Staircase, Summary
 from hopping_leg.evaluate.robustness.outcome import OVERALL
 from hopping_leg.html_page import Column, table
+from hopping_leg.terminal import print_table
 
 
 def millimetres(value: float, sign: bool = False) -> str:
@@ -245,7 +246,7 @@ def print_evaluation(console: Console, evaluation: Evaluation) -> None:
             "base: lowest height over whole runs; contacts: of base or knee with the ground;\n"
             "out: time with a joint outside its soft limits"
         )
-        console.print(_text_table(_SHORT, one.summary, title, caption))
+        print_table(_text_table(_SHORT, one.summary, title, caption), console)
     lines = [
         f"Staircase, {step.controller}: {'rises' if step.monotone else 'does not rise'} at every"
         f" step ({step.monotone_runs} of {step.runs} runs on their own), {step.skipped_hops}"
@@ -288,9 +289,9 @@ def print_robustness(console: Console, result: dict[str, Any]) -> None:
         f"{', '.join(f'{command:g}' for command in c['commands_m'])} m, {c['seeds']} seeds from"
         f" {c['seed']}; in brackets the 95 % interval;\nR: on RealAIGym's leaderboard, too"
     )
-    console.print(_text_table(columns, [*marked, OVERALL], title, caption))
+    print_table(_text_table(columns, [*marked, OVERALL], title, caption), console)
     if result["recovery"]:
-        console.print(_recovery_table(result))
+        print_table(_recovery_table(result), console)
     for row in result["steps"]:
         settled = row["settled_after_hops"]
         console.print(
@@ -341,7 +342,7 @@ def print_skills(console: Console, result: dict[str, Any]) -> None:
         (_CLIMBS, "climbs", "Stairs: worst step, apex minus command above the ground of it"),
         (_LANDINGS, "landings", f"Dropped by {drop:.0f} mm"),
     ):
-        console.print(_text_table(columns, result[name], title))
+        print_table(_text_table(columns, result[name], title), console)
 
 
 def _text_table(
@@ -349,9 +350,9 @@ def _text_table(
 ) -> Table:
     """Return a table for the terminal, within 80 columns where names allow."""
     shown = Table(title=title, caption=caption, box=box.SIMPLE_HEAD, padding=0)
-    shown.add_column(columns[0].heading, overflow="fold", min_width=14)
+    shown.add_column(columns[0].heading, min_width=14)
     for column in columns[1:]:
-        shown.add_column(column.heading, justify="right", overflow="fold")
+        shown.add_column(column.heading, justify="right")
     for row in rows:
         shown.add_row(*(column.text(row) for column in columns))
     return shown

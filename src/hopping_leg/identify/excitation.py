@@ -13,6 +13,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.errors import TraceError, UsageError
 from hopping_leg.identify.feasibility import HardwareRange, check_demand, demand
 from hopping_leg.identify.recording_format import PAIRS, Pair, Rig
+from hopping_leg.io import is_number
 from hopping_leg.robot import Robot, kinematics
 from hopping_leg.trace import Trace
 
@@ -83,6 +84,7 @@ class Multisine:
 RATE = 200.0
 """Rate of the paper's recordings, Hz."""
 _KEY = "excitation"
+_WORDS = ("rig", "robot", "description")
 _FACTS = {"rig": "rig", "rate_hz": "rate", "robot": "robot", "description": "description"}
 
 
@@ -124,8 +126,10 @@ class Excitation:
 def load_excitation(path: Path) -> Excitation:
     """Load an excitation, or raise TraceError if the file is missing, foreign or none."""
     trace = Trace.load(path)
-    facts = trace.header.get(_KEY)
-    if facts is None:
+    found = trace.header.get(_KEY)
+    facts = found if isinstance(found, dict) else {}
+    known = all(isinstance(facts.get(name), str) for name in _WORDS)
+    if not known or not is_number(rate := facts.get("rate_hz", 0)) or not rate > 0:
         raise TraceError(f"{path} is no excitation; write one with `hop excite`.")
     pairs = (PAIRS[f"{quantity}_command"] for quantity in ("position", "velocity"))
     position, velocity = (np.column_stack([trace.column(c) for c in pair]) for pair in pairs)

@@ -8,7 +8,6 @@ import csv
 import gzip
 import hashlib
 import io
-import tomllib
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
@@ -23,11 +22,13 @@ from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.errors import RecordingError, UsageError, unknown_name
 from hopping_leg.identify import importers, recording_checks, unit_checks
 from hopping_leg.identify.recording_format import COLUMNS, PAIRS, RecordingMetadata, float_column
-from hopping_leg.io import read_dataclass
+from hopping_leg.io import parse_toml, read_dataclass
+from hopping_leg.parquet import read_parquet
 from hopping_leg.trace import Trace
 
 _KEY, _FLAGS = "recording", {"true": 1.0, "false": 0.0}
 _PARQUET, _GZIP = b"PAR1", b"\x1f\x8b"
+_MOST_TEXT = 1 << 28  # bytes
 
 
 def _read_csv(content: bytes, origin: str) -> pl.DataFrame:
@@ -58,9 +59,14 @@ def _read_csv(content: bytes, origin: str) -> pl.DataFrame:
 def _rows(content: bytes, origin: str) -> Iterator[list[str]]:
     if content.startswith(_GZIP):
         try:
-            content = gzip.decompress(content)
+            with gzip.open(io.BytesIO(content)) as file:
+                content = file.read(_MOST_TEXT + 1)
         except (OSError, EOFError, zlib.error) as error:
             raise RecordingError(f"{origin} is not a whole gzip file: {error}.") from error
+    if len(content) > _MOST_TEXT:
+        raise RecordingError(
+            f"{origin} holds more than {_MOST_TEXT >> 20} MiB of text; cut it into shorter ones."
+        )
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -193,7 +199,7 @@ def load_recording(path: str | Path) -> Recording:
         raise RecordingError(f"{path} is empty; record again.")
     digest = hashlib.sha256(content).hexdigest()
     native = content.startswith(_PARQUET)
-    table, header = _native(path) if native else (_read_csv(content, origin), {})
+    table, header = _native(path, content) if native else (_read_csv(content, origin), {})
     sidecar = _sidecar(path)
     names: dict[str, str] = {}
     if sidecar is not None:
@@ -220,15 +226,10 @@ def sidecar_path(path: Path) -> Path:
     return path.with_name(f"{Path(name).stem}.toml")
 
 
-def _native(path: Path) -> tuple[pl.DataFrame, dict[str, Any]]:
-    try:
-        text = pl.read_parquet_metadata(path).get("hopping_leg")
-        if text is not None:
-            trace = Trace.load(path)
-            return trace.table, dict(trace.header)
-        table = pl.read_parquet(path)
-    except (pl.exceptions.PolarsError, OSError) as error:
-        raise RecordingError(f"{path} is not a readable Parquet file: {error}.") from error
+def _native(path: Path, content: bytes) -> tuple[pl.DataFrame, dict[str, Any]]:
+    table, metadata = read_parquet(content, str(path), RecordingError)
+    if "hopping_leg" in metadata:
+        return table, dict(Trace.of(table, metadata, path).header)
     kinds = {c: pl.String if COLUMNS.get(c) is pl.String else pl.Float64 for c in table.columns}
     return _cast(table, kinds, str(path)), {}
 
@@ -238,9 +239,9 @@ def _sidecar(path: Path) -> tuple[str, dict[str, Any]] | None:
     if file == path or not file.is_file():
         return None
     try:
-        return str(file), tomllib.loads(file.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        raise RecordingError(f"{file} is not valid TOML: {error}.") from error
+        return str(file), parse_toml(file.read_bytes(), str(file), RecordingError)
+    except OSError as error:
+        raise RecordingError(f"Cannot read {file}: {error.strerror}.") from error
 
 
 def _apply(

@@ -4,16 +4,17 @@ A checkpoint is written beside its final name, flushed to disk, and renamed, so 
 with a final name is always whole. Nothing is pickled.
 """
 
+import hashlib
 import json
 import os
 import shutil
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 
-from hopping_leg.errors import UsageError
+from hopping_leg.errors import TraceError, UsageError
+from hopping_leg.io import one_line, parse_json
 
 Tree = dict[str, Any]
 """Nested dictionaries and lists of arrays and JSON values, with text keys."""
@@ -29,24 +30,32 @@ _ARRAY = "__array__"
 
 
 def write_checkpoint(folder: Path, steps: int, tree: Tree) -> Path:
-    """Write ``folder/checkpoint-<steps>`` and delete all but the newest ``KEPT``."""
+    """Write ``folder/checkpoint-<steps>`` and delete all but the newest ``KEPT``.
+
+    Raises:
+        TraceError: It cannot be written; nothing of it is left.
+    """
     final = folder / f"{_PREFIX}{steps:012d}"
     part = folder / f"{final.name}.tmp"
     if final.exists():
         return final
     shutil.rmtree(part, ignore_errors=True)
-    part.mkdir(parents=True)
     arrays: dict[str, Any] = {}
     plain = _split(tree, "", arrays)
-    with (part / "arrays.npz").open("wb") as file:
-        np.savez(file, **arrays)
-        _flush(file)
-    with (part / "state.json").open("w", encoding="utf-8") as file:
-        json.dump({"schema": SCHEMA, "tree": plain}, file)
-        _flush(file)
-    _flush_folder(part)
-    part.rename(final)
-    _flush_folder(folder)
+    try:
+        part.mkdir(parents=True)
+        with (part / "arrays.npz").open("wb") as file:
+            np.savez(file, **arrays)
+            _flush(file)
+        with (part / "state.json").open("w", encoding="utf-8") as file:
+            json.dump({"schema": SCHEMA, "tree": plain, "sha256": _digest(part, plain)}, file)
+            _flush(file)
+        _flush_folder(part)
+        part.rename(final)
+        _flush_folder(folder)
+    except OSError as error:
+        shutil.rmtree(part, ignore_errors=True)
+        raise TraceError(f"Cannot write {final}: {error.strerror}; nothing was changed.") from error
     for old in list_checkpoints(folder)[:-KEPT]:
         shutil.rmtree(old)
     return final
@@ -60,19 +69,28 @@ def list_checkpoints(folder: Path) -> list[Path]:
 def read_checkpoint(path: Path) -> Tree:
     """Read a checkpoint; raise ``UsageError`` where it is damaged or of another schema."""
     try:
-        stored = json.loads((path / "state.json").read_text(encoding="utf-8"))
+        stored = parse_json((path / "state.json").read_bytes(), "its state")
+        if stored["schema"] != SCHEMA:
+            raise UsageError(f"its schema is {stored['schema']}; this version reads {SCHEMA}")
+        if stored.get("sha256", "") not in ("", _digest(path, stored["tree"])):
+            raise UsageError("its checksum does not fit")
         with np.load(path / "arrays.npz", allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
-        if stored["schema"] != SCHEMA:
-            raise UsageError(
-                f"{path} has checkpoint schema {stored['schema']}; this version reads {SCHEMA}."
-            )
         tree: Tree = _join(stored["tree"], arrays)
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
+    except Exception as error:  # numpy and zipfile raise many unrelated types
         raise UsageError(
-            f"Checkpoint {path} is damaged ({error}); delete it to resume from the one before."
+            f"Checkpoint {path} is damaged ({one_line(error)}); delete it to resume from the one"
+            " before."
         ) from error
     return tree
+
+
+def _digest(path: Path, plain: Any) -> str:  # noqa: ANN401
+    """Return the SHA-256 of a checkpoint's arrays and the rest of its tree."""
+    with (path / "arrays.npz").open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256")
+    digest.update(json.dumps(plain).encode())
+    return digest.hexdigest()
 
 
 def _split(node: Any, path: str, arrays: dict[str, Any]) -> Any:  # noqa: ANN401

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from hopping_leg.errors import UsageError
-from hopping_leg.io import versions, write_json
+from hopping_leg.io import parse_json, versions, write_json
+from hopping_leg.locks import FOLDER_LOCK
 from hopping_leg.rl import checkpoint, recipes
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.robot.parameters import Robot
@@ -104,14 +105,21 @@ class RunFolder:
         """Raise ``UsageError`` where the run in the folder was asked for something else."""
         stored = read_json(self.path / "config.json")
         # A run from before an option existed was asked for what is its default.
-        _complete(stored.get("options", {}), self._defaults)
-        check_same(self.path, stored, {key: self.config[key] for key in _ASKED})
+        options = stored.get("options")
+        if not isinstance(options, dict):
+            raise UsageError(f"{self.path / 'config.json'} is damaged; give another --out.")
+        _complete(options, self._defaults)
+        asked = {key: self.config[key] for key in _ASKED}
+        for config in (stored, asked):
+            if isinstance(config.get("source"), str):
+                config["source"] = str(Path(config["source"]).resolve())
+        check_same(self.path, stored, asked)
 
 
 def is_new(folder: Path, *, resume: bool) -> bool:
     """Tell whether a folder holds no run; ``UsageError`` where it must not be used."""
     if not (folder / "config.json").exists():
-        if folder.is_dir() and any(folder.iterdir()):
+        if folder.is_dir() and any(entry.name != FOLDER_LOCK for entry in folder.iterdir()):
             raise UsageError(f"{folder} is not empty and holds no run; give another --out.")
         return True
     if not resume:
@@ -153,8 +161,7 @@ def as_stored(values: dict[str, Any]) -> dict[str, Any]:
 
 def read_json(file: Path) -> dict[str, Any]:
     """Return the object in a JSON file."""
-    content: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-    return content
+    return parse_json(file.read_bytes(), str(file))
 
 
 def read_result(path: Path) -> dict[str, Any]:

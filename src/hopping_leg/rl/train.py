@@ -11,7 +11,7 @@ from typing import Any
 import torch
 from rich.progress import TextColumn, TimeRemainingColumn
 
-from hopping_leg import errors, io
+from hopping_leg import errors, io, locks
 from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.progress import LiveProgress
 from hopping_leg.rl import loggers, onnx_export, policy_evaluation, run_folder, stages
@@ -112,15 +112,16 @@ def train(
     fitted = recipe.fit(robot)
     folder = run_folder.RunFolder(out, fitted, robot, seed, minutes, source)
     recipe, worst_score = stages.within_reach(fitted, robot)
-    tree = folder.begin(resume=resume)
-    trainer = Trainer(recipe, robot, seed, folder, minutes, threads, began)
-    trainer.end_stage(worst_score)
-    trainer.learner.set_logger(loggers.make_logger(folder.path, log, folder.config))
-    trainer.on_snapshot = on_snapshot
-    if tree is not None:
-        trainer.restore(tree)
-    with TrainingProgress(f"{recipe.name} seed {seed}", quiet=quiet) as progress:
-        return trainer.run(progress)
+    with locks.hold_folder(out, errors.UsageError):
+        tree = folder.begin(resume=resume)
+        trainer = Trainer(recipe, robot, seed, folder, minutes, threads, began)
+        trainer.end_stage(worst_score)
+        trainer.learner.set_logger(loggers.make_logger(folder.path, log, folder.config))
+        trainer.on_snapshot = on_snapshot
+        if tree is not None:
+            trainer.restore(tree)
+        with TrainingProgress(f"{recipe.name} seed {seed}", quiet=quiet) as progress:
+            return trainer.run(progress)
 
 
 class Trainer:

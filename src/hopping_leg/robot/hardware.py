@@ -13,6 +13,12 @@ from hopping_leg.io import quantity
 REGISTER_MAP = 5
 """Version of the drives' register map that this package speaks (register 0x102)."""
 
+WATCHDOG = (0.002, 0.1, "the drives' own default is 0.1 s (servo.default_timeout_s)")
+TEMPERATURE = (20.0, 75.0, "the drives trip at 75 deg C (servo.fault_temperature)")
+VOLTAGE = (10.0, 46.0, "moteus drives work from 10 V and trip at 46 V (servo.max_voltage)")
+CURRENT = (0.0, 100.0, "a moteus r4 gives 100 A at most")
+"""Bounds that no robot file can move, each with its source: beyond them a limit guards nothing."""
+
 
 @dataclass(frozen=True)
 class Servo:
@@ -70,6 +76,11 @@ class Hardware:
         return self.hip, self.knee
 
 
+def speed_constant(servo: Servo) -> float:
+    """Return the rotor's speed per volt, rad/(s V), by moteus' formula for the torque constant."""
+    return 1.5 / math.sqrt(3) / servo.torque_constant
+
+
 def contradictions(hardware: Hardware) -> Iterator[str]:
     """Yield sentences about fields that contradict each other."""
     for name, servo in (("hip", hardware.hip), ("knee", hardware.knee)):
@@ -84,3 +95,16 @@ def contradictions(hardware: Hardware) -> Iterator[str]:
     if low >= high:
         at = "'hardware.voltage"
         yield f"{at}_low' ({low:g} V) must lie below {at}_high' ({high:g})."
+    for path, value, unit, least, most, source in (
+        ("watchdog", hardware.watchdog, "s", *WATCHDOG),
+        ("temperature_limit", hardware.temperature_limit, "deg C", *TEMPERATURE),
+        ("voltage_low", hardware.voltage_low, "V", *VOLTAGE),
+        ("voltage_high", hardware.voltage_high, "V", *VOLTAGE),
+        ("hip.max_current", hardware.hip.max_current, "A", *CURRENT),
+        ("knee.max_current", hardware.knee.max_current, "A", *CURRENT),
+    ):
+        if not least <= value <= most:
+            yield (
+                f"'hardware.{path}' is {value:g} {unit} but must lie between {least:g} and"
+                f" {most:g}: {source}."
+            )

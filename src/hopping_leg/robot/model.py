@@ -8,6 +8,11 @@ import numpy as np
 from hopping_leg.errors import RobotError
 from hopping_leg.robot.parameters import Joint, Link, Rail, Robot
 
+# Warnings would be logged to a file in the user's folder.
+_LOGGING = mujoco.MjLogConfig.get()
+_LOGGING.logto_file = False
+_LOGGING.set()
+
 GRAVITY = 9.81
 """Standard gravity, m/s2; leg.xml states the same."""
 

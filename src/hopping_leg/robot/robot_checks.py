@@ -6,7 +6,7 @@ from operator import attrgetter
 
 from hopping_leg.errors import RobotError, unknown_name
 from hopping_leg.io import Tree
-from hopping_leg.robot.hardware import contradictions
+from hopping_leg.robot.hardware import contradictions, speed_constant
 from hopping_leg.robot.model import TIMESTEP
 from hopping_leg.robot.parameters import JOINTS, KINDS, Robot
 
@@ -34,6 +34,7 @@ _PLAUSIBLE = {
 }
 """Largest values, SI, that a leg on a rail may have where they are no mistake of the unit."""
 
+_ROUNDING = 1.001
 _STOPS = {f"{joint}.stop_{end}" for joint in JOINTS for end in ("lower", "upper")}
 
 
@@ -127,6 +128,22 @@ def _contradictions(robot: Robot) -> Iterator[str]:
             yield from _above(
                 f"{name}.motor.{smaller}", limit, f"{name}.motor.peak_torque", peak, "N m"
             )
+        servo, ratio = getattr(robot.hardware, name), joint.motor.gear_ratio
+        current, voltage = f"'hardware.{name}.max_current'", "'hardware.voltage_high'"
+        constant = f"'hardware.{name}.torque_constant' ({servo.torque_constant:g} N m/A)"
+        most = servo.torque_constant * servo.max_current * ratio
+        if peak > most * _ROUNDING:
+            yield (
+                f"'{name}.motor.peak_torque' is {peak:g} N m but {constant} times {current}"
+                f" ({servo.max_current:g} A) and the gear ratio gives {most:.3g} N m at most."
+            )
+        fastest = speed_constant(servo) * robot.hardware.voltage_high / ratio
+        if joint.motor.no_load_speed > fastest * _ROUNDING:
+            yield (
+                f"'{name}.motor.no_load_speed' is {joint.motor.no_load_speed:g} rad/s but by"
+                f" {constant} {voltage} ({robot.hardware.voltage_high:g} V) turns it at"
+                f" {fastest:.3g} rad/s at most."
+            )
         if joint.load_friction >= 1:
             yield (
                 f"'{name}.load_friction' is {joint.load_friction:g} but a gear that takes all that"
@@ -134,6 +151,9 @@ def _contradictions(robot: Robot) -> Iterator[str]:
             )
     for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
         yield from _above(f"{name}.com", link.com, f"{name}.length", link.length, "m")
+    for name in _STOPS if robot.kind == "leg" else ():
+        if abs(stop := attrgetter(name)(robot)) > 2 * math.pi:
+            yield f"'{name}' is {stop:g} rad but no leg's joint turns more than once, 6.28 rad."
     if robot.kind not in KINDS:
         yield f"'kind': {unknown_name('kind of robot', robot.kind, KINDS)}"
     if robot.kind == "leg" and (robot.knee.lower < -math.pi or robot.knee.upper > 0):

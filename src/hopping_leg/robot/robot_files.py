@@ -2,7 +2,6 @@
 
 import json
 import logging
-import tomllib
 from functools import partial
 from importlib import resources
 from multiprocessing import parent_process
@@ -10,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from hopping_leg.errors import RobotError, unknown_name
-from hopping_leg.io import Field, Tree, is_number, read_dataclass
+from hopping_leg.io import Field, Tree, is_number, one_line, parse_toml, read_dataclass
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.robot.robot_checks import (
     check_physics,
@@ -115,7 +114,9 @@ def _chain(tree: Tree, name: str) -> list[tuple[str, Tree]]:
     while "extends" in tree:
         parent = tree["extends"]
         if not isinstance(parent, str):
-            raise RobotError(f"{name}: 'extends' must be a robot's name or file, not {parent!r}.")
+            raise RobotError(
+                f"{name}: 'extends' must be a robot's name or file, not {one_line(parent)}."
+            )
         name = _beside(name, parent)
         names = [file for file, _ in reversed(chain)]
         if name in names:
@@ -160,10 +161,7 @@ def _read(name: str) -> Tree:
         content = (_SHIPPED / f"{name}.toml").read_bytes()
     else:
         raise RobotError(unknown_name("robot", name, shipped) + " Or give a .toml file.")
-    try:
-        return tomllib.loads(content.decode())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise RobotError(f"{name} is not valid TOML: {error}.") from error
+    return parse_toml(content, name, RobotError)
 
 
 def _merge(parent: Tree, child: Tree) -> Tree:
@@ -205,12 +203,12 @@ def _text(value: Any) -> str:  # noqa: ANN401
 def _read_quantity(origin: str, entry: object, spec: Field, path: str) -> float:
     unit = spec.metadata["unit"]
     if not isinstance(entry, dict) or set(entry) != {"value", "unit", "source"}:
-        is_what = "missing" if entry is None else repr(entry)
+        is_what = "missing" if entry is None else one_line(entry)
         form = f'{{ value = ..., unit = "{unit}", source = "..." }}'
         raise RobotError(f"{origin}: '{path}' is {is_what}; it needs {form}.")
     value: float = entry["value"]
     if not is_number(value):
-        raise RobotError(f"{origin}: '{path}' must be a finite number, not {value!r}.")
+        raise RobotError(f"{origin}: '{path}' must be a finite number, not {one_line(value)}.")
     if entry["unit"] != unit:
         raise RobotError(f"{origin}: '{path}' is in {entry['unit']!r} but must be in '{unit}'.")
     if not isinstance(entry["source"], str) or not entry["source"].strip():

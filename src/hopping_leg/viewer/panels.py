@@ -1,23 +1,40 @@
 """Inputs of the page and the queue that carries them to the thread that simulates."""
 
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Collection, Coroutine
 from queue import Empty, SimpleQueue
 from typing import Any
 
 import viser
 
 from hopping_leg.controllers.registry import controller_names
-from hopping_leg.errors import HoppingLegError
+from hopping_leg.errors import HoppingLegError, UsageError
+from hopping_leg.io import is_number, one_line
 from hopping_leg.robot import load_robot, shipped_robots
 from hopping_leg.viewer import data_source, live_leg, playback_clock
 from hopping_leg.viewer import live_settings as ranges
 
 Action = Callable[[], None]
+_ROUNDING = 1e-6  # Of the page's numbers
 
 
 def put_value(handle: Any, value: object) -> None:  # noqa: ANN401
     """Set an input of the page; viser's types take its values for read-only."""
     handle.value = value
+
+
+def chosen(handle: Any, offered: Collection[str]) -> str:  # noqa: ANN401
+    """Return a choice of the page; UsageError where it was not offered, e.g. a path."""
+    if handle.value not in offered:
+        raise UsageError(f"The page sent {one_line(handle.value)}, which it does not offer.")
+    return str(handle.value)
+
+
+def within(handle: Any, bounds: ranges.Range) -> float:  # noqa: ANN401
+    """Return a number of the page; UsageError where its slider does not reach it."""
+    value, (low, high) = handle.value, bounds
+    if not is_number(value) or not low - _ROUNDING <= value <= high + _ROUNDING:
+        raise UsageError(f"The page sent {one_line(value)}, not {low:g} to {high:g}.")
+    return float(min(max(value, low), high))
 
 
 class GuiQueue:
@@ -79,14 +96,15 @@ class LivePanel:
         self._height = _slider(gui, "Height, m", live.valid, HEIGHT_STEP, live.height, hint)
         self._height.on_update(queue.from_page(self._set_height))
         names = (*controller_names(), *(n for n in live.names if n not in controller_names()))
+        self._names = names
         self._first = gui.add_dropdown("Controller", names, initial_value=live.names[0])
         beside = live.names[1] if len(live.names) > 1 else NOBODY
         self._second = gui.add_dropdown("Beside it", (NOBODY, *names), initial_value=beside)
         for dropdown in (self._first, self._second):
             dropdown.on_update(queue.from_page(self._controllers))
         legs = [name for name in shipped_robots() if load_robot(name).kind == "leg"]
-        robots = tuple(legs if robot in legs else [*legs, robot])
-        self._robot = gui.add_dropdown("Robot", robots, initial_value=robot)
+        self._robots = tuple(legs if robot in legs else [*legs, robot])
+        self._robot = gui.add_dropdown("Robot", self._robots, initial_value=robot)
         self._robot.on_update(queue.from_page(self._set_robot))
         stand = gui.add_button("Stand up", icon=viser.Icon.RELOAD, hint="Begin anew; key R")
         stand.on_click(queue.from_page(live.stand))
@@ -96,13 +114,17 @@ class LivePanel:
             force = _slider(gui, "Force, N", ranges.PUSH, 1.0, 30.0)
             up = gui.add_button("Push up", icon=viser.Icon.ARROW_UP, hint="Key P")
             down = gui.add_button("Push down", icon=viser.Icon.ARROW_DOWN, hint="Key O")
-        up.on_click(queue.from_page(lambda: live.push(force.value)))
-        down.on_click(queue.from_page(lambda: live.push(-force.value)))
+
+        def push(sign: int) -> None:
+            live.push(sign * within(force, ranges.PUSH))
+
+        up.on_click(queue.from_page(lambda: push(1)))
+        down.on_click(queue.from_page(lambda: push(-1)))
         keys = (
             ("Higher", "K", lambda: self._change(KEY_STEP)),
             ("Lower", "J", lambda: self._change(-KEY_STEP)),
-            ("Push up", "P", lambda: live.push(force.value)),
-            ("Push down", "O", lambda: live.push(-force.value)),
+            ("Push up", "P", lambda: push(1)),
+            ("Push down", "O", lambda: push(-1)),
             ("Stand up", "R", live.stand),
         )
         for label, key, action in keys:
@@ -134,22 +156,23 @@ class LivePanel:
             handle.on_update(queue.from_page(self._settings))
 
     def _set_height(self) -> None:
-        self._live.set_height(self._height.value)
+        self._live.set_height(within(self._height, self._live.valid))
 
     def _change(self, by: float) -> None:
         put_value(self._height, self._live.set_height(self._live.height + by))
 
     def _controllers(self) -> None:
-        beside = self._second.value
-        names = (self._first.value,) if beside == NOBODY else (self._first.value, beside)
         try:
+            names: tuple[str, ...] = (chosen(self._first, self._names),)
+            if self._second.value != NOBODY:
+                names += (chosen(self._second, self._names),)
             self._live.set_controllers(names)
         finally:
             self._show()
 
     def _set_robot(self) -> None:
         try:
-            self._live.set_robot(self._robot.value)
+            self._live.set_robot(chosen(self._robot, self._robots))
         finally:
             self._show()
 
@@ -208,7 +231,7 @@ class ReplayPanel:
             put_value(self._time, round(self._shown, 2))
 
     def _seek(self) -> None:
-        self._replay.seek(self._time.value)
+        self._replay.seek(within(self._time, (0.0, self._replay.length)))
         self._shown = self._replay.now
 
 
@@ -226,7 +249,7 @@ class TimeControls:
         speed = gui.add_dropdown("Speed", names, initial_value="1", hint="1 is real time")
         self._pause.on_click(queue.from_page(self._toggle))
         step.on_click(queue.from_page(self._step))
-        speed.on_update(queue.from_page(lambda: clock.set_speed(float(speed.value))))
+        speed.on_update(queue.from_page(lambda: clock.set_speed(float(chosen(speed, names)))))
         keys = (("Pause or go on", "space", self._toggle), ("Single step", "S", self._step))
         for label, key, action in keys:
             gui.add_command(label, hotkey=key).on_trigger(queue.from_keys(action))  # type: ignore[arg-type]

@@ -6,12 +6,13 @@ import io
 import math
 import socket
 import time
+import urllib.parse
 
 import viser
 
 from hopping_leg.errors import UsageError
 from hopping_leg.sim import CONTROL_RATE
-from hopping_leg.viewer import charts, data_source, live_leg, panels, playback_clock, scene
+from hopping_leg.viewer import access, charts, data_source, live_leg, panels, playback_clock, scene
 
 FRAME_RATE = 60.0
 _SLOW = 6
@@ -45,11 +46,12 @@ class Viewer:
         detail: float | None = None,
     ) -> None:
         self._source = source
-        self._server = _serve(host, port)
+        self._server, token = _serve(host, port)
         reached_at = "localhost" if host == "0.0.0.0" else host
         self.address = f"http://{reached_at}:{self._server.get_port()}"
-        if detail is not None:
-            self.address += f"/?fixedDpr={detail:g}"
+        query = {"token": token, "fixedDpr": "" if detail is None else f"{detail:g}"}
+        if any(query.values()):
+            self.address += f"/?{urllib.parse.urlencode({k: v for k, v in query.items() if v})}"
         self.clock = playback_clock.PlaybackClock(1 / CONTROL_RATE)
         self._queue = panels.GuiQueue()
         gui = self._server.gui
@@ -134,16 +136,20 @@ class Viewer:
         return f'<div style="padding:0.4em 1em;line-height:1.5">{"<br>".join(lines)}</div>'
 
 
-def _serve(host: str, port: int) -> viser.ViserServer:
+def _serve(host: str, port: int) -> tuple[viser.ViserServer, str]:
+    """Return the server and the token that its address needs, or none."""
     if not 0 <= port < 65536:
         raise UsageError(f"--port is {port} but must lie between 0 and 65535.")
     try:
         # viser itself would try other ports without end.
         socket.create_server((host, 0)).close()
+        who = access.Access(host)
     except OSError as error:
         raise UsageError(
             f"The page cannot be served at {host} ({error}); --host must be an address of this"
             " computer, e.g. 127.0.0.1."
         ) from error
-    with contextlib.redirect_stdout(io.StringIO()):
-        return viser.ViserServer(host=host, port=port, verbose=False)
+    with contextlib.redirect_stdout(io.StringIO()), who.guarded():
+        server = viser.ViserServer(host=host, port=port, verbose=False)
+    assert who.installed, "this version of viser would serve everyone"
+    return server, who.token

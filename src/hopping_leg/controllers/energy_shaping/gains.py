@@ -4,7 +4,6 @@ A gain file is one TOML per tuned set, beside the leg it was found on.
 """
 
 import json
-import tomllib
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
@@ -182,14 +181,12 @@ def load_gains(name_or_path: str | Path = TUNED) -> GainFile:
     name = str(name_or_path)
     source: Any = Path(name) if name.endswith(".toml") else _SHIPPED / f"{name}.toml"
     try:
-        tree = tomllib.loads(source.read_text(encoding="utf-8"))
+        content = source.read_bytes()
     except OSError as error:
         raise errors.UsageError(
             f"There is no gain file {source}; write one with `hop tune`."
         ) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise errors.UsageError(f"{source} is not valid TOML: {error}.") from error
-    return io.read_dataclass(GainFile, tree, name)
+    return io.read_dataclass(GainFile, io.parse_toml(content, str(source)), name)
 
 
 def save_gains(path: Path, found: GainFile) -> None:

@@ -19,6 +19,7 @@ from hopping_leg.controllers.command_schedule import CommandSchedule
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically, write_json
+from hopping_leg.locks import hold_folder
 from hopping_leg.rl import onnx_export, run_folder
 from hopping_leg.rl.finetune import apex_estimate
 from hopping_leg.rl.finetune.trial_data import Score, TrialData, estimated, score
@@ -248,22 +249,23 @@ def finetune(
             "options": asdict(options),
         }
     )
-    if run_folder.is_new(out, resume=resume):
-        write_json(out / "config.json", asked)
-    else:
-        run_folder.check_same(out, run_folder.read_json(out / "config.json"), asked)
-        run_folder.refuse_finished(out / POLICY)
-    finetuning = Finetuning(task, robot, options, out, pretraining, on_trial)
-    content, reason = finetuning.run()
-    result = {
-        **asked,
-        **summary(finetuning.rows, reason),
-        "versions": run_folder.library_versions(),
-    }
-    write_json(out / RESULT, result)
-    write_atomically(out / "model_card.md", card(result).encode())
-    write_atomically(out / POLICY, content)
-    return result
+    with hold_folder(out, UsageError):
+        if run_folder.is_new(out, resume=resume):
+            write_json(out / "config.json", asked)
+        else:
+            run_folder.check_same(out, run_folder.read_json(out / "config.json"), asked)
+            run_folder.refuse_finished(out / POLICY)
+        finetuning = Finetuning(task, robot, options, out, pretraining, on_trial)
+        content, reason = finetuning.run()
+        result = {
+            **asked,
+            **summary(finetuning.rows, reason),
+            "versions": run_folder.library_versions(),
+        }
+        write_json(out / RESULT, result)
+        write_atomically(out / "model_card.md", card(result).encode())
+        write_atomically(out / POLICY, content)
+        return result
 
 
 def summary(rows: list[Row], reason: str) -> dict[str, Any]:

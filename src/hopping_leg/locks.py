@@ -1,0 +1,109 @@
+"""What one process holds at a time, and gives back when it ends, however that is."""
+
+import contextlib
+import fcntl
+import os
+import socket
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from hopping_leg.errors import HoppingLegError
+from hopping_leg.io import safe_file_name
+
+FOLDER_LOCK = ".lock"
+"""Name of the file that says who works in a folder."""
+
+_MASTERS = ("/dev/ptmx", "/dev/pts/ptmx")
+
+
+class Lock:
+    """Holds a device or file until ``close``.
+
+    Args:
+        path: Device, or a file that is made if there is none.
+        what: Its name in messages.
+        error: Raised where somebody else holds it; says who.
+    """
+
+    def __init__(self, path: Path, what: str, error: type[HoppingLegError]) -> None:
+        flags = os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK
+        try:
+            self._descriptor = os.open(path, flags if path.exists() else flags | os.O_CREAT, 0o644)
+        except OSError as problem:
+            raise error(f"Cannot open {path}: {problem.strerror}.") from problem
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            others = list(_holders(path)) if os.isatty(self._descriptor) else []
+        except BlockingIOError:
+            others = list(_holders(path)) or ["another process, or this one"]
+        if others:
+            self.close()
+            raise error(f"{what} is in use by {' and '.join(others)}; end that first.")
+
+    def close(self) -> None:
+        """Give it back; again does nothing."""
+        if self._descriptor >= 0:
+            os.close(self._descriptor)
+            self._descriptor = -1
+
+
+def named_lock(name: str, what: str, error: type[HoppingLegError]) -> Lock:
+    """Hold a name on this computer."""
+    file = f"hopping-leg-{safe_file_name(name)}.lock"
+    return Lock(Path(tempfile.gettempdir()) / file, what, error)
+
+
+@contextlib.contextmanager
+def hold_folder(folder: Path, error: type[HoppingLegError]) -> Iterator[None]:
+    """Let no other process work in a folder meanwhile; what one of this host left is taken over.
+
+    Raises:
+        HoppingLegError: ``error``, which names the process and host that hold it.
+    """
+    file, here = folder / FOLDER_LOCK, socket.gethostname()
+    made = not folder.exists()
+    folder.mkdir(parents=True, exist_ok=True)
+    left = file.read_text(encoding="utf-8", errors="replace").strip() if file.exists() else ""
+    lock = Lock(file, str(folder), error)
+    try:
+        if left and not left.endswith(f" on {here}"):
+            raise error(f"{folder} is in use by {left}; if that has ended, delete {file}.")
+        file.write_text(f"process {os.getpid()} on {here}\n", encoding="utf-8")
+        try:
+            yield
+        finally:
+            file.unlink(missing_ok=True)
+    finally:
+        lock.close()
+        if made:
+            with contextlib.suppress(OSError):  # it holds something by now
+                folder.rmdir()
+
+
+def _holders(path: Path) -> Iterator[str]:
+    """Yield the other processes that have a file open, but for whoever serves it as a terminal."""
+    sought = path.stat()
+    for process in Path("/proc").glob("[0-9]*"):
+        if process.name == str(os.getpid()):
+            continue
+        with contextlib.suppress(OSError):  # it ended, or is another user's
+            opened = list((process / "fd").iterdir())
+            serves = any(_target(entry) in _MASTERS for entry in opened)
+            if not serves and any(_same(entry, sought) for entry in opened):
+                words = (
+                    (process / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
+                )
+                yield f"process {process.name} ({words.strip()[:80]})"
+
+
+def _target(entry: Path) -> str:
+    with contextlib.suppress(OSError):
+        return str(entry.readlink())
+    return ""
+
+
+def _same(entry: Path, sought: os.stat_result) -> bool:
+    with contextlib.suppress(OSError):
+        return os.path.samestat(entry.stat(), sought)
+    return False

@@ -1,0 +1,369 @@
+"""Mutated files of every kind: ``python -m tests.fuzz KIND COUNT`` tries so many, seed by seed.
+
+Whatever a file holds, reading it ends well or in a sentence, in bounded time and memory.
+"""
+
+import functools
+import gzip
+import io
+import json
+import re
+import resource
+import signal
+import struct
+import sys
+import tempfile
+import traceback
+import zlib
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from hopping_leg.errors import HoppingLegError
+
+MEMORY = 3 << 30
+"""Most that reading a file may take, bytes: the 2 GiB of a table, and what the program needs."""
+
+SECONDS = 60
+LONGEST = 1500
+"""Characters of a sentence."""
+
+_NUMBER = re.compile(rb"-?\d+(\.\d+)?([eE][-+]?\d+)?")
+_WORD = re.compile(rb'"[^"]*"|[A-Za-z_]\w*')
+_STRANGE = (
+    b"0", b"-1", b"1e308", b"1e999", b"nan", b"NaN", b"inf", b"-inf", b"null", b"true", b'""', b"x",
+    b"[]", b"{}", b"[1, 2]", b'{"a": 1}', b"9" * 400, b"9" * 5000, b"[" * 3000, b'"\xc3\xa4\xff"',
+    b"'''", b"1979-05-27", b"\x00", b'"[red]:smile:"', b"2e9", b"1e-320",
+)  # fmt: skip
+
+
+def mutate(content: bytes, rng: np.random.Generator, *, text: bool) -> bytes:
+    """Return a content with one to four changes."""
+    data = bytearray(content)
+    for _ in range(rng.choice([1, 1, 1, 2, 4])):
+        at, length = int(rng.integers(len(data) + 1)), int(rng.integers(1, 64))
+        other = int(rng.integers(len(data) + 1))
+        match int(rng.integers(12 if text else 6)):
+            case 0 if data:
+                data[at % len(data)] ^= 1 << int(rng.integers(8))
+            case 1:
+                del data[at : at + length]
+            case 2:
+                data[at:at] = data[other : other + length]
+            case 3:
+                data[at : at + length] = rng.bytes(length)
+            case 4:
+                del data[at:]
+            case 5:
+                extreme = struct.pack("<q", int(rng.choice([0, -1, 2**31 - 1, 2**62, 1 << 20])))
+                data[at : at + 8] = extreme[: int(rng.choice([1, 4, 8]))]
+            case _:
+                found = list((_NUMBER if rng.integers(2) else _WORD).finditer(data))
+                if found:
+                    start, end = found[int(rng.integers(len(found)))].span()
+                    data[start:end] = _STRANGE[int(rng.integers(len(_STRANGE)))]
+    return bytes(data)
+
+
+class Kind:
+    """Files in a folder of which one is mutated, and what reads them.
+
+    ``seal`` makes the file from the mutated content, e.g. with a checksum that fits.
+    """
+
+    def __init__(self, files, name, read, *, text=True, content=None, seal=lambda data: data):
+        self.files, self.name, self.read, self.text, self.seal = files, name, read, text, seal
+        self.content = files[name] if content is None else content
+
+    def write(self, folder, content):
+        """Write all files, one of them from this content."""
+        for name, whole in {**self.files, self.name: self.seal(content)}.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(whole)
+
+    def run(self, folder, seed):
+        """Read the file of a seed; return what is wrong with how that ended, or nothing."""
+        rng = np.random.default_rng(seed)
+        self.write(folder, mutate(self.content, rng, text=self.text))
+        signal.alarm(SECONDS)
+        try:
+            self.read(folder / self.name)
+        except HoppingLegError as error:
+            said = str(error)
+            if not said.strip() or "\n" in said or len(said) > LONGEST:
+                return f"not one sentence: {said[:300]!r}"
+        except BaseException:
+            return traceback.format_exc(limit=-4)
+        finally:
+            signal.alarm(0)
+        return ""
+
+
+def _framed(header, data):
+    """Return a flight recording whose frames are cut from a content, checksums valid."""
+    from hopping_leg.deploy.flight_recorder import _MAGIC, _frame
+
+    parts = data.split(b"\n\n")
+    kinds = [int(part[:1] or b"0", 36) % 4 if part[:1].isalnum() else 0 for part in parts]
+    return _MAGIC + b"".join(_frame(k, p[1:]) for k, p in zip(kinds, parts, strict=True))
+
+
+def _with_card(content, card):
+    """Return a policy with other metadata."""
+    import onnx
+
+    model = onnx.load_from_string(content)
+    model.metadata_props[0].value = card.decode("latin-1").replace("\0", " ")
+    return model.SerializeToString()
+
+
+def _native(header, table=None):
+    from hopping_leg.parquet import to_parquet
+
+    text = header.decode("latin-1").replace("\0", " ")
+    return to_parquet(_table() if table is None else table, {"hopping_leg": text})
+
+
+def _table():
+    from tests.identify.runs import swinging
+
+    return swinging(80)
+
+
+def _written(write):
+    with tempfile.TemporaryDirectory() as folder:
+        write(Path(folder))
+        return {
+            str(file.relative_to(folder)): file.read_bytes()
+            for file in sorted(Path(folder).rglob("*"))
+            if file.is_file()
+        }
+
+
+def _robots(make=False):
+    from importlib import resources
+
+    from hopping_leg.robot import build_model, load_robot
+
+    def read(path):
+        build_model(load_robot(path))
+
+    shipped = resources.files("hopping_leg.robot") / "robots"
+    name = "twin.toml" if make else "legv2.toml"
+    return Kind({"leg.toml": (shipped / name).read_bytes()}, "leg.toml", read)
+
+
+def _gains():
+    from importlib import resources
+
+    from hopping_leg.controllers.energy_shaping.gains import load_gains
+
+    gains = resources.files("hopping_leg.controllers") / "gains" / "energy-shaping.toml"
+    return Kind({"gains.toml": gains.read_bytes()}, "gains.toml", load_gains)
+
+
+def _schedules():
+    from hopping_leg.controllers.command_schedule import CommandSchedule
+
+    def read(path):
+        CommandSchedule.parse(path.read_bytes().decode("latin-1"))
+
+    return Kind({"schedule": b"0.25:5,0.30:5,0.35:2.5"}, "schedule", read)
+
+
+def _faults():
+    from hopping_leg.emulator.faults import load_faults
+
+    script = b'[[fault]]\nkind = "late_reply"\nsince = "flight"\nat = 2.0\nphase = "stance"\n'
+    script += b'drive = "knee"\nvalue = 0.012\ncount = 3\n\n[[fault]]\nkind = "configuration"\n'
+    script += b'name = "servo.max_current_A"\nvalue = 20.0\nduration = 0.1\n'
+    return Kind({"faults.toml": script}, "faults.toml", load_faults)
+
+
+def _recordings(form):
+    from hopping_leg.identify.recording import load_recording
+    from tests.identify.runs import SIDECAR
+
+    parquet = io.BytesIO()
+    _table().write_parquet(parquet)
+    names = {"csv": "run.csv", "gzip": "run.csv.gz", "parquet": "run.parquet"}
+    contents = {"csv": _table().write_csv().encode(), "parquet": parquet.getvalue()}
+    name = names.get(form, "run.csv")
+    files = {"run.toml": SIDECAR.encode(), name: contents.get(form, contents["csv"])}
+    if form == "gzip-raw":
+        files["run.csv.gz"] = gzip.compress(files.pop("run.csv"))
+        return Kind(files, "run.csv.gz", load_recording, text=False)
+    if form == "gzip":
+        seal = functools.partial(gzip.compress, compresslevel=1)
+        return Kind(files, name, load_recording, seal=seal)
+    if form == "sidecar":
+        read = lambda path: load_recording(path.with_name("run.csv"))  # noqa: E731
+        return Kind(files, "run.toml", read)
+    return Kind(files, name, load_recording, text=form == "csv")
+
+
+def _traces(form):
+    from hopping_leg.identify.excitation import Multisine, load_excitation, make_excitation
+    from hopping_leg.identify.recording import load_recording
+    from hopping_leg.robot import load_robot
+    from hopping_leg.trace import Trace
+
+    if form == "excitation":
+        excitation = make_excitation(Multisine(duration=12.0), load_robot("legv2"))
+        files = _written(lambda folder: excitation.save(folder / "run.parquet"))
+        whole = io.BytesIO(files["run.parquet"])
+        header = pl.read_parquet_metadata(whole)["hopping_leg"].encode()
+        seal = functools.partial(_native, table=pl.read_parquet(whole))
+        return Kind(files, "run.parquet", load_excitation, content=header, seal=seal)
+    recording = {"rig": "fixed-base", "rate_hz": 200.0, "robot": "legv2", "source": "made up"}
+    header = json.dumps({"schema": 1, "events": [], "recording": recording}).encode()
+    files = {"run.parquet": _native(header)}
+    if form == "header":
+        return Kind(files, "run.parquet", load_recording, content=header, seal=_native)
+    return Kind(files, "run.parquet", Trace.load, text=False)
+
+
+def _boxes(form):
+    from hopping_leg.deploy.flight_recorder import FlightRecorder, recover
+
+    columns = ("time_s", "command_m", "hip_position_rad")
+    first = json.dumps({"columns": columns, "header": {"robot": "legv2"}}).encode()
+    row, event = struct.pack("<3d", 1, 2, 3), json.dumps({"state": "damping"}).encode()
+    framed = b"\n\n".join([b"0" + first, b"1" + row, b"2" + event, b"1" + row])
+
+    def write(folder):
+        box = FlightRecorder(folder / "run.blackbox", columns, {"robot": "legv2"})
+        for tick in range(9):
+            box.row([float(tick), 0.3, 1.0])
+        box.event(state="damping")
+        box.close()
+
+    files = _written(write)
+    if form == "raw":
+        return Kind(files, "run.blackbox", recover, text=False)
+    seal = functools.partial(_framed, first)
+    return Kind(files, "run.blackbox", recover, content=framed, seal=seal)
+
+
+def _checkpoints(form):
+    from hopping_leg.rl.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
+
+    tree = {"weights": np.arange(60.0).reshape(3, 20), "steps": 7, "names": ["a", {"b": np.eye(2)}]}
+    files = _written(lambda folder: write_checkpoint(folder, 7, tree))
+    state, arrays = sorted(files, reverse=True)
+    read = lambda path: read_checkpoint(list_checkpoints(path.parent.parent)[0])  # noqa: E731
+    if form == "old":  # of a version without checksums
+        stored = json.loads(files[state])
+        del stored["sha256"]
+        files[state] = json.dumps(stored).encode()
+    name = state if form == "state" else arrays
+    return Kind(files, name, read, text=form == "state")
+
+
+def _runs(form):
+    from hopping_leg.rl.recipes import get_recipe
+    from hopping_leg.rl.run_folder import RunFolder, read_result
+    from hopping_leg.robot import load_robot
+    from tests.evaluate.test_comparison import TRAINING
+
+    recipe, robot = get_recipe("fast"), load_robot("legv2-identified")
+
+    def folder(path):
+        return RunFolder(path, recipe, robot, 0, None)
+
+    if form == "result":
+        read = lambda path: read_result(path.parent)  # noqa: E731
+        return Kind({"result.json": json.dumps(TRAINING).encode()}, "result.json", read)
+    config = json.dumps(folder(Path("run")).config).encode()
+    read = lambda path: folder(path.parent).begin(resume=True)  # noqa: E731
+    return Kind({"config.json": config}, "config.json", read)
+
+
+def _policies(form):
+    from hopping_leg.controllers.policy import METADATA_KEY, Policy
+    from hopping_leg.controllers.registry import load_policy
+
+    policy = load_policy("fast")
+    files = {"policy.onnx": policy.content}
+    if form == "card":
+        card = policy.card.to_json().encode()
+        seal = functools.partial(_with_card, policy.content)
+        assert METADATA_KEY
+        return Kind(files, "policy.onnx", Policy.load, content=card, seal=seal)
+    return Kind(files, "policy.onnx", Policy.load, text=False)
+
+
+def _results(form):
+    from hopping_leg.evaluate.comparison import set_beside
+    from hopping_leg.evaluate.result_files import read_runs
+    from hopping_leg.evaluate.tables import print_evaluation
+    from hopping_leg.terminal import plain_console
+    from tests.evaluate.test_comparison import TRAINING
+
+    def read(path):
+        runs = read_runs([str(path), str(path.with_name("other.json"))])
+        if runs[0].evaluation is not None:
+            print_evaluation(plain_console(quiet=True), runs[0].evaluation)
+        set_beside(runs)
+
+    if form == "training":
+        return Kind(
+            dict.fromkeys(("a.json", "other.json"), json.dumps(TRAINING).encode()), "a.json", read
+        )
+    stored = Path(__file__).parents[1] / "studies" / "evaluation" / "results" / "evaluation.json"
+    content = json.loads(stored.read_bytes())
+    for name in ("summary", "sequence", "ladder", "distributions", "staircase", "neighbours"):
+        content[name] = content[name][:3]
+    content["secondary"] = None
+    return Kind(
+        dict.fromkeys(("a.json", "other.json"), json.dumps(content).encode()), "a.json", read
+    )
+
+
+KINDS = {
+    "robot": _robots,
+    "twin": functools.partial(_robots, make=True),
+    "gains": _gains,
+    "schedule": _schedules,
+    "faults": _faults,
+    **{
+        f"recording-{form}": functools.partial(_recordings, form)
+        for form in ("csv", "gzip", "gzip-raw", "sidecar", "parquet")
+    },
+    **{f"trace-{f}": functools.partial(_traces, f) for f in ("raw", "header", "excitation")},
+    **{f"flight-recorder-{f}": functools.partial(_boxes, f) for f in ("raw", "framed")},
+    **{f"checkpoint-{f}": functools.partial(_checkpoints, f) for f in ("state", "arrays", "old")},
+    **{f"run-{f}": functools.partial(_runs, f) for f in ("config", "result")},
+    **{f"policy-{f}": functools.partial(_policies, f) for f in ("raw", "card")},
+    **{f"result-{f}": functools.partial(_results, f) for f in ("evaluation", "training")},
+}
+"""What makes each kind."""
+
+SLOW = {"recording-parquet": 20}
+"""Kinds of which each file needs a process of its own: one is tried where others try so many."""
+
+
+def main(name, count, first=0):
+    """Try seeds and say after each what is wrong; a line that is missing is that of an abort."""
+    kind = KINDS[name]()
+
+    def too_long(*_):
+        raise RuntimeError(f"it took more than {SECONDS} s")
+
+    signal.signal(signal.SIGALRM, too_long)
+    with tempfile.TemporaryDirectory() as folder:
+        kind.write(Path(folder) / "files", kind.content)
+        kind.read(Path(folder) / "files" / kind.name)  # what is not mutated is read
+        for seed in range(first, count):
+            print(f"begin {seed}", flush=True)
+            wrong = kind.run(Path(folder) / "files", (zlib.crc32(name.encode()), seed))
+            if not wrong and resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 > MEMORY:
+                wrong = f"it took more than {MEMORY >> 30} GiB"
+            if wrong:
+                print(json.dumps({"seed": seed, "wrong": wrong}), flush=True)
+    print("end", flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], int(sys.argv[2]), *map(int, sys.argv[3:]))

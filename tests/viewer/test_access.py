@@ -1,0 +1,134 @@
+"""Who may use the page, and what it may ask for: nothing but what it was offered."""
+
+import asyncio
+import http.client
+import itertools
+from types import SimpleNamespace
+
+import pytest
+
+pytest.importorskip("viser", reason="the extra 'view' is not installed")
+
+import websockets
+from hypothesis import given
+from hypothesis import strategies as st
+from websockets.datastructures import Headers
+from websockets.http11 import Request
+
+from hopping_leg.errors import UsageError
+from hopping_leg.viewer.access import Access
+from hopping_leg.viewer.live_leg import LiveSimulation
+from hopping_leg.viewer.panels import GuiQueue, LivePanel, chosen, within
+from hopping_leg.viewer.viewer import Viewer
+
+OWN = ("127.0.0.1:8080", "localhost:9000", "[::1]:1", "localhost")
+FOREIGN = ("elsewhere.example", "127.0.0.1.elsewhere.example:8080", "192.168.0.7:8080", "", "[")
+
+
+def request(host, origin=None, *, upgrade=False, path="/", cookie=""):
+    headers = Headers({"Host": host})
+    for name, value in (("Origin", origin), ("Cookie", cookie or None)):
+        if value is not None:
+            headers[name] = value
+    if upgrade:
+        headers["Upgrade"] = "websocket"
+    return Request(path, headers)
+
+
+@pytest.mark.parametrize("upgrade", [False, True])
+def test_this_computers_page_alone_is_served_and_only_to_itself(upgrade):
+    access = Access("127.0.0.1")
+    for host, other in itertools.product(OWN + FOREIGN, (*OWN, *FOREIGN, None)):
+        origin = None if other is None else f"http://{other}"
+        served, asked = SimpleNamespace(headers=Headers()), request(host, origin, upgrade=upgrade)
+        answer = access.answer(lambda *_, served=served: served, None, asked)
+        fits = host in OWN and (other == host or (other is None and not upgrade))
+        assert (answer is served) is fits, (host, origin)
+        assert answer.headers["X-Frame-Options"] == "DENY"
+
+
+@given(st.text("abcXYZ019-_", max_size=30))
+def test_other_computers_need_the_token_in_address_or_cookie(word):
+    access = Access("0.0.0.0")
+    assert len(access.token) > 16
+    for given_token, fits in ((word, False), (access.token, True)):
+        for asked in (
+            request("box:8080", path=f"/?token={given_token}"),
+            request("box:8080", cookie=f"other=1; hopping_leg={given_token}"),
+        ):
+            served = SimpleNamespace(headers=Headers())
+            answer = access.answer(lambda *_, served=served: served, None, asked)
+            assert (answer is served) is fits
+            assert (access.token in answer.headers.get("Set-Cookie", "")) is fits
+
+
+def test_the_served_page_and_its_websocket_are_guarded():
+    with Served() as (host, port):
+        for name, status in ((f"{host}:{port}", 200), ("elsewhere.example", 403)):
+            connection = http.client.HTTPConnection(host, port, timeout=30)
+            connection.request("GET", "/", headers={"Host": name})
+            assert connection.getresponse().status == status
+
+        async def knock(origin):
+            async with websockets.connect(
+                f"ws://{host}:{port}", origin=origin, subprotocols=["viser-v0"]
+            ):
+                return True
+
+        assert asyncio.run(knock(f"http://{host}:{port}"))
+        for origin in (None, "http://elsewhere.example"):
+            with pytest.raises(websockets.exceptions.InvalidStatus, match="403"):
+                asyncio.run(knock(origin))
+
+
+class Served:
+    """A live simulation's page."""
+
+    def __enter__(self):
+        live = LiveSimulation(("energy-shaping",), "legv2-paper", 0.3)
+        self.viewer = Viewer(live, "legv2-paper", port=0)
+        host, port = self.viewer.address.removeprefix("http://").split("/")[0].split(":")
+        return host.replace("localhost", "127.0.0.1"), int(port)
+
+    def __exit__(self, *_):
+        self.viewer.close()
+
+
+ANYTHING = st.none() | st.booleans() | st.floats() | st.text() | st.integers() | st.just("a.py:C")
+
+
+@given(ANYTHING)
+def test_a_value_that_was_not_offered_is_refused(value):
+    handle, offered = SimpleNamespace(value=value), ("fast", "1")
+    if value in offered:
+        assert chosen(handle, offered) == value
+    else:
+        with pytest.raises(UsageError, match="does not offer"):
+            chosen(handle, offered)
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if number and -1e-6 <= value <= 1 + 1e-6:
+        assert 0 <= within(handle, (0.0, 1.0)) <= 1
+    else:
+        with pytest.raises(UsageError, match="not 0 to 1"):
+            within(handle, (0.0, 1.0))
+
+
+def test_the_page_cannot_name_a_file_or_a_class(tmp_path):
+    plug_in, mark = tmp_path / "mine.py", tmp_path / "loaded"
+    plug_in.write_text(f"open({str(mark)!r}, 'w')\n")
+    viser = pytest.importorskip("viser")
+    server = viser.ViserServer(port=0, verbose=False)
+    live, queue = LiveSimulation(("energy-shaping",), "legv2-paper", 0.3), GuiQueue()
+    panel = LivePanel(server, queue, live, "legv2-paper")
+    for handle, name in itertools.product(
+        (panel._first, panel._second, panel._robot), (f"{plug_in}:Mine", "/etc/passwd", "x.toml")
+    ):
+        before = (live.names, live.robot)
+        shown, handle._impl.value = handle.value, name
+        queue.put(panel._set_robot if handle is panel._robot else panel._controllers)
+        (complaint,) = queue.run()
+        assert "does not offer" in complaint
+        assert (live.names, live.robot) == before
+        handle._impl.value = shown
+    assert not mark.exists()
+    server.stop()
