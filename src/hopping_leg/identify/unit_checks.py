@@ -1,4 +1,4 @@
-"""What the loader refuses: time that runs backwards, numbers in other units than SI.
+"""What the loader knows of a table, and what it refuses: numbers in other units than SI.
 
 Rows in messages are those of the file, the first below the header being 0.
 """
@@ -51,6 +51,11 @@ class Inspection:
         """Note something strange; the sentence gets the file and a full stop."""
         self.warnings.append(f"{self.origin}: {sentence}.")
 
+    def set(self, column: str, values: Array) -> None:
+        """Give a column other values, (ticks,); NaN stands for nothing."""
+        kept = pl.Series(column, values).fill_nan(None)
+        self.table = self.table.with_columns(kept)
+
     def drop(self, column: str) -> None:
         """Make a column as if it had not been recorded."""
         self.table = self.table.with_columns(pl.lit(None, self.table[column].dtype).alias(column))
@@ -58,13 +63,11 @@ class Inspection:
 
 STALL = 2.0
 """A gap between rows of more than this many periods is a stall."""
-_TIME_UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1 / 60}
-_SPARSEST = 20.0  # periods per row beyond which the rate or the time's unit must be wrong
 _DEGREE, _TURN = 180 / np.pi, 1 / (2 * np.pi)
 _POSITION_UNITS = {"degrees": _DEGREE, "revolutions": _TURN}
 _VELOCITY_UNITS = {"degrees/s": 1 / _DEGREE, "revolutions/s": 1 / _TURN, "rpm": 1 / _TURN / 60}
 _HALF_TURNS = 12.5  # largest distance of a joint from its middle, rad, two turns; degrees exceed it
-_FASTEST = 150.0
+FASTEST = 150.0
 """Speed of a joint, rad/s, far beyond any leg's motor; degrees per second exceed it."""
 _HIGHEST = 5.0  # base height, m; millimetres exceed it
 _STRONGEST = 5.0  # torque in units of the motor's peak; mN m exceed it
@@ -82,35 +85,6 @@ def row_period(time: np.ndarray, period: float) -> float:
     return max(period, float(np.median(np.diff(time)))) if len(time) > 1 else period
 
 
-def check_clock(inspection: Inspection) -> None:
-    """Refuse time that is missing, not finite, not increasing or in another unit."""
-    time, where = inspection.floats("time_s"), inspection.named("time_s")
-    bad = np.flatnonzero(~np.isfinite(time))
-    if len(bad):
-        inspection.refuse(
-            f"{where} has no time in row {inspection.row(bad[0])}; every row needs one."
-        )
-    steps = np.diff(time)
-    back = np.flatnonzero(steps <= 0)
-    if len(back):
-        index = back[0] + 1
-        inspection.refuse(
-            f"{where} does not increase in row {inspection.row(index)}:"
-            f" {time[index]:.9g} s comes after {time[index - 1]:.9g} s; remove the row."
-        )
-    if not len(steps):
-        return
-    step, metadata = float(np.median(steps)), inspection.metadata
-    periods = step * metadata.rate_hz
-    if not 0.5 <= periods <= _SPARSEST:
-        unit = next((u for u, f in _TIME_UNITS.items() if 0.8 < periods / f < 1.25), None)
-        guess = f"the time seems to be in {unit}" if unit else "one of the two is wrong"
-        inspection.refuse(
-            f"{where} steps by {step:.3g} from row to row but the metadata's rate_hz ="
-            f" {metadata.rate_hz:g} means {metadata.period:.3g} s; {guess}."
-        )
-
-
 def check_units(inspection: Inspection) -> None:
     """Refuse positions, speeds, torques and heights that cannot be rad, rad/s, N m and m."""
     try:
@@ -120,7 +94,7 @@ def check_units(inspection: Inspection) -> None:
         strongest = [_COMMON_PEAK] * 2
     joints = (
         ("position", [_HALF_TURNS] * 2, "rad", "degrees"),
-        ("velocity", [_FASTEST] * 2, "rad/s", "degrees/s"),
+        ("velocity", [FASTEST] * 2, "rad/s", "degrees/s"),
         ("torque", [_STRONGEST * peak for peak in strongest], "N m", "mN m"),
     )
     for quantity, limits, unit, guess in joints:
