@@ -134,8 +134,12 @@ def run(args: Identify) -> None:
         io.write_json(args.json, {"command": command, **result.as_json(identified)})
     if args.report:
         io.write_atomically(args.report, write_fit_report(identified, command, args.threads))
+    if warning := result.warning(identified):
+        say(warning)
     _show(identified)
     say(*(f"{_FILES[name]}: {path}" for name, path in outputs))
+    if warning:
+        raise errors.PhysicsError(warning)
 
 
 def _bounds(text: str) -> tuple[str, tuple[float, float]]:

@@ -38,7 +38,10 @@ def drop_spikes(inspection: Inspection) -> None:
 
 
 def check_steadiness(inspection: Inspection) -> None:
-    """Refuse angles that jump; leave out stretches in which a sensor stood still."""
+    """Leave out stretches in which a sensor stood still; refuse angles that jump."""
+    for quantity in _WITNESSES:
+        for joint in range(2):
+            _drop_stale(inspection, quantity, joint)
     for column in PAIRS["position"]:
         known, steps, times = _steps(inspection, column)
         leaps = np.flatnonzero(np.abs(steps) > np.maximum(_LEAP, FASTEST * times))
@@ -48,9 +51,6 @@ def check_steadiness(inspection: Inspection) -> None:
                 f" {inspection.row(known[leaps[0] + 1])} ({len(leaps)} such jumps): its counter"
                 " wraps, or the encoder lost its place; make it go on, or split the file there."
             )
-    for quantity in _WITNESSES:
-        for joint in range(2):
-            _drop_stale(inspection, quantity, joint)
 
 
 def _steps(inspection: Inspection, column: str) -> tuple[IntArray, Array, Array]:

@@ -12,6 +12,7 @@ _COUNTERS = [2.0**bits * unit for bits in (16, 24, 31, 32) for unit in (1e-9, 1e
 ]
 """Where counters of nanoseconds to seconds begin anew, and the time of day, s."""
 _SOON = 5.0  # usual steps within which a wrapped clock goes on
+_ALIKE = 0.01  # periods within which two steps are one
 _COARSE, _USELESS = 0.15, 0.3  # periods that a clock's tick may last: with a warning, and at all
 
 
@@ -30,14 +31,13 @@ def check_clock(inspection: Inspection) -> None:
     steps, metadata = np.diff(time), inspection.metadata
     if not len(steps):
         return
-    stuck = steps == 0
-    if stuck.mean() > _COARSE and (steps >= 0).all() and not stuck.all():
-        inspection.refuse(
-            f"{where} is too coarse: it stands still in {int(stuck.sum())} rows, first in row"
-            f" {inspection.row(np.argmax(stuck) + 1)}, and then steps by"
-            f" {np.median(steps[~stuck]) * 1e3:.4g} ms, where a row takes"
-            f" {metadata.period * 1e3:.4g}; record it to a tenth of that."
-        )
+    tick = _tick(steps, metadata.period)
+    if tick > _COARSE * metadata.period:
+        sentence = f"{where} is too coarse: it counts in {tick * 1e3:.4g} ms, where a row takes"
+        sentence += f" {metadata.period * 1e3:.4g}; record it to a tenth of that"
+        if tick > _USELESS * metadata.period:
+            inspection.refuse(f"{sentence}.")
+        inspection.warn(sentence)
     back = np.flatnonzero(steps <= 0)
     if len(back):
         index = back[0] + 1
@@ -55,13 +55,6 @@ def check_clock(inspection: Inspection) -> None:
             f"{where} steps by {step:.3g} from row to row but the metadata's rate_hz ="
             f" {metadata.rate_hz:g} means {metadata.period:.3g} s; {guess}."
         )
-    tick = _tick(steps, metadata.period)
-    if tick > _COARSE * metadata.period:
-        sentence = f"{where} is coarse: it counts in {tick * 1e3:.4g} ms, where a row takes"
-        sentence += f" {metadata.period * 1e3:.4g}; record it to a tenth of that"
-        if tick > _USELESS * metadata.period:
-            inspection.refuse(f"{sentence}.")
-        inspection.warn(sentence)
 
 
 def _unwrap(inspection: Inspection, time: Array) -> None:
@@ -83,9 +76,11 @@ def _unwrap(inspection: Inspection, time: Array) -> None:
 
 
 def _tick(steps: Array, period: float) -> float:
-    """Return what a clock counts in, s, where its period is no multiple of that, else 0."""
-    sizes = np.unique(np.round(steps, 7))
+    """Return what a clock counts in, s, where rows are no whole number of that apart, else 0."""
+    sizes = np.unique(steps / period)
+    sizes = sizes[np.append(True, np.diff(sizes) > _ALIKE)]
     tick = float(np.diff(sizes).min(initial=np.inf))
-    counts = (sizes / tick, period / tick)
-    counted, odd = (np.abs(count - np.rint(count)) for count in counts)
-    return tick if np.isfinite(tick) and counted.max() < 1e-3 and odd > 1e-2 else 0.0
+    counts = np.append(sizes, 1.0) / tick
+    odd = np.abs(counts - np.rint(counts))
+    counted = np.isfinite(tick) and sizes[0] >= 0 and odd[:-1].max() < 0.1
+    return tick * period if counted and (odd[-1] > 2 * _ALIKE or sizes[0] == 0 < tick - 1) else 0.0

@@ -124,7 +124,7 @@ def _file_bounds(robot: Robot) -> dict[str, tuple[float, float]]:
     """Return bounds that robot files demand: centres of mass on links, peaks above limits."""
     bounds = {}
     for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
-        whole = (1 - 1e-9) * link.length
+        whole = (1 - 1e-9) * link.reach
         if link.com < whole:
             bounds[f"{name}.com"] = (0.25 * link.com, min(4 * link.com, whole))
     for name, motor in (("hip", robot.hip.motor), ("knee", robot.knee.motor)):

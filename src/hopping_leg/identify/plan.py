@@ -9,6 +9,7 @@ from hopping_leg.errors import RecordingError, RobotError, UsageError, unknown_n
 from hopping_leg.identify import cost, initial_states, recording_format
 from hopping_leg.identify.parameters import LegHypothesis, ParameterSet, choose
 from hopping_leg.identify.recording import Recording
+from hopping_leg.identify.torque_balance import check_balance
 from hopping_leg.robot import COARSE_TIMESTEP, JOINTS, Robot, load_robot
 
 _TOLERANCE = 0.2  # share by which link lengths may differ between files of one leg
@@ -30,6 +31,12 @@ def robot_of(recordings: Sequence[Recording]) -> str:
 def check_recordings(recordings: Sequence[Recording], robot: Robot) -> None:
     """Raise RecordingError for another leg's recordings, or ones without their rig's commands."""
     for recording in recordings:
+        lacking = np.isnan(recording.array("position")).all(axis=0)
+        if lacking.any():
+            raise RecordingError(
+                f"{recording.name} has no positions of the {JOINTS[int(np.argmax(lacking))]}; a fit"
+                " needs those of both joints, as one moves the other: record both."
+            )
         wanted, what = "position_command", "targets of its on-board PD"
         if recording.metadata.onboard == "torque":
             wanted, what = "torque_command", "commanded torques"
@@ -38,6 +45,7 @@ def check_recordings(recordings: Sequence[Recording], robot: Robot) -> None:
                 f"{recording.name} has no {what} ({', '.join(recording_format.PAIRS[wanted])}),"
                 " so that nothing says what moved the leg; record them."
             )
+        check_balance(recording, robot)
         try:
             own = load_robot(recording.metadata.robot)
         except RobotError:

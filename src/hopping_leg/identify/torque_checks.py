@@ -18,7 +18,8 @@ _LEAST_TORQUE = 0.1  # rms, N m, of what is asked for, below which noise rules
 _ALIKE, _STRANGE = 0.9, 0.6  # correlations from which on torques are one, and are strangers
 _OPPOSED = -0.5
 _CLEARER = 0.7  # share of what a row leaves unexplained that another one must stay below
-_LATEST = 4  # rows by which torques are searched for
+_LATEST = 10  # rows by which torques are searched for
+_TOO_LATE = 0.02  # s, longer than any drive takes
 _STATED, _COMMANDED = (0.75, 1.33), (0.4, 2.5)
 """Measured torque over what a stated PD, or a torque command, asks for."""
 _SATURATED = 0.8  # of the largest torque, beyond which motors give less
@@ -67,10 +68,11 @@ def check_torque(inspection: Inspection) -> None:
         if best != right and 1 - correlation**2 < _CLEARER * (1 - found[right][1] ** 2):
             late = best - right
             sentence = (
-                f"{named} follows the stated PD {abs(late)} rows {'late' if late > 0 else 'early'}"
+                f"{named} follows the stated PD {'late' if late > 0 else 'early'}, by"
+                f" {abs(late) * metadata.period * 1e3:.3g} ms or {abs(late)} of its rows"
                 f" (correlation {correlation:.3f}, {found[right][1]:.3f} at its own row)"
             )
-            if late < 0:
+            if late < 0 or late * metadata.period >= _TOO_LATE:
                 inspection.refuse(
                     f"{sentence}; move the column, or say sample = 'after-command' or onboard ="
                     " 'continuous'."
