@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hopping_leg.errors import RecordingError
+from hopping_leg.identify.pipeline import identify
 from hopping_leg.identify.plan import check_recordings
 from hopping_leg.identify.recording_format import PAIRS
 from hopping_leg.identify.torque_balance import check_balance
@@ -20,7 +21,7 @@ ANGLES = ("position", "position_command")
 
 
 def test_the_legs_own_recording_is_believed_in_a_mirror_too():
-    check_recordings([tracked()], LEG)
+    check_balance(tracked(), LEG)
     every = [column for name in OF_A_JOINT for column in PAIRS[name]]
     check_balance(changed(tracked(), -pl.col(every)), LEG)
 
@@ -29,7 +30,7 @@ def test_the_legs_own_recording_is_believed_in_a_mirror_too():
 def test_one_joint_in_a_mirror_is_refused(joint):
     every = [PAIRS[name][joint] for name in OF_A_JOINT]
     with pytest.raises(RecordingError, match="sign"):
-        check_recordings([changed(tracked(), -pl.col(every))], LEG)
+        check_balance(changed(tracked(), -pl.col(every)), LEG)
 
 
 @pytest.mark.parametrize("joint", [0, 1])
@@ -59,7 +60,7 @@ def test_another_designs_links_are_refused():
     run = run.with_metadata(robot="doublependulum")
     check_balance(run, other)
     with pytest.raises(RecordingError, match=r"thigh of 0\.\d+ .*'doublependulum' is 0\.3 m"):
-        check_recordings([run], robot)
+        identify([run], robot)
 
 
 @pytest.mark.parametrize("joint", ["hip", "knee"])

@@ -3,10 +3,9 @@
 import numpy as np
 
 from hopping_leg.arrays import Array, IntArray
-from hopping_leg.errors import RobotError
 from hopping_leg.identify.recording_format import PAIRS
 from hopping_leg.identify.unit_checks import FASTEST, Inspection
-from hopping_leg.robot import JOINTS, load_robot
+from hopping_leg.robot import JOINTS
 
 _TURN = 2 * np.pi
 _NEAR = 0.02  # s, within which no joint turns by half a turn
@@ -82,8 +81,8 @@ def _drop_spikes(inspection: Inspection, column: str, least: float, often: float
     far = max(least, often * float(np.quantile(np.abs(steps), 0.98)))
     near = np.append(times < 2 * np.median(np.diff(inspection.floats("time_s"))), False)
     values = inspection.floats(column)
-    seen, out = values[known], []
-    for leap in np.flatnonzero(np.abs(steps) > far):
+    seen, out = values[known], list[int]()
+    for leap in np.flatnonzero(np.abs(steps) > far).tolist():
         if out and leap <= out[-1]:
             continue
         for last in range(leap + 1, min(leap + 1 + _SHORT, len(seen) - 1)):
@@ -129,9 +128,7 @@ def _drop_stale(inspection: Inspection, quantity: str, joint: int) -> None:
 
 def check_posture(inspection: Inspection) -> None:
     """Refuse angles beyond mechanical stops; doubt those that a leg hardly has."""
-    try:
-        robot = load_robot(inspection.metadata.robot)
-    except (RobotError, OSError):
+    if (robot := inspection.robot) is None:
         return
     columns = PAIRS["position"]
     angles = [inspection.floats(column) for column in columns]

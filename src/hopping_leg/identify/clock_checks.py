@@ -64,7 +64,7 @@ def _unwrap(inspection: Inspection, time: Array) -> None:
         return
     usual = float(np.median(steps[steps > 0]))
     wraps: list[str] = []
-    for index in np.flatnonzero(steps < 0):
+    for index in np.flatnonzero(steps < 0).tolist():
         turns = [c for c in _COUNTERS if 0 < steps[index] + c < _SOON * usual]
         if turns:
             time[index + 1 :] += turns[0]

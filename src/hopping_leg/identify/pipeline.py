@@ -17,6 +17,7 @@ from hopping_leg.identify.plan import FitPlan, check_recordings, make_plan
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.result import Identified, as_json, software_versions
 from hopping_leg.identify.search import Pass, Report, Searcher, SearchOptions
+from hopping_leg.identify.torque_balance import check_balance
 from hopping_leg.identify.windows import SHORTEST, cut, duration, hold_out
 from hopping_leg.io import write_json
 from hopping_leg.robot import NO_MISMATCH, Robot, check_physics
@@ -88,6 +89,8 @@ def identify(
                 f" {unknown_name('fitted parameter', name, plan.parameters.names)}"
             )
     fit, held, split = _split(recordings, validate, plan, seed)
+    for recording in (*recordings, *validate):
+        check_balance(recording, robot)
     windows = cut(fit, plan.window, unscored=plan.unscored)
     objective = Objective(
         tuple(fit), tuple(windows), plan.parameters, plan.scoring, plan.timestep, options.threads

@@ -9,7 +9,6 @@ from hopping_leg.errors import RecordingError, RobotError, UsageError, unknown_n
 from hopping_leg.identify import cost, initial_states, recording_format
 from hopping_leg.identify.parameters import LegHypothesis, ParameterSet, choose
 from hopping_leg.identify.recording import Recording
-from hopping_leg.identify.torque_balance import check_balance
 from hopping_leg.robot import COARSE_TIMESTEP, JOINTS, Robot, load_robot
 
 _TOLERANCE = 0.2  # share by which link lengths may differ between files of one leg
@@ -45,7 +44,6 @@ def check_recordings(recordings: Sequence[Recording], robot: Robot) -> None:
                 f"{recording.name} has no {what} ({', '.join(recording_format.PAIRS[wanted])}),"
                 " so that nothing says what moved the leg; record them."
             )
-        check_balance(recording, robot)
         try:
             own = load_robot(recording.metadata.robot)
         except RobotError:

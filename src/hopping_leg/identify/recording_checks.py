@@ -40,11 +40,11 @@ def check_table(inspection: Inspection) -> None:
     _align_commands(inspection)
     angle_checks.drop_spikes(inspection)
     unit_checks.check_units(inspection)
+    _check_motion(inspection)
     angle_checks.check_steadiness(inspection)
     unit_checks.check_velocity(inspection)
     angle_checks.check_posture(inspection)
     torque_checks.check_torque(inspection)
-    _check_motion(inspection)
     _warn_of_stalls(inspection)
 
 

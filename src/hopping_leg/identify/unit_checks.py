@@ -5,6 +5,7 @@ Rows in messages are those of the file, the first below the header being 0.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NoReturn
 
 import numpy as np
@@ -13,7 +14,7 @@ import polars as pl
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RecordingError, RobotError
 from hopping_leg.identify.recording_format import PAIRS, RecordingMetadata, float_column
-from hopping_leg.robot import load_robot
+from hopping_leg.robot import Robot, load_robot
 
 
 @dataclass
@@ -29,6 +30,14 @@ class Inspection:
     """The file's own column for a recording's column, where they differ."""
     warnings: list[str] = field(default_factory=list)
     """What was strange so far, a sentence each."""
+
+    @cached_property
+    def robot(self) -> Robot | None:
+        """The robot that the recording is filed under, None if it is not here."""
+        try:
+            return load_robot(self.metadata.robot)
+        except (RobotError, OSError):
+            return None
 
     def named(self, column: str) -> str:
         """Return a column as the file calls it, in quotes."""
@@ -87,11 +96,9 @@ def row_period(time: np.ndarray, period: float) -> float:
 
 def check_units(inspection: Inspection) -> None:
     """Refuse positions, speeds, torques and heights that cannot be rad, rad/s, N m and m."""
-    try:
-        robot = load_robot(inspection.metadata.robot)
+    strongest, robot = [_COMMON_PEAK] * 2, inspection.robot
+    if robot is not None:
         strongest = [j.motor.peak_torque * j.belt_ratio for j in (robot.hip, robot.knee)]
-    except (RobotError, OSError):
-        strongest = [_COMMON_PEAK] * 2
     joints = (
         ("position", [_HALF_TURNS] * 2, "rad", "degrees"),
         ("velocity", [FASTEST] * 2, "rad/s", "degrees/s"),
