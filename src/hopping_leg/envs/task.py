@@ -82,8 +82,6 @@ class Step(NamedTuple):
     """Episode over because the leg fell; never by default, (n,)."""
     truncated: BoolArray
     """Episode over because its time was up, (n,)."""
-    command: Array
-    """Desired height in force during the tick, m, (n,)."""
     apex_error: Array
     """Apex height minus command where a leg just passed an in-flight apex, else NaN, m, (n,)."""
     apex_height: Array
@@ -96,6 +94,8 @@ class Step(NamedTuple):
     """Observations before the restart, (n, size), where any episode ended."""
     final_privileged: Array32 | None
     """True states before the restart, (n, privileged_size), where any episode ended."""
+    command: Array
+    """Desired height in force during the tick, m, (n,)."""
 
 
 class HoppingTask:
@@ -310,8 +310,8 @@ class HoppingTask:
             self._begin(rows)
             observation = self._see_anew(rows)
         return Step(
-            observation, reward, terminated, truncated, command, apex_error, apex_height, height,
-            terms, final_observation, final_privileged,
+            observation, reward, terminated, truncated, apex_error, apex_height, height, terms,
+            final_observation, final_privileged, command,
         )  # fmt: skip
 
     def _begin(self, rows: IntArray, command: Array | None = None) -> None:
