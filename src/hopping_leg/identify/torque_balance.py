@@ -8,14 +8,16 @@ friction, with angles q1 and q12 = q1 + q2, speeds w, and torques t less frictio
     dp1/dt = t1 - G1 sin(q1 - z1) - G2 sin(q12 - z2)
     dp2/dt = t2 - G2 sin(q12 - z2) - b sin q2 w1 (w1 + w2)
 
-Inertias a to d must be positive, the zeros z small, and g b / G2 is the length of the thigh: other
-values mean that a sign, a zero or the leg is another one.
+What gears lose of a torque and by how much it is late is linear, too. The inertias must be
+positive, the zeros z small, and g b / G2 is the length of the thigh; and with no other sign of a
+joint may the same balance leave far less unexplained.
 """
 
 import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RecordingError
+from hopping_leg.identify.identifiability import correlation_time
 from hopping_leg.identify.initial_states import full_states
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.validation import as_torque_driven
@@ -23,10 +25,84 @@ from hopping_leg.robot import JOINTS, Robot
 
 _SPAN = 0.1  # over which momentum is balanced, s
 _DRAG = 0.05  # speed at which friction is fully there, rad/s
-_SURE = 4.0  # deviations from which on a number is beyond doubt
+_SURE = 5.0  # deviations from which on a number is beyond doubt
+_BETTER = 1.8  # factor by which another sign or zero must leave less unexplained
 _ZERO = 0.25  # rad by which a zero may be off, as friction holds a hanging leg
-_LENGTH = 1.3  # factor by which the thigh's length may differ
-_DENSE = 0.9  # share of rows with position and velocity, below which nothing is said
+_LENGTH, _COSTS = 1.4, 1.05
+"""Factors: of the thigh's length, and of what is left unexplained with the robot's own."""
+_DENSE = 0.4  # share of rows with position and velocity, below which nothing is said
+_MOST = 1.0  # of the torques' shares left unexplained, summed, beyond which nothing is said
+
+
+class _Balance:
+    """The balance of a recording whose torques are commanded, solved for its numbers.
+
+    ``values`` and their deviations ``errors`` are a, b, c, d, G cos z and -G sin z of hip and knee,
+    and friction; ``unexplained`` is the torques' share that is left. Signs are factors of each
+    joint's angles and torques; ``upright`` takes both zeros for right, ``lever``, s2, b / G2 for
+    known.
+    """
+
+    def __init__(
+        self,
+        recording: Recording,
+        angles: tuple[int, int] = (1, 1),
+        torques: tuple[int, int] = (1, 1),
+        *,
+        upright: bool = False,
+        lever: float = 0.0,
+    ) -> None:
+        time, step = recording.time, np.diff(recording.time)
+        (q1, q2), (w1, w2) = ((values * angles).T for values in full_states(recording))
+        torque = np.nan_to_num(recording.array("torque_command") * torques).T
+        rows = max(1, round(_SPAN / float(np.median(step))))
+
+        def over(values: Array) -> Array:
+            """Return the mean over each span of what was integrated until every row."""
+            spans: Array = values[rows:] - values[:-rows]
+            return spans / (time[rows:] - time[:-rows])
+
+        def mean(values: Array, *, held: bool = False) -> Array:
+            whole = values[:-1] if held else (values[1:] + values[:-1]) / 2
+            return over(np.append(0.0, np.cumsum(whole * step)))
+
+        zero, both, one, fold = np.zeros(len(time) - rows), q1 + q2, w1 + w2, np.cos(q2)
+        hangs, leans = mean(np.sin(both)), mean(np.cos(both))
+        pairs = [
+            (over(w1), zero),
+            (over(fold * (2 * w1 + w2)), over(fold * w1) + mean(np.sin(q2) * w1 * one)),
+            (over(one), over(one)),
+            (zero, over(w2)),
+            (mean(np.sin(q1)), zero),
+            (hangs, hangs),
+            (mean(np.cos(q1)), zero),
+            (leans, leans),
+        ]
+        for joint, speed in enumerate((w1, w2)):
+            drag, asked = np.tanh(speed / _DRAG), torque[joint]
+            for values in (drag, speed, np.abs(asked) * drag, np.append(0.0, np.diff(asked))):
+                column = [zero, zero]
+                column[joint] = mean(values, held=values is not drag and values is not speed)
+                pairs.append((column[0], column[1]))
+        design = np.stack([np.concatenate(pair) for pair in pairs], axis=1)
+        if upright:
+            design[:, 6:8] = 0.0
+        if lever:
+            design[:, 5] += lever * design[:, 1]
+            design[:, 1] = 0.0
+        target = np.concatenate([mean(column, held=True) for column in torque])
+        weight = np.ones(len(target))
+        for _ in range(2):  # again with each joint's own noise
+            self.values = np.linalg.lstsq(weight[:, None] * design, weight * target)[0]
+            left = (target - design @ self.values).reshape(2, -1)
+            weight = np.repeat(1 / np.maximum(np.std(left, axis=1), 1e-6), len(zero))
+        sizes = np.var(target.reshape(2, -1), axis=1)
+        self.unexplained = float(np.sum(np.var(left, axis=1) / np.maximum(sizes, 1e-9)))
+        # spans that overlap tell the same again, and so does what the balance does not explain
+        alike = [max(float(rows), correlation_time(joint)) for joint in left]
+        scaled = design * (weight / np.sqrt(np.repeat(alike, len(zero))))[:, None]
+        deviations = np.diag(np.linalg.pinv(scaled.T @ scaled, hermitian=True))
+        self.errors = np.where(scaled.any(axis=0), np.sqrt(np.maximum(deviations, 0)), np.inf)
 
 
 def check_balance(recording: Recording, robot: Robot) -> None:
@@ -37,90 +113,49 @@ def check_balance(recording: Recording, robot: Robot) -> None:
     """
     driven = as_torque_driven(recording)
     known = np.isfinite([recording.array(name) for name in ("position", "velocity")]).mean()
-    if recording.metadata.rig != "fixed-base" or known < _DENSE or not driven.has("torque_command"):
+    silent = recording.metadata.rig != "fixed-base" or not driven.has("torque_command")
+    if silent or known < _DENSE or recording.time[-1] - recording.time[0] < 10 * _SPAN:
         return
-    found = _solve(driven)
-    if found is None:
+    found = _Balance(driven)
+    if found.unexplained > _MOST:
         return
-    values, errors = found
-    for name, at in (("hip", 0), ("knee", 3)):
-        if values[at] < -_SURE * errors[at]:
-            raise RecordingError(
-                f"{recording.name}: the {name} accelerates against its torque; turn the sign of"
-                " its torque round, or of its angle with everything else of that joint."
-            )
-    if values[1] < -_SURE * errors[1]:
+    values, errors = found.values, found.errors
+    others = {
+        "hip or knee is turned round, with its angle, velocity, torque and commands": (
+            _Balance(driven, (1, -1), (1, -1))
+        ),
+        "the hip's torque is turned round": _Balance(driven, torques=(-1, 1)),
+        "the knee's torque is turned round": _Balance(driven, torques=(1, -1)),
+    }
+    wrong = min(others, key=lambda change: others[change].unexplained)
+    if found.unexplained > _BETTER * others[wrong].unexplained:
         raise RecordingError(
-            f"{recording.name}: hip and knee drive each other the wrong way; turn round the sign of"
-            " angle, velocity, torque and commands of one of them."
+            f"{recording.name}: torques and motion fit together"
+            f" {found.unexplained / others[wrong].unexplained:.3g} times better where the sign of"
+            f" {wrong}; turn it round, a positive torque accelerates towards positive angles."
         )
+    if min(values[0] / errors[0], values[3] / errors[3]) < -_SURE:
+        raise RecordingError(
+            f"{recording.name}: the leg accelerates against its torques; turn their signs round."
+        )
+    upright = _Balance(driven, upright=True).unexplained
     for joint, name in enumerate(JOINTS):
-        size = float(np.hypot(values[4 + joint], values[6 + joint]))
         zero = float(np.arctan2(-values[6 + joint], values[4 + joint]))
-        if abs(zero) > _ZERO + _SURE * float(errors[6 + joint]) / max(size, 1e-9) and (
-            size > _SURE * float(max(errors[4 + joint], errors[6 + joint]))
-        ):
-            hangs = "the thigh" if joint == 0 else "the shank"
+        falls = values[4 + joint] < -_SURE * errors[4 + joint]
+        if falls or (abs(zero) > _ZERO and upright > _BETTER * found.unexplained):
             raise RecordingError(
-                f"{recording.name}: by its gravity {hangs} hangs down at {zero:.2g} rad"
-                f" {'of the hip' if joint == 0 else 'of hip and knee together'}, not at 0; shift"
+                f"{recording.name}: by its gravity the {('thigh', 'shank')[joint]} hangs down at"
+                f" {zero:.2g} rad of {('the hip', 'hip and knee together')[joint]}, not at 0; shift"
                 f" the {name}'s zero, or turn its sign round."
             )
-    gravity = recording.metadata.effective_gravity
+    gravity, given = recording.metadata.effective_gravity, robot.thigh.length
     length = gravity * float(values[1] / values[5])
     spread = abs(length) * float(np.hypot(errors[1] / values[1], errors[5] / values[5]))
-    given = robot.thigh.length
     far = not given / _LENGTH < length < given * _LENGTH
-    if far and abs(length - given) > _SURE * spread:
+    costs = _Balance(driven, lever=given / gravity).unexplained / found.unexplained
+    if far and abs(length - given) > _SURE * spread and costs > _COSTS:
         raise RecordingError(
             f"{recording.name}: torques and motion tell of a thigh of {length:.2g} +- {spread:.1g}"
-            f" m, but that of '{robot.name}' is {given:g} m: it is another leg, whose file --robot"
-            " wants, or one joint's sign is another, of angle, velocity, torque and commands."
+            f" m, but that of '{robot.name}' is {given:g} m; give the file of this recording's leg"
+            " with --robot."
         )
-
-
-def _solve(recording: Recording) -> tuple[Array, Array] | None:
-    """Return a, b, c, d, G cos z, -G sin z and friction of both joints, and their deviations."""
-    time = recording.time
-    (q1, q2), (w1, w2) = (values.T for values in full_states(recording))
-    torque = np.nan_to_num(recording.array("torque_command"))
-    step = np.diff(time)
-    rows = max(1, round(_SPAN / float(np.median(step))))
-    if len(time) < 10 * rows:
-        return None
-
-    def over(values: Array) -> Array:
-        """Return the mean over each span of what was integrated until every row."""
-        spans: Array = values[rows:] - values[:-rows]
-        return spans / (time[rows:] - time[:-rows])
-
-    def mean(values: Array, *, held: bool = False) -> Array:
-        whole = values[:-1] if held else (values[1:] + values[:-1]) / 2
-        return over(np.append(0.0, np.cumsum(whole * step)))
-
-    both, zero, one, fold = q1 + q2, np.zeros(len(time) - rows), w1 + w2, np.cos(q2)
-    hangs, leans = mean(np.sin(both)), mean(np.cos(both))
-    pairs = [
-        (over(w1), zero),
-        (over(fold * (2 * w1 + w2)), over(fold * w1) + mean(np.sin(q2) * w1 * one)),
-        (over(one), over(one)),
-        (zero, over(w2)),
-        (mean(np.sin(q1)), zero),
-        (hangs, hangs),
-        (mean(np.cos(q1)), zero),
-        (leans, leans),
-        *((mean(np.tanh(w1 / _DRAG)), zero), (zero, mean(np.tanh(w2 / _DRAG)))),
-        *((mean(w1), zero), (zero, mean(w2))),
-    ]
-    design = np.stack([np.concatenate(pair) for pair in pairs], axis=1)
-    target = np.concatenate([mean(column, held=True) for column in torque.T])
-    weight = np.ones(len(target))
-    for _ in range(2):  # again with each joint's own noise
-        values, *_ = np.linalg.lstsq(weight[:, None] * design, weight * target, rcond=None)
-        noise = np.std((target - design @ values).reshape(2, -1), axis=1)
-        weight = np.repeat(1 / np.maximum(noise, 1e-6), len(zero))
-    scaled = weight[:, None] * design
-    normal = scaled.T @ scaled / rows  # spans that overlap tell the same again
-    if not np.isfinite(normal).all() or np.linalg.cond(normal) > 1e12:
-        return None
-    return values, np.sqrt(np.diag(np.linalg.inv(normal)))
