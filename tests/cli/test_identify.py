@@ -11,7 +11,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from hopping_leg.cli import INTERRUPTED, identify, main
+from hopping_leg.cli import FAILED, INTERRUPTED, identify, main
 from hopping_leg.cli.identify import FitProgress
 from hopping_leg.identify.excitation import Excitation
 from hopping_leg.identify.play_excitation import play
@@ -66,6 +66,20 @@ def test_from_recordings_to_robot_numbers_and_report(recordings, tmp_path, capsy
     assert tree["command"].startswith(f"hop identify {fitted} --validate {judge}")
     assert main(["robots", "check", str(out)]) == main(["robots", "show", str(out)]) == 0
     assert not re.search(r'(?:src|href)="(?!data:)', page.read_text())
+
+
+def test_a_fit_that_is_worse_than_its_start_fails(recordings, tmp_path, capsys):
+    """Fitted to the leg itself, judged by another leg, from that other leg's numbers."""
+    clock = np.arange(600) / 100.0
+    position = swing(6.0, rate=100.0, phase=2.0)
+    excitation = Excitation(clock, position, 0 * position, "fixed-base", 100.0, "legv2", "a swing")
+    judge = tmp_path / "judge.parquet"
+    play(excitation, load_robot("legv2"), believed="legv2").save(judge)
+    words = [recordings[0], "--validate", judge, "--parameters", ",".join(TRUTH)]
+    assert call(tmp_path, *words) == FAILED
+    said = capsys.readouterr()
+    assert said.out.index("do not use it") < said.out.index("95 % interval")
+    assert "do not use it" in said.err
 
 
 @pytest.mark.slow

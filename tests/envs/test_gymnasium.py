@@ -1,18 +1,285 @@
+import copy
+import pickle
 import subprocess
 import sys
 
 import gymnasium
 import numpy as np
 import pytest
+import torch
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers import vector as wrappers
 
 from hopping_leg import ENV_ID
-from hopping_leg.envs import HoppingTask, TaskConfig, paper_reward
+from hopping_leg.envs import ApexRewardConfig, HoppingTask, TaskConfig, apex_reward, paper_reward
+from hopping_leg.errors import UsageError
 from hopping_leg.robot import DEFAULT_ROBOT, load_robot
 from hopping_leg.sim import NO_NOISE
+from hopping_leg.sim.randomization import WIDE_RANGES
 
 SHORT = TaskConfig(episode=0.1)
+RANDOM = TaskConfig(
+    episode=0.1,
+    observation="dated",
+    reset_distribution="mixed",
+    command_range=(0.22, 0.4),
+    command_resampling_time=(0.02, 0.05),
+    randomised=WIDE_RANGES,
+)
+"""All that can be random."""
+APEX = apex_reward(load_robot(DEFAULT_ROBOT), ApexRewardConfig(), 200.0)
+"""A reward that remembers."""
+SINGLE, VECTOR, SYNC = "single", "vector_entry_point", "sync"
+KINDS = [SINGLE, VECTOR, SYNC, pytest.param("async", marks=pytest.mark.slow)]
+
+
+def make(kind, count=2, **words):
+    words = {"options": RANDOM, "reward": APEX, **words}
+    if kind == SINGLE:
+        return gymnasium.make(ENV_ID, **words)
+    return gymnasium.make_vec(ENV_ID, count, vectorization_mode=kind, **words)
+
+
+def plan(env, ticks=45, seed=7):
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-1, 1, (ticks, *env.action_space.shape)).astype(np.float32)
+
+
+def play(env, seed=None, actions=None, spoil=lambda seen: None):
+    """Return observations and rewards of some ticks as bytes; ``spoil`` gets all that is seen."""
+    told = []
+    seen = env.reset(seed=seed)
+    told.append(seen[0].tobytes())
+    for action in plan(env) if actions is None else actions:
+        spoil(seen)
+        seen = env.step(action)
+        told += [seen[0].tobytes(), np.asarray(seen[1]).tobytes()]
+        if env.spec.kwargs.get("vectorization_mode") is None and seen[3]:
+            told.append(env.reset()[0].tobytes())
+    return told
+
+
+def legs(env):
+    """Return what the legs are."""
+    inner = getattr(env.unwrapped, "envs", [env])
+    return [one.unwrapped.task.legs.table.tobytes() for one in inner]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_everything_random_follows_the_seed(kind):
+    env = make(kind)
+    first, other, again = (play(env, seed) for seed in (3, 4, 3))
+    assert first == again == play(make(kind), 3)
+    assert first != other
+    env.close()
+
+
+@pytest.mark.parametrize("kind", [SINGLE, VECTOR, SYNC])
+def test_what_differs_from_leg_to_leg_follows_the_seed(kind):
+    env, drawn = make(kind), []
+    for seed in (3, 4, None, 3):
+        env.reset(seed=seed)
+        drawn.append(legs(env))
+    assert drawn[0] != drawn[1] == drawn[2]
+    assert drawn[0] == drawn[3]
+
+
+@pytest.mark.parametrize("kind", [VECTOR, SYNC])
+def test_a_leg_knows_nothing_of_its_neighbour(kind):
+    env = make(kind)
+    actions = plan(env)
+    rows = []
+    for factor in (1, -1):
+        changed = actions * [[1], [factor]]
+        env.reset(seed=1)
+        rows.append([env.step(action)[:2] for action in changed.astype(np.float32)])
+    for (seen, reward), (other_seen, other_reward) in zip(*rows, strict=True):
+        np.testing.assert_array_equal(seen[0], other_seen[0])
+        assert reward[0] == other_reward[0]
+    assert (seen[1] != other_seen[1]).any()
+
+
+@pytest.mark.parametrize("kind", [SINGLE, VECTOR])
+def test_spaces_are_each_environments_own(kind):
+    samples = []
+    for neighbour in (1, 2):
+        one, other = make(kind), make(kind)
+        one.action_space.seed(1)
+        other.action_space.seed(neighbour)
+        samples.append(one.action_space.sample().tobytes())
+    assert samples[0] == samples[1]
+
+
+def overwrite(seen):
+    """Fill every array in what an environment returned."""
+    if isinstance(seen, dict):
+        seen = tuple(seen.values())
+    if isinstance(seen, tuple):
+        for part in seen:
+            overwrite(part)
+    elif isinstance(seen, np.ndarray):
+        seen[...] = None if seen.dtype == object else 1
+
+
+@pytest.mark.parametrize("mode", AutoresetMode)
+def test_arrays_belong_to_the_caller(mode):
+    words = {} if mode is AutoresetMode.DISABLED else {"autoreset_mode": mode}
+    kind = SINGLE if mode is AutoresetMode.DISABLED else VECTOR
+    assert play(make(kind, **words), 3, spoil=overwrite) == play(make(kind, **words), 3)
+
+
+@pytest.mark.parametrize("kind", [SINGLE, VECTOR])
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, "shape", "text", "more", None])
+def test_an_action_without_meaning_is_refused_and_nothing_has_moved(kind, wrong):
+    env, twin = make(kind), make(kind)
+    good = plan(env)[0]
+    bad = {"shape": good.ravel()[:1], "text": "left", "more": np.stack([good] * 3), None: None}
+    for one in (env, twin):
+        one.reset(seed=0)
+    with pytest.raises(UsageError, match=r"[Aa]ction.*not"):
+        env.step(bad[wrong] if wrong in bad else np.where(np.arange(2) == 1, wrong, good))
+    assert env.step(good)[0].tobytes() == twin.step(good)[0].tobytes()
+
+
+@pytest.mark.parametrize("kind", [SINGLE, VECTOR])
+@pytest.mark.parametrize(
+    "form", [np.ndarray.tolist, lambda a: torch.tensor(a, requires_grad=True), np.float64]
+)
+def test_actions_may_be_lists_and_tensors(kind, form):
+    usual, other = (
+        play(make(kind, disable_env_checker=True) if kind == SINGLE else make(kind), 0, actions)
+        for actions in (plan(make(kind)), [form(a) for a in plan(make(kind))])
+    )
+    assert usual == other
+
+
+@pytest.mark.parametrize("kind", [SINGLE, VECTOR])
+def test_words_without_meaning_are_refused(kind):
+    with pytest.raises(UsageError, match=r"no render mode 'ansi'.*rgb_array"):
+        make(kind, render_mode="ansi")
+    env = make(kind)
+    for options in ({"height": 0.3}, {"command": -1}, {"command": [0.3] * 5}, {"command": "high"}):
+        with pytest.raises(UsageError, match="command"):
+            env.reset(options=options)
+    with pytest.raises(UsageError, match="autoreset mode"):
+        make(VECTOR, autoreset_mode="Never")
+    for mask in ([1, 0], [True], [False, False]):
+        with pytest.raises(UsageError, match="reset_mask"):
+            make(VECTOR).reset(options={"reset_mask": mask})
+    for seed in ([1], [1, -1]):
+        with pytest.raises(UsageError, match="one for each of 2 legs"):
+            make(VECTOR).reset(seed=seed)
+
+
+@pytest.mark.parametrize("kind", [SINGLE, VECTOR])
+@pytest.mark.parametrize("take", [copy.deepcopy, pickle.dumps])
+def test_a_copy_is_refused_and_another_environment_goes_on(kind, take):
+    env, other = make(kind), make(kind)
+    play(env, 3)
+    with pytest.raises(UsageError, match=r"task\.restore\(.*task\.state"):
+        take(env.unwrapped)
+    other.reset(seed=9)
+    other.unwrapped.task.restore(env.unwrapped.task.state())
+    assert legs(env) == legs(other)
+    action = plan(env)[0]
+    assert env.step(action)[0].tobytes() == other.step(action)[0].tobytes()
+
+
+@pytest.mark.parametrize("kind", [SINGLE, VECTOR])
+def test_a_given_command_holds_for_its_episode(kind):
+    env = make(kind)
+    _, info = env.reset(seed=0, options={"command": 0.28})
+    told = [info["command"], *(env.step(a)[4]["command"] for a in plan(env, 19))]
+    assert (np.array(told) == 0.28).all()
+    _, info = env.reset()
+    assert (np.array(info["command"]) != 0.28).all()
+
+
+def test_a_seed_for_every_leg_and_a_mask():
+    env = make(VECTOR)
+    assert play(env, [1, 2]) == play(env, [1, 2]) != play(env, [1, 3])
+    assert play(env, [1, None]) != play(env, [1, None])
+    env.reset(seed=5)
+    env.step(plan(env)[0])
+    drawn, before = legs(env), env.unwrapped.task.legs.state[0].copy()
+    mask = np.array([False, True])
+    _, info = env.reset(seed=6, options={"reset_mask": mask, "command": [0.2, 0.33]})
+    np.testing.assert_array_equal(env.unwrapped.task.legs.state[0], before)
+    np.testing.assert_array_equal(info["_command"], mask)
+    assert info["command"][1] == 0.33
+    assert info["command"][0] != 0.2
+    assert legs(env) == drawn
+    early = make(VECTOR)
+    assert np.isfinite(early.reset(options={"reset_mask": mask})[0]).all()
+
+
+def same(ours, theirs):
+    """Compare infos where their masks say that there is something."""
+    keys = {k for k in (*ours, *theirs) if not k.startswith("_")}
+    for key in keys:
+        nothing = np.zeros(2, bool)
+        mask, other = (np.asarray(i.get(f"_{key}", nothing)) for i in (ours, theirs))
+        np.testing.assert_array_equal(mask, other, err_msg=key)
+        if not mask.any():
+            continue
+        if isinstance(ours[key], dict):
+            same(ours[key], theirs[key])
+        else:
+            for mine, yours in zip(ours[key][mask], theirs[key][mask], strict=True):
+                np.testing.assert_allclose(mine, yours, rtol=1e-6, err_msg=key)
+
+
+@pytest.mark.parametrize("mode", AutoresetMode)
+def test_the_vector_environment_does_as_gymnasiums_own(mode):
+    options = TaskConfig(
+        episode=0.2, commands=(0.3,), disturbance=NO_NOISE, fall_clearance=0.06, fall_penalty=1.0
+    )
+    words = {"options": options, "reward": APEX}
+    ours = make(VECTOR, autoreset_mode=mode, **words)
+    theirs = make(SYNC, vector_kwargs={"autoreset_mode": mode}, **words)
+    ends = np.zeros(2)
+    for one, other in [(ours.reset(seed=0), theirs.reset(seed=0))]:
+        np.testing.assert_array_equal(one[0], other[0])
+        same(one[1], other[1])
+    for tick in range(150):
+        push = np.array([[0.6, -0.5], [0.1, 0.2]], np.float32) * (-1) ** (tick // 15)
+        one, other = ours.step(push), theirs.step(push)
+        assert [part.dtype for part in one[:4]] == [part.dtype for part in other[:4]]
+        for part, others in zip(one[:4], other[:4], strict=True):
+            np.testing.assert_allclose(part, others, rtol=1e-9)
+        same(one[4], other[4])
+        ended = one[2] | one[3]
+        ends += ended
+        if mode is AutoresetMode.DISABLED and ended.any():
+            with pytest.raises(UsageError, match="has ended"):
+                ours.step(push)
+            for env in (ours, theirs):
+                env.reset(options={"reset_mask": ended})
+    assert (ends > 2).all()
+    assert ends[0] != ends[1], "one leg fell, one had its time"
+
+
+@pytest.mark.parametrize(
+    "wrap",
+    [
+        wrappers.NormalizeObservation,
+        wrappers.FlattenObservation,
+        wrappers.NormalizeReward,
+        wrappers.RecordEpisodeStatistics,
+        wrappers.ClipAction,
+        wrappers.DictInfoToList,
+    ],
+)
+def test_gymnasiums_vector_wrappers_fit(wrap):
+    env = wrap(make(VECTOR))
+    env.reset(seed=0)
+    for action in plan(env):
+        seen, reward, *_, info = env.step(action)
+        assert np.isfinite(seen).all()
+        assert np.isfinite(reward).all()
+        if "episode" in info:
+            assert set(info["episode"]["l"][info["_episode"]]) == {20}
 
 
 @pytest.mark.filterwarnings("error")
@@ -53,7 +320,8 @@ def test_rewards_are_explained_in_info():
 
 
 def test_vector_env_is_the_batched_task():
-    vector = gymnasium.make_vec(ENV_ID, num_envs=5, options=SHORT, threads=1)
+    mode = AutoresetMode.SAME_STEP
+    vector = gymnasium.make_vec(ENV_ID, 5, options=SHORT, threads=1, autoreset_mode=mode)
     observation, _ = vector.reset(seed=11)
     robot = load_robot(DEFAULT_ROBOT)
     rng, _ = gymnasium.utils.seeding.np_random(11)
@@ -92,7 +360,7 @@ def test_the_observation_is_the_papers_or_a_chosen_one():
     for options, sizes in ((TaskConfig(), {15}), (TaskConfig(observation="dated"), range(16, 99))):
         single = gymnasium.make(ENV_ID, options=options)
         vector = gymnasium.make_vec(ENV_ID, num_envs=3, options=options)
-        assert vector.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+        assert vector.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
         for env in (single, vector):
             observation, _ = env.reset(seed=0)
             assert env.observation_space.contains(observation)

@@ -37,7 +37,7 @@ class Patience:
         self.ticks = self.ticks + 1
         return self.ticks
 
-    def reset(self, rows):
+    def restart(self, rows):
         self.ticks[rows] = 0
 
     def state(self):
@@ -81,7 +81,7 @@ def test_a_weight_may_depend_on_the_share_of_the_training():
     reward = Reward([one], scale=0.5)
     task = HoppingTask(ROBOT, 2, TaskConfig(), reward, np.random.default_rng(0), 1)
     for share, expected in ((0.0, 2.0), (0.25, 1.5), (1.0, 0.0)):
-        reward.anneal(share)
+        task.reward.anneal(share)
         step = task.step(np.zeros((2, 2)))
         assert (step.reward == expected).all()
         assert (step.terms == 1.0).all()

@@ -44,7 +44,8 @@ def test_same_seed_same_bytes_at_any_thread_count():
 
 @pytest.mark.parametrize("ticks", [1, 37, 90])
 def test_a_restored_task_goes_on_exactly(ticks):
-    one, other = task(BUSY, seed=0), task(BUSY, seed=5)
+    options = replace(BUSY, randomised=WIDE_RANGES)
+    one, other = task(options, seed=0), task(options, seed=5)
     plan = actions(ticks + 60)
     for action in plan[:ticks]:
         last = one.step(action)
@@ -188,7 +189,7 @@ def test_a_draw_makes_the_same_legs_again_and_another_one_others():
     one = task(TaskConfig(randomised=WIDE_RANGES), count=6)
     heights = []
     for draw in (1, 2, 1):
-        one.randomize(draw)
+        one.reseed(np.random.default_rng(draw))
         one.legs.stand(slice(None), [0.7, -1.4], 0.05)
         for _ in range(40):
             one.legs.step(np.full((6, 2), [1.0, -3.0]))

@@ -110,9 +110,24 @@ def test_a_drive_that_tracks_positions_is_believed(onboard):
     np.testing.assert_array_equal(simulated(run), simulated(run.with_metadata(zeroed=False)))
 
 
-def test_zeros_are_smooth_in_the_delay():
+@pytest.mark.parametrize(
+    ("name", "step"),
+    [("drive.delay", 2e-5), ("hip.friction", 1e-3), ("shank.com", 2e-4), ("knee.armature", 2e-5)],
+)
+def test_zeros_are_smooth_in_every_parameter(name, step):
     finder = OffsetFinder(ZEROED)
-    delays = 2e-5 * np.arange(100)
-    steps = np.diff([finder.find(TRUE.replace({"drive.delay": delay})) for delay in delays], axis=0)
+    values = TRUE.get(name) + step * np.arange(60)
+    steps = np.diff([finder.find(TRUE.replace({name: value})) for value in values], axis=0)
     assert (np.abs(steps) > 0).all()
     assert (np.abs(steps).max(axis=0) < 3 * np.abs(steps).mean(axis=0)).all()
+
+
+@pytest.mark.parametrize("onboard", ["zoh", "torque"])
+def test_simulations_are_smooth_in_the_delay(onboard):
+    run = record(LEG, swing(1.0), onboard=onboard)
+    delays = 2e-5 * np.arange(60) + 1e-5
+    hypotheses = [LegHypothesis(LEG).replace({"drive.delay": delay}) for delay in delays]
+    found = WindowSimulator([run], cut([run], None), timestep=STEP).run(hypotheses)
+    steps = np.abs(np.diff(found.position[:, 0], axis=0)).max(axis=1)
+    assert (steps > 0).all()
+    assert (steps.max(axis=0) < 3 * steps.mean(axis=0)).all()

@@ -8,7 +8,7 @@ import pytest
 from hopping_leg.errors import RobotError
 from hopping_leg.identify.report import parameter_table, quality_table, write_fit_report
 from hopping_leg.identify.report_figures import residual_spectrum, worst_stretch
-from hopping_leg.identify.result import as_json, save_robot
+from hopping_leg.identify.result import as_json, save_robot, warning
 from hopping_leg.identify.validation import overlays
 from hopping_leg.robot import load_robot, load_tree
 from tests.identify.fitting import TRUTH, identified, run
@@ -41,6 +41,24 @@ def test_intervals_hold_their_values():
         assert row["interval_low"] <= row["value"] <= row["interval_high"]
     assert tree["correlations"]["names"] == list(TRUTH)
     np.testing.assert_allclose(np.diag(tree["correlations"]["matrix"]), 1.0)
+
+
+def test_intervals_end_where_what_is_possible_does():
+    wide = dataclasses.replace(identified().identifiability, half_width=np.full(len(TRUTH), 9.0))
+    for row in as_json(dataclasses.replace(identified(), identifiability=wide))["parameters"]:
+        assert 0 == row["interval_low"] <= row["value"] <= row["interval_high"] < np.inf
+
+
+def test_a_fit_that_is_worse_than_its_start_says_so_first(tmp_path):
+    found = identified()
+    swapped = {"validation": found.start_validation, "start_validation": found.validation}
+    worse = dataclasses.replace(found, **swapped)
+    assert warning(found) == ""
+    assert "do not use it" in as_json(worse)["warning"]
+    save_robot(worse, tmp_path / "worse.toml", "legv2")
+    assert (tmp_path / "worse.toml").read_text().startswith(f"# {warning(worse)}")
+    page = write_fit_report(worse).decode()
+    assert page.index("do not use it") < page.index("How well it predicts")
 
 
 def test_what_does_not_exist_is_null_and_nobody_tells_of_it():

@@ -1,6 +1,7 @@
 """Recordings of a leg that is known exactly: simulated with a plain loop over mj_step."""
 
 import dataclasses
+from functools import cache
 
 import mujoco
 import numpy as np
@@ -70,6 +71,12 @@ def record(robot, targets, rig="fixed-base", rate=200.0, onboard="zoh", name="tw
         columns["height_m"] = height
     metadata = RecordingMetadata(rig, rate, "legv2", "simulated", onboard=onboard, **GAINS)
     return make_recording(pl.DataFrame(columns), metadata, name)
+
+
+@cache
+def tracked():
+    """Return the leg swinging for some seconds under its PD."""
+    return record(LEG, swing(8.0))
 
 
 def noisy(run, **scales):

@@ -1,6 +1,11 @@
+import copy
+import dataclasses
 import logging
+import math
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from hopping_leg import cli
 from hopping_leg.errors import RobotError
@@ -75,18 +80,92 @@ def test_numbers_that_belong_to_a_changed_one_are_named_until_stated(tmp_path, p
     assert doubts(written(tmp_path / "last.toml", restated, "leg.toml")) == []
 
 
+def whole(path, **values):
+    """Write legv2 with other values as a file that stands alone."""
+    tree = copy.deepcopy(load_tree("legv2"))
+    for number, value in values.items():
+        dict(numbers(tree))[number]["value"] = value
+    path.write_text(robot_text(tree))
+    return str(path)
+
+
+def said(file):
+    """Return what is doubted in a robot file, or why it is refused."""
+    try:
+        return doubts(file)
+    except RobotError as error:
+        return [str(error)]
+
+
+OTHER_UNITS = {
+    "kg": (1e3,),
+    "m": (1e3, 1e2, 39.37),
+    "kg m2": (1e9, 1e7, 1e4),
+    "N m": (1e3,),
+    "rad/s": (30 / math.pi, 180 / math.pi),
+    "rad": (180 / math.pi,),
+    "N m s/rad": (1e3,),
+}
+"""Values in other units for one in SI."""
+ENTRIES = [(p, e) for p, e in numbers(load_tree("legv2")) if e["unit"] in OTHER_UNITS]
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(number=st.sampled_from(ENTRIES), data=st.data())
+def test_a_value_in_another_unit_is_doubted_by_its_name(tmp_path, number, data):
+    path, entry = number
+    factor = data.draw(st.sampled_from(OTHER_UNITS[entry["unit"]]))
+    found = said(whole(tmp_path / "leg.toml", **{path: entry["value"] * factor}))
+    assert any(f"'{path}'" in sentence for sentence in found)
+    if entry["unit"] in ("kg", "rad/s") or path.endswith("length"):
+        assert any("is it in" in sentence for sentence in found)
+
+
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    path=st.sampled_from([f"{k}.{n}" for k in ("thigh", "shank") for n in ("mass", "inertia")]),
+    power=st.sampled_from([-2, -1, 1, 2, 3]),
+)
+def test_a_decimal_point_that_slipped_is_doubted(tmp_path, path, power):
+    entry = dict(numbers(load_tree("legv2")))[path]
+    file = written(
+        tmp_path / "leg.toml", {path: (entry["value"] * 10.0**power, entry["unit"])}, "legv2"
+    )
+    assert any(f"'{path}'" in s and "decimal point" in s for s in said(file))
+
+
 @pytest.mark.parametrize(
-    ("path", "value"),
+    ("path", "value", "says"),
     [
-        ("shank.inertia", (0.098349, "kg m2")),
-        ("shank.mass", (117.94, "kg")),
-        ("thigh.length", (150, "m")),
-        ("knee.motor.rotor_inertia", (6.07e-2, "kg m2")),
+        ("shank.inertia", 0.098349, "radius of gyration of 0.9"),
+        ("knee.motor.gear_ratio", 1 / 6, "is it inverted"),
+        ("knee.belt_ratio", 0.5, "is it inverted"),
+        ("hip.motor.no_load_speed", 420.0, "is it in rpm"),
+        ("shank.mass", 117.94, "is it in g"),
+        ("thigh.length", 150, "is it in mm"),
+        ("hip.upper", 68.0, "in degrees"),
+        ("knee.motor.rotor_inertia", 6.07e-2, "kg cm2"),
+        ("rail.friction", 50.0, "would hang on the rail"),
+        ("knee.friction", 30.0, "more torque than the motor gives"),
+        ("knee.armature", 5.0, "behind the gear"),
     ],
 )
-def test_another_unit_is_doubted(tmp_path, path, value):
-    found = doubts(written(tmp_path / "leg.toml", {path: value}, "legv2"))
-    assert any(f"'{path}'" in doubt for doubt in found)
+def test_what_cannot_be_is_doubted(tmp_path, path, value, says):
+    unit = next((e["unit"] for p, e in numbers(load_tree("legv2")) if p == path), "kg m2")
+    found = said(written(tmp_path / "leg.toml", {path: (value, unit)}, "legv2"))
+    assert any(f"'{path}'" in sentence and says in sentence for sentence in found)
+
+
+def test_a_weight_beyond_a_links_end_needs_a_word(tmp_path):
+    out = {"shank.com": (0.16, "m"), "shank.inertia": (2e-4, "kg m2")}
+    (sentence,) = said(written(tmp_path / "leg.toml", out, "legv2"))
+    assert "'shank.com' (0.16 m) must not exceed 'shank.length'" in sentence
+    extended = written(tmp_path / "leg.toml", {**out, "shank.extent": (0.2, "m")}, "legv2")
+    assert doubts(extended) == []
+    assert load_robot(extended).shank.com == 0.16
+    plain = load_robot("legv2")
+    link = dataclasses.replace(plain.shank, extent=0.2)
+    assert dataclasses.replace(plain, shank=link).digest == plain.digest
 
 
 def test_a_leg_without_stops_is_told_whose_it_gets(tmp_path):

@@ -132,11 +132,15 @@ def run(args: Identify) -> None:
         )
     result.save_robot(identified, args.out, origin)
     command = command_line("hop identify", args, ("folder", "resume", "threads", "ray"))
+    if warning := result.warning(identified):
+        say(warning)
     _show(identified)
     save_json(args.json, {"command": command, **result.as_json(identified)})
     if args.report:
         io.write_atomically(args.report, write_fit_report(identified, command, args.threads))
     say(*(f"{_FILES[name]}: {path}" for name, path in outputs))
+    if warning:
+        raise errors.PhysicsError(warning)
 
 
 def _bounds(text: str) -> tuple[str, tuple[float, float]]:

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from hopping_leg.arrays import Array
+from hopping_leg.arrays import Array, BoolArray, IntArray
 from hopping_leg.controllers.observation_history import ObservationHistory, make_observation_history
 from hopping_leg.controllers.onnx_session import measure_session, open_session
 from hopping_leg.errors import PolicyError, UsageError
@@ -183,11 +183,31 @@ class Policy:
             f" '{robot.name}' ({robot.digest})."
         )
 
-    def reset(self, count: int) -> None:
-        """Forget everything; the next measurement has ``count`` rows."""
-        self._layout.reset(count)
-        self._torque = np.zeros((count, 2))
-        self._memory = np.zeros((count, self._memory_size), np.float32)
+    def reset(self, count: int | IntArray | BoolArray) -> None:
+        """Forget everything, the next measurement has ``count`` rows; or forget single legs.
+
+        Those are named by an array of their rows, or a mask, and begin anew with the next
+        measurement; all others go on.
+
+        Raises:
+            UsageError: There are no such rows.
+        """
+        if isinstance(count, int | np.integer):
+            self._layout.reset(int(count))
+            self._forgotten: IntArray = np.arange(0)
+            self._torque = np.zeros((count, 2))
+            self._memory = np.zeros((count, self._memory_size), np.float32)
+            return
+        try:
+            rows = np.arange(len(self._torque))[np.asarray(count)]
+        except IndexError as error:
+            raise UsageError(
+                f"{self.name} controls {len(self._torque)} legs and cannot forget {count}; name"
+                " rows of these, or mask them."
+            ) from error
+        self._torque[rows], self._memory = 0.0, self._memory.copy()
+        self._memory[rows] = 0.0
+        self._forgotten = np.union1d(self._forgotten, rows)
 
     def act(self, measurement: Measurement) -> Array:
         """Return joint torques, N m, (n, 2).
@@ -203,6 +223,9 @@ class Policy:
                 f" {card.command_high:g} m, not for {newest[~fits][0]:g} m."
             )
         self._layout.update(measurement, self._torque)
+        if len(self._forgotten):
+            self._layout.restart(self._forgotten, measurement)
+            self._forgotten = np.arange(0)
         feeds = self._layout.inputs()
         if self.remembers:
             feeds[MEMORY] = self._memory
@@ -210,7 +233,7 @@ class Policy:
         if memory:
             (self._memory,) = memory
         self._torque = torque.astype(np.float64)
-        return self._torque
+        return self._torque.copy()
 
     def internals(self) -> dict[str, Array]:
         """Return nothing: a network has no state to show."""

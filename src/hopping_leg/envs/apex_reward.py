@@ -103,7 +103,7 @@ def apex_reward(robot: Robot, config: ApexRewardConfig, rate: float) -> Reward:
 class ApexEvent:
     """How near an apex is to the command, by the motion and the time before it.
 
-    Time goes on over the end of an episode, so that the first apex of the next one pays like any.
+    An episode begins as if its last apex were long ago, so that the first one pays like any.
     """
 
     def __init__(self, config: ApexRewardConfig, rate: float) -> None:
@@ -120,7 +120,7 @@ class ApexEvent:
         """Return the kernel of the apex error, weighted, 0 without an apex, (n,)."""
         c, flying = self._config, t.flying
         if len(self._air) != len(flying):
-            self._air, self._since = np.zeros(len(flying)), np.zeros(len(flying))
+            self._air, self._since = np.zeros(len(flying)), np.full(len(flying), c.full_period)
         self._air = np.where(flying, self._air + 1 / self._rate, 0.0)
         self._since = self._since + 1 / self._rate
         motion = np.square(np.minimum(1.0, self._air / c.full_air))
@@ -130,8 +130,10 @@ class ApexEvent:
         kernel = (1 - c.tail) * np.exp(-error / self._width) + c.tail * np.exp(-error / c.width[0])
         return np.where(t.apex, motion * patience * kernel, 0.0)
 
-    def reset(self, rows: IntArray) -> None:
-        """Do nothing: time goes on."""
+    def restart(self, rows: IntArray) -> None:
+        """Forget the past of some legs."""
+        if len(self._air):
+            self._air[rows], self._since[rows] = 0.0, self._config.full_period
 
     def state(self) -> dict[str, Any]:
         """Return every leg's time in the air and since its last apex."""

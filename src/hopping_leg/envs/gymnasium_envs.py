@@ -1,10 +1,12 @@
 """The task as Gymnasium environments: one leg, and many as a vector environment.
 
 Both are ``HoppingLeg-v0``, registered by ``import hopping_leg``, and thin views of a
-``HoppingTask``; the same seed gives the same bytes.
+``HoppingTask``; the same seed gives the same bytes. Observations are float32, rewards float64, and
+every array that is handed out is the caller's.
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -14,18 +16,15 @@ import numpy.typing as npt
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from hopping_leg.arrays import Array, Array32, BoolArray
+from hopping_leg.arrays import Array, Array32, BoolArray, IntArray
 from hopping_leg.envs import rewards, task_config
 from hopping_leg.envs.paper_reward import paper_reward
 from hopping_leg.envs.task import HoppingTask, Step
-from hopping_leg.errors import UsageError
+from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, build_model, load_robot
 from hopping_leg.sim import LegSimulator
 
 Image = npt.NDArray[np.uint8]
-
-ACTIONS = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
-"""Hip and knee torque over ``TaskConfig.action_torque``."""
 
 _LARGEST = float(np.finfo(np.float32).max)
 
@@ -77,19 +76,73 @@ def _make_task(
     return HoppingTask(leg, num_envs, options, terms, rng, threads, autoreset=autoreset)
 
 
-def _observation_space(task: HoppingTask) -> "gymnasium.spaces.Box[np.float32]":
-    return gymnasium.spaces.Box(-_LARGEST, _LARGEST, (task.observation.size,), np.float32)
+def _spaces(
+    task: HoppingTask,
+) -> "tuple[gymnasium.spaces.Box[np.float32], gymnasium.spaces.Box[np.float32]]":
+    """Return spaces of an observation and of an action, torques over ``action_torque``."""
+    size = (task.observation.size,)
+    seen = gymnasium.spaces.Box(-_LARGEST, _LARGEST, size, np.float32)
+    return seen, gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
+
+
+def _check_render_mode(mode: str | None) -> None:
+    if mode not in (None, *(valid := HoppingEnv.metadata["render_modes"])):
+        raise UsageError(unknown_name("render mode", str(mode), valid))
+
+
+def _numbers(action: Any) -> Array:  # noqa: ANN401
+    """Return an action of any kind as an array; a tensor may still carry its gradient."""
+    try:
+        kept = action.detach().cpu() if hasattr(action, "detach") else action
+        return np.asarray(kept, np.float64)
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"An action must be an array of numbers, not {action!r:.60}.") from error
+
+
+def _asked(
+    options: dict[str, Any] | None, count: int, *names: str
+) -> tuple[IntArray | None, Array | None]:
+    """Return which legs a reset is for, None for all, and their commands, m, None to draw them."""
+    options = options or {}
+    for name in options:
+        if name not in names:
+            raise UsageError(unknown_name("option of reset", str(name), names))
+    mask, command = options.get("reset_mask"), options.get("command")
+    rows = None
+    if mask is not None:
+        mask = np.asarray(mask)
+        if mask.shape != (count,) or mask.dtype != np.bool_ or not mask.any():
+            raise UsageError(
+                f"'reset_mask' must hold true or false for each of {count} legs, true at least"
+                f" once, not {mask!r:.60}."
+            )
+        rows = np.flatnonzero(mask)
+    if command is not None:
+        try:
+            command = np.broadcast_to(np.asarray(command, np.float64), count)
+        except (TypeError, ValueError):
+            command = np.zeros(1)
+        if not ((command > 0) & (command < np.inf)).all():
+            raise UsageError(
+                f"'command' must be a positive height in m, one for all or for each of {count}"
+                f" legs, not {options['command']!r:.60}."
+            )
+        command = command if rows is None else command[rows]
+    return rows, command
 
 
 class HoppingEnv(gymnasium.Env[Array32, Array32]):
     """One leg hopping to commanded heights.
 
-    ``info`` holds ``base_height`` and ``command``, m, ``reward_terms``, the reward's unweighted
-    terms by name, and, in a step that passes an in-flight apex, ``apex_height`` and ``apex_error``
-    (its height above the command), m.
+    ``info`` holds ``base_height`` and ``command``, that of the tick, m, ``reward_terms``, the
+    reward's unweighted terms by name, and, in a step that passes an in-flight apex, ``apex_height``
+    and ``apex_error`` (its height above the command), m.
 
-    The robot may be a name or the path of a TOML file; the reward is the paper's if None; the
-    render mode is ``"rgb_array"`` or None.
+    The robot may be a name or the path of a TOML file; the reward, of which the environment takes a
+    copy, is the paper's if None; the render mode is ``"rgb_array"`` or None.
+
+    Raises:
+        UsageError: The render mode is unknown.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 200}  # noqa: RUF012
@@ -101,29 +154,33 @@ class HoppingEnv(gymnasium.Env[Array32, Array32]):
         reward: rewards.Reward | None = None,
         render_mode: str | None = None,
     ) -> None:
+        _check_render_mode(render_mode)
         self.render_mode = render_mode
         self.metadata = {**type(self).metadata, "render_fps": round(options.rate)}
         self.task = _make_task(robot, 1, options, reward, threads=1, autoreset=False)
-        self.observation_space, self.action_space = _observation_space(self.task), ACTIONS
+        self.observation_space, self.action_space = _spaces(self.task)
         self._camera, self._seeded = Camera(self.task.legs), False
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array32, dict[str, Any]]:
-        """Begin an episode; a ``seed`` restarts all randomness."""
+        """Begin an episode; a ``seed`` restarts all randomness.
+
+        The option ``command`` is the episode's height, m; UsageError refuses any other.
+        """
+        _, command = _asked(options, 1, "command")
         super().reset(seed=seed)
         again, self._seeded = self._seeded and seed is None, True
         task = self.task
-        observation = task.reset() if again else task.reseed(self.np_random)
-        info = {"base_height": task.legs.height.item(), "command": task.command.item()}
-        return observation[0], info
+        seen = task.reset(None, command) if again else task.reseed(self.np_random, None, command)
+        return seen[0], {"base_height": task.legs.height.item(), "command": task.command.item()}
 
     def step(self, action: Array32) -> tuple[Array32, float, bool, bool, dict[str, Any]]:
-        """Act for one control period."""
-        step = self.task.step(action[None])
+        """Act for one control period; UsageError refuses an action that is not two numbers."""
+        step = self.task.step(_numbers(action)[None])
         info: dict[str, Any] = {
             "base_height": step.height.item(),
-            "command": self.task.command.item(),
+            "command": step.command.item(),
             "reward_terms": dict(zip(self.task.reward.names, step.terms[0].tolist(), strict=True)),
         }
         if not math.isnan(apex_height := step.apex_height.item()):
@@ -143,14 +200,18 @@ class HoppingEnv(gymnasium.Env[Array32, Array32]):
 class HoppingVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
     """Legs hopping to commanded heights, on the batched simulation.
 
-    Episodes restart in the step that ends them (``AutoresetMode.SAME_STEP``):
-    ``info["final_obs"]`` and ``info["final_info"]`` then hold what was seen last. Arguments are
-    those of ``HoppingEnv``; the threads, 0 for one per core, change no result.
+    Arguments are those of ``HoppingEnv``; the threads, 0 for one per core, change no result. Where
+    an episode ended, the next one begins by ``autoreset_mode``: in the step after it, whose action
+    counts for nothing; in the same step, whose ``info["final_obs"]`` and ``info["final_info"]``
+    hold what ``HoppingEnv`` would have returned; or, disabled, with ``reset`` alone.
+
+    Raises:
+        UsageError: The mode of rendering or autoreset is unknown.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012
         **HoppingEnv.metadata,
-        "autoreset_mode": AutoresetMode.SAME_STEP,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
 
     def __init__(
@@ -161,51 +222,118 @@ class HoppingVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
         reward: rewards.Reward | None = None,
         threads: int = 0,
         render_mode: str | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
     ) -> None:
+        _check_render_mode(render_mode)
+        try:
+            self._mode = AutoresetMode(autoreset_mode)
+        except ValueError as error:
+            names = [mode.value for mode in AutoresetMode]
+            raise UsageError(unknown_name("autoreset mode", str(autoreset_mode), names)) from error
         self.num_envs, self.render_mode = num_envs, render_mode
-        self.metadata = {**type(self).metadata, "render_fps": round(options.rate)}
-        self.task = _make_task(robot, num_envs, options, reward, threads, autoreset=True)
-        self.single_observation_space = _observation_space(self.task)
-        self.single_action_space = ACTIONS
+        self.metadata = {
+            **type(self).metadata,
+            "render_fps": round(options.rate),
+            "autoreset_mode": self._mode,
+        }
+        same_step = self._mode is AutoresetMode.SAME_STEP
+        self.task = _make_task(robot, num_envs, options, reward, threads, autoreset=same_step)
+        self.single_observation_space, self.single_action_space = _spaces(self.task)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.action_space = batch_space(ACTIONS, num_envs)
-        self._all = np.ones(num_envs, np.bool_)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._ended = np.zeros(num_envs, np.bool_)  # legs that wait for their next episode
         self._camera, self._seeded = Camera(self.task.legs), False
 
     def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
     ) -> tuple[Array32, dict[str, Any]]:
-        """Begin an episode in every leg; a ``seed`` restarts all randomness."""
-        super().reset(seed=seed)
+        """Begin an episode in every leg, or in those of the option ``reset_mask``, (n,).
+
+        A seed, or a sequence of one per leg, restarts all randomness: the legs share one source of
+        it, and what differs from leg to leg is drawn anew unless there is a mask. The option
+        ``command`` is the episodes' height, m, or (n,) of them; UsageError refuses any other.
+        """
+        rows, command = _asked(options, self.num_envs, "command", "reset_mask")
+        if rows is not None and not self._seeded:
+            self.reset()  # the legs that the mask leaves out begin somehow, too
+        self._restart_randomness(seed)
         again, self._seeded = self._seeded and seed is None, True
-        observation = self.task.reset() if again else self.task.reseed(self.np_random)
-        return observation, self._masked(self._standing(), self._all)
+        task = self.task
+        seen = task.reset(rows, command) if again else task.reseed(self.np_random, rows, command)
+        new = np.ones(self.num_envs, np.bool_)
+        if rows is not None:
+            new = np.isin(np.arange(self.num_envs), rows)
+        self._ended[new] = False
+        standing = {"base_height": task.legs.height.copy(), "command": task.command.copy()}
+        return seen, self._masked(standing, new)
+
+    def _restart_randomness(self, seed: int | Sequence[int | None] | None) -> None:
+        if seed is None or isinstance(seed, int | np.integer):
+            super().reset(seed=None if seed is None else int(seed))
+            return
+        if len(seed) != self.num_envs or any(one is not None and one < 0 for one in seed):
+            raise UsageError(
+                f"Seeds must be one for all or one for each of {self.num_envs} legs, 0 or more, not"
+                f" {seed!r:.60}."
+            )
+        unknown = np.random.SeedSequence().generate_state(self.num_envs)
+        numbers = [unknown[leg] if one is None else one for leg, one in enumerate(seed)]
+        self.np_random = np.random.default_rng([int(number) for number in numbers])
 
     def step(self, actions: Array32) -> tuple[Array32, Array, BoolArray, BoolArray, dict[str, Any]]:
-        """Act for one control period in every leg; actions are (n, 2)."""
-        step = self.task.step(actions)
-        return step.observation, step.reward, step.terminated, step.truncated, self._info(step)
+        """Act for one control period in every leg; actions are (n, 2).
 
-    def _standing(self) -> dict[str, Any]:
-        return {"base_height": self.task.legs.height.copy(), "command": self.task.command.copy()}
+        Raises:
+            UsageError: Actions are not finite or of another shape, or a leg's episode has ended and
+                nobody has begun the next.
+        """
+        new, waiting = self._ended, np.count_nonzero(self._ended)
+        if waiting and self._mode is AutoresetMode.DISABLED:
+            raise UsageError(
+                f"The episode of leg {int(np.argmax(new))} has ended; begin the next one with"
+                " reset(options={'reset_mask': terminated | truncated})."
+            )
+        step = self.task.step(_numbers(actions))
+        seen, reward = step.observation, step.reward
+        terminated, truncated = step.terminated.copy(), step.truncated.copy()
+        if waiting:
+            seen = self.task.reset(np.flatnonzero(new))
+            reward[new], terminated[new], truncated[new] = 0.0, False, False
+        if self._mode is AutoresetMode.SAME_STEP:
+            new = terminated | truncated
+        else:
+            self._ended = terminated | truncated
+        return seen, reward, terminated, truncated, self._info(step, new)
 
-    def _info(self, step: Step) -> dict[str, Any]:
-        apexes = {"apex_height": step.apex_height, "apex_error": step.apex_error}
-        info = self._masked(self._standing(), self._all)
-        info |= self._masked(apexes, ~np.isnan(step.apex_height))
+    def _info(self, step: Step, new: BoolArray) -> dict[str, Any]:
+        """Return what a step tells, where ``new`` legs have just begun an episode."""
+        command = np.where(new, self.task.command, step.command)
+        standing = {"base_height": self.task.legs.height.copy(), "command": command}
+        info = self._masked(standing, np.ones(self.num_envs, np.bool_))
+        info |= self._of_tick(step, ~new)
         if step.final_observation is None:
             return info
-        ended = step.terminated | step.truncated
         last = np.full(self.num_envs, None, dtype=object)
-        for leg in np.flatnonzero(ended):
-            last[leg] = step.final_observation[leg]
-        final = self._masked({"base_height": step.height}, ended)
-        return info | self._masked({"final_obs": last, "final_info": final}, ended)
+        for leg in np.flatnonzero(new):
+            last[leg] = step.final_observation[leg].copy()
+        final = self._masked({"base_height": step.height, "command": step.command}, new)
+        final |= self._of_tick(step, new)
+        return info | self._masked({"final_obs": last, "final_info": final}, new)
+
+    def _of_tick(self, step: Step, legs: BoolArray) -> dict[str, Any]:
+        """Return rewards' terms and apexes of some legs."""
+        terms = dict(zip(self.task.reward.names, step.terms.T.copy(), strict=True))
+        apexes = {"apex_height": step.apex_height.copy(), "apex_error": step.apex_error.copy()}
+        info = self._masked({"reward_terms": self._masked(terms, legs)}, legs)
+        return info | self._masked(apexes, legs & ~np.isnan(step.apex_height))
 
     @staticmethod
     def _masked(values: dict[str, Any], mask: BoolArray) -> dict[str, Any]:
         """Add to every entry the mask of the legs that have it, as Gymnasium asks for."""
-        return values | {f"_{name}": mask for name in values}
+        return values | {f"_{name}": mask.copy() for name in values}
 
     def render(self) -> tuple[Image, ...] | None:
         """Return a picture of every leg from the side in mode ``"rgb_array"``."""

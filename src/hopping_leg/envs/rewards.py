@@ -79,8 +79,8 @@ class StatefulTerm(Protocol):
         """Return the unweighted term, (n,)."""
         ...
 
-    def reset(self, rows: IntArray) -> None:
-        """Begin new episodes of some legs."""
+    def restart(self, rows: IntArray) -> None:
+        """Forget the past of some legs, whose episodes begin anew; nothing, if never called."""
         ...
 
     def state(self) -> dict[str, Any]:
@@ -113,6 +113,10 @@ class PerLeg:
     def set(self, t: Transition, terms: Array, column: int) -> None:
         """Set a column of the terms, (n, k)."""
         self._function(t.state, t.command, t.action, t.last_action, *self._numbers, terms, column)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "PerLeg":
+        """Return itself, which remembers nothing."""
+        return self
 
     def __call__(self, transition: Transition) -> Array:
         """Return the unweighted term, (n,)."""
@@ -174,10 +178,10 @@ class Reward:
         _weigh(terms, self._weights, self.scale, reward)
         return reward, terms
 
-    def reset(self, rows: IntArray) -> None:
-        """Begin new episodes of some legs."""
+    def restart(self, rows: IntArray) -> None:
+        """Forget the past of some legs, whose episodes begin anew."""
         for term in self._stateful.values():
-            term.reset(rows)
+            term.restart(rows)
 
     def state(self) -> dict[str, Any]:
         """Return what the terms remember from tick to tick, by their names."""

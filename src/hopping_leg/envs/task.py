@@ -1,7 +1,8 @@
 """The learning problem for many legs at once: observation, reward, commands, episodes."""
 
+import copy
 import math
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -93,13 +94,16 @@ class Step(NamedTuple):
     """Observations before the restart, (n, size), where any episode ended."""
     final_privileged: Array32 | None
     """True states before the restart, (n, privileged_size), where any episode ended."""
+    command: Array
+    """Desired height in force during the tick, m, (n,)."""
 
 
 class HoppingTask:
     """n legs learning to hop; the only place where observation and reward are put together.
 
     All randomness comes from ``rng``; the threads, 0 for one per core, change no result. With
-    ``autoreset`` the next episode begins within the tick that ends one, else with ``reset``.
+    ``autoreset`` the next episode begins within the tick that ends one, else with ``reset``. The
+    reward is copied: what it remembers is of this task's legs alone.
     """
 
     def __init__(
@@ -114,14 +118,14 @@ class HoppingTask:
         autoreset: bool = True,
     ) -> None:
         self.autoreset = autoreset
-        self.robot, self.count, self.options, self.reward = robot, count, options, reward
-        noise, self._rng, draws = rng.spawn(3)
-        self._draw_seed, self._draw = int(draws.integers(2**62)), 0
+        self.robot, self.count, self.options = robot, count, options
+        self.reward = copy.deepcopy(reward)
+        noise, self._rng, legs = rng.spawn(3)
         self._numbers = np.zeros((count, len(options.randomised)))
         self.legs = LegSimulator(
             robot, count, rate=options.rate, timestep=options.timestep, threads=threads
         )
-        self.randomize()
+        self._randomize(int(legs.integers(2**62)))
         self.plant = Plant(self.legs, options.disturbance, options.soft_limits, noise)
         self.observation = make_observation(robot, options, count)
         self._scaling = sample_scaling(robot, options)
@@ -140,52 +144,83 @@ class HoppingTask:
         self.last_action, self._rises = np.zeros((count, 2)), np.zeros(count, np.bool_)
         self.reset()
 
-    def randomize(self, draw: int = 1) -> None:
-        """Let every leg go on with numbers of its own, the same ones for the same draw."""
-        ranges = self.options.randomised
-        if not ranges or draw == self._draw:
-            return
-        rng = np.random.default_rng([self._draw_seed, draw])
-        variants = randomization.sample(self.robot, ranges, self.count, rng)
-        self.legs.set_robots(variants)
-        self._numbers, self._draw = randomization.normalized(self.robot, variants, ranges), draw
+    def _randomize(self, seed: int) -> None:
+        """Let every leg go on with numbers of its own, the same ones for the same seed."""
+        self._legs_seed, ranges = seed, self.options.randomised
+        if ranges:
+            rng = np.random.default_rng(seed)
+            variants = randomization.sample(self.robot, ranges, self.count, rng)
+            self.legs.set_robots(variants)
+            self._numbers = randomization.normalized(self.robot, variants, ranges)
 
     @property
     def privileged_size(self) -> int:
         """Entries of the true state that a critic may see."""
         return PRIVILEGED + len(self.options.randomised)
 
-    def reseed(self, rng: np.random.Generator) -> Array32:
-        """Take all randomness from another source and begin anew; return what is seen."""
-        noise, self._rng = rng.spawn(2)
-        self.plant.reseed(noise)
-        return self.reset()
+    def reseed(
+        self, rng: np.random.Generator, ids: IntArray | None = None, command: Array | None = None
+    ) -> Array32:
+        """Take all randomness from another source and begin anew, see ``reset``.
 
-    def reset(self, ids: IntArray | None = None) -> Array32:
-        """Begin new episodes of some legs, or of all, staggered; return all observations."""
+        Where only some legs begin anew, all keep the numbers in which they differ.
+        """
+        noise, self._rng, legs = rng.spawn(3)
+        self.plant.reseed(noise)
+        if ids is None:
+            self._randomize(int(legs.integers(2**62)))
+        return self.reset(ids, command)
+
+    def reset(self, ids: IntArray | None = None, command: Array | None = None) -> Array32:
+        """Begin new episodes of some legs, or of all, staggered; return all observations.
+
+        A given ``command``, m, (k,), holds until its leg's episode ends; None draws one.
+        """
         rows = np.arange(self.count) if ids is None else np.asarray(ids)
-        self._begin(rows)
+        self._begin(rows, command)
         if ids is None and self.options.random_episode_start:
             self._end[:] = self._tick + self._rng.integers(1, self._horizon + 1, self.count)
             self._plan()
         return self._see_anew(rows)
 
     def step(self, action: Array | Array32) -> Step:
-        """Act for a period; actions are torques over ``action_torque`` in [-1, 1], (n, 2)."""
+        """Act for a period; actions are torques over ``action_torque`` in [-1, 1], (n, 2).
+
+        Raises:
+            UsageError: Actions are not finite or of another shape; nothing has moved.
+        """
         legs = self.legs
         taken, torque = np.array(action, np.float64), np.empty((self.count, 2))
-        _clip(taken, self._torque, torque)
-        height_before = legs.height.copy()
+        if taken.shape != torque.shape or not _clip(taken, self._torque, torque):
+            self._refuse(taken)
+        command, height_before = self.command.copy(), legs.height.copy()
         self.applied_torque = self.plant.drive(torque)
         apex, apex_height, apex_error = self._apexes(height_before)
         reward, terms = self.reward(
             rewards.Transition(
-                legs.state, self.command, taken, self.last_action,
+                legs.state, command, taken, self.last_action,
                 apex, apex_height, legs.foot_clearance,
             )
         )  # fmt: skip
         self.last_action = taken
-        return self._next(reward, terms, apex_error, apex_height)
+        return self._next(reward, terms, command, apex_error, apex_height)
+
+    def _refuse(self, action: Array) -> NoReturn:
+        wrong = f"an array of shape {action.shape}"
+        if action.shape == (self.count, 2):
+            leg = int(np.argmin(np.isfinite(action).all(axis=1)))
+            wrong = f"{action[leg].tolist()} for leg {leg}"
+        raise errors.UsageError(
+            "Actions are torques of hip and knee over the full action's, finite numbers from -1 to"
+            f" 1 in the shape ({self.count}, 2), not {wrong}; check what computes them."
+        )
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse copies, whose arrays would no longer share what they must."""
+        raise errors.UsageError(
+            "An environment cannot be copied or pickled; make another with the same arguments and"
+            " let it go on with its task.restore(...) from this one's task.state()."
+        )
 
     def _apexes(self, height_before: Array) -> tuple[BoolArray, Array, Array]:
         legs = self.legs
@@ -216,12 +251,15 @@ class HoppingTask:
             "last_action": self.last_action.copy(),
             "rises": self._rises.copy(),
             "rng": self._rng.bit_generator.state,
+            "legs_seed": self._legs_seed,
             "reward": self.reward.state(),
             "observation": self.observation.state(),
         }
 
     def restore(self, state: dict[str, Any]) -> Array32:
         """Go on from a ``state``; return the observations, (n, size)."""
+        if (seed := state.get("legs_seed", self._legs_seed)) != self._legs_seed:
+            self._randomize(seed)
         self.legs.restore(state["legs"])
         self.plant.channel.restore(state["channel"])
         self.command[:] = state["command"]
@@ -246,7 +284,9 @@ class HoppingTask:
         self.observation.restart(rows, self._samples, self.plant.channel)
         return self.observation.view(self._samples)
 
-    def _next(self, reward: Array, terms: Array, apex_error: Array, apex_height: Array) -> Step:
+    def _next(
+        self, reward: Array, terms: Array, command: Array, apex_error: Array, apex_height: Array
+    ) -> Step:
         self._tick += 1
         if self._tick >= self._next_switch:
             self._change_commands()
@@ -271,18 +311,19 @@ class HoppingTask:
             observation = self._see_anew(rows)
         return Step(
             observation, reward, terminated, truncated, apex_error, apex_height, height, terms,
-            final_observation, final_privileged,
+            final_observation, final_privileged, command,
         )  # fmt: skip
 
-    def _begin(self, rows: IntArray) -> None:
+    def _begin(self, rows: IntArray, command: Array | None = None) -> None:
         count = len(rows)
-        self.command[rows] = self._draw_commands(count)
+        self.command[rows] = self._draw_commands(count) if command is None else command
         height, q = self._reset_sampler.draw(self.command[rows], self._rng)
         self.legs.place(rows, height, q)
         self._end[rows] = self._tick + self._horizon
         self.last_action[rows], self._rises[rows] = 0.0, False
-        self.reward.reset(rows)
-        if self.options.command_resampling_time is not None:
+        self.reward.restart(rows)
+        self._switch[rows] = np.iinfo(np.int64).max
+        if self.options.command_resampling_time is not None and command is None:
             self._switch[rows] = self._tick + self._draw_holds(count)
         self.plant.channel.restart(rows, self.legs.q[rows], self.legs.qd[rows], self.command[rows])
         self._plan()
@@ -313,13 +354,19 @@ class HoppingTask:
 
 
 @compiled
-def _clip(action: Array, full: Array, torque: Array) -> None:
-    """Clip actions to [-1, 1] and set their torques; ``full`` are those of a full action, (2,)."""
+def _clip(action: Array, full: Array, torque: Array) -> bool:
+    """Clip actions to [-1, 1] and set their torques; return whether all are finite.
+
+    ``full`` are the torques of a full action, (2,).
+    """
     for leg in range(len(action)):
         for joint in range(2):
+            if not math.isfinite(action[leg, joint]):
+                return False
             if abs(action[leg, joint]) > 1:
                 action[leg, joint] = math.copysign(1.0, action[leg, joint])
             torque[leg, joint] = action[leg, joint] * full[joint]
+    return True
 
 
 @compiled

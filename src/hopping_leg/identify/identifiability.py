@@ -6,7 +6,6 @@ own correlation time, else the intervals would be far too narrow. Nor is the mod
 another law of dry friction would make of the values is added to their intervals.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +14,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.identify.parameters import ParameterSet
 
 _NINETY_FIVE = 1.959963984540054
-_UNTOLD = 0.5  # an interval wider than this share of the value, to either side, tells little
+_UNTOLD = 0.5  # an interval wider than this share of value or scale, to either side, tells little
 _TIED = 0.95  # correlation beyond which only a combination of two parameters is known
 _SINGULAR = 1e-10
 
@@ -63,7 +62,7 @@ def identifiability(
     low, high = parameters.bounds
     near = 1e-6 * (high - low)
     at_bound = ((vector - low <= near) | (high - vector <= near)).tolist()
-    statements = _statements(parameters.names, values, half, correlation, at_bound)
+    statements = _statements(parameters, values, half, correlation, at_bound)
     return Identifiability(parameters.names, values, half, correlation, at_bound, statements)
 
 
@@ -96,13 +95,14 @@ def _covariance(jacobian: Array, variance: float) -> tuple[Array, Array]:
 
 
 def _statements(
-    names: Sequence[str], values: Array, half: Array, correlation: Array, at_bound: list[bool]
+    parameters: ParameterSet, values: Array, half: Array, correlation: Array, at_bound: list[bool]
 ) -> list[str]:
-    said = []
-    for name, value, width, stuck in zip(names, values, half, at_bound, strict=True):
+    said, names = [], parameters.names
+    sizes = np.maximum(np.abs(values), parameters.scale)  # a value near zero is known, too
+    for name, value, size, width, stuck in zip(names, values, sizes, half, at_bound, strict=True):
         if not np.isfinite(width):
             said.append(f"These data say nothing about '{name}'.")
-        elif width > _UNTOLD * abs(value):
+        elif width > _UNTOLD * size:
             said.append(
                 f"'{name}' is {value:.3g} only to within {width:.2g}: these data hardly tell it."
             )

@@ -1,11 +1,14 @@
 """Recordings of other loggers, recognised by their columns."""
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import polars as pl
 
+from hopping_leg.errors import RecordingError
 from hopping_leg.identify.recording_format import PAIRS, Quantisation, RecordingMetadata
 
 BOOM_RADIUS = 1.146
@@ -52,6 +55,20 @@ class LogFormat:
     """From the rig's table to columns of the recording beside those that are renamed."""
     own_rate: bool = False
     """Whether the rate, never stated, is that of the clock to three digits, or 1 where unknown."""
+
+    def check_path(self, path: Path) -> None:
+        """Refuse the log of another design of the rig, if its path names one, e.g. designC0.
+
+        Raises:
+            RecordingError: The columns are the rig's, the leg is not.
+        """
+        named = re.search(r"design_?([A-Z])\.?(\d)", str(path))
+        design = f"design {named[1]}.{named[2]}" if named else ""
+        if design not in self.metadata.source:
+            raise RecordingError(
+                f"{path} is of {design} by its name, but '{self.metadata.robot}' is another robot"
+                f" ({self.metadata.source}); write its own robot file, and a sidecar that names it."
+            )
 
     def read(self, table: pl.DataFrame) -> tuple[pl.DataFrame, RecordingMetadata]:
         """Return a recording's table and metadata from the rig's own table."""

@@ -17,6 +17,7 @@ from hopping_leg.identify.plan import FitPlan, check_recordings, make_plan
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.result import Identified, as_json, software_versions
 from hopping_leg.identify.search import Pass, Report, Searcher, SearchOptions
+from hopping_leg.identify.torque_balance import check_balance
 from hopping_leg.identify.windows import SHORTEST, cut, duration, hold_out
 from hopping_leg.io import write_json
 from hopping_leg.robot import NO_MISMATCH, Robot, check_physics
@@ -88,6 +89,8 @@ def identify(
                 f" {unknown_name('fitted parameter', name, plan.parameters.names)}"
             )
     fit, held, split = _split(recordings, validate, plan, seed)
+    for recording in (*recordings, *validate):
+        check_balance(recording, robot)
     windows = cut(fit, plan.window, unscored=plan.unscored)
     objective = Objective(
         tuple(fit), tuple(windows), plan.parameters, plan.scoring, plan.timestep, options.threads
@@ -124,7 +127,7 @@ def _file_bounds(robot: Robot) -> dict[str, tuple[float, float]]:
     """Return bounds that robot files demand: centres of mass on links, peaks above limits."""
     bounds = {}
     for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
-        whole = (1 - 1e-9) * link.length
+        whole = (1 - 1e-9) * link.reach
         if link.com < whole:
             bounds[f"{name}.com"] = (0.25 * link.com, min(4 * link.com, whole))
     for name, motor in (("hip", robot.hip.motor), ("knee", robot.knee.motor)):

@@ -30,6 +30,12 @@ def robot_of(recordings: Sequence[Recording]) -> str:
 def check_recordings(recordings: Sequence[Recording], robot: Robot) -> None:
     """Raise RecordingError for another leg's recordings, or ones without their rig's commands."""
     for recording in recordings:
+        lacking = np.isnan(recording.array("position")).all(axis=0)
+        if lacking.any():
+            raise RecordingError(
+                f"{recording.name} has no positions of the {JOINTS[int(np.argmax(lacking))]}; a fit"
+                " needs those of both joints, as one moves the other: record both."
+            )
         wanted, what = "position_command", "targets of its on-board PD"
         if recording.metadata.onboard == "torque":
             wanted, what = "torque_command", "commanded torques"

@@ -4,12 +4,8 @@ Native files are traces (Parquet) whose header holds the metadata; CSV and forei
 need a sidecar, or come from one of the known rigs.
 """
 
-import csv
-import gzip
 import hashlib
-import io
-import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -21,83 +17,13 @@ import polars as pl
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.errors import RecordingError, UsageError, unknown_name
 from hopping_leg.identify import importers, recording_checks, unit_checks
+from hopping_leg.identify.csv_table import read_csv
 from hopping_leg.identify.recording_format import COLUMNS, PAIRS, RecordingMetadata, float_column
 from hopping_leg.io import parse_toml, read_dataclass
 from hopping_leg.parquet import read_parquet
 from hopping_leg.trace import Trace
 
-_KEY, _FLAGS = "recording", {"true": 1.0, "false": 0.0}
-_PARQUET, _GZIP = b"PAR1", b"\x1f\x8b"
-_MOST_TEXT = 1 << 28  # bytes
-
-
-def _read_csv(content: bytes, origin: str) -> pl.DataFrame:
-    """Return a CSV's table, plain or gzip, numbers as floats, empty fields and NaN as null."""
-    rows = _rows(content, origin)
-    header = [name.strip() for name in next(rows, [])]
-    if not header:
-        raise RecordingError(f"{origin} is empty; record again.")
-    for name in header:
-        if not name or header.count(name) > 1:
-            raise RecordingError(
-                f"{origin}: the header's column '{name}' is nameless or there twice;"
-                " give every column its own name."
-            )
-    body: list[list[str]] = []
-    for row in rows:
-        if len(row) != len(header):
-            raise RecordingError(
-                f"{origin}: row {len(body)} has {len(row)} fields but the header names"
-                f" {len(header)} (column '{header[min(len(row), len(header) - 1)]}');"
-                " a logger that was killed leaves such a row, delete it."
-            )
-        body.append(row)
-    texts = pl.DataFrame(body, schema=dict.fromkeys(header, pl.String), orient="row")
-    return pl.DataFrame([_parse(column, origin) for column in texts])
-
-
-def _rows(content: bytes, origin: str) -> Iterator[list[str]]:
-    if content.startswith(_GZIP):
-        try:
-            with gzip.open(io.BytesIO(content)) as file:
-                content = file.read(_MOST_TEXT + 1)
-        except (OSError, EOFError, zlib.error) as error:
-            raise RecordingError(f"{origin} is not a whole gzip file: {error}.") from error
-    if len(content) > _MOST_TEXT:
-        raise RecordingError(
-            f"{origin} holds more than {_MOST_TEXT >> 20} MiB of text; cut it into shorter ones."
-        )
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise RecordingError(
-            f"{origin} is neither Parquet nor a CSV in UTF-8: byte {error.start} is no text."
-        ) from error
-    reader = csv.reader(io.StringIO(text, newline=""))
-    try:
-        yield from (row for row in reader if row)
-    except csv.Error as error:
-        raise RecordingError(f"{origin}: line {reader.line_num} is not CSV: {error}.") from error
-
-
-def _parse(texts: pl.Series, origin: str) -> pl.Series:
-    words = texts.str.strip_chars()
-    words = words.set(words == "", None)
-    if COLUMNS.get(words.name) is pl.String:
-        return words
-    numbers = words.cast(pl.Float64, strict=False)
-    strange = (words.is_not_null() & numbers.is_null()).arg_true()
-    if strange.len() == 0:
-        return numbers.fill_nan(None)
-    flags = words.str.to_lowercase().replace_strict(_FLAGS, default=None, return_dtype=pl.Float64)
-    numbers = numbers.zip_with(numbers.is_not_null(), flags)
-    for row in strange:
-        if numbers[row] is None:
-            text = words[row] if len(words[row]) <= 20 else f"{words[row][:20]}..."
-            raise RecordingError(
-                f"{origin}: column '{words.name}', row {row}: {text!r} is no number."
-            )
-    return numbers.fill_nan(None)
+_KEY, _PARQUET = "recording", b"PAR1"
 
 
 @dataclass(frozen=True)
@@ -178,7 +104,7 @@ def make_recording(
     inspection = unit_checks.Inspection(table, metadata, name, names or {})
     recording_checks.check_table(inspection)
     trace, warnings = Trace(inspection.table, header or {}), tuple(inspection.warnings)
-    return Recording(trace, metadata, Path(name).name, digest, warnings)
+    return Recording(trace, inspection.metadata, Path(name).name, digest, warnings)
 
 
 def load_recording(path: str | Path) -> Recording:
@@ -199,7 +125,7 @@ def load_recording(path: str | Path) -> Recording:
         raise RecordingError(f"{path} is empty; record again.")
     digest = hashlib.sha256(content).hexdigest()
     native = content.startswith(_PARQUET)
-    table, header = _native(path, content) if native else (_read_csv(content, origin), {})
+    table, header = _native(path, content) if native else (read_csv(content, origin), {})
     sidecar = _sidecar(path)
     names: dict[str, str] = {}
     if sidecar is not None:
@@ -208,6 +134,8 @@ def load_recording(path: str | Path) -> Recording:
         tree = header.pop(_KEY)
         metadata = read_dataclass(RecordingMetadata, tree, origin, error=RecordingError)
     else:
+        if "t" not in table.columns:  # the same logs before they were converted
+            table = table.rename({"time": "t"}, strict=False)
         importer = importers.recognise(table.columns)
         if importer is None:
             raise RecordingError(
@@ -215,6 +143,7 @@ def load_recording(path: str | Path) -> Recording:
                 f" sidecar {sidecar_path(path).name} beside it; its columns are:"
                 f" {', '.join(table.columns[:12])}."
             )
+        importer.check_path(path)
         table, metadata = importer.read(table)
         names = {new: old for old, new in importer.names.items()}
     return make_recording(table, metadata, origin, names=names, header=header, digest=digest)

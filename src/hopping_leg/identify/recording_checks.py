@@ -4,12 +4,14 @@ A check raises, or changes the inspection's table to what can be believed. Rows 
 those of the file, the first below the header being 0.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import polars as pl
 
 from hopping_leg.arrays import BoolArray
 from hopping_leg.errors import RecordingError
-from hopping_leg.identify import unit_checks
+from hopping_leg.identify import angle_checks, clock_checks, torque_checks, unit_checks
 from hopping_leg.identify.recording_format import MEASURED, PAIRS
 from hopping_leg.identify.unit_checks import STALL, Inspection, row_period
 
@@ -31,13 +33,18 @@ def check_table(inspection: Inspection) -> None:
         raise RecordingError(
             f"{inspection.origin} has no column 'time_s'; a recording needs time and position."
         )
-    unit_checks.check_clock(inspection)
+    clock_checks.check_clock(inspection)
     _drop_garbage(inspection)
     _drop_zeros(inspection)
     _drop_startup(inspection)
+    _align_commands(inspection)
+    angle_checks.drop_spikes(inspection)
     unit_checks.check_units(inspection)
-    unit_checks.check_velocity(inspection)
     _check_motion(inspection)
+    angle_checks.check_steadiness(inspection)
+    unit_checks.check_velocity(inspection)
+    angle_checks.check_posture(inspection)
+    torque_checks.check_torque(inspection)
     _warn_of_stalls(inspection)
 
 
@@ -98,6 +105,17 @@ def _drop_startup(inspection: Inspection) -> None:
             f" {columns}); left out"
         )
     inspection.table = inspection.table.slice(rows)
+
+
+def _align_commands(inspection: Inspection) -> None:
+    """Put each command beside the state before it acted; the last row's is unknown."""
+    if inspection.metadata.sample == "before-command":
+        return
+    inspection.metadata = replace(inspection.metadata, sample="before-command")
+    commands = [c for q in PAIRS if q.endswith("_command") for c in PAIRS[q]]
+    commands += [*PAIRS["stiffness"], *PAIRS["damping"]]
+    later = [pl.col(c).shift(-1) for c in commands if c in inspection.table.columns]
+    inspection.table = inspection.table.with_columns(later)[:-1]
 
 
 def _asleep(inspection: Inspection) -> int:

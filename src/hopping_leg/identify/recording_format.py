@@ -38,7 +38,7 @@ COLUMNS: dict[str, type[pl.DataType]] = {
     "contact": pl.Boolean,
     "phase": pl.String,
 } | {column: pl.Float64 for columns in PAIRS.values() for column in columns}
-"""Every column of a recording; only time and one position are required.
+"""Every column of a recording; time and one position are required, a fit needs both.
 
 ``row`` is that of the source file, the first below the header being 0; ``exact_time`` is false
 where the time stamp is a guess; ``height_m`` is the hip axis above the ground, ``base_rise_m`` the

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from hopping_leg.html_page import Column, page_template, svg_uri, table
 from hopping_leg.identify import report_figures as figures
 from hopping_leg.identify.parameters import LegHypothesis
-from hopping_leg.identify.result import Identified, as_json, parameters_json, quality_json
+from hopping_leg.identify.result import Identified, as_json, parameters_json, quality_json, warning
 from hopping_leg.identify.validation import RESTART, Overlay, overlays, rms
 from hopping_leg.io import Tree
 from hopping_leg.robot import JOINTS, load_robot, load_tree
@@ -130,10 +130,11 @@ def _subtitle(identified: Identified) -> str:
     fit, held = (
         sum(float(r.time[-1] - r.time[0]) for r in p) for p in (identified.fit, identified.held)
     )
-    return (
+    about = (
         f"{identified.start.robot.name} on {rigs}; {fit:.0f} s fitted, {held:.0f} s"
         f" held out to judge ({identified.split}); search: {identified.plan.search}"
     )
+    return f"{warning(identified)} {about}".strip()
 
 
 def _provenance(tree: dict[str, Any]) -> dict[str, str]:
@@ -164,7 +165,8 @@ def _interval(row: dict[str, Any]) -> str:
 
 
 def _untold(row: dict[str, Any]) -> bool:
-    return not row["interval_high"] - row["interval_low"] <= abs(row["value"])
+    size = max(abs(row["value"]), row["scale"])
+    return not row["interval_high"] - row["interval_low"] <= size
 
 
 def _looked_up(values: Mapping[str, float], row: dict[str, Any]) -> str:

@@ -13,9 +13,12 @@ from hopping_leg.identify.plan import FitPlan
 from hopping_leg.identify.recording import Recording
 from hopping_leg.identify.validation import Validation
 from hopping_leg.io import plain, replace_at, versions, write_atomically
-from hopping_leg.robot import Robot, load_tree, robot_from_tree, robot_text
+from hopping_leg.robot import JOINTS, Robot, load_tree, robot_from_tree, robot_text
 
 _LATENCY = "reality.latency.command"
+_WORSE = 1.01
+"""Geometric mean of errors after the fit over those before, from which on it is worse."""
+_SHARES = ("load_friction", "ramp")
 _LIBRARIES = ("hopping-leg", "mujoco", "numpy", "scipy", "cma", "polars")
 
 
@@ -59,6 +62,7 @@ def as_json(identified: Identified) -> dict[str, Any]:
         "start_validation": validation_json(identified.start_validation),
         "validation_by_rig": {r: validation_json(v) for r, v in identified.by_rig.items()},
         "quality": quality_json(identified),
+        "warning": warning(identified),
         "parameters": parameters_json(identified),
         "correlations": {"names": known.names, "matrix": known.correlation.tolist()},
         "cannot_tell": known.statements,
@@ -125,8 +129,26 @@ def quality_json(identified: Identified) -> list[dict[str, Any]]:
     ]
 
 
+def warning(identified: Identified) -> str:
+    """Return a sentence if the fit errs more than its start on held-out data, else ""."""
+    rows = quality_json(identified)
+    pairs = [(row[f"{j}_before"], row[f"{j}_after"]) for row in rows for j in JOINTS]
+    known = [math.log(after / before) for before, after in pairs if before > 0 and after > 0]
+    ratio = math.exp(sum(known) / len(known)) if known else 1.0
+    if ratio < _WORSE:
+        return ""
+    return (
+        f"On data that it has not seen this fit errs {ratio:.3g} times as much as what it began"
+        " with: do not use it; check the recordings' signs, units and gains, or fit fewer"
+        " parameters."
+    )
+
+
 def parameters_json(identified: Identified) -> list[dict[str, Any]]:
-    """Return a record per parameter: value, 95 % interval, start and bounds, SI."""
+    """Return a record per parameter: value, 95 % interval, start and bounds, SI.
+
+    Intervals end where what is possible does: most numbers at zero, shares at one, too.
+    """
     known = identified.identifiability
     first = {p.name: p.start for p in identified.plan.parameters.parameters}
     values, halves = known.values.tolist(), known.half_width.tolist()
@@ -136,8 +158,11 @@ def parameters_json(identified: Identified) -> list[dict[str, Any]]:
             "name": p.name,
             "unit": p.unit,
             "value": value,
-            "interval_low": value - half,
-            "interval_high": value + half,
+            "interval_low": max(value - half, 0.0 if p.low >= 0 else -math.inf),
+            "interval_high": min(value + half, 1.0 if p.name.endswith(_SHARES) else math.inf)
+            if math.isfinite(half)
+            else half,
+            "scale": p.scale,
             "start": first.get(p.name, identified.start.get(p.name)),
             "bound_low": p.low,
             "bound_high": p.high,
@@ -197,7 +222,8 @@ def _place(name: str) -> str:
 
 def _comment(identified: Identified, origin: str) -> str:
     """Return what stands above the tables: provenance, quality, and what stays unknown."""
-    lines = [f"Identified by `hop identify` from {origin}; numbers without 'identified' are its."]
+    lines = [text for text in (warning(identified),) if text]
+    lines += [f"Identified by `hop identify` from {origin}; numbers without 'identified' are its."]
     for use, recordings in (("Fitted to", identified.fit), ("Judged by", identified.held)):
         lines += [f"{use}: {r.name}, sha256 {r.digest or 'unknown'}" for r in recordings]
     lines.append(f"Split: {identified.split}; seed {identified.seed}; {identified.plan.search}.")

@@ -150,6 +150,9 @@ class _WindowGroup:
         for n, recording in enumerate(self._recordings):
             stated = recording.metadata.torque_limit or table["torque_limit"][:, n]
             table["torque_limit"][:, n] = np.where(np.isnan(fitted), stated, fitted)
+            seen = recording.array("position")  # where a joint has been, nothing stops it
+            table["stop_lower"][:, n] = np.fmin(table["stop_lower"][:, n], np.nanmin(seen, axis=0))
+            table["stop_upper"][:, n] = np.fmax(table["stop_upper"][:, n], np.nanmax(seen, axis=0))
         return table
 
     def _drives(self, hypotheses: Sequence[parameters.LegHypothesis]) -> Records:

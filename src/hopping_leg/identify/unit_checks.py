@@ -1,10 +1,11 @@
-"""What the loader refuses: time that runs backwards, numbers in other units than SI.
+"""What the loader knows of a table, and what it refuses: numbers in other units than SI.
 
 Rows in messages are those of the file, the first below the header being 0.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NoReturn
 
 import numpy as np
@@ -13,7 +14,7 @@ import polars as pl
 from hopping_leg.arrays import Array
 from hopping_leg.errors import RecordingError, RobotError
 from hopping_leg.identify.recording_format import PAIRS, RecordingMetadata, float_column
-from hopping_leg.robot import load_robot
+from hopping_leg.robot import Robot, load_robot
 
 
 @dataclass
@@ -29,6 +30,14 @@ class Inspection:
     """The file's own column for a recording's column, where they differ."""
     warnings: list[str] = field(default_factory=list)
     """What was strange so far, a sentence each."""
+
+    @cached_property
+    def robot(self) -> Robot | None:
+        """The robot that the recording is filed under, None if it is not here."""
+        try:
+            return load_robot(self.metadata.robot)
+        except (RobotError, OSError):
+            return None
 
     def named(self, column: str) -> str:
         """Return a column as the file calls it, in quotes."""
@@ -51,6 +60,11 @@ class Inspection:
         """Note something strange; the sentence gets the file and a full stop."""
         self.warnings.append(f"{self.origin}: {sentence}.")
 
+    def set(self, column: str, values: Array) -> None:
+        """Give a column other values, (ticks,); NaN stands for nothing."""
+        kept = pl.Series(column, values).fill_nan(None)
+        self.table = self.table.with_columns(kept)
+
     def drop(self, column: str) -> None:
         """Make a column as if it had not been recorded."""
         self.table = self.table.with_columns(pl.lit(None, self.table[column].dtype).alias(column))
@@ -58,13 +72,11 @@ class Inspection:
 
 STALL = 2.0
 """A gap between rows of more than this many periods is a stall."""
-_TIME_UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1 / 60}
-_SPARSEST = 20.0  # periods per row beyond which the rate or the time's unit must be wrong
 _DEGREE, _TURN = 180 / np.pi, 1 / (2 * np.pi)
 _POSITION_UNITS = {"degrees": _DEGREE, "revolutions": _TURN}
 _VELOCITY_UNITS = {"degrees/s": 1 / _DEGREE, "revolutions/s": 1 / _TURN, "rpm": 1 / _TURN / 60}
 _HALF_TURNS = 12.5  # largest distance of a joint from its middle, rad, two turns; degrees exceed it
-_FASTEST = 150.0
+FASTEST = 150.0
 """Speed of a joint, rad/s, far beyond any leg's motor; degrees per second exceed it."""
 _HIGHEST = 5.0  # base height, m; millimetres exceed it
 _STRONGEST = 5.0  # torque in units of the motor's peak; mN m exceed it
@@ -82,45 +94,14 @@ def row_period(time: np.ndarray, period: float) -> float:
     return max(period, float(np.median(np.diff(time)))) if len(time) > 1 else period
 
 
-def check_clock(inspection: Inspection) -> None:
-    """Refuse time that is missing, not finite, not increasing or in another unit."""
-    time, where = inspection.floats("time_s"), inspection.named("time_s")
-    bad = np.flatnonzero(~np.isfinite(time))
-    if len(bad):
-        inspection.refuse(
-            f"{where} has no time in row {inspection.row(bad[0])}; every row needs one."
-        )
-    steps = np.diff(time)
-    back = np.flatnonzero(steps <= 0)
-    if len(back):
-        index = back[0] + 1
-        inspection.refuse(
-            f"{where} does not increase in row {inspection.row(index)}:"
-            f" {time[index]:.9g} s comes after {time[index - 1]:.9g} s; remove the row."
-        )
-    if not len(steps):
-        return
-    step, metadata = float(np.median(steps)), inspection.metadata
-    periods = step * metadata.rate_hz
-    if not 0.5 <= periods <= _SPARSEST:
-        unit = next((u for u, f in _TIME_UNITS.items() if 0.8 < periods / f < 1.25), None)
-        guess = f"the time seems to be in {unit}" if unit else "one of the two is wrong"
-        inspection.refuse(
-            f"{where} steps by {step:.3g} from row to row but the metadata's rate_hz ="
-            f" {metadata.rate_hz:g} means {metadata.period:.3g} s; {guess}."
-        )
-
-
 def check_units(inspection: Inspection) -> None:
     """Refuse positions, speeds, torques and heights that cannot be rad, rad/s, N m and m."""
-    try:
-        robot = load_robot(inspection.metadata.robot)
+    strongest, robot = [_COMMON_PEAK] * 2, inspection.robot
+    if robot is not None:
         strongest = [j.motor.peak_torque * j.belt_ratio for j in (robot.hip, robot.knee)]
-    except (RobotError, OSError):
-        strongest = [_COMMON_PEAK] * 2
     joints = (
         ("position", [_HALF_TURNS] * 2, "rad", "degrees"),
-        ("velocity", [_FASTEST] * 2, "rad/s", "degrees/s"),
+        ("velocity", [FASTEST] * 2, "rad/s", "degrees/s"),
         ("torque", [_STRONGEST * peak for peak in strongest], "N m", "mN m"),
     )
     for quantity, limits, unit, guess in joints:

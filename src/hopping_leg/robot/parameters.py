@@ -53,6 +53,14 @@ class Link:
     """Distance of the centre of mass from the link's upper joint, along the link."""
     inertia: float = field(metadata={"unit": "kg m2"})
     """Inertia about the centre of mass, around the joint's axis (the paper's Z)."""
+    extent: float = quantity("m", 0.0, zero=True)
+    """How far from the upper joint its mass reaches where a weight sticks out beyond its end. No
+    physics depends on it: it says where the centre of mass may be, and how large the inertia."""
+
+    @property
+    def reach(self) -> float:
+        """How far from the upper joint its mass reaches, m."""
+        return max(self.length, self.extent)
 
 
 @dataclass(frozen=True)
@@ -202,6 +210,8 @@ class Robot:
         del values["name"], values["description"], values["kind"], values["hardware"]
         if self.reality.neutral:
             del values["reality"]
+        for link in ("thigh", "shank"):
+            del values[link]["extent"]
         for joint, name in itertools.product(JOINTS, ("load_friction", "torque_gain")):
             if values[joint][name] == Joint.__dataclass_fields__[name].default:
                 del values[joint][name]

@@ -7,7 +7,7 @@ from operator import attrgetter
 from hopping_leg.errors import RobotError, unknown_name
 from hopping_leg.io import Tree
 from hopping_leg.robot.hardware import contradictions, speed_constant
-from hopping_leg.robot.model import TIMESTEP
+from hopping_leg.robot.model import GRAVITY, TIMESTEP
 from hopping_leg.robot.parameters import JOINTS, KINDS, Robot
 
 _REACH = [f"{joint}.{end}" for joint in JOINTS for end in ("lower", "upper")]
@@ -26,13 +26,43 @@ for _joint in JOINTS:
     _at_output = [f"{_joint}.motor.{name}" for name in _AT_OUTPUT]
     _DEPENDENTS[f"{_joint}.motor.gear_ratio"] = [_armature, *_losses, *_at_output]
 
-_PLAUSIBLE = {
-    "base.mass": 50.0,
-    **dict.fromkeys(("thigh.mass", "shank.mass"), 50.0),
-    **dict.fromkeys(("thigh.length", "shank.length"), 2.0),
-    **dict.fromkeys(("hip.motor.rotor_inertia", "knee.motor.rotor_inertia"), 5e-3),
+_PLAUSIBLE: dict[str, tuple[float, float]] = {
+    "mass": (5e-3, 20.0),
+    "length": (0.03, 1.0),
+    "com": (5e-4, 1.0),
+    "radius": (1e-3, 0.2),
+    "rotor_inertia": (1e-7, 5e-3),
+    "armature": (1e-6, 0.5),
+    "gear_ratio": (1.0, 200.0),
+    "belt_ratio": (1.0, 10.0),
+    "peak_torque": (0.1, 300.0),
+    "torque_limit": (0.05, 300.0),
+    "rated_torque": (0.05, 300.0),
+    "no_load_speed": (2.0, 200.0),
+    "time_constant": (0.0, 0.5),
+    "damping_ratio": (0.05, 20.0),
 }
-"""Largest values, SI, that a leg on a rail may have where they are no mistake of the unit."""
+"""Least and largest values, SI, that a leg on a rail may have, by the last part of the path."""
+_SLIPS = {
+    "kg": {1e-3: "g", 0.45359: "lb"},
+    "m": {1e-3: "mm", 1e-2: "cm", 0.0254: "inches"},
+    "kg m2": {1e-9: "g mm2 or kg um2", 1e-7: "g cm2", 1e-6: "kg mm2", 1e-4: "kg cm2"},
+    "N m": {1e-3: "mN m", 1e-2: "N cm", 0.0980665: "kgf cm"},
+    "rad/s": {math.pi / 30: "rpm", math.pi / 180: "degrees/s", 2 * math.pi: "turns/s"},
+    "rad": {math.pi / 180: "degrees", 2 * math.pi: "turns"},
+    "s": {1e-3: "ms", 1e-6: "us"},
+    "1": {},
+}
+"""What one of another unit is, SI."""
+_WIDEST = {"leg": 2 * math.pi, "pendulum": 12 * math.pi}
+"""Largest joint limits, rad, by the robot's kind."""
+_HEAVIEST = 40.0  # kg, of a link per metre
+_CROSSWAYS = 1.1  # share of an inertia that the width of a link and its motor may add
+_LEAST_GYRATION = 0.05  # radius of gyration over length that a link hardly falls below
+_ARMATURES = (5e-3, 20.0)  # armature over what rotor, gear and belt reflect
+_SIZES = ("mass", "length", "com", "inertia", "radius", "ratio", "_torque", "_limit", "_speed")
+"""Ends of the paths of numbers that one robot hardly has ten times of another's."""
+_EXACTLY = 0.01  # of a power of ten, within which a changed number has lost its decimal point
 
 _ROUNDING = 1.001
 _STOPS = {f"{joint}.stop_{end}" for joint in JOINTS for end in ("lower", "upper")}
@@ -66,6 +96,15 @@ def doubts_of_inheritance(chain: list[tuple[str, Tree]], resolved: list[Tree]) -
     ``chain`` are the files with their own tables, the root first, ``resolved`` all tables of each.
     """
     for level, (name, own) in enumerate(chain[1:], 1):
+        before = {path: entry["value"] for path, entry in numbers(resolved[level - 1])}
+        for path, entry in numbers(own):
+            value, was = entry["value"], before.get(path, 0.0)
+            power = math.log10(value / was) if value * was > 0 else 0.0
+            if path.endswith(_SIZES) and round(power) and abs(power - round(power)) < _EXACTLY:
+                yield (
+                    f"{name}: '{path}' is {value:g} {entry['unit']}, {10.0 ** round(power):g} times"
+                    f" that of {chain[level - 1][0]}; is its decimal point right?"
+                )
         stated_later = {path for _, tree in chain[level + 1 :] for path, _ in numbers(tree)}
         unfit = unfit_numbers(resolved[level - 1], own)
         unfit = {path: cause for path, cause in unfit.items() if path not in stated_later}
@@ -81,18 +120,76 @@ def doubts_of_inheritance(chain: list[tuple[str, Tree]], resolved: list[Tree]) -
 
 def doubts_of_values(robot: Robot, stated: Tree, origin: str) -> Iterator[str]:
     """Yield sentences about numbers that look like another unit or are not ``stated``."""
-    for path, most in _PLAUSIBLE.items():
-        if (value := attrgetter(path)(robot)) > most:
-            yield f"{origin}: '{path}' is {value:g} but hardly above {most:g}; is its unit right?"
-    for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
-        if link.inertia > link.mass * link.length**2:
+    for path, entry in numbers(stated):
+        name = path.rpartition(".")[2]
+        low, high = _PLAUSIBLE.get(name, (-math.inf, math.inf))
+        if name in ("lower", "upper", "stop_lower", "stop_upper"):
+            low, high = -_WIDEST[robot.kind], _WIDEST[robot.kind]
+        if path.startswith("reality.") or low <= entry["value"] <= high:
+            continue
+        guess = _slip(entry["value"], entry["unit"], low, high)
+        yield (
+            f"{origin}: '{path}' is {entry['value']:g} {entry['unit']} but hardly beyond {low:g} to"
+            f" {high:g}; {guess}?"
+        )
+    balls = (robot.base.radius, robot.knee_cap.radius, robot.foot.radius)
+    links = (("thigh", robot.thigh), ("shank", robot.shank))
+    for (name, link), above, below in zip(links, balls, balls[1:], strict=False):
+        # the farther apart the two ends at which all mass sits, the larger is the inertia
+        reach = link.reach + below - link.com
+        most = _CROSSWAYS * link.mass * (link.com + above) * reach
+        least = link.mass * (_LEAST_GYRATION * link.length) ** 2
+        if not least <= link.inertia <= most:
+            radius = math.sqrt(link.inertia / link.mass)
             yield (
-                f"{origin}: '{name}.inertia' exceeds '{name}.mass' times the square of"
-                f" '{name}.length' ({link.mass * link.length**2:.3g} kg m2); check all three."
+                f"{origin}: '{name}.inertia' is {link.inertia:g} kg m2, a radius of gyration of"
+                f" {radius:.3g} m on a link of {link.length:g} m, whose mass and centre of mass"
+                f" allow {least:.2g} to {most:.2g} kg m2;"
+                f" {_slip(link.inertia, 'kg m2', least, most)}? State '{name}.extent' where a"
+                " weight sticks out."
             )
+        if link.mass > _HEAVIEST * link.length:
+            yield (
+                f"{origin}: '{name}.mass' is {link.mass:g} kg on {link.length:g} m; "
+                f"{_slip(link.mass, 'kg', 0.0, _HEAVIEST * link.length)}?"
+            )
+    for name, joint in (("hip", robot.hip), ("knee", robot.knee)):
+        ratio = joint.motor.gear_ratio * joint.belt_ratio
+        reflected = joint.motor.rotor_inertia * ratio**2
+        if not _ARMATURES[0] <= joint.armature / reflected <= _ARMATURES[1]:
+            yield (
+                f"{origin}: '{name}.armature' is {joint.armature:.3g} kg m2, but rotor, gear and"
+                f" belt reflect {reflected:.3g}; is the rotor's inertia that behind the gear?"
+            )
+        for path, torque in (
+            (f"{name}.friction", joint.friction),
+            (f"{name}.damping", joint.damping * joint.no_load_speed),
+        ):
+            if torque > joint.torque_limit:
+                yield (
+                    f"{origin}: '{path}' takes more torque than the motor gives,"
+                    f" {joint.torque_limit:g} N m; check both."
+                )
+    weight = robot.mass * GRAVITY
+    if robot.rail.friction > weight:
+        yield (
+            f"{origin}: 'rail.friction' is {robot.rail.friction:g} N, more than the leg's weight,"
+            f" {weight:.3g}; it would hang on the rail."
+        )
     missing = sorted(_STOPS - {path for path, _ in numbers(stated)})
     if missing and robot.kind == "leg":
         yield f"{origin} does not state {', '.join(missing)}; leg V2's mechanical stops are taken."
+
+
+def _slip(value: float, unit: str, low: float, high: float) -> str:
+    """Return the likely reason why a value lies beyond bounds, as part of a sentence."""
+    for factor, other in _SLIPS[unit].items():
+        if low <= value * factor <= high:
+            return f"is it in {other}"
+    if unit == "1" and low <= 1 / value <= high:
+        return "is it inverted"
+    powers = [n for n in (1, 2, 3, -1, -2, -3) if low <= value / 10**n <= high]
+    return "is its decimal point right" if powers else "is its unit right"
 
 
 def check_physics(robot: Robot, origin: str) -> None:
@@ -121,7 +218,8 @@ def _contradictions(robot: Robot) -> Iterator[str]:
             if inner > outer:
                 yield (
                     f"'{name}.{key}' ({getattr(joint, key):g} rad) lies beyond the mechanical stop"
-                    f" '{name}.stop_{key}' ({getattr(joint, f'stop_{key}'):g}); state both."
+                    f" '{name}.stop_{key}' ({getattr(joint, f'stop_{key}'):g});"
+                    f" {'is it in degrees?' if inner - outer > math.tau else 'state both.'}"
                 )
         for smaller in ("torque_limit", "rated_torque"):
             limit = getattr(joint.motor, smaller)
@@ -150,7 +248,8 @@ def _contradictions(robot: Robot) -> Iterator[str]:
                 " it gets never turns; give less than 1."
             )
     for name, link in (("thigh", robot.thigh), ("shank", robot.shank)):
-        yield from _above(f"{name}.com", link.com, f"{name}.length", link.length, "m")
+        end = f"{name}.{'extent' if link.extent else 'length'}"
+        yield from _above(f"{name}.com", link.com, end, link.reach, "m")
     for name in _STOPS if robot.kind == "leg" else ():
         if abs(stop := attrgetter(name)(robot)) > 2 * math.pi:
             yield f"'{name}' is {stop:g} rad but no leg's joint turns more than once, 6.28 rad."
