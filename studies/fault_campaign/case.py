@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from hopping_leg.controllers.command_schedule import CommandSchedule
+from hopping_leg.controllers.fallback import with_fallback
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.deploy.drive_info import inspect
 from hopping_leg.deploy.hardware_trials import Performance, header_of, perform
@@ -132,7 +133,7 @@ class Scene:
         """
         controller = load_controller(self.case.controller, self.robot)
         sequence = MotionSequence(
-            controller,
+            with_fallback(controller, self.robot),
             CommandSchedule(((self.height, 100.0),)),
             hopping_poses(self.robot),
             SoftLimiter(self.robot, SoftLimits()),

@@ -25,7 +25,7 @@ from pathlib import Path
 import tyro
 
 from hopping_leg.cli import motors, options
-from hopping_leg.controllers import command_schedule, joint_pd, policy, protocol, registry
+from hopping_leg.controllers import command_schedule, fallback, joint_pd, policy, protocol, registry
 from hopping_leg.deploy import hardware_trials, height_page, keyboard, safety_limits, stop_reasons
 from hopping_leg.deploy.loop import ControlLoop
 from hopping_leg.deploy.motion_sequence import MotionSequence, SequenceTiming, hopping_poses
@@ -73,12 +73,15 @@ def run(args: Deploy) -> None:
     robot.require_leg()
     done = _perform(args, robot, *_plan(args, robot))
     cause = done.outcome.supervisor.stop_cause
+    events = done.trace.header["events"]
     options.say(
-        *done.notices, f"{cause} {done.outcome.ticks} ticks, {done.outcome.skipped} left out."
+        *done.notices,
+        *(event["fallback"] for event in events if "fallback" in event),
+        f"{cause} {done.outcome.ticks} ticks, {done.outcome.skipped} left out.",
     )
     options.say_written(done.path)
     if cause.reason not in (stop_reasons.Reason.FINISHED, stop_reasons.Reason.OPERATOR_STOP):
-        errors = [event.get("controller_error", "") for event in done.trace.header["events"]]
+        errors = [event.get("controller_error", "") for event in events]
         words = [f"The leg was stopped: {cause}", *errors, _emulated(args, cause), done.complaint]
         raise HardwareError(" ".join(filter(None, words)))
     if done.complaint:
@@ -151,7 +154,8 @@ def _perform(
         poses = replace(poses, start=controller.position[0])
     limiter = SoftLimiter(robot, SoftLimits()) if args.soft_limits else None
     timing = SequenceTiming(hop=seconds)
-    sequence = MotionSequence(controller, height or schedule, poses, limiter, timing)
+    hops = fallback.with_fallback(controller, robot)
+    sequence = MotionSequence(hops, height or schedule, poses, limiter, timing)
     limits = safety_limits.hopping_limits(robot, rate)
 
     @contextlib.contextmanager

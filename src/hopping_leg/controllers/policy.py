@@ -31,12 +31,17 @@ MEMORY, NEXT_MEMORY = "memory", "next_memory"
 """Input and output of a graph that remembers: what it gave at a tick is what it gets at the next,
 and zeros at first."""
 
+INPUTS = ("hip position", "knee position", "hip velocity", "knee velocity")
+"""What a card's ``input_low`` and ``input_high`` bound."""
+
 OtherRobot = Literal["refuse", "warn", "accept"]
 """What to do with a policy that was trained for another robot."""
 
 _log = logging.getLogger(__name__)
 _ROUNDING = 1e-9
 _MOST_RATE = 1e4  # Hz
+_MARGIN = 0.25
+"""Share of its range of inputs by which they may lie beyond it."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +70,11 @@ class Card:
     """Control steps of experience."""
     versions: dict[str, str] = field(default_factory=dict)
     """Versions of the libraries that trained it."""
+    input_low: tuple[float, ...] = ()
+    """Smallest of what its joints did in the trials that selected it: positions of hip and knee,
+    rad, then their velocities, rad/s; empty where nothing was stored."""
+    input_high: tuple[float, ...] = ()
+    """Largest of the same."""
 
     def __post_init__(self) -> None:
         hip, knee = self.torque_scale
@@ -78,6 +88,12 @@ class Card:
                     f"'{name}' of its card is {getattr(self, name)}, which no policy has; export"
                     " the policy again."
                 )
+        sizes = {len(self.input_low), len(self.input_high)}
+        if len(sizes) > 1 or not sizes <= {0, len(INPUTS)} or self.input_low > self.input_high:
+            raise PolicyError(
+                f"'input_low' and 'input_high' of its card must hold {len(INPUTS)} rising pairs, or"
+                " nothing; export the policy again."
+            )
 
     def to_json(self) -> str:
         """Return the card as stored in the file."""
@@ -234,6 +250,18 @@ class Policy:
             (self._memory,) = memory
         self._torque = torque.astype(np.float64)
         return self._torque.copy()
+
+    def outside(self, measurement: Measurement) -> str:
+        """Return which input of the first leg is far beyond all that training met, or ""."""
+        card = self.card
+        values = np.concatenate([measurement.q[0, 0], measurement.qd[0, 0]])
+        for name, value, low, high in zip(
+            INPUTS, values, card.input_low, card.input_high, strict=False
+        ):
+            margin = _MARGIN * (high - low)
+            if not low - margin <= value <= high + margin:
+                return f"{name} {value:.3g}, trained from {low:.3g} to {high:.3g}"
+        return ""
 
     def internals(self) -> dict[str, Array]:
         """Return nothing: a network has no state to show."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hopping_leg.controllers.fallback import Fallback
 from hopping_leg.controllers.protocol import SAMPLES, Controller, Measurement
 from hopping_leg.deploy import flight_recorder, realtime, safety_limits, stop_reasons
 from hopping_leg.deploy.drive_link import BRAKE, STOP, DriveCommand, DriveLink, Exchange, Reply
@@ -129,6 +130,8 @@ class ControlLoop:
         self._internals = _internal_names(sequence.controller)
         self._stop, self._complaint = threading.Event(), ""
         self._asked, self._took, self._abandoned = math.inf, 0.0, False
+        if isinstance(sequence.controller, Fallback):
+            sequence.controller.report = self._note_fallback
 
     @property
     def waited(self) -> float:
@@ -247,6 +250,9 @@ class ControlLoop:
             self._took, self._asked = self.waited, math.inf
             if self._abandoned:
                 raise SystemExit
+
+    def _note_fallback(self, sentence: str) -> None:
+        self._recorder.event(time_s=self._asked, fallback=sentence)
 
     def _read_internals(self) -> list[float]:
         found = self._sequence.controller.internals()

@@ -208,8 +208,16 @@ def build_policy(network: Network, card: Card) -> bytes:
     return content
 
 
-def with_command_map(content: bytes, correction: CommandMap, card: Card | None = None) -> bytes:
-    """Return a policy file whose command is corrected before anything else, if asked with a card.
+def with_card(content: bytes, card: Card) -> bytes:
+    """Return a policy file with another card."""
+    model = onnx.load_from_string(content)
+    helper.set_model_props(model, {METADATA_KEY: card.to_json()})
+    carded: bytes = model.SerializeToString(deterministic=True)
+    return carded
+
+
+def with_command_map(content: bytes, correction: CommandMap) -> bytes:
+    """Return a policy file whose command is corrected before anything else.
 
     The shift is the first one and, for every height h, the change of its slope there times
     max(command - h, 0).
@@ -234,8 +242,6 @@ def with_command_map(content: bytes, correction: CommandMap, card: Card | None =
     del inner.node[:]
     inner.node.extend(nodes)
     inner.initializer.extend(graph.weights)
-    if card is not None:
-        helper.set_model_props(model, {METADATA_KEY: card.to_json()})
     onnx.checker.check_model(model, full_check=True)
     mapped: bytes = model.SerializeToString(deterministic=True)
     return mapped

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from hopping_leg.controllers.hardware_trial import MEASURED
 from hopping_leg.controllers.protocol import Controller
 from hopping_leg.controllers.rollout import Rollout, RolloutConfig, rollout
 from hopping_leg.hop_detection import HopMeasurement, measure_hops
@@ -26,6 +27,9 @@ CALIBRATION_SEEDS = (505, 506, 507, 508)
 
 _SPACING = 0.01
 """Spacing of heights at which nothing between two others should be missed, m."""
+
+_RANGE_SECONDS = 10.0
+"""Of the trials that tell a policy's range of inputs."""
 
 SETTLE = 0.2
 """Share of a trial at its start that does not count."""
@@ -83,6 +87,16 @@ def evaluate_policy(
         _command_result(runs, command, range(index * legs, (index + 1) * legs), rate)
         for index, command in enumerate(commands)
     ]
+
+
+def input_range(
+    controller: Controller, robot: Robot, commands: tuple[float, ...], rate: float
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the least and the largest ``controllers.policy.INPUTS`` in trials at commands, m."""
+    schedule = np.tile(commands, (round(_RANGE_SECONDS * rate), 1))
+    run = rollout(controller, RolloutConfig(robot, rate=rate), schedule, FINAL_SEEDS[0])
+    columns = [run.data[name] for pair in ("q", "qd") for name in MEASURED[pair]]
+    return tuple(float(c.min()) for c in columns), tuple(float(c.max()) for c in columns)
 
 
 def every_centimetre(commands: Sequence[float]) -> tuple[float, ...]:

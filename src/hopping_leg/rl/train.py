@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -205,7 +205,11 @@ class Trainer:
             )  # fmt: skip
             selected |= self.selection.final(content)
             self.end_stage(selected["worst_score_m"])
-        return content, selected
+        policy = Policy(content, "the selected policy", recipe.name)
+        heights = policy_evaluation.every_centimetre(recipe.task.command_bounds)
+        low, high = policy_evaluation.input_range(policy, self.robot, heights, recipe.task.rate)
+        card = replace(policy.card, input_low=low, input_high=high)
+        return onnx_export.with_card(content, card), selected
 
     @contextmanager
     def _timed(self, name: str) -> Iterator[None]:

@@ -63,6 +63,8 @@ class Hardware:
     """Capacitance of the bus; by default the most that mjbots' power distributor may precharge."""
     temperature_limit: float = quantity("deg C", 65.0)
     """Highest temperature of the drives' electronics; they derate from 50 and trip at 75."""
+    fallback: str = "energy-shaping"
+    """Controller that takes over where a policy cannot go on; empty lets the drives brake."""
 
     def __post_init__(self) -> None:
         for name, default_id in (("hip", 1.0), ("knee", 2.0)):

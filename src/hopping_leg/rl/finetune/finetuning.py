@@ -208,7 +208,9 @@ class Finetuning:
             steps=policy.card.steps + round(60 * self.minutes * policy.card.rate),
         )
         command_map = onnx_export.CommandMap(self._options.commands, tuple(shifts))
-        return onnx_export.with_command_map(policy.content, command_map, card)
+        return onnx_export.with_card(
+            onnx_export.with_command_map(policy.content, command_map), card
+        )
 
 
 def _numbers(judged: Score, prefix: str) -> Row:

@@ -1,0 +1,85 @@
+"""A chain of controllers, each of which takes over where the one before it cannot go on."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.controllers import registry
+from hopping_leg.controllers.policy import Policy
+from hopping_leg.controllers.protocol import Controller, Measurement
+from hopping_leg.robot import Robot
+
+_OUTSIDE_TICKS = 3
+"""Ticks in a row in which inputs are outside the range of the training before it counts."""
+
+
+class Fallback:
+    """A policy with another controller behind it, for one leg; implements ``Controller``.
+
+    It hands over, once and for good until ``reset``, where the policy raises an error, asks for a
+    torque that is no number, or meets inputs far outside the range of its training
+    (``Policy.outside``). What the other controller raises ends the run.
+
+    Args:
+        policy: Controls the leg as long as it can.
+        other: Takes over.
+
+    Attributes:
+        report: Called with the reason of a hand-over, a sentence.
+    """
+
+    def __init__(self, policy: Policy, other: Controller) -> None:
+        self.policy, self.other, self.name = policy, other, policy.name
+        self.report: Callable[[str], None] = lambda _: None
+        self.reset(1)
+
+    def reset(self, count: int) -> None:
+        """Forget everything; the policy begins again. ``count`` must be 1."""
+        self.policy.reset(count)
+        self.other.reset(count)
+        self._outside, self._active = 0, 0
+
+    def act(self, measurement: Measurement) -> Array:
+        """Return joint torques, N m, (1, 2)."""
+        if self._active == 0:
+            torque, reason = self._of_policy(measurement)
+            if not reason:
+                return torque
+            self._active = 1
+            self.report(f"{self.other.name} took over from {self.policy.name}: {reason}.")
+        return self.other.act(measurement)
+
+    def internals(self) -> dict[str, Array]:
+        """Return which controller acts: 0 for the policy, 1 for the other."""
+        return {"fallback": np.array([float(self._active)])}
+
+    def _of_policy(self, measurement: Measurement) -> tuple[Array, str]:
+        """Return the policy's torques and why they cannot be taken, or ""."""
+        unknown = np.full((1, 2), math.nan)
+        beyond = self.policy.outside(measurement)
+        self._outside = self._outside + 1 if beyond else 0
+        if self._outside >= _OUTSIDE_TICKS:
+            return unknown, beyond
+        try:
+            torque = self.policy.act(measurement)
+        except Exception as error:  # the other controller goes on, whatever it was
+            return unknown, str(error).rstrip(".") or type(error).__name__
+        return torque, "" if np.isfinite(
+            torque
+        ).all() else "it asked for a torque that is no number"
+
+
+def with_fallback(controller: Controller, robot: Robot) -> Controller:
+    """Return a policy with what its robot's file names as ``hardware.fallback`` behind it.
+
+    Other controllers, and policies for a robot that names none, are returned as they are.
+
+    Raises:
+        UsageError: There is no such controller.
+    """
+    if not isinstance(controller, Policy) or not robot.hardware.fallback:
+        return controller
+    rate = controller.card.rate
+    return Fallback(controller, registry.load_controller(robot.hardware.fallback, robot, rate=rate))

@@ -1,0 +1,103 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from hopping_leg.controllers import RolloutConfig
+from hopping_leg.controllers.fallback import Fallback, with_fallback
+from hopping_leg.controllers.policy import Card, Policy
+from hopping_leg.controllers.registry import load_controller, load_policy
+from hopping_leg.controllers.rollout import rollout
+from hopping_leg.errors import PolicyError, UsageError
+from hopping_leg.hop_detection import measure_hops
+from hopping_leg.rl.onnx_export import with_card
+from hopping_leg.robot import load_robot
+from hopping_leg.sim.channel import Measurement
+
+FAST = load_policy("fast")
+ROBOT = load_robot(FAST.card.robot)
+LOW, HIGH = (0.0, -2.0, -10.0, -20.0), (1.0, -0.5, 10.0, 20.0)
+
+
+def ranged():
+    card = dataclasses.replace(FAST.card, input_low=LOW, input_high=HIGH)
+    return Policy(with_card(FAST.content, card), "ranged", "ranged")
+
+
+def fallback(policy):
+    chain, said = Fallback(policy, load_controller("energy-shaping", ROBOT)), []
+    chain.report = said.append
+    return chain, said
+
+
+def measurement(q=(0.5, -1.2), qd=(0.0, 0.0)):
+    return Measurement(
+        np.tile(q, (1, 3, 1)), np.tile(qd, (1, 3, 1)), np.full((1, 3), 0.3), np.zeros((1, 3))
+    )
+
+
+def test_a_card_keeps_the_range_of_inputs_and_refuses_one_that_is_none():
+    assert (ranged().card.input_low, ranged().card.input_high) == (LOW, HIGH)
+    for low, high in (((0.0,), (1.0,)), (LOW, ()), (HIGH, LOW)):
+        with pytest.raises(PolicyError, match="rising pairs"):
+            dataclasses.replace(FAST.card, input_low=low, input_high=high)
+    assert isinstance(FAST.card, Card)
+
+
+@pytest.mark.parametrize(
+    ("seen", "named"),
+    [
+        ({"q": (1.3, -1.2)}, "hip position 1.3"),
+        ({"q": (0.5, 0.2)}, "knee position 0.2"),
+        ({"qd": (-16.0, 0.0)}, "hip velocity -16"),
+    ],
+)
+def test_inputs_that_stay_beyond_the_training_hand_over_for_good(seen, named):
+    chain, said = fallback(ranged())
+    for _ in range(2):
+        chain.act(measurement(**seen))
+    chain.act(measurement())
+    assert not said
+    for _ in range(3):
+        chain.act(measurement(**seen))
+    assert len(said) == 1
+    assert named in said[0]
+    chain.act(measurement())
+    assert chain.internals()["fallback"] == [1.0]
+    chain.reset(1)
+    assert chain.internals()["fallback"] == [0.0]
+
+
+@pytest.mark.parametrize("failure", ["nan", "error"])
+def test_energy_shaping_hops_on_where_a_policy_fails(failure):
+    """The policy fails after three seconds, in whatever phase the leg is then."""
+    policy, ticks = load_policy("fast"), 1600
+    act, count = policy.act, 0
+
+    def failing(seen):
+        nonlocal count
+        count += 1
+        if count <= 600:
+            return act(seen)
+        if failure == "error":
+            raise UsageError("It gave up.")
+        return np.full((1, 2), np.nan)
+
+    policy.act = failing
+    chain, said = fallback(policy)
+    run = rollout(chain, RolloutConfig(ROBOT), np.full((ticks, 1), 0.30), 1000)
+    names = ("height_m", "height_rate_m_s", "foot_clearance_m")
+    height, rate, clearance = (run.data[name][800:, 0] for name in names)
+    hops = measure_hops(height, rate, clearance, 200.0, 0)
+    assert len(said) == 1
+    assert run.data["fallback"][[599, 600], 0].tolist() == [0.0, 1.0]
+    assert len(hops.apex) >= 5
+    assert np.abs(np.median(hops.apex) - 0.30) < 0.03
+
+
+def test_nothing_takes_over_from_other_controllers_or_where_the_robot_names_nothing():
+    shaping = load_controller("energy-shaping", ROBOT)
+    assert with_fallback(shaping, ROBOT) is shaping
+    hardware = dataclasses.replace(ROBOT.hardware, fallback="")
+    assert with_fallback(FAST, dataclasses.replace(ROBOT, hardware=hardware)) is FAST
+    assert isinstance(with_fallback(FAST, ROBOT), Fallback)
