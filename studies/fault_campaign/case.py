@@ -137,7 +137,11 @@ class Scene:
             CommandSchedule(((self.height, 100.0),)),
             hopping_poses(self.robot),
             SoftLimiter(self.robot, SoftLimits()),
-            dataclasses.replace(_TIMING, hop=_FIRST_HOP + self.mishap.at + _AFTERWARDS),
+            dataclasses.replace(
+                SequenceTiming() if self.family.grounded else _TIMING,
+                hop=_FIRST_HOP + self.mishap.at + _AFTERWARDS,
+            ),
+            weighed=self.robot,
         )
         self.require_fitness(link)
         done = perform(

@@ -42,12 +42,14 @@ class Family:
         draw: Returns one.
         reasons: For which the run may end; ``FINISHED`` where it may go on.
         refused: Whether the leg must not be armed.
+        grounded: Whether it must not hop.
     """
 
     name: str
     draw: Callable[[np.random.Generator], Mishap]
     reasons: frozenset[Reason] = field(default=frozenset())
     refused: bool = False
+    grounded: bool = False
 
 
 _READINGS = {
@@ -98,6 +100,10 @@ def _jump(rng: np.random.Generator) -> dict[str, float | str]:
     return {"value": float(rng.choice([-1, 1]) * rng.uniform(0.2, 2.0))}
 
 
+def _drift(rng: np.random.Generator) -> dict[str, float | str]:
+    return {"value": float(rng.choice([-1, 1]) * rng.uniform(0.15, 2.0))}
+
+
 def _unplugged(rng: np.random.Generator) -> dict[str, float | str]:
     return {"drive": "both", "duration": float(rng.uniform(0.05, 0.6))}
 
@@ -119,6 +125,17 @@ def _pose(rng: np.random.Generator) -> Mishap:
         return Mishap(start=EmulatorConfig(faults=(Fault("boot_pose", drive=drive, value=turns),)))
     hip, knee = rng.uniform(2.0, 3.0), rng.uniform(0.3, 2.0)
     return Mishap(start=EmulatorConfig(pose=f"{hip:.3f},{knee:.3f}"))
+
+
+def _wiring(rng: np.random.Generator) -> Mishap:
+    """A wrong sign of the hip, or a wrong gear or belt of the knee, in a pose that looks right."""
+    hip, knee = rng.uniform(0.5, 1.1), rng.uniform(-2.1, -1.0)
+    if rng.random() < 0.5:
+        fault, hip = Fault("reversed", drive="hip"), -hip
+    else:
+        ratio = float(rng.choice([0.5, 2 / 3, 1.5, 2.0]))
+        fault, knee = Fault("ratio", drive="knee", value=ratio), knee / ratio
+    return Mishap(start=EmulatorConfig(faults=(fault,), pose=f"{hip:.3f},{knee:.3f}"))
 
 
 _SETTINGS = {
@@ -161,6 +178,11 @@ FAMILIES: dict[str, Family] = dict(
         _family("garbage line", _faulty("garbage_line", _few), _R.FINISHED),
         _family("encoder jump", _faulty("encoder_jump", _jump), _R.ENCODER_JUMP),
         _family(
+            "encoder drift",
+            _faulty("encoder_drift", _drift),
+            *(_R.ENCODER_DRIFT, _R.ENCODER_JUMP, _R.POSITION_LIMIT),
+        ),
+        _family(
             "drive fault",
             _faulty("drive_fault", _one_of([int(code) for code in FaultCode])),
             _R.DRIVE_FAULT,
@@ -194,6 +216,15 @@ FAMILIES: dict[str, Family] = dict(
         _family("stalled host", _stall, _R.LOOP_STALLED, _R.DRIVE_TIMEOUT),
         _family("killed host", _death),
         ("wrong boot pose", Family("wrong boot pose", _pose, refused=True)),
+        (
+            "wrong wiring",
+            Family(
+                "wrong wiring",
+                _wiring,
+                frozenset({_R.WEIGHT_WRONG, _R.POSITION_LIMIT, _R.SPEED_LIMIT}),
+                grounded=True,
+            ),
+        ),
         ("wrong configuration", Family("wrong configuration", _configuration, refused=True)),
     ]
 )

@@ -1,7 +1,7 @@
 """What was wrong with a trial: the wire, trace and flight recording are asked one by one."""
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +9,11 @@ import numpy as np
 from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.deploy.hardware_trials import Performance
-from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.deploy.supervisor import State
 from hopping_leg.emulator.wire_log import WireLog
 from hopping_leg.errors import TraceError
 from studies.fault_campaign.case import Result, Scene
+from studies.fault_campaign.families import Family
 from studies.fault_campaign.verdict import problems_of_commands, reaction, restarts
 
 BRAKED_WITHIN = 0.025
@@ -41,14 +41,15 @@ def judge_wire(result: Result, scene: Scene, log: WireLog, modes: Sequence[int])
         result.problems.append("a drive is still in torque mode at the end")
 
 
-def judge_trace(result: Result, done: Performance, reasons: Collection[Reason]) -> None:
+def judge_trace(result: Result, done: Performance, family: Family | None) -> None:
     """Add what the trace tells: the reason, and whether the leg stayed stopped.
 
     Args:
         result: To be added to.
         done: The run.
-        reasons: That are correct; any if empty.
+        family: Of the mishap; None accepts any reason.
     """
+    reasons = family.reasons if family else frozenset()
     cause = done.outcome.supervisor.stop_cause
     result.reason, result.sentence = cause.reason.name, str(cause)
     if reasons and cause.reason not in reasons:
@@ -57,6 +58,8 @@ def judge_trace(result: Result, done: Performance, reasons: Collection[Reason]) 
     told = [event.get("reason") for event in done.trace.header["events"]]
     if cause.reason.name.lower() not in told:
         result.problems.append("the reason is not in the trace")
+    if family and family.grounded and np.isfinite(done.trace.column("hip_command_nm")).any():
+        result.problems.append("the leg hopped")
     states = done.trace.column("state")
     if (np.diff(states) < 0).any() or states[-1] != State.STOPPED:
         result.problems.append("the supervisor did not stay stopped")

@@ -78,7 +78,7 @@ def _hop(scene: Scene, emulator: EmulatorProcess, folder: Path) -> Result:
     )
     result.began = record.faults[0][0] if record.faults else _armed(record.log)
     judge_wire(result, scene, record.log, emulator.state().modes)
-    judge_trace(result, done, () if result.disturbed else scene.family.reasons)
+    judge_trace(result, done, None if result.disturbed else scene.family)
     return result
 
 

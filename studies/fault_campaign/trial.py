@@ -156,15 +156,17 @@ def _hop(scene: Scene) -> Result:
             done = None
         finally:
             lockstep.link.close()
-    faults = lockstep.robot.fault_injector.log
-    result.began = faults[0][0] if faults else clock.began
+    injector = lockstep.robot.fault_injector
+    result.began = injector.log[0][0] if injector.log else clock.began
+    if mishap.start is not None:
+        result.began = injector.powered
     if result.began is None:
         result.problems.append("the mishap did not happen")
         return result
     modes = [drive.machine.mode for drive in lockstep.robot.drives]
     judge_wire(result, scene, lockstep.robot.log, modes)
     if done is not None:
-        judge_trace(result, done, scene.family.reasons)
+        judge_trace(result, done, scene.family)
         return result
     result.braked = clock.braked
     if clock.braked is None or clock.braked > BRAKED_WITHIN:

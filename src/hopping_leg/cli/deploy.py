@@ -155,7 +155,8 @@ def _perform(
     limiter = SoftLimiter(robot, SoftLimits()) if args.soft_limits else None
     timing = SequenceTiming(hop=seconds)
     hops = fallback.with_fallback(controller, robot)
-    sequence = MotionSequence(hops, height or schedule, poses, limiter, timing)
+    weighed = None if isinstance(controller, joint_pd.JointPD) else robot
+    sequence = MotionSequence(hops, height or schedule, poses, limiter, timing, weighed=weighed)
     limits = safety_limits.hopping_limits(robot, rate)
 
     @contextlib.contextmanager

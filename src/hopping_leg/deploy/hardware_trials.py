@@ -281,6 +281,7 @@ class DeployedRobot:
             hopping_poses(self.robot),
             protocol.SoftLimiter(self.robot, SoftLimits()),
             SequenceTiming(hop=schedule.seconds),
+            weighed=self.robot,
         )
         with self.connect() as link:
             found = self.check(link)

@@ -188,6 +188,7 @@ class ControlLoop:
             stop_reasons.Operator.STOP if self._stop.is_set() else operator,
             self._sequence.finished,
             took,
+            step.trouble,
         )
         after, outgoing = supervise(self._limits, state, seen)
         if outgoing != held:

@@ -12,6 +12,7 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import command_schedule, joint_pd, protocol
 from hopping_leg.controllers.rollout import RolloutConfig
+from hopping_leg.deploy import weight_check
 from hopping_leg.deploy.drive_link import Pair
 from hopping_leg.robot import Robot, kinematics
 
@@ -79,6 +80,8 @@ class SequenceStep:
     phase: Part
     controller: Pair = (np.nan, np.nan)
     """What the controller alone asked for, N m; NaN outside of the hop."""
+    trouble: str = ""
+    """Why the leg must not go on; empty if it may."""
 
 
 @dataclass
@@ -92,6 +95,8 @@ class MotionSequence:
         limiter: None goes without soft limits.
         timing: Length of each part.
         gains: Joint PD of rising and sinking.
+        weighed: Robot whose weight the leg must carry before it hops, see ``weight_check``; None
+            does not look, as for a leg whose foot is off the ground.
     """
 
     controller: protocol.Controller
@@ -100,9 +105,11 @@ class MotionSequence:
     limiter: protocol.SoftLimiter | None
     timing: SequenceTiming = field(default_factory=SequenceTiming)
     gains: joint_pd.JointGains = field(default_factory=joint_pd.JointGains)
+    weighed: Robot | None = None
 
     def __post_init__(self) -> None:
         self._began: float | None = None
+        self._forces: list[tuple[float, float]] = []
         self._from, self._phase = np.zeros(2), Part.WAIT
         self.controller.reset(1)
 
@@ -124,6 +131,8 @@ class MotionSequence:
         if phase is not self._phase and phase in (Part.SINK, Part.DONE):
             self._from = q.copy()
         if phase is Part.HOP and self._phase is not Part.HOP:
+            if trouble := self._unfit():
+                return SequenceStep((0.0, 0.0), self.command(time), phase, trouble=trouble)
             self.controller.reset(1)
         self._phase = phase
         command = self.command(time)
@@ -131,12 +140,21 @@ class MotionSequence:
             asked = self.controller.act(measurement)[0]
         else:
             asked = self._hold(phase, lasted, q, qd)
+        if phase is Part.SETTLE and self.weighed is not None:
+            self._forces.append(weight_check.foot_force(self.weighed, q, asked))
         torque = asked
         if self.limiter is not None:
             samples = np.concatenate([measurement.q, measurement.qd], axis=2)
             torque = asked + self.limiter.added(asked[None], samples)[0]
         own = _pair(asked) if phase is Part.HOP else (np.nan, np.nan)
         return SequenceStep(_pair(torque), command, phase, own)
+
+    def _unfit(self) -> str:
+        """Return why the leg must not hop after it has settled, or ""."""
+        if self.weighed is None:
+            return ""
+        forward, upward = np.mean(self._forces[len(self._forces) // 2 :], axis=0)
+        return weight_check.complaint(self.weighed, forward, upward)
 
     def command(self, time: float) -> float:
         """Return the height commanded at a time, m."""

@@ -45,8 +45,13 @@ class Reason(IntEnum):
     LOOP_STALLED = 25, "This computer was late: the control loop stood still too long."
     CONTROLLER_FAILED = 26, "The controller raised an error."
     TORQUE_NOT_FINITE = 27, "The controller asked for a torque that is no number."
+    ENCODER_DRIFT = 30, "A position moves away from what its velocity adds up to."
+    WEIGHT_WRONG = 29, "The leg does not stand as its robot's file says."
     CONTROLLER_SLOW = 28, "The controller takes longer than a control period has."
 
+
+_DRIFT_SECONDS = 1.0  # Time after which a drift is forgotten
+_GAP = 1.5  # Periods between two replies beyond which velocities no longer tell the way between
 
 _ON_TIME = 0.2
 """Of a late tick that one in time makes up for: one late tick in six is tolerated for ever."""
@@ -98,6 +103,7 @@ class SupervisorInput:
         operator: Since the last tick.
         finished: Whether the sequence is over.
         controller: How long the controller took in the tick before, s.
+        trouble: Why the sequence must not go on; empty if it may.
     """
 
     time: float
@@ -107,6 +113,7 @@ class SupervisorInput:
     operator: Operator = Operator.NOTHING
     finished: bool = False
     controller: float = 0.0
+    trouble: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +126,7 @@ class Counts:
         excess: Ticks in a row with too much torque.
         overruns: Ticks that began too late, less a part of one for each in time since then.
         late: How late the last of them began, s.
+        drift: What positions gained over their velocities lately, rad.
     """
 
     last: Replies = (None, None)
@@ -126,6 +134,7 @@ class Counts:
     excess: tuple[int, int] = (0, 0)
     overruns: float = 0.0
     late: float = 0.0
+    drift: Pair = (0.0, 0.0)
 
     def after(self, limits: SafetyLimits, seen: SupervisorInput) -> "Counts":
         """Return the counts after a tick."""
@@ -133,7 +142,18 @@ class Counts:
         overruns, late = max(self.overruns - _ON_TIME, 0.0), self.late
         if seen.late > limits.period:
             overruns, late = self.overruns + 1, seen.late
-        return Counts((hip[0], knee[0]), (hip[1], knee[1]), (hip[2], knee[2]), overruns, late)
+        drift = self._drifted(0, limits, hip[0]), self._drifted(1, limits, knee[0])
+        return Counts(
+            (hip[0], knee[0]), (hip[1], knee[1]), (hip[2], knee[2]), overruns, late, drift
+        )
+
+    def _drifted(self, index: int, limits: SafetyLimits, reply: Reply | None) -> float:
+        """Return a drive's drift with a reply; across a gap, or without a reply, it is unknown."""
+        last, drift = self.last[index], self.drift[index]
+        if reply is None or last is None or not 0 < reply.taken - last.taken < _GAP * limits.period:
+            return drift
+        fading = math.exp(-(reply.taken - last.taken) / _DRIFT_SECONDS)
+        return drift * fading + _unexplained(last, reply)
 
     def _of_drive(
         self, index: int, limits: SafetyLimits, reply: Reply | None
@@ -142,6 +162,12 @@ class Counts:
             return self.last[index], self.missing[index] + 1, self.excess[index]
         much = abs(reply.torque) > limits.excess_torque * limits.torque[index]
         return reply, 0, self.excess[index] + 1 if much else 0
+
+
+def _unexplained(last: Reply, reply: Reply) -> float:
+    """Return the part of a position's change that the velocities do not tell, rad."""
+    elapsed = max(reply.taken - last.taken, 0.0)
+    return reply.position - last.position - elapsed * (last.velocity + reply.velocity) / 2
 
 
 def find_cause(
@@ -160,6 +186,8 @@ def find_cause(
             if found is not None:
                 return Cause(found.reason, f"{JOINTS[index]}: {found.detail}")
     for index, joint in enumerate(JOINTS):
+        if not abs(now.drift[index]) <= limits.drift:
+            return Cause(Reason.ENCODER_DRIFT, f"{joint}: {abs(now.drift[index]):.3g} rad off")
         if now.excess[index] > limits.excess_ticks:
             return Cause(Reason.TORQUE_LIMIT, f"{joint}: limit {limits.torque[index]:g} N m")
         if now.missing[index] > limits.missing_ticks:
@@ -188,10 +216,9 @@ def _of_joint(limits: SafetyLimits, index: int, last: Reply | None, reply: Reply
         values = f"{reply.position:g} rad, {reply.velocity:g} rad/s, {reply.torque:g} N m"
         return Cause(Reason.MEASUREMENT_NOT_FINITE, values)
     if last is not None:
-        elapsed = max(reply.taken - last.taken, 0.0)
-        predicted = last.position + elapsed * (last.velocity + reply.velocity) / 2
-        error = abs(reply.position - predicted)
-        if not error <= limits.jump * max(1.0, elapsed / limits.period):
+        periods = (reply.taken - last.taken) / limits.period
+        error = abs(_unexplained(last, reply))
+        if not error <= limits.jump * max(1.0, periods):
             return Cause(Reason.ENCODER_JUMP, f"{error:.3g} rad off")
     ahead = reply.position + limits.braking[index] * reply.velocity
     lower, upper = limits.lower[index], limits.upper[index]
@@ -222,6 +249,8 @@ def _of_loop(limits: SafetyLimits, now: Counts, seen: SupervisorInput) -> Cause 
             return Cause(Reason.CONTROLLER_SLOW, f"{took:.1f} ms of {period:g} ms")
         reason = Reason.LOOP_STALLED if stalled else Reason.LOOP_OVERRUN
         return Cause(reason, _late_text(seen.late))
+    if seen.trouble:
+        return Cause(Reason.WEIGHT_WRONG, seen.trouble)
     if seen.wanted is None:
         return Cause(Reason.CONTROLLER_FAILED)
     if not math.isfinite(seen.wanted[0] + seen.wanted[1]):

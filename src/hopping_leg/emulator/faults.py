@@ -108,6 +108,9 @@ class FaultyRobot(Protocol):
     def drives(self) -> "tuple[EmulatedDrive, ...]":
         """Hip and knee."""
 
+    def rewire(self, joint: int, ratio: float) -> None:
+        """Let a drive believe that its joint turns so many times as far as it does."""
+
 
 @dataclass
 class Delivery:
@@ -228,13 +231,25 @@ class _EncoderJump(FaultKind, kind="encoder_jump"):
     text, unit, value = "a joint's angle is wrong from now on", "rad", 0.5
 
     def begin(self) -> None:
-        for joint, drive in zip(self.fault.joints, self.drives, strict=True):
-            jump = self.robot.leg.transforms[joint].motor_velocity(self.fault.amount)
-            drive.encoder.jump = jump * drive.encoder.gear_ratio
+        self.shift(self.fault.amount)
 
     def end(self) -> None:
-        for drive in self.drives:
-            drive.encoder.jump = 0.0
+        self.shift(0.0)
+
+    def shift(self, angle: float) -> None:
+        for joint, drive in zip(self.fault.joints, self.drives, strict=True):
+            jump = self.robot.leg.transforms[joint].motor_velocity(angle)
+            drive.encoder.jump = jump * drive.encoder.gear_ratio
+
+
+class _EncoderDrift(_EncoderJump, kind="encoder_drift"):
+    text, unit, value = "a joint's angle drifts, its velocity does not", "rad/s", 0.3
+
+    def begin(self) -> None:
+        """Begin with no error."""
+
+    def update(self) -> None:
+        self.shift(self.fault.amount * (self.robot.time - self.begun))
 
 
 class _Disturbance(FaultKind):
@@ -312,6 +327,29 @@ class _BootPose(FaultKind, kind="boot_pose"):
     def begin(self) -> None:
         for drive in self.drives:
             drive.encoder.shift_rotor(self.fault.amount)
+
+
+class _Reversed(FaultKind, kind="reversed"):
+    text = "a motor turns its joint the other way than the robot's file says, from the start"
+    at_start = True
+
+    def begin(self) -> None:
+        for joint in self.fault.joints:
+            self.robot.rewire(joint, -1.0)
+
+
+class _Ratio(FaultKind, kind="ratio"):
+    text, unit, value = "a drive believes its joint to turn so many times as far", "1", 2.0
+    at_start = True
+
+    @classmethod
+    def check(cls, fault: Fault) -> None:
+        if not fault.amount > 0:
+            raise UsageError(f"'value' of a ratio is {fault.amount:g} but must be above 0.")
+
+    def begin(self) -> None:
+        for joint in self.fault.joints:
+            self.robot.rewire(joint, self.fault.amount)
 
 
 class _Configuration(FaultKind, kind="configuration"):

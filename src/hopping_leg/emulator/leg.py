@@ -31,6 +31,7 @@ class EmulatedLeg:
 
     def __init__(self, robot: Robot, q: Array, seed: int) -> None:
         self.transforms = joint_transforms(robot)
+        self.wiring = [1.0, 1.0]  # Joint angles as the drives believe them over the true ones
         free = replace(robot, hip=_unlimited(robot.hip), knee=_unlimited(robot.knee))
         immediate = replace(robot.reality.latency, command=0.0, jitter=0.0)
         free = replace(free, reality=replace(robot.reality, latency=immediate))
@@ -66,17 +67,18 @@ class EmulatedLeg:
 
     def sensed(self, joint: int) -> tuple[float, float, float]:
         """Return what one motor's sensors see: position, rev, velocity, rev/s, torque, N m."""
-        transform, legs = self.transforms[joint], self._legs
+        transform, legs, ratio = self.transforms[joint], self._legs, self.wiring[joint]
         return (
-            transform.motor_position(float(legs.measured_q[0, joint])),
-            transform.motor_velocity(float(legs.measured_qd[0, joint])),
-            transform.motor_torque(float(legs.measured_torque[0, joint])),
+            transform.motor_position(ratio * float(legs.measured_q[0, joint])),
+            transform.motor_velocity(ratio * float(legs.measured_qd[0, joint])),
+            transform.motor_torque(float(legs.measured_torque[0, joint]) / ratio),
         )
 
     def step(self, motor_torque: tuple[float, float]) -> None:
         """Go on by one physics step with torques at the motors' outputs, N m."""
-        wires = zip(self.transforms, motor_torque, strict=True)
-        self._legs.step(np.array([[wire.joint_torque(torque) for wire, torque in wires]]))
+        wires = zip(self.transforms, self.wiring, motor_torque, strict=True)
+        torques = [wire.joint_torque(torque) * ratio for wire, ratio, torque in wires]
+        self._legs.step(np.array([torques]))
 
 
 def _unlimited(joint: Joint) -> Joint:

@@ -62,6 +62,13 @@ class EmulatedRobot:
         self._sense()
         self.fault_injector = FaultInjector(self, faults, self._rng)
 
+    def rewire(self, joint: int, ratio: float) -> None:
+        """Let a drive believe that its joint turns so many times as far as it does."""
+        self.leg.wiring[joint] = ratio
+        position, *_ = self.leg.sensed(joint)
+        self.drives[joint].boot(position)
+        self.drives[joint].encoder.set_nearest(position)
+
     def advance(self, until: float) -> None:
         """Simulate whole steps up to a time, s."""
         while self.time + leg.TIMESTEP <= until + 1e-9:
@@ -142,6 +149,7 @@ class FaultInjector:
 
     Attributes:
         log: Which fault began when, s.
+        powered: When both drives were powered for the first time, s.
         flown: When the foot left the ground for the first time, s.
     """
 
@@ -152,7 +160,7 @@ class FaultInjector:
         self._pending = [fault for fault in faults if not KINDS[fault.kind].at_start]
         self._running: list[FaultKind] = []
         self.log: list[tuple[float, Fault]] = []
-        self._powered = self.flown = math.inf
+        self.powered = self.flown = math.inf
         self._contact, self._rate = True, 0.0
         for fault in faults:
             if KINDS[fault.kind].at_start:
@@ -165,7 +173,7 @@ class FaultInjector:
     def step(self) -> None:
         """Begin, update and end what is due before a step of physics."""
         phases, time = self._phases(), self._robot.time
-        since = {"start": 0.0, "powered": self._powered, "flight": self.flown}
+        since = {"start": 0.0, "powered": self.powered, "flight": self.flown}
         for fault in list(self._pending):
             if time >= since[fault.since] + fault.at and fault.phase in phases:
                 self._pending.remove(fault)
@@ -190,8 +198,8 @@ class FaultInjector:
     def _phases(self) -> set[str]:
         """Return the phases of this moment; record power and the first lift-off."""
         robot = self._robot
-        if math.isinf(self._powered) and all(drive.active for drive in robot.drives):
-            self._powered = robot.time
+        if math.isinf(self.powered) and all(drive.active for drive in robot.drives):
+            self.powered = robot.time
         contact, rate = robot.leg.foot_clearance <= 0, robot.leg.height_rate
         phases = {"any", "stance" if contact else "flight"}
         if not contact:
@@ -199,7 +207,7 @@ class FaultInjector:
             if self._rate > 0 >= rate:
                 phases.add("apex")
             airborne = robot.leg.foot_clearance > _AIRBORNE
-            if airborne and math.isinf(self.flown) and math.isfinite(self._powered):
+            if airborne and math.isinf(self.flown) and math.isfinite(self.powered):
                 self.flown = robot.time
         elif not self._contact:
             phases.add("touchdown")
