@@ -21,6 +21,7 @@ from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTim
 from hopping_leg.deploy.preflight import check_drives, require_fit, required_settings
 from hopping_leg.deploy.safety_limits import hopping_limits
 from hopping_leg.deploy.supervisor import State
+from hopping_leg.deploy.stop_reasons import Reason
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.emulator.virtual_time import Lockstep
@@ -47,7 +48,7 @@ def emulated():
         yield start
 
 
-def run(lockstep, path, *, controller="energy-shaping", hop=0.5, rise=0.5):
+def run(lockstep, path, *, controller="energy-shaping", hop=0.5, rise=0.5, weighed=None):
     controller = load_controller(controller, LEG)
     sequence = MotionSequence(
         controller,
@@ -55,9 +56,21 @@ def run(lockstep, path, *, controller="energy-shaping", hop=0.5, rise=0.5):
         hopping_poses(LEG),
         SoftLimiter(LEG, SoftLimits()),
         SequenceTiming(hop=hop, rise=rise, settle=0.2, sink=0.6),
+        weighed=weighed,
     )
     header = header_of(LEG, controller, 200.0)
     return perform(lockstep.link, sequence, LIMITS, path, header, clock=lockstep, realtime=False)
+
+
+def test_a_hip_that_turns_the_other_way_never_hops(emulated, tmp_path):
+    q = hopping_poses(LEG).start
+    wrong = emulated(faults=(Fault("reversed", drive="hip"),), pose=f"{-q[0]},{q[1]}")
+    require_fit(check_drives(LEG, LIMITS, inspect(wrong.link)))
+    done = run(wrong, tmp_path / "wrong.parquet", rise=2.0, weighed=LEG)
+    assert done.outcome.supervisor.stop_cause.reason is Reason.WEIGHT_WRONG
+    assert np.isnan(done.trace.column("hip_command_nm")).all()
+    right = run(emulated(), tmp_path / "right.parquet", rise=2.0, weighed=LEG)
+    assert right.outcome.supervisor.stop_cause.reason is Reason.FINISHED
 
 
 def test_healthy_drives_pass_every_check_and_say_who_they_are(emulated):

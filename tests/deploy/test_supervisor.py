@@ -123,6 +123,7 @@ def at(tick, index, **changes):
         (seen(2, late=0.05), Reason.LOOP_STALLED, "50.0 ms"),
         (seen(2, wanted=None), Reason.CONTROLLER_FAILED, ""),
         (seen(2, wanted=(math.inf, 0.0)), Reason.TORQUE_NOT_FINITE, "inf"),
+        (seen(2, trouble="by the file"), Reason.WEIGHT_WRONG, "by the file"),
         (seen(2, finished=True), Reason.FINISHED, ""),
     ],
 )
@@ -132,6 +133,18 @@ def test_each_cause_damps_within_the_tick_and_says_why(observation, reason, deta
     assert memory.cause.reason is reason
     assert detail in str(memory.cause)
     assert out.action is Action.BRAKE
+
+
+@pytest.mark.parametrize(("rate", "caught"), [(0.05, False), (0.2, True), (-0.2, True)])
+def test_a_position_that_drifts_from_its_velocity_is_caught(rate, caught):
+    memory = running()
+    for tick in range(2, 1000):
+        swing = 0.3 * math.sin(20 * tick * PERIOD), 6.0 * math.cos(20 * tick * PERIOD)
+        angle = 0.7 + swing[0] + rate * tick * PERIOD
+        memory, _ = supervise(LIMITS, memory, at(tick, 0, position=angle, velocity=swing[1]))
+        if memory.state is not State.RUNNING:
+            break
+    assert (memory.cause.reason is Reason.ENCODER_DRIFT) is caught
 
 
 def test_a_joint_that_drifts_out_of_its_range_is_caught():

@@ -11,10 +11,10 @@ import numpy as np
 from hopping_leg.arrays import Array
 from hopping_leg.robot import Robot, dynamics
 
-UPWARD = (0.75, 2.0)
+UPWARD = (0.82, 2.0)
 """Shares of its file's weight that a leg may seem to carry; a payload adds to it."""
 
-SIDEWAYS = 0.75
+SIDEWAYS = 0.66
 """Largest share with which it may seem to push sideways, as a foot that was dragged into place."""
 
 
@@ -42,6 +42,6 @@ def complaint(robot: Robot, forward: float, upward: float) -> str:
         return ""
     return (
         f"by the file of {robot.name} its foot pushes with {upward:.0%} of the weight upward and"
-        f" {forward:.0%} forward; check signs, CAN ids, gears, belt and zeros of both joints, and that"
-        " the foot stands on the ground"
+        f" {forward:.0%} forward; check signs, CAN ids, gears, belt and zeros of both joints, and"
+        " that the foot stands on the ground"
     )
