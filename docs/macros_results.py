@@ -76,6 +76,27 @@ def pick(tree: Any, path: str) -> Any:  # noqa: ANN401
     return tree
 
 
+def safety_case() -> str:
+    """Return the table of the safety case, from the fault campaign's families and results."""
+    file = "fault_campaign/fault_campaign.json"
+    campaign = read(file) if stored(file) else {"rows": []}
+    lines = ["| fault | noticed by | then | within, ms | trials | unsafe | at most, 95 % |"]
+    lines.append("|---|---|---|---|---|---|---|")
+    for row in importlib.import_module("studies.fault_campaign.safety_case").rows(campaign):
+        most = "–" if row["upper_bound"] is None else f"{100 * row['upper_bound']:.2g} %"
+        within = number(scaled(row["within_s"], 1e3))
+        names = "fault", "noticed_by", "follows"
+        cells = (*(row[name] for name in names), within, row["trials"], row["unsafe"], most)
+        lines.append("| " + " | ".join(map(str, cells)) + " |")
+    return "\n".join(lines)
+
+
+def not_certified() -> str:
+    """Return the list of what the safety case does not show."""
+    case = importlib.import_module("studies.fault_campaign.safety_case")
+    return "\n".join(f"- {entry};" for entry in case.NOT_CERTIFIED).rstrip(";") + "."
+
+
 def value(file: str, path: str, factor: float | None = None, digits: int | None = None) -> str:
     """Return one number of a result, times a factor, with so many digits after the point."""
     found = scaled(pick(read(file), path), factor)
@@ -417,6 +438,7 @@ MACROS = {
     "entries": entries,
     "latest": latest,
     "limits": limits,
+    "not_certified": not_certified,
     "not_stored": not_stored,
     "one": one,
     "percentiles": percentiles,
@@ -424,6 +446,7 @@ MACROS = {
     "pivot": pivot,
     "precision": precision,
     "recoveries": recoveries,
+    "safety_case": safety_case,
     "separation": separation,
     "stored": stored,
     "table": table,

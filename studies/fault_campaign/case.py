@@ -101,7 +101,7 @@ class Scene:
         rng = case.rng
         self.case, self.family, self.robot = case, family, robot
         self.mishap = family.draw(rng)
-        faults = () if self.mishap.fault is None else (self.mishap.fault,)
+        faults = tuple(filter(None, (self.mishap.fault, self.mishap.second)))
         self.start = dataclasses.replace(
             self.mishap.start or EmulatorConfig(faults=faults),
             robot=case.robot,
@@ -165,7 +165,8 @@ def words(mishap: Mishap) -> str:
         faults = ", ".join(map(_of_fault, mishap.start.faults))
         return faults or f"pose {mishap.start.pose}"
     if mishap.fault is not None:
-        return f"{_of_fault(mishap.fault)} at {mishap.at:.3f} s"
+        both = map(_of_fault, filter(None, (mishap.fault, mishap.second)))
+        return f"{' and '.join(both)} at {mishap.fault.at:.3f} s"
     if mishap.dies:
         return f"killed at {mishap.at:.3f} s"
     return f"stalled for {mishap.stall:.3f} s at {mishap.at:.3f} s"

@@ -20,6 +20,7 @@ class Mishap:
 
     Attributes:
         fault: Of wire or drives; None where the host itself is struck.
+        second: Another one.
         stall: How long the host stands still, s; 0 if it does not.
         dies: Whether the host is killed.
         start: Differences of the start, where the leg must not be armed at all.
@@ -27,6 +28,7 @@ class Mishap:
     """
 
     fault: Fault | None = None
+    second: Fault | None = None
     stall: float = 0.0
     dies: bool = False
     start: EmulatorConfig | None = None
@@ -160,6 +162,44 @@ def _configuration(rng: np.random.Generator) -> Mishap:
     return Mishap(start=EmulatorConfig(faults=(fault,)))
 
 
+_SEVERE: dict[str, Callable[[np.random.Generator], dict[str, float | str]]] = {
+    "silence": _nothing,
+    "power_loss": _nothing,
+    "encoder_jump": _jump,
+    "drive_fault": _one_of([int(code) for code in FaultCode]),
+    "over_voltage": _between(42.5, 60.0),
+    "under_voltage": _between(2.0, 17.5),
+}
+"""Kinds of fault after which no run may go on."""
+
+_SEVERE_REASONS = (
+    *(Reason.REPLIES_MISSING, Reason.DRIVE_LEFT_MODE, Reason.DRIVE_TIMEOUT, Reason.ENCODER_JUMP),
+    *(Reason.DRIVE_FAULT, Reason.VOLTAGE_HIGH, Reason.VOLTAGE_LOW, Reason.POSITION_LIMIT),
+)
+
+
+def _severe(since: str, first: float, last: float) -> Callable[[np.random.Generator], Mishap]:
+    """Return what draws a severe fault of a drive between two times after an event, s."""
+
+    def draw(rng: np.random.Generator) -> Mishap:
+        kind = str(rng.choice(list(_SEVERE)))
+        at, drive = float(rng.uniform(first, last)), str(rng.choice(["hip", "knee", "both"]))
+        values = {"drive": drive, **_SEVERE[kind](rng)}
+        return Mishap(Fault(kind, since=since, at=at, **values))  # type: ignore[arg-type]
+
+    return draw
+
+
+_WITHIN = 0.05  # s
+
+
+def _double(rng: np.random.Generator) -> Mishap:
+    """Two severe faults within some ticks of each other."""
+    at = float(rng.uniform(0, HOP_SECONDS))
+    first, second = (_severe("flight", at, at + _WITHIN)(rng).fault for _ in range(2))
+    return Mishap(first, second, at=at)
+
+
 def _family(
     name: str, draw: Callable[[np.random.Generator], Mishap], *reasons: Reason
 ) -> tuple[str, Family]:
@@ -213,6 +253,10 @@ FAMILIES: dict[str, Family] = dict(
             _faulty("power_loss", _nothing),
             *(_R.DRIVE_LEFT_MODE, _R.REPLIES_MISSING),
         ),
+        _family("fault while arming", _severe("powered", 0.0, 0.3), *_SEVERE_REASONS),
+        _family("fault at lift-off", _severe("flight", 0.0, 0.005), *_SEVERE_REASONS),
+        _family("fault while sinking", _severe("flight", 1.0, 1.6), *_SEVERE_REASONS),
+        _family("double fault", _double, *_SEVERE_REASONS),
         _family("stalled host", _stall, _R.LOOP_STALLED, _R.DRIVE_TIMEOUT),
         _family("killed host", _death),
         ("wrong boot pose", Family("wrong boot pose", _pose, refused=True)),

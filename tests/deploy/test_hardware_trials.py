@@ -20,8 +20,8 @@ from hopping_leg.deploy.hardware_trials import DeployedRobot, header_of, perform
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
 from hopping_leg.deploy.preflight import check_drives, require_fit, required_settings
 from hopping_leg.deploy.safety_limits import hopping_limits
-from hopping_leg.deploy.supervisor import State
 from hopping_leg.deploy.stop_reasons import Reason
+from hopping_leg.deploy.supervisor import State
 from hopping_leg.emulator.faults import Fault
 from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.emulator.virtual_time import Lockstep
