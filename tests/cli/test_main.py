@@ -253,6 +253,16 @@ def test_what_a_terminal_cannot_encode_is_replaced(tmp_path, encoding):
     assert sorted(path.name for path in tmp_path.iterdir()) == [folder.name], "onnxruntime, mujoco"
 
 
+@pytest.mark.parametrize("name", ["MUJOCO_GL", "MPLBACKEND"])
+def test_a_variable_that_a_library_refuses_is_named(tmp_path, name):
+    done = hop(["evaluate", "--help"], tmp_path, **{name: "nowhere"})
+    assert done.returncode == 2
+    assert (
+        done.stderr.decode()
+        == f"hop: 'nowhere' in the variable {name} does not work here; unset it.\n"
+    )
+
+
 def test_mujoco_writes_no_log_into_the_users_folder(tmp_path):
     code = (
         "import mujoco; from hopping_leg.robot import build_model, load_robot;"

@@ -164,6 +164,8 @@ def test_words_without_meaning_are_refused(kind):
             env.reset(options=options)
     with pytest.raises(UsageError, match="autoreset mode"):
         make(VECTOR, autoreset_mode="Never")
+    with pytest.raises(UsageError, match="episode"):
+        make(VECTOR, max_episode_steps=0)
     for mask in ([1, 0], [True], [False, False]):
         with pytest.raises(UsageError, match="reset_mask"):
             make(VECTOR).reset(options={"reset_mask": mask})
@@ -258,6 +260,15 @@ def test_the_vector_environment_does_as_gymnasiums_own(mode):
                 env.reset(options={"reset_mask": ended})
     assert (ends > 2).all()
     assert ends[0] != ends[1], "one leg fell, one had its time"
+
+
+@pytest.mark.parametrize("kind", [SINGLE, VECTOR, SYNC])
+@pytest.mark.parametrize(("most", "ticks"), [(7, 7), (99, 20)])
+def test_an_episode_has_at_most_the_steps_that_gymnasium_is_told(kind, most, ticks):
+    env = make(kind, max_episode_steps=most)
+    env.reset(seed=0)
+    ended = [np.all(env.step(action)[3]) for action in plan(env, ticks)]
+    assert np.flatnonzero(ended).tolist() == [ticks - 1]
 
 
 @pytest.mark.parametrize(

@@ -33,23 +33,31 @@ COMMENTS = ["", "# made by a logger", "% leg 2; second run"]
     end=st.sampled_from(["\n", "\r\n"]),
     encoding=st.sampled_from(["utf-8", "utf-8-sig", "utf-16"]),
     packed=st.booleans(),
+    last=st.sampled_from(["", "rows", "all"]),
 )
 def test_every_dialect_reads_the_same(
-    rows, mark, comma, hidden, units, comments, end, encoding, packed
+    rows, mark, comma, hidden, units, comments, end, encoding, packed, last
 ):
     blank = mark.startswith(" ")
-    lines = [*comments, ("# " if hidden else "") + mark.join(NAMES)]
+    last = "" if hidden else last
+    lines = [*comments, ("# " if hidden else "") + mark.join(NAMES) + mark * (last == "all")]
     if units and not hidden and not blank:
         lines.append(mark.join(units))
     for row in rows:
         fields = [repr(value) for value in row]
         if comma and mark != "," and not (hidden and blank):
             fields = [field.replace(".", ",") for field in fields]
-        lines += [mark.join(fields), *comments[:1]]
+        lines += [mark.join(fields) + mark * bool(last), *comments[:1]]
     content = end.join(lines).encode(encoding)
     table = read_csv(gzip.compress(content) if packed else content, "log.csv")
     assert table.columns == NAMES
     np.testing.assert_array_equal(table.to_numpy(), rows)
+
+
+@pytest.mark.parametrize("mark", [",", ";", "\t"])
+def test_a_field_without_a_value_is_null_wherever_it_stands(mark):
+    text = "a,b\n,1\n2,\n3,4\n".replace(",", mark)
+    assert read_csv(text.encode(), "log.csv").rows() == [(None, 1), (2, None), (3, 4)]
 
 
 def of_savez(path):

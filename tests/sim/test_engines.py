@@ -108,6 +108,19 @@ def hops(engine, robot, ticks=400):
     return rollout(controller, config, commands, 0, on_legs=drop).data["height_m"]
 
 
+@pytest.mark.parametrize("engine", ["stepper", "mujoco"])
+def test_what_became_unstable_stays_so_and_its_neighbour_goes_on(engine):
+    alone, legs = (make_simulator(PAPER, count, engine=engine, threads=1) for count in (1, 2))
+    alone.stand(slice(None), POSTURE)
+    legs.stand(slice(None), POSTURE)
+    legs.qd[0] = 1e12
+    for _ in range(20):
+        alone.step(np.zeros((1, 2)))
+        legs.step(np.zeros((2, 2)))
+    assert not np.isfinite(legs.state[0]).all()
+    np.testing.assert_array_equal(legs.q[1], alone.q[0])
+
+
 def test_energy_shaping_hops_as_in_the_stepper():
     """Contacts amplify what MuJoCo's tolerance leaves of a difference."""
     one, other = (hops(engine, CAD) for engine in ("mujoco", "stepper"))

@@ -12,9 +12,11 @@ import errno
 import importlib
 import inspect
 import io
+import os
 import signal
 import sys
 import threading
+import traceback
 import types
 from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import version
@@ -109,9 +111,27 @@ def guard(program: Callable[[], int]) -> int:
             f"This needs {error.name}, which comes with the extra '{extra}':"
             f" pip install 'hopping-leg[{extra}]'."
         )
+    except Exception as error:
+        name = _refused_variable(error)
+        if name is None:
+            raise
+        sentence = f"'{os.environ[name]}' in the variable {name} does not work here; unset it."
     with contextlib.suppress(OSError, ValueError):  # the terminal may be gone
         print(f"hop: {sentence}", file=sys.stderr)
     return code
+
+
+def _refused_variable(error: Exception) -> str | None:
+    """Return the variable that ended the import of MuJoCo or matplotlib, if it was one."""
+    frames = [frame for frame, _ in traceback.walk_tb(error.__traceback__)]
+    imported = [f.f_globals["__name__"] for f in frames if f.f_code.co_name == "<module>"]
+    for name, module in (
+        ("MUJOCO_GL", "mujoco.rendering.classic.gl_context"),
+        ("MPLBACKEND", "matplotlib"),
+    ):
+        if module in imported and name in os.environ:
+            return name
+    return None
 
 
 _EXTRAS = {

@@ -5,6 +5,7 @@ Both are ``HoppingLeg-v0``, registered by ``import hopping_leg``, and thin views
 every array that is handed out is the caller's.
 """
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -203,10 +204,11 @@ class HoppingVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
     Arguments are those of ``HoppingEnv``; the threads, 0 for one per core, change no result. Where
     an episode ended, the next one begins by ``autoreset_mode``: in the step after it, whose action
     counts for nothing; in the same step, whose ``info["final_obs"]`` and ``info["final_info"]``
-    hold what ``HoppingEnv`` would have returned; or, disabled, with ``reset`` alone.
+    hold what ``HoppingEnv`` would have returned; or, disabled, with ``reset`` alone. Episodes are
+    no longer than ``max_episode_steps``, as with Gymnasium's own ``TimeLimit``.
 
     Raises:
-        UsageError: The mode of rendering or autoreset is unknown.
+        UsageError: The mode of rendering or autoreset is unknown, or an episode has no steps.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012
@@ -223,6 +225,7 @@ class HoppingVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
         threads: int = 0,
         render_mode: str | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | None = None,
     ) -> None:
         _check_render_mode(render_mode)
         try:
@@ -236,6 +239,9 @@ class HoppingVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
             "render_fps": round(options.rate),
             "autoreset_mode": self._mode,
         }
+        if max_episode_steps is not None:
+            longest = min(options.episode, max_episode_steps / options.rate)
+            options = dataclasses.replace(options, episode=longest)
         same_step = self._mode is AutoresetMode.SAME_STEP
         self.task = _make_task(robot, num_envs, options, reward, threads, autoreset=same_step)
         self.single_observation_space, self.single_action_space = _spaces(self.task)

@@ -45,16 +45,18 @@ def read_csv(content: bytes, origin: str) -> pl.DataFrame:
     comments: list[str] = []
     lines: list[str] = []
     for line in _text(content, origin).splitlines():
-        if line.strip() and not line.lower().startswith("sep="):  # for spreadsheets
-            (comments if line.lstrip().startswith(("#", "%", "//")) else lines).append(line.strip())
+        if line.lstrip().startswith(("#", "%", "//")):
+            comments.append(line.strip())
+        elif line.strip() and not line.lower().startswith("sep="):  # for spreadsheets
+            lines.append(line.strip(" "))  # a tab at either end stands beside an empty field
     if not lines:
         raise RecordingError(f"{origin} is empty; record again.")
-    mark = _mark(lines[0])
+    mark = _mark(lines[0].strip())
     rows = _split(lines, mark, origin)
     if _numeric(rows[0]):  # numpy.savetxt writes its header as a comment
         headers = (_split([c.lstrip("#%/ ")], _mark(c), origin) for c in reversed(comments))
         rows[:0] = next((h for h in headers if h and len(h[0]) == len(rows[0])), [])
-    header, body = [name.strip() for name in rows[0]], rows[1:]
+    header, body = _without_last_mark(rows)
     if _numeric(header):
         raise RecordingError(f"{origin} has no header, it begins with numbers; name its columns.")
     for name in header:
@@ -112,6 +114,16 @@ def _split(lines: list[str], mark: str, origin: str) -> list[list[str]]:
         return [row for row in reader if row]
     except csv.Error as error:
         raise RecordingError(f"{origin}: line {reader.line_num} is not CSV: {error}.") from error
+
+
+def _without_last_mark(rows: list[list[str]]) -> tuple[list[str], list[list[str]]]:
+    """Return header and rows without the empty field that a mark at a line's end leaves."""
+    header = [name.strip() for name in rows[0]]
+    if len(header) > 1 and not header[-1]:
+        header.pop()
+    longer = len(header) + 1
+    cut = [r[:-1] if len(r) == longer and not r[-1].strip() else r for r in rows[1:]]
+    return header, cut
 
 
 def _is_number(text: str) -> bool:

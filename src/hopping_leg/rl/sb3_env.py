@@ -16,7 +16,8 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
     """A ``HoppingTask`` for stable-baselines3.
 
     Observations are (n, size); with ``privileged`` the true state follows in the same rows, for
-    critics that may see it in training.
+    critics that may see it in training. All randomness is the task's; ``seed`` and ``set_options``
+    of stable-baselines3 change nothing.
     """
 
     def __init__(self, task: HoppingTask, *, privileged: bool = False) -> None:

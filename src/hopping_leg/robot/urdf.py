@@ -34,7 +34,7 @@ def to_urdf(robot: Robot) -> str:
     _shape(shank, "collision", "sphere", 0.0, radius=robot.knee_cap.radius)
     for role in ("collision", "visual"):
         _shape(shank, role, "sphere", -robot.shank.length, radius=robot.foot.radius)
-    Xml.SubElement(root, "link", name="foot")
+    _link(root, "foot", 0.0, 0.0, 0.0)  # PyBullet gives a link without inertia a mass of 1 kg
     _rail(root, robot)
     _hinge(root, "hip", "base", "thigh", 0.0, robot.hip)
     _hinge(root, "knee", "thigh", "shank", -robot.thigh.length, robot.knee)

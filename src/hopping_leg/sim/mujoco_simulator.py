@@ -50,6 +50,8 @@ class MujocoSimulator(Simulator):
             edit(spec)
         for actuator in spec.actuators:
             actuator.ctrllimited = False
+        # An unstable leg must be seen, not put back to where it began.
+        spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         model = compile_spec(spec, robot.name)
         self.batch = batch.Batch(model, count, threads)
         self._ctrl, self._force = self.batch.bind("ctrl"), self.batch.bind("qfrc_applied")

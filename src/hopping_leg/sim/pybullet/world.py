@@ -174,8 +174,8 @@ def import_pybullet() -> Any:  # noqa: ANN401
 def pybullet_urdf(robot: Robot, *, foot_collides: bool = True) -> str:
     """Return the URDF to be loaded with ``URDF_USE_INERTIA_FROM_FILE``.
 
-    The fixed frame ``foot`` is left out (a link without inertia weighs 1 kg in PyBullet), and the
-    rail is long. Knee and base collide in any case.
+    The fixed frame ``foot`` is left out, which nothing here asks for, and the rail is long. Knee
+    and base collide in any case.
 
     Raises:
         RobotError: The base is too light to give the rotor its mass.
