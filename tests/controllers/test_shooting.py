@@ -11,11 +11,11 @@ from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.controllers.shooting import HopShape, Shooting, hop_law
 from hopping_leg.errors import UsageError
-from hopping_leg.hop_detection import find_hops
 from hopping_leg.io import replace_at
 from hopping_leg.robot import GRAVITY, load_robot
 from hopping_leg.sim import LegSimulator, leg_simulator
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, sample
+from tests.controllers.measurements import hops_of
 
 HEIGHTS = np.linspace(0.22, 0.40, 10)
 ROBOT = load_robot("legv2-identified")
@@ -28,11 +28,6 @@ def hop(robot, commands, engine="stepper", legs=None):
     setup = RolloutConfig(robot, timestep=STEP, threads=1, engine=engine)
     wanted = np.tile(commands, (round(5 * setup.rate), 1))
     return rollout(Shooting(robot), setup, wanted, 0, legs=legs)
-
-
-def hops_of(run, leg):
-    columns = (run.data[c][:, leg] for c in ("height_m", "height_rate_m_s", "foot_clearance_m"))
-    return find_hops(*columns)
 
 
 def check_apexes(run, commands):
