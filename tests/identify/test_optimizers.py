@@ -47,22 +47,6 @@ def test_shares_in_turn_find_the_bottom_of_their_sum():
     assert found.cost - least < 0.05 * (own.mean() - least)
 
 
-def test_a_share_judges_a_generation_and_the_whole_only_the_last_ones():
-    counted = {"share": 0, "whole": 0}
-
-    def count(name, function):
-        def run(vectors):
-            counted[name] += len(vectors)
-            return function(vectors)
-
-        return run
-
-    shares = [count("share", share) for share in SHARES]
-    cma_es(count("whole", sum_of_shares), TWO, CmaOptions(20), seed=0, shares=shares)
-    assert counted["share"] == 20 * 16
-    assert 0 < counted["whole"] < 16
-
-
 @pytest.mark.parametrize("shares", [(), SHARES], ids=["whole", "shares"])
 def test_a_killed_cma_es_resumes_exactly_from_its_own_checkpoint_alone(tmp_path, shares):
     options, file = CmaOptions(20, population=6), tmp_path / "state.json"
