@@ -100,25 +100,6 @@ def test_a_new_command_holds_for_the_next_push():
     np.testing.assert_allclose(found.apex[late], commands[found.tick, 0][late], atol=0.005)
 
 
-def test_what_it_remembers_is_its_state():
-    legs, commands = LegSimulator(ROBOT, 4, timestep=STEP, threads=1), HEIGHTS[::3]
-    legs.stand(slice(None), [0.7, -1.4])
-    first, restored, fresh = (Shooting(ROBOT) for _ in range(3))
-    for one in (first, restored, fresh):
-        one.watch(legs)
-        one.reset(4)
-    for _ in range(130):
-        legs.step(first.torque(commands))
-    restored.restore(first.state())
-    differed = False
-    for _ in range(130):
-        torque = first.torque(commands)
-        np.testing.assert_array_equal(restored.torque(commands), torque)
-        differed |= not np.array_equal(fresh.torque(commands), torque)
-        legs.step(torque)
-    assert differed
-
-
 SHAPE = np.rec.array([astuple(HopShape())], [(f.name, np.float64) for f in fields(HopShape)])[0]
 NUMBERS = ("flight", "squat", "liftoff", "stop")
 

@@ -102,16 +102,12 @@ def test_every_mistake_gets_a_sentence_that_names_the_field(tmp_path, path, mist
     ("content", "sentence"),
     [
         ("base = [", "not valid TOML"),
-        ("\xff", "not valid TOML"),
         ("base = 3", "'name' is missing"),
-        ('name = "x"\nbase = 3', "'base' must be a table"),
-        ("name = 3", "'name' is 3 but must be a text"),
         ('extends = "legv2"\nkind = "log"', "Did you mean 'leg'"),
         ('name = " "\nextends = "legv2"', "'name' is empty"),
         ("extends = 3", "'extends' must be"),
         ('extends = "legv3"', "Did you mean 'legv"),
         ('extends = "leg.toml"', "circle"),
-        ('extends = "legv2"\ncolour = "red"', "There is no field 'colour'"),
         ('extends = "legv2"\n[hip]\nbelt_ration = 1', "Did you mean 'belt_ratio'"),
     ],
 )
