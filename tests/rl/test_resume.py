@@ -10,12 +10,7 @@ from hopping_leg.envs import Reward
 from hopping_leg.errors import UsageError
 from hopping_leg.rl import train as module
 from hopping_leg.rl.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
-from tests.rl.learners import (
-    EVERY,
-    ROBOT,
-    TINY,
-    try_briefly,
-)
+from tests.rl.learners import EVERY, ROBOT, TINY, try_briefly
 
 
 class KilledError(Exception):
