@@ -92,15 +92,6 @@ def test_whatever_a_leg_is_like_it_can_be_surprised(delay, rubs):
     assert np.ptp(legs.height) > 1e-3
 
 
-def test_the_seed_fixes_the_draws_and_ranges_hold():
-    assert drawn(5, seed=3) == drawn(5, seed=3)
-    assert drawn(5, seed=3) != drawn(5, seed=4)
-    values = [robot.contact.time_constant for robot in drawn(50)]
-    assert 0.02 <= min(values) < 0.03
-    assert 0.06 < max(values) <= 0.09
-    assert {robot.thigh.length for robot in drawn(5)} == {LEG.thigh.length}
-
-
 def test_what_controllers_believe_may_not_vary():
     with pytest.raises(UsageError, match=r"thigh\.length"):
         drawn(2, ranges=[Range("thigh.length", "m", 0.1, 0.2, "test")])
