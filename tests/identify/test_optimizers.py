@@ -46,11 +46,13 @@ def test_shares_in_turn_find_the_bottom_of_their_sum():
     assert found.cost - least < 0.05 * (own.mean() - least)
 
 
-def test_a_checkpoint_of_another_search_or_none_is_refused_and_left_alone(tmp_path):
-    options, file = CmaOptions(2, population=6), tmp_path / "state.json"
-    cma_es(sum_of_shares, TWO, options, seed=1, shares=SHARES, checkpoint=file)
+def test_what_a_checkpoint_knows_is_not_searched_again_and_another_searchs_is_refused(tmp_path):
+    options, file = CmaOptions(3, population=6), tmp_path / "state.json"
+    found = cma_es(squares, TWO, options, seed=1, checkpoint=file)
+    again = cma_es(lambda _: pytest.fail("searched"), TWO, options, seed=1, checkpoint=file)
+    np.testing.assert_array_equal(again.vector, found.vector)
     with pytest.raises(UsageError, match="belongs to a search with other"):
-        cma_es(sum_of_shares, TWO, options, seed=2, shares=SHARES, checkpoint=file)
+        cma_es(squares, TWO, options, seed=2, checkpoint=file)
     file.write_text("[]")
     with pytest.raises(UsageError, match="no checkpoint"):
         least_squares(bowl, TWO, checkpoint=file)
