@@ -130,22 +130,16 @@ def test_a_missing_column_is_named_with_those_that_exist():
         some_trace().column("speed")
 
 
-def test_missing_foreign_and_truncated_files_are_refused(tmp_path):
+def test_missing_and_foreign_files_are_refused(tmp_path):
     with pytest.raises(TraceError, match="There is no trace file"):
         Trace.load(tmp_path / "none.parquet")
     foreign = tmp_path / "foreign.parquet"
     pl.DataFrame({"a": [1]}).write_parquet(foreign)
     with pytest.raises(TraceError, match="not a trace"):
         Trace.load(foreign)
-    whole = tmp_path / "whole.parquet"
-    some_trace().save(whole)
-    cut = tmp_path / "cut.parquet"
-    cut.write_bytes(whole.read_bytes()[:-200])
-    with pytest.raises(TraceError, match="not a readable Parquet file"):
-        Trace.load(cut)
-    pl.DataFrame({"a": [1]}).write_parquet(cut, metadata={"hopping_leg": '{"schema": 0}'})
+    pl.DataFrame({"a": [1]}).write_parquet(foreign, metadata={"hopping_leg": '{"schema": 0}'})
     with pytest.raises(TraceError, match="schema 0"):
-        Trace.load(cut)
+        Trace.load(foreign)
 
 
 def test_a_failed_write_leaves_the_old_file_whole(tmp_path):

@@ -9,18 +9,6 @@ from hopping_leg.rl.train import TrainingProgress
 from hopping_leg.sim_to_real.jobs import Board
 
 
-def test_without_a_terminal_there_is_a_line_at_most_once_a_minute(capsys, monkeypatch):
-    now = 100.0
-    monkeypatch.setattr(time, "monotonic", lambda: now)
-    with LiveProgress("work") as progress:
-        progress._line_if_due("first")
-        now += 59.0
-        progress._line_if_due("too soon")
-        now += 1.0
-        progress._line_if_due("second")
-    assert capsys.readouterr().err == "first\nsecond\n"
-
-
 @pytest.mark.parametrize("option", [{"quiet": True}, {"lines": False}])
 def test_quiet_work_and_a_bar_leave_the_lines_out(capsys, option):
     with LiveProgress("work", **option) as progress:

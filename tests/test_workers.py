@@ -1,6 +1,5 @@
 """Work shared out gives the same as at home, and nobody works on when its boss is gone."""
 
-import builtins
 import contextlib
 import os
 import signal
@@ -127,13 +126,6 @@ def test_where_no_cluster_answers_there_is_a_sentence_at_once(address):
 
 
 def test_without_ray_there_is_a_sentence(monkeypatch):
-    real = builtins.__import__
-
-    def refuse(name, *rest, **more):
-        if name == "ray":
-            raise ModuleNotFoundError(name)
-        return real(name, *rest, **more)
-
-    monkeypatch.setattr(builtins, "__import__", refuse)
+    monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(UsageError, match=r"hopping-leg\[cluster\]"):
         RayWorkers()

@@ -61,8 +61,8 @@ def test_bad_input_is_one_sentence(spring, refused, words, sentence):
 def test_robustness_leaves_numbers_figure_and_what_goes_on(spring, tmp_path, capsys):
     out, file = tmp_path / "kept", tmp_path / "robustness.json"
     words = ["robustness", "spring", "--commands", "0.3", "--seeds", "2", "--axes", "pushes"]
-    words += ["--threads", "1", "--out", str(out)]
-    assert main([*words, "--json", str(file)]) == 0
+    words += ["--threads", "1", "--out", str(out), "--json", str(file)]
+    assert main(words) == 0
     data = json.loads(file.read_text())
     assert [row["axis"] for row in data["scores"]] == ["pushes", "overall"]
     assert all(0 <= row["low"] <= row["score"] <= row["high"] <= 1 for row in data["scores"])
@@ -70,11 +70,7 @@ def test_robustness_leaves_numbers_figure_and_what_goes_on(spring, tmp_path, cap
     assert "--axes pushes" in data["command"]
     assert (out / "robustness.svg").read_bytes().startswith(b"<?xml")
     assert "overall" in capsys.readouterr().out
-    kept = {path.name: path.read_bytes() for path in out.glob("spring-*.json")}
-    assert len(kept) == 2
-    assert main(words) == 0
-    assert json.loads((out / "robustness.json").read_text())["scores"] == data["scores"]
-    assert {path.name: path.read_bytes() for path in out.glob("spring-*.json")} == kept
+    assert len(list(out.glob("spring-*.json"))) == 2
 
 
 def test_trainings_beside_each_other(tmp_path, capsys):

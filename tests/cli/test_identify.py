@@ -30,14 +30,17 @@ def recordings(tmp_path_factory):
     folder = tmp_path_factory.mktemp("recordings")
     files = []
     for number in range(2):
-        position = swing(6.0, rate=100.0, phase=float(number))
-        clock = np.arange(len(position)) / 100.0
-        excitation = Excitation(
-            clock, position, 0 * position, "fixed-base", 100.0, "legv2", "a swing"
-        )
         files.append(folder / f"swing-{number}.parquet")
-        play(excitation, TWIN, believed="legv2").save(files[-1])
+        swung(TWIN, float(number)).save(files[-1])
     return files
+
+
+def swung(robot, phase):
+    """Return a recording of a robot that plays a swing of six seconds."""
+    position = swing(6.0, rate=100.0, phase=phase)
+    clock = np.arange(len(position)) / 100.0
+    excitation = Excitation(clock, position, 0 * position, "fixed-base", 100.0, "legv2", "a swing")
+    return play(excitation, robot, believed="legv2")
 
 
 def call(folder, *words):
@@ -68,15 +71,19 @@ def test_from_recordings_to_robot_numbers_and_report(recordings, tmp_path, capsy
     assert not re.search(r'(?:src|href)="(?!data:)', page.read_text())
 
 
-def test_a_fit_that_is_worse_than_its_start_fails(recordings, tmp_path, capsys):
+def test_a_fit_that_is_worse_than_its_start_fails_and_every_file_says_so(
+    recordings, tmp_path, capsys
+):
     """Fitted to the leg itself, judged by another leg, from that other leg's numbers."""
-    clock = np.arange(600) / 100.0
-    position = swing(6.0, rate=100.0, phase=2.0)
-    excitation = Excitation(clock, position, 0 * position, "fixed-base", 100.0, "legv2", "a swing")
     judge = tmp_path / "judge.parquet"
-    play(excitation, load_robot("legv2"), believed="legv2").save(judge)
+    swung(load_robot("legv2"), 2.0).save(judge)
     words = [recordings[0], "--validate", judge, "--parameters", ",".join(TRUTH)]
-    assert call(tmp_path, *words) == FAILED
+    numbers, page = tmp_path / "leg.json", tmp_path / "leg.html"
+    assert call(tmp_path, *words, "--json", numbers, "--report", page) == FAILED
+    assert "do not use it" in json.loads(numbers.read_text())["warning"]
+    assert "do not use it" in (tmp_path / "leg.toml").read_text().partition("\n")[0]
+    text = page.read_text()
+    assert text.index("do not use it") < text.index("How well it predicts")
     said = capsys.readouterr()
     assert said.out.index("do not use it") < said.out.index("95 % interval")
     assert "do not use it" in said.err

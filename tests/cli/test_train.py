@@ -48,6 +48,10 @@ def test_a_training_leaves_policy_card_and_json(tiny, tmp_path, capsys, refused)
         (["--recipe", "paper", "--set", "discount=0.9"], "Available: batch_size, "),
         (["--set", "learning_rate=fast"], "give e.g. learning_rate="),
         (["--set", "num_envs=2.5"], "a whole number"),
+        (["--set", "task.timestep=soon"], "a number"),
+        (["--set", "memory=lstm"], "window"),
+        (["--recipe", "paper", "--set", "reward.speed=3"], "reward.height"),
+        (["--recipe", "paper", "--set", "privileged_critic=perhaps"], "true or false"),
         (["--heights", "0.4", "0.2"], "the smaller first"),
         (["--robot", "legv9"], "There is no robot"),
         (["--observation", "dates"], "dated, dated-long"),
@@ -64,12 +68,6 @@ def test_a_folder_with_other_things_is_left_alone(tmp_path, refused):
     (tmp_path / "thesis.tex").write_text("years of work")
     refused(["train", "--out", tmp_path], "holds no run")
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
-
-
-@pytest.mark.parametrize("content", ["", "[]", "{", '{"options": 3}', "[" * 5000, "\xff"])
-def test_a_broken_config_is_one_sentence(tiny, tmp_path, refused, content):
-    (tmp_path / "config.json").write_text(content, encoding="latin-1")
-    refused(["train", "--recipe", "tiny", "--out", tmp_path, "--resume"], "config.json")
 
 
 def test_a_full_disk_leaves_no_half_checkpoint_and_names_the_next_command(

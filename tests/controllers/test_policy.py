@@ -10,13 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from onnx import TensorProto, helper
 
-from hopping_leg.controllers.observation_history import OBSERVATION_HISTORIES
 from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.controllers.registry import load_controller, load_policy
 from hopping_leg.errors import PolicyError, UsageError
-from hopping_leg.rl.onnx_export import Network, RecurrentUnit, build_policy
+from hopping_leg.rl.onnx_export import Network, build_policy
 from hopping_leg.robot import load_robot
 from hopping_leg.sim.channel import Measurement
+from tests.controllers.measurements import measurement
+from tests.rl.test_onnx_export import made
 
 ROBOT = load_robot("legv2-paper")
 CARD = Card("test", "three-samples", 0.22, 0.4, (8.0, 6.0), ROBOT.name, ROBOT.digest, 200.0)
@@ -30,11 +31,6 @@ def network(activation="relu", squash="tanh", seed=0):
         for i, o in itertools.pairwise(sizes)
     ]
     return Network(rng.normal(size=15), rng.uniform(0.1, 2, 15), layers, activation, squash)
-
-
-def measurement(count):
-    q, qd = np.random.default_rng(1).normal(size=(2, count, 3, 2))
-    return Measurement(q, qd, np.full((count, 3), 0.3), np.zeros((count, 3)))
 
 
 def loaded(net, count):
@@ -73,15 +69,6 @@ def test_card_survives_the_file_and_same_weights_give_the_same_bytes(tmp_path):
     assert Policy.load(path).card == CARD
     assert Policy.load(path).name == "a"
     assert path.read_bytes() == build_policy(network(), CARD)
-
-
-@pytest.mark.parametrize("keep", [0, 10, 0.5, 0.99])
-def test_truncated_file_is_refused_in_a_sentence(tmp_path, keep):
-    content = build_policy(network(), CARD)
-    path = tmp_path / "cut.onnx"
-    path.write_bytes(content[: keep if keep in (0, 10) else int(keep * len(content))])
-    with pytest.raises(PolicyError, match=r"cut\.onnx"):
-        Policy.load(path)
 
 
 def refused(tmp_path, model, says):
@@ -142,17 +129,6 @@ def test_another_robot_is_refused_or_named(tmp_path, caplog):
         load_policy(path).check_robot(ROBOT, 400.0)
 
 
-def remembering(layout):
-    """Return a policy with a memory."""
-    rng, k = np.random.default_rng(0), 6
-    size = sum(int(np.prod(shape)) for shape in OBSERVATION_HISTORIES[layout].shapes.values())
-    shapes = ((3 * k, size), (3 * k, k), 3 * k, 3 * k)
-    unit = RecurrentUnit(*(rng.normal(size=shape) for shape in shapes))
-    dense = [(rng.normal(size=(2, k)), np.zeros(2))]
-    net = Network(np.zeros(size), np.ones(size), dense, "tanh", "tanh", memory=unit)
-    return Policy(build_policy(net, dataclasses.replace(CARD, layout=layout)), "memory", "test")
-
-
 def stream(ticks, seed):
     """Return measurements of four legs, some of them late."""
     rng = np.random.default_rng(seed)
@@ -173,7 +149,9 @@ def stream(ticks, seed):
 def test_a_forgotten_leg_acts_as_from_a_fresh_start_and_others_go_on(
     layout, rows, mask, before, seed
 ):
-    told, untold, fresh = policies = [remembering(layout) for _ in range(3)]
+    told, untold, fresh = policies = [
+        Policy(made(layout, remembers=True), "memory", "test") for _ in range(3)
+    ]
     for policy in policies:
         policy.reset(4)
     seen = list(stream(before + 5, seed))

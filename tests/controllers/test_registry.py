@@ -40,6 +40,7 @@ def test_the_first_policy_decides(made_on):
     first, second = made_on(OTHER), made_on(DEFAULT_ROBOT)
     assert robot_of([first]) == robot_of(["energy-shaping", first, second]) == OTHER
     assert robot_of([second, first]) == DEFAULT_ROBOT
+    assert robot_of([made_on("my-leg")]) == DEFAULT_ROBOT, "it is not shipped"
 
 
 @pytest.mark.parametrize(
@@ -47,7 +48,3 @@ def test_the_first_policy_decides(made_on):
 )
 def test_who_was_not_trained_hops_on_the_default_robot(controllers):
     assert robot_of(controllers) == DEFAULT_ROBOT
-
-
-def test_a_robot_that_is_not_shipped_gives_the_default_one(made_on):
-    assert robot_of([made_on("my-leg")]) == DEFAULT_ROBOT

@@ -11,11 +11,11 @@ from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.controllers.shooting import HopShape, Shooting, hop_law
 from hopping_leg.errors import UsageError
-from hopping_leg.hop_detection import find_hops
 from hopping_leg.io import replace_at
 from hopping_leg.robot import GRAVITY, load_robot
 from hopping_leg.sim import LegSimulator, leg_simulator
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, sample
+from tests.controllers.measurements import hops_of
 
 HEIGHTS = np.linspace(0.22, 0.40, 10)
 ROBOT = load_robot("legv2-identified")
@@ -28,11 +28,6 @@ def hop(robot, commands, engine="stepper", legs=None):
     setup = RolloutConfig(robot, timestep=STEP, threads=1, engine=engine)
     wanted = np.tile(commands, (round(5 * setup.rate), 1))
     return rollout(Shooting(robot), setup, wanted, 0, legs=legs)
-
-
-def hops_of(run, leg):
-    columns = (run.data[c][:, leg] for c in ("height_m", "height_rate_m_s", "foot_clearance_m"))
-    return find_hops(*columns)
 
 
 def check_apexes(run, commands):
@@ -103,25 +98,6 @@ def test_a_new_command_holds_for_the_next_push():
     late = (found.tick % 400 > 200) & (found.tick > 200)
     assert late.sum() >= 6
     np.testing.assert_allclose(found.apex[late], commands[found.tick, 0][late], atol=0.005)
-
-
-def test_what_it_remembers_is_its_state():
-    legs, commands = LegSimulator(ROBOT, 4, timestep=STEP, threads=1), HEIGHTS[::3]
-    legs.stand(slice(None), [0.7, -1.4])
-    first, restored, fresh = (Shooting(ROBOT) for _ in range(3))
-    for one in (first, restored, fresh):
-        one.watch(legs)
-        one.reset(4)
-    for _ in range(130):
-        legs.step(first.torque(commands))
-    restored.restore(first.state())
-    differed = False
-    for _ in range(130):
-        torque = first.torque(commands)
-        np.testing.assert_array_equal(restored.torque(commands), torque)
-        differed |= not np.array_equal(fresh.torque(commands), torque)
-        legs.step(torque)
-    assert differed
 
 
 SHAPE = np.rec.array([astuple(HopShape())], [(f.name, np.float64) for f in fields(HopShape)])[0]

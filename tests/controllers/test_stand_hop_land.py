@@ -13,16 +13,11 @@ from hopping_leg.controllers.stand_hop_land import (
     StandHopLand,
 )
 from hopping_leg.errors import UsageError
-from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import GRAVITY, load_robot
+from tests.controllers.measurements import hops_of
 from tests.evaluate.conftest import Spring
 
 ROBOT = load_robot("legv2-paper")
-COLUMNS = ("height_m", "height_rate_m_s", "foot_clearance_m")
-
-
-def hops_of(run, leg):
-    return find_hops(*(run.data[name][:, leg] for name in COLUMNS))
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,8 @@ from hopping_leg.controllers import RolloutConfig, rollout
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.controllers.user_controllers import is_user_controller
 from hopping_leg.errors import ControllerError
-from hopping_leg.hop_detection import find_hops
 from hopping_leg.robot import load_robot
-from hopping_leg.sim.channel import Measurement
+from tests.controllers.measurements import hops_of, measurement
 
 ROBOT = load_robot("legv2-paper")
 BOUNCER = Path(__file__).parents[2] / "examples" / "bouncer.py"
@@ -37,13 +36,6 @@ class Leg:
 """
 
 
-def measurement(count):
-    rng = np.random.default_rng(0)
-    q, qd = rng.normal(size=(2, count, 3, 2))
-    command = np.full((count, 3), 0.3) + 0.01 * np.arange(count)[:, None]
-    return Measurement(q, qd, command, np.zeros((count, 3)))
-
-
 def written(path, text, **parts):
     for name, value in parts.items():
         text = text.replace(f"{{{name}}}", value)
@@ -62,11 +54,9 @@ def test_example_hops_with_every_leg_on_its_own():
     controller = load_controller(f"{BOUNCER}:Bouncer", ROBOT)
     commands = np.tile([0.30, 0.35], (800, 1))
     run = rollout(controller, RolloutConfig(ROBOT, threads=1), commands, seed=3)
-    columns = [run.data[c] for c in ("height_m", "height_rate_m_s", "foot_clearance_m")]
-    low, high = (find_hops(*(column[200:, leg] for column in columns)) for leg in (0, 1))
-    assert len(low.apex) > 5
-    assert len(high.apex) > 5
-    assert np.median(high.apex) > np.median(low.apex) + 0.02
+    low, high = (hops.apex[hops.tick > 200] for hops in (hops_of(run, 0), hops_of(run, 1)))
+    assert min(len(low), len(high)) > 5
+    assert np.median(high) > np.median(low) + 0.02
     assert run.header["controller"] == "Bouncer"
 
 

@@ -62,8 +62,12 @@ def test_a_term_is_a_function_and_a_line():
     np.testing.assert_allclose(step.terms[:, -1], np.sum(action**2, axis=1))
     np.testing.assert_allclose(step.reward, without.reward - 0.5 * step.terms[:, -1])
     env = HoppingEnv(reward=more.reward)
-    env.reset(seed=0)
-    assert tuple(env.step(np.zeros(2, np.float32))[4]["reward_terms"]) == more.reward.names
+    _, info = env.reset(seed=0)
+    assert info["base_height"] == pytest.approx(0.2 + ROBOT.foot.radius)
+    _, reward, *_, info = env.step(np.zeros(2, np.float32))
+    assert tuple(info["reward_terms"]) == more.reward.names
+    weighted = [term.weight * info["reward_terms"][term.name] for term in more.reward.terms]
+    assert reward == pytest.approx(sum(weighted))
 
 
 def test_a_term_may_remember_and_goes_on_exactly():

@@ -19,9 +19,9 @@ BUSY = TaskConfig(episode=0.2, reset_distribution="mixed", random_episode_start=
 BUSY = replace(BUSY, command_resampling_time=(0.05, 0.1))
 
 
-def task(options=BUSY, count=6, seed=0, threads=1, **kwargs):
+def task(options=BUSY, count=6, seed=0):
     rng = np.random.default_rng(seed)
-    return HoppingTask(ROBOT, count, options, paper_reward(ROBOT), rng, threads, **kwargs)
+    return HoppingTask(ROBOT, count, options, paper_reward(ROBOT), rng, 1)
 
 
 def actions(ticks, count=6, seed=7):
@@ -31,15 +31,6 @@ def actions(ticks, count=6, seed=7):
 def fingerprint(step):
     parts = [step.observation, step.reward, step.truncated, step.apex_error, step.height]
     return [part.tobytes() for part in (*parts, step.terms)]
-
-
-def test_same_seed_same_bytes_at_any_thread_count():
-    runs = [task(threads=threads) for threads in (1, 2, 4)]
-    for action in actions(120):
-        first, *others = [fingerprint(run.step(action)) for run in runs]
-        assert all(other == first for other in others)
-    one, other = (task(seed=seed).step(np.zeros((6, 2))) for seed in (0, 1))
-    assert fingerprint(one) != fingerprint(other)
 
 
 @pytest.mark.parametrize("ticks", [1, 37, 90])
@@ -91,27 +82,6 @@ def test_staggered_legs_do_not_end_together():
     spread = task(TaskConfig(episode=0.5, random_episode_start=True), count=50)
     ends = [spread.step(np.zeros((50, 2))).truncated.sum() for _ in range(100)]
     assert sum(ends) == 50 > 5 * max(ends)
-
-
-def test_without_autoreset_a_leg_goes_on():
-    going = task(TaskConfig(episode=0.05), count=1, autoreset=False)
-    heights = []
-    for _ in range(15):
-        step = going.step(np.full((1, 2), 0.5))
-        heights.append(step.height[0])
-    assert step.truncated.all()
-    assert step.final_observation is None
-    assert heights[-1] != pytest.approx(0.21, abs=1e-6)
-
-
-def test_resetting_some_legs_leaves_the_others_alone():
-    some = task(TaskConfig(disturbance=NO_NOISE), count=4)
-    for action in actions(30, count=4):
-        some.step(action)
-    before = some.legs.state.copy()
-    some.reset(np.array([1, 3]))
-    np.testing.assert_array_equal(some.legs.state[[0, 2]], before[[0, 2]])
-    np.testing.assert_allclose(some.legs.height[[1, 3]], 0.2 + ROBOT.foot.radius)
 
 
 def test_commands_come_from_the_paper_or_a_range_and_switch_on_time():
@@ -183,21 +153,6 @@ def test_a_restart_shows_nothing_of_the_last_episode():
     assert step.truncated.all()
     np.testing.assert_array_equal(step.observation, fresh)
     assert not np.allclose(step.final_observation, fresh)
-
-
-def test_a_draw_makes_the_same_legs_again_and_another_one_others():
-    one = task(TaskConfig(randomised=WIDE_RANGES), count=6)
-    heights = []
-    for draw in (1, 2, 1):
-        one.reseed(np.random.default_rng(draw))
-        one.legs.stand(slice(None), [0.7, -1.4], 0.05)
-        for _ in range(40):
-            one.legs.step(np.full((6, 2), [1.0, -3.0]))
-        heights.append(one.legs.height.copy())
-    first, second, again = heights
-    np.testing.assert_array_equal(first, again)
-    assert len(set(first)) == 6
-    assert (first != second).all()
 
 
 @pytest.mark.parametrize(

@@ -47,25 +47,19 @@ def test_an_evaluation_survives_the_disk(judged):
     assert evaluation_from(json.loads(text)).dumps() == text
 
 
-def test_controllers_of_the_same_name_are_told_apart_and_numbers_stay(folders, judged):
+def test_runs_beside_each_other_keep_names_numbers_and_heights_and_say_how_they_differ(
+    folders, judged
+):
     compared = set_beside(read_runs([str(folders / "a"), str(folders / "b")]))
     assert compared.evaluation.controllers == ["a: spring", "b: spring"]
     errors = [row.median_error_m for row in compared.evaluation.rows("b: spring")]
     assert errors == pytest.approx([row.median_error_m for row in judged.evaluation.summary])
-
-
-def test_differing_robots_and_conditions_are_said(folders):
-    compared = set_beside(read_runs([str(folders / "a"), str(folders / "b")]))
+    drawn = {(run.controller, run.trial.kind) for run in traces_of(compared)}
+    assert drawn == {("a: spring", "sequence"), ("a: spring", "staircase")}
     assert "robots differ: legv2-paper" in compared.notes[0]
     assert "long-leg (xyz) in b" in compared.notes[0]
     assert {"name": "seeds", "in a": "2", "in b": "9"} in compared.differences
     assert not set_beside(read_runs([f"x={folders / 'a'}", f"y={folders / 'a'}"])).differences
-
-
-def test_heights_come_from_the_traces_that_were_kept(folders):
-    compared = set_beside(read_runs([str(folders / "a"), str(folders / "b")]))
-    drawn = {(run.controller, run.trial.kind) for run in traces_of(compared)}
-    assert drawn == {("a: spring", "sequence"), ("a: spring", "staircase")}
 
 
 def test_the_page_holds_everything_and_needs_nothing(folders):

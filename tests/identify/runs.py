@@ -51,6 +51,13 @@ def swinging(rows=600, rate=200.0):
     )
 
 
+def rig_log(clock="t", rows=600):
+    """Return a table as the double pendulum's rig logs it."""
+    names = ["pos_meas1", "pos_meas2", "vel_meas1", "vel_meas2", "tau_con1", "tau_con2"]
+    table = swinging(rows, rate=500.0)
+    return table[:, :7].rename(dict(zip(table.columns[:7], [clock, *names], strict=True)))
+
+
 def write_run(folder, table, sidecar=SIDECAR, name="run.csv"):
     """Write a table as CSV with its sidecar; return the CSV's path."""
     path = folder / name

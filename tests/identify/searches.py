@@ -23,15 +23,3 @@ def objective(parameters=TWO, scoring=SCORING, recordings=(RUN,), length=0.5):
 def bowl(vectors):
     """Return residuals of a tilted bowl with its bottom at (1, -0.5)."""
     return vectors @ np.array([[2.0, 0.3], [0.1, 1.0]]) - np.array([1.95, -0.2])
-
-
-def killed(function, after):
-    """Return the function, which breaks at one of its calls as a kill would."""
-    calls = iter(range(after))
-
-    def run(vectors):
-        if next(calls, None) is None:
-            raise KeyboardInterrupt
-        return function(vectors)
-
-    return run

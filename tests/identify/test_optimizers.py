@@ -1,5 +1,4 @@
 import dataclasses
-import json
 import pickle
 
 import numpy as np
@@ -12,7 +11,7 @@ from hopping_leg.identify.optimizers import CmaOptions, Found, cma_es, jacobian,
 from hopping_leg.identify.parameters import choose
 from hopping_leg.identify.plan import make_plan, pass_names
 from hopping_leg.identify.search import Searcher, SearchOptions, second_pass
-from tests.identify.searches import BOTTOM, CAD, RUN, SCORING, TRUTH, TWO, bowl, killed, objective
+from tests.identify.searches import BOTTOM, CAD, RUN, SCORING, TRUTH, TWO, bowl, objective
 from tests.identify.twin import LEG, noisy, record, swing
 
 
@@ -47,41 +46,13 @@ def test_shares_in_turn_find_the_bottom_of_their_sum():
     assert found.cost - least < 0.05 * (own.mean() - least)
 
 
-def test_a_share_judges_a_generation_and_the_whole_only_the_last_ones():
-    counted = {"share": 0, "whole": 0}
-
-    def count(name, function):
-        def run(vectors):
-            counted[name] += len(vectors)
-            return function(vectors)
-
-        return run
-
-    shares = [count("share", share) for share in SHARES]
-    cma_es(count("whole", sum_of_shares), TWO, CmaOptions(20), seed=0, shares=shares)
-    assert counted["share"] == 20 * 16
-    assert 0 < counted["whole"] < 16
-
-
-@pytest.mark.parametrize("shares", [(), SHARES], ids=["whole", "shares"])
-def test_a_killed_cma_es_resumes_exactly_from_its_own_checkpoint_alone(tmp_path, shares):
-    options, file = CmaOptions(20, population=6), tmp_path / "state.json"
-    whole = cma_es(sum_of_shares, TWO, options, seed=1, shares=shares)
-    broken = [killed(share, 2) for share in shares]
-    with pytest.raises(KeyboardInterrupt):
-        cma_es(killed(sum_of_shares, 7), TWO, options, seed=1, shares=broken, checkpoint=file)
-    done = len(json.loads(file.read_text())["state"]["costs"])
-    counted = []
-    shares = [lambda v, s=share: counted.append(1) or s(v) for share in shares]
-    resumed = cma_es(
-        lambda v: counted.append(1) or sum_of_shares(v),
-        TWO, options, seed=1, shares=shares, checkpoint=file,
-    )  # fmt: skip
-    assert len(counted) == 20 - done + bool(shares)
-    assert resumed.history == whole.history
-    np.testing.assert_array_equal(resumed.vector, whole.vector)
+def test_what_a_checkpoint_knows_is_not_searched_again_and_another_searchs_is_refused(tmp_path):
+    options, file = CmaOptions(3, population=6), tmp_path / "state.json"
+    found = cma_es(squares, TWO, options, seed=1, checkpoint=file)
+    again = cma_es(lambda _: pytest.fail("searched"), TWO, options, seed=1, checkpoint=file)
+    np.testing.assert_array_equal(again.vector, found.vector)
     with pytest.raises(UsageError, match="belongs to a search with other"):
-        cma_es(sum_of_shares, TWO, options, seed=2, checkpoint=file)
+        cma_es(squares, TWO, options, seed=2, checkpoint=file)
     file.write_text("[]")
     with pytest.raises(UsageError, match="no checkpoint"):
         least_squares(bowl, TWO, checkpoint=file)

@@ -1,16 +1,13 @@
 import dataclasses
 import gzip
 import hashlib
-import string
 
 import numpy as np
 import polars as pl
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 from scipy.ndimage import uniform_filter1d
 
-from hopping_leg.errors import HoppingLegError, RecordingError, UsageError
+from hopping_leg.errors import RecordingError, UsageError
 from hopping_leg.identify.feasibility import inverse_dynamics
 from hopping_leg.identify.importers import IMPORTERS, recognise
 from hopping_leg.identify.recording import load_recording, make_recording
@@ -76,22 +73,14 @@ def test_a_sidecar_may_name_the_columns(tmp_path):
 @pytest.mark.parametrize(
     ("sidecar", "sentence"),
     [
-        ("rig = ", "run.toml is not valid TOML"),
         (SIDECAR + "[columns]\nheight = 'x'", "no recording column 'height'"),
         (SIDECAR + "[columns]\nheight_m = 'x'", "no column 'x'"),
         (SIDECAR + "columns = 3", r"\[columns\] must name"),
-        ('rig = "rail"', "'rate_hz' is missing"),
         (SIDECAR.replace("fixed-base", "fixed base"), "Did you mean 'fixed-base'"),
         (SIDECAR.replace("200.0", "0"), "'rate_hz' is 0.0 but must be positive"),
-        (SIDECAR.replace("200.0", '"fast"'), "'rate_hz' is 'fast' but must be a finite number"),
         (SIDECAR + "rate = 3", "Did you mean 'rate_hz'"),
-        (SIDECAR + "stiffness = 3", "'stiffness' is 3 but must be a pair"),
         (SIDECAR + "stiffness = [1, -3]", "must hold zero or more"),
         (SIDECAR + "startup_rows = -1", "'startup_rows' is -1 but must be 0 or more"),
-        (SIDECAR + "startup_rows = true", "'startup_rows' is True but must be a whole number"),
-        (SIDECAR + "gains_exact = 1", "'gains_exact' is 1 but must be true or false"),
-        (SIDECAR + "quantisation = 1", "'quantisation' must be a table"),
-        (SIDECAR.replace('"made up"', "1"), "'source' is 1 but must be a text"),
     ],
 )
 def test_a_broken_sidecar_gets_a_sentence(tmp_path, sidecar, sentence):
@@ -100,21 +89,13 @@ def test_a_broken_sidecar_gets_a_sentence(tmp_path, sidecar, sentence):
     assert "run.toml" in str(caught.value)
 
 
-def test_tables_of_unknown_rigs_are_told_what_is_known(tmp_path):
+def test_folders_and_tables_of_unknown_rigs_are_told_what_is_known(tmp_path):
+    with pytest.raises(RecordingError, match="Cannot read"):
+        load_recording(tmp_path)
     path = tmp_path / "log.csv"
     path.write_text("a,b\n1,2\n")
     with pytest.raises(RecordingError, match=r"legv2_fixed_base.*log\.toml.*a, b"):
         load_recording(path)
-
-
-def test_folders_and_truncated_files_get_a_sentence(tmp_path):
-    with pytest.raises(RecordingError, match="Cannot read"):
-        load_recording(tmp_path)
-    whole, cut = tmp_path / "whole.parquet", tmp_path / "cut.parquet"
-    load_recording(write_run(tmp_path, swinging())).save(whole)
-    cut.write_bytes(whole.read_bytes()[:-100])
-    with pytest.raises(HoppingLegError, match=r"cut\.parquet is not a readable Parquet"):
-        load_recording(cut)
 
 
 def test_segments_end_where_rows_are_missing():
@@ -130,70 +111,6 @@ def test_a_log_that_keeps_every_fourth_row_has_no_stalls():
     assert recording.warnings == ()
     with pytest.raises(UsageError, match="Did you mean 'position'"):
         recording.array("positon")
-
-
-KNOWN = sorted({n for i in IMPORTERS.values() for n in (*i.columns, *i.names)} | set(COLUMNS))
-FIELDS = st.one_of(
-    st.floats().map(repr),
-    st.integers(-5, 5).map(str),
-    st.sampled_from(["", "nan", "inf", "-0", "1e400", "5e-324", "true", "STAGING", '"', " 3 "]),
-    st.text(string.printable, max_size=6),
-)
-NUMBERS = st.floats(-3, 3) | st.sampled_from([float("inf"), float("nan"), 5e-324, 0.0])
-
-
-@st.composite
-def tables(draw):
-    """Draw a table of known columns with anything in them."""
-    importer = draw(st.sampled_from([*IMPORTERS.values(), None]))
-    names = draw(st.lists(st.sampled_from(KNOWN), max_size=6, unique=True))
-    names = [*(importer.columns if importer else ()), *names]
-    names = draw(st.permutations(sorted(set(names)))) or ["t"]
-    lines = [[draw(FIELDS) for _ in names] for _ in range(draw(st.integers(0, 4)))]
-    return [names, *lines * draw(st.sampled_from([1, 1, 12]))]
-
-
-@st.composite
-def runs(draw):
-    """Draw a table of numbers in the order of time."""
-    columns = sorted(set(COLUMNS) - {"time_s", "row"})
-    columns = draw(st.lists(st.sampled_from(columns), max_size=8, unique=True))
-    values = draw(st.lists(NUMBERS, min_size=5, max_size=5))
-    rows = range(draw(st.integers(25, 40)))
-    cells = [[values[(row * 7 + i) % 5] for i in range(len(columns))] for row in rows]
-    return [["time_s", *columns], *(list(map(repr, [row / 200, *cells[row]])) for row in rows)]
-
-
-@st.composite
-def damaged(draw):
-    """Draw a packed table with a wrong byte that ends early."""
-    whole = bytearray(gzip.compress(b"t,pos\n" + b"1.0,2.0\n" * 200, mtime=0))
-    whole[draw(st.integers(0, len(whole) - 1))] = draw(st.integers(0, 255))
-    return bytes(whole[: draw(st.integers(1, len(whole)))])
-
-
-CSV = (tables() | runs()).map(lambda lines: "\n".join(map(",".join, lines)).encode())
-SIDECARS = st.sampled_from([None, SIDECAR, "columns = {}", "rig = 3", "[rig]"])
-
-
-@settings(max_examples=230, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(
-    file=st.tuples(st.just("run.csv"), CSV | st.binary(max_size=60))
-    | st.tuples(st.just("run.csv.gz"), damaged()),
-    sidecar=SIDECARS | st.text(max_size=40),
-)
-def test_whatever_stands_in_a_file_is_read_or_refused_in_a_sentence(tmp_path, file, sidecar):
-    (tmp_path / file[0]).write_bytes(file[1])
-    (tmp_path / "run.toml").unlink(missing_ok=True)
-    if sidecar is not None:
-        (tmp_path / "run.toml").write_text(sidecar, encoding="utf-8")
-    try:
-        sentences = load_recording(tmp_path / file[0]).warnings
-    except HoppingLegError as error:
-        sentences = [str(error)]
-    for sentence in sentences:
-        assert sentence.startswith(str(tmp_path))
-        assert sentence.endswith((".", "?"))
 
 
 FILES = sorted(RECORDINGS.glob("*/*.csv.gz"))

@@ -85,13 +85,6 @@ def test_rows_are_met_at_their_own_time_stamps_and_commands_within_a_step():
     assert np.abs(coarse - fine).max() < 0.05 * effect
 
 
-def test_the_answer_is_smooth_in_the_delay():
-    run = record(LEG, swing(1.0), onboard="torque")
-    late = [FREE.replace({"drive.delay": delay}) for delay in 1e-3 + np.arange(0, 2e-3, 2e-5)]
-    steps = np.diff(simulator([run]).run(late).position[:, 0, 50], axis=0)
-    np.testing.assert_allclose(steps, np.broadcast_to(steps.mean(0), steps.shape), rtol=0.1)
-
-
 def test_friction_that_grows_with_load_slows_the_leg():
     run = record(LEG, swing(1.0), onboard="torque")
     lossy = TRUE.replace({"hip.load_friction": 0.3, "knee.load_friction": 0.3})

@@ -27,16 +27,11 @@ def test_the_legs_own_recording_is_believed_in_a_mirror_too():
 
 
 @pytest.mark.parametrize("joint", [0, 1])
-def test_one_joint_in_a_mirror_is_refused(joint):
-    every = [PAIRS[name][joint] for name in OF_A_JOINT]
-    with pytest.raises(RecordingError, match="sign"):
-        check_balance(changed(tracked(), -pl.col(every)), LEG)
-
-
-@pytest.mark.parametrize("joint", [0, 1])
-def test_a_torque_against_its_motion_is_refused(joint):
+@pytest.mark.parametrize("names", [OF_A_JOINT, ("torque",)], ids=["joint", "torque"])
+def test_a_joint_in_a_mirror_and_a_torque_against_its_motion_are_refused(names, joint):
+    mirrored = changed(tracked(), -pl.col([PAIRS[name][joint] for name in names]))
     with pytest.raises(RecordingError, match=r"against its torque|sign"):
-        check_balance(changed(tracked(), -pl.col(PAIRS["torque"][joint])), LEG)
+        check_balance(mirrored, LEG)
 
 
 @settings(max_examples=8)

@@ -46,17 +46,6 @@ def test_a_leg_whose_motors_are_too_slow_is_asked_for_lower_hops():
     assert low < min(recipe.selection.eval_commands) < max(recipe.selection.eval_commands) < high
 
 
-def test_a_leg_that_cannot_hop_is_a_sentence(monkeypatch):
-    def evaluate_policy(*args, seconds, **options):
-        return evaluate(*args, seconds=0.5, **options)
-
-    evaluate = stages.evaluate_policy
-    monkeypatch.setattr(stages, "evaluate_policy", evaluate_policy)
-    few = FAST.replace(heights=(0.26, 0.28)).fit(ROBOT)
-    with pytest.raises(UsageError, match="on changed; check masses, lengths and motors"):
-        stages.within_reach(few, with_motors(torque_limit=0.1))
-
-
 @pytest.mark.parametrize(
     ("missed", "range_m"),
     [
@@ -79,7 +68,7 @@ def test_the_longest_run_of_heights_is_asked(monkeypatch, missed, range_m):
     assert score == pytest.approx(0.005), "of the heights that are asked"
     names = [round(0.26 + k / 100, 2) for k in range(15)]
     missed.update({h: {"hops": 0} for h in names if h not in names[3:5]})
-    with pytest.raises(UsageError, match=r"no range of heights between 0\.26 and 0\.4 m"):
+    with pytest.raises(UsageError, match=r"between 0\.26 and 0\.4 m .*; check masses"):
         stages.within_reach(FAST, ROBOT)
 
 

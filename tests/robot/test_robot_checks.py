@@ -1,4 +1,3 @@
-import copy
 import dataclasses
 import logging
 import math
@@ -9,18 +8,10 @@ from hypothesis import strategies as st
 
 from hopping_leg import cli
 from hopping_leg.errors import RobotError
-from hopping_leg.robot import doubts, load_robot, load_tree, numbers, robot_text, shipped_robots
+from hopping_leg.robot import doubts, load_robot, load_tree, numbers, shipped_robots
+from tests.robot.files import UNITS, whole, written
 
 EXAMPLE = "examples/my_leg.toml"
-
-
-def written(path, text, extends="legv2-paper"):
-    """Write numbers ``{path: (value, unit)}`` as a robot file that extends another."""
-    lines = [f'name = "mine"\nextends = "{extends}"']
-    for number, (value, unit) in text.items():
-        lines.append(f'{number} = {{ value = {value}, unit = "{unit}", source = "test" }}')
-    path.write_text("\n".join(lines))
-    return str(path)
 
 
 @pytest.mark.parametrize("name", [*shipped_robots(), EXAMPLE])
@@ -80,15 +71,6 @@ def test_numbers_that_belong_to_a_changed_one_are_named_until_stated(tmp_path, p
     assert doubts(written(tmp_path / "last.toml", restated, "leg.toml")) == []
 
 
-def whole(path, **values):
-    """Write legv2 with other values as a file that stands alone."""
-    tree = copy.deepcopy(load_tree("legv2"))
-    for number, value in values.items():
-        dict(numbers(tree))[number]["value"] = value
-    path.write_text(robot_text(tree))
-    return str(path)
-
-
 def said(file):
     """Return what is doubted in a robot file, or why it is refused."""
     try:
@@ -115,7 +97,8 @@ ENTRIES = [(p, e) for p, e in numbers(load_tree("legv2")) if e["unit"] in OTHER_
 def test_a_value_in_another_unit_is_doubted_by_its_name(tmp_path, number, data):
     path, entry = number
     factor = data.draw(st.sampled_from(OTHER_UNITS[entry["unit"]]))
-    found = said(whole(tmp_path / "leg.toml", **{path: entry["value"] * factor}))
+    value = (entry["value"] * factor, entry["unit"])
+    found = said(written(tmp_path / "leg.toml", {path: value}, "legv2"))
     assert any(f"'{path}'" in sentence for sentence in found)
     if entry["unit"] in ("kg", "rad/s") or path.endswith("length"):
         assert any("is it in" in sentence for sentence in found)
@@ -151,8 +134,8 @@ def test_a_decimal_point_that_slipped_is_doubted(tmp_path, path, power):
     ],
 )
 def test_what_cannot_be_is_doubted(tmp_path, path, value, says):
-    unit = next((e["unit"] for p, e in numbers(load_tree("legv2")) if p == path), "kg m2")
-    found = said(written(tmp_path / "leg.toml", {path: (value, unit)}, "legv2"))
+    value = (value, UNITS.get(path, "kg m2"))
+    found = said(written(tmp_path / "leg.toml", {path: value}, "legv2"))
     assert any(f"'{path}'" in sentence and says in sentence for sentence in found)
 
 
@@ -169,12 +152,11 @@ def test_a_weight_beyond_a_links_end_needs_a_word(tmp_path):
 
 
 def test_a_leg_without_stops_is_told_whose_it_gets(tmp_path):
-    tree = load_tree("legv2")
-    for joint in ("hip", "knee"):
-        del tree[joint]["stop_lower"], tree[joint]["stop_upper"]
-    file = tmp_path / "leg.toml"
-    file.write_text(robot_text(tree))
-    (sentence,) = doubts(str(file))
+    def remove_stops(tree):
+        for joint in (tree["hip"], tree["knee"]):
+            del joint["stop_lower"], joint["stop_upper"]
+
+    (sentence,) = doubts(whole(tmp_path / "leg.toml", remove_stops))
     assert "hip.stop_lower, hip.stop_upper, knee.stop_lower, knee.stop_upper" in sentence
 
 

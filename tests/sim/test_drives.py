@@ -1,7 +1,5 @@
 """What the stepper has between a command and a joint: delays, drive, motor, gear, transmission."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -212,17 +210,3 @@ def test_stiction_holds_up_to_its_share_of_friction():
     for _ in range(20):
         legs.step(np.array([[0.55, 0.0], [0.55, 0.0], [0.65, 0.0]]))
     assert (np.abs(legs.q[:, 0]) > [0.02, 1e-4, 0.02]).tolist() == [True, False, True]
-
-
-def test_a_gear_under_load_takes_its_share_of_the_torque_and_may_hold():
-    """1.2 N m against 0.2 + 0.3 x 1.2 N m of friction move the hip as 0.84 N m without load do."""
-    moved = []
-    for share, torque, ticks in ((0.3, 1.2, 4), (0, 0.84, 4), (0.9, 1, 1), (0, 1, 1)):
-        hip = dataclasses.replace(CAD.hip, friction=0.2, damping=0.0, load_friction=share)
-        legs = hanging(dataclasses.replace(CAD, hip=hip))
-        for _ in range(ticks):
-            legs.step(np.array([[torque, 0.0]]))
-        moved.append(float(legs.qd[0, 0]))
-    assert moved[0] > 0.5
-    assert abs(moved[2]) < 1e-4 < 0.4 < moved[3]
-    assert moved[0] == pytest.approx(moved[1], rel=1e-6)

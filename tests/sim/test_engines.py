@@ -153,6 +153,7 @@ def test_motor_line_gain_load_friction_and_pushes_are_the_steppers():
     assert limited > 10
 
 
-def test_a_reality_is_refused():
+@pytest.mark.parametrize("make", ["mujoco", "pybullet"], indirect=True)
+def test_engines_that_simulate_no_reality_refuse_it(make):
     with pytest.raises(UsageError, match="reality"):
-        MujocoSimulator(load_robot("twin"), 1)
+        make(load_robot("twin"), 1)

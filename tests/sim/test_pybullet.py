@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from hopping_leg.errors import UsageError
-from hopping_leg.robot import SoftLimits, build_model, dynamics, kinematics, load_robot
+from hopping_leg.robot import build_model, dynamics, kinematics, load_robot
 from hopping_leg.robot.kinematics import joint_angles
-from hopping_leg.sim import LegSimulator, NoiseAndDelay, Plant
+from hopping_leg.sim import LegSimulator
 from hopping_leg.sim.pybullet import PyBulletSimulator
 from hopping_leg.sim.pybullet.ground_law import GroundLaw
 from tests.robot.legs import random_state
@@ -70,23 +70,6 @@ def test_pybullets_own_ground_is_rigid():
     assert sink_and_rest(legs)[0] < 1e-4
 
 
-def hop(count, ground):
-    legs = PyBulletSimulator(PAPER, count, timestep=1e-3, ground=ground)
-    plant = Plant(legs, NoiseAndDelay(), SoftLimits(), np.random.default_rng(3))
-    legs.stand(slice(None), POSTURE, clearance=0.01)
-    command = np.full(count, 0.3)
-    plant.channel.restart(slice(None), legs.q, legs.qd, command)
-    for _ in range(20):
-        measurement = plant.sense(command)
-        plant.drive(20 * (POSTURE - measurement.q[:, 0]))
-    return legs.state.tobytes()
-
-
-@pytest.mark.parametrize("ground", ["robot", "spring", "rigid"])
-def test_same_seed_same_bytes(ground):
-    assert hop(2, ground) == hop(2, ground)
-
-
 def test_legs_do_not_meet_each_other():
     together, alone = (
         PyBulletSimulator(PAPER, 3, ground="rigid"),
@@ -97,11 +80,6 @@ def test_legs_do_not_meet_each_other():
         for _ in range(20):
             legs.step(np.tile([0.5, 1.0], (legs.count, 1)))
     np.testing.assert_array_equal(together.state, np.tile(alone.state, (3, 1)))
-
-
-def test_a_leg_with_a_reality_is_refused():
-    with pytest.raises(UsageError, match="only the stepper"):
-        PyBulletSimulator(load_robot("twin"), 1)
 
 
 def test_worlds_are_freed_with_their_legs():

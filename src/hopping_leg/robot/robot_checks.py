@@ -233,14 +233,15 @@ def _contradictions(robot: Robot) -> Iterator[str]:
         if peak > most * _ROUNDING:
             yield (
                 f"'{name}.motor.peak_torque' is {peak:g} N m but {constant} times {current}"
-                f" ({servo.max_current:g} A) and the gear ratio gives {most:.3g} N m at most."
+                f" ({servo.max_current:g} A) and '{name}.motor.gear_ratio' ({ratio:g}) gives"
+                f" {most:.3g} N m at most; {_slip(ratio, '1', 1.0, math.inf)}?"
             )
         fastest = speed_constant(servo) * robot.hardware.voltage_high / ratio
-        if joint.motor.no_load_speed > fastest * _ROUNDING:
+        if (speed := joint.motor.no_load_speed) > fastest * _ROUNDING:
             yield (
-                f"'{name}.motor.no_load_speed' is {joint.motor.no_load_speed:g} rad/s but by"
+                f"'{name}.motor.no_load_speed' is {speed:g} rad/s but by"
                 f" {constant} {voltage} ({robot.hardware.voltage_high:g} V) turns it at"
-                f" {fastest:.3g} rad/s at most."
+                f" {fastest:.3g} rad/s at most; {_slip(speed, 'rad/s', 0.0, fastest)}?"
             )
         if joint.load_friction >= 1:
             yield (

@@ -1,13 +1,11 @@
 """Skills are measured against the true state, and the measures see what they should see."""
 
 import dataclasses
-import json
 
 import numpy as np
 import polars as pl
 import pytest
 
-from hopping_leg.cli import main
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import Entry
@@ -70,17 +68,6 @@ def test_energy_shaping_counts_and_climbs(setup, shaping):
     assert all(abs(row.median_error_m) < 0.01 and row.hops >= 3 for row in rows)
     assert whole.skipped_hops == 0
     assert abs(whole.worst_error_m) == max(abs(row.median_error_m) for row in rows)
-
-
-@pytest.mark.slow
-def test_command_line_writes_everything(tmp_path, capsys):
-    file = tmp_path / "skills.json"
-    words = ["skills", "energy-shaping", "--commands", "0.3", "--seeds", "1"]
-    assert main([*words, "--floor", "soft", "--threads", "1", "--json", str(file)]) == 0
-    data = json.loads(file.read_text())
-    assert data["command"].startswith("hop skills energy-shaping")
-    assert [len(data[name]) for name in ("counted", "stairs", "climbs", "landings")] == [2, 7, 1, 2]
-    assert "weights" in capsys.readouterr().out
 
 
 def test_skills_need_the_stepper(setup, shaping):

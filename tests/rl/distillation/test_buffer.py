@@ -1,12 +1,10 @@
 """What a student is shown: the newest ticks, with what the teacher did when they took effect."""
 
 import numpy as np
-import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hopping_leg.rl.checkpoint import read_checkpoint, write_checkpoint
 from hopping_leg.rl.distillation.buffer import LabelledRollout, RolloutBuffer, shift_labels
 
 TICKS, LEGS = 4, 3
@@ -64,20 +62,6 @@ def test_ticks_without_a_label_are_not_drawn():
     observations, _ = held.ticks(300, draws())
     assert 150 < len(observations) < 250
     assert set(observations[:, 1].tolist()) == {1.0, 2.0}
-
-
-@pytest.mark.parametrize("added", [1, 3])
-def test_a_buffer_after_its_file_draws_the_same(added, tmp_path):
-    held, again = buffer(), buffer()
-    for number in range(added):
-        held.add(rollout(number, begun=[(1, 0)]), np.array([0, 1, 2]))
-    again.restore(read_checkpoint(write_checkpoint(tmp_path, 0, held.state())))
-    assert again.filled == held.filled
-    for one in (held, again):
-        one.add(rollout(7), PROMPT)
-    for name in ("ticks", "sequences"):
-        first, second = (getattr(one, name)(50, draws()) for one in (held, again))
-        assert all(torch.equal(a, b) for a, b in zip(first, second, strict=True))
 
 
 @given(

@@ -163,8 +163,3 @@ RULES = StoppingRules(minutes=2.0, tolerance=0.004, margin=0.01, patience=3, gai
 def test_it_stops_when_good_enough_without_time_or_without_gain(going_on, ended, says):
     assert not RULES.reason(*going_on, 0.25)
     assert says in RULES.reason(*ended, 0.25)
-
-
-def test_only_a_confirmed_decline_is_rolled_back():
-    rolled = [RULES.rolled_back([0.01, 0.03, *more]) for more in ([], [0.015], [0.025])]
-    assert rolled == [False, False, True]
