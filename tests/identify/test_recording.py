@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.ndimage import uniform_filter1d
 
 from hopping_leg.errors import HoppingLegError, RecordingError, UsageError
-from hopping_leg.identify.feasibility import inverse_dynamics
+from hopping_leg.identify.excitation import inverse_dynamics
 from hopping_leg.identify.importers import IMPORTERS, recognise
 from hopping_leg.identify.recording import load_recording, make_recording
 from hopping_leg.identify.recording_format import COLUMNS, PAIRS
@@ -132,7 +132,9 @@ def test_a_log_that_keeps_every_fourth_row_has_no_stalls():
         recording.array("positon")
 
 
-KNOWN = sorted({n for i in IMPORTERS.values() for n in (*i.columns, *i.names)} | set(COLUMNS))
+KNOWN = sorted(
+    {n for i in IMPORTERS.values() for n in (*i.recognised_by, *i.columns.values())} | set(COLUMNS)
+)
 FIELDS = st.one_of(
     st.floats().map(repr),
     st.integers(-5, 5).map(str),
@@ -147,7 +149,7 @@ def tables(draw):
     """Draw a table of known columns with anything in them."""
     importer = draw(st.sampled_from([*IMPORTERS.values(), None]))
     names = draw(st.lists(st.sampled_from(KNOWN), max_size=6, unique=True))
-    names = [*(importer.columns if importer else ()), *names]
+    names = [*(importer.recognised_by if importer else ()), *names]
     names = draw(st.permutations(sorted(set(names)))) or ["t"]
     lines = [[draw(FIELDS) for _ in names] for _ in range(draw(st.integers(0, 4)))]
     return [names, *lines * draw(st.sampled_from([1, 1, 12]))]
@@ -202,9 +204,9 @@ FILES = sorted(RECORDINGS.glob("*/*.csv.gz"))
 @pytest.mark.parametrize("name", IMPORTERS)
 def test_a_rig_is_recognised_by_its_own_columns_only(name):
     importer = IMPORTERS[name]
-    assert recognise(sorted(importer.columns)) is importer
-    assert recognise(sorted(importer.columns)[1:]) is not importer
-    assert set(importer.names.values()) <= set(COLUMNS)
+    assert recognise(sorted(importer.recognised_by)) is importer
+    assert recognise(sorted(importer.recognised_by)[1:]) is not importer
+    assert set(importer.columns) <= set(COLUMNS)
 
 
 @needs_recordings
