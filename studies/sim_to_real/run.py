@@ -143,7 +143,7 @@ class Foretell(Meet):
     """A shipped controller in what a method believes a twin to be: the robot ``source``."""
 
     believer: Method | None = None
-    source: str | Path = ""
+    source: str = ""
 
     @property
     def name(self) -> str:

@@ -206,11 +206,11 @@ class Study:
         if not self.seeds or min(self.seeds) < 0 or len(set(self.seeds)) < len(self.seeds):
             raise UsageError(f"Training seeds {self.seeds} must be 0 or more, each given once.")
 
-    def source(self, twin: Twin, method: Method) -> str | Path:
+    def source(self, twin: Twin, method: Method) -> str:
         """Return the robot that a method simulates for a twin: its name or file."""
         if method.truth:
             return twin.source
-        return self._fitted(twin, method.fit) if method.fit else method.robot or twin.believed
+        return str(self._fitted(twin, method.fit)) if method.fit else method.robot or twin.believed
 
     def training(self, twin: Twin, method: Method, seed: int) -> TrainPolicy:
         """Return a training; what does not depend on the twin is trained once."""

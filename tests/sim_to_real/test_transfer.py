@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from pathlib import Path
 
 import polars as pl
 import pytest
@@ -72,6 +73,14 @@ def test_a_recording_belongs_to_its_twin_and_time(tmp_path, twin):
             assert other.done
 
 
+def test_a_twin_that_goes_to_its_stops_is_recorded(tmp_path, twin):
+    job = RecordTwin(tmp_path / "rail.parquet", twin, "rail")
+    job.run(quiet=True)
+    assert job.done
+    lowest = load_recording(job.file).array("position").min()
+    assert lowest < twin.robot.knee.stop_lower, "belts and stops give way"
+
+
 LEG = LegHypothesis(load_robot("legv2"))
 
 
@@ -138,7 +147,7 @@ def test_each_controller_knows_what_its_method_says_of_the_twin(tmp_path, twin):
 
     run = Transfer(tmp_path, twin, FAST, seed=3)
     assert [record.rig for record in run.records] == ["fixed-base", "rail"]
-    assert run.fit.file == run.trainings[0].source == run.identified
+    assert run.fit.file == Path(run.trainings[0].source) == run.identified
     assert run.trainings[1].source == "legv2"
     assert [hop.method for hop in run.hops] == ["identified", "cad", "energy-shaping"]
     assert [hop.policy and hop.policy.parent.name for hop in run.hops] == [

@@ -104,7 +104,7 @@ _WITNESSES = {
     "torque": ("torque_command", "position_command"),
 }
 """What moves with a quantity."""
-_OUTSIDE = 0.1  # rad beyond a mechanical stop that a recording may show
+_OUTSIDE = 0.2  # rad beyond a mechanical stop that a recording may show: stops and belts give way
 _BENT = 0.2  # rad, from which on a joint is bent to one side
 
 

@@ -111,7 +111,7 @@ def given_twin(word: str) -> Twin:
     return Twin(robot.name, word if word in shipped_robots() else str(Path(word)), parent)
 
 
-def simulated(source: str | Path) -> Robot:
+def simulated(source: str) -> Robot:
     """Return a robot as training simulates it: of [reality] it has the loop's delay alone."""
     robot = load_robot(source)
     latency = Latency(command=robot.reality.latency.command)
@@ -245,7 +245,7 @@ class TrainPolicy(Job):
     """Training of a policy in the simulation of the robot ``source``; it has a folder."""
 
     folder: Path
-    source: str | Path
+    source: str
     recipe: "Recipe"
     seed: int = 0
 
@@ -465,15 +465,13 @@ class Transfer:
     def trainings(self) -> list[TrainPolicy]:
         """Trainings on the identified robot and on the believed one."""
         believed = self.twin.believed
-        names = {f"{self.twin.name}-identified": self.identified, Path(believed).stem: believed}
+        folder, seed = self.folder / "training", self.seed
         return [
-            TrainPolicy(
-                self.folder / "training" / f"{name}-seed{self.seed}",
-                source,
-                self.recipe,
-                self.seed,
+            TrainPolicy(folder / f"{name}-seed{seed}", source, self.recipe, seed)
+            for name, source in (
+                (f"{self.twin.name}-identified", str(self.identified)),
+                (Path(believed).stem, believed),
             )
-            for name, source in names.items()
         ]
 
     @property
