@@ -14,7 +14,7 @@ import shlex
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
@@ -40,7 +40,6 @@ def main(
     name: str,
     options: Any = None,  # noqa: ANN401
     arguments: Sequence[str] | None = None,
-    keep_out: Collection[str] = (),
 ) -> int:
     """Run a study, print its numbers, write the JSON; return the exit code.
 
@@ -49,21 +48,20 @@ def main(
         options: Its options: a dataclass with a field ``json`` and a method ``measure``, or a union
             of such dataclasses, one for each part; None for a study that is only its results.
         arguments: Words behind the name; default: those of the process.
-        keep_out: Options that the stored command shall not name.
     """
     given = sys.argv[1:] if arguments is None else arguments
     if options is None or list(given) == ["--results"]:
         return guard(lambda: run_results(name))
-    return guard(lambda: _run(name, options, given, keep_out))
+    return guard(lambda: _run(name, options, given))
 
 
-def _run(name: str, options: Any, given: Sequence[str], keep_out: Collection[str]) -> int:  # noqa: ANN401
+def _run(name: str, options: Any, given: Sequence[str]) -> int:  # noqa: ANN401
     program = f"python -m studies.{name}"
     about = inspect.getdoc(importlib.import_module(f"studies.{name}"))
     args = read_options(options, program, about, given)
     if get_args(options):
         program = f"{program} {verb_of(args)}"
-    command = command_line(program, args, KEPT | {"recordings", *keep_out})
+    command = command_line(program, args, KEPT | {"recordings"})
     result = {"command": command, **args.measure()}
     if args.json is not None:
         write_json(args.json, result)

@@ -17,13 +17,12 @@ from torch import nn
 
 from hopping_leg import envs
 from hopping_leg.arrays import Array, Array32
-from hopping_leg.rl.distillation.dagger import Dagger
+from hopping_leg.rl.distillation.dagger import Dagger, cosine
 from hopping_leg.rl.distillation.students import WindowStudent
 from hopping_leg.rl.onnx_export import Network
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.sb3_env import TaskVecEnv
 from hopping_leg.rl.sb3_policies import dense, dense_network
-from hopping_leg.rl.schedules import cosine
 from hopping_leg.robot import Robot
 from hopping_leg.sim import LegSimulator
 

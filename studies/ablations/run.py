@@ -19,8 +19,8 @@ from hopping_leg.controllers.policy import Card
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.evaluate.result_files import ResultCache
 from hopping_leg.evaluate.runner import software_versions
-from hopping_leg.rl.calibration import calibrate
 from hopping_leg.rl.onnx_export import Network, build_policy
+from hopping_leg.rl.policy_evaluation import calibrate
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.rl.recipes.fast import FAST
 from hopping_leg.rl.stages import within_reach

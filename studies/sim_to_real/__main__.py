@@ -6,4 +6,4 @@ from studies.shared import main
 from studies.sim_to_real.run import Experiment
 
 if __name__ == "__main__":
-    sys.exit(main("sim_to_real", Experiment, keep_out=("threads",)))
+    sys.exit(main("sim_to_real", Experiment))

@@ -1,6 +1,7 @@
 """The study's two experiments: train and hop on twins, or predict a shipped policy's hops."""
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,16 +9,16 @@ from typing import Any, Literal
 
 import numpy as np
 import tyro
-from rich.console import Console
 
 from hopping_leg.arrays import Array
-from hopping_leg.cli.options import Heights, at_least
-from hopping_leg.cli.reproduce import show_transfer
+from hopping_leg.cli.options import Heights, at_least, say
+from hopping_leg.cli.reproduce import show_overall, show_transfer
 from hopping_leg.controllers import Controller
 from hopping_leg.controllers.registry import ENERGY_SHAPING, load_controller
 from hopping_leg.errors import UsageError
-from hopping_leg.evaluate.statistics import LEAST_TWINS, median_interval, twins_note
+from hopping_leg.evaluate.statistics import LEAST_TWINS, twins_note
 from hopping_leg.evaluate.tables import millimetres
+from hopping_leg.rl.run_folder import read_result
 from hopping_leg.robot import (
     DriveMismatch,
     GroundMismatch,
@@ -27,23 +28,12 @@ from hopping_leg.robot import (
     Robot,
     load_robot,
 )
-from hopping_leg.sim_to_real.methods import DEFAULT, FORETOLD, Method, choose_methods
-from hopping_leg.sim_to_real.stages import HopOnTwin, HopTrial
-from hopping_leg.sim_to_real.study import Study, find_twins
-from hopping_leg.sim_to_real.transfer import (
-    about,
-    fit_row,
-    fits,
-    hops,
-    records,
-    transfer,
-    work_through,
-)
+from hopping_leg.sim_to_real.jobs import work_through
+from hopping_leg.sim_to_real.tables import Row, median_over_twins, overall, tabulate
+from hopping_leg.sim_to_real.transfer import HopTrial, Twin, about, simulated
+from studies.sim_to_real.study import DEFAULT, FORETOLD, Method, Study, choose_methods, find_twins
 
 Without = Callable[[ModelMismatch], ModelMismatch]
-
-_SEED = 0
-"""Of the bootstrap."""
 
 
 def _drives(*names: str) -> Without:
@@ -74,10 +64,10 @@ EFFECTS: dict[str, Without] = {
 
 
 @dataclass(frozen=True)
-class HopWithout(HopOnTwin):
+class HopWithout(HopTrial):
     """A policy tried on a twin that lacks one effect."""
 
-    effect: str
+    effect: str = ""
 
     @property
     def name(self) -> str:
@@ -90,45 +80,42 @@ class HopWithout(HopOnTwin):
         robot = self.twin.robot
         return dataclasses.replace(robot, reality=EFFECTS[self.effect](robot.reality))
 
-    @property
-    def file(self) -> Path:
-        """File of the result."""
-        path = super().file
-        return path.with_name(f"{path.stem}-without-{self.effect}.json")
+
+def without(hop: HopTrial, effect: str) -> HopWithout:
+    """Return a trial on the same twin, one effect taken away."""
+    fields = {field.name: getattr(hop, field.name) for field in dataclasses.fields(hop)}
+    file = hop.file.with_name(f"{hop.file.stem}-without-{effect}.json")
+    return HopWithout(**{**fields, "file": file}, effect=effect)
 
 
-def effect_rows(hops: Sequence[HopOnTwin], without: Sequence[HopWithout]) -> list[dict[str, Any]]:
+def effect_rows(hops: Sequence[HopTrial], less: Sequence[HopWithout]) -> list[Row]:
     """Return the errors with every effect and with each taken away, one row each, by method.
 
     Args:
         hops: On the twins as they are.
-        without: On the twins with one effect less.
+        less: On the twins with one effect less.
     """
-    kinds: dict[tuple[str, str], list[HopOnTwin]] = {}
-    for job in hops:
-        kinds.setdefault((job.method.name, "all effects"), []).append(job)
-    for less in without:
-        kinds.setdefault((less.method.name, f"without {less.effect}"), []).append(less)
-    return [_row(method, kind, jobs) for (method, kind), jobs in kinds.items()]
+    kinds: dict[tuple[str, str], list[Row]] = {}
+    for hop in hops:
+        kinds.setdefault((hop.method, "all effects"), []).extend(hop.rows())
+    for hop in less:
+        kinds.setdefault((hop.method, f"without {hop.effect}"), []).extend(hop.rows())
+    return [
+        {
+            "method": method,
+            "twin": kind,
+            **median_over_twins(rows, "median_abs_error_m"),
+            "worst_abs_error_m": max(row["median_abs_error_m"] for row in rows),
+            "median_std_m": _median([row["std_m"] for row in rows if row["hops"]]),
+            "skipped_hops": sum(row["skipped_hops"] for row in rows),
+            "missed_runs": sum(row["missed_runs"] for row in rows),
+        }
+        for (method, kind), rows in kinds.items()
+    ]
 
 
-def _row(method: str, kind: str, jobs: Sequence[HopOnTwin]) -> dict[str, Any]:
-    rows = [row for job in jobs for row in job.rows()]
-    twins = dict.fromkeys(row["twin"] for row in rows)
-    errors = [np.array([r["median_abs_error_m"] for r in rows if r["twin"] == t]) for t in twins]
-    low, high = median_interval(errors, _SEED, LEAST_TWINS)
-    stds = [row["std_m"] for row in rows if row["hops"]]
-    return {
-        "method": method,
-        "twin": kind,
-        "median_abs_error_m": float(np.median(np.concatenate(errors))),
-        "median_abs_error_low_m": low,
-        "median_abs_error_high_m": high,
-        "worst_abs_error_m": float(np.max(np.concatenate(errors))),
-        "median_std_m": float(np.median(stds)) if stds else None,
-        "skipped_hops": sum(row["skipped_hops"] for row in rows),
-        "missed_runs": sum(row["missed_runs"] for row in rows),
-    }
+def _median(values: Sequence[float]) -> float | None:
+    return float(np.median(values)) if values else None
 
 
 HOPPERS = ("fast", ENERGY_SHAPING)
@@ -138,50 +125,39 @@ leg, and energy shaping, which no simulation has trained."""
 
 @dataclass(frozen=True)
 class Meet(HopTrial):
-    """A shipped controller on a twin."""
-
-    hopper: str
+    """A shipped controller, named as the method, on a twin."""
 
     @property
     def name(self) -> str:
         """What is done."""
-        return f"hop on {self.twin.name}, shipped {self.hopper}"
-
-    @property
-    def file(self) -> Path:
-        """File of the result."""
-        return self.study.folder / "predictions" / f"{self.twin.name}-{self.hopper}.json"
+        return f"hop on {self.twin.name}, shipped {self.method}"
 
     @property
     def controller(self) -> Controller:
         """The shipped controller, of the believed leg."""
-        return load_controller(self.hopper, load_robot(self.twin.believed), other="accept")
+        return load_controller(self.method, load_robot(self.twin.believed), other="accept")
 
 
 @dataclass(frozen=True)
 class Foretell(Meet):
-    """A shipped controller in what a method believes a twin to be."""
+    """A shipped controller in what a method believes a twin to be: the robot ``source``."""
 
-    method: Method
+    believer: Method | None = None
+    source: str = ""
 
     @property
     def name(self) -> str:
         """What is done."""
-        return f"foretell {self.twin.name}, {self.method.name}, {self.hopper}"
+        assert self.believer is not None
+        return f"foretell {self.twin.name}, {self.believer.name}, {self.method}"
 
     @property
     def leg(self) -> Robot:
         """The method's simulation."""
-        return self.study.simulated(self.twin, self.method)
-
-    @property
-    def file(self) -> Path:
-        """File of the result."""
-        name = f"{self.twin.name}-{self.hopper}-{self.method.name}.json"
-        return self.study.folder / "predictions" / name
+        return simulated(self.source)
 
 
-def prediction_rows(foretold: Sequence[Foretell], met: Sequence[Meet]) -> list[dict[str, Any]]:
+def prediction_rows(foretold: Sequence[Foretell], met: Sequence[Meet]) -> list[Row]:
     """Return how far each method's predicted apexes are off, one row per controller and method.
 
     A leg that does not hop counts with the height in which it stands.
@@ -194,23 +170,23 @@ def prediction_rows(foretold: Sequence[Foretell], met: Sequence[Meet]) -> list[d
         Medians over twins and commands, intervals over twins; ``errors_m`` are predicted minus
         measured apexes by twin and command, m.
     """
-    true = {(job.hopper, job.twin.name): _apexes(job) for job in met}
+    true = {(job.method, job.twin.name): _apexes(job) for job in met}
     kinds: dict[tuple[str, Method], dict[str, Array]] = {}
     for job in foretold:
-        error = _apexes(job) - true[job.hopper, job.twin.name]
-        kinds.setdefault((job.hopper, job.method), {})[job.twin.name] = error
+        assert job.believer is not None
+        error = _apexes(job) - true[job.method, job.twin.name]
+        kinds.setdefault((job.method, job.believer), {})[job.twin.name] = error
     rows = []
     for (hopper, method), errors in kinds.items():
-        absolute = [np.abs(error) for error in errors.values()]
-        low, high = median_interval(absolute, _SEED, LEAST_TWINS)
+        absolute = [
+            {"twin": twin, "median_abs_error_m": abs(e)} for twin in errors for e in errors[twin]
+        ]
         rows.append({
             "controller": hopper,
             "method": method.name,
             "meaning": method.meaning,
-            "median_abs_error_m": float(np.median(np.concatenate(absolute))),
-            "median_abs_error_low_m": low,
-            "median_abs_error_high_m": high,
-            "worst_abs_error_m": float(np.max(np.concatenate(absolute))),
+            **median_over_twins(absolute, "median_abs_error_m"),
+            "worst_abs_error_m": float(max(row["median_abs_error_m"] for row in absolute)),
             "median_error_m": float(np.median(np.concatenate(list(errors.values())))),
             "errors_m": {name: error.tolist() for name, error in errors.items()},
         })  # fmt: skip
@@ -219,20 +195,68 @@ def prediction_rows(foretold: Sequence[Foretell], met: Sequence[Meet]) -> list[d
 
 def _apexes(job: Meet) -> Array:
     """Return the median apex at every command, m."""
-    return np.array([row["command_m"] + row["median_error_m"] for row in job.measured()])
+    return np.array([row["command_m"] + row["median_error_m"] for row in job.rows()])
 
 
-def transfer_and_effects(study: Study, at_once: int) -> dict[str, Any]:
-    """Run the transfer; if the study asks for it, also on twins that lack one effect at a time."""
-    result = transfer(study, at_once)
+def transfer(study: Study, at_once: int) -> Row:
+    """Run a study, or what is left of it, and return its numbers.
+
+    If the study asks for it, policies also hop on twins that lack one effect at a time.
+
+    Raises:
+        UsageError: The folder holds results of other options, or there is no such recipe.
+    """
+    rounds = (study.records(), study.fits(), study.trainings(), study.hops())
+    work_through(rounds, at_once)
+    meanings = {method.name: method.meaning for method in study.methods}
+    trials = [row for hop in study.hops() for row in hop.rows()]
+    result = {
+        **about(study.twins, study.seconds, study.repeats),
+        "training_seeds": list(study.seeds),
+        "recipe": study.recipe,
+        "recipe_changes": list(study.changes),
+        "training_steps": study.steps,
+        **tabulate(meanings, trials),
+        **best_in_own_simulation(study, trials),
+        "identification": [fit.row() for fit in study.fits()],
+        "trainings": [training.row() for training in study.trainings()],
+    }
     if study.effects:
-        work_through([without(study)], at_once)
-        shown = [job for job in hops(study) if job.method in _dissected(study)]
-        result["effects"] = effect_rows(shown, without(study))
+        shown = (study.methods[0].name, ENERGY_SHAPING)
+        hops = [hop for hop in study.hops() if hop.method in shown]
+        less = [without(hop, effect) for effect in EFFECTS for hop in hops]
+        work_through([less], at_once)
+        result["effects"] = effect_rows(hops, less)
     return result
 
 
-def predict(study: Study, at_once: int = 1) -> dict[str, Any]:
+def best_in_own_simulation(study: Study, trials: Sequence[Row]) -> Row:
+    """Return methods and comparison over one policy per method and twin.
+
+    It is the one that hops best in the simulation that it was trained in: what someone gets who
+    trains several times and chooses without having met the leg.
+    """
+    if len(study.seeds) == 1:
+        return {}
+    best = {}
+    for method, twin in itertools.product(study.methods, study.twins):
+        seeds = study.seeds if method.trained else study.seeds[:1]
+        scores = {seed: _own_score(study, twin, method, seed) for seed in seeds}
+        best[method.name, twin.name] = min(scores, key=scores.__getitem__)
+    chosen = [row for row in trials if row["seed"] == best[row["method"], row["twin"]]]
+    meanings = {method.name: method.meaning for method in study.methods}
+    return {"best_in_own_simulation": overall(meanings, chosen)}
+
+
+def _own_score(study: Study, twin: Twin, method: Method, seed: int) -> float:
+    """Return the score of a policy where it was trained, m; less is better."""
+    if not method.trained:
+        return 0.0
+    result = read_result(study.training(twin, method, seed).folder)
+    return float(result["selected"]["score_m"])
+
+
+def predict(study: Study, at_once: int = 1) -> Row:
     """Compare what the methods' simulations foretell, without a training; return the numbers.
 
     Args:
@@ -244,40 +268,29 @@ def predict(study: Study, at_once: int = 1) -> dict[str, Any]:
             options.
     """
     for method in study.methods:
-        if method.randomised or method.controller:
-            reason = "trains on many simulations" if method.randomised else "has no simulation"
+        if method.ranges != "none" or not method.trained:
+            reason = "trains on many simulations" if method.trained else "has no simulation"
             raise UsageError(
                 f"The method '{method.name}' {reason}, so that none foretells; name"
                 f" others, e.g. {', '.join(FORETOLD)}."
             )
-    work_through((records(study), fits(study), [*foretold(study), *met(study)]), at_once)
+    work_through((study.records(), study.fits(), [*foretold(study), *met(study)]), at_once)
     return {
-        **about(study),
+        **about(study.twins, study.seconds, study.repeats),
         "methods": prediction_rows(foretold(study), met(study)),
-        "identification": [fit_row(fit) for fit in fits(study)],
+        "identification": [fit.row() for fit in study.fits()],
         "notes": twins_note(len(study.twins)),
     }
-
-
-def without(study: Study) -> list[HopWithout]:
-    """Return the trials on twins that lack one effect, if they were asked for."""
-    return [
-        HopWithout(study, hop.twin, hop.method, hop.seed, effect)
-        for effect in (EFFECTS if study.effects else ())
-        for hop in hops(study)
-        if hop.method in _dissected(study)
-    ]
-
-
-def _dissected(study: Study) -> list[Method]:
-    """Return the methods whose losses by each effect are told: the first, and energy shaping."""
-    return [m for m in study.methods if m == study.methods[0] or m.controller]
 
 
 def foretold(study: Study) -> list[Foretell]:
     """Return what each method's simulation says of the shipped controllers' hops."""
     return [
-        Foretell(study, twin, hopper, method)
+        Foretell(
+            **_trial(study, twin, hopper, f"-{method.name}"),
+            believer=method,
+            source=study.source(twin, method),
+        )
         for hopper in HOPPERS
         for method in study.methods
         for twin in study.twins
@@ -286,7 +299,17 @@ def foretold(study: Study) -> list[Foretell]:
 
 def met(study: Study) -> list[Meet]:
     """Return the same controllers' hops on the twins."""
-    return [Meet(study, twin, hopper) for hopper in HOPPERS for twin in study.twins]
+    return [Meet(**_trial(study, twin, hopper)) for hopper in HOPPERS for twin in study.twins]
+
+
+def _trial(study: Study, twin: Twin, hopper: str, more: str = "") -> dict[str, Any]:
+    return {
+        "file": study.folder / "predictions" / f"{twin.name}-{hopper}{more}.json",
+        "twin": twin,
+        "method": hopper,
+        "commands": study.commands,
+        "repeats": study.repeats,
+    }
 
 
 @dataclass(frozen=True)
@@ -324,8 +347,6 @@ class Experiment:
     effect costs."""
     jobs: int = 1
     """Recordings, fits, trainings or trials at the same time, each in its own process."""
-    threads: int = 1
-    """Threads of each job."""
     folder: Path = Path("runs/transfer")
     """Folder for recordings, robots, trainings and trials; what is there is not done again."""
     json: Path | None = None
@@ -339,7 +360,7 @@ class Experiment:
         study = Study(
             self.folder,
             find_twins(self.twins, self.folder / "twins"),
-            tuple(choose_methods(self._methods())),
+            choose_methods(self._methods()),
             seeds=self.seeds,
             recipe=self.recipe,
             changes=self.set,
@@ -349,10 +370,15 @@ class Experiment:
             commands=self.commands,
             repeats=self.repeats,
             effects=self.effects,
-            threads=self.threads,
         )
-        result = predict(study, self.jobs) if foretell else transfer_and_effects(study, self.jobs)
-        (show_predictions if foretell else show_transfer)(result)
+        result = (predict if foretell else transfer)(study, self.jobs)
+        if foretell:
+            show_predictions(result)
+        else:
+            show_transfer(result)
+        if best := result.get("best_in_own_simulation"):
+            say("\nOf several trainings, those alone that hop best in their own simulation:")
+            show_overall(best)
         return result
 
     def _methods(self) -> tuple[str, ...]:
@@ -364,14 +390,12 @@ class Experiment:
 
 def show_predictions(result: dict[str, Any]) -> None:
     """Print how far off each method's predictions are."""
-    console = Console()
     for row in result["methods"]:
-        console.print(
-            f"{row['method']} foretells apexes of {row['controller']} to"
-            f" {millimetres(row['median_abs_error_m'])} mm"
-            f" ({millimetres(row['median_abs_error_low_m'])} to"
-            f" {millimetres(row['median_abs_error_high_m'])})",
-            highlight=False,
+        error, low, high = (
+            millimetres(row[f"median_abs_error{end}_m"]) for end in ("", "_low", "_high")
         )
-    for note in result["notes"]:
-        console.print(f"Note: {note}", highlight=False)
+        say(
+            f"{row['method']} foretells apexes of {row['controller']} to {error} mm"
+            f" ({low} to {high})"
+        )
+    say(*(f"Note: {note}" for note in result["notes"]))

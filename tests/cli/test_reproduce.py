@@ -11,33 +11,30 @@ from hopping_leg.cli.reproduce import NOTHING_MEANT
 from hopping_leg.controllers.registry import shipped_policies
 
 pytest.importorskip("torch")
-from hopping_leg.rl.recipes.fast import FAST
-from hopping_leg.sim_to_real import transfer as transfer_run
+from hopping_leg.sim_to_real.transfer import Transfer
 
 NUMBERS = {"rows": [], "methods": [], "comparison": [], "notes": []}
 
 
 @pytest.fixture
 def calls(monkeypatch):
-    """Replace study and evaluation by notes of what they were asked for."""
+    """Replace transfer and evaluation by notes of what they were asked for."""
     found = {"transfer": [], "evaluate": []}
 
-    def fake_transfer(study, at_once, _afterwards):
-        found["transfer"].append((study, at_once))
+    def fake_run(transfer, at_once, _afterwards):
+        found["transfer"].append((transfer, at_once))
         return NUMBERS
 
-    monkeypatch.setattr(transfer_run, "transfer", fake_transfer)
+    monkeypatch.setattr(Transfer, "run", fake_run)
     monkeypatch.setattr(evaluate, "run", lambda args, notes: found["evaluate"].append(args))
     return found
 
 
 def test_it_goes_from_a_twin_to_a_judged_policy(calls, tmp_path, capsys):
     assert main(["reproduce", "--out", str(tmp_path), "--seed", "3"]) == 0
-    [(study, at_once)] = calls["transfer"]
-    assert [method.name for method in study.methods] == [
-        "identified", "cad", "energy-shaping"]  # fmt: skip
-    assert (study.seeds, len(study.twins), at_once) == ((3,), 1, 2)
-    assert not study.twins[0].robot.reality.neutral
+    [(transfer, at_once)] = calls["transfer"]
+    assert (transfer.seed, transfer.recipe.schedule.steps, at_once) == (3, 400_000, 2)
+    assert not transfer.twin.robot.reality.neutral
     [judged] = calls["evaluate"]
     policy, *others = judged.controllers
     assert policy.endswith("identified-seed3/policy.onnx")
@@ -53,17 +50,13 @@ def test_sizes_have_folders_of_their_own_and_a_twin_of_your_own_plays_the_real_l
     calls, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    for words in ([], ["--quick", "--twin", "twin"], ["--full"]):
+    for words in ([], ["--quick", "--twin", "twin"]):
         assert main(["reproduce", *words]) == 0
-    studies = [study for study, _ in calls["transfer"]]
-    folders = [study.folder.parent for study in studies]
-    assert folders == [Path("runs") / name for name in ("reproduce", "quick", "full")]
-    assert [(twin.name, twin.believed) for twin in studies[1].twins] == [("twin", "legv2-paper")]
+    usual, quick = (transfer for transfer, _ in calls["transfer"])
+    folders = [transfer.folder.parent for transfer in (usual, quick)]
+    assert folders == [Path("runs") / name for name in ("reproduce", "quick")]
+    assert (quick.twin.name, quick.twin.believed) == ("twin", "legv2-paper")
     assert calls["evaluate"][1].seeds == 1
-    full = studies[2]
-    assert (full.seconds, len(full.twins), full.steps) == (240.0, 5, FAST.schedule.steps)
-    names = {method.name for method in full.methods}
-    assert names >= {"identified", "cad", "table-1", "randomised", "two-pass", "one-pass"}
 
 
 @pytest.mark.parametrize(("first", "then"), [([], ["--quick"]), (["--quick"], [])])
@@ -75,9 +68,7 @@ def test_a_folder_never_mixes_sizes(calls, tmp_path, refused, first, then):
     assert main([*words, *first]) == 0
 
 
-@pytest.mark.parametrize(
-    "wrong", ["--steps 0", "--jobs 0", "--seed -1", "--quick --full", "--twin legv2"]
-)
+@pytest.mark.parametrize("wrong", ["--steps 0", "--jobs 0", "--seed -1", "--twin legv2"])
 def test_meaningless_options_are_refused_before_anything_runs(calls, tmp_path, wrong):
     assert main(["reproduce", "--out", str(tmp_path / "new"), *wrong.split()]) == 2
     assert not calls["transfer"]

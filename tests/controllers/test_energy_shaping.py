@@ -10,8 +10,7 @@ from hopping_leg.controllers.energy_shaping import (
     paper_energy_shaping,
     tuned_energy_shaping,
 )
-from hopping_leg.controllers.energy_shaping.phases import Phase
-from hopping_leg.controllers.energy_shaping.virtual_leg import retraction
+from hopping_leg.controllers.energy_shaping.virtual_leg import Phase, retraction
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.metrics import measure
 from hopping_leg.robot import GRAVITY, load_robot

@@ -6,8 +6,13 @@ import polars as pl
 import pytest
 
 from hopping_leg.errors import TraceError, UsageError
-from hopping_leg.identify.excitation import Multisine, load_excitation, make_excitation
-from hopping_leg.identify.feasibility import HardwareRange, inverse_dynamics
+from hopping_leg.identify.excitation import (
+    HardwareRange,
+    Multisine,
+    inverse_dynamics,
+    load_excitation,
+    make_excitation,
+)
 from hopping_leg.identify.paper_excitation import Stroke, Strokes, adapt, fixed_base, moving_base
 from hopping_leg.robot import build_model, kinematics, load_robot
 from hopping_leg.trace import Trace

@@ -8,7 +8,7 @@ import pytest
 from scipy.ndimage import uniform_filter1d
 
 from hopping_leg.errors import RecordingError, UsageError
-from hopping_leg.identify.feasibility import inverse_dynamics
+from hopping_leg.identify.excitation import inverse_dynamics
 from hopping_leg.identify.importers import IMPORTERS, recognise
 from hopping_leg.identify.recording import load_recording, make_recording
 from hopping_leg.identify.recording_format import COLUMNS, PAIRS
@@ -119,9 +119,9 @@ FILES = sorted(RECORDINGS.glob("*/*.csv.gz"))
 @pytest.mark.parametrize("name", IMPORTERS)
 def test_a_rig_is_recognised_by_its_own_columns_only(name):
     importer = IMPORTERS[name]
-    assert recognise(sorted(importer.columns)) is importer
-    assert recognise(sorted(importer.columns)[1:]) is not importer
-    assert set(importer.names.values()) <= set(COLUMNS)
+    assert recognise(sorted(importer.recognised_by)) is importer
+    assert recognise(sorted(importer.recognised_by)[1:]) is not importer
+    assert set(importer.columns) <= set(COLUMNS)
 
 
 @needs_recordings

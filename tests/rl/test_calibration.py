@@ -5,9 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from hopping_leg.rl import calibration
-from hopping_leg.rl.calibration import calibrate
-from hopping_leg.rl.policy_evaluation import CALIBRATION_SEEDS, CommandResult
+from hopping_leg.rl import policy_evaluation
+from hopping_leg.rl.policy_evaluation import CALIBRATION_SEEDS, CommandResult, calibrate
 from hopping_leg.sim.channel import Measurement
 from tests.rl.learners import ROBOT
 from tests.rl.test_onnx_export import shown
@@ -37,10 +36,10 @@ def calibrated(monkeypatch, hop, rounds=3):
             for c, r in zip(commands, reached, strict=True)
         ]
 
-    monkeypatch.setattr(calibration, "evaluate_policy", evaluate_policy)
+    monkeypatch.setattr(policy_evaluation, "evaluate_policy", evaluate_policy)
     content = calibrate(shown("three-samples"), ROBOT, (0.22, 0.40), rounds, 200.0)
     assert seeds == list(CALIBRATION_SEEDS[:rounds])
-    return told(calibration.Policy(content, "here", "test"), HEIGHTS) - HEIGHTS
+    return told(policy_evaluation.Policy(content, "here", "test"), HEIGHTS) - HEIGHTS
 
 
 def test_hops_that_are_off_by_what_depends_on_the_height_meet_their_commands(monkeypatch):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hopping_leg.envs import HoppingTask
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.model_card import MISSED, missed_commands, stages
-from hopping_leg.rl.recipes import RECIPES, change, changes_of, get_recipe, randomise, recipe_of
+from hopping_leg.rl.recipes import RECIPES, change, changes_of, get_recipe, randomise, words_of
 from hopping_leg.rl.run_folder import RunFolder
 from hopping_leg.robot import load_robot, shipped_robots
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES, Range
@@ -100,14 +100,31 @@ def test_a_run_says_what_is_not_the_recipes(changes, words, tmp_path):
     heights=st.sampled_from([None, (0.2, 0.4)]),
     observation=st.sampled_from([None, "three-samples", "dated"]),
 )
-def test_a_runs_recipe_is_read_from_its_options(name, numbers, ranges, heights, observation):
+def test_the_words_of_a_run_make_its_recipe(name, numbers, ranges, heights, observation):
     recipe = get_recipe(name).replace(numbers, heights=heights)
     if ranges is not None:
         recipe = randomise(recipe, ranges)
     if observation is not None:
         recipe = recipe.replace({"task.observation": observation})
     stored = json.loads(json.dumps(dataclasses.asdict(recipe)))
-    assert recipe_of(name, stored) == recipe
+    assert made_by(name, words_of(name, stored)) == recipe
+
+
+def made_by(name, words):
+    """Return the recipe that ``hop train --recipe NAME`` makes with further words."""
+    given: dict[str, list[str]] = {}
+    for word in words:
+        if word.startswith("--"):
+            values = given.setdefault(word, [])
+        else:
+            values.append(word)
+    recipe = change(get_recipe(name), given.get("--set", []))
+    if "--randomise" in given:
+        recipe = randomise(recipe, *given["--randomise"])
+    if "--observation" in given:
+        recipe = recipe.replace({"task.observation": given["--observation"][0]})
+    heights = tuple(map(float, given["--heights"])) if "--heights" in given else None
+    return recipe.replace(heights=heights)
 
 
 def test_a_recipe_of_ones_own_is_named_by_its_file(tmp_path):

@@ -18,9 +18,17 @@ import numpy as np
 import tyro
 
 from hopping_leg.cli.options import JsonFile, RobotFile, save_json, say, show_table
-from hopping_leg.identify import feasibility, recording_format
 from hopping_leg.identify import paper_excitation as paper
-from hopping_leg.identify.excitation import RATE, Excitation, Multisine, Template, make_excitation
+from hopping_leg.identify import recording_format
+from hopping_leg.identify.excitation import (
+    RATE,
+    Excitation,
+    HardwareRange,
+    Multisine,
+    Template,
+    demand,
+    make_excitation,
+)
 from hopping_leg.robot import Robot, load_robot
 
 
@@ -36,9 +44,9 @@ class Common:
     """Targets per second, Hz."""
     track_velocity: bool = False
     """Velocity targets are the positions' derivative, as in the lab's recordings, not zero."""
-    hip_range: recording_format.Pair = feasibility.HardwareRange().hip
+    hip_range: recording_format.Pair = HardwareRange().hip
     """Range of the real hip, rad."""
-    knee_range: recording_format.Pair = feasibility.HardwareRange().knee
+    knee_range: recording_format.Pair = HardwareRange().knee
     """Range of the real knee, rad."""
 
 
@@ -84,7 +92,7 @@ def run(
 ) -> None:
     """Write an excitation."""
     robot = load_robot(args.robot)
-    limits = feasibility.HardwareRange(args.hip_range, args.knee_range)
+    limits = HardwareRange(args.hip_range, args.knee_range)
     template, tracked = _template(args, robot, limits), args.track_velocity
     excitation = make_excitation(
         template, robot, rate=args.rate, limits=limits, track_velocity=tracked
@@ -100,9 +108,7 @@ def run(
     save_json(args.json, facts)
 
 
-def _template(
-    args: MovingBase | MultisineCommand, robot: Robot, limits: feasibility.HardwareRange
-) -> Template:
+def _template(args: MovingBase | MultisineCommand, robot: Robot, limits: HardwareRange) -> Template:
     if isinstance(args, MultisineCommand):
         return args.signal
     make = paper.moving_base
@@ -120,7 +126,7 @@ def _template(
 
 
 def _facts(excitation: Excitation, robot: Robot) -> dict[str, Any]:
-    asked = feasibility.demand(robot, excitation.rig, excitation.position, excitation.rate)
+    asked = demand(robot, excitation.rig, excitation.position, excitation.rate)
     return {
         "robot": robot.name,
         "rig": excitation.rig,

@@ -4,13 +4,13 @@ A twin plays the real leg. It is recorded, identified from the recordings, a con
 from scratch on what was identified, evaluated there beside the shipped controllers with the paper's
 trials, and hops on the twin without tuning, beside a controller that was trained on the CAD's
 robot. Takes less than five minutes on two idle cores. A run that was interrupted or killed goes on
-where it was when the same command is called again.
+where it was when the same command is called again. Many twins, the paper's sizes and other ways to
+identify and train are a study of their own: `python -m studies.sim_to_real` in a checkout.
 
 Examples:
   hop reproduce --quick                         # does everything work here?
   hop reproduce
   hop reproduce --seed 1 --out runs/second
-  hop reproduce --full
 """
 
 import time
@@ -22,11 +22,8 @@ from hopping_leg import errors, io
 from hopping_leg.cli import evaluate, options
 from hopping_leg.controllers.registry import ENERGY_SHAPING, shipped_policies
 from hopping_leg.identify.optimizers import LeastSquaresOptions
-from hopping_leg.sim_to_real.methods import DEFAULT, choose_methods
-from hopping_leg.sim_to_real.study import SHORTEST, USUAL_FIT, Study, find_twins
+from hopping_leg.sim_to_real.transfer import USUAL_FIT, Transfer, drawn_twin, given_twin
 
-_MINIATURE = ("identified", "cad", ENERGY_SHAPING)
-_PAPER = (*DEFAULT, "rail-only", "fixed-base-only", "two-pass", "one-pass")
 _GLANCE = LeastSquaresOptions(rounds=1, evaluations=2)
 _MARK = "size.txt"
 _JUDGING, _QUICK_JUDGING = 50.0, 10.0
@@ -44,7 +41,7 @@ class Reproduce:
 
     out: Path | None = None
     """Folder for report.html, evaluation.json, transfer.json, traces/ and, in transfer/,
-    recordings, robots, trainings and trials; default: runs/reproduce, runs/quick or runs/full."""
+    recordings, robots, trainings and trials; default: runs/reproduce or runs/quick."""
     seed: int = 0
     """Seed of the trainings; the evaluation's seeds follow from another number."""
     twin: str | None = None
@@ -55,16 +52,13 @@ class Reproduce:
     """Recordings, trainings or trials at the same time; take the number of cores."""
     quick: bool = False
     """Take every step as shortly as can be, to see that it works; the numbers mean nothing."""
-    full: bool = False
-    """Take the paper's sizes: 240 s per recording, five twins, all ablations, trainings of the
-    recipe's full length. Takes hours."""
     json: Path | None = None
     """File for every number of the evaluation, besides evaluation.json."""
 
     @property
     def size(self) -> str:
-        """Which of the three sizes."""
-        return "quick" if self.quick else "full" if self.full else "usual"
+        """Which of the two sizes."""
+        return "quick" if self.quick else "usual"
 
     @property
     def folder(self) -> Path:
@@ -76,21 +70,17 @@ def run(args: Reproduce) -> None:
     """Record, identify, train, evaluate, transfer, report."""
     start = time.monotonic()
     _check(args)
-    from hopping_leg.sim_to_real.transfer import transfer
-
     folder, notes = args.folder, [NOTHING_MEANT] if args.quick else []
-    study = make_study(args)
+    transfer = make_transfer(args)
     io.write_atomically(folder / _MARK, f"{args.size}\n".encode())
     judging = _QUICK_JUDGING if args.quick else _JUDGING
-    result = transfer(study, args.jobs, args.jobs * judging)
+    result = transfer.run(args.jobs, args.jobs * judging)
     io.write_json(folder / "transfer.json", {**result, "notes": [*notes, *result["notes"]]})
-    twin, method = study.twins[0], study.methods[0]
-    policy = study.training(twin, method, args.seed) / "policy.onnx"
-    robot = study.fitted(twin, method)
+    policy, robot = transfer.policy, transfer.identified
     others = ("fast",) if args.quick else shipped_policies()
     evaluate.run(
         evaluate.Evaluate(
-            controllers=(f"{method.name}={policy}", *others, ENERGY_SHAPING),
+            controllers=(f"identified={policy}", *others, ENERGY_SHAPING),
             robot=str(robot),
             seeds=1 if args.quick else 5,
             out=folder,
@@ -111,19 +101,17 @@ def run(args: Reproduce) -> None:
     )
 
 
-def make_study(args: Reproduce) -> Study:
-    """Return what is done with how many twins."""
+def make_transfer(args: Reproduce) -> Transfer:
+    """Return what is done with the twin."""
     from hopping_leg.rl.recipes.fast import FAST
 
     folder = args.folder / "transfer"
-    return Study(
+    return Transfer(
         folder,
-        find_twins([args.twin or ("5" if args.full else "1")], folder / "twins"),
-        tuple(choose_methods(_PAPER if args.full else _MINIATURE)),
-        seeds=(args.seed,),
-        steps=FAST.schedule.steps if args.full else 1 if args.quick else args.steps,
-        seconds=240.0 if args.full else SHORTEST,
-        least_squares=_GLANCE if args.quick else USUAL_FIT,
+        given_twin(args.twin) if args.twin else drawn_twin(0, folder / "twins"),
+        FAST.replace({"steps": 1 if args.quick else args.steps}),
+        args.seed,
+        _GLANCE if args.quick else USUAL_FIT,
         repeats=1 if args.quick else 3,
     )
 
@@ -131,8 +119,6 @@ def make_study(args: Reproduce) -> Study:
 def _check(args: Reproduce) -> None:
     options.at_least(0, seed=args.seed)
     options.at_least(1, jobs=args.jobs, steps=args.steps)
-    if args.quick and args.full:
-        raise errors.UsageError("--quick and --full exclude each other; give one of them.")
     mark = args.folder / _MARK
     size = mark.read_text(encoding="utf-8", errors="replace").strip() if mark.exists() else ""
     if size not in ("", args.size):
@@ -143,7 +129,7 @@ def _check(args: Reproduce) -> None:
 
 
 def show_transfer(result: dict[str, Any]) -> None:
-    """Print a study's tables."""
+    """Print the tables of sim-to-real trials."""
     rows = []
     for row in result["rows"]:
         low, high = (_mm(row[f"median_abs_error_{end}_m"]) for end in ("low", "high"))
@@ -154,14 +140,12 @@ def show_transfer(result: dict[str, Any]) -> None:
     options.show_table(
         ("trained on", "command, mm", "|error|, mm", "95 %", "error, mm", "skipped"), rows
     )
-    _show_overall(result)
+    show_overall(result)
     options.say(*(f"Note: {note}" for note in result["notes"]))
-    if "best_in_own_simulation" in result:
-        options.say("\nOf several trainings, those alone that hop best in their own simulation:")
-        _show_overall(result["best_in_own_simulation"])
 
 
-def _show_overall(result: dict[str, Any]) -> None:
+def show_overall(result: dict[str, Any]) -> None:
+    """Print the methods' errors over all commands."""
     for row in result["methods"]:
         options.say(
             f"{row['method']}: {_mm(row['median_abs_error_m'])} mm over all commands,"

@@ -9,7 +9,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.controllers import joint_pd, protocol, sample_history
-from hopping_leg.controllers.energy_shaping import phases, virtual_leg
+from hopping_leg.controllers.energy_shaping import virtual_leg
 from hopping_leg.controllers.energy_shaping.gains import load_gains, scale_gains
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.errors import UsageError
@@ -36,7 +36,7 @@ class Landing:
         self._stiffness = _LANDING_STIFFNESS * self._weight / reach
         self._damping = _LANDING_DAMPING * self._weight / np.sqrt(reach * GRAVITY)
         self._waiting = landing_posture(robot)
-        self._detector = phases.TouchdownDetector(robot, count, debounced=True)
+        self._detector = virtual_leg.TouchdownDetector(robot, count, debounced=True)
         self._from = np.tile(self._waiting, (count, 1))
 
     def begin(self, who: BoolArray, q: Array) -> None:
@@ -49,7 +49,7 @@ class Landing:
         target, rate = virtual_leg.retraction(self._from, self._waiting, clock, gains.retract_time)
         torque = virtual_leg.flight_torque(gains, leg, target, rate)
         met = self._detector.update(leg, rate, torque, gains)
-        return torque, (met & (clock >= gains.flight_min)) | (clock > phases.FLIGHT_LIMIT)
+        return torque, (met & (clock >= gains.flight_min)) | (clock > virtual_leg.FLIGHT_LIMIT)
 
     def brake(self, leg: virtual_leg.LegView) -> Array:
         """Return the torques of spring and damper, N m, (n, 2); they never pull the ground."""
@@ -172,7 +172,7 @@ class StandHopLand:
         self._observer.reset(count)
         self._liftoff = LiftoffDetector(self.robot, self._period, count)
         self._landing = Landing(self.robot, count, self._standing)
-        self._modes = phases.Phases(count)
+        self._modes = virtual_leg.Phases(count)
         if self._dropped:
             self._modes.enter(np.ones(count, np.bool_), Mode.FLY, self._landing.blind)
         self._made = np.zeros(count, np.int64)

@@ -11,7 +11,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.errors import UsageError
-from hopping_leg.identify import excitation, feasibility, recording_format
+from hopping_leg.identify import excitation, recording_format
 from hopping_leg.robot import Robot, kinematics
 
 DURATION = 240.0
@@ -156,7 +156,7 @@ def adapt(
     robot: Robot,
     *,
     rate: float = excitation.RATE,
-    limits: feasibility.HardwareRange | None = None,
+    limits: excitation.HardwareRange | None = None,
 ) -> Strokes:
     """Return the strokes as large as the leg can follow: the paper's grid does not fit every leg.
 
@@ -166,19 +166,19 @@ def adapt(
     Raises:
         UsageError: A stroke is beyond the leg at any amplitude.
     """
-    limits = limits or feasibility.HardwareRange()
+    limits = limits or excitation.HardwareRange()
     return Strokes(tuple(_adapt_stroke(s, robot, rate, limits) for s in strokes.parts))
 
 
 def _adapt_stroke(
-    stroke: Stroke, robot: Robot, rate: float, limits: feasibility.HardwareRange
+    stroke: Stroke, robot: Robot, rate: float, limits: excitation.HardwareRange
 ) -> Stroke:
     time = np.arange(round(stroke.duration * rate)) / rate
     stroke = replace(stroke, margin=max(stroke.margin, LAB_MARGIN))
     while True:
         try:
-            wanted = feasibility.demand(robot, stroke.rig, stroke.joints(robot, time), rate)
-            feasibility.check_demand(robot, wanted, rate, limits)
+            wanted = excitation.demand(robot, stroke.rig, stroke.joints(robot, time), rate)
+            excitation.check_demand(robot, wanted, rate, limits)
         except UsageError:
             stroke = replace(stroke, amplitude=stroke.amplitude * _SHRINK)
             if stroke.amplitude < _SMALLEST:

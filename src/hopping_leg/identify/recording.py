@@ -145,7 +145,7 @@ def load_recording(path: str | Path) -> Recording:
             )
         importer.check_path(path)
         table, metadata = importer.read(table)
-        names = {new: old for old, new in importer.names.items()}
+        names = importer.columns
     return make_recording(table, metadata, origin, names=names, header=header, digest=digest)
 
 

@@ -11,7 +11,7 @@ import polars as pl
 
 from hopping_leg.arrays import BoolArray
 from hopping_leg.errors import RecordingError
-from hopping_leg.identify import angle_checks, clock_checks, torque_checks, unit_checks
+from hopping_leg.identify import signal_checks, torque_checks, unit_checks
 from hopping_leg.identify.recording_format import MEASURED, PAIRS
 from hopping_leg.identify.unit_checks import STALL, Inspection, row_period
 
@@ -33,17 +33,17 @@ def check_table(inspection: Inspection) -> None:
         raise RecordingError(
             f"{inspection.origin} has no column 'time_s'; a recording needs time and position."
         )
-    clock_checks.check_clock(inspection)
+    signal_checks.check_clock(inspection)
     _drop_garbage(inspection)
     _drop_zeros(inspection)
     _drop_startup(inspection)
     _align_commands(inspection)
-    angle_checks.drop_spikes(inspection)
+    signal_checks.drop_spikes(inspection)
     unit_checks.check_units(inspection)
     _check_motion(inspection)
-    angle_checks.check_steadiness(inspection)
+    signal_checks.check_steadiness(inspection)
     unit_checks.check_velocity(inspection)
-    angle_checks.check_posture(inspection)
+    signal_checks.check_posture(inspection)
     torque_checks.check_torque(inspection)
     _warn_of_stalls(inspection)
 

@@ -15,10 +15,10 @@ from hopping_leg import errors, io, locks
 from hopping_leg.controllers.policy import Card, Policy
 from hopping_leg.progress import LiveProgress
 from hopping_leg.rl import loggers, onnx_export, policy_evaluation, run_folder, stages
-from hopping_leg.rl.calibration import calibrate
 from hopping_leg.rl.checkpoint import write_checkpoint
 from hopping_leg.rl.learner import RecentHops
 from hopping_leg.rl.model_card import write_card
+from hopping_leg.rl.policy_evaluation import calibrate
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.robot.parameters import Robot
 

@@ -1,18 +1,19 @@
 """Jobs of a sim-to-real study: each is done once, some at a time in processes of their own."""
 
+import json
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, wait
-from typing import ClassVar
+from pathlib import Path
+from typing import Any, ClassVar
 
+from hopping_leg.errors import UsageError
 from hopping_leg.progress import LiveProgress, minutes
 from hopping_leg.sim import compile_physics
 from hopping_leg.workers import ProcessWorkers
 
 _LOOK_EVERY = 1.0
 _MOST_GUESSED = 0.95
-
-
 _BELIEVED = 10.0
 """Work, s, after which the pace of this computer counts as much as that of the weights."""
 
@@ -104,6 +105,55 @@ class Job(ABC):
     def progress(self) -> tuple[float, str]:
         """Return the share that is known to be done in another process, and what to show."""
         return 0.0, ""
+
+
+class StoredJob(Job):
+    """A job whose result is a file, stored with the options that it depends on."""
+
+    file: Path
+
+    @property
+    @abstractmethod
+    def asked(self) -> dict[str, Any]:
+        """Options that the result depends on, as JSON values."""
+
+    @property
+    def stored(self) -> dict[str, Any]:
+        """Options that the stored result was made with; others may stand beside them."""
+        text = self.file.with_suffix(".json").read_text(encoding="utf-8")
+        asked: dict[str, Any] = json.loads(text)["asked"]
+        return asked
+
+    @property
+    def done(self) -> bool:
+        """Whether the result is stored.
+
+        Raises:
+            UsageError: It is stored, but of other options.
+        """
+        if not self.file.exists():
+            return False
+        stored = self.stored
+        other = [name for name, value in self.asked.items() if stored.get(name) != value]
+        if other:
+            raise UsageError(
+                f"{self.file} was made with other options ({', '.join(other)}); give another"
+                " folder, or delete it to make it again."
+            )
+        return True
+
+
+def work_through(
+    rounds: Sequence[Sequence[Job]], at_once: int = 1, afterwards: float = 0.0
+) -> None:
+    """Do what is not done of some stages, one stage after the other.
+
+    What the caller does ``afterwards``, s of a core, counts in the time left.
+    """
+    total = afterwards + sum(job.weight for stage in rounds for job in stage)
+    with Board(total, at_once, own_bars=at_once == 1) as board:
+        for stage in rounds:
+            work(stage, at_once, board)
 
 
 def work(jobs: Sequence[Job], at_once: int, board: Board) -> None:

@@ -1,297 +1,511 @@
-"""A sim-to-real study and its numbers: per method over twins and seeds, with intervals."""
+"""Record a twin, identify it, train on that, hop on it: the paper's claim, tried once.
 
-import itertools
+A twin plays the real leg. It brings latency, noise and losses of its own; the paper's disturbance
+stays off there, as it would come on top. A twin without [reality] is met with the paper's
+disturbance.
+"""
+
 import json
-from collections.abc import Iterable, Sequence
-from typing import Any, TypeVar
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
 
-import numpy as np
+from hopping_leg import io, trace
+from hopping_leg.controllers import Controller, RolloutConfig
+from hopping_leg.controllers.policy import Policy
+from hopping_leg.controllers.registry import ENERGY_SHAPING, load_controller
+from hopping_leg.errors import UsageError
+from hopping_leg.evaluate import entries, runner
+from hopping_leg.evaluate.motor_load import MotorLoad
+from hopping_leg.identify import excitation, play_excitation
+from hopping_leg.identify.optimizers import LeastSquaresOptions
+from hopping_leg.identify.paper_excitation import Strokes, adapt, fixed_base, moving_base
+from hopping_leg.identify.parameters import LegHypothesis
+from hopping_leg.identify.pipeline import IdentifyOptions, identify
+from hopping_leg.identify.recording import Recording, load_recording
+from hopping_leg.identify.recording_format import Rig
+from hopping_leg.identify.result import Identified, as_json, save_robot
+from hopping_leg.identify.search import SearchOptions
+from hopping_leg.robot import NO_MISMATCH, Latency, Robot, load_robot, parent_robot, shipped_robots
+from hopping_leg.sim import NO_NOISE, NoiseAndDelay
+from hopping_leg.sim.randomization import draw_twin
+from hopping_leg.sim_to_real.jobs import Job, StoredJob, work_through
+from hopping_leg.sim_to_real.tables import tabulate
 
-from hopping_leg.arrays import Array
-from hopping_leg.evaluate import runner, statistics
-from hopping_leg.sim_to_real import jobs, methods, stages
-from hopping_leg.sim_to_real.study import Study, TwinFile
+if TYPE_CHECKING:
+    from hopping_leg.rl.recipe import Recipe
+    from hopping_leg.rl.run_folder import RunFolder
 
-J = TypeVar("J", bound=jobs.Job)
+RIGS: tuple[Rig, ...] = ("fixed-base", "rail")
+
+SHORTEST = 30.0
+"""Shortest recording, s: one swing of the leg per amplitude."""
+
+_BOTH_SWINGS = 120.0
+"""Recordings of so many seconds have room for both swing periods of the paper."""
+
+COMMANDS = (0.25, 0.27, 0.29, 0.31, 0.33, 0.35)
+"""Apex heights at which a twin is tried, m."""
+
+FIRST_SEED = 1000
+"""First seed of the trials; no seed from here on has chosen anything."""
+
+USUAL_FIT = LeastSquaresOptions(tolerance=1e-3)
+"""A round that lowers the cost by a smaller share ends the search."""
+
+_INERTIA_FACTOR = 10.0
+"""How far off the CAD's link inertias may be: the paper's Table I has nine times the shank's."""
+
+MEANINGS = {
+    "identified": "identified from both recordings",
+    "cad": "CAD defaults",
+    ENERGY_SHAPING: "energy shaping, tuned, untouched",
+}
+"""What a controller is trained on before it meets the twin, by the method's name."""
 
 
-def transfer(study: Study, at_once: int = 1, afterwards: float = 0.0) -> dict[str, Any]:
-    """Run a study, or what is left of it, and return its numbers.
+@dataclass(frozen=True)
+class Twin:
+    """A leg that plays the real one.
 
-    What the caller does ``afterwards``, s of a core, counts in the time left.
+    Attributes:
+        name: In results and file names.
+        source: Shipped name or path of its robot file.
+        believed: Robot that it extends: all that is known of it without a recording.
+    """
+
+    name: str
+    source: str
+    believed: str
+
+    @property
+    def robot(self) -> Robot:
+        """The twin itself."""
+        return load_robot(self.source)
+
+
+def drawn_twin(seed: int, folder: Path) -> Twin:
+    """Return a twin that is drawn at random; its robot file is written to a folder."""
+    twin = draw_twin(seed)
+    path = folder / f"{twin.robot.name}.toml"
+    if not path.exists() or load_robot(path) != twin.robot:
+        twin.save(path)
+    return Twin(twin.robot.name, str(path), str(twin.tree["extends"]))
+
+
+def given_twin(word: str) -> Twin:
+    """Return a shipped robot, or one of a file, as a twin.
 
     Raises:
-        UsageError: The folder holds results of other options, or there is no such recipe.
+        UsageError: It extends no robot.
+        RobotError: There is no such robot.
     """
-    for training in trainings(study):
-        training.recipe()
-    rounds = (records(study), fits(study), trainings(study), hops(study))
-    work_through(rounds, at_once, afterwards)
-    return tabulate(study, fits(study), trainings(study), hops(study))
+    robot = load_robot(word)
+    robot.require_leg()
+    parent = parent_robot(word)
+    if parent is None:
+        raise UsageError(
+            f"{word} extends no robot, so that nothing says what is believed of it before it is"
+            " identified; let its file extend one, e.g. legv2."
+        )
+    return Twin(robot.name, word if word in shipped_robots() else str(Path(word)), parent)
 
 
-def work_through(
-    rounds: Sequence[Sequence[jobs.Job]], at_once: int, afterwards: float = 0.0
-) -> None:
-    """Do what is not done of some stages, one stage after the other."""
-    total = afterwards + sum(job.weight for stage in rounds for job in stage)
-    with jobs.Board(total, at_once, own_bars=at_once == 1) as board:
-        for stage in rounds:
-            jobs.work(stage, at_once, board)
+def simulated(source: str) -> Robot:
+    """Return a robot as training simulates it: of [reality] it has the loop's delay alone."""
+    robot = load_robot(source)
+    latency = Latency(command=robot.reality.latency.command)
+    return replace(robot, reality=replace(NO_MISMATCH, latency=latency))
 
 
-def records(study: Study) -> list[stages.RecordTwin]:
-    """Return the recordings that the methods need."""
-    rigs = {rig for method in study.methods if method.fit for rig in method.fit.rigs}
-    return [stages.RecordTwin(study, twin, rig) for twin in study.twins for rig in sorted(rigs)]
+@dataclass(frozen=True)
+class RecordTwin(StoredJob):
+    """A twin recorded on a rig for ``seconds``."""
+
+    file: Path
+    twin: Twin
+    rig: Rig
+    seconds: float = SHORTEST
+
+    weight: ClassVar[float] = 5.0
+
+    @property
+    def name(self) -> str:
+        """What is done."""
+        return f"record {self.twin.name}, {self.rig}"
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """Twin and duration, s."""
+        return {"robot_digest": self.twin.robot.digest, "seconds": self._template().duration}
+
+    @property
+    def stored(self) -> dict[str, Any]:
+        """The recording's header."""
+        return trace.Trace.load(self.file).header
+
+    def run(self, *, quiet: bool) -> None:
+        """Play the paper's trajectory and write the recording."""
+        believed = load_robot(self.twin.believed)
+        template = adapt(self._template(), believed)
+        recording = play_excitation.play(
+            excitation.make_excitation(template, believed),
+            self.twin.robot,
+            believed=self.twin.believed,
+            seed=RIGS.index(self.rig),
+        )
+        recording.trace.header["seconds"] = template.duration
+        recording.save(self.file)
+
+    def _template(self) -> Strokes:
+        if self.rig != "fixed-base":
+            return moving_base(duration=self.seconds)
+        swings = (10.0, 20.0) if self.seconds >= _BOTH_SWINGS else (10.0,)
+        return fixed_base(swings=swings, duration=self.seconds)
 
 
-def fits(study: Study) -> list[stages.IdentifyTwin]:
-    """Return all identifications, those of the first method first; several may share one."""
-    every = (stages.IdentifyTwin(study, t, m) for m in study.methods if m.fit for t in study.twins)
-    return list({study.fitted(fit.twin, fit.method): fit for fit in every}.values())
+@dataclass(frozen=True)
+class IdentifyTwin(StoredJob):
+    """A twin identified from recordings; beside the robot file, as .json, stands the fit.
 
-
-def trainings(study: Study) -> list[stages.TrainPolicy]:
-    """Return all trainings; several twins may share one."""
-    every = (stages.TrainPolicy(study, t, m, s) for s, m, t in _all(study) if not m.controller)
-    return list({train.path: train for train in every}.values())
-
-
-def hops(study: Study) -> list[stages.HopOnTwin]:
-    """Return all trials; what is not trained has one for each twin."""
-    return [
-        stages.HopOnTwin(study, t, m, s)
-        for s, m, t in _all(study)
-        if not m.controller or s == study.seeds[0]
-    ]
-
-
-def _all(study: Study) -> Iterable[tuple[int, methods.Method, TwinFile]]:
-    return ((s, m, t) for s in study.seeds for m in study.methods for t in study.twins)
-
-
-Row = dict[str, Any]
-
-_SEED = 0
-"""Seed of the bootstrap."""
-
-
-def tabulate(
-    study: Study,
-    fits: Sequence[stages.IdentifyTwin],
-    trainings: Sequence[stages.TrainPolicy],
-    hops: Sequence[stages.HopOnTwin],
-) -> dict[str, Any]:
-    """Return everything that was measured, as JSON values; all jobs must be done."""
-    trials = [row for hop in hops for row in hop.rows()]
-    rows = [
-        _pooled(method, [r for r in trials if (r["method"], r["command_m"]) == (method.name, c)])
-        for method in study.methods
-        for c in study.commands
-    ]
-    return {
-        **about(study),
-        "training_seeds": list(study.seeds),
-        "recipe": study.recipe,
-        "recipe_changes": list(study.changes),
-        "training_steps": study.steps,
-        "rows": rows,
-        **_overall(trials, study),
-        **_best_in_own_simulation(trials, study),
-        "identification": [fit_row(fit) for fit in fits],
-        "trainings": [_training(training) for training in trainings],
-        "trials": trials,
-        "notes": statistics.twins_note(len(study.twins)),
-    }
-
-
-def _overall(trials: Sequence[Row], study: Study) -> Row:
-    first, *others = study.methods
-    return {
-        "methods": [_whole(method, trials, study) for method in study.methods],
-        "comparison": [compare(first.name, other.name, trials, _SEED) for other in others],
-    }
-
-
-def _best_in_own_simulation(trials: Sequence[Row], study: Study) -> Row:
-    """Return the same over the better trainings alone, if there are several of each.
-
-    Of the training seeds of a method and twin, the one counts whose policy scored best in the
-    simulation that it was trained in: what someone gets who trains several times and chooses
-    without having met the leg.
+    Attributes:
+        file: Robot file.
+        method: Its name in results.
+        effort: How far least squares on positions and torques search.
     """
-    if len(study.seeds) == 1:
-        return {}
-    best = {}
-    for method, twin in itertools.product(study.methods, study.twins):
-        if method.controller:
-            best[method.name, twin.name] = study.seeds[0]
-            continue
-        runs = [stages.TrainPolicy(study, twin, method, seed) for seed in study.seeds]
-        best[method.name, twin.name] = min(runs, key=lambda run: run.own_score).seed
-    chosen = [row for row in trials if row["seed"] == best[row["method"], row["twin"]]]
-    return {"best_in_own_simulation": _overall(chosen, study)}
+
+    file: Path
+    twin: Twin
+    recordings: tuple[Path, ...]
+    method: str = "identified"
+    effort: LeastSquaresOptions = USUAL_FIT
+
+    weight: ClassVar[float] = 35.0
+    on_all_cores: ClassVar[bool] = True
+
+    @property
+    def name(self) -> str:
+        """What is done."""
+        return f"identify {self.twin.name}, {self.method}"
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """Recordings and search."""
+        effort = None if self.effort == USUAL_FIT else asdict(self.effort)
+        digests = [recording.digest for recording in self._load()]
+        return {"recordings": digests, "least_squares": effort}
+
+    def options(self, recordings: list[Recording], believed: Robot) -> IdentifyOptions:
+        """Return how the twin is identified."""
+        links = {"thigh.inertia": believed.thigh.inertia, "shank.inertia": believed.shank.inertia}
+        bounds = {name: (v / _INERTIA_FACTOR, v * _INERTIA_FACTOR) for name, v in links.items()}
+        return IdentifyOptions(bounds=bounds, effort=SearchOptions(least_squares=self.effort))
+
+    def run(self, *, quiet: bool) -> None:
+        """Identify and write the robot file; a fit that was killed goes on."""
+        believed, recordings = load_robot(self.twin.believed), self._load()
+        options, folder = self.options(recordings, believed), self.file.with_suffix("")
+        identified = identify(recordings, believed, options=options, folder=folder, resume=True)
+        content = {"asked": self.asked, **as_json(identified), "truth": self._truth(identified)}
+        io.write_json(self.file.with_suffix(".json"), content)
+        save_robot(identified, self.file, self.twin.believed)
+
+    def row(self) -> dict[str, Any]:
+        """Return how well the fit went: errors on data it has not seen, and its parameters."""
+        found = json.loads(self.file.with_suffix(".json").read_text(encoding="utf-8"))
+        before, after, truth = found["start_validation"], found["validation"], found["truth"]
+        kept = ("name", "unit", "start", "value", "interval_low", "interval_high", "at_bound")
+        errors = ("closed_loop_position_rms_rad", "closed_loop_torque_rms_nm")
+        return {
+            "method": self.method,
+            "twin": self.twin.name,
+            **{f"{name}_before": before[name] for name in errors},
+            **{name: after[name] for name in errors},
+            "parameters": [
+                {**{key: row[key] for key in kept}, "truth": truth.get(row["name"])}
+                for row in found["parameters"]
+            ],
+        }
+
+    def _load(self) -> list[Recording]:
+        return [load_recording(path) for path in self.recordings]
+
+    def _truth(self, identified: Identified) -> dict[str, float]:
+        """Return the twin's own values of what was fitted, where it has them."""
+        robot = simulated(self.twin.source)
+        truth, names = LegHypothesis(robot), identified.passes[-1].parameters.names
+        values = {name: truth.get(name) for name in names if not name.startswith("drive.")}
+        if "drive.delay" in names:
+            values["drive.delay"] = robot.reality.latency.command
+        return values
 
 
-def about(study: Study) -> Row:
-    """Return what every study's results begin with: the twins and how they were met."""
+@dataclass(frozen=True)
+class TrainPolicy(Job):
+    """Training of a policy in the simulation of the robot ``source``; it has a folder."""
+
+    folder: Path
+    source: str
+    recipe: "Recipe"
+    seed: int = 0
+
+    @property
+    def weight(self) -> float:
+        """Rough time, s."""
+        return 10.0 + self.recipe.schedule.steps / 17_000
+
+    @property
+    def name(self) -> str:
+        """What is done."""
+        return f"train {self.folder.name}"
+
+    @property
+    def done(self) -> bool:
+        """Whether the policy is there.
+
+        Raises:
+            UsageError: The folder holds another training.
+        """
+        if not (self.folder / "config.json").exists():
+            return False
+        run = self._run_folder()
+        run.check_same()
+        return run.policy.exists()
+
+    def run(self, *, quiet: bool) -> None:
+        """Train; a training that was killed goes on."""
+        from hopping_leg.rl.train import train
+
+        robot = simulated(self.source)
+        train(self.recipe, robot, self.seed, self.folder, resume=True, threads=1, quiet=quiet)
+
+    def progress(self) -> tuple[float, str]:
+        """Return the share done and what to show while it runs."""
+        snapshots = sorted((self.folder / "snapshots").glob("*.onnx"))
+        steps = int(snapshots[-1].stem) if snapshots else 0
+        share = min(steps / self.recipe.schedule.steps, 1.0)
+        return share, f"{steps / 1e6:.1f}M steps" if steps else "begun"
+
+    def row(self) -> dict[str, Any]:
+        """Return how the policy hops in the simulation that it was trained in.
+
+        Raises:
+            UsageError: The training is not finished.
+        """
+        from hopping_leg.rl.run_folder import read_result
+
+        result = read_result(self.folder)
+        errors = [trial["median_error_m"] for trial in result["selected"]["trials"]]
+        worst = None if None in errors else max(map(abs, errors))
+        return {
+            "training": self.folder.name,
+            "minutes": result["minutes"],
+            "steps": result["steps"],
+            "own_simulation_worst_abs_median_error_m": worst,
+            "own_simulation_score_m": float(result["selected"]["score_m"]),
+        }
+
+    def _run_folder(self) -> "RunFolder":
+        from hopping_leg.rl.run_folder import RunFolder
+
+        robot = simulated(self.source)
+        return RunFolder(self.folder, self.recipe.fit(robot), robot, self.seed, None)
+
+
+_KEPT = ("command_m", "median_error_m", "median_abs_error_m", "std_m", "hops", "skipped_hops",
+         "missed_runs", "hop_rate_hz", "flight_fraction", "body_contacts",
+         *MotorLoad.__dataclass_fields__)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class HopTrial(StoredJob):
+    """A controller tried on a twin, ``repeats`` runs of 15 s at each command.
+
+    Attributes:
+        file: Where what was measured is kept.
+        method: Name of what it was trained on.
+        seed: Seed of its training.
+        policy: Trained policy; None takes energy shaping, tuned on the believed leg.
+    """
+
+    file: Path
+    twin: Twin
+    method: str
+    seed: int = 0
+    policy: Path | None = None
+    commands: tuple[float, ...] = COMMANDS
+    repeats: int = 3
+
+    weight: ClassVar[float] = 8.0
+
+    @property
+    def name(self) -> str:
+        """What is done."""
+        return f"hop on {self.twin.name}, {self.method}, seed {self.seed}"
+
+    @property
+    def leg(self) -> Robot:
+        """Leg that hops."""
+        return self.twin.robot
+
+    @property
+    def controller(self) -> Controller:
+        """What hops."""
+        if self.policy is None:
+            return load_controller(ENERGY_SHAPING, load_robot(self.twin.believed))
+        return Policy(self.policy.read_bytes(), "the trained policy", "policy")
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """Controller, leg and trials."""
+        return {
+            "policy": entries.fingerprint(self.controller),
+            "twin": self.leg.digest,
+            "commands": list(self.commands),
+            "repeats": self.repeats,
+        }
+
+    def run(self, *, quiet: bool) -> None:
+        """Try the controller at every command and write what was measured."""
+        rows = hop(self.controller, self.leg, self.commands, self.repeats)
+        io.write_json(self.file, {"asked": self.asked, "rows": rows})
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return what was measured, one row per command."""
+        where = {"method": self.method, "twin": self.twin.name, "seed": self.seed}
+        found = json.loads(self.file.read_text(encoding="utf-8"))["rows"]
+        return [{**where, **row} for row in found]
+
+
+def disturbance_of(robot: Robot) -> NoiseAndDelay:
+    """Return what a leg is tried with on top of what it brings: nothing, if it brings anything."""
+    return NoiseAndDelay() if robot.reality.neutral else NO_NOISE
+
+
+def hop(
+    controller: Controller, robot: Robot, commands: tuple[float, ...], repeats: int
+) -> list[dict[str, Any]]:
+    """Let a controller hop on a robot and return a row per command.
+
+    Errors are apex minus command. A leg that never leaves the ground at a command counts as
+    ``motionless``; its error is standing height minus command.
+    """
+    judged = runner.evaluate(
+        [entries.entry_of("policy", controller)],
+        RolloutConfig(robot, disturbance_of(robot), threads=1),
+        commands=commands,
+        repeats=repeats,
+        seed=FIRST_SEED,
+        kinds=("fixed",),
+    )
+    summary = judged.evaluation.to_json()["summary"]
+    return [{**{n: row[n] for n in _KEPT}, "motionless": not row["hops"]} for row in summary]
+
+
+def about(twins: tuple[Twin, ...], seconds: float, repeats: int) -> dict[str, Any]:
+    """Return what results begin with: the twins and how they were met."""
     return {
         "twins": [
             {
                 "name": twin.name,
                 "robot_digest": twin.robot.digest,
                 "believed": twin.believed,
-                "paper_disturbance": stages.disturbance_of(twin.robot).delay_probability > 0,
+                "paper_disturbance": disturbance_of(twin.robot).delay_probability > 0,
             }
-            for twin in study.twins
+            for twin in twins
         ],
-        "recording_seconds": study.seconds,
-        "evaluation_seed": stages.FIRST_SEED,
-        "evaluation_seeds": study.repeats,
+        "recording_seconds": seconds,
+        "evaluation_seed": FIRST_SEED,
+        "evaluation_seeds": repeats,
         "versions": runner.software_versions(),
     }
 
 
-def _pooled(method: methods.Method, trials: Sequence[Row]) -> Row:
-    return {
-        "method": method.name,
-        "meaning": method.meaning,
-        "command_m": trials[0]["command_m"],
-        "policies": len(trials),
-        **_median(trials, "median_abs_error_m"),
-        **_median(trials, "median_error_m"),
-        "worst_abs_error_m": max(r["median_abs_error_m"] for r in trials),
-        "median_std_m": float(np.median([r["std_m"] for r in trials if r["hops"]] or [np.nan])),
-        **_sums(trials),
-    }
+@dataclass(frozen=True)
+class Transfer:
+    """One pass from a leg that is not known to hops on it, beside a training on the CAD's robot.
 
-
-def _median(trials: Sequence[Row], name: str) -> Row:
-    """Return the median of a number and its interval over the twins."""
-    numbers = _by_twin(trials, name)
-    low, high = statistics.median_interval(numbers, _SEED, statistics.LEAST_TWINS)
-    start = name.removesuffix("_m")
-    median = float(np.median(np.concatenate(numbers)))
-    return {name: median, f"{start}_low_m": low, f"{start}_high_m": high}
-
-
-def _sums(trials: Sequence[Row]) -> Row:
-    names = ("hops", "skipped_hops", "missed_runs", "body_contacts", "motionless")
-    return {name: sum(r[name] for r in trials) for name in names}
-
-
-def _loads(trials: Sequence[Row]) -> Row:
-    """Return the medians of what hopping asks of the motors and of the soft limits."""
-    names = ("outside_limits_fraction", "soft_limit_share", "rated_torque_share",
-             "mean_electrical_power_w", "peak_regeneration_w", "torque_reversals_hz")  # fmt: skip
-    return {name: float(np.median([r[name] for r in trials])) for name in names}
-
-
-def _by_twin(trials: Sequence[Row], name: str) -> list[Array]:
-    """Return a number of every seed, one array per twin."""
-    twins = dict.fromkeys(r["twin"] for r in trials)
-    return [np.array([r[name] for r in trials if r["twin"] == twin]) for twin in twins]
-
-
-def _whole(method: methods.Method, trials: Sequence[Row], study: Study) -> Row:
-    mine = [r for r in trials if r["method"] == method.name]
-    runs: dict[tuple[str, int], list[Row]] = {}
-    for row in mine:
-        runs.setdefault((row["twin"], row["seed"]), []).append(row)
-    return {
-        "method": method.name,
-        "meaning": method.meaning,
-        "policies": len(runs),
-        **_median(mine, "median_abs_error_m"),
-        "worst_command_median_abs_error_m": max(
-            _at(mine, method.name, command) for command in study.commands
-        ),
-        "worst_abs_error_m": max(r["median_abs_error_m"] for r in mine),
-        "ordered": sum(map(_ordered, runs.values())),
-        **_loads(mine),
-        **_sums(mine),
-    }
-
-
-def _ordered(run: Sequence[Row]) -> bool:
-    """Return whether a policy's median apex rises from every command to the next."""
-    ranked = sorted(run, key=lambda r: float(r["command_m"]))
-    apexes = [r["command_m"] + r["median_error_m"] for r in ranked]
-    moves = not any(r["motionless"] for r in run)
-    return moves and all(low < high for low, high in itertools.pairwise(apexes))
-
-
-def fit_row(fit: stages.IdentifyTwin) -> Row:
-    """Return how well a fit went: errors on data it has not seen, and its parameters."""
-    file = fit.study.fitted(fit.twin, fit.method).with_suffix(".json")
-    found = json.loads(file.read_text(encoding="utf-8"))
-    before, after = found["start_validation"], found["validation"]
-    names = ("closed_loop_position_rms_rad", "closed_loop_torque_rms_nm")
-    truth = found["truth"]
-    return {
-        "method": fit.fit.name,
-        "twin": fit.twin.name,
-        **{f"{name}_before": before[name] for name in names},
-        **{name: after[name] for name in names},
-        "parameters": [
-            {**{k: p[k] for k in ("name", "unit", "start", "value", "interval_low",
-                                  "interval_high", "at_bound")}, "truth": truth.get(p["name"])}
-            for p in found["parameters"]
-        ],
-    }  # fmt: skip
-
-
-def _training(training: stages.TrainPolicy) -> Row:
-    """Return how a policy hops in the simulation that it was trained in."""
-    result = training.result
-    errors = [trial["median_error_m"] for trial in result["selected"]["trials"]]
-    known = [abs(error) for error in errors if error is not None]
-    return {
-        "training": training.path.name,
-        "minutes": result["minutes"],
-        "steps": result["steps"],
-        "own_simulation_worst_abs_median_error_m": max(known)
-        if len(known) == len(errors)
-        else None,
-        "own_simulation_score_m": training.own_score,
-    }
-
-
-def compare(first: str, other: str, trials: Sequence[dict[str, Any]], seed: int) -> dict[str, Any]:
-    """Return the ratio of two methods' errors, overall and at the command where it is smallest.
-
-    Trials are one row per method, twin, seed and command. The medians are over all of them; the
-    interval resamples whole twins, so that both methods keep meeting the same ones; it is NaN with
-    fewer than ``LEAST_TWINS``.
+    Attributes:
+        folder: Keeps recordings, robots, trainings and trials; what is there is not done again.
+        seed: Seed of the trainings.
+        effort: How far the fit searches.
+        repeats: Runs at each command.
     """
-    count = len({row["twin"] for row in trials})
-    errors = {
-        name: _by_twin([row for row in trials if row["method"] == name], "median_abs_error_m")
-        for name in (first, other)
-    }
 
-    def ratio(index: Sequence[int]) -> float:
-        above, below = (
-            np.median(np.concatenate([errors[method][i] for i in index]))
-            for method in (other, first)
-        )
-        return float(above / below)
+    folder: Path
+    twin: Twin
+    recipe: "Recipe"
+    seed: int = 0
+    effort: LeastSquaresOptions = USUAL_FIT
+    repeats: int = 3
 
-    low, high = statistics.bootstrap(range(count), ratio, seed, statistics.LEAST_TWINS)
-    return {
-        "method": other,
-        "over": first,
-        "ratio": ratio(range(count)),
-        "ratio_low": float(low),
-        "ratio_high": float(high),
-        "least_ratio_of_a_command": min(
-            _at(trials, other, c) / _at(trials, first, c)
-            for c in dict.fromkeys(row["command_m"] for row in trials)
-        ),
-    }
+    @property
+    def identified(self) -> Path:
+        """File of the identified robot."""
+        return self.folder / "robots" / f"{self.twin.name}-identified.toml"
 
+    @property
+    def policy(self) -> Path:
+        """Policy that was trained on it."""
+        return self.trainings[0].folder / "policy.onnx"
 
-def _at(trials: Sequence[dict[str, Any]], method: str, command: float) -> float:
-    rows = [row for row in trials if (row["method"], row["command_m"]) == (method, command)]
-    return float(np.median([row["median_abs_error_m"] for row in rows]))
+    @property
+    def records(self) -> list[RecordTwin]:
+        """A recording on each rig."""
+        folder, twin = self.folder / "recordings", self.twin
+        return [RecordTwin(folder / f"{twin.name}-{rig}.parquet", twin, rig) for rig in RIGS]
+
+    @property
+    def fit(self) -> IdentifyTwin:
+        """The fit to both."""
+        files = tuple(record.file for record in self.records)
+        return IdentifyTwin(self.identified, self.twin, files, effort=self.effort)
+
+    @property
+    def trainings(self) -> list[TrainPolicy]:
+        """Trainings on the identified robot and on the believed one."""
+        believed = self.twin.believed
+        folder, seed = self.folder / "training", self.seed
+        return [
+            TrainPolicy(folder / f"{name}-seed{seed}", source, self.recipe, seed)
+            for name, source in (
+                (f"{self.twin.name}-identified", str(self.identified)),
+                (Path(believed).stem, believed),
+            )
+        ]
+
+    @property
+    def hops(self) -> list[HopTrial]:
+        """Trials of both policies, and of a controller that needs no training."""
+        policies = [*(training.folder / "policy.onnx" for training in self.trainings), None]
+        return [
+            HopTrial(
+                self.folder / "trials" / f"{self.twin.name}-{method}-seed{self.seed}.json",
+                self.twin,
+                method,
+                self.seed,
+                policy,
+                repeats=self.repeats,
+            )
+            for method, policy in zip(MEANINGS, policies, strict=True)
+        ]
+
+    def run(self, at_once: int = 1, afterwards: float = 0.0) -> dict[str, Any]:
+        """Do what is left of it and return its numbers.
+
+        What the caller does ``afterwards``, s of a core, counts in the time left.
+
+        Raises:
+            UsageError: The folder holds results of other options.
+        """
+        work_through((self.records, [self.fit], self.trainings, self.hops), at_once, afterwards)
+        return {
+            **about((self.twin,), SHORTEST, self.repeats),
+            "training_seeds": [self.seed],
+            "recipe": self.recipe.name,
+            "recipe_changes": [],
+            "training_steps": self.recipe.schedule.steps,
+            **tabulate(MEANINGS, [trial for hop in self.hops for trial in hop.rows()]),
+            "identification": [self.fit.row()],
+            "trainings": [training.row() for training in self.trainings],
+        }

@@ -6,7 +6,7 @@ Paper, "Energy Shaping". Each push presses with k F_f; each hop corrects k by th
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.controllers.energy_shaping import equations, phases, virtual_leg
+from hopping_leg.controllers.energy_shaping import equations, virtual_leg
 from hopping_leg.controllers.energy_shaping.gains import Gain, ShapingGains, ShapingOptions
 from hopping_leg.controllers.sample_history import DatedObserver
 from hopping_leg.errors import UsageError
@@ -51,8 +51,8 @@ class EnergyShaping:
         self._observer = DatedObserver(self.period, self.gains.position_pull)
         self._observer.reset(count)
         debounced = self.options.contact == "debounced"
-        self._detector = phases.TouchdownDetector(self.robot, count, debounced=debounced)
-        self._phases = phases.Phases(count)
+        self._detector = virtual_leg.TouchdownDetector(self.robot, count, debounced=debounced)
+        self._phases = virtual_leg.Phases(count)
         self._k_ratio = np.ones(count)
         self._length_0 = np.full(count, np.nan)
         self._pushed = np.full(count, np.nan)
@@ -121,13 +121,13 @@ class EnergyShaping:
         thrust = self._gain(command) * forward + gains.push_damping * (intended - leg.rate)
         brake = gains.touchdown_stiffness * (landing - leg.length)
         brake = brake - gains.touchdown_damping * leg.rate
-        return np.where(self._phases.are(phases.Phase.LIFTOFF), thrust, brake)
+        return np.where(self._phases.are(virtual_leg.Phase.LIFTOFF), thrust, brake)
 
     def _pressing_share(self, leg: virtual_leg.LegView, liftoff: Array) -> Array:
-        share = np.where(self._phases.are(phases.Phase.FLIGHT), 0.0, 1.0)
+        share = np.where(self._phases.are(virtual_leg.Phase.FLIGHT), 0.0, 1.0)
         if self.options.liftoff == "timed":
             until = equations.share_of_period(leg.length, leg.rate, liftoff, self.period)
-            share = np.where(self._phases.are(phases.Phase.LIFTOFF), until, share)
+            share = np.where(self._phases.are(virtual_leg.Phase.LIFTOFF), until, share)
         return share
 
     def _end_push(self, leg: virtual_leg.LegView, liftoff: Array) -> None:
@@ -139,12 +139,14 @@ class EnergyShaping:
                 done = leg.length >= liftoff
             case "timed":
                 done, rate, since = self._share < 1, self._rate, (1 - self._share) * self.period
-        who = self._phases.are(phases.Phase.LIFTOFF) & (done | (clock > phases.PUSH_LIMIT))
+        who = self._phases.are(virtual_leg.Phase.LIFTOFF) & (
+            done | (clock > virtual_leg.PUSH_LIMIT)
+        )
         self._liftoff_height = np.where(who, leg.stand, self._liftoff_height)
         self._liftoff_rate = np.where(who, rate, self._liftoff_rate)
         self._liftoff_q = np.where(who[:, None], leg.q, self._liftoff_q)
         self._highest = np.where(who, 0.0, self._highest)
-        self._phases.enter(who, phases.Phase.FLIGHT, since)
+        self._phases.enter(who, virtual_leg.Phase.FLIGHT, since)
 
     def _end_flight(
         self, leg: virtual_leg.LegView, posture_rate: Array, flying: Array, command: Array
@@ -155,11 +157,13 @@ class EnergyShaping:
         touched = pushed & (clock > shortest)
         if self.options.contact == "true":
             touched = (self._true().foot_clearance() <= 0) & (clock > _BLIND_TICKS * self.period)
-        who = self._phases.are(phases.Phase.FLIGHT) & (touched | (clock > phases.FLIGHT_LIMIT))
+        who = self._phases.are(virtual_leg.Phase.FLIGHT) & (
+            touched | (clock > virtual_leg.FLIGHT_LIMIT)
+        )
         if who.any():  # a touchdown that nobody noticed came before contact was believed
             too_short = np.minimum(clock, shortest)
             self._judge_hop(who, leg, command, np.where(touched, clock, too_short))
-        self._phases.enter(who, phases.Phase.TOUCHDOWN)
+        self._phases.enter(who, virtual_leg.Phase.TOUCHDOWN)
 
     def _judge_hop(
         self, who: BoolArray, leg: virtual_leg.LegView, command: Array, airborne: Array
@@ -180,16 +184,18 @@ class EnergyShaping:
         clock = self._phases.clock
         rate = self._true().height_rate if self.options.contact == "true" else leg.rate
         turned = (rate >= 0) & (clock > 2 * self.period)
-        who = self._phases.are(phases.Phase.TOUCHDOWN) & (turned | (clock > phases.BRAKE_LIMIT))
+        who = self._phases.are(virtual_leg.Phase.TOUCHDOWN) & (
+            turned | (clock > virtual_leg.BRAKE_LIMIT)
+        )
         self._length_0 = np.where(who, leg.length, self._length_0)
         self._pushed = np.where(who, command, self._pushed)
-        self._phases.enter(who, phases.Phase.LIFTOFF)
+        self._phases.enter(who, virtual_leg.Phase.LIFTOFF)
 
     def _estimate_height(self, leg: virtual_leg.LegView) -> None:
         flying = equations.ballistic_height(
             self._liftoff_height, self._liftoff_rate, self._phases.clock
         )
-        self._height = np.where(self._phases.are(phases.Phase.FLIGHT), flying, leg.stand)
+        self._height = np.where(self._phases.are(virtual_leg.Phase.FLIGHT), flying, leg.stand)
         if self.truth is not None:
             self._highest = np.maximum(self._highest, self.truth.height)
 

@@ -7,6 +7,7 @@ in its stead now and then. A rollout and the gradient steps on those before it r
 """
 
 import copy
+import math
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -26,8 +27,12 @@ from hopping_leg.rl.distillation.students import Student, StudentConfig
 from hopping_leg.rl.learner import RecentHops
 from hopping_leg.rl.onnx_export import Network
 from hopping_leg.rl.resumable import load_optimizer, to_numpy, to_torch
-from hopping_leg.rl.schedules import cosine
 from hopping_leg.sim import LegSimulator
+
+
+def cosine(left: float) -> float:
+    """Fall from 1 to 0.02 as the share of the budget that is left falls from 1 to 0."""
+    return 0.02 + 0.98 * (1 + math.cos(math.pi * (1 - left))) / 2
 
 
 class Teacher(Protocol):

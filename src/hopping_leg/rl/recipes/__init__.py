@@ -127,20 +127,6 @@ def words_of(name: str, options: dict[str, Any]) -> list[str]:
     return [*words, "--set", *changes] if changes else words
 
 
-def recipe_of(name: str, options: dict[str, Any]) -> Recipe:
-    """Return the recipe that a run was asked for, the inverse of ``words_of``."""
-    usual = get_recipe(options.get("source") or name)
-    recipe = change(usual, changes_of(usual, options))
-    ranges = _ranges_of(options["task"]["randomised"])
-    if ranges is not None:
-        recipe = randomise(recipe, ranges)
-    heights = options.get("heights")
-    return recipe.replace(
-        {"task.observation": options["task"]["observation"]},
-        heights=tuple(heights) if heights else None,
-    )
-
-
 def _ranges_of(stored: list[Any]) -> Randomise | None:
     """Return from which ranges the legs of a run drew their numbers, None if from a user's own."""
     drawn = [[s["path"], s["low"], s["high"]] for s in stored]
