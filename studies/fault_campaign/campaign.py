@@ -142,7 +142,8 @@ def summary(campaign: Campaign, robot: Robot, rows: Sequence[Row]) -> dict[str, 
 
 def _family_row(name: str, rows: Sequence[Row]) -> dict[str, Any]:
     own = [row for row in rows if row["family"] == name]
-    reactions = [row["reaction"] for row in own if row["reaction"] is not None]
+    fair = [row for row in own if not row["disturbed"]]
+    reactions = [row["reaction"] for row in fair if row["reaction"] is not None]
     reasons = Counter(row["reason"] or "KILLED" for row in own)
     return {
         "family": name,
