@@ -3,17 +3,19 @@
 import dataclasses
 import json
 
+import numpy as np
 import polars as pl
 import pytest
 from studies.sim_to_real.run import EFFECTS, HopWithout
 
 from hopping_leg.controllers import RolloutConfig
+from hopping_leg.controllers.registry import load_policy
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.robot import load_robot
-from hopping_leg.sim import NO_NOISE
+from hopping_leg.sim import NO_NOISE, Measurement
 from hopping_leg.sim.randomization import IDENTIFIABLE_RANGES, WIDE_RANGES
 from hopping_leg.sim_to_real import stages
 from hopping_leg.sim_to_real.stages import HopOnTwin, IdentifyTwin, RecordTwin, TrainPolicy
@@ -151,6 +153,17 @@ def test_a_leg_that_never_hops_errs_by_the_distance_from_standing(tmp_path):
     assert row["median_error_m"] == pytest.approx(standing - 0.3, abs=1e-3)
     assert row["median_abs_error_m"] == -row["median_error_m"]
     assert json.dumps(row)
+
+
+def test_a_policy_is_asked_for_the_nearest_height_of_its_training():
+    policy, asked = load_policy("fast"), []
+    act = policy.act
+    policy.act = lambda seen: asked.append(seen.command) or act(seen)
+    within = stages.WithinRange(policy, load_robot("legv2"))
+    within.reset(2)
+    zeros, command = np.zeros((2, 3, 2)), np.array([[0.3] * 3, [9.0] * 3])
+    within.act(Measurement(zeros, zeros, command, np.zeros((2, 3))))
+    np.testing.assert_array_equal(asked[0][:, 0], [0.3, policy.card.command_high])
 
 
 def test_energy_shaping_hops_without_a_training_once_per_twin(tmp_path):
