@@ -17,9 +17,9 @@ Examples:
 """
 
 RESULTS = (
-    "python -m studies.sim_to_real --twins 5 --steps 2000000 --folder runs/transfer-fast --json "
+    "python -m studies.sim_to_real --jobs 2 --folder runs/transfer-fast --json "
     "studies/sim_to_real/results/fast.json",
-    "python -m studies.sim_to_real prediction --twins 5 --json "
+    "python -m studies.sim_to_real prediction --twins 5 --jobs 2 --json "
     "studies/sim_to_real/results/prediction.json",
 )
 

@@ -182,7 +182,7 @@ class Study:
     """Recipe by which policies are trained."""
     changes: tuple[str, ...] = ()
     """Numbers of the recipe that differ from its defaults, each ``name=number``."""
-    steps: int = 6_000_000
+    steps: int = 1_200_000
     """Control steps of experience of a training."""
     seconds: float = 60.0
     """Duration of each recording, s."""

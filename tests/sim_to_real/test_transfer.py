@@ -4,22 +4,25 @@ import dataclasses
 import json
 from pathlib import Path
 
+import numpy as np
 import polars as pl
 import pytest
 
 from hopping_leg.controllers import RolloutConfig
+from hopping_leg.controllers.registry import load_policy
 from hopping_leg.errors import UsageError
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import load_recording
 from hopping_leg.robot import load_robot
-from hopping_leg.sim import NO_NOISE
+from hopping_leg.sim import NO_NOISE, Measurement
 from hopping_leg.sim_to_real import transfer
 from hopping_leg.sim_to_real.transfer import (
     IdentifyTwin,
     RecordTwin,
     TrainPolicy,
     Transfer,
+    WithinRange,
     drawn_twin,
     given_twin,
     simulated,
@@ -155,3 +158,14 @@ def test_each_controller_knows_what_its_method_says_of_the_twin(tmp_path, twin):
     ]  # fmt: skip
     assert all(hop.leg == twin.robot for hop in run.hops)
     assert run.hops[2].controller.robot == load_robot("legv2"), "it knows the believed leg alone"
+
+
+def test_a_policy_is_asked_for_the_nearest_height_of_its_training():
+    policy, asked = load_policy("fast"), []
+    act = policy.act
+    policy.act = lambda seen: asked.append(seen.command) or act(seen)
+    within = WithinRange(policy, load_robot("legv2"))
+    within.reset(2)
+    zeros, command = np.zeros((2, 3, 2)), np.array([[0.3] * 3, [9.0] * 3])
+    within.act(Measurement(zeros, zeros, command, np.zeros((2, 3))))
+    np.testing.assert_array_equal(asked[0][:, 0], [0.3, policy.card.command_high])

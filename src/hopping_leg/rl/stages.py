@@ -6,7 +6,7 @@ command is calibrated.
 """
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from hopping_leg.controllers.shooting import Shooting
@@ -67,7 +67,8 @@ def within_reach(recipe: Recipe, robot: Robot) -> tuple[Recipe, float]:
     """Return a recipe for the heights that its teacher reaches, and the teacher's worst score, m.
 
     A recipe without a teacher stays as it is. The heights are the longest run of centimetres
-    without a skipped hop and with a small median error.
+    without a skipped hop and with a small median error. Whole control periods by which commands are
+    late are left out: students learn to command by so much earlier.
 
     Raises:
         UsageError: There are none.
@@ -75,8 +76,9 @@ def within_reach(recipe: Recipe, robot: Robot) -> tuple[Recipe, float]:
     if not isinstance(recipe.algorithm, DaggerConfig):
         return recipe, 0.0
     rate, heights = recipe.task.rate, every_centimetre(recipe.task.command_bounds)
-    teacher = Shooting(robot, recipe.algorithm.teacher, rate=rate)
-    results = evaluate_policy(teacher, robot, heights, rate=rate, legs=2, seconds=5.0)
+    soon = _within_a_period(robot, 1 / rate)
+    teacher = Shooting(soon, recipe.algorithm.teacher, rate=rate)
+    results = evaluate_policy(teacher, soon, heights, rate=rate, legs=2, seconds=5.0)
     runs = [list(run) for reached, run in itertools.groupby(results, key=_is_reached) if reached]
     longest = max(runs, key=len, default=[])
     if len(longest) < 3:
@@ -88,6 +90,13 @@ def within_reach(recipe: Recipe, robot: Robot) -> tuple[Recipe, float]:
     if len(longest) < len(heights):
         recipe = recipe.within(longest[0].command_m, longest[-1].command_m)
     return recipe, max(map(command_score, longest))
+
+
+def _within_a_period(robot: Robot, period: float) -> Robot:
+    """Return a robot whose commands are late by the part beyond whole control periods, s, alone."""
+    latency = robot.reality.latency
+    late = replace(latency, command=latency.command % period)
+    return replace(robot, reality=replace(robot.reality, latency=late))
 
 
 def _is_reached(result: CommandResult) -> bool:

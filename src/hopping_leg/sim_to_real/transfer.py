@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from hopping_leg import io, trace
+from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig
+from hopping_leg.controllers.command_schedule import command_range
 from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import ENERGY_SHAPING, load_controller
 from hopping_leg.errors import UsageError
@@ -27,7 +29,7 @@ from hopping_leg.identify.recording_format import Rig
 from hopping_leg.identify.result import Identified, as_json, save_robot
 from hopping_leg.identify.search import SearchOptions
 from hopping_leg.robot import NO_MISMATCH, Latency, Robot, load_robot, parent_robot, shipped_robots
-from hopping_leg.sim import NO_NOISE, NoiseAndDelay
+from hopping_leg.sim import NO_NOISE, Measurement, NoiseAndDelay
 from hopping_leg.sim.randomization import draw_twin
 from hopping_leg.sim_to_real.jobs import Job, StoredJob, work_through
 from hopping_leg.sim_to_real.tables import tabulate
@@ -382,16 +384,38 @@ def disturbance_of(robot: Robot) -> NoiseAndDelay:
     return NoiseAndDelay() if robot.reality.neutral else NO_NOISE
 
 
+class WithinRange:
+    """A controller that is asked for the nearest command that it knows; a Controller."""
+
+    def __init__(self, controller: Controller, robot: Robot) -> None:
+        self.name, self._controller = controller.name, controller
+        self._range = command_range(controller, robot)
+
+    def reset(self, count: int) -> None:
+        """Forget everything."""
+        self._controller.reset(count)
+
+    def act(self, measurement: Measurement) -> Array:
+        """Return joint torques, N m, (n, 2)."""
+        command = measurement.command.clip(*self._range)
+        return self._controller.act(replace(measurement, command=command))
+
+    def internals(self) -> dict[str, Array]:
+        """Return what the controller shows."""
+        return self._controller.internals()
+
+
 def hop(
     controller: Controller, robot: Robot, commands: tuple[float, ...], repeats: int
 ) -> list[dict[str, Any]]:
     """Let a controller hop on a robot and return a row per command.
 
     Errors are apex minus command. A leg that never leaves the ground at a command counts as
-    ``motionless``; its error is standing height minus command.
+    ``motionless``; its error is standing height minus command. A policy whose training reached less
+    high is asked for the highest command that it knows.
     """
     judged = runner.evaluate(
-        [entries.entry_of("policy", controller)],
+        [entries.entry_of("policy", WithinRange(controller, robot))],
         RolloutConfig(robot, disturbance_of(robot), threads=1),
         commands=commands,
         repeats=repeats,
