@@ -57,7 +57,7 @@ _SLIPS = {
 _WIDEST = {"leg": 2 * math.pi, "pendulum": 12 * math.pi}
 """Largest joint limits, rad, by the robot's kind."""
 _HEAVIEST = 40.0  # kg, of a link per metre
-_CROSSWAYS = 1.1  # share of an inertia that the width of a link and its motor may add
+_CROSSWAYS = 1.2  # share of an inertia that the width of a link and its motor may add
 _LEAST_GYRATION = 0.05  # radius of gyration over length that a link hardly falls below
 _ARMATURES = (5e-3, 20.0)  # armature over what rotor, gear and belt reflect
 _SIZES = ("mass", "length", "com", "inertia", "radius", "ratio", "_torque", "_limit", "_speed")
