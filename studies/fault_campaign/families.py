@@ -103,7 +103,7 @@ def _jump(rng: np.random.Generator) -> dict[str, float | str]:
 
 
 def _drift(rng: np.random.Generator) -> dict[str, float | str]:
-    return {"value": float(rng.choice([-1, 1]) * rng.uniform(0.15, 2.0))}
+    return {"value": float(rng.choice([-1, 1]) * rng.uniform(0.4, 2.0))}
 
 
 def _unplugged(rng: np.random.Generator) -> dict[str, float | str]:

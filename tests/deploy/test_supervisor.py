@@ -135,7 +135,7 @@ def test_each_cause_damps_within_the_tick_and_says_why(observation, reason, deta
     assert out.action is Action.BRAKE
 
 
-@pytest.mark.parametrize(("rate", "caught"), [(0.05, False), (0.2, True), (-0.2, True)])
+@pytest.mark.parametrize(("rate", "caught"), [(0.1, False), (0.4, True), (-0.4, True)])
 def test_a_position_that_drifts_from_its_velocity_is_caught(rate, caught):
     memory = running()
     for tick in range(2, 1000):

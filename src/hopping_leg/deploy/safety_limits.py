@@ -43,9 +43,9 @@ class SafetyLimits:
     """Ticks in a row with too much torque that are tolerated: one sample may be noise."""
     jump: float = 0.15
     """Error of a position predicted from the last one and the velocities, rad per period."""
-    drift: float = 0.08
+    drift: float = 0.2
     """What a position may gain over the integral of its velocity within about a second, rad;
-    hopping legs show 0.01."""
+    light legs show 0.1 at impacts."""
     missing_ticks: int = 3
     """Ticks in a row without a reply that are tolerated: as many as the drives' watchdog lets the
     host miss."""
