@@ -52,6 +52,7 @@ class Reason(IntEnum):
 
 _DRIFT_SECONDS = 1.0  # Time after which a drift is forgotten
 _GAP = 1.5  # Periods between two replies beyond which velocities no longer tell the way between
+_IMPACT = 3.0  # Change of speed between two replies beyond which they do not, rad/s
 
 _ON_TIME = 0.2
 """Of a late tick that one in time makes up for: one late tick in six is tolerated for ever."""
@@ -148,9 +149,11 @@ class Counts:
         )
 
     def _drifted(self, index: int, limits: SafetyLimits, reply: Reply | None) -> float:
-        """Return a drive's drift with a reply; across a gap, or without a reply, it is unknown."""
+        """Return a drive's drift with a reply; across a gap or an impact it is unknown."""
         last, drift = self.last[index], self.drift[index]
-        if reply is None or last is None or not 0 < reply.taken - last.taken < _GAP * limits.period:
+        if reply is None or last is None or abs(reply.velocity - last.velocity) > _IMPACT:
+            return drift
+        if not 0 < reply.taken - last.taken < _GAP * limits.period:
             return drift
         fading = math.exp(-(reply.taken - last.taken) / _DRIFT_SECONDS)
         return drift * fading + _unexplained(last, reply)
