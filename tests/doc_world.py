@@ -23,6 +23,10 @@ SHORTER = {
     "hop doctor --write": {"--yes": None},
     "hop emulate": {"--seconds": "0.3", "--no-realtime": None},
     "hop evaluate": {"--seeds": "1", "--commands": "0.3", "--floor": "soft", "--no-video": None},
+    "hop evaluate --engine": {
+        "--seeds": "1", "--commands": "0.3", "--floor": "soft", "--no-video": None,
+        "--timestep": "0.001",
+    },
     "hop robustness": {"--seeds": "1", "--commands": "0.3", "--axes": "payload"},
     "hop skills": {"--seeds": "1", "--commands": "0.3", "--floor": "soft"},
     "hop excite fixed-base": {

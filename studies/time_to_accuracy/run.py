@@ -190,7 +190,7 @@ def _mean_spent(spent: list[Row]) -> list[Row]:
 
 @styled
 def draw(rows: list[Row]) -> Figure:
-    """Draw error and scatter over time, a line per seed."""
+    """Draw error and scatter over time, a line per seed; what does not hop has no scatter."""
     figure, axes = panels(2)
     names = list(dict.fromkeys(row["recipe"] for row in rows))
     keys = ("mean_abs_median_error_m", "mean_std_m")
@@ -199,10 +199,10 @@ def draw(rows: list[Row]) -> Figure:
             own = [row for row in rows if row["recipe"] == name]
             for number, seed in enumerate(dict.fromkeys(row["seed"] for row in own)):
                 line = [row for row in own if row["seed"] == seed]
-                axis.plot(
-                    [row["seconds"] for row in line], [1e3 * row[key] for row in line], ".-",
-                    color=colour, lw=0.8, label=name if number == 0 else None,
-                )  # fmt: skip
+                label = name if number == 0 else None
+                seconds = [row["seconds"] for row in line]
+                shown = [1e3 * row[key] or np.nan for row in line]
+                axis.plot(seconds, shown, ".-", color=colour, lw=0.8, label=label)
         axis.set(xscale="log", yscale="log", ylabel=title)
     axes[0][0].legend(ncol=len(names))
     axes[-1][0].set_xlabel("wall-clock time, s")

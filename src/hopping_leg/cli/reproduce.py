@@ -46,7 +46,7 @@ class Reproduce:
     """Seed of the trainings; the evaluation's seeds follow from another number."""
     twin: str | None = None
     """Robot file of the leg that plays the real one; default: one that is drawn."""
-    steps: int = 1_200_000
+    steps: int = Study.steps
     """Control steps of experience of each training; by default the recipe's."""
     jobs: int = 2
     """Recordings, trainings or trials at the same time; take the number of cores."""

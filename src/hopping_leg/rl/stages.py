@@ -6,6 +6,7 @@ command is calibrated.
 """
 
 import itertools
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,6 +24,8 @@ from hopping_leg.robot.parameters import Robot
 
 _REACHED = 0.005
 """Median error with which the teacher reaches a height, m."""
+
+_ROUNDING = 1e-9  # Of a control period
 
 
 @dataclass(frozen=True)
@@ -95,7 +98,8 @@ def within_reach(recipe: Recipe, robot: Robot) -> tuple[Recipe, float]:
 def _within_a_period(robot: Robot, period: float) -> Robot:
     """Return a robot whose commands are late by the part beyond whole control periods, s, alone."""
     latency = robot.reality.latency
-    late = replace(latency, command=latency.command % period)
+    whole = math.floor(latency.command / period + _ROUNDING) * period
+    late = replace(latency, command=max(latency.command - whole, 0.0))
     return replace(robot, reality=replace(robot.reality, latency=late))
 
 
