@@ -36,7 +36,7 @@ class Lock:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             others = list(_holders(path)) if os.isatty(self._descriptor) else []
         except BlockingIOError:
-            others = list(_holders(path)) or ["another process, or this one"]
+            others = list(_holders(path, served=False)) or ["another process, or this one"]
         if others:
             self.close()
             raise error(f"{what} is in use by {' and '.join(others)}; end that first.")
@@ -63,7 +63,10 @@ def hold_folder(folder: Path, error: type[HoppingLegError]) -> Iterator[None]:
     """
     file, here = folder / FOLDER_LOCK, socket.gethostname()
     made = not folder.exists()
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise error(f"{folder} cannot be made a folder: {problem.strerror}.") from problem
     left = file.read_text(encoding="utf-8", errors="replace").strip() if file.exists() else ""
     lock = Lock(file, str(folder), error)
     try:
@@ -81,7 +84,7 @@ def hold_folder(folder: Path, error: type[HoppingLegError]) -> Iterator[None]:
                 folder.rmdir()
 
 
-def _holders(path: Path) -> Iterator[str]:
+def _holders(path: Path, *, served: bool = True) -> Iterator[str]:
     """Yield the other processes that have a file open, but for whoever serves it as a terminal."""
     sought = path.stat()
     for process in Path("/proc").glob("[0-9]*"):
@@ -89,7 +92,7 @@ def _holders(path: Path) -> Iterator[str]:
             continue
         with contextlib.suppress(OSError):  # it ended, or is another user's
             opened = list((process / "fd").iterdir())
-            serves = any(_target(entry) in _MASTERS for entry in opened)
+            serves = served and any(_target(entry) in _MASTERS for entry in opened)
             if not serves and any(_same(entry, sought) for entry in opened):
                 words = (
                     (process / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")

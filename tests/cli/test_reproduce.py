@@ -33,7 +33,7 @@ def calls(monkeypatch):
 def test_it_goes_from_a_twin_to_a_judged_policy(calls, tmp_path, capsys):
     assert main(["reproduce", "--out", str(tmp_path), "--seed", "3"]) == 0
     [(transfer, at_once)] = calls["transfer"]
-    assert (transfer.seed, transfer.recipe.schedule.steps, at_once) == (3, 400_000, 2)
+    assert (transfer.seed, transfer.recipe.schedule.steps, at_once) == (3, 1_200_000, 2)
     assert not transfer.twin.robot.reality.neutral
     [judged] = calls["evaluate"]
     policy, *others = judged.controllers

@@ -198,3 +198,13 @@ def test_time_passes_on_the_wire():
     assert run.link.controllers[0].transport.count() == 1
     assert isinstance(run.link.transport, moteus.Transport)
     run.link.close()
+
+
+def test_a_link_has_one_emulator(tmp_path):
+    config = EmulatorConfig(link=tmp_path / "leg")
+    with EmulatorProcess(config) as first:
+        with pytest.raises(UsageError, match="leg is in use by process"):
+            EmulatorProcess(config)
+        assert first.path.exists()
+    with EmulatorProcess(config) as second:
+        assert second.path.exists()

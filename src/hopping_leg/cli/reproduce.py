@@ -46,8 +46,8 @@ class Reproduce:
     """Seed of the trainings; the evaluation's seeds follow from another number."""
     twin: str | None = None
     """Robot file of the leg that plays the real one; default: one that is drawn."""
-    steps: int = Study.steps
-    """Control steps of experience of each training; by default the recipe's."""
+    steps: int = 1_200_000
+    """Control steps of experience of each training."""
     jobs: int = 2
     """Recordings, trainings or trials at the same time; take the number of cores."""
     quick: bool = False

@@ -27,7 +27,9 @@ from rich.progress import Progress
 
 from hopping_leg.cli.options import JsonFile, RobotFile, at_least, save_json, say, show_table
 from hopping_leg.controllers.energy_shaping.tuning import Search, tune
+from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically
+from hopping_leg.locks import hold_folder
 from hopping_leg.rl.search_space import Tuning
 from hopping_leg.robot import DEFAULT_ROBOT, load_robot
 
@@ -72,7 +74,8 @@ def run(
 ) -> None:
     """Search."""
     if isinstance(args, GainSearch):
-        _tune_gains(args)
+        with hold_folder(args.out, UsageError):
+            _tune_gains(args)
     else:
         _tune_recipe(args)
 

@@ -117,16 +117,18 @@ def uninterrupted() -> Iterator[None]:
 
 @contextlib.contextmanager
 def keeping_time(*, realtime: bool) -> Iterator[tuple[str, ...]]:
-    """Let a loop run undisturbed, if asked for with priority and locked memory.
+    """Let a loop run undisturbed, with priority and locked memory, unless time is virtual.
 
     Yields notices of what the computer does not permit.
     """
-    notices = (lock_memory(), prefer_this_process()) if realtime else ()
+    if not realtime:
+        yield ()
+        return
+    notices = (lock_memory(), prefer_this_process())
     try:
         with uninterrupted():
             yield tuple(notice for notice in notices if notice)
     finally:
-        if realtime:
-            _schedule_all(os.SCHED_OTHER, 0)
-            with contextlib.suppress(OSError, AttributeError):
-                ctypes.CDLL(None).munlockall()
+        _schedule_all(os.SCHED_OTHER, 0)
+        with contextlib.suppress(OSError, AttributeError):
+            ctypes.CDLL(None).munlockall()

@@ -164,17 +164,25 @@ def serve(robot: EmulatedRobot, port: Port, *, ready: bool) -> bool:
 
     ``ready`` tells that the host may have sent something; returns whether the host has something.
     """
+    answered = False
     if ready and port.plugged:
         for frame in port.receive():
             robot.receive(frame)
-    items = robot.reply_queue.take(robot.time)
-    for item in items:
-        if port.plugged:
-            port.send(item)
+            answered |= _deliver(robot, port)  # the host reads it while the next one is answered
+    answered |= _deliver(robot, port)
     if robot.plugged == port.plugged:
-        return bool(items)
+        return answered
     if robot.plugged:
         port.plug_in()
     else:
         port.unplug()
     return True
+
+
+def _deliver(robot: EmulatedRobot, port: Port) -> bool:
+    """Send what is due; return whether there was anything."""
+    items = robot.reply_queue.take(robot.time)
+    for item in items:
+        if port.plugged:
+            port.send(item)
+    return bool(items)

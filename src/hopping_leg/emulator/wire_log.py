@@ -57,7 +57,7 @@ class WireLog:
 
     def __init__(self) -> None:
         self.commands: deque[CommandEvent] = deque(maxlen=_REMEMBERED)
-        self.answers: deque[ReplyEvent] = deque(maxlen=_REMEMBERED)
+        self._replies: deque[tuple[float, int, bytes]] = deque(maxlen=_REMEMBERED)
         self.changes: deque[ModeChange] = deque(maxlen=_REMEMBERED)
         self._modes = [DriveMode.STOPPED, DriveMode.STOPPED]
 
@@ -77,13 +77,25 @@ class WireLog:
             self.commands.append(CommandEvent(time, joint, mode, torque, most))
 
     def record_reply(self, time: float, joint: int, answer: frames.Frame) -> None:
-        """Note a drive's answer, if it tells the drive's state."""
-        values = parse_reply(answer.data)
-        if values.keys() >= set(_TOLD):
-            mode, fault, voltage, temperature = (values[register] for register in _TOLD)
-            self.answers.append(
-                ReplyEvent(time, joint, DriveMode(int(mode)), int(fault), voltage, temperature)
+        """Note a drive's answer."""
+        self._replies.append((time, joint, answer.data))
+
+    @property
+    def answers(self) -> list[ReplyEvent]:
+        """The answers that told a drive's state."""
+        read = ((time, joint, parse_reply(data)) for time, joint, data in self._replies)
+        return [
+            ReplyEvent(
+                time,
+                joint,
+                DriveMode(int(values[Register.MODE])),
+                int(values[Register.FAULT]),
+                values[Register.VOLTAGE],
+                values[Register.TEMPERATURE],
             )
+            for time, joint, values in read
+            if values.keys() >= set(_TOLD)
+        ]
 
     def record_mode(self, time: float, joint: int, drive: EmulatedDrive) -> None:
         """Note a drive's mode after a step, if it is another."""

@@ -1,5 +1,6 @@
 """From recordings to identified parameters, judged on data that the fit has not seen."""
 
+import contextlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -20,6 +21,7 @@ from hopping_leg.identify.search import Pass, Report, Searcher, SearchOptions
 from hopping_leg.identify.torque_balance import check_balance
 from hopping_leg.identify.windows import SHORTEST, cut, duration, hold_out
 from hopping_leg.io import write_json
+from hopping_leg.locks import FOLDER_LOCK, hold_folder
 from hopping_leg.robot import NO_MISMATCH, Robot, check_physics
 
 _CREEP = 0.02  # rad/s; intervals hold what friction that fades below it makes of the values
@@ -64,7 +66,7 @@ def identify(
     and the result; None keeps none.
 
     Raises:
-        UsageError: An option has no meaning.
+        UsageError: An option has no meaning, or another process works in the folder.
         RecordingError: A recording is another leg's, too short, or lacks what is needed.
         PhysicsError: The fit failed.
     """
@@ -96,26 +98,35 @@ def identify(
         tuple(fit), tuple(windows), plan.parameters, plan.scoring, plan.timestep, options.threads
     )
     about = {"fitted": [r.name for r in fit], "starts": options.effort.starts}
-    if folder is not None:
-        _prepare(folder, _config(objective, options, held, seed), resume=resume)
-    searcher = Searcher(plan, objective, options.effort, seed, folder, report, options.ray, about)
-    passes = searcher.run([r.metadata.rig for r in recordings])
-    report("finding intervals", 1.0, passes[-1].found.cost)
-    try:
-        hypothesis, known = _conclude(objective, passes[-1], options)
-    except PhysicsError as error:
-        _finish(folder, {"failed": str(error)})
-        raise
-    report("judging", 1.0, passes[-1].found.cost)
-    effort = (plan.timestep, options.threads)
-    before, after = (validation.validate(held, h, *effort) for h in (plan.start, hypothesis))
-    rigs = dict.fromkeys(r.metadata.rig for r in held)
-    groups = {rig: [r for r in held if r.metadata.rig == rig] for rig in rigs if len(rigs) > 1}
-    by_rig = {k: validation.validate(group, hypothesis, *effort) for k, group in groups.items()}
-    parts = (tuple(passes), known, tuple(fit), tuple(held), split, after, before, by_rig, seed)
-    identified = Identified(hypothesis, plan.start, plan, *parts)
-    _finish(folder, as_json(identified))
-    return identified
+    config = _config(objective, options, held, seed)
+    with _held(folder):
+        if folder is not None:
+            _prepare(folder, config, resume=resume)
+        searcher = Searcher(
+            plan, objective, options.effort, seed, folder, report, options.ray, about
+        )
+        passes = searcher.run([r.metadata.rig for r in recordings])
+        report("finding intervals", 1.0, passes[-1].found.cost)
+        try:
+            hypothesis, known = _conclude(objective, passes[-1], options)
+        except PhysicsError as error:
+            _finish(folder, {"failed": str(error)})
+            raise
+        report("judging", 1.0, passes[-1].found.cost)
+        effort = (plan.timestep, options.threads)
+        before, after = (validation.validate(held, h, *effort) for h in (plan.start, hypothesis))
+        rigs = dict.fromkeys(r.metadata.rig for r in held)
+        groups = {rig: [r for r in held if r.metadata.rig == rig] for rig in rigs if len(rigs) > 1}
+        by_rig = {k: validation.validate(group, hypothesis, *effort) for k, group in groups.items()}
+        parts = (tuple(passes), known, tuple(fit), tuple(held), split, after, before, by_rig, seed)
+        identified = Identified(hypothesis, plan.start, plan, *parts)
+        _finish(folder, as_json(identified))
+        return identified
+
+
+def _held(folder: Path | None) -> contextlib.AbstractContextManager[None]:
+    """Let no other process fit in the folder meanwhile."""
+    return contextlib.nullcontext() if folder is None else hold_folder(folder, UsageError)
 
 
 def _finish(folder: Path | None, result: dict[str, Any]) -> None:
@@ -213,7 +224,7 @@ def _prepare(folder: Path, config: dict[str, Any], *, resume: bool) -> None:
     file, result = folder / _CONFIG, folder / _RESULT
     checkpoints = list(folder.glob("search-*.json"))
     if not file.exists():
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        if any(path.name != FOLDER_LOCK for path in folder.iterdir()):
             raise UsageError(f"{folder} is not empty and holds no run; give another folder.")
     elif checkpoints and (resume or not result.exists()):
         try:

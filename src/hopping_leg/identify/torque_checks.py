@@ -16,7 +16,7 @@ _LEAST_ROWS = 50
 _LEAST_TORQUE = 0.1  # rms, N m, of what is asked for, below which noise rules
 _ALIKE, _STRANGE = 0.9, 0.6  # correlations from which on torques are one, and are strangers
 _OPPOSED = -0.5
-_CLEARER = 0.7  # share of what a row leaves unexplained that another one must stay below
+_CLEARER = 0.5  # share of what a row leaves unexplained that another one must stay below
 _LATEST = 10  # rows by which torques are searched for
 _TOO_LATE = 0.02  # s, longer than any drive takes
 _RATIOS = {False: (0.75, 1.33), True: (0.4, 2.5)}
@@ -36,7 +36,7 @@ def check_torque(inspection: Inspection) -> None:
         if right not in found:
             continue
         best = max(found, key=lambda late: abs(found[late][1]))
-        (slope, correlation), own = found[best], found[right][1]
+        (slopes, correlation), own = found[best], found[right][1]
         named, late = inspection.named(column), best - right
         if correlation < _OPPOSED:
             inspection.refuse(
@@ -45,7 +45,8 @@ def check_torque(inspection: Inspection) -> None:
                 " its sign round."
             )
         exact, (low, high) = commanded or metadata.gains_exact, _RATIOS[commanded]
-        if exact and correlation > _ALIKE and not low < slope < high:
+        if exact and correlation > _ALIKE and not (slopes[0] < high and slopes[1] > low):
+            slope = float(np.sqrt(abs(slopes[0] * slopes[1])))
             inspection.refuse(
                 f"{named} is {slope:.3g} times what was asked for{_side(robot, joint, slope)};"
                 " give torques in N m at the joint, and gains likewise."
@@ -89,8 +90,12 @@ def _asked(inspection: Inspection, joint: int) -> Array:
     return asked + damping * (rate - column("velocity"))
 
 
-def _compare(asked: Array, measured: Array, late: int) -> tuple[float, float] | None:
-    """Return measured over asked and their correlation where the measured rows are late."""
+def _compare(asked: Array, measured: Array, late: int) -> tuple[tuple[float, float], float] | None:
+    """Return measured over asked, least and most, and their correlation at rows that are late.
+
+    Errors of what is asked for pull its regression towards zero, those of what is measured the
+    inverse one away from it: the truth is between.
+    """
     x = asked[max(-late, 0) : len(asked) - max(late, 0)]
     y = measured[max(late, 0) : len(measured) - max(-late, 0)]
     known = ~np.isnan(x + y)
@@ -98,8 +103,10 @@ def _compare(asked: Array, measured: Array, late: int) -> tuple[float, float] | 
     if len(x) < _LEAST_ROWS or np.sqrt(np.mean(x**2)) < _LEAST_TORQUE or not y.any():
         return None
     small = np.abs(x) <= np.median(np.abs(x))  # larger ones may be beyond what a motor gives
-    ratio = float(x[small] @ y[small] / max(x[small] @ x[small], 1e-12))
-    return ratio, float(x @ y) / float(np.sqrt((x @ x) * (y @ y)))
+    asked_power, both, power = x[small] @ x[small], x[small] @ y[small], y[small] @ y[small]
+    least = float(both / max(asked_power, 1e-12))
+    most = float(power / both) if both > 0 else least
+    return (least, most), float(x @ y) / float(np.sqrt((x @ x) * (y @ y)))
 
 
 def _side(robot: Robot | None, joint: int, slope: float) -> str:

@@ -6,7 +6,9 @@ the training's checkpoint where it can reach it.
 """
 
 import dataclasses
+import math
 import shutil
+import time
 import warnings
 from pathlib import Path
 from typing import Any
@@ -16,7 +18,7 @@ from optuna.exceptions import ExperimentalWarning
 from optuna.importance import get_param_importances
 from optuna.pruners import MedianPruner
 from optuna.samplers import TPESampler
-from optuna.storages import RDBStorage
+from optuna.storages import RDBStorage, fail_stale_trials
 from optuna.study import Study
 from optuna.trial import FrozenTrial, Trial, TrialState
 from sqlalchemy import Connection, Engine, event
@@ -69,6 +71,17 @@ def _row(trial: FrozenTrial) -> dict[str, Any]:
 _FAILURES = (PhysicsError, ValueError, FloatingPointError)
 """What a training with bad numbers may end in; the study goes on."""
 
+
+class _SurplusError(Exception):
+    """A trial more than the study wants."""
+
+
+_CAUGHT = (*_FAILURES, _SurplusError)
+
+_ENDED = (TrialState.COMPLETE, TrialState.PRUNED)
+_BEGUN = (*_ENDED, TrialState.RUNNING)
+_LOOK_EVERY = 1.0  # s, for the last trials of others
+
 _PATIENCE = 60.0
 """How long a worker waits for others to let go of SQLite's file, s."""
 
@@ -118,14 +131,19 @@ def tune(tuning: Tuning, workers: int | None = None, ray: str | None = None) -> 
 
 
 def work(tuning: Tuning, worker: int = 0) -> None:
-    """Take trials of a study until it has all of them; any process on any machine may."""
+    """Take trials of a study until it has all of them; any process on any machine may.
+
+    The last ones that others train are waited for: one that gives no sign of life is taken up.
+    """
     study = open_study(tuning, worker)
-    if not _over(study, tuning):
-        study.optimize(
-            lambda trial: _run_trial(trial, tuning),
-            catch=_FAILURES,
-            callbacks=[lambda study, _: study.stop() if _over(study, tuning) else None],
-        )
+    while _trials(study, *_ENDED) < tuning.trials:
+        if _trials(study, *_BEGUN) < tuning.trials:
+            study.optimize(lambda trial: _run_trial(trial, tuning), n_trials=1, catch=_CAUGHT)
+        else:
+            time.sleep(_LOOK_EVERY)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", ExperimentalWarning)
+                fail_stale_trials(study)
 
 
 def open_study(tuning: Tuning, worker: int = 0) -> Study:
@@ -204,6 +222,8 @@ def _lock_before_reading(engine: Engine) -> None:
 
 def _run_trial(trial: Trial, tuning: Tuning) -> float:
     """Train with a trial's numbers; return the score of the policy it selects, m."""
+    if _trials(trial.study, *_BEGUN, before=trial.number) >= tuning.trials:
+        raise _SurplusError  # others asked for the last one at the same time
     space = recipes.SPACES[tuning.recipe]
     values = {name: found.suggest(trial, name) for name, found in space.items()}
     recipe = _recipe(tuning).replace(values)
@@ -249,11 +269,10 @@ def _take_up(study: Study, trial: FrozenTrial | Trial) -> None:
     study.enqueue_trial(trial.params, user_attrs={FOLDER: folder})
 
 
-def _over(study: Study, tuning: Tuning) -> bool:
-    """Tell whether a study has all its trials; those that were cut off do not count."""
-    trials = study.get_trials(deepcopy=False)
-    ended = (TrialState.COMPLETE, TrialState.PRUNED)
-    return sum(t.state in ended or ERROR in t.user_attrs for t in trials) >= tuning.trials
+def _trials(study: Study, *states: TrialState, before: float = math.inf) -> int:
+    """Return how many trials before a number are in a state, or failed without being cut off."""
+    trials = (t for t in study.get_trials(deepcopy=False) if t.number < before)
+    return sum(t.state in states or ERROR in t.user_attrs for t in trials)
 
 
 def _recipe(tuning: Tuning) -> Recipe:

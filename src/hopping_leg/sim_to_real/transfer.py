@@ -28,6 +28,7 @@ from hopping_leg.identify.recording import Recording, load_recording
 from hopping_leg.identify.recording_format import Rig
 from hopping_leg.identify.result import Identified, as_json, save_robot
 from hopping_leg.identify.search import SearchOptions
+from hopping_leg.locks import hold_folder
 from hopping_leg.robot import NO_MISMATCH, Latency, Robot, load_robot, parent_robot, shipped_robots
 from hopping_leg.sim import NO_NOISE, Measurement, NoiseAndDelay
 from hopping_leg.sim.randomization import draw_twin
@@ -520,9 +521,11 @@ class Transfer:
         What the caller does ``afterwards``, s of a core, counts in the time left.
 
         Raises:
-            UsageError: The folder holds results of other options.
+            UsageError: The folder holds results of other options, or another process works in it.
         """
-        work_through((self.records, [self.fit], self.trainings, self.hops), at_once, afterwards)
+        jobs = (self.records, [self.fit], self.trainings, self.hops)
+        with hold_folder(self.folder, UsageError):
+            work_through(jobs, at_once, afterwards)
         return {
             **about((self.twin,), SHORTEST, self.repeats),
             "training_seeds": [self.seed],

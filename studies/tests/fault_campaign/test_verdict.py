@@ -1,9 +1,10 @@
 import math
+from types import SimpleNamespace
 
 import pytest
 
 from hopping_leg.deploy.drive_link import DriveMode
-from hopping_leg.emulator.wire_log import CommandEvent, ReplyEvent, WireLog
+from hopping_leg.emulator.wire_log import CommandEvent, ReplyEvent
 from studies.fault_campaign.verdict import (
     Limits,
     problems_of_commands,
@@ -23,10 +24,10 @@ def answered(time, mode=DriveMode.POSITION, voltage=24.0, temperature=30.0):
 
 
 def log(*entries):
-    log = WireLog()
-    log.commands.extend(e for e in entries if isinstance(e, CommandEvent))
-    log.answers.extend(e for e in entries if isinstance(e, ReplyEvent))
-    return log
+    return SimpleNamespace(
+        commands=[e for e in entries if isinstance(e, CommandEvent)],
+        answers=[e for e in entries if isinstance(e, ReplyEvent)],
+    )
 
 
 def test_healthy_commands_are_no_problem():
