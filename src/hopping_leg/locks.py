@@ -32,11 +32,14 @@ class Lock:
             self._descriptor = os.open(path, flags if path.exists() else flags | os.O_CREAT, 0o644)
         except OSError as problem:
             raise error(f"Cannot open {path}: {problem.strerror}.") from problem
+        busy, terminal = False, os.isatty(self._descriptor)
         try:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            others = list(_holders(path)) if os.isatty(self._descriptor) else []
         except BlockingIOError:
-            others = list(_holders(path, served=False)) or ["another process, or this one"]
+            busy = True
+        others = list(_holders(path, served=terminal)) if busy or terminal else []
+        if busy and not others:
+            others = ["another process, or this one"]
         if others:
             self.close()
             raise error(f"{what} is in use by {' and '.join(others)}; end that first.")
@@ -84,8 +87,8 @@ def hold_folder(folder: Path, error: type[HoppingLegError]) -> Iterator[None]:
                 folder.rmdir()
 
 
-def _holders(path: Path, *, served: bool = True) -> Iterator[str]:
-    """Yield the other processes that have a file open, but for whoever serves it as a terminal."""
+def _holders(path: Path, *, served: bool) -> Iterator[str]:
+    """Yield the other processes that have a file open, but for whoever serves it if it is."""
     sought = path.stat()
     for process in Path("/proc").glob("[0-9]*"):
         if process.name == str(os.getpid()):

@@ -6,4 +6,4 @@ from studies.kills.run import Kills
 from studies.shared import main
 
 if __name__ == "__main__":
-    sys.exit(main("kills", Kills, keep_out=("folder",)))
+    sys.exit(main("kills", Kills))

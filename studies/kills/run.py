@@ -117,7 +117,7 @@ class Kills:
             if name not in VERBS:
                 raise UsageError(unknown_name("verb", name, VERBS))
         shutil.rmtree(self.folder, ignore_errors=True)
-        rows = []
+        rows: list[dict[str, Any]] = []
         for name in self.verbs:
             rng = np.random.default_rng([self.seed, len(rows)])
             rows.append(kill(VERBS[name], self.folder.absolute() / name, self.kills, rng))
