@@ -156,7 +156,7 @@ def doubts_of_values(robot: Robot, stated: Tree, origin: str) -> Iterator[str]:
     for name, joint in (("hip", robot.hip), ("knee", robot.knee)):
         ratio = joint.motor.gear_ratio * joint.belt_ratio
         reflected = joint.motor.rotor_inertia * ratio**2
-        if not _ARMATURES[0] <= joint.armature / reflected <= _ARMATURES[1]:
+        if not _ARMATURES[0] * reflected <= joint.armature <= _ARMATURES[1] * reflected:
             yield (
                 f"{origin}: '{name}.armature' is {joint.armature:.3g} kg m2, but rotor, gear and"
                 f" belt reflect {reflected:.3g}; is the rotor's inertia that behind the gear?"

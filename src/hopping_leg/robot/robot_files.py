@@ -34,6 +34,9 @@ def shipped_robots() -> list[str]:
     return sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml"))
 
 
+_LARGEST = 1e12  # magnitude of any number, whatever its unit
+
+
 def load_robot(name_or_path: str | Path) -> Robot:
     """Load a robot by shipped name, e.g. ``"legv2"``, or from a file that ends in ``.toml``.
 
@@ -209,6 +212,8 @@ def _read_quantity(origin: str, entry: object, spec: Field, path: str) -> float:
     value: float = entry["value"]
     if not is_number(value):
         raise RobotError(f"{origin}: '{path}' must be a finite number, not {one_line(value)}.")
+    if abs(value) > _LARGEST:
+        raise RobotError(f"{origin}: '{path}' is {value:.3g}, which no leg has; give it in {unit}.")
     if entry["unit"] != unit:
         raise RobotError(f"{origin}: '{path}' is in {entry['unit']!r} but must be in '{unit}'.")
     if not isinstance(entry["source"], str) or not entry["source"].strip():
