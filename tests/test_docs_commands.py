@@ -187,7 +187,7 @@ def parse(words, monkeypatch):
 def parse_study(words, monkeypatch):
     """Check a study's options without running it."""
 
-    def parse_only(name, options, arguments, keep_out):
+    def parse_only(name, options, arguments):
         read_options(options, name, None, arguments)
         return 0
 

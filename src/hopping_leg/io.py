@@ -62,11 +62,25 @@ def json_text(value: object) -> str:
     return f"{json.dumps(plain(value), indent=1, allow_nan=False)}\n"
 
 
+_MOST_DIGITS = 300
+"""Of an integer; longer ones do not fit the numbers that they are computed with."""
+
+
 def parse_json(
     content: bytes | str, origin: str, error: type[HoppingLegError] = UsageError
 ) -> Tree:
     """Return the object that JSON holds; ``error`` says that it is damaged or no object."""
-    return _parse(json.loads, content, origin, "readable as JSON", error)
+    return _parse(_read_json, content, origin, "readable as JSON", error)
+
+
+def _read_json(content: bytes | str) -> object:
+    return json.loads(content, parse_int=_read_int)
+
+
+def _read_int(text: str) -> int:
+    if len(text) > _MOST_DIGITS:
+        raise ValueError(f"a number of {len(text)} digits")
+    return int(text)
 
 
 def parse_toml(content: bytes, origin: str, error: type[HoppingLegError] = UsageError) -> Tree:
@@ -245,7 +259,7 @@ def is_number(value: object) -> bool:
     """Tell whether a value is a finite number and no truth value."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
-    return math.isfinite(value) if isinstance(value, float) else abs(value) < 1 << 1023
+    return math.isfinite(value) if isinstance(value, float) else abs(value) < 10**_MOST_DIGITS
 
 
 def _form(kind: Any, choices: tuple[str, ...]) -> str:  # noqa: ANN401

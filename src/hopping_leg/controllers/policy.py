@@ -186,7 +186,10 @@ class Policy:
         self.name, self.origin, self.content = name, origin, content
         self.digest = hashlib.sha256(content).hexdigest()[:16]
         self._session = open_session(content, origin)
-        text = self._session.get_modelmeta().custom_metadata_map.get(METADATA_KEY)
+        try:
+            text = self._session.get_modelmeta().custom_metadata_map.get(METADATA_KEY)
+        except UnicodeDecodeError as error:
+            raise PolicyError(f"{origin} has a damaged policy card: it is no text.") from error
         if text is None:
             raise PolicyError(
                 f"{origin} is an ONNX file but not a policy; make one with `hop train`."
