@@ -1,6 +1,6 @@
 """Say in plain words what is wrong with a leg, as far as its recordings tell.
 
-Told are a motor that gives too little, offsets of torque, commands that act late, the zero of the hip,
+Told are a motor that gives too little, offsets of torque, commands that act late, the hip's zero,
 friction that differs by direction, and lost measurements, each with its interval and what to do. A
 clamped leg tells most. Backlash, soft belts and friction that varies with the angle are not told.
 

@@ -125,10 +125,10 @@ def _asked(recording: Recording) -> Array:
 
 def _regression(design: Array, target: Array) -> tuple[Array, Array]:
     """Return values, (k,), and their covariance, (k, k), for residuals that last some rows."""
-    values = np.linalg.lstsq(design, target)[0]
+    values: Array = np.linalg.lstsq(design, target)[0]
     left = target - design @ values
     variance = float(np.var(left)) * correlation_time(left)
-    return values, variance * np.linalg.pinv(design.T @ design, hermitian=True)
+    return values, np.asarray(variance * np.linalg.pinv(design.T @ design, hermitian=True))
 
 
 def _balance(recording: Recording, shifts: list[float]) -> Iterator[Finding]:
