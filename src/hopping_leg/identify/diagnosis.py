@@ -125,7 +125,7 @@ def _asked(recording: Recording) -> Array:
 
 def _regression(design: Array, target: Array) -> tuple[Array, Array]:
     """Return values, (k,), and their covariance, (k, k), for residuals that last some rows."""
-    values: Array = np.linalg.lstsq(design, target)[0]
+    values = np.asarray(np.linalg.lstsq(design, target)[0], np.float64)
     left = target - design @ values
     variance = float(np.var(left)) * correlation_time(left)
     return values, np.asarray(variance * np.linalg.pinv(design.T @ design, hermitian=True))
