@@ -28,6 +28,7 @@ STIFFNESS, DAMPING = (20.0, 12.0), (0.3, 0.15)
 _SUBSTEPS = 100
 _CREEP = 0.01
 """Speed at which friction is mostly there, rad/s."""
+_DRAWS = 2000
 _TONES = np.array([0.2, 0.35, 0.55, 0.8, 1.1, 1.5, 2.0, 2.7])
 
 
@@ -152,6 +153,14 @@ def _track(p, target, kp, kd):  # type: ignore[no-untyped-def]  # noqa: ANN001, 
     return seen
 
 
+def _distances(draws: Array, true: Array) -> Array:
+    """Return how far out draws, (n, k), and last the truth, (k,), are by the draws' covariance."""
+    deviation = draws.std(axis=0)
+    off = (np.vstack([draws, true]) - draws.mean(axis=0)) / deviation
+    inverse = np.linalg.pinv(np.cov(off[:-1], rowvar=False), hermitian=True)
+    return np.asarray(np.einsum("ni,ij,nj->n", off, inverse, off))
+
+
 def coverage(
     arms: int, seconds: float, seed: int, threads: int, on_arm: Callable[[int, int], None]
 ) -> dict[str, Any]:
@@ -165,12 +174,14 @@ def coverage(
         on_arm: Called with arms done and in all.
 
     Returns:
-        Shares of 95 % intervals that hold the truth, in all and by parameter, and what fits take.
+        Shares of 95 % intervals that hold the truth, in all and by parameter, likewise of those of
+        draws from the posterior, of truths that are, all numbers together, no farther out than
+        95 % of the draws, and what fits take.
     """
     robot = load_robot(BELIEVED)
     inside: dict[str, list[bool]] = {}
     errors: dict[str, list[float]] = {}
-    taken = []
+    taken, drawn_inside, beside = [], [], []
     for arm in range(arms):
         truth = draw_truth(robot, np.random.default_rng([seed, arm]))
         recording = record_arm(robot, truth, seconds, seed + arm)
@@ -178,10 +189,16 @@ def coverage(
         known = identify([recording], robot, options=IdentifyOptions(threads=threads))
         taken.append(time.perf_counter() - begin)
         found = known.identifiability
+        draws = known.posterior(_DRAWS, seed + arm)
+        true = np.array([truth.get(name, 1.0) for name in found.names])  # gains of the motors
+        low, high = np.quantile(draws, (0.025, 0.975), axis=0)
+        drawn_inside += ((low <= true) & (true <= high)).tolist()
+        far = _distances(draws, true)
+        beside.append(bool(far[-1] <= np.quantile(far[:-1], 0.95)))
         for name, value, half in zip(found.names, found.values, found.half_width, strict=True):
-            true = truth.get(name, 1.0)  # gains of the motors
-            inside.setdefault(name, []).append(bool(abs(value - true) <= half))
-            errors.setdefault(name, []).append(float((value - true) / half))
+            error = float(value - truth.get(name, 1.0))
+            inside.setdefault(name, []).append(abs(error) <= half)
+            errors.setdefault(name, []).append(error / half)
         on_arm(arm + 1, arms)
     return {
         "rows": [
@@ -193,6 +210,8 @@ def coverage(
             for name, hits in inside.items()
         ],
         "share_inside": float(np.mean(list(inside.values()))),
+        "share_inside_draws": float(np.mean(drawn_inside)),
+        "share_among_draws": float(np.mean(beside)),
         "intervals": sum(map(len, inside.values())),
         "arms": arms,
         "recorded_s": seconds,

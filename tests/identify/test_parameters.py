@@ -54,6 +54,23 @@ def test_intervals_cover_the_truth_as_often_as_they_say():
     assert 0.91 < covered / 600 < 0.99
 
 
+def test_draws_vary_together_as_the_data_and_another_friction_law_let_them():
+    rng = np.random.default_rng(0)
+    slopes = rng.normal(size=(2000, 2)) @ np.array([[1.0, 0.9], [0.0, 0.1]])
+    noise, scale = rng.normal(size=2000), TWO.scale
+    for share in (0.0, 0.3):
+        change = share * slopes @ np.ones(2)
+        known = identifiability(TWO, np.zeros(2), noise, slopes, change)
+        deviation = np.sqrt(np.diag(known.covariance))
+        np.testing.assert_allclose(1.96 * deviation, known.half_width, rtol=1e-4)
+        tied = known.covariance / np.outer(deviation, deviation)
+        if not share:
+            np.testing.assert_allclose(tied, known.correlation, atol=1e-9)
+        else:  # both move together, against what the data alone would let them
+            assert known.correlation[0, 1] < -0.9 < tied[0, 1]
+            np.testing.assert_array_less(share * scale, known.half_width)
+
+
 def test_what_the_data_do_not_touch_is_said():
     slopes = np.zeros((50, 2))
     slopes[:, 0] = 1.0

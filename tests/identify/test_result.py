@@ -5,11 +5,12 @@ import tomllib
 import numpy as np
 import pytest
 
+from hopping_leg.errors import UsageError
 from hopping_leg.identify.report import parameter_table, quality_table, write_fit_report
 from hopping_leg.identify.report_figures import residual_spectrum, worst_stretch
 from hopping_leg.identify.result import as_json, save_robot
 from hopping_leg.identify.validation import overlays
-from hopping_leg.robot import load_robot, load_tree
+from hopping_leg.robot import check_physics, load_robot, load_tree
 from tests.identify.fitting import TRUTH, identified, run
 from tests.identify.twin import LEG, changed, record, swing
 
@@ -42,6 +43,46 @@ def test_intervals_end_where_what_is_possible_does():
     wide = dataclasses.replace(identified().identifiability, half_width=np.full(len(TRUTH), 9.0))
     for row in as_json(dataclasses.replace(identified(), identifiability=wide))["parameters"]:
         assert 0 == row["interval_low"] <= row["value"] <= row["interval_high"] < np.inf
+
+
+def test_draws_have_the_intervals_quantiles_and_stay_within_what_is_possible():
+    found = identified()
+    known, (low, high) = found.identifiability, found.passes[-1].parameters.bounds
+    low, high = (found.passes[-1].parameters.values(b) for b in (low, high))
+    deviation = np.sqrt(np.diag(known.covariance))
+    wide = dataclasses.replace(known, covariance=known.covariance * 1e6)  # beyond the bounds
+    for one in (known, wide):
+        drawn = dataclasses.replace(found, identifiability=one).posterior(20_000, seed=1)
+        spread = np.sqrt(np.diag(one.covariance))
+        for side, share in ((-1.96, 0.025), (1.96, 0.975)):
+            expected = np.clip(known.values + side * spread, low, high)
+            error = np.abs(np.quantile(drawn, share, axis=0) - expected)
+            np.testing.assert_array_less(error, 0.06 * spread)
+        assert ((low <= drawn) & (drawn <= high)).all()
+    np.testing.assert_allclose(1.96 * deviation, known.half_width, rtol=1e-4)
+    np.testing.assert_array_equal(found.posterior(3, seed=1), found.posterior(3, seed=1))
+    for row in found.posterior(20, seed=2):
+        check_physics(found.hypothesis.replace(dict(zip(known.names, row, strict=True))).robot, "")
+
+
+def test_what_nothing_is_known_of_is_drawn_from_all_between_its_bounds():
+    found = identified()
+    blind = dataclasses.replace(found.identifiability, half_width=np.array([np.inf, 1.0]))
+    drawn = dataclasses.replace(found, identifiability=blind).posterior(2000)[:, 0]
+    first = found.passes[-1].parameters.parameters[0]
+    np.testing.assert_allclose(
+        np.quantile(drawn, [0.25, 0.75]), [first.high / 4, 3 * first.high / 4], rtol=0.1
+    )
+
+
+def test_the_posterior_is_written_with_names_and_units():
+    found = identified()
+    assert "posterior" not in as_json(found)
+    written = as_json(found, posterior=5)["posterior"]
+    assert (written["names"], len(written["units"])) == (list(TRUTH), len(TRUTH))
+    np.testing.assert_array_equal(written["samples"], found.posterior(5, found.seed))
+    with pytest.raises(UsageError, match="must not be negative"):
+        found.posterior(-1)
 
 
 def test_what_does_not_exist_is_null_and_nobody_tells_of_it():

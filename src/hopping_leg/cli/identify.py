@@ -8,6 +8,7 @@ Examples:
   hop identify fixed-base.parquet moving-base.parquet --out my_leg.toml --report report.html
   hop identify run1.csv.gz run2.csv.gz --validate run3.csv.gz --out leg.toml --json leg.json
   hop identify fixed-base.parquet moving-base.parquet --search two-pass --out paper.toml
+  hop identify run1.csv.gz run2.csv.gz --json leg.json --posterior 100
   hop identify run1.csv.gz --parameters hip.friction,knee.friction --bounds hip.friction=0,0.5
 """
 
@@ -68,6 +69,8 @@ class Identify:
     """Generations of CMA-ES, in each pass."""
     population: int = optimizers.CmaOptions().population
     """Candidates in a generation of CMA-ES."""
+    posterior: int = 0
+    """Draws of all parameters that the recordings allow, for --json; 0 writes none."""
     threads: int = 0
     """Threads of the physics; 0 takes every core. They change no bit of the result."""
     ray: str | None = None
@@ -110,6 +113,8 @@ def run(args: Identify) -> None:
     origin = args.robot or plan.robot_of([*recordings, *judges])
     outputs = [(name, path) for name in _FILES if (path := getattr(args, name)) is not None]
     _check_outputs(args, origin, outputs)
+    if args.posterior < 0 or (args.posterior and args.json is None):
+        raise errors.UsageError("--posterior needs a positive number of draws, and --json FILE.")
     robot = load_robot(origin)
     for use, group in (("fit", recordings), ("judge", judges)):
         for r in group:
@@ -135,7 +140,7 @@ def run(args: Identify) -> None:
     if warning := result.warning(identified):
         say(warning)
     _show(identified)
-    save_json(args.json, {"command": command, **result.as_json(identified)})
+    save_json(args.json, {"command": command, **result.as_json(identified, args.posterior)})
     if args.report:
         io.write_atomically(args.report, write_fit_report(identified, command, args.threads))
     say(*(f"{_FILES[name]}: {path}" for name, path in outputs))

@@ -30,6 +30,9 @@ class Identifiability:
     """Half widths of the 95 % intervals, (k,); infinite where the data say nothing."""
     correlation: Array
     """(k, k)"""
+    covariance: Array
+    """SI, (k, k), to draw values from: its deviations are those of the intervals, for which what
+    another law of friction would make of all values together counts, too."""
     at_bound: list[bool]
     """Whether a value stands at a bound of its search."""
     statements: list[str]
@@ -54,16 +57,22 @@ def identifiability(
     scale = np.where(deviation > 0, deviation, 1.0)
     correlation = covariance / np.outer(scale, scale)
     np.fill_diagonal(correlation, 1.0)
-    half = _NINETY_FIVE * deviation
+    shift = np.zeros(len(vector))
     if change is not None:
-        half += np.abs(covariance @ (jacobian.T @ change)) / max(variance, 1e-300)
+        shift = covariance @ (jacobian.T @ change) / max(variance, 1e-300)
+    half = _NINETY_FIVE * deviation + np.abs(shift)
+    total = covariance + np.outer(shift, shift) / _NINETY_FIVE**2
+    wide = half / _NINETY_FIVE / np.sqrt(np.maximum(np.diag(total), 1e-300)) * parameters.scale
     half = np.where(blind, np.inf, half * parameters.scale)
     values = parameters.values(vector)
     low, high = parameters.bounds
     near = 1e-6 * (high - low)
     at_bound = ((vector - low <= near) | (high - vector <= near)).tolist()
     statements = _statements(parameters, values, half, correlation, at_bound)
-    return Identifiability(parameters.names, values, half, correlation, at_bound, statements)
+    return Identifiability(
+        parameters.names, values, half, correlation, total * np.outer(wide, wide), at_bound,
+        statements,
+    )  # fmt: skip
 
 
 def correlation_time(residuals: Array) -> float:

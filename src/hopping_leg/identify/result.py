@@ -6,6 +6,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from hopping_leg.arrays import Array
+from hopping_leg.errors import UsageError
 from hopping_leg.identify import recording_format, search
 from hopping_leg.identify.identifiability import Identifiability
 from hopping_leg.identify.parameters import LegHypothesis
@@ -50,9 +54,33 @@ class Identified:
         """The robot with the identified values."""
         return self.hypothesis.robot
 
+    def posterior(self, count: int, seed: int = 0) -> Array:
+        """Draw values of the fitted parameters that the data allow, SI, (count, k).
 
-def as_json(identified: Identified) -> dict[str, Any]:
-    """Return every number of an identification as JSON values; what does not exist is null."""
+        Their quantiles are the intervals, as far as these lie within the bounds of the search,
+        where draws beyond them end; what the data say nothing about is drawn from all between.
+
+        Raises:
+            UsageError: The count or the seed is negative.
+        """
+        if count < 0 or seed < 0:
+            raise UsageError("The number of draws and their seed must not be negative.")
+        known, rng = self.identifiability, np.random.default_rng(seed)
+        searched = self.passes[-1].parameters
+        low, high = (searched.values(bound) for bound in searched.bounds)
+        deviation = np.maximum(np.sqrt(np.diag(known.covariance)), 1e-300)
+        tied = known.covariance / np.outer(deviation, deviation)  # in units alike, for accuracy
+        normal = rng.multivariate_normal(np.zeros(len(tied)), tied, count, method="eigh")
+        drawn, anything = known.values + deviation * normal, rng.uniform(low, high, normal.shape)
+        told = np.isfinite(known.half_width)
+        return np.asarray(np.clip(np.where(told, drawn, anything), low, high))
+
+
+def as_json(identified: Identified, posterior: int = 0) -> dict[str, Any]:
+    """Return every number of an identification as JSON values; what does not exist is null.
+
+    So many values of all parameters are drawn from the posterior; 0 leaves it out.
+    """
     known, plan = identified.identifiability, identified.plan
     tree = {
         "robot": identified.start.robot.name,
@@ -94,6 +122,13 @@ def as_json(identified: Identified) -> dict[str, Any]:
         "seed": identified.seed,
         "versions": software_versions(),
     }
+    if posterior:
+        parameters = identified.passes[-1].parameters.parameters
+        tree["posterior"] = {
+            "names": known.names,
+            "units": [p.unit for p in parameters],
+            "samples": identified.posterior(posterior, identified.seed).tolist(),
+        }
     return dict(plain(tree))
 
 

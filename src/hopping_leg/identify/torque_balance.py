@@ -34,13 +34,13 @@ _DENSE = 0.4  # share of rows with position and velocity, below which nothing is
 _MOST = 1.0  # of the torques' shares left unexplained, summed, beyond which nothing is said
 
 
-class _Balance:
+class Balance:
     """The balance of a recording whose torques are commanded, solved for its numbers.
 
     ``values`` and their deviations ``errors`` are a, b, c, d, G cos z and -G sin z of hip and knee,
-    and friction; ``unexplained`` is the torques' share that is left. Signs are factors of each
-    joint's angles and torques; ``upright`` takes both zeros for right, ``lever``, s2, b / G2 for
-    known.
+    and friction; ``offsets`` and their deviations are torques that are always there, if ``biased``;
+    ``unexplained`` is the torques' share that is left. Signs are factors of each joint's angles and
+    torques; ``upright`` takes both zeros for right, ``lever``, s2, b / G2 for known.
     """
 
     def __init__(
@@ -50,6 +50,7 @@ class _Balance:
         torques: tuple[int, int] = (1, 1),
         *,
         upright: bool = False,
+        biased: bool = False,
         lever: float = 0.0,
     ) -> None:
         time, step = recording.time, np.diff(recording.time)
@@ -84,6 +85,8 @@ class _Balance:
                 column = [zero, zero]
                 column[joint] = mean(values, held=values is not drag and values is not speed)
                 pairs.append((column[0], column[1]))
+        always = mean(np.ones(len(time))) if biased else zero
+        pairs += [(always, zero), (zero, always)]
         design = np.stack([np.concatenate(pair) for pair in pairs], axis=1)
         if upright:
             design[:, 6:8] = 0.0
@@ -103,6 +106,7 @@ class _Balance:
         scaled = design * (weight / np.sqrt(np.repeat(alike, len(zero))))[:, None]
         deviations = np.diag(np.linalg.pinv(scaled.T @ scaled, hermitian=True))
         self.errors = np.where(scaled.any(axis=0), np.sqrt(np.maximum(deviations, 0)), np.inf)
+        self.offsets = self.values[-2:], self.errors[-2:]
 
 
 def check_balance(recording: Recording, robot: Robot) -> None:
@@ -116,16 +120,16 @@ def check_balance(recording: Recording, robot: Robot) -> None:
     silent = recording.metadata.rig != "fixed-base" or not driven.has("torque_command")
     if silent or known < _DENSE or recording.time[-1] - recording.time[0] < 10 * _SPAN:
         return
-    found = _Balance(driven)
+    found = Balance(driven)
     if found.unexplained > _MOST:
         return
     values, errors = found.values, found.errors
     others = {
         "hip or knee is turned round, with its angle, velocity, torque and commands": (
-            _Balance(driven, (1, -1), (1, -1))
+            Balance(driven, (1, -1), (1, -1))
         ),
-        "the hip's torque is turned round": _Balance(driven, torques=(-1, 1)),
-        "the knee's torque is turned round": _Balance(driven, torques=(1, -1)),
+        "the hip's torque is turned round": Balance(driven, torques=(-1, 1)),
+        "the knee's torque is turned round": Balance(driven, torques=(1, -1)),
     }
     wrong = min(others, key=lambda change: others[change].unexplained)
     if found.unexplained > _BETTER * others[wrong].unexplained:
@@ -138,7 +142,7 @@ def check_balance(recording: Recording, robot: Robot) -> None:
         raise RecordingError(
             f"{recording.name}: the leg accelerates against its torques; turn their signs round."
         )
-    upright = _Balance(driven, upright=True).unexplained
+    upright = Balance(driven, upright=True).unexplained
     for joint, name in enumerate(JOINTS):
         zero = float(np.arctan2(-values[6 + joint], values[4 + joint]))
         falls = values[4 + joint] < -_SURE * errors[4 + joint]
@@ -152,7 +156,7 @@ def check_balance(recording: Recording, robot: Robot) -> None:
     length = gravity * float(values[1] / values[5])
     spread = abs(length) * float(np.hypot(errors[1] / values[1], errors[5] / values[5]))
     far = not given / _LENGTH < length < given * _LENGTH
-    costs = _Balance(driven, lever=given / gravity).unexplained / found.unexplained
+    costs = Balance(driven, lever=given / gravity).unexplained / found.unexplained
     if far and abs(length - given) > _SURE * spread and costs > _COSTS:
         raise RecordingError(
             f"{recording.name}: torques and motion tell of a thigh of {length:.2g} +- {spread:.1g}"
