@@ -22,7 +22,8 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.cli import guard, read_options
-from hopping_leg.cli.options import KEPT, command_line, verb_of
+from hopping_leg.cli.option_help import word_of
+from hopping_leg.cli.options import KEPT, command_line
 from hopping_leg.errors import UsageError
 from hopping_leg.io import versions, write_atomically, write_json
 from studies import readmes
@@ -60,7 +61,7 @@ def _run(name: str, options: Any, given: Sequence[str]) -> int:  # noqa: ANN401
     about = inspect.getdoc(importlib.import_module(f"studies.{name}"))
     args = read_options(options, program, about, given)
     if get_args(options):
-        program = f"{program} {verb_of(args)}"
+        program = f"{program} {word_of(type(args))}"
     command = command_line(program, args, KEPT | {"recordings"})
     result = {"command": command, **args.measure()}
     if args.json is not None:

@@ -8,7 +8,7 @@ from rich import progress
 
 from hopping_leg.terminal import plain_console
 
-_LINE_SECONDS = 60.0
+_LINE_SECONDS = 30.0
 
 
 class LiveProgress:

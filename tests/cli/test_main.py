@@ -22,6 +22,7 @@ from hypothesis import strategies as st
 
 from hopping_leg import cli
 from hopping_leg.cli import main
+from hopping_leg.cli.option_help import kinds_of, show_help, tidy_words, word_of
 from hopping_leg.cli.options import (
     Heights,
     check_outputs,
@@ -29,7 +30,6 @@ from hopping_leg.cli.options import (
     going_on,
     say,
     show_table,
-    verb_of,
 )
 from hopping_leg.errors import UsageError
 from hopping_leg.progress import LiveProgress, ShareProgress
@@ -39,11 +39,11 @@ from hopping_leg.robot import load_robot, load_tree, numbers, shipped_robots
 def failing(monkeypatch, error):
     """Make `hop robots` raise."""
 
-    def run(args: int) -> None:
+    def run(args: Inner) -> None:
         raise error
 
     monkeypatch.setattr(cli.importlib, "import_module", lambda _: SimpleNamespace(run=run))
-    return main(["robots", "1"])
+    return main(["robots"])
 
 
 def test_version_and_overview_are_said_and_every_verb_exists(capsys):
@@ -51,8 +51,12 @@ def test_version_and_overview_are_said_and_every_verb_exists(capsys):
     assert capsys.readouterr().out.startswith("hop 0.")
     assert main([]) == 0
     shown = capsys.readouterr().out
+    assert [line.split()[:2] for line in shown.splitlines()[:2]] == [
+        ["hop", "--version"],
+        ["hop", "demo"],
+    ]
     for verb in cli.VERBS:
-        assert f"  {verb}" in shown
+        assert f" {verb} " in shown
         assert importlib.util.find_spec(f"hopping_leg.cli.{verb}") is not None
 
 
@@ -132,14 +136,85 @@ def test_other_shells_know_every_verb_and_another_is_refused(capsys, refused):
     refused(["--tyro-print-completion", "tcsh"], "There is no shell 'tcsh'")
 
 
-@pytest.mark.parametrize("arguments", [["robots", "show"], ["robots", "list", "--colour", "red"]])
-def test_wrong_usage_exits_with_2(arguments):
-    with pytest.raises(SystemExit, match="2"):
-        main(arguments)
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["simulate"], "Did you mean 'evaluate' or 'view'?"),
+        (["plot"], "Did you mean 'report'?"),
+        (["calibrate"], "Did you mean 'identify'?"),
+        (["simulat"], "Did you mean 'evaluate' or 'view'?"),
+        (["robots"], "hop robots needs another word. Available: list, show"),
+        (["robots", "chek", "x"], "There is no hop robots 'chek'. Did you mean check?"),
+        (["robots", "show"], "hop robots show needs ROBOT: A shipped name"),
+        (["robots", "list", "--colour", "red"], "hop robots list has no option --colour."),
+        (["train", "--sed", "3"], "Did you mean --seed?"),
+        (["train", "--output=x"], "Did you mean --out?"),
+        (["train", "--set", "num_envs=4", "--set", "gamma=0.9"], "--set is given twice"),
+        (["train", "--seed"], "--seed needs a value; give --seed N."),
+        (["train", "--seed", "1.5"], "--seed is '1.5' but must be a whole number."),
+        (["train", "--minutes", "few"], "--minutes is 'few' but must be a number."),
+        (["train", "--log", "wand"], "There is no value of --log 'wand'. Did you mean 'wandb'?"),
+        (["train", "--resume", "now"], "--resume takes no value, but 'now' stands behind it."),
+        (["train", "more"], "Unrecognized options: more"),
+    ],
+)
+def test_wrong_usage_is_one_sentence_with_the_nearest_name(refused, words, sentence):
+    refused(words, sentence)
 
 
-def test_an_option_given_twice_is_refused(refused):
-    refused(["train", "--set", "num_envs=4", "--set", "gamma=0.9"], "--set is given twice")
+@dataclass(frozen=True)
+class Lists:
+    names: tyro.conf.Positional[tuple[str, ...]]
+    heights: Heights = ()
+    pair: tuple[float, float] | None = None
+    set: tuple[str, ...] = ()
+    files: tuple[Path, ...] = ()
+    loud: bool = False
+
+
+def lists(*words):
+    return tyro.cli(Lists, args=tidy_words(Lists, "hop", words))
+
+
+@given(st.lists(st.integers(0, 9), min_size=1), st.sampled_from([",", ", ", " "]))
+def test_lists_are_given_with_commas_or_spaces(numbers, sign):
+    given_as = sign.join(map(str, numbers)).split(" ")
+    found = lists("a", "--heights", *given_as)
+    assert found == Lists(("a",), heights=tuple(map(float, numbers)))
+    assert lists("--heights", *given_as, "a", "b") == Lists(("a", "b"), heights=found.heights)
+
+
+def test_only_a_comma_between_entries_parts_a_word(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("a,b", "c", "d"):
+        Path(name).write_text("")
+    assert lists("x,y", "a,b", "run/x,y").names == ("x", "y", "a,b", "run/x,y")
+    assert lists("x", "--set", "a=1,b=2").set == ("a=1", "b=2")
+    assert lists("x", "--set", "hip.friction=0,1").set == ("hip.friction=0,1",)
+    assert lists("x", "--pair=1,2", "--loud", "y") == Lists(("x", "y"), pair=(1.0, 2.0), loud=True)
+    assert lists("x", "--files", "c,d", "a,b").files == (Path("c"), Path("d"), Path("a,b"))
+
+
+@pytest.mark.parametrize("columns", [40, 80, 200])
+@pytest.mark.parametrize("verb", cli.VERBS)
+def test_help_fits_the_terminal_and_names_every_option(capsys, monkeypatch, verb, columns):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    for kind in kinds_of(cli._load_verb(verb)[1]) or [""]:
+        with pytest.raises(SystemExit, match="0"):
+            main([verb, *kind.split(), "--help"])
+        shown = capsys.readouterr().out
+        assert shown.startswith(f"usage: hop {verb}")
+        assert all(len(line) <= columns for line in shown.splitlines() if len(line.split()) > 2)
+        assert not re.search(r"\[\[[A-Z]|None\b|\(default:", shown)
+
+
+def test_an_example_that_is_too_long_is_still_one_command(monkeypatch):
+    about = "Does.\n\nExamples:\n  hop do --robot a_rather_long_name.toml --out runs/mine"
+    monkeypatch.setenv("COLUMNS", "40")
+    shown = show_help(Inner, "hop do", about, [])
+    example = shown.split("Examples:\n")[1].split("\n\n")[0]
+    assert example.count("\n") == 2
+    assert shlex.split(example.replace("\\\n", "")) == about.split("Examples:")[1].split()
 
 
 def test_list_names_every_shipped_robot(capsys, tmp_path):
@@ -229,7 +304,7 @@ class TwoWords(Options):
 def test_defaults_and_what_changes_no_number_are_left_out_and_names_are_tyros(capsys):
     assert command_line("hop", Options(out=Path("there"))) == "hop"
     assert command_line("hop", Options(out=Path("there")), ()) == "hop --out there"
-    assert verb_of(TwoWords()) == "two-words"
+    assert word_of(TwoWords) == "two-words"
     assert command_line("hop two-words", TwoWords(loud=True)) == "hop two-words --loud"
     with pytest.raises(SystemExit):
         tyro.cli(Options | TwoWords, args=["--help"])
@@ -316,13 +391,13 @@ def test_a_result_that_cannot_be_written_is_still_printed(capsys, words):
 
 
 def test_sigterm_ends_a_verb_as_ctrl_c_does_and_says_how_to_go_on(monkeypatch, capsys):
-    def run(args: int) -> None:
+    def run(args: Inner) -> None:
         with going_on("the same command goes on."):
             os.kill(os.getpid(), signal.SIGTERM)
             time.sleep(10)
 
     monkeypatch.setattr(cli.importlib, "import_module", lambda _: SimpleNamespace(run=run))
-    assert main(["robots", "1"]) == cli.TERMINATED
+    assert main(["robots"]) == cli.TERMINATED
     assert "Stopped; the same command goes on." in capsys.readouterr().err
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
 

@@ -12,6 +12,7 @@ import errno
 import importlib
 import inspect
 import io
+import itertools
 import os
 import signal
 import sys
@@ -25,9 +26,11 @@ from typing import Annotated, Any, Union, get_type_hints
 import tyro
 
 from hopping_leg import terminal
+from hopping_leg.cli import option_help
 from hopping_leg.errors import HoppingLegError, UsageError, unknown_name
 
 VERBS = {
+    "demo": "watch learned beside classical control in the browser, at once",
     "robots": "list the legs, show every number with its source, check your own",
     "evaluate": "run the paper's trials for controllers and write the report",
     "robustness": "ask how far the world may change before controllers fail",
@@ -49,6 +52,29 @@ VERBS = {
 }
 """Every verb with its line in the overview."""
 
+MEANT = {
+    "deploy": "run hardware real start",
+    "doctor": "check install setup info status diagnose",
+    "emulate": "mock simulator fake",
+    "evaluate": "simulate sim test eval benchmark run rollout judge measure score",
+    "excite": "excitation trajectory",
+    "export": "urdf onnx save convert inspect",
+    "finetune": "continue adapt",
+    "identify": "calibrate fit sysid estimate system-identification",
+    "record": "log capture play",
+    "report": "plot draw figure figures compare show graph html",
+    "reproduce": "paper all everything",
+    "robots": "legs models list import urdf",
+    "robustness": "perturb disturb stress benchmark",
+    "skills": "stairs land jump",
+    "train": "learn fit-policy rl fit",
+    "tune": "optimise optimize search sweep gains hyperparameters",
+    "view": "simulate sim watch viewer play render show visualise visualize gui",
+    "demo": "try example start hello tutorial",
+}
+"""Verbs with the words that others use for them."""
+
+_HELP, _VERSION = "--help", "--version"
 _SHELLS = ("bash", "zsh", "fish")
 _CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes)
 
@@ -146,17 +172,17 @@ _EXTRAS = {
 
 
 def _dispatch(arguments: list[str]) -> int:
-    if not arguments or arguments[0] in ("-h", "--help", "help"):
+    if not arguments or arguments[0] in ("-h", _HELP, "help"):
         print(overview())
         return 0
     verb, rest = arguments[0], arguments[1:]
-    if verb == "--version":
+    if verb in (_VERSION, "-V", "version"):
         print(f"hop {version('hopping-leg')}")
         return 0
     if verb == "--tyro-print-completion":
         return _print_completion(*rest[:1])
     if verb not in VERBS:
-        raise UsageError(unknown_name("verb", verb, VERBS) + " Try `hop --help`.")
+        raise UsageError(unknown_name("verb", verb, VERBS, MEANT) + " Try `hop --help`.")
     module, kind = _load_verb(verb)
     from hopping_leg.cli.options import check_outputs
 
@@ -174,13 +200,27 @@ def read_options(
 ) -> Any:  # noqa: ANN401
     """Return an instance of a dataclass of options, or of one of a union's, as subcommands.
 
-    An option that is given twice, which would silently lose its first values, is a UsageError.
+    Raises:
+        UsageError: The arguments are not as the options ask.
     """
-    flags = [word.partition("=")[0] for word in arguments if word.startswith("--")]
-    for flag in flags:
-        if flags.count(flag) > 1:
-            raise UsageError(f"{flag} is given twice; give it once, with all its values behind it.")
-    return tyro.cli(options, prog=program, description=description, args=arguments, config=_CONFIG)
+    if any(word in ("-h", _HELP) for word in arguments):
+        print(option_help.show_help(options, program, description, arguments))
+        raise SystemExit(0)
+    words = option_help.tidy_words(options, program, arguments)
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):
+            return tyro.cli(options, prog=program, args=words, config=_CONFIG)
+    except SystemExit as ended:
+        raise UsageError(f"{_sentence(said.getvalue())} `{program} {_HELP}` shows more.") from ended
+
+
+def _sentence(box: str) -> str:
+    """Return what is wrong from the box that tyro prints: what stands above its inner line."""
+    inside = [line.strip("\u2502 ") for line in box.splitlines()[1:-1]]
+    above = itertools.takewhile(lambda line: line.strip("\u2500"), inside)
+    text = " ".join(line for line in above if line)
+    return text if text.endswith((".", "!")) else f"{text}."
 
 
 def _load_verb(verb: str) -> tuple[types.ModuleType, Any]:
@@ -211,15 +251,14 @@ def _print_completion(shell: str = "") -> int:
 
 def overview() -> str:
     """Return what ``hop --help`` prints."""
-    width = max(map(len, VERBS))
-    verbs = "\n".join(f"  {name:<{width}}  {line}" for name, line in VERBS.items())
-    return f"""\
-usage: hop VERB [options]
-
-A one-legged robot hops to commanded heights: simulate, train, evaluate, compare.
-
-{verbs}
-
-`hop VERB --help` explains a verb; `hop --tyro-print-completion bash` prints a script
-that completes them in the shell (or zsh, fish). Start here:
-  hop evaluate fast energy-shaping --out runs/first"""
+    return "\n\n".join(
+        [
+            f"hop {_VERSION}  say which version this is\nhop demo       {VERBS['demo']}",
+            "A one-legged robot hops to commanded heights: simulate, train, evaluate, compare.",
+            option_help.columns([entry for entry in VERBS.items() if entry[0] != "demo"]),
+            option_help.wrapped(
+                "`hop VERB --help` explains a verb; `hop --tyro-print-completion bash` prints a"
+                " script that completes them in the shell (or zsh, fish)."
+            ),
+        ]
+    )

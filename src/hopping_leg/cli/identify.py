@@ -22,7 +22,6 @@ from rich.table import Column
 from hopping_leg import errors, io
 from hopping_leg.cli.options import (
     JsonFile,
-    Names,
     command_line,
     going_on,
     save_json,
@@ -58,7 +57,7 @@ class Identify:
     """Write the report to this file as one HTML page."""
     search: str | None = None
     """`least-squares` (default), `cma`, or the paper's `two-pass`."""
-    parameters: Names | None = None
+    parameters: tuple[str, ...] | None = None
     """What to fit, e.g. `hip.friction,drive.delay`; default: what these recordings may tell. With
     `two-pass` they are fitted besides Table I."""
     bounds: tuple[str, ...] = ()

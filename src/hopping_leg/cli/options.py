@@ -3,51 +3,23 @@
 import contextlib
 import dataclasses
 import os
-import re
 import shlex
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
-from typing import Annotated, Any, get_args, get_type_hints
+from typing import Annotated, Any, get_type_hints
 
 import tyro
 from rich.table import Column, Table
 
 from hopping_leg import io
+from hopping_leg.cli.option_help import marks_of
 from hopping_leg.errors import TraceError, UsageError
 from hopping_leg.robot import DEFAULT_ROBOT
 from hopping_leg.terminal import plain_console, print_table
 
-
-def parse_heights(text: str) -> tuple[float, ...]:
-    """Return comma-separated heights, m; an entry that is no number is a UsageError."""
-    try:
-        return tuple(float(part) for part in text.split(","))
-    except ValueError as error:
-        raise UsageError(
-            f"'{text}' is not a list of heights; give metres separated by commas, e.g. 0.25,0.30."
-        ) from error
-
-
-def _one_word(
-    metavar: str, read: Callable[[str], tuple[Any, ...]], form: str
-) -> tyro.constructors.PrimitiveConstructorSpec[Any]:
-    return tyro.constructors.PrimitiveConstructorSpec(
-        nargs=1,
-        metavar=metavar,
-        instance_from_str=lambda words: read(words[0]),
-        is_instance=lambda value: isinstance(value, tuple),
-        str_from_instance=lambda values: [",".join(format(value, form) for value in values)],
-    )
-
-
-Heights = Annotated[tuple[float, ...], _one_word("M,M,...", parse_heights, "g")]
-"""Heights in metres, given as ``0.25,0.30``."""
-Names = Annotated[
-    tuple[str, ...],
-    _one_word("NAME,NAME,...", lambda text: tuple(n.strip() for n in text.split(",")), ""),
-]
-"""Names given as ``hip.friction,knee.damping``."""
+Heights = Annotated[tuple[float, ...], tyro.conf.arg(metavar="M ...")]
+"""Heights in metres."""
 RobotFile = Annotated[str, tyro.conf.arg(help="A shipped robot or the path of a .toml file.")]
 OwnRobot = Annotated[
     str | None,
@@ -154,20 +126,14 @@ def command_line(verb: str, args: Any, leave_out: Collection[str] = KEPT) -> str
     """
     before, behind = verb.split(), []
     for name, value, hint in _given(args, leave_out):
-        marks = list(_marks(hint))
         flag = f"--{name.replace('_', '-')}"
         if isinstance(value, bool):
             behind.append(flag if value else f"--no-{flag[2:]}")
-        elif any(mark is tyro.conf.Positional for mark in marks):
-            before += _words(value, marks)
+        elif any(mark is tyro.conf.Positional for mark in marks_of(hint)):
+            before += _words(value)
         else:
-            behind += [flag, *_words(value, marks)]
+            behind += [flag, *_words(value)]
     return shlex.join([*before, *behind])
-
-
-def verb_of(args: object) -> str:
-    """Return the name that tyro gives to a dataclass as a subcommand, e.g. ``energy-shaping``."""
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", "-", type(args).__name__).lower()
 
 
 def _given(args: Any, leave_out: Collection[str]) -> Iterator[tuple[str, Any, Any]]:  # noqa: ANN401
@@ -180,15 +146,5 @@ def _given(args: Any, leave_out: Collection[str]) -> Iterator[tuple[str, Any, An
             yield field.name, value, hints[field.name]
 
 
-def _marks(hint: object) -> Iterator[object]:
-    yield from getattr(hint, "__metadata__", ())
-    for part in get_args(hint):
-        yield from _marks(part)
-
-
-def _words(value: object, marks: Collection[object]) -> list[str]:
-    """Return a value as tyro reads it; the option's own reader says how, if it has one."""
-    for mark in marks:
-        if isinstance(mark, tyro.constructors.PrimitiveConstructorSpec):
-            return mark.str_from_instance(value)
+def _words(value: object) -> list[str]:
     return [str(entry) for entry in (value if isinstance(value, tuple | list) else [value])]

@@ -1,0 +1,41 @@
+"""Watch the best policy hop beside energy shaping, the classical controller, in the browser.
+
+Change the height, push the legs, put a payload on them; `hop view` shows other controllers, legs
+and recordings. On a server, open the printed address through `ssh -L 8080:localhost:8080`.
+
+Examples:
+  hop demo
+  hop demo --no-browser
+"""
+
+from dataclasses import dataclass
+
+from hopping_leg.cli import view
+from hopping_leg.controllers.registry import ENERGY_SHAPING
+
+BEST = "precise"
+"""The shipped policy that hops most accurately."""
+
+
+@dataclass(frozen=True)
+class Demo:
+    """Where the page is."""
+
+    host: str = view.View.host
+    """Address of this computer to serve at, as for `hop view`."""
+    port: int = view.View.port
+    """Port to serve at; if it is in use, the next free one."""
+    browser: bool = True
+    """Open the page where there is a screen."""
+    seconds: float = float("inf")
+    """Time after which the page closes, s."""
+
+
+def run(args: Demo) -> None:
+    """Serve the page until Ctrl-C."""
+    shown = (BEST, ENERGY_SHAPING)
+    view.run(
+        view.View(
+            shown, None, host=args.host, port=args.port, browser=args.browser, seconds=args.seconds
+        )
+    )
