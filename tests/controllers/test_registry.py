@@ -7,7 +7,13 @@ import pytest
 from onnx import helper
 
 from hopping_leg.controllers.policy import METADATA_KEY
-from hopping_leg.controllers.registry import load_policy, robot_of, shipped_policies
+from hopping_leg.controllers.registry import (
+    load_controller,
+    load_policy,
+    robot_of,
+    shipped_policies,
+)
+from hopping_leg.errors import UsageError
 from hopping_leg.robot import DEFAULT_ROBOT, load_robot, shipped_robots
 
 OTHER = next(name for name in shipped_robots() if name.startswith("leg") and name != DEFAULT_ROBOT)
@@ -48,3 +54,10 @@ def test_the_first_policy_decides(made_on):
 )
 def test_who_was_not_trained_hops_on_the_default_robot(controllers):
     assert robot_of(controllers) == DEFAULT_ROBOT
+
+
+def test_a_robot_file_is_no_controller(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text('name = "mine"\nextends = "legv2"\n')
+    with pytest.raises(UsageError, match="mine.toml is a robot file, no controller"):
+        load_controller(file, load_robot("legv2"))

@@ -186,7 +186,10 @@ def load_gains(name_or_path: str | Path = TUNED) -> GainFile:
         raise errors.UsageError(
             f"There is no gain file {source}; write one with `hop tune`."
         ) from error
-    return io.read_dataclass(GainFile, io.parse_toml(content, str(source)), name)
+    tree = io.parse_toml(content, str(source))
+    if "extends" in tree or "thigh" in tree:
+        raise errors.UsageError(f"{name} is a robot file, no controller; give it with --robot.")
+    return io.read_dataclass(GainFile, tree, name)
 
 
 def save_gains(path: Path, found: GainFile) -> None:
