@@ -59,5 +59,5 @@ def test_who_was_not_trained_hops_on_the_default_robot(controllers):
 def test_a_robot_file_is_no_controller(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text('name = "mine"\nextends = "legv2"\n')
-    with pytest.raises(UsageError, match="mine.toml is a robot file, no controller"):
+    with pytest.raises(UsageError, match="is a robot file, no controller"):
         load_controller(file, load_robot("legv2"))
