@@ -159,7 +159,10 @@ def run_hop(words, monkeypatch):
     with monkeypatch.context() as patch:
         if "--transport" in words:
             robot = words[words.index("--robot") + 1] if "--robot" in words else robot_of(words)
-            put_behind(patch, robot=robot, pose="zero" if "--home" in words else "stand")
+            pose, clamped = "zero" if "--home" in words else "stand", "fixed-base.parquet" in words
+            put_behind(
+                patch, robot="real_leg.toml" if clamped else robot, pose=pose, clamped=clamped
+            )
         if command in INTERRUPTED:
             patch.setattr("hopping_leg.rl.train.Trainer.tick", interrupt)
         code = main(with_files(shorten(words)[1:]))

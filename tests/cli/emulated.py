@@ -13,9 +13,16 @@ from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.identify.excitation import Excitation
 
 
-def put_behind(monkeypatch, **start):
-    """Put drives behind every transport that is opened from now on; return them and their clock."""
+def put_behind(monkeypatch, *, clamped=False, **start):
+    """Put drives behind every transport that is opened from now on; return them and their clock.
+
+    The base of a clamped leg stays where it is.
+    """
     lockstep = Lockstep(EmulatorConfig(**{"robot": "legv2-paper", **start}).build())
+    if clamped:
+        legs = lockstep.robot.leg._legs
+        legs.fixed_base = True
+        legs.set_robots(legs.robots)
     monkeypatch.setattr(transport, "opener", lambda name: None)
     monkeypatch.setattr(moteus_link, "MoteusLink", lambda robot, opener: lockstep.link)
     monkeypatch.setattr(hardware_trials, "RealClock", lambda: lockstep)
