@@ -72,5 +72,5 @@ def nearest_names(
     asked = name.lstrip("-").lower()
     if asked in words:
         return words[asked]
-    close = get_close_matches(name, words, n=1)
+    close = get_close_matches(asked, words, n=1)
     return words[close[0]] if close else []

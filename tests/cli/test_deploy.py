@@ -213,7 +213,7 @@ def test_a_recording_holds_what_was_played_and_measured(tmp_path, rig):
 def test_wrong_input_is_one_sentence(tmp_path, refused):
     file, _ = write_sine(tmp_path, "rail", 300)
     for words, sentence in (
-        ([], "No excitation"),
+        ([], "hop record needs EXCITATION"),
         ([str(tmp_path / "none.parquet")], "none.parquet"),
         ([str(file), "--robot", "twinn"], "Did you mean 'twin'"),
         ([str(file), "--believed", "legv9"], "There is no robot 'legv9'"),

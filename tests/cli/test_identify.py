@@ -144,7 +144,7 @@ def write_bad(folder):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        ([], "No recording was given"),
+        ([], "hop identify needs RECORDING"),
         (["none.csv"], "There is no recording"),
         (["empty.csv"], "empty.csv is empty"),
         (["noise.csv"], "noise.csv is neither Parquet nor a CSV"),
@@ -193,13 +193,15 @@ def test_warnings_of_recordings_are_shown(tmp_path, capsys):
     assert "uninitialised memory" in capsys.readouterr().out
 
 
-def test_without_a_terminal_there_is_a_line_a_minute(monkeypatch, capsys):
+def test_without_a_terminal_there_are_two_lines_a_minute(monkeypatch, capsys):
     clock = [0.0]
     monkeypatch.setattr(time, "monotonic", lambda: clock[0])
     with FitProgress() as progress:
-        for second in range(0, 181, 20):
+        for second in range(0, 181, 10):
             clock[0] = float(second)
             progress.update("cma", max(second, 1) / 400, 1234.5)
     lines = capsys.readouterr().err.strip().splitlines()
-    assert [line.split(" · ")[0] for line in lines] == ["cma 15 %", "cma 30 %", "cma 45 %"]
+    assert [line.split(" · ")[0] for line in lines] == [
+        f"cma {share} %" for share in (15, 22, 30, 38, 45)
+    ]
     assert lines[0] == "cma 15 % · cost 1234.5 · at most 5:40 left"
