@@ -170,7 +170,9 @@ def _own_texts(kind: type) -> dict[str, str]:
     return {
         entry.target.id: " ".join(after.value.value.split()).replace("``", "`")
         for entry, after in itertools.pairwise(body)
-        if isinstance(entry, ast.AnnAssign) and isinstance(after, ast.Expr)
+        if isinstance(entry, ast.AnnAssign) and isinstance(entry.target, ast.Name)
+        if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+        if isinstance(after.value.value, str)
     }
 
 
