@@ -66,9 +66,12 @@ def pages() -> dict[str, bytes]:
     beside = {name: f"policies/{name}.onnx" for name in policies}
     code = {name: (FOLDER / f"{name}.js").read_bytes() for name in MODULES}
     imports = {f"live/{name}.js": data_uri(code[name], "text/javascript") for name in MODULES}
-    whole = template.render(imports=imports, modules=[], data=_json(data(inside)), offline=True)
+    numbers = {"rate": round(CONTROL_RATE), "steps": round(1 / TIMESTEP), "first": CONTROLLERS[0]}
+    whole = template.render(
+        numbers, imports=imports, modules=[], data=_json(data(inside)), offline=True
+    )
     split = template.render(
-        imports={"live/": "./"}, modules=MODULES, data=_json(data(beside)), offline=False
+        numbers, imports={"live/": "./"}, modules=MODULES, data=_json(data(beside)), offline=False
     )
     files = {f"live/policies/{name}.onnx": content for name, content in policies.items()}
     pages = {"live/index.html": split, "live/hopping-leg.html": whole}

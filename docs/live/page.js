@@ -118,7 +118,10 @@ function showCards() {
   }));
 }
 
-const millimetres = (metres) => `${metres < 0 ? "\u2212" : "+"}${Math.abs(1000 * metres).toFixed(0)} mm`;
+function millimetres(metres) {
+  const whole = Math.round(1000 * metres);
+  return `${whole < 0 ? "\u2212" : "+"}${Math.abs(whole)} mm`;
+}
 
 function updateCards() {
   for (const { leg: { apexes, deepest }, card } of legs) {

@@ -63,7 +63,7 @@ export function drawScene(canvas, colours, legs, command, top, push) {
     const x = width * (i + 1) / (legs.length + 1);
     line(context, colours.line, 10, [x, 0], [x, y(0)]);
     drawLeg(context, colours, leg, colour, x, y, scale);
-    drawApex(context, leg, colour, x, y, scale);
+    drawApex(context, leg, colour, x, y, Math.min(0.13 * scale, 0.4 * width / (legs.length + 1)));
     if (push) drawPush(context, colours, x, y(leg.plant.leg.height), push, scale);
   });
 }
@@ -89,15 +89,15 @@ function drawLeg(context, colours, { robot, plant: { leg: { state } } }, colour,
   disc(context, colours.ink, foot, Math.max(scale * robot.foot.radius, 4));
 }
 
-function drawApex(context, { apexes }, colour, x, y, scale) {
+function drawApex(context, { apexes }, colour, x, y, half) {
   const apex = apexes.at(-1);
   if (apex === undefined) return;
-  line(context, colour, 3, [x - 0.13 * scale, y(apex)], [x + 0.13 * scale, y(apex)]);
+  line(context, colour, 3, [x - half, y(apex)], [x + half, y(apex)]);
 }
 
 function drawPush(context, colours, x, hip, push, scale) {
-  const from = hip - Math.sign(push) * 0.16 * scale * -1;
-  const to = hip - Math.sign(push) * 0.07 * scale;
+  const from = hip + Math.sign(push) * 0.16 * scale;
+  const to = hip + Math.sign(push) * 0.07 * scale;
   const wing = Math.sign(push) * 0.02 * scale;
   line(context, colours.ink, 4, [x, from], [x, to]);
   line(context, colours.ink, 4, [x - 0.02 * scale, to + wing], [x, to], [x + 0.02 * scale, to + wing]);
