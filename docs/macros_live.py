@@ -62,7 +62,7 @@ def pages() -> dict[str, bytes]:
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, autoescape=False)
     template = environment.from_string((FOLDER / "page.html.j2").read_text(encoding="utf-8"))
     policies = {name: (_PACKAGE / f"policies/{name}.onnx").read_bytes() for name in _policies()}
-    inside = {name: data_uri(content, "application/octet-stream") for name, content in policies.items()}
+    inside = {name: data_uri(one, "application/octet-stream") for name, one in policies.items()}
     beside = {name: f"policies/{name}.onnx" for name in policies}
     code = {name: (FOLDER / f"{name}.js").read_bytes() for name in MODULES}
     imports = {f"live/{name}.js": data_uri(code[name], "text/javascript") for name in MODULES}

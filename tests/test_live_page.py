@@ -1,12 +1,13 @@
 """The live page in a real browser: its physics and controllers against the package's."""
 
+import base64
 import functools
 import http.server
 import importlib
-import json
 import sys
 import threading
 from dataclasses import replace
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -14,11 +15,10 @@ import pytest
 from hopping_leg.controllers.registry import load_controller
 from hopping_leg.controllers.rollout import RolloutConfig, rollout
 from hopping_leg.hop_detection import find_hops
-from hopping_leg.io import replace_at
-from hopping_leg.robot import TIMESTEP, load_robot, robot_text, shipped_robots
+from hopping_leg.robot import TIMESTEP, load_robot, shipped_robots
+from hopping_leg.robot.robot_files import load_tree, robot_text
 from hopping_leg.sim import LegSimulator
 from hopping_leg.sim.leg_table import LEG, leg_table
-from hopping_leg.sim.stepper import MEMORY
 from hopping_leg.viewer.live_settings import LiveSettings
 from tests.doc_pages import DOCS
 
@@ -66,7 +66,8 @@ def ask(page, body, argument=None):
     imports = ", ".join(f'import("live/{name}.js")' for name in names)
     return page.evaluate(
         "async (argument) => { const modules = Object.assign({}, ..."
-        f"(await Promise.all([{imports}]))); return (({{ {PUBLIC} }}) => {{ {body} }})(modules); }}",
+        f"(await Promise.all([{imports}])));"
+        f" return (({{ {PUBLIC} }}) => {{ {body} }})(modules); }}",
         argument,
     )
 
@@ -134,3 +135,185 @@ def test_ticks_in_air_and_contact_are_those_of_the_package(page, address, name):
     )
     expected = ticks_of(robot, states, torques)
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+
+
+TICKS = 300
+"""Of a run, 1.5 s: three or four hops."""
+
+RUN = """
+const [name, robotName, command, noise, ticks, channel, sensors, jitter, bytes] = argument;
+const robot = shippedRobot(robotName);
+const controller = name === "energy-shaping" ? new EnergyShaping(name, robot)
+  : name === "shooting" ? new Shooting(robot)
+  : new Policy(Uint8Array.from(atob(bytes), (c) => c.charCodeAt(0)), name, name);
+const draws = { channel: () => channel.shift(), sensors: () => sensors.shift(),
+  jitter: () => jitter.shift() };
+const contact = robot.reality.ground?.time_constant ?? robot.contact.time_constant;
+const settings = { payload: 0, ground: contact, delay: 0, noise };
+const leg = new Leg(controller, robot, settings, command, draws);
+const torques = [];
+for (let tick = 0; tick < ticks; tick++) torques.push([...leg.tick(command, 0)]);
+return { torques, apexes: leg.apexes };
+"""
+
+
+def draws_of(seed, noisy, jitters):
+    """Return the numbers that a rollout of one leg draws: of its channel, sensors and commands."""
+    rng = np.random.default_rng(seed)
+    channel = rng.random((512, 8))
+    (own,) = np.random.default_rng(seed).spawn(1)
+    jitter, sensors = [], []
+    for _ in range(TICKS):
+        jitter += own.random(1).tolist() if jitters else []
+        sensors += own.standard_normal((1, 6)).tolist() if noisy else []
+    return channel.tolist(), sensors, jitter
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("controller", "robot", "hops"),
+    [
+        ("fast", "legv2-identified", 3),
+        ("precise", "legv2-identified", 3),
+        ("paper", "legv2-paper", 2),
+        ("energy-shaping", "legv2-identified", 2),
+        ("energy-shaping", "legv1", 2),
+        ("shooting", "legv2-identified", 3),
+        ("fast", "twin", 1),
+        ("energy-shaping", "twin", 2),
+    ],
+)
+def test_first_hops_are_those_of_the_package_with_the_same_draws(
+    page, address, controller, robot, hops
+):
+    page.goto(address)
+    seed, command, leg = 5, 0.3, load_robot(robot)
+    expected = rollout(
+        load_controller(controller, leg, other="accept", simulated=True),
+        RolloutConfig(leg, threads=1),
+        np.full((TICKS, 1), command),
+        seed,
+    ).data
+    column = {name: values[:, 0] for name, values in expected.items()}
+    row = leg_table([leg], TIMESTEP)[0]
+    draws = draws_of(seed, row["sensor_noise"].any(), row["command_jitter"].any())
+    policy = resources.files("hopping_leg") / f"policies/{controller}.onnx"
+    content = base64.b64encode(policy.read_bytes()).decode() if policy.is_file() else ""
+    found = ask(page, RUN, [controller, robot, command, True, TICKS, *draws, content])
+    torques = np.array(found["torques"]).T
+    for name, values in zip(("hip", "knee"), torques, strict=True):
+        np.testing.assert_allclose(values[:30], column[f"{name}_command_nm"][:30], atol=1e-4)
+    names = ("height_m", "height_rate_m_s", "foot_clearance_m")
+    apexes = find_hops(*(column[name] for name in names)).apex
+    assert len(apexes) >= hops
+    np.testing.assert_allclose(found["apexes"][:hops], apexes[:hops], atol=1e-4)
+
+
+@pytest.mark.slow
+def test_a_visitors_files_are_read_as_the_package_reads_them(page, address, tmp_path):
+    page.goto(address)
+    number = '{{ value = {}, unit = "{}", source = "scale" }}'
+    text = "\n".join(
+        [
+            'name = "mine" # a comment',
+            'extends = "legv2-paper"',
+            "[base]",
+            f"mass = {number.format('1_100e-3', 'kg')}",
+            "[hip]",
+            f"belt_ratio = {number.format('1.5', '1')}",
+            f"motor.rated_torque = {number.format('5', 'N m')}",
+            "[hardware.hip]",
+            f"id = {number.format('3', '1')}",
+        ]
+    )
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    row = leg_table([load_robot(tmp_path / "mine.toml")], TIMESTEP)[0]
+    found = ask(
+        page, "return legTable(readRobot(argument[0], 'mine.toml'), argument[1]);", [text, TIMESTEP]
+    )
+    for field in LEG.names:
+        if field != "fixed_base":
+            np.testing.assert_allclose(found[field], row[field], 1e-12, 1e-15, err_msg=field)
+    whole = robot_text(load_tree("twin"))
+    assert ask(page, "return readRobot(argument, 'twin.toml').hip.motor.gear_ratio;", whole) == 6
+    for broken, sentence in (
+        (text.replace('"kg"', '"g"'), "mine.toml: 'base.mass' is in 'g' but must be in 'kg'."),
+        (text.replace("1_100e-3", "-1"), "mine.toml: 'base.mass' is -1 kg but must be more than"),
+        (text.replace("mass", "maß"), "mine.toml: line 4 is no TOML that this page reads"),
+        (text.replace("[base]", "[body]"), "mine.toml: 'body.mass' is no number of a robot"),
+        (text.replace('"legv2-paper"', '"other.toml"'), "'extends' is 'other.toml', which this"),
+        (whole.replace("value = 0.95,", "value = 1.95,"), "must be at most"),
+        (text.replace('extends = "legv2-paper"', ""), "mine.toml: 'base.radius' is missing"),
+    ):
+        said = ask(
+            page,
+            "try { readRobot(argument, 'mine.toml'); } catch (e) { return e.message; }",
+            broken,
+        )
+        assert sentence in said, said
+
+
+@pytest.mark.slow
+def test_the_page_obeys_and_keeps_pace(page, address, tmp_path):
+    page.goto(address)
+    page.wait_for_function("performance.getEntriesByName('first hop').length")
+    assert page.evaluate("document.documentElement.scrollWidth") == page.viewport_size["width"]
+    page.get_by_label("Height", exact=True).fill("0.35")
+    page.wait_for_function(
+        "[...document.querySelectorAll('article dd:nth-of-type(1)')]"
+        ".every((cell) => Math.abs(parseFloat(cell.textContent) - 0.35) < 0.015)"
+    )
+    page.locator("h1").click()
+    page.keyboard.press("k")
+    assert page.locator("#height-value").inner_text() in ("0.355 m", "0.360 m")
+    robot = robot_text({"name": "heavier", "extends": "legv2-identified"})
+    policy = (resources.files("hopping_leg") / "policies/paper.onnx").read_bytes()
+    page.locator("#file").set_input_files(
+        [{"name": "heavier.toml", "mimeType": "text/plain", "buffer": robot.encode()}]
+    )
+    page.get_by_text("fast was trained on legv2-identified, not on heavier.").wait_for()
+    page.locator("#file").set_input_files(
+        [{"name": "mine.onnx", "mimeType": "application/octet-stream", "buffer": policy}]
+    )
+    page.get_by_text("mine was trained on legv2-paper, not on heavier.").wait_for()
+    page.locator("#file").set_input_files(
+        [{"name": "bad.onnx", "mimeType": "application/octet-stream", "buffer": policy[:999]}]
+    )
+    page.get_by_text("bad.onnx cannot be read as a policy.").wait_for()
+    for name in ("shooting", "precise", "energy-shaping", "paper", "fast"):
+        page.get_by_label("Controller", exact=True).select_option(name)
+        page.locator("article .name").get_by_text(name, exact=True).first.wait_for()
+    took = ask(
+        page,
+        "return Promise.all([fetch('policies/precise.onnx').then((a) => a.arrayBuffer())]).then("
+        "([bytes]) => { const robot = shippedRobot('legv2-identified');"
+        "const settings = { payload: 0, ground: 0.02, delay: 0, noise: true };"
+        "const policy = new Policy(new Uint8Array(bytes), 'precise', 'precise');"
+        "const leg = new Leg(policy, robot, settings, 0.3); const took = [];"
+        "for (let i = 0; i < 600; i++) { const now = performance.now(); leg.tick(0.3, 0);"
+        "took.push(performance.now() - now); } return took; });",
+    )
+    assert np.median(took[100:]) < 1.0
+
+
+@pytest.mark.slow
+def test_one_file_holds_everything(browser, site):
+    page, asked, complaints = browser.new_page(), [], []
+    page.on("request", lambda request: asked.append(request.url))
+    page.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    file = (site / "live/hopping-leg.html").as_uri()
+    page.goto(file)
+    page.wait_for_function("performance.getEntriesByName('first hop').length")
+    page.get_by_label("Controller", exact=True).select_option("paper")
+    page.get_by_text("paper was trained on legv2-paper, not on legv2-identified.").wait_for()
+    page.close()
+    assert complaints == []
+    assert {url for url in asked if not url.startswith("data:")} == {file}
+
+
+def test_a_page_with_one_policy_is_small(live):
+    files = {f"{name}.js": (DOCS / f"live/{name}.js").read_bytes() for name in live.MODULES}
+    pages = live.pages()
+    loaded = [*files.values(), pages["live/index.html"], pages["live/policies/precise.onnx"]]
+    assert sum(map(len, loaded)) < 600e3

@@ -96,8 +96,8 @@ class Channel {
   }
 
   // Forget the past: the buffer fills with the present, noiseless state.
-  restart(measured, command) {
-    this.buffer = Array.from({ length: DATA.noise.delay_buffer }, () => [...measured, command]);
+  restart(present, command) {
+    this.buffer = Array.from({ length: DATA.noise.delay_buffer }, () => [...present, command]);
   }
 
   // Return three samples of (q1, q2, qd1, qd2, command), newest first, and how many ticks back.
@@ -134,7 +134,10 @@ export class Plant {
 
   setQuiet(quiet) { this.channel = new Channel(quiet, this.draws); }
 
-  restart(command) { this.channel.restart(this.leg.measured, command); }
+  restart(command) {
+    const [, q1, q2, , w1, w2] = this.leg.state;
+    this.channel.restart([q1, q2, w1, w2], command);
+  }
 
   sense(command) {
     this.seen = this.channel.sense(this.leg.measured, command);
