@@ -145,7 +145,7 @@ const [name, robotName, command, noise, ticks, channel, sensors, jitter, bytes] 
 const robot = shippedRobot(robotName);
 const controller = name === "energy-shaping" ? new EnergyShaping(name, robot)
   : name === "shooting" ? new Shooting(robot)
-  : new Policy(Uint8Array.from(atob(bytes), (c) => c.charCodeAt(0)), name, name);
+  : new Policy(Uint8Array.from(atob(bytes), (c) => c.charCodeAt(0)), name);
 const draws = { channel: () => channel.shift(), sensors: () => sensors.shift(),
   jitter: () => jitter.shift() };
 const contact = robot.reality.ground?.time_constant ?? robot.contact.time_constant;
@@ -234,11 +234,12 @@ def test_a_visitors_files_are_read_as_the_package_reads_them(page, address, tmp_
     for field in LEG.names:
         if field != "fixed_base":
             np.testing.assert_allclose(found[field], row[field], 1e-12, 1e-15, err_msg=field)
-    whole = robot_text(load_tree("twin"))
+    whole = robot_text(load_tree("twin") | {"name": "twin-2"})
     assert ask(page, "return readRobot(argument, 'twin.toml').hip.motor.gear_ratio;", whole) == 6
     for broken, sentence in (
         (text.replace('"kg"', '"g"'), "mine.toml: 'base.mass' is in 'g' but must be in 'kg'."),
         (text.replace("1_100e-3", "-1"), "mine.toml: 'base.mass' is -1 kg but must be more than"),
+        (text.replace("mine", "legv2", 1), "mine.toml: 'legv2' is a shipped robot"),
         (text.replace("mass", "maß"), "mine.toml: line 4 is no TOML that this page reads"),
         (text.replace("[base]", "[body]"), "mine.toml: 'body.mass' is no number of a robot"),
         (text.replace('"legv2-paper"', '"other.toml"'), "'extends' is 'other.toml', which this"),
@@ -275,7 +276,7 @@ def test_the_page_obeys_and_keeps_pace(page, address, tmp_path):
     page.locator("#file").set_input_files(
         [{"name": "mine.onnx", "mimeType": "application/octet-stream", "buffer": policy}]
     )
-    page.get_by_text("mine was trained on legv2-paper, not on heavier.").wait_for()
+    page.get_by_text("mine.onnx was trained on legv2-paper, not on heavier.").wait_for()
     page.locator("#file").set_input_files(
         [{"name": "bad.onnx", "mimeType": "application/octet-stream", "buffer": policy[:999]}]
     )
@@ -288,7 +289,7 @@ def test_the_page_obeys_and_keeps_pace(page, address, tmp_path):
         "return Promise.all([fetch('policies/precise.onnx').then((a) => a.arrayBuffer())]).then("
         "([bytes]) => { const robot = shippedRobot('legv2-identified');"
         "const settings = { payload: 0, ground: 0.02, delay: 0, noise: true };"
-        "const policy = new Policy(new Uint8Array(bytes), 'precise', 'precise');"
+        "const policy = new Policy(new Uint8Array(bytes), 'precise');"
         "const leg = new Leg(policy, robot, settings, 0.3); const took = [];"
         "for (let i = 0; i < 600; i++) { const now = performance.now(); leg.tick(0.3, 0);"
         "took.push(performance.now() - now); } return took; });",

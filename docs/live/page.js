@@ -24,6 +24,7 @@ let legs = []; // {leg, colour, card} each
 let command = 0.3;
 let pushTicks = 0;
 let force = 0;
+let choice = 0;
 let playing = true;
 let behind = 0; // simulated time that is due, s
 let top = 0.5;
@@ -49,7 +50,7 @@ async function policyBytes(name) {
 async function makeController(name, robot) {
   if (name === "energy-shaping") return new EnergyShaping(name, robot);
   if (name === "shooting") return new Shooting(robot);
-  return new Policy(await policyBytes(name), name, `Policy ${name}`);
+  return new Policy(await policyBytes(name), name);
 }
 
 const settings = () => ({
@@ -63,7 +64,9 @@ const settings = () => ({
 async function begin() {
   const robot = robots.get($("robot").value);
   const names = ["first", "second"].map((id) => $(id).value).filter((name) => name !== NONE);
+  const own = ++choice;
   const controllers = await Promise.all(names.map((name) => makeController(name, robot)));
+  if (own !== choice) return; // something else was chosen meanwhile
   setRange(controllers, robot);
   const sentences = controllers.map((one) => one.stranger(robot)).filter(Boolean);
   say(sentences.join(" "));
@@ -194,18 +197,18 @@ async function attempt(work) {
 }
 
 async function open(file) {
-  const name = file.name.replace(/\.\w+$/, "");
-  if (file.name.endsWith(".onnx")) {
+  const { name } = file; // with its ending, so that no shipped policy has it
+  if (name.endsWith(".onnx")) {
     const bytes = new Uint8Array(await file.arrayBuffer());
-    const policy = new Policy(bytes, name, file.name);
-    policies.set(policy.name, bytes);
+    void new Policy(bytes, name); // refused before it is listed
+    policies.set(name, bytes);
     choose("first", name);
-  } else if (file.name.endsWith(".toml")) {
-    const robot = readRobot(await file.text(), file.name);
+  } else if (name.endsWith(".toml")) {
+    const robot = readRobot(await file.text(), name);
     robots.set(robot.name, robot);
     choose("robot", robot.name);
     ownGround();
-  } else throw new PageError(`${file.name} is neither a policy (.onnx) nor a robot (.toml).`);
+  } else throw new PageError(`${name} is neither a policy (.onnx) nor a robot (.toml).`);
   showSettings();
   await begin();
 }

@@ -6,7 +6,7 @@ import { sharpContext } from "live/scene.js";
 const SECONDS = 5;
 const LEFT = 40;
 const RIGHT = 8;
-const TITLE = 20;
+const TITLE = 32;
 const TIMES = 20; // px for the time axis
 
 // A panel: title, share of the canvas's height, unit's range of values, and the rows' column.
@@ -54,7 +54,7 @@ export function drawPlots(canvas, colours, legs, top, limits) {
 
 function grid(context, colours, { title, low, high, step = high }, x, y, from) {
   context.fillStyle = colours.ink;
-  context.fillText(title, LEFT, from + 14);
+  context.fillText(title, LEFT, from + 22);
   context.fillStyle = colours.soft;
   context.strokeStyle = colours.line;
   context.lineWidth = 1;
@@ -64,7 +64,8 @@ function grid(context, colours, { title, low, high, step = high }, x, y, from) {
     context.moveTo(x(SECONDS), y(value));
     context.lineTo(x(0), y(value));
     context.stroke();
-    context.fillText(step < 1 ? value.toFixed(1) : value.toFixed(0), LEFT - 6, y(value) + 4);
+    const text = value.toFixed(step < 1 ? 1 : 0).replace("-", "\u2212");
+    context.fillText(text, LEFT - 6, y(value) + 4);
   }
   context.textAlign = "left";
 }

@@ -5,28 +5,32 @@ import { makeHistory } from "live/history.js";
 import { readOnnx, runOnnx } from "live/onnx.js";
 
 export class Policy {
-  // Read an ONNX file's bytes; messages name `origin`.
-  constructor(bytes, name, origin) {
+  // Read an ONNX file's bytes; messages name it.
+  constructor(bytes, name) {
     this.name = name;
     try {
       this.graph = readOnnx(bytes);
     } catch (error) {
       const why = error instanceof PageError ? error.message
         : "It is truncated, damaged or of another kind.";
-      throw new PageError(`${origin} cannot be read as a policy. ${why}`);
+      throw new PageError(`${name} cannot be read as a policy. ${why}`);
     }
     const text = this.graph.metadata.hopping_leg;
     if (!text) {
-      throw new PageError(`${origin} is an ONNX file but not a policy; make one with hop train.`);
+      throw new PageError(`${name} is an ONNX file but not a policy; make one with hop train.`);
     }
-    this.card = JSON.parse(text);
+    try {
+      this.card = JSON.parse(text);
+    } catch {
+      throw new PageError(`${name} has a damaged policy card; export the policy again.`);
+    }
     const { layout, rate } = this.card;
     if (!makeHistory(layout)) {
-      throw new PageError(`${origin} has the observation layout '${layout}'; this page knows: ${
+      throw new PageError(`${name} has the observation layout '${layout}'; this page knows: ${
         ["three-samples", ...Object.keys(DATA.layouts)].join(", ")}.`);
     }
     if (rate !== DATA.rate) {
-      throw new PageError(`${origin} was trained at ${rate} Hz; this page runs at ${DATA.rate} Hz.`);
+      throw new PageError(`${name} was trained at ${rate} Hz; this page runs at ${DATA.rate} Hz.`);
     }
     // A gated recurrent unit has two biases for each of three gates.
     this.memorySize = this.graph.inputs.includes("memory")

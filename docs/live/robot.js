@@ -28,6 +28,9 @@ export function readRobot(text, origin) {
   if (typeof name !== "string" || !name.trim()) {
     throw new PageError(`${origin}: 'name' is missing; give the robot a name.`);
   }
+  if (Object.hasOwn(DATA.robots, name)) {
+    throw new PageError(`${origin}: '${name}' is a shipped robot; give this one a name of its own.`);
+  }
   if (kind !== "leg") throw new PageError(`${origin}: a ${kind} cannot hop; open a leg's file.`);
   if (parent !== undefined && !Object.hasOwn(DATA.robots, parent)) {
     throw new PageError(`${origin}: 'extends' is '${parent}', which this page cannot read; extend`

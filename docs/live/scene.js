@@ -62,8 +62,8 @@ export function drawScene(canvas, colours, legs, command, top, push) {
   legs.forEach(({ leg, colour }, i) => {
     const x = width * (i + 1) / (legs.length + 1);
     line(context, colours.line, 10, [x, 0], [x, y(0)]);
-    drawLeg(context, colours, leg, colour, x, y, scale);
     drawApex(context, leg, colour, x, y, Math.min(0.13 * scale, 0.4 * width / (legs.length + 1)));
+    drawLeg(context, colours, leg, colour, x, y, scale);
     if (push) drawPush(context, colours, x, y(leg.plant.leg.height), push, scale);
   });
 }
@@ -100,5 +100,6 @@ function drawPush(context, colours, x, hip, push, scale) {
   const to = hip + Math.sign(push) * 0.07 * scale;
   const wing = Math.sign(push) * 0.02 * scale;
   line(context, colours.ink, 4, [x, from], [x, to]);
-  line(context, colours.ink, 4, [x - 0.02 * scale, to + wing], [x, to], [x + 0.02 * scale, to + wing]);
+  const half = 0.02 * scale;
+  line(context, colours.ink, 4, [x - half, to + wing], [x, to], [x + half, to + wing]);
 }
