@@ -17,6 +17,7 @@ from typing import Any
 import jinja2
 
 sys.path.insert(0, str(Path(__file__).parent.parent))  # for the studies, which are not installed
+import macros_live
 import macros_package
 import macros_results
 from mkdocs.exceptions import PluginError
@@ -51,10 +52,12 @@ MACROS = {
 
 
 def on_files(files: Files, config: Any) -> Files:  # noqa: ANN401
-    """Put results and figures of the studies beside the pages (called by mkdocs)."""
+    """Put results of the studies and the live page beside the pages (called by mkdocs)."""
     for path in sorted([*ROOT.glob("studies/*/results/*"), *ROOT.glob("studies/*/figures/*")]):
         address = f"results/{path.parts[-3]}/{path.name}"
         files.append(File.generated(config, address, abs_src_path=str(path)))
+    for address, content in macros_live.pages().items():
+        files.append(File.generated(config, address, content=content))
     return files
 
 

@@ -106,11 +106,12 @@ TRUE_CONTACT = ShapingOptions(contact="true", height="true")
 ROBUST = ShapingOptions("dated", "debounced", "timed", "flight_time", "pushed")
 """The readings of the tuned controller."""
 
-_POWERS_OF_SIZE = {
+POWERS_OF_SIZE = {
     "liftoff_length": 1.0,
     "landing_length": 1.0,
     "height_offset": 1.0,
     "reference": 1.0,
+    "k0_slope": -1.0,
     "retract_time": 0.5,
     "flight_min": 0.5,
     "push_rate": 0.5,
@@ -118,8 +119,10 @@ _POWERS_OF_SIZE = {
     "flight_min_slope": -0.5,
     "push_rate_slope": -0.5,
 }
-_FORCES: tuple[str, ...] = ("kp_y", "kd_y", "push_damping")
-_FORCES += ("touchdown_stiffness", "touchdown_damping", "touchdown_force")
+"""Gains that grow with a power of the leg's size."""
+FORCES: tuple[str, ...] = ("kp_y", "kd_y", "push_damping")
+FORCES += ("touchdown_stiffness", "touchdown_damping", "touchdown_force")
+"""Gains that grow with the leg's mass."""
 
 
 def scale_gains(gains: ShapingGains, origin: Robot, robot: Robot) -> ShapingGains:
@@ -129,9 +132,8 @@ def scale_gains(gains: ShapingGains, origin: Robot, robot: Robot) -> ShapingGain
     as those of a fall do, and the flight PD with its inertia, less what its joints damp anyway.
     """
     size = (robot.thigh.length + robot.shank.length) / (origin.thigh.length + origin.shank.length)
-    factors = {name: size**power for name, power in _POWERS_OF_SIZE.items()}
-    factors["k0_slope"] = 1 / size
-    factors |= dict.fromkeys(_FORCES, robot.mass / origin.mass)
+    factors = {name: size**power for name, power in POWERS_OF_SIZE.items()}
+    factors |= dict.fromkeys(FORCES, robot.mass / origin.mass)
     scaled = {name: getattr(gains, name) * factor for name, factor in factors.items()}
     inertia = _joint_inertia(robot) / _joint_inertia(origin)
     for joint, factor in zip(JOINTS, inertia, strict=True):

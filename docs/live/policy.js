@@ -1,0 +1,68 @@
+// A trained policy: a port of `src/hopping_leg/controllers/policy.py`.
+
+import { DATA, PageError } from "live/data.js";
+import { makeHistory } from "live/history.js";
+import { readOnnx, runOnnx } from "live/onnx.js";
+
+export class Policy {
+  // Read an ONNX file's bytes; messages name it.
+  constructor(bytes, name) {
+    this.name = name;
+    try {
+      this.graph = readOnnx(bytes);
+    } catch (error) {
+      const why = error instanceof PageError ? error.message
+        : "It is truncated, damaged or of another kind.";
+      throw new PageError(`${name} cannot be read as a policy. ${why}`);
+    }
+    const text = this.graph.metadata.hopping_leg;
+    if (!text) {
+      throw new PageError(`${name} is an ONNX file but not a policy; make one with hop train.`);
+    }
+    try {
+      this.card = JSON.parse(text);
+    } catch {
+      throw new PageError(`${name} has a damaged policy card; export the policy again.`);
+    }
+    const { layout, rate } = this.card;
+    if (!makeHistory(layout)) {
+      throw new PageError(`${name} has the observation layout '${layout}'; this page knows: ${
+        ["three-samples", ...Object.keys(DATA.layouts)].join(", ")}.`);
+    }
+    if (rate !== DATA.rate) {
+      throw new PageError(`${name} was trained at ${rate} Hz; this page runs at ${DATA.rate} Hz.`);
+    }
+    // A gated recurrent unit has two biases for each of three gates.
+    this.memorySize = this.graph.inputs.includes("memory")
+      ? this.graph.weights.get("gru_bias").length / 6 : 0;
+    this.reset();
+    this.act({ back: [0, 1, 2], samples: Array(3).fill([0, 0, 0, 0, this.card.command_low]) });
+  }
+
+  // Heights that it can be asked for, m.
+  get range() { return [this.card.command_low, this.card.command_high]; }
+
+  // A sentence if a robot is not that of its training, or "".
+  stranger(robot) {
+    const { card, name } = this;
+    return card.robot === robot.name ? ""
+      : `${name} was trained on ${card.robot}, not on ${robot.name}.`;
+  }
+
+  reset() {
+    this.history = makeHistory(this.card.layout);
+    this.torque = [0, 0];
+    this.memory = new Float32Array(this.memorySize);
+  }
+
+  // Return joint torques, N m.
+  act(measurement) {
+    this.history.update(measurement, this.torque);
+    const inputs = this.history.inputs();
+    if (this.memorySize) inputs.memory = this.memory;
+    const outputs = runOnnx(this.graph, inputs);
+    if (outputs.next_memory) this.memory = outputs.next_memory;
+    this.torque = [...outputs.torque];
+    return this.torque;
+  }
+}
