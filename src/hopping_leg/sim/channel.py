@@ -191,4 +191,6 @@ def _disturb(
         for k in range(SAMPLES):
             ticks = order[k] if late else k
             back[leg, k] = ticks
-            samples[leg, k] = buffer[(tick - ticks) % depth, leg]
+            seen = buffer[(tick - ticks) % depth, leg]
+            for i in range(len(seen)):  # to assign all at once takes seconds to compile
+                samples[leg, k, i] = seen[i]
