@@ -10,6 +10,8 @@ pip="venv/bin/python -m pip --disable-pip-version-check install -q"
 $pip -c constraints.txt ./*.whl
 venv/bin/python -c 'import hopping_leg, sys; assert "torch" not in sys.modules'
 venv/bin/python -c 'import gymnasium; gymnasium.make("HoppingLeg-v0")'
+../../.venv/bin/uvx --python venv/bin/python --constraints constraints.txt --from ./*.whl hop --version
+../../.venv/bin/pipx run --no-cache --pip-args="-c $PWD/constraints.txt" --spec "$(echo "$PWD"/*.whl)" hop --version
 venv/bin/hop robots list
 venv/bin/hop export urdf --out leg.urdf
 venv/bin/hop evaluate energy-shaping --commands 0.3 --seeds 1 --floor soft --out report

@@ -52,6 +52,10 @@ SECONDS = {
 
 ELSEWHERE = {
     "hop finetune": "minutes even when small: tests/cli/test_finetune.py",
+    **dict.fromkeys(
+        ("hop policies push", "hop policies pull", "hop policies list --hub"),
+        "a hub: tests/controllers/test_policy_hub.py",
+    ),
     "hop reproduce": "minutes even with --quick: tests/cli/test_reproduce.py",
 }
 """Commands that are not run here, and why; their options must parse all the same."""
@@ -103,6 +107,7 @@ def furnish(page: str) -> None:
     make = {
         "deploy": _wired_leg_and_killed_run,
         "evaluation": _stored_runs,
+        "other-tools": _bag_and_policy,
         "own-controller": lambda: _trial().save(Path(TRIAL)),
         "robustness": _trained_policy,
         "transfer": lambda: draw_twin(0).save(Path("my_twin.toml")),
@@ -114,6 +119,22 @@ def furnish(page: str) -> None:
 def _trained_policy() -> None:
     Path("runs/mine").mkdir()
     shutil.copy(ROOT / "src/hopping_leg/policies/fast.onnx", "runs/mine/policy.onnx")
+
+
+def _bag_and_policy() -> None:
+    """Leave what is not made here: a recording as a bag, and what comes from the hub."""
+    from hopping_leg.formats.mcap_writer import to_mcap
+    from hopping_leg.identify.excitation import Multisine, make_excitation
+    from hopping_leg.identify.play_excitation import play
+
+    leg = load_robot("legv2")
+    recording = play(make_excitation(Multisine(duration=12.0), leg), leg, believed="legv2")
+    recording.save(Path("bag.parquet"))
+    Path("bag.mcap").write_bytes(to_mcap(Trace.load(Path("bag.parquet"))))
+    Path("bag.parquet").unlink()
+    for folder in ("mine", "pulled"):
+        Path(f"runs/{folder}").mkdir()
+        shutil.copy(ROOT / "src/hopping_leg/policies/fast.onnx", f"runs/{folder}/policy.onnx")
 
 
 def _wired_leg_and_killed_run() -> None:

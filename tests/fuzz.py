@@ -206,6 +206,21 @@ def _recordings(form):
     return Kind(files, name, load_recording, text=form == "csv")
 
 
+def _bags(form):
+    from hopping_leg.formats.mcap_writer import to_mcap
+    from hopping_leg.identify.recording import load_recording
+    from hopping_leg.trace import Trace
+    from tests.formats.test_bags import record
+    from tests.identify.runs import SIDECAR
+
+    if form == "mcap":
+        files = {"run.toml": SIDECAR.encode(), "run.mcap": to_mcap(Trace(_table()))}
+        return Kind(files, "run.mcap", load_recording, text=False)
+    files = _written(lambda folder: record(folder / "run", "sqlite3", _table()))
+    (name,) = (name for name in files if name.endswith(".db3"))
+    return Kind({"run/run.toml": SIDECAR.encode(), **files}, name, load_recording, text=False)
+
+
 def _traces(form):
     from hopping_leg.identify.excitation import Multisine, load_excitation, make_excitation
     from hopping_leg.identify.recording import load_recording
@@ -334,6 +349,7 @@ KINDS = {
         f"recording-{form}": functools.partial(_recordings, form)
         for form in ("csv", "rig", "gzip", "gzip-raw", "sidecar", "parquet")
     },
+    **{f"bag-{form}": functools.partial(_bags, form) for form in ("mcap", "sqlite")},
     **{f"trace-{f}": functools.partial(_traces, f) for f in ("raw", "header", "excitation")},
     **{f"flight-recorder-{f}": functools.partial(_boxes, f) for f in ("raw", "framed")},
     **{f"checkpoint-{f}": functools.partial(_checkpoints, f) for f in ("state", "arrays", "old")},

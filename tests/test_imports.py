@@ -10,12 +10,12 @@ import hopping_leg
 from tests.extras import TRAINING, run_without
 
 ROOT = Path(hopping_leg.__file__).parent
-ORDER = ["foundation", "robot", "sim", "controllers", "identify", "envs", "rl"]
+ORDER = ["foundation", "robot", "formats", "sim", "controllers", "identify", "envs", "rl"]
 ORDER += ["deploy", "emulator", "evaluate", "sim_to_real", "viewer", "cli"]
 FOUNDATION = {"", "arrays", "cma_strategy", "errors", "figure_style", "hop_detection"}
 FOUNDATION |= {"html_page", "io", "locks", "parquet", "progress", "terminal", "trace", "workers"}
 BESIDE = {("viewer", "rl"), ("emulator", "rl")}
-BESIDE |= {("deploy", room) for room in ("sim", "identify", "envs", "rl")}
+BESIDE |= {("deploy", room) for room in ("formats", "sim", "identify", "envs", "rl")}
 BESIDE |= {("evaluate", room) for room in ("identify", "envs", "rl", "deploy", "emulator")}
 """Later rooms that still must not use these earlier ones: neither evaluation, viewer nor robot
 needs torch, and what drives the robot knows nothing of a simulation."""

@@ -1,6 +1,7 @@
 """What is handed out is whole: source archive, metadata, citation."""
 
 import importlib.metadata
+import json
 import subprocess
 import sys
 import tarfile
@@ -10,6 +11,8 @@ from pathlib import Path
 import pytest
 
 import hopping_leg
+from hopping_leg.cli import read_options
+from hopping_leg.cli.demo import Demo
 from hopping_leg.cli.doctor import PURPOSES
 from tests.doc_pages import ROOT
 
@@ -52,6 +55,18 @@ def test_the_source_archive_holds_nothing_large_and_no_run(archive):
     assert not {name: size for name, size in archive.items() if size > LARGEST}
     top = {name.partition("/")[0] for name in archive}
     assert not top & {"runs", "build", "site", ".venv", "MUJOCO_LOG.TXT"}
+
+
+def test_the_container_is_built_by_the_commands_of_the_readme():
+    lines = (ROOT / "Dockerfile").read_text().replace("\\\n", "").splitlines()
+    commands = [line.removeprefix("RUN ") for line in lines if line.startswith("RUN ")]
+    system, *commands = commands
+    assert {"python3.11-venv", "make", "git"} <= set(system.split())
+    readme = (ROOT / "README.md").read_text()
+    assert commands
+    assert all(command in readme for command in commands)
+    (call,) = [json.loads(line.removeprefix("CMD ")) for line in lines if line.startswith("CMD ")]
+    assert read_options(Demo, "hop demo", None, call[1:]).host == "0.0.0.0"
 
 
 def test_doctor_knows_every_extra():

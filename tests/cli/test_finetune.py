@@ -67,5 +67,5 @@ def test_a_run_leaves_policy_card_and_numbers(tmp_path, monkeypatch, capsys):
     assert result["trials"][1]["shifts_m"] != [0.0] * 3
     assert "used up" in capsys.readouterr().out
     assert "fast" in (out / "model_card.md").read_text()
-    assert main(["export", "policy", str(out / "policy.onnx")]) == 0
+    assert main(["policies", "show", str(out / "policy.onnx")]) == 0
     assert main([*words, "--resume"]) == 2

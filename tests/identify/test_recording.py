@@ -90,7 +90,7 @@ def test_a_broken_sidecar_gets_a_sentence(tmp_path, sidecar, sentence):
 
 
 def test_folders_and_tables_of_unknown_rigs_are_told_what_is_known(tmp_path):
-    with pytest.raises(RecordingError, match="Cannot read"):
+    with pytest.raises(RecordingError, match="no bag"):
         load_recording(tmp_path)
     path = tmp_path / "log.csv"
     path.write_text("a,b\n1,2\n")

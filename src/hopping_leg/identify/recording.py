@@ -16,6 +16,7 @@ import polars as pl
 
 from hopping_leg.arrays import Array, BoolArray
 from hopping_leg.errors import RecordingError, UsageError, unknown_name
+from hopping_leg.formats import bag_reader
 from hopping_leg.identify import importers, recording_checks, unit_checks
 from hopping_leg.identify.csv_table import read_csv
 from hopping_leg.identify.recording_format import COLUMNS, PAIRS, RecordingMetadata, float_column
@@ -108,24 +109,14 @@ def make_recording(
 
 
 def load_recording(path: str | Path) -> Recording:
-    """Load native Parquet, a table with a sidecar, ``run.toml``, or a known rig's log.
+    """Load native Parquet, a table or bag with a sidecar, ``run.toml``, or a known rig's log.
 
     Raises:
         RecordingError: It cannot be read or believed; names file, column and row.
     """
     path = Path(path)
     origin = str(path)
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError as error:
-        raise RecordingError(f"There is no recording {path}.") from error
-    except OSError as error:
-        raise RecordingError(f"Cannot read the recording {path}: {error.strerror}.") from error
-    if not content:
-        raise RecordingError(f"{path} is empty; record again.")
-    digest = hashlib.sha256(content).hexdigest()
-    native = content.startswith(_PARQUET)
-    table, header = _native(path, content) if native else (read_csv(content, origin), {})
+    table, header, digest = _read(path, origin)
     sidecar = _sidecar(path)
     names: dict[str, str] = {}
     if sidecar is not None:
@@ -147,6 +138,28 @@ def load_recording(path: str | Path) -> Recording:
         table, metadata = importer.read(table)
         names = importer.columns
     return make_recording(table, metadata, origin, names=names, header=header, digest=digest)
+
+
+def _read(path: Path, origin: str) -> tuple[pl.DataFrame, dict[str, Any], str]:
+    """Return a file's or bag's own table, its header, and the SHA-256 of its bytes."""
+    try:
+        files = bag_reader.bag_files(path)
+        contents = [file.read_bytes() for file in files or [path]]
+    except FileNotFoundError as error:
+        raise RecordingError(f"There is no recording {path}.") from error
+    except IsADirectoryError as error:
+        raise RecordingError(f"{path} is a folder without .mcap or .db3 files, no bag.") from error
+    except OSError as error:
+        raise RecordingError(f"Cannot read the recording {path}: {error.strerror}.") from error
+    content = b"".join(contents)
+    digest = hashlib.sha256(content).hexdigest()
+    if files:
+        return *bag_reader.read_bag(files, origin), digest
+    if not content:
+        raise RecordingError(f"{path} is empty; record again.")
+    if content.startswith(_PARQUET):
+        return *_native(path, content), digest
+    return read_csv(content, origin), {}, digest
 
 
 def sidecar_path(path: Path) -> Path:

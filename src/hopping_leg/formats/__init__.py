@@ -1,0 +1,1 @@
+"""Traces in the files of other tools: ROS 2 bags, rerun recordings, LeRobot datasets."""

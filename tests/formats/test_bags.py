@@ -1,0 +1,187 @@
+"""Bags: what is written is read back, by us and by others, and what others write is read by us."""
+
+import io
+
+import numpy as np
+import polars as pl
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hopping_leg.errors import RecordingError, TraceError
+from hopping_leg.formats.bag_reader import bag_files, read_bag
+from hopping_leg.formats.ros_messages import COLUMNS, DEFINITIONS, JOINT_STATE, STATES
+from hopping_leg.identify.recording import Recording, load_recording
+from hopping_leg.trace import Trace
+from tests.formats.traces import noise
+from tests.identify.runs import METADATA, SIDECAR, swinging
+
+pytest.importorskip("mcap_ros2", reason="the extra 'ros' is not installed")
+from hopping_leg.formats.mcap_writer import to_mcap
+
+JOINTS = [c for of in COLUMNS.values() for triple in of.values() for c in triple if c]
+
+
+def read(path):
+    return read_bag(bag_files(path), str(path))
+
+
+def written(folder, trace):
+    path = folder / "run.mcap"
+    path.write_bytes(to_mcap(trace))
+    return path
+
+
+values = st.floats(allow_nan=False, width=64)
+
+
+@settings(max_examples=30)
+@given(
+    stamps=st.lists(st.integers(0, 10**15), min_size=1, max_size=30, unique=True).map(sorted),
+    columns=st.sets(st.sampled_from(JOINTS)).map(lambda chosen: chosen | {"hip_position_rad"}),
+    data=st.data(),
+)
+def test_samples_and_times_come_back_as_they_were(stamps, columns, data, tmp_path_factory):
+    times = np.array(stamps) / 1e9
+    table = {
+        c: data.draw(st.lists(values, min_size=len(times), max_size=len(times))) for c in columns
+    }
+    trace = Trace(pl.DataFrame({"time_s": times, **table}), {"robot": "legv2", "seed": 3})
+    back, header = read(written(tmp_path_factory.mktemp("bag"), trace))
+    assert header == trace.header
+    whole = times[0] // 1
+    np.testing.assert_allclose(back["time_s"], times - whole, rtol=0, atol=1e-9 + 1e-15 * times[-1])
+    for column in columns:
+        found = trace.column(column)
+        if np.isfinite(found).any():
+            assert back[column].to_list() == found.tolist(), column
+
+
+def test_other_readers_open_the_file_and_find_the_same_samples(tmp_path):
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
+    from rosbags.highlevel import AnyReader
+
+    trace = noise()
+    path = written(tmp_path, trace)
+    reader = make_reader(io.BytesIO(path.read_bytes()), decoder_factories=[DecoderFactory()])
+    assert reader.get_header().profile == "ros2"
+    theirs = [m for _, c, _, m in reader.iter_decoded_messages(topics=["/joint_states"])]
+    with AnyReader([path]) as bag:
+        wanted = [c for c in bag.connections if c.topic == "/joint_states"]
+        ours = [bag.deserialize(raw, c.msgtype) for c, _, raw in bag.messages(wanted)]
+        kinds = {c.topic: c.msgtype for c in bag.connections}
+    assert kinds["/joint_commands"] == JOINT_STATE
+    assert kinds["/foot_clearance_m"] == "std_msgs/msg/Float64"
+    for messages in (theirs, ours):
+        assert [m.name for m in messages] == [["rail", "hip", "knee"]] * 40
+        for joint, column in enumerate(["height_m", "hip_position_rad", "knee_position_rad"]):
+            assert [m.position[joint] for m in messages] == trace.column(column).tolist()
+        assert [m.header.stamp.nanosec for m in messages] == [5_000_000 * k for k in range(40)]
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_a_bag_of_ros_is_identified_from_like_any_recording(tmp_path, storage):
+    path, table = tmp_path / "bag", swinging(100)
+    record(path, storage, table, start=1_700_000_000)
+    (tmp_path / "bag.toml").write_text(SIDECAR)
+    recording = load_recording(path)
+    assert len(recording) == 100
+    np.testing.assert_allclose(recording.time, table["time_s"], atol=1e-9)
+    for column in ("hip_position_rad", "knee_velocity_rad_s", "hip_torque_nm", "knee_command_nm"):
+        np.testing.assert_array_equal(recording.trace.column(column), table[column])
+    (file,) = bag_files(path)
+    (tmp_path / file.with_suffix(".toml").name).write_text(SIDECAR)
+    alone = file.rename(tmp_path / file.name)
+    assert load_recording(alone).digest == recording.digest
+
+
+def test_a_row_has_the_newest_command_that_was_logged_by_then(tmp_path):
+    table = pl.DataFrame({"time_s": [0.0, 0.01, 0.02], "hip_position_rad": [1.0, 2.0, 3.0]})
+    late = pl.DataFrame({"time_s": [0.005, 0.015], "hip_command_nm": [5.0, 6.0]})
+    record(tmp_path / "bag", "mcap", table, late)
+    back, _ = read(tmp_path / "bag")
+    assert back["hip_command_nm"].to_list() == [None, 5.0, 6.0]
+
+
+def test_a_sidecar_names_joints_that_are_called_otherwise(tmp_path):
+    record(tmp_path / "bag", "mcap", swinging(50), topic="/leg/state", joints=("j1", "j2"))
+    with pytest.raises(RecordingError, match=r"leg/state/j1\.position"):
+        load_recording(tmp_path / "bag")
+    names = [
+        f'{j}_position_rad = "leg/state/{k}.position"' for j, k in (("hip", "j1"), ("knee", "j2"))
+    ]
+    (tmp_path / "bag.toml").write_text(SIDECAR + "[columns]\n" + "\n".join(names))
+    found = load_recording(tmp_path / "bag")
+    np.testing.assert_array_equal(
+        found.trace.column("knee_position_rad"), swinging(50)["knee_position_rad"]
+    )
+
+
+def test_a_recording_needs_no_sidecar_after_its_way_through_mcap(tmp_path):
+    recording = Recording(Trace(swinging(60)), METADATA, "run")
+    recording.save(tmp_path / "run.parquet")
+    again = load_recording(written(tmp_path, Trace.load(tmp_path / "run.parquet")))
+    assert again.metadata == METADATA
+    for column in swinging(60).columns:
+        np.testing.assert_allclose(
+            again.trace.column(column), swinging(60)[column], rtol=0, atol=1e-9
+        )
+
+
+def test_what_is_no_bag_is_said_in_a_sentence(tmp_path):
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(RecordingError, match="no bag"):
+        load_recording(tmp_path / "empty")
+    (tmp_path / "empty" / "a_0.db3.zstd").touch()
+    with pytest.raises(RecordingError, match="zstd -d"):
+        load_recording(tmp_path / "empty")
+    path = written(tmp_path, noise())
+    path.write_bytes(path.read_bytes()[:-500])
+    with pytest.raises(RecordingError, match="no whole bag"):
+        load_recording(path)
+    table = pl.DataFrame({"time_s": [0.0], "command_m": [0.3]})
+    with pytest.raises(RecordingError, match="no message of sensor_msgs"):
+        load_recording(written(tmp_path, Trace(table)))
+    with pytest.raises(TraceError, match="0 or more"):
+        to_mcap(Trace(pl.DataFrame({"time_s": [-1.0]})))
+
+
+def record(path, storage, *tables, start=0, topic=None, joints=("hip", "knee")):
+    """Write tables of a recording's columns, one after another, with an independent library."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    message, header, time = (
+        types.types[name]
+        for name in (JOINT_STATE, "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
+    )
+    with Writer(path, version=9, storage_plugin=StoragePlugin[storage.upper()]) as bag:
+        names = {t: topic or f"/{t}" for t in COLUMNS if topic is None or t == STATES}
+        topics = {
+            t: bag.add_connection(name, JOINT_STATE, typestore=types) for t, name in names.items()
+        }
+        for table in tables:
+            for row in table.iter_rows(named=True):
+                stamp = round(1e9 * row["time_s"]) + start * 10**9
+                head = header(time(*divmod(stamp, 10**9)), "base")
+                for name, connection in topics.items():
+                    arrays = [
+                        np.array(
+                            [row[c] for j in ("hip", "knee") if (c := COLUMNS[name][j][k]) in row]
+                        )
+                        for k in range(3)
+                    ]
+                    if any(map(len, arrays)):
+                        filled = message(head, list(joints[: max(map(len, arrays))]), *arrays)
+                        bag.write(connection, stamp, types.serialize_cdr(filled, JOINT_STATE))
+
+
+def test_message_definitions_are_those_of_ros():
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for name, text in DEFINITIONS.items():
+        for kind, fields in get_types_from_msg(text, name).items():
+            assert store.fielddefs[kind] == fields, kind
