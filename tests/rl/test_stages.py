@@ -46,20 +46,6 @@ def test_a_leg_whose_motors_are_too_slow_is_asked_for_lower_hops():
     assert low < min(recipe.selection.eval_commands) < max(recipe.selection.eval_commands) < high
 
 
-@pytest.mark.parametrize(("late", "later"), [(0.002, 0.007), (0.0, 0.015)])
-def test_whole_periods_of_latency_leave_the_reach_as_it_is(late, later):
-    few, reality = FAST.replace(heights=(0.26, 0.28)).fit(ROBOT), ROBOT.reality
-
-    def reach(seconds):
-        latency = dataclasses.replace(reality.latency, command=seconds)
-        changed = dataclasses.replace(reality, latency=latency)
-        return stages.within_reach(few, dataclasses.replace(ROBOT, reality=changed))
-
-    (recipe, score), (other, same) = reach(late), reach(later)
-    assert recipe == other
-    assert score == pytest.approx(same, abs=1e-5)
-
-
 @pytest.mark.parametrize(
     ("missed", "range_m"),
     [

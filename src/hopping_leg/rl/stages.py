@@ -6,8 +6,7 @@ command is calibrated.
 """
 
 import itertools
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from hopping_leg.controllers.shooting import Shooting
@@ -24,8 +23,6 @@ from hopping_leg.robot.parameters import Robot
 
 _REACHED = 0.005
 """Median error with which the teacher reaches a height, m."""
-
-_ROUNDING = 1e-9  # Of a control period
 
 
 @dataclass(frozen=True)
@@ -70,8 +67,7 @@ def within_reach(recipe: Recipe, robot: Robot) -> tuple[Recipe, float]:
     """Return a recipe for the heights that its teacher reaches, and the teacher's worst score, m.
 
     A recipe without a teacher stays as it is. The heights are the longest run of centimetres
-    without a skipped hop and with a small median error. Whole control periods by which commands are
-    late are left out: students learn to command by so much earlier.
+    without a skipped hop and with a small median error.
 
     Raises:
         UsageError: There are none.
@@ -79,9 +75,8 @@ def within_reach(recipe: Recipe, robot: Robot) -> tuple[Recipe, float]:
     if not isinstance(recipe.algorithm, DaggerConfig):
         return recipe, 0.0
     rate, heights = recipe.task.rate, every_centimetre(recipe.task.command_bounds)
-    soon = _within_a_period(robot, 1 / rate)
-    teacher = Shooting(soon, recipe.algorithm.teacher, rate=rate)
-    results = evaluate_policy(teacher, soon, heights, rate=rate, legs=2, seconds=5.0)
+    teacher = Shooting(robot, recipe.algorithm.teacher, rate=rate)
+    results = evaluate_policy(teacher, robot, heights, rate=rate, legs=2, seconds=5.0)
     runs = [list(run) for reached, run in itertools.groupby(results, key=_is_reached) if reached]
     longest = max(runs, key=len, default=[])
     if len(longest) < 3:
@@ -93,14 +88,6 @@ def within_reach(recipe: Recipe, robot: Robot) -> tuple[Recipe, float]:
     if len(longest) < len(heights):
         recipe = recipe.within(longest[0].command_m, longest[-1].command_m)
     return recipe, max(map(command_score, longest))
-
-
-def _within_a_period(robot: Robot, period: float) -> Robot:
-    """Return a robot whose commands are late by the part beyond whole control periods, s, alone."""
-    latency = robot.reality.latency
-    whole = math.floor(latency.command / period + _ROUNDING) * period
-    late = replace(latency, command=max(latency.command - whole, 0.0))
-    return replace(robot, reality=replace(robot.reality, latency=late))
 
 
 def _is_reached(result: CommandResult) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.arrays import Array, IntArray
+from hopping_leg.arrays import Array, IntArray, Records
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import TIMESTEP, Robot
 from hopping_leg.sim import stepper
@@ -133,21 +133,15 @@ class LegSimulator(Simulator):
         return self._reading[:, 4:6] if self._disturbed else self._memory["motor_torque"]
 
     @property
-    def command_delay_ticks(self) -> IntArray:
-        """Whole control periods by which each leg's commands are late, (n,)."""
-        ticks: IntArray = (self.table["command_latency"] / self.period + 1e-9).astype(np.int64)
-        return ticks
-
-    @property
     def loads(self) -> Array:
         """What the last control period was for the motors, (n, 8), see ``LOADS``."""
         loads: Array = self._memory["loads"]
         return loads
 
     @property
-    def solution(self) -> tuple[Array, Array]:
-        """Accelerations that the solver begins with, (n, 3), and motors' torques, N m, (n, 2)."""
-        return self._memory["acceleration"].copy(), self._memory["motor_torque"].copy()
+    def records(self) -> Records:
+        """What each leg remembers besides its state, live, (n,) of ``MEMORY``."""
+        return self._memory
 
     def reseed(self, rng: np.random.Generator) -> None:
         """Take jitter and sensor noise from here on from another source."""

@@ -72,6 +72,23 @@ def send(memory: Record, command: Array, arrival: float) -> None:
 
 
 @inlined
+def copy_memory(source: Record, target: Record) -> None:
+    """Copy what a leg's next steps depend on."""
+    for i in range(4):
+        target.rotor[i] = source.rotor[i]
+    for i in range(3):
+        target.acceleration[i] = source.acceleration[i]
+    for i in range(2):
+        target.motor_torque[i] = source.motor_torque[i]
+    for i in range(COMMAND):
+        target.command[i] = source.command[i]
+    for k in range(int(source.waiting)):
+        for i in range(1 + COMMAND):
+            target.pending[k, i] = source.pending[k, i]
+    target.waiting = source.waiting
+
+
+@inlined
 def asked(command: Array, joint: int, angle: float, speed: float) -> float:
     """Return the torque that a command asks of a joint's drive."""
     torque: float = command[joint]

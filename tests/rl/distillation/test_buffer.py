@@ -1,14 +1,11 @@
-"""What a student is shown: the newest ticks, with what the teacher did when they took effect."""
+"""What a student is shown: the newest ticks, with what the teacher would have done."""
 
 import numpy as np
 import torch
-from hypothesis import given
-from hypothesis import strategies as st
 
-from hopping_leg.rl.distillation.buffer import LabelledRollout, RolloutBuffer, shift_labels
+from hopping_leg.rl.distillation.buffer import LabelledRollout, RolloutBuffer
 
 TICKS, LEGS = 4, 3
-PROMPT = np.zeros(LEGS, np.int64)
 
 
 def buffer(rollouts=2):
@@ -33,7 +30,7 @@ def draws():
 def test_the_oldest_rollouts_make_room():
     held, generator = buffer(), draws()
     for number in range(1, 6):
-        held.add(rollout(number), PROMPT)
+        held.add(rollout(number))
         kept = {float(n) for n in (number - 1, number) if n}
         observations, labels = held.ticks(200, generator)
         assert observations.shape == labels.shape == (200, 2)
@@ -46,38 +43,11 @@ def test_the_oldest_rollouts_make_room():
 
 
 def test_a_sequence_counts_up_to_a_new_episode_with_its_own_legs_memory():
-    """An episode that begins with the sequence remembers nothing; unknown labels do not count."""
+    """An episode that begins with the sequence remembers nothing."""
     held = buffer()
-    held.add(rollout(0, begun=[(0, 1), (2, 1)]), np.array([1, 0, 0]))
+    held.add(rollout(0, begun=[(0, 1), (2, 1)]))
     drawn = held.sequences(TICKS * LEGS, draws())
     legs = drawn.observations[0, :, 1].tolist()
     counts = {leg: c.tolist() for leg, c in zip(legs, drawn.valid.int().T, strict=True)}
-    assert counts == {0: [1, 1, 1, 0], 1: [1, 1, 0, 0], 2: [1, 1, 1, 1]}
+    assert counts == {0: [1, 1, 1, 1], 1: [1, 1, 0, 0], 2: [1, 1, 1, 1]}
     assert dict(zip(legs, drawn.memory[:, 0].tolist(), strict=True)) == {0: 1, 1: 0, 2: 3}
-
-
-def test_ticks_without_a_label_are_not_drawn():
-    held = buffer()
-    held.add(rollout(1), np.array([TICKS, 0, 0]))
-    observations, _ = held.ticks(300, draws())
-    assert 150 < len(observations) < 250
-    assert set(observations[:, 1].tolist()) == {1.0, 2.0}
-
-
-@given(
-    delay=st.lists(st.integers(0, 3), min_size=LEGS, max_size=LEGS),
-    begun=st.sets(st.tuples(st.integers(0, 9), st.integers(0, LEGS - 1)), max_size=6),
-)
-def test_the_label_of_a_late_legs_tick_is_what_the_teacher_did_when_it_took_effect(delay, begun):
-    """Unless the rollout or the episode was over by then."""
-    starts = np.zeros((10, LEGS), bool)
-    for place in begun:
-        starts[place] = True
-    taught = np.repeat(np.arange(10.0, dtype=np.float32)[:, None, None], LEGS, 1).repeat(2, 2)
-    labels, known = shift_labels(taught, starts, np.array(delay))
-    for tick in range(10):
-        for leg, late in enumerate(delay):
-            then = tick + late
-            lasts = then < 10 and not starts[tick + 1 : then + 1, leg].any()
-            assert known[tick, leg] == lasts
-            assert not lasts or labels[tick, leg].tolist() == [then, then]

@@ -4,7 +4,7 @@ from dataclasses import astuple, dataclass, fields, replace
 
 import numpy as np
 
-from hopping_leg.arrays import Array
+from hopping_leg.arrays import Array, Records
 from hopping_leg.controllers.protocol import Measurement
 from hopping_leg.controllers.shooting import hop_law
 from hopping_leg.errors import UsageError
@@ -18,8 +18,21 @@ _TICKS = 200
 _FIRST_PUSH = 2.5
 """Push-off force with which planning begins, over the weight."""
 
-_TRIES, _TOLERANCE = 5, 1e-4
-"""Simulations per push and control period at most, and error of the apex that is good enough, m."""
+
+@dataclass(frozen=True)
+class Planning:
+    """How hops are simulated, and how often."""
+
+    timestep: float = 1e-3
+    """Physics step, s."""
+    elastic_timestep: float = 2.5e-4
+    """Physics step on the ground of a leg with an elastic transmission, s."""
+    simulations: int = 5
+    """Simulations per plan at most."""
+    tolerance: float = 1e-4
+    """Error of the apex that is good enough, m."""
+    every: int = 1
+    """Control periods between two plans of a push."""
 
 
 @dataclass(frozen=True)
@@ -82,13 +95,13 @@ class Shooting:
     Everything but the push-off force follows from the command. While a leg pushes, the force is the
     one with which a simulation of the hop's rest, on the leg's true parameters, ends at the
     commanded apex; it is found anew in every control period. Legs that differ are planned for each
-    as it is, but with a rigid transmission.
+    as it is.
 
     Args:
         robot: The leg.
         shape: What hops are like.
+        planning: How they are simulated.
         rate: Control rate, Hz.
-        timestep: Physics step of the simulated hops, s.
     """
 
     name = "shooting"
@@ -97,11 +110,11 @@ class Shooting:
         self,
         robot: Robot,
         shape: HopShape | None = None,
+        planning: Planning | None = None,
         *,
         rate: float = CONTROL_RATE,
-        timestep: float = 1e-3,
     ) -> None:
-        self.robot, self.timestep, self._steps = robot, timestep, round(1 / (rate * timestep))
+        self.robot, self.planning, self.period = robot, planning or Planning(), 1 / rate
         self._shapes = np.array([astuple(shape or HopShape())], _SHAPE)
 
     def watch(self, legs: Simulator) -> None:
@@ -118,7 +131,7 @@ class Shooting:
         """Forget everything; the next measurement has ``count`` rows."""
         self._phase = np.full(count, float(hop_law.LANDING))
         self._torque = np.zeros((count, 2))
-        self._scratch = np.zeros(count, stepper.MEMORY)
+        self._scratch = np.zeros(2 * count, stepper.MEMORY)
         self._hops = np.zeros(count, hop_law.HOP)
         self._hops["push"] = _FIRST_PUSH * self.robot.mass * GRAVITY
         self._known: tuple[Robot, ...] = ()
@@ -131,34 +144,44 @@ class Shooting:
         """Return joint torques for desired apexes, m, (n,), in the true state, N m, (n, 2)."""
         legs = self._legs
         if legs.robots is not self._known:
-            self._known = legs.robots
-            self._table = leg_table([_rigid(robot) for robot in legs.robots], self.timestep)
-        state, acceleration, motor = self.look()
+            self._plan_for(legs.robots)
+        state, memory = self.look()
+        how = self.planning
         legs.in_parallel(
             lambda first, last: hop_law.act(
-                self._table, self._shapes, state, acceleration, motor, self._phase, command,
-                self._hops, self._torque, self._scratch, first, last, _TRIES, _TOLERANCE,
-                self._steps, self.timestep, _TICKS,
+                self._ground, self._air, self._shapes, state, memory, self._phase, command,
+                self._hops, self._torque, self._scratch, self._steps, first, last,
+                how.simulations, how.tolerance, how.every, self.period,
+                round(self.period / how.timestep), _TICKS,
             )
         )  # fmt: skip
         return self._torque.copy()
 
-    def look(self) -> tuple[Array, Array, Array]:
-        """Return what plans begin with: state, (n, 6), accelerations, (n, 3), and torques, (n, 2).
+    def _plan_for(self, robots: tuple[Robot, ...]) -> None:
+        """Plan on the parameters of robots."""
+        self._known, how = robots, self.planning
+        self._air = leg_table([_rigid(robot) for robot in robots], how.timestep)
+        self._ground = self._air.copy()
+        self._steps = np.full(len(robots), round(self.period / how.timestep))
+        elastic = np.flatnonzero(self._legs.table["elastic"].any(axis=1))
+        if len(elastic):
+            self._ground[elastic] = leg_table([robots[k] for k in elastic], how.elastic_timestep)
+            self._steps[elastic] = round(self.period / how.elastic_timestep)
 
-        Torques are what the motors give, N m.
-        """
-        acceleration, motor = self._legs.solution
-        return self._legs.state.copy(), acceleration, motor
+    def look(self) -> tuple[Array, Records]:
+        """Return what plans begin with: states, (n, 6), and the stepper's memory, (n,)."""
+        return self._legs.state, self._legs.records
 
     def state(self) -> dict[str, Array]:
         """Return what is remembered from tick to tick."""
-        push: Array = self._hops["push"]
-        return {"phase": self._phase.copy(), "push": push.copy()}
+        remembered = {name: self._hops[name].copy() for name in ("push", "unplanned")}
+        return {"phase": self._phase.copy(), **remembered}
 
     def restore(self, state: dict[str, Array]) -> None:
         """Go on from a ``state``."""
-        self._phase[:], self._hops["push"] = state["phase"], state["push"]
+        self._phase[:] = state["phase"]
+        for name in ("push", "unplanned"):
+            self._hops[name] = state[name]
 
     def internals(self) -> dict[str, Array]:
         """Return the phase and the push-off force, N."""

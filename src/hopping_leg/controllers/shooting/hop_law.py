@@ -12,18 +12,20 @@ import math
 
 import numpy as np
 
-from hopping_leg.arrays import Array, Record, Records
+from hopping_leg.arrays import Array, IntArray, Record, Records
 from hopping_leg.sim.compiled import compiled, inlined
 from hopping_leg.sim.leg_physics import ROWS
-from hopping_leg.sim.stepper import COMMAND, send, step_leg
+from hopping_leg.sim.stepper import COMMAND, copy_memory, send, step_leg
 
 FLIGHT, LANDING, PUSH = 0, 1, 2
 """Phases: in the air, on the ground before and after the leg stops to shorten."""
 
-HOP = np.dtype([(name, np.float64) for name in ("flight", "squat", "liftoff", "stop", "push")])
+HOP = np.dtype(
+    [(name, np.float64) for name in ("flight", "squat", "liftoff", "stop", "push", "unplanned")]
+)
 """Numbers of one hop: length from hip to foot in flight, heights of the hip above the foot's centre
 at which landing ends and at which the push ends, all m, deceleration from which on the leg brakes,
-m/s2, push-off force, N."""
+m/s2, push-off force, N, control periods of the push since that was planned."""
 
 LIFTED = 0.01
 """Gap between foot and ground with which a leg is in the air, whatever its length, m."""
@@ -33,6 +35,7 @@ _FALL = 0.3  # force over the weight with which a leg sinks until it has to brak
 _LEAST_STROKE = 0.08  # of a landing, over the stretched length
 _LEAST_PUSH, _MOST_PUSH = 0.2, 14.0  # push-off force over the weight
 _REST = 0.02  # speed of the hip below which a landing ends, m/s
+_SPRINGS = 6  # control periods of a flight until transmissions have given back their energy
 _LATE = 0.6  # share of the push's way below which a landing may end
 
 
@@ -118,27 +121,56 @@ def law(p: Record, shape: Record, state: Array, hop: Record, phase: int, torque:
 
 
 @inlined
-def apex_of(
-    p: Record, shape: Record, state: Array, memory: Record, past: Array, rows: Array,
-    hop: Record, phase: int, torque: Array, command: Array, steps: int, dt: float, ticks: int,
+def begin_plan(
+    p: Record, state: Array, memory: Record, past: Array, rows: Array, here: Array, plan: Record,
+    steps: int, dt: float,
 ) -> float:  # fmt: skip
-    """Return the height of the next apex after a lift-off, NaN if none comes; all but p changes.
+    """Set ``here`` and ``plan`` to a leg when the next command arrives, but for what remains.
 
-    Commands arrive late by the latency beyond whole control periods: whoever commands through
-    those asks for what is to be given when they are over.
+    Commands under way act until then. Returns what remains: by how much the next command is later
+    than whole control periods, s.
     """
-    pushed, period = phase != FLIGHT, steps * dt
-    late = p.command_latency - math.floor(p.command_latency / period + 1e-9) * period
+    for i in range(6):
+        here[i] = state[i]
+    copy_memory(memory, plan)
+    whole = int(p.command_latency / (steps * dt) + 1e-9)
+    if whole > 0:
+        step_leg(p, here, plan, past, rows, 0.0, whole * steps, dt)
+    return p.command_latency - whole * steps * dt
+
+
+@inlined
+def last_command(memory: Record, torque: Array) -> None:
+    """Set ``torque``, (2,), to the newest command, be it in force or under way."""
+    waiting = int(memory.waiting)
+    for i in range(2):
+        torque[i] = memory.pending[waiting - 1, 1 + i] if waiting > 0 else memory.command[i]
+
+
+@inlined
+def apex_of(
+    ground: Record, air: Record, shape: Record, state: Array, memory: Record, past: Array,
+    rows: Array, hop: Record, torque: Array, command: Array, late: float, steps: int, dt: float,
+    air_steps: int, air_dt: float, ticks: int,
+) -> float:  # fmt: skip
+    """Return the height of the next apex of a leg that pushes, NaN if none comes.
+
+    Changes all but the tables' rows. In the air the transmission is rigid and the step coarser.
+    """
+    phase, period, flown = PUSH, steps * dt, 0
     for _ in range(ticks):
-        phase = next_phase(p, state, hop, phase)
-        if phase != FLIGHT:
-            pushed = True
-        law(p, shape, state, hop, phase, torque)
+        phase = next_phase(ground, state, hop, phase)
+        law(ground, shape, state, hop, phase, torque)
         command[0], command[1] = torque[0], torque[1]
         send(memory, command, late)
         height, rate = state[0], state[3]
-        step_leg(p, state, memory, past, rows, 0.0, steps, dt)
-        if pushed and phase == FLIGHT and rate > 0 and state[3] <= 0:
+        if phase == FLIGHT:
+            flown += 1
+        if flown > _SPRINGS:
+            step_leg(air, state, memory, past, rows, 0.0, air_steps, air_dt)
+        else:
+            step_leg(ground, state, memory, past, rows, 0.0, steps, dt)
+        if phase == FLIGHT and rate > 0 and state[3] <= 0:
             # Between two ticks the base moves on a parabola.
             return height + rate * rate * period / (2 * max(rate - state[3], 1e-9))
     return np.nan
@@ -146,64 +178,67 @@ def apex_of(
 
 @compiled
 def act(
-    table: Records, shapes: Records, state: Array, acceleration: Array, motor: Array,
-    phases: Array, commands: Array, hops: Records, torques: Array, scratch: Records,
-    first: int, last: int, tries: int, tolerance: float, steps: int, dt: float, ticks: int,
+    ground: Records, air: Records, shapes: Records, state: Array, memory: Records, phases: Array,
+    commands: Array, hops: Records, torques: Array, scratch: Records, steps: IntArray,
+    first: int, last: int, tries: int, tolerance: float, every: int, period: float,
+    air_steps: int, ticks: int,
 ) -> None:  # fmt: skip
     """Set phases and torques of legs; plan those that push.
 
     The push-off force is the one whose simulated apex is the command, found by regula falsi.
 
     Args:
-        table: Rows of the planning model, (n,).
+        ground: Rows of the planning model on the ground, (n,).
+        air: Rows of the same in the air, (n,).
         shapes: The shape of all hops, (1,).
-        state: True states, (n, 6).
-        acceleration: Present accelerations, where the solver begins, (n, 3).
-        motor: What the motors give, N m, (n, 2).
+        state: States, (n, 6).
+        memory: What the legs remember, (n,) of ``MEMORY``.
         phases: Phase of each leg, (n,); set.
         commands: Apex heights, m, (n,).
         hops: Numbers of the hops, (n,); set.
         torques: What to command, N m, (n, 2); set.
-        scratch: One record of memory per thread; the one of number ``first`` is used.
+        scratch: Two records of memory per thread; those from twice ``first`` on are used.
+        steps: Physics steps per control period on the ground, (n,).
         first: First leg.
         last: Leg before which to stop.
-        tries: Simulations per push and control period at most.
+        tries: Simulations per plan at most.
         tolerance: Error of the apex that is good enough, m.
-        steps: Physics steps per control period.
-        dt: Physics step, s.
+        every: Control periods between two plans of a push.
+        period: Control period, s.
+        air_steps: Physics steps per control period in the air.
         ticks: Control periods of a simulation at most.
     """
     rows, past = np.empty((ROWS, 5)), np.empty((0, 6))
-    command, here, torque = np.zeros(COMMAND), np.empty(6), np.empty(2)
-    memory, shape = scratch[first], shapes[0]
+    command, here, there, torque = np.zeros(COMMAND), np.empty(6), np.empty(6), np.empty(2)
+    begun, plan, shape = scratch[2 * first], scratch[2 * first + 1], shapes[0]
     for k in range(first, last):
-        p, hop = table[k], hops[k]
-        for i in range(2):
-            torques[k, i] = motor[k, i]
+        p, hop, dt = ground[k], hops[k], period / steps[k]
+        late = begin_plan(p, state[k], memory[k], past, rows, here, begun, steps[k], dt)
+        last_command(memory[k], torques[k])
         shape_hop(p, shape, commands[k], hop)
-        phases[k] = next_phase(p, state[k], hop, int(phases[k]))
-        if phases[k] != PUSH:
-            law(p, shape, state[k], hop, int(phases[k]), torques[k])
+        phases[k] = next_phase(p, here, hop, int(phases[k]))
+        hop.unplanned = hop.unplanned + 1 if phases[k] == PUSH else every
+        if phases[k] != PUSH or hop.unplanned < every:
+            law(p, shape, here, hop, int(phases[k]), torques[k])
             continue
+        hop.unplanned = 0
         weight = p.mass * p.gravity
         least, most = _LEAST_PUSH * weight, _MOST_PUSH * weight
         low, high, low_error, high_error = least, most, np.nan, np.nan
         best, best_error = hop.push, np.inf
-        way = hop.liftoff + p.foot_radius - state[k, 0]
+        way = hop.liftoff + p.foot_radius - here[0]
         step = weight / max(way, 0.03 * (p.thigh_length + p.shank_length)) / 2
         for _ in range(tries):
             force = hop.push
             for i in range(6):
-                here[i] = state[k, i]
+                there[i] = here[i]
             for i in range(2):
-                torque[i] = motor[k, i]
-                memory.motor_torque[i] = memory.command[i] = motor[k, i]
-            for i in range(3):
-                memory.acceleration[i] = acceleration[k, i]
-            memory.waiting = 0
+                torque[i] = torques[k, i]
+            copy_memory(begun, plan)
             apex = apex_of(
-                p, shape, here, memory, past, rows, hop, PUSH, torque, command, steps, dt, ticks
-            )
+                p, air[k], shape, there, plan, past, rows, hop, torque, command, late, steps[k], dt,
+                air_steps, period / air_steps, ticks,
+            )  # fmt: skip
             error = apex - commands[k] if apex == apex else -1.0
             if abs(error) < best_error:
                 best, best_error = force, abs(error)
@@ -223,4 +258,4 @@ def act(
             if hop.push == best and not least < best < most:
                 break
         hop.push = best
-        law(p, shape, state[k], hop, PUSH, torques[k])
+        law(p, shape, here, hop, PUSH, torques[k])

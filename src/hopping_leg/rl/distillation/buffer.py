@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from hopping_leg.arrays import Array32, BoolArray, IntArray
+from hopping_leg.arrays import Array32, BoolArray
 from hopping_leg.rl.checkpoint import Tree
 
 
@@ -30,7 +30,7 @@ class Sequences(NamedTuple):
     labels: torch.Tensor
     """(ticks, b, 2)."""
     valid: torch.Tensor
-    """Which ticks come before the first new episode and have a label, (ticks, b)."""
+    """Which ticks come before the first new episode, (ticks, b)."""
     memory: torch.Tensor
     """(b, k)."""
 
@@ -50,7 +50,6 @@ class RolloutBuffer:
         shape = (max(rollouts, 1), ticks, count)
         self._observations = torch.zeros((*shape, size), dtype=torch.float16)
         self._labels = torch.zeros((*shape, 2), dtype=torch.float16)
-        self._known = torch.zeros(shape, dtype=torch.bool)
         self._valid = torch.zeros(shape, dtype=torch.bool)
         self._memory = torch.zeros((shape[0], count, memory))
         self.added = 0
@@ -61,31 +60,21 @@ class RolloutBuffer:
         """Rollouts held."""
         return min(self.added, len(self._labels))
 
-    def add(self, rollout: LabelledRollout, delay: IntArray) -> None:
-        """Keep a rollout in the place of the oldest.
-
-        What is commanded acts ``delay`` ticks later, (n,): the label of a tick is what the teacher
-        did then, where the episode and the rollout last so long.
-        """
+    def add(self, rollout: LabelledRollout) -> None:
+        """Keep a rollout in the place of the oldest."""
         place = self.added % len(self._labels)
-        labels, known = shift_labels(rollout.labels, rollout.begun, delay)
         later = rollout.begun.copy()
         later[0] = False
         self._observations[place] = torch.from_numpy(rollout.observations)
-        self._labels[place] = torch.from_numpy(labels)
-        self._known[place] = torch.from_numpy(known)
-        self._valid[place] = torch.from_numpy(known & ~np.logical_or.accumulate(later))
+        self._labels[place] = torch.from_numpy(rollout.labels)
+        self._valid[place] = torch.from_numpy(~np.logical_or.accumulate(later))
         self._memory[place] = torch.from_numpy(rollout.memory * ~rollout.begun[0][:, None])
         self.added += 1
 
     def ticks(self, count: int, generator: torch.Generator) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return observations, (b, size), and labels, (b, 2), of ``count`` ticks at random.
-
-        Those without a label are left out.
-        """
-        held = self.filled * self._known[0].numel()
+        """Return observations, (b, size), and labels, (b, 2), of ``count`` ticks at random."""
+        held = self.filled * self._valid[0].numel()
         rows = torch.randint(held, (count,), generator=generator)
-        rows = rows[self._known.view(-1)[rows]]
         observations = self._observations.view(-1, self._observations.shape[-1])
         return observations[rows].float(), self._labels.view(-1, 2)[rows].float()
 
@@ -113,18 +102,4 @@ class RolloutBuffer:
             getattr(self, f"_{name}")[: self.filled] = torch.from_numpy(state[name])
 
 
-_ARRAYS = ("observations", "labels", "known", "valid", "memory")
-
-
-def shift_labels(labels: Array32, begun: BoolArray, delay: IntArray) -> tuple[Array32, BoolArray]:
-    """Return the labels of ``delay`` ticks later, (ticks, n, 2), and where they are known.
-
-    They are unknown at the end of the rollout and of an episode.
-    """
-    if not delay.any():
-        return labels, np.ones(begun.shape, np.bool_)
-    ticks, rows = np.arange(len(begun))[:, None], np.arange(len(delay))
-    then = np.minimum(ticks + delay, len(begun) - 1)
-    episode = begun.cumsum(axis=0)
-    known = (ticks + delay < len(begun)) & (episode[then, rows] == episode)
-    return labels[then, rows], known
+_ARRAYS = ("observations", "labels", "valid", "memory")

@@ -149,7 +149,7 @@ class Dagger:
                 self._actor.load_state_dict(self.student.state_dict())
                 rollout = beside.submit(self._collect)
                 self._train()
-                self._buffer.add(rollout.result(), self.task.legs.command_delay_ticks)
+                self._buffer.add(rollout.result())
                 self.num_timesteps += self.config.n_steps * self.task.count
                 rollouts += 1
                 if rollouts % log_interval == 0:
