@@ -1,7 +1,5 @@
 """A student hops while the teacher, who sees the truth, says what it would do."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 import torch
@@ -105,22 +103,6 @@ def test_a_clock_hastens_the_schedules_and_never_delays_them():
     made.on_boundary = lambda: shares.append(made.share)
     learn(made, 4 * ROLLOUT)
     assert shares == pytest.approx([0.0, 0.7, 0.8, 0.75])
-
-
-def test_late_legs_learn_what_the_teacher_did_when_their_commands_took_effect():
-    period = 1 / TINY_FAST.task.rate
-    latency = dataclasses.replace(ROBOT.reality.latency, command=2 * period)
-    late = dataclasses.replace(ROBOT, reality=dataclasses.replace(ROBOT.reality, latency=latency))
-    for robot, ticks in ((ROBOT, 0), (late, 2)):
-        made = learner(counted(gradient_steps=1), robot=robot)
-        learn(made, 2 * ROLLOUT)
-        held = made._buffer.state()
-        asked = np.arange(2 * made.config.n_steps).reshape(2, -1, 1, 1) / 100 + ticks / 100
-        known = held["known"][: made._buffer.filled]
-        assert known[:, : -ticks or None].mean() > 0.8
-        assert not ticks or not known[:, -ticks:].any()
-        wrong = np.abs(held["labels"][: made._buffer.filled] - asked).max(axis=-1) > 1e-3
-        assert not (wrong & known).any()
 
 
 def test_the_label_is_what_shooting_does_in_the_true_state():
