@@ -84,7 +84,7 @@ def test_late_shooting_knows_where_the_leg_is_but_for_its_errors_of_velocities(m
     class Noting(LateShooting):
         def look(self):
             known, *rest = super().look()
-            looks.append((known, Shooting.look(self)[0]))
+            looks.append((known, Shooting.look(self)[0].copy()))
             return known, *rest
 
     setup = RolloutConfig(ROBOT, NO_NOISE, threads=1)

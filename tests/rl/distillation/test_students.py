@@ -7,7 +7,6 @@ from hopping_leg.rl.distillation.buffer import LabelledRollout, RolloutBuffer
 from hopping_leg.rl.distillation.students import StudentConfig
 
 LEGS, TICKS = 5, 6
-PROMPT = np.zeros(LEGS, np.int64)
 
 
 def student():
@@ -31,7 +30,7 @@ def test_learning_sees_what_acting_saw():
                     torch.from_numpy(now), memory * torch.from_numpy(~new)[:, None]
                 )
                 acted.append(action.numpy())
-        held.add(LabelledRollout(seen, np.stack(acted), begun, before), PROMPT)
+        held.add(LabelledRollout(seen, np.stack(acted), begun, before))
         loss = one.loss(held, TICKS * LEGS, torch.Generator().manual_seed(0))
         assert loss.item() < 1e-6, "labels are kept in half precision"
     with torch.no_grad():
@@ -55,7 +54,7 @@ def test_a_recurrent_student_learns_to_repeat_what_is_no_longer_seen():
     optimizer = torch.optim.Adam(one.parameters(), lr=1e-2)
     for _ in range(300):
         held = RolloutBuffer(1, TICKS, LEGS, 2, one.memory_size)
-        held.add(shown_once(), PROMPT)
+        held.add(shown_once())
         loss = one.loss(held, TICKS * LEGS, generator)
         optimizer.zero_grad()
         loss.backward()
