@@ -155,6 +155,25 @@ def _robots(make=False):
     return Kind({"leg.toml": (shipped / name).read_bytes()}, "leg.toml", read)
 
 
+def _descriptions(form):
+    from hopping_leg.robot import build_model, get_spec, load_robot, to_urdf
+    from hopping_leg.robot.importing import imported_robot as importing
+    from hopping_leg.robot.importing.known_numbers import Given
+    from hopping_leg.robot.importing.leg_parts import Names
+    from hopping_leg.robot.robot_files import robot_from_tree
+
+    def read(path):
+        leg = importing.read_leg(path, Names())
+        made = importing.imported_robot(leg, Given(("qdd100",)), path.name)
+        build_model(robot_from_tree(made.tree, path.name))
+
+    leg = load_robot("legv2")
+    spec = get_spec(leg)
+    spec.compile()
+    text = to_urdf(leg) if form == "urdf" else spec.to_xml()
+    return Kind({"leg.xml": text.encode()}, "leg.xml", read)
+
+
 def _gains():
     from importlib import resources
 
@@ -342,6 +361,7 @@ def _results(form):
 KINDS = {
     "robot": _robots,
     "twin": functools.partial(_robots, make=True),
+    **{f"description-{f}": functools.partial(_descriptions, f) for f in ("urdf", "mjcf")},
     "gains": _gains,
     "schedule": _schedules,
     "faults": _faults,

@@ -31,7 +31,7 @@ from hopping_leg.errors import HoppingLegError, UsageError, unknown_name
 
 VERBS = {
     "demo": "watch learned beside classical control in the browser, at once",
-    "robots": "list the legs, show every number with its source, check your own",
+    "robots": "list the legs, show every number, import or check your own",
     "evaluate": "run the paper's trials for controllers and write the report",
     "robustness": "ask how far the world may change before controllers fail",
     "skills": "so many hops and stop, stairs, soft landings",
@@ -66,7 +66,7 @@ MEANT = {
     "record": "log capture play",
     "report": "plot draw figure figures compare show graph html",
     "reproduce": "paper all everything",
-    "robots": "legs models list import urdf",
+    "robots": "legs models list import urdf mjcf",
     "robustness": "perturb disturb stress benchmark",
     "skills": "stairs land jump",
     "train": "learn fit-policy rl fit",

@@ -105,6 +105,11 @@ def say_written(*paths: Path | None) -> None:
     say(*(f"Wrote {path}" for path in paths if path))
 
 
+def say_next(*commands: Iterable[object]) -> None:
+    """Say what may come next: commands that the shell reads and that work as they stand."""
+    say("Next:", *(f"  {shlex.join(map(str, words))}" for words in commands))
+
+
 def show_table(
     columns: Iterable[Column | str], rows: Iterable[Iterable[object]], title: str | None = None
 ) -> None:

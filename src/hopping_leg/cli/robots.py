@@ -1,21 +1,28 @@
-"""List the legs, show every number of one with its source, check your own file.
+"""List the legs, show every number of one with its source, import or check your own.
 
-A robot is a TOML file; your own may extend a shipped one and change only what differs.
+A robot is a TOML file; your own may extend a shipped one and change only what differs, or be
+imported from URDF or MJCF.
 
 Examples:
   hop robots list
   hop robots show legv2-paper
+  hop robots import leg.urdf --motor qdd100
   hop robots check examples/my_leg.toml
 """
 
+import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import tyro
 
-from hopping_leg.cli.options import save_json, say, show_table
+from hopping_leg.cli.options import save_json, say, say_next, show_table
+from hopping_leg.errors import UsageError
+from hopping_leg.io import write_atomically
 from hopping_leg.robot import Robot, build_model, numbers, robot_files
+from hopping_leg.robot.importing import imported_robot, known_numbers
+from hopping_leg.robot.importing.leg_parts import Names
 
 Target = tyro.conf.Positional[str]
 
@@ -46,8 +53,38 @@ class Check:
     """The path of a .toml file, or a shipped name."""
 
 
-def run(args: List | Show | Check) -> None:
-    """List, show or check robots."""
+@dataclass(frozen=True)
+class Import:
+    """Make a robot file of a leg's URDF or MJCF, e.g. `hop robots import leg.urdf --motor qdd100`.
+
+    Meshes are not read. What the file does not say is asked for on a terminal, else assumed and
+    listed; every number in the robot file says where it comes from.
+    """
+
+    description: tyro.conf.Positional[Path]
+    """The URDF or MJCF file."""
+    base: str | None = None
+    """Body that slides on the rail; default: what the vertical slide above the hip moves, else all
+    above the hip."""
+    hip: str | None = None
+    """Hip's joint; default: found by structure and usual names."""
+    knee: str | None = None
+    """Knee's joint; default: found likewise."""
+    foot: str | None = None
+    """Link, body, site or geom at the centre of the foot; default: found likewise."""
+    motor: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ()
+    """Motor of both joints, or the hip's and the knee's: qdd100, ak80-9 or ak80-6."""
+    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=NUMBER ...")] = ()
+    """Numbers that the file does not say, or says wrongly, in SI units, e.g. `--set
+    knee.belt_ratio=2 motor.gear_ratio=9`; motor.X is that of both joints."""
+    out: Path | None = None
+    """The robot file; default: the file's name with .toml, in this folder."""
+
+
+def run(
+    args: List | Show | Annotated[Import, tyro.conf.subcommand(name="import")] | Check,
+) -> None:
+    """List, show, import or check robots."""
     if isinstance(args, List):
         robots = [robot_files.load_robot(name) for name in robot_files.shipped_robots()]
         for robot in robots:
@@ -68,12 +105,71 @@ def run(args: List | Show | Check) -> None:
         say(*doubted)
         facts = {**asdict(robot), "derived": derived(robot), "doubts": doubted}
         save_json(args.json, facts)
+    elif isinstance(args, Import):
+        _import(args)
     else:
         robot = robot_files.robot_from_tree(robot_files.load_tree(args.robot), args.robot)
         doubted = robot_files.doubts(args.robot)
         build_model(robot)
         print(f"{args.robot} is a valid robot: {robot.name} ({_summary(robot)}).")
         say(*(f"But {doubt}" for doubt in doubted))
+
+
+def _import(args: Import) -> None:
+    """Write the robot file, say what was assumed in it and what comes next."""
+    out = args.out or Path(f"{args.description.stem}.toml")
+    if out.exists():
+        raise UsageError(f"{out} exists and is not replaced; remove it, or give another --out.")
+    values = imported_robot.read_values(args.set)
+    names = Names(args.base, args.hip, args.knee, args.foot)
+    leg = imported_robot.read_leg(args.description, names)
+    asks = sys.stdin.isatty() and sys.stdout.isatty()
+    motors = args.motor or (_ask_motors() if asks else ())
+    given = known_numbers.Given(motors, values)
+    made = imported_robot.imported_robot(leg, given, str(args.description), _ask if asks else None)
+    robot = robot_files.robot_from_tree(made.tree, str(out))
+    build_model(robot)
+    write_atomically(out, robot_files.robot_text(made.tree, made.comment).encode())
+    say(*made.comment.splitlines())
+    if made.assumed:
+        entries = dict(numbers(made.tree))
+        rows = [
+            (path, f"{entries[path]['value']:g}", entries[path]["unit"], why)
+            for path, why in made.assumed.items()
+        ]
+        title = f"assumed, since {args.description.name} does not say"
+        show_table(("number", "value", "unit", "because"), rows, title)
+    say(f"Wrote {out}: {robot.name} ({_summary(robot)}).")
+    say(*(f"But {doubt}" for doubt in robot_files.doubts(out)))
+    say_next(
+        ["hop", "robots", "check", out],
+        ["hop", "tune", "energy-shaping", "--robot", out, "--out", f"runs/{out.stem}"],
+    )
+
+
+def _ask_motors() -> tuple[str, ...]:
+    valid = ", ".join(known_numbers.MOTORS)
+    words = input(f"Motor of both joints, or hip's and knee's ({valid}; Enter: another): ")
+    return tuple(words.replace(",", " ").split())
+
+
+_ASKED = ("belt_ratio", "torque_limit", "rail.friction", "contact.time_constant")
+"""Ends of the paths of numbers that are asked for though they could be assumed."""
+
+
+def _ask(path: str, unit: str, assumed: float | None) -> float | None:
+    """Ask for a number; Enter takes what would be assumed, if anything would."""
+    if assumed is not None and not path.endswith(_ASKED):
+        return assumed
+    usual = "" if assumed is None else f" [{assumed:g}]"
+    while True:
+        answer = input(f"{path}, {unit}{usual}: ").strip()
+        if not answer:
+            return assumed
+        try:
+            return float(answer)
+        except ValueError:
+            say(f"'{answer}' is no number; give one in {unit}, or press Enter.")
 
 
 def derived(robot: Robot) -> dict[str, Any]:

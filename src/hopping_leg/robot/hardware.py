@@ -80,7 +80,12 @@ class Hardware:
 
 def speed_constant(servo: Servo) -> float:
     """Return the rotor's speed per volt, rad/(s V), by moteus' formula for the torque constant."""
-    return 1.5 / math.sqrt(3) / servo.torque_constant
+    return torque_constant(servo.torque_constant)
+
+
+def torque_constant(speed_constant: float) -> float:
+    """Return the torque constant, N m/A, for a speed constant, rad/(s V), or the other way."""
+    return 1.5 / math.sqrt(3) / speed_constant
 
 
 def contradictions(hardware: Hardware) -> Iterator[str]:

@@ -26,7 +26,7 @@ for _joint in JOINTS:
     _at_output = [f"{_joint}.motor.{name}" for name in _AT_OUTPUT]
     _DEPENDENTS[f"{_joint}.motor.gear_ratio"] = [_armature, *_losses, *_at_output]
 
-_PLAUSIBLE: dict[str, tuple[float, float]] = {
+PLAUSIBLE: dict[str, tuple[float, float]] = {
     "mass": (5e-3, 20.0),
     "length": (0.03, 1.0),
     "com": (5e-4, 1.0),
@@ -122,7 +122,7 @@ def doubts_of_values(robot: Robot, stated: Tree, origin: str) -> Iterator[str]:
     """Yield sentences about numbers that look like another unit or are not ``stated``."""
     for path, entry in numbers(stated):
         name = path.rpartition(".")[2]
-        low, high = _PLAUSIBLE.get(name, (-math.inf, math.inf))
+        low, high = PLAUSIBLE.get(name, (-math.inf, math.inf))
         if name in ("lower", "upper", "stop_lower", "stop_upper"):
             low, high = -_WIDEST[robot.kind], _WIDEST[robot.kind]
         if path.startswith("reality.") or low <= entry["value"] <= high:

@@ -2,6 +2,7 @@
 
 import json
 import logging
+import shlex
 from functools import partial
 from importlib import resources
 from multiprocessing import parent_process
@@ -163,6 +164,9 @@ def _read(name: str) -> Tree:
     elif name in shipped:
         content = (_SHIPPED / f"{name}.toml").read_bytes()
     else:
+        if name.endswith((".urdf", ".xml")):
+            words = shlex.join(["hop", "robots", "import", name])
+            raise RobotError(f"{name} is no robot file; make one of it: {words}.")
         raise RobotError(unknown_name("robot", name, shipped) + " Or give a .toml file.")
     return parse_toml(content, name, RobotError)
 
