@@ -20,9 +20,9 @@ from hopping_leg.controllers.energy_shaping.gains import (
     load_gains,
     own_gains,
 )
+from hopping_leg.controllers.mpc import HopShape
 from hopping_leg.controllers.observation_history import OBSERVATION_HISTORIES, Dated
 from hopping_leg.controllers.rollout import RolloutConfig
-from hopping_leg.controllers.shooting import HopShape
 from hopping_leg.figure_style import COLOURS
 from hopping_leg.hop_detection import FLIGHT_CLEARANCE
 from hopping_leg.html_page import data_uri
@@ -49,7 +49,7 @@ from hopping_leg.viewer.live_leg import PUSH_SECONDS
 
 FOLDER = Path(__file__).parent / "live"
 MODULES = sorted(file.stem for file in FOLDER.glob("*.js"))
-CONTROLLERS = ("fast", registry.ENERGY_SHAPING, "precise", registry.SHOOTING, "paper")
+CONTROLLERS = ("fast", registry.ENERGY_SHAPING, "precise", registry.MPC_TRUE_STATE, "paper")
 """The first ones have the first colours."""
 
 _PACKAGE = resources.files("hopping_leg")

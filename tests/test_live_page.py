@@ -62,7 +62,7 @@ def address(site):
 
 def ask(page, body, argument=None):
     """Evaluate the body of a function of (the page's modules, an argument)."""
-    names = ["leg", "onnx", "plant", "policy", "robot", "shaping", "shooting", "stepper", "table"]
+    names = ["leg", "mpc", "onnx", "plant", "policy", "robot", "shaping", "stepper", "table"]
     imports = ", ".join(f'import("live/{name}.js")' for name in names)
     return page.evaluate(
         "async (argument) => { const modules = Object.assign({}, ..."
@@ -73,8 +73,8 @@ def ask(page, body, argument=None):
 
 
 PUBLIC = (
-    "Leg, Plant, Policy, EnergyShaping, Shooting, changedRobot, legTable, makeMemory, readRobot,"
-    " shippedRobot, stepLeg"
+    "Leg, Plant, Policy, EnergyShaping, TrueStateMpc, changedRobot, legTable, makeMemory,"
+    " readRobot, shippedRobot, stepLeg"
 )
 """What the tests take from the page's modules."""
 
@@ -144,7 +144,7 @@ RUN = """
 const [name, robotName, command, noise, ticks, channel, sensors, jitter, bytes] = argument;
 const robot = shippedRobot(robotName);
 const controller = name === "energy-shaping" ? new EnergyShaping(name, robot)
-  : name === "shooting" ? new Shooting(robot)
+  : name === "mpc-true-state" ? new TrueStateMpc(robot)
   : new Policy(Uint8Array.from(atob(bytes), (c) => c.charCodeAt(0)), name);
 const draws = { channel: () => channel.shift(), sensors: () => sensors.shift(),
   jitter: () => jitter.shift() };
@@ -178,7 +178,7 @@ def draws_of(seed, noisy, jitters):
         ("paper", "legv2-paper", 2),
         ("energy-shaping", "legv2-identified", 2),
         ("energy-shaping", "legv1", 2),
-        ("shooting", "legv2-identified", 3),
+        ("mpc-true-state", "legv2-identified", 3),
         ("fast", "twin", 1),
         ("energy-shaping", "twin", 2),
     ],
@@ -281,7 +281,7 @@ def test_the_page_obeys_and_keeps_pace(page, address, tmp_path):
         [{"name": "bad.onnx", "mimeType": "application/octet-stream", "buffer": policy[:999]}]
     )
     page.get_by_text("bad.onnx cannot be read as a policy.").wait_for()
-    for name in ("shooting", "precise", "energy-shaping", "paper", "fast"):
+    for name in ("mpc-true-state", "precise", "energy-shaping", "paper", "fast"):
         page.get_by_label("Controller", exact=True).select_option(name)
         page.locator("article .name").get_by_text(name, exact=True).first.wait_for()
     took = ask(

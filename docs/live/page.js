@@ -7,7 +7,7 @@ import { Policy } from "live/policy.js";
 import { readRobot, shippedRobot } from "live/robot.js";
 import { drawScene, pageColours } from "live/scene.js";
 import { EnergyShaping } from "live/shaping.js";
-import { Shooting } from "live/shooting.js";
+import { TrueStateMpc } from "live/mpc.js";
 
 const NONE = "none";
 const HEADROOM = 0.11; // above the highest command, m: half a base and a little, of a leg like V2
@@ -49,7 +49,7 @@ async function policyBytes(name) {
 
 async function makeController(name, robot) {
   if (name === "energy-shaping") return new EnergyShaping(name, robot);
-  if (name === "shooting") return new Shooting(robot);
+  if (name === "mpc-true-state") return new TrueStateMpc(robot);
   return new Policy(await policyBytes(name), name);
 }
 

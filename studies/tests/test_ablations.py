@@ -118,7 +118,7 @@ def test_a_teacher_that_learns_acts_by_the_true_state_and_its_seed(teachers):
     np.testing.assert_allclose(eager.torque(task.command), [task.options.action_torque] * 4)
 
 
-def test_the_student_of_a_teacher_that_learnt_is_another_than_that_of_shooting():
+def test_the_student_of_a_teacher_that_learnt_is_another_than_that_of_mpc():
     recipe = TINY_FAST.replace(steps=PPO_ROLLOUT)
     taught, shot = (weights(way(recipe, ROBOT, 0)) for way in (taught_by_ppo, distilled))
     assert [len(layer) for layer in taught] == [len(layer) for layer in shot]

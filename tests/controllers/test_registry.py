@@ -50,7 +50,8 @@ def test_the_first_policy_decides(made_on):
 
 
 @pytest.mark.parametrize(
-    "controllers", [[], ["energy-shaping"], ["shooting"], ["nobody"], ["missing.onnx", "my.toml"]]
+    "controllers",
+    [[], ["energy-shaping"], ["mpc-true-state"], ["nobody"], ["missing.onnx", "my.toml"]],
 )
 def test_who_was_not_trained_hops_on_the_default_robot(controllers):
     assert robot_of(controllers) == DEFAULT_ROBOT

@@ -1,11 +1,11 @@
-"""Controllers by name: energy shaping, shooting, policies, a user's policy, gain file or class."""
+"""Controllers by name: energy shaping, mpc, policies, a user's policy, gain file or class."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import resources
 from pathlib import Path
 
-from hopping_leg.controllers import energy_shaping, protocol, shooting, user_controllers
+from hopping_leg.controllers import energy_shaping, mpc, protocol, user_controllers
 from hopping_leg.controllers.policy import OtherRobot, Policy
 from hopping_leg.errors import PolicyError, UsageError, unknown_name
 from hopping_leg.robot import DEFAULT_ROBOT, Robot, shipped_robots
@@ -20,7 +20,7 @@ ENERGY_SHAPING_FLYING = "energy-shaping-flying"
 ENERGY_SHAPING_LITERAL = "energy-shaping-literal"
 """The paper's law and gains as printed."""
 
-SHOOTING = "shooting"
+MPC_TRUE_STATE = "mpc-true-state"
 """Plans every push in the true state: in simulation alone."""
 
 _FACTORIES: dict[str, Callable[..., protocol.Controller]] = {
@@ -29,7 +29,7 @@ _FACTORIES: dict[str, Callable[..., protocol.Controller]] = {
         energy_shaping.tuned_energy_shaping, gains=ENERGY_SHAPING_FLYING
     ),
     ENERGY_SHAPING_LITERAL: energy_shaping.paper_energy_shaping,
-    SHOOTING: shooting.Shooting,
+    MPC_TRUE_STATE: mpc.TrueStateMpc,
 }
 _SHIPPED = resources.files("hopping_leg") / "policies"
 
@@ -108,7 +108,7 @@ def load_controller(
     """
     name = str(name_or_path)
     if name in _FACTORIES:
-        if name == SHOOTING and not simulated:
+        if name == MPC_TRUE_STATE and not simulated:
             raise UsageError(
                 f"{name} sees the true state, which only `hop evaluate` and studies know; choose"
                 f" another controller, e.g. {ENERGY_SHAPING}."

@@ -9,7 +9,7 @@ import itertools
 from dataclasses import dataclass
 from typing import Any
 
-from hopping_leg.controllers.shooting import Shooting
+from hopping_leg.controllers.mpc import TrueStateMpc
 from hopping_leg.errors import UsageError
 from hopping_leg.rl.distillation.dagger import DaggerConfig
 from hopping_leg.rl.policy_evaluation import (
@@ -75,7 +75,7 @@ def within_reach(recipe: Recipe, robot: Robot) -> tuple[Recipe, float]:
     if not isinstance(recipe.algorithm, DaggerConfig):
         return recipe, 0.0
     rate, heights = recipe.task.rate, every_centimetre(recipe.task.command_bounds)
-    teacher = Shooting(robot, recipe.algorithm.teacher, rate=rate)
+    teacher = TrueStateMpc(robot, recipe.algorithm.teacher, rate=rate)
     results = evaluate_policy(teacher, robot, heights, rate=rate, legs=2, seconds=5.0)
     runs = [list(run) for reached, run in itertools.groupby(results, key=_is_reached) if reached]
     longest = max(runs, key=len, default=[])

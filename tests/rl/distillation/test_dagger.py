@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from hopping_leg.controllers.shooting import Shooting
+from hopping_leg.controllers.mpc import TrueStateMpc
 from hopping_leg.rl.distillation.dagger import DaggerConfig
 from hopping_leg.sim import leg_simulator
 from tests.rl.learners import ROBOT, STUDENTS, TINY_FAST, learn, learner, policy_file
@@ -105,9 +105,9 @@ def test_a_clock_hastens_the_schedules_and_never_delays_them():
     assert shares == pytest.approx([0.0, 0.7, 0.8, 0.75])
 
 
-def test_the_label_is_what_shooting_does_in_the_true_state():
+def test_the_label_is_what_mpc_does_in_the_true_state():
     made = learner(TINY_FAST)
-    other = Shooting(ROBOT, TINY_FAST.algorithm.teacher)
+    other = TrueStateMpc(ROBOT, TINY_FAST.algorithm.teacher)
     other.watch(made.task.legs)
     other.reset(made.task.count)
     for _ in range(40):

@@ -19,7 +19,7 @@ import torch
 from stable_baselines3.common.logger import Logger
 
 from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.controllers.shooting import HopShape, Shooting
+from hopping_leg.controllers.mpc import HopShape, TrueStateMpc
 from hopping_leg.envs.task import HoppingTask
 from hopping_leg.rl.checkpoint import Tree
 from hopping_leg.rl.distillation.buffer import LabelledRollout, RolloutBuffer
@@ -78,11 +78,11 @@ class DaggerConfig:
     headroom: float = 0.01
     """How far training goes beyond the highest command, m: calibrated commands may lie there."""
     teacher: HopShape = field(default_factory=HopShape)
-    """What the hops of the shooting controller, the teacher, are like."""
+    """What the hops of the teacher, `mpc-true-state`, are like."""
 
     def make_teacher(self, task: HoppingTask) -> Teacher:
         """Build the teacher."""
-        return Shooting(task.robot, self.teacher, rate=task.options.rate)
+        return TrueStateMpc(task.robot, self.teacher, rate=task.options.rate)
 
 
 class Dagger:

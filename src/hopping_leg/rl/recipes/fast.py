@@ -1,4 +1,4 @@
-"""The fast recipe: accurate hopping soon, by imitation of the shooting controller.
+"""The fast recipe: accurate hopping soon, by imitation of `mpc-true-state`.
 
 Rollouts are short and gradient steps many: a student has to meet the states in which it stands
 still soon.

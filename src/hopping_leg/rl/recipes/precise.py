@@ -1,6 +1,6 @@
 """The precise recipe: one network from 0.7 s of joint samples to torques.
 
-A student learns by imitation of the shooting controller, which sees the true state and plans every
+A student learns by imitation of `mpc-true-state`, which sees the true state and plans every
 push, so that nothing has to be found by trial and error. Longer, wider and on more of the past than
 ``fast``.
 """

@@ -19,14 +19,14 @@ from hopping_leg.arrays import Array
 from hopping_leg.cli.options import at_least
 from hopping_leg.cma_strategy import seeded_strategy
 from hopping_leg.controllers import RolloutConfig, rollout
+from hopping_leg.controllers.mpc import HopShape, TrueStateMpc
 from hopping_leg.controllers.protocol import Controller
-from hopping_leg.controllers.shooting import HopShape, Shooting
 from hopping_leg.evaluate.motor_load import motor_load
 from hopping_leg.evaluate.result_files import ResultCache
 from hopping_leg.hop_detection import measure_hops
 from hopping_leg.robot import Robot, load_robot
 from hopping_leg.workers import ProcessWorkers
-from studies.shooting.late import LateShooting
+from studies.mpc.late import LateMpc
 
 ROBOTS = ("legv2-identified", "legv2", "legv2-paper")
 
@@ -137,7 +137,7 @@ def measure(
 def cost(name: str, shape: HopShape, seed: int) -> float:
     """Return what is bad about a shape on a robot: mean over heights, mm."""
     robot = load_robot(name)
-    hops = measure(LateShooting(robot, shape, seed), robot, _HEIGHTS, seed)
+    hops = measure(LateMpc(robot, shape, seed), robot, _HEIGHTS, seed)
     return float(np.mean([h.cost for h in hops]))
 
 
@@ -172,7 +172,7 @@ class Reach:
         table = Table("robot", "command, m", "error, mm", "std, mm", "hip RMS, N m", "power, W")
         for name in self.robots:
             robot = load_robot(name)
-            for hops in measure(Shooting(robot), robot, heights.tolist(), self.seed):
+            for hops in measure(TrueStateMpc(robot), robot, heights.tolist(), self.seed):
                 rows.append({"robot": name, **asdict(hops)})
                 numbers = (1e3 * hops.median_error_m, 1e3 * hops.std_m, hops.rms_hip_torque_nm)
                 cells = [f"{value:.1f}" for value in (*numbers, hops.mean_power_w)]
@@ -193,7 +193,7 @@ class Search:
     """Candidates per generation."""
     seed: int = 0
     """Of the search; noise takes the number of the generation, the judgement at the end 1000."""
-    out: Path = Path("runs/shooting")
+    out: Path = Path("runs/mpc")
     """Where generations are kept: a killed search goes on."""
     json: Path | None = None
     """Write every number to this file."""

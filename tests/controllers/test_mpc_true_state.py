@@ -1,4 +1,4 @@
-"""Shooting: hops are as high as asked, calm, and of one shape on any leg."""
+"""MPC in the true state: hops are as high as asked, calm, and of one shape on any leg."""
 
 from dataclasses import astuple, fields
 
@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hopping_leg.controllers import RolloutConfig, rollout
+from hopping_leg.controllers.mpc import HopShape, TrueStateMpc, hop_law
 from hopping_leg.controllers.registry import load_controller
-from hopping_leg.controllers.shooting import HopShape, Shooting, hop_law
 from hopping_leg.errors import UsageError
 from hopping_leg.io import replace_at
 from hopping_leg.robot import GRAVITY, load_robot
@@ -27,7 +27,7 @@ STEP = 2.5e-4
 def hop(robot, commands, engine="stepper", legs=None):
     setup = RolloutConfig(robot, timestep=STEP, threads=1, engine=engine)
     wanted = np.tile(commands, (round(5 * setup.rate), 1))
-    return rollout(Shooting(robot), setup, wanted, 0, legs=legs)
+    return rollout(TrueStateMpc(robot), setup, wanted, 0, legs=legs)
 
 
 def check_apexes(run, commands, most=0.002):
@@ -107,7 +107,7 @@ def test_commands_under_way_are_planned_with():
 def test_a_new_command_holds_for_the_next_push():
     setup = RolloutConfig(ROBOT, timestep=STEP, threads=1)
     commands = np.repeat([[0.25], [0.36], [0.28]], 400, axis=0)
-    found = hops_of(rollout(Shooting(ROBOT), setup, commands, seed=0), 0)
+    found = hops_of(rollout(TrueStateMpc(ROBOT), setup, commands, seed=0), 0)
     late = (found.tick % 400 > 200) & (found.tick > 200)
     assert late.sum() >= 6
     np.testing.assert_allclose(found.apex[late], commands[found.tick, 0][late], atol=0.005)
@@ -150,6 +150,6 @@ def test_lengths_of_a_hop_fit_the_leg_rise_with_the_height_and_grow_with_the_leg
 
 def test_it_is_for_simulated_legs_of_the_stepper_alone():
     with pytest.raises(UsageError, match="true state"):
-        load_controller("shooting", ROBOT)
+        load_controller("mpc-true-state", ROBOT)
     with pytest.raises(UsageError, match="stepper"):
         hop(ROBOT, np.array([0.3]), engine="mujoco")

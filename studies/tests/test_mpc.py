@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from hopping_leg.controllers import RolloutConfig, rollout
-from hopping_leg.controllers.shooting import HopShape, Shooting
+from hopping_leg.controllers.mpc import HopShape, TrueStateMpc
 from hopping_leg.robot import load_robot
 from hopping_leg.sim import NO_NOISE
 from hopping_leg.workers import ProcessWorkers
-from studies.shooting import late
-from studies.shooting import run as module
-from studies.shooting.late import LateShooting
-from studies.shooting.run import Hops, Reach, Search, from_unit, measure, to_unit
+from studies.mpc import late
+from studies.mpc import run as module
+from studies.mpc.late import LateMpc
+from studies.mpc.run import Hops, Reach, Search, from_unit, measure, to_unit
 
 ROBOT = load_robot("legv2-identified")
 GOOD = Hops(0.3, 0.0, 0.003, 20, 2.0, 0, 0.5, 1.0, 10.0, 0.0, 15.0, 0.05)
@@ -70,21 +70,21 @@ def test_a_leg_that_does_not_hop_costs_most():
     assert still.cost == 120
 
 
-def test_late_shooting_hops_by_its_seed_alone():
+def test_late_mpc_hops_by_its_seed_alone():
     commands = np.full((300, 2), 0.3)
     setup = RolloutConfig(ROBOT, NO_NOISE, threads=1)
-    shooting = [LateShooting(ROBOT, HopShape(), seed) for seed in (3, 3, 4)]
-    runs = [rollout(one, setup, commands, seed=0).data["height_m"] for one in shooting]
+    controllers = [LateMpc(ROBOT, HopShape(), seed) for seed in (3, 3, 4)]
+    runs = [rollout(one, setup, commands, seed=0).data["height_m"] for one in controllers]
     np.testing.assert_array_equal(runs[0], runs[1])
     assert not np.array_equal(runs[0], runs[2])
     assert not np.array_equal(runs[0][:, 0], runs[0][:, 1]), "each leg has errors of its own"
 
 
-def test_late_shooting_knows_where_the_leg_is_but_for_its_errors_of_velocities(monkeypatch):
-    class Noting(LateShooting):
+def test_late_mpc_knows_where_the_leg_is_but_for_its_errors_of_velocities(monkeypatch):
+    class Noting(LateMpc):
         def look(self):
             known, *rest = super().look()
-            looks.append((known, Shooting.look(self)[0].copy()))
+            looks.append((known, TrueStateMpc.look(self)[0].copy()))
             return known, *rest
 
     setup = RolloutConfig(ROBOT, NO_NOISE, threads=1)
@@ -102,7 +102,7 @@ def test_late_shooting_knows_where_the_leg_is_but_for_its_errors_of_velocities(m
     assert (error[True][3:] > 3 * error[False][3:]).all()
 
 
-def test_shooting_reaches_its_heights_with_the_true_state(brief):
+def test_mpc_reaches_its_heights_with_the_true_state(brief):
     rows = Reach(robots=(ROBOT.name,)).measure()["rows"]
     assert [row["command_m"] for row in rows][:3] == [0.22, 0.24, 0.26]
     low = [row for row in rows if row["command_m"] <= 0.36]
@@ -111,8 +111,8 @@ def test_shooting_reaches_its_heights_with_the_true_state(brief):
 
 
 def test_legs_are_measured_height_by_height(brief):
-    alone = measure(Shooting(ROBOT), ROBOT, (0.34,), 0)
-    low, high = measure(Shooting(ROBOT), ROBOT, (0.24, 0.34), 0)
+    alone = measure(TrueStateMpc(ROBOT), ROBOT, (0.34,), 0)
+    low, high = measure(TrueStateMpc(ROBOT), ROBOT, (0.24, 0.34), 0)
     assert (low.command_m, high.command_m) == (0.24, 0.34)
     assert low.hops_per_s > high.hops_per_s
     assert high.median_error_m == pytest.approx(alone[0].median_error_m, abs=0.003)

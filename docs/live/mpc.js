@@ -1,5 +1,5 @@
-// Shooting: simulate the rest of the hop, choose the push-off that reaches the apex. A port of
-// `src/hopping_leg/controllers/shooting`; it sees the true state of the simulated leg.
+// MPC: simulate the rest of the hop, choose the push-off that reaches the apex. A port of
+// `src/hopping_leg/controllers/mpc`; it sees the true state of the simulated leg.
 
 import { DATA, PERIOD, clamp } from "live/data.js";
 import { commandLimits } from "live/robot.js";
@@ -124,9 +124,9 @@ function apexOf(p, shape, state, memory, hop, torque) {
   return NaN;
 }
 
-export class Shooting {
+export class TrueStateMpc {
   constructor(robot) {
-    this.name = "shooting";
+    this.name = "mpc-true-state";
     this.range = commandLimits(robot);
     this.robot = robot;
     this.reset();

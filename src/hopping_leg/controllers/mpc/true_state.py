@@ -1,12 +1,12 @@
-"""The shooting controller: knows the true state and plans on the stepper."""
+"""MPC in the true state of simulated legs, by shooting on the stepper."""
 
 from dataclasses import astuple, dataclass, fields, replace
 
 import numpy as np
 
 from hopping_leg.arrays import Array, Records
+from hopping_leg.controllers.mpc import hop_law
 from hopping_leg.controllers.protocol import Measurement
-from hopping_leg.controllers.shooting import hop_law
 from hopping_leg.errors import UsageError
 from hopping_leg.robot import GRAVITY, Robot
 from hopping_leg.sim import CONTROL_RATE, LegSimulator, Simulator, stepper
@@ -40,7 +40,7 @@ class HopShape:
     """What hops are like, on any leg: see ``hop_law`` for the units.
 
     The defaults have the least scatter, on the shipped legs, of a controller that sees the state
-    late and errs about velocities as a policy does (``studies.shooting``).
+    late and errs about velocities as a policy does (``studies.mpc``).
     """
 
     flight_length: float = 0.68
@@ -89,7 +89,7 @@ class HopShape:
 _SHAPE = np.dtype([(field.name, np.float64) for field in fields(HopShape)])
 
 
-class Shooting:
+class TrueStateMpc:
     """Controls simulated legs whose true state it sees: what a perfect estimate would be worth.
 
     Everything but the push-off force follows from the command. While a leg pushes, the force is the
@@ -104,7 +104,7 @@ class Shooting:
         rate: Control rate, Hz.
     """
 
-    name = "shooting"
+    name = "mpc-true-state"
 
     def __init__(
         self,
@@ -124,7 +124,9 @@ class Shooting:
             UsageError: They are of another engine than the stepper.
         """
         if not isinstance(legs, LegSimulator):
-            raise UsageError("Shooting plans on the engine stepper; leave --engine out.")
+            raise UsageError(
+                "MPC in the true state plans on the engine stepper; leave --engine out."
+            )
         self._legs = legs
 
     def reset(self, count: int) -> None:

@@ -1,4 +1,4 @@
-"""A hop in a few numbers: the law that shooting plans with, and its simulation to the next apex.
+"""A hop in a few numbers: the law that MPC plans with, and its simulation to the next apex.
 
 In the air a joint PD holds the foot below the hip. On the ground the foot stays below the hip while
 the leg presses it down: first so that the hip stops at a certain height, then with one force until

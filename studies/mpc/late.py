@@ -1,4 +1,4 @@
-"""Shooting that sees as little as a policy does: late, and with errors about velocities."""
+"""MPC that sees as little as a policy does: late, and with errors about velocities."""
 
 from collections import deque
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from hopping_leg.arrays import Array, Records
-from hopping_leg.controllers.shooting import HopShape, Shooting
+from hopping_leg.controllers.mpc import HopShape, TrueStateMpc
 from hopping_leg.robot import Robot
 from hopping_leg.sim import stepper
 
@@ -21,10 +21,10 @@ _JOINT_SPEED_ERROR = 0.1  # rad/s
 _LASTING = 0.7  # share of an error that is left a control period later
 
 
-class LateShooting(Shooting):
+class LateMpc(TrueStateMpc):
     """Plans from the state two control periods ago, carried forward, with errors of velocities."""
 
-    name = "late-shooting"
+    name = "late-mpc"
 
     def __init__(self, robot: Robot, shape: HopShape, seed: int) -> None:
         super().__init__(robot, shape)

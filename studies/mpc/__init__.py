@@ -1,9 +1,9 @@
 """What hops shall the teacher show, and how high does it reach?"""
 
 RESULTS = (
-    "python -m studies.shooting reach --json studies/shooting/results/reach.json",
-    "python -m studies.shooting search --generations 20 --population 10 --json "
-    "studies/shooting/results/search.json",
+    "python -m studies.mpc reach --json studies/mpc/results/reach.json",
+    "python -m studies.mpc search --generations 20 --population 10 --json "
+    "studies/mpc/results/search.json",
 )
 
 TABLES = (
