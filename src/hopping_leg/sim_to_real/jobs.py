@@ -40,10 +40,11 @@ class Board(LiveProgress):
 
     def finish(self, name: str, weight: float, *, new: bool = True) -> None:
         """Count a job; one that is not new was done by an earlier run."""
-        self._begun = 0.0
+        self._begun = max(0.0, self._begun - weight)
         if new:
             self._new += weight
-            self._line(self._told(f"done: {name}"))
+            left = self._time_left()
+            self._line(self._told(f"done: {name}{left and ' · '}{left}"))
         else:
             self._old += weight
         self._bar.update(self._task, completed=self._done)
