@@ -8,7 +8,6 @@ that is swung hard at the top has them, the highest is that of the hop.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from hopping_leg.arrays import Array, BoolArray, IntArray
 from hopping_leg.trace import Trace
@@ -97,6 +96,8 @@ def find_bounces(height: Array, clearance: Array) -> IntArray:
     Returns:
         Index of each maximum that stands at least ``BOUNCE`` out of its surroundings, (bounces,).
     """
+    from scipy.signal import find_peaks  # takes a second, which no other part of the package needs
+
     peaks, _ = find_peaks(height, prominence=BOUNCE)
     grounded: IntArray = peaks[clearance[peaks] < FLIGHT_CLEARANCE]
     return grounded

@@ -106,5 +106,9 @@ def _source(args: View) -> "DataSource":
     if args.box is not None:
         return RecorderSource(args.box, args.robot)
     return LiveSimulation(
-        args.controllers, args.robot or robot_of(args.controllers), args.height, args.seed
+        args.controllers,
+        args.robot or robot_of(args.controllers),
+        args.height,
+        args.seed,
+        at_once=True,
     )

@@ -88,7 +88,7 @@ def compiling_notice(*functions: Callable[..., Any]) -> Iterator[None]:
     def watch() -> None:
         while not done.wait(1.0):
             if any(one.stats.cache_misses for one in functions):  # type: ignore[attr-defined]
-                _say()
+                say_compiling()
                 return
 
     if multiprocessing.parent_process() is None:
@@ -99,7 +99,14 @@ def compiling_notice(*functions: Callable[..., Any]) -> Iterator[None]:
         done.set()
 
 
+def was_compiled(function: Callable[..., Any]) -> bool:
+    """Tell whether a process that ended has left the compiled function behind."""
+    name = f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
+    return FOLDER is not None and any(Path(FOLDER).glob(f"*/{name}-*.nbc"))
+
+
 @cache
-def _say() -> None:
+def say_compiling() -> None:
+    """Say on stderr, once, that the physics is being compiled."""
     text = "Compiling the leg's physics, once; some ten seconds."
     print(text, file=sys.stderr, flush=True)

@@ -1,5 +1,8 @@
 """A live simulation of one leg, or two side by side, that follow commands while they hop."""
 
+import subprocess
+import sys
+
 import numpy as np
 
 from hopping_leg.arrays import Array
@@ -7,7 +10,9 @@ from hopping_leg.controllers import command_schedule, protocol, registry
 from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.errors import PhysicsError, UsageError
 from hopping_leg.robot import Robot, SoftLimits, load_robot
-from hopping_leg.sim import CONTROL_RATE, LegSimulator, Plant
+from hopping_leg.sim import CONTROL_RATE, LegSimulator, Plant, stepper
+from hopping_leg.sim.compiled import FOLDER, say_compiling, was_compiled
+from hopping_leg.sim.mujoco_simulator import MujocoSimulator
 from hopping_leg.viewer.live_settings import PUSH, LiveSettings, default_settings
 from hopping_leg.viewer.tracks import FIELDS, Track
 
@@ -21,6 +26,16 @@ PUSH_SECONDS = 0.05
 """How long a push lasts."""
 
 
+def start_compiling() -> "subprocess.Popen[bytes] | None":
+    """Begin to compile the stepper in another process; None if that was done or cannot be kept."""
+    if FOLDER is None or was_compiled(stepper.step_legs):
+        return None
+    say_compiling()
+    code = "import os; getattr(os, 'nice', int)(10)\n"  # the page goes first
+    code += "from hopping_leg.sim.leg_simulator import compile_physics; compile_physics()"
+    return subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL)
+
+
 class LiveSimulation:
     """The simulation behind the page; knows nothing of it.
 
@@ -29,6 +44,7 @@ class LiveSimulation:
         robot: Name or file.
         height: Commanded first, m; brought into what the controllers can be asked for.
         seed: Of noise and random delay, the same for both legs.
+        at_once: Let MuJoCo simulate while the stepper is being compiled, if it never was here.
 
     Raises:
         UsageError: There is no such controller, or they share no height.
@@ -36,7 +52,13 @@ class LiveSimulation:
     """
 
     def __init__(
-        self, controllers: tuple[str, ...], robot: str, height: float, seed: int = 0
+        self,
+        controllers: tuple[str, ...],
+        robot: str,
+        height: float,
+        seed: int = 0,
+        *,
+        at_once: bool = False,
     ) -> None:
         self.notices: list[str] = []
         self.now = 0.0
@@ -46,6 +68,8 @@ class LiveSimulation:
         self.robot = load_robot(robot)
         self.settings = default_settings(self.robot)
         self.names: tuple[str, ...] = ()
+        self._compiling = start_compiling() if at_once else None
+        self._in_mujoco = False
         self._begin(controllers, self.robot)
 
     @property
@@ -55,6 +79,10 @@ class LiveSimulation:
 
     def advance(self, seconds: float) -> None:
         """Let simulated time pass, in whole ticks."""
+        if self._compiling is not None and self._compiling.poll() is not None:
+            self._compiling, self._in_mujoco = None, False
+            for leg in self._legs:
+                leg.use_stepper(self.height)
         for _ in range(round(seconds * CONTROL_RATE)):
             self.tick()
 
@@ -88,7 +116,13 @@ class LiveSimulation:
         self._push_ticks = round(PUSH_SECONDS * CONTROL_RATE)
 
     def set_settings(self, settings: LiveSettings) -> None:
-        """Change the settings while the legs hop; their controllers are not told."""
+        """Change the settings while the legs hop; their controllers are not told.
+
+        Raises:
+            UsageError: The physics that knows of such settings is still being compiled.
+        """
+        if self._in_mujoco and not settings.apply(self.robot).reality.neutral:
+            raise UsageError("Delays can be set once the leg's physics is compiled, in seconds.")
         self.settings = settings
         for leg in self._legs:
             leg.set_settings(self.settings, self.height)
@@ -136,8 +170,11 @@ class LiveSimulation:
         self.names = names
         self._controllers: list[protocol.Controller] = loaded
         self.set_height(self.height)
+        neutral = self.settings.apply(robot).reality.neutral
+        self._in_mujoco = self._compiling is not None and neutral
         self._legs: list[LiveLeg] = [
-            LiveLeg(c, robot, self.settings, self.height, self._seed) for c in loaded
+            LiveLeg(c, robot, self.settings, self.height, self._seed, in_mujoco=self._in_mujoco)
+            for c in loaded
         ]
         depth = round(KEPT_SECONDS * CONTROL_RATE)
         self.tracks: list[Track] = [Track(c.name, robot, depth=depth) for c in loaded]
@@ -173,11 +210,13 @@ class LiveLeg:
         settings: LiveSettings,
         height: float,
         seed: int,
+        *,
+        in_mujoco: bool = False,
     ) -> None:
         self.controller, self.robot, self.settings = controller, robot, settings
         self._rng = np.random.default_rng(seed)
-        self._force = 0.0
-        self._legs = LegSimulator(settings.apply(robot), 1, rate=CONTROL_RATE, threads=1)
+        self._force, self._in_mujoco = 0.0, in_mujoco
+        self._legs = self._simulator()
         self._connect()
         self.stand(height)
 
@@ -197,9 +236,12 @@ class LiveLeg:
     def set_settings(self, settings: LiveSettings, height: float) -> None:
         """Change the settings in the present state; the controller is not told."""
         self.settings = settings
-        self._legs.set_robots([settings.apply(self.robot)])
-        self._connect()
-        self._plant.channel.restart(_ALL, self._legs.q, self._legs.qd, np.array([height]))
+        self._go_on(height)
+
+    def use_stepper(self, height: float) -> None:
+        """Let the stepper simulate from the present state on."""
+        self._in_mujoco = False
+        self._go_on(height)
 
     def tick(self, height: float, force: float) -> Array:
         """Let one control period pass; return its row, (fields of a track,).
@@ -223,6 +265,22 @@ class LiveLeg:
         if not np.abs(legs.qd).max() < _IMPOSSIBLE:
             raise PhysicsError(f"The simulation of {self.robot.name} became unstable.")
         return row
+
+    def _simulator(self) -> LegSimulator | MujocoSimulator:
+        kind = MujocoSimulator if self._in_mujoco else LegSimulator
+        return kind(self.settings.apply(self.robot), 1, rate=CONTROL_RATE, threads=1)
+
+    def _go_on(self, height: float) -> None:
+        """Simulate from the present state on with the present settings."""
+        if isinstance(self._legs, LegSimulator):
+            self._legs.set_robots([self.settings.apply(self.robot)])
+        else:
+            state, self._legs = self._legs.state.copy(), self._simulator()
+            self._legs.state[:] = state
+            self._legs.forget(_ALL)
+            self._legs.push(np.array([self._force]))
+        self._connect()
+        self._plant.channel.restart(_ALL, self._legs.q, self._legs.qd, np.array([height]))
 
     def _connect(self) -> None:
         self._plant = Plant(self._legs, self.settings.noise_and_delay, SoftLimits(), self._rng)
