@@ -202,6 +202,6 @@ def test_without_a_terminal_there_are_two_lines_a_minute(monkeypatch, capsys):
             progress.update("cma", max(second, 1) / 400, 1234.5)
     lines = capsys.readouterr().err.strip().splitlines()
     assert [line.split(" · ")[0] for line in lines] == [
-        f"cma {share} %" for share in (15, 22, 30, 38, 45)
+        f"cma {share} %" for share in (2, 10, 18, 25, 32, 40)
     ]
-    assert lines[0] == "cma 15 % · cost 1234.5 · at most 5:40 left"
+    assert lines[-1] == "cma 40 % · cost 1234.5 · about 4:00 left"

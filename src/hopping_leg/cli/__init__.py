@@ -189,8 +189,11 @@ def _dispatch(arguments: list[str]) -> int:
         return _print_completion(*rest[:1])
     if verb not in VERBS:
         raise UsageError(unknown_name("verb", verb, VERBS, MEANT) + " Try `hop --help`.")
-    module, kind = _load_verb(verb)
-    from hopping_leg.cli.options import check_outputs
+    from hopping_leg.progress import said_if_slow
+
+    with said_if_slow(f"Loading hop {verb}."):
+        module, kind = _load_verb(verb)
+        from hopping_leg.cli.options import check_outputs
 
     args = read_options(kind, f"hop {verb}", inspect.getdoc(module), rest)
     check_outputs(args)

@@ -18,6 +18,7 @@ from hopping_leg.cli.options import JsonFile, save_json, say
 from hopping_leg.identify.diagnosis import diagnose
 from hopping_leg.identify.plan import robot_of
 from hopping_leg.identify.recording import load_recording
+from hopping_leg.progress import said_if_slow
 from hopping_leg.robot import load_robot
 
 
@@ -38,7 +39,8 @@ def run(args: Diagnose) -> None:
     robot = load_robot(args.robot or robot_of(recordings))
     rows = []
     for recording in recordings:
-        findings = diagnose(recording, robot)
+        with said_if_slow(f"Diagnosing {recording.name}."):
+            findings = diagnose(recording, robot)
         sentences = [f"  {finding.sentence}" for finding in findings]
         say(f"{recording.name}:", *(sentences or ["  Nothing is wrong that this recording tells."]))
         rows += [{"recording": recording.name, **asdict(finding)} for finding in findings]

@@ -108,14 +108,15 @@ def run(args: Evaluate, notes: Sequence[str] = ()) -> None:
     if args.traces:
         trials.save_traces(judged.runs, args.traces)
     if args.report:
-        videos = render_videos(judged, setup.robot) if args.video else None
-        io.write_atomically(args.report, write_report(judged, videos))
+        with progress.said_if_slow("Writing the report."):
+            videos = render_videos(judged, setup.robot) if args.video else None
+            io.write_atomically(args.report, write_report(judged, videos))
     options.say_written(args.json, args.report, args.traces)
 
 
 def _judge(entries: list[Entry], setup: RolloutConfig, args: Evaluate) -> EvaluationRun:
     floors = ("soft", "stiff") if args.floor == "both" else (args.floor,)
-    with progress.ShareProgress() as bar:
+    with progress.ShareProgress(parts=len(entries) * len(floors)) as bar:
         judged = [
             evaluate(
                 entries,

@@ -22,6 +22,7 @@ from hopping_leg import errors
 from hopping_leg.cli import motors, options
 from hopping_leg.controllers.registry import load_policy, robot_of
 from hopping_leg.deploy import hardware_trials, safety_limits
+from hopping_leg.progress import said_if_slow
 from hopping_leg.robot import Robot, load_robot
 
 if TYPE_CHECKING:
@@ -62,7 +63,8 @@ class Finetune:
 
 def run(args: Finetune) -> None:
     """Continue the training, say how it went."""
-    from hopping_leg.rl.finetune import finetuning
+    with said_if_slow("Loading torch."):
+        from hopping_leg.rl.finetune import finetuning
 
     policy, robot = load_policy(args.policy), load_robot(args.robot or robot_of([args.policy]))
     _refuse(args, policy, robot)

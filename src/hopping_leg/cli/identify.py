@@ -32,7 +32,7 @@ from hopping_leg.identify import optimizers, plan, recording, result
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.report import write_fit_report
 from hopping_leg.identify.search import SearchOptions
-from hopping_leg.progress import LiveProgress, minutes
+from hopping_leg.progress import LiveProgress, said_if_slow
 from hopping_leg.robot import JOINTS, load_robot
 
 _FILES = {"out": "Robot", "json": "Numbers", "report": "Report"}
@@ -85,15 +85,11 @@ class FitProgress(LiveProgress):
     """Stage, share done, time left and cost of a fit, as a context manager."""
 
     def __init__(self) -> None:
-        super().__init__("preparing", first_line=60.0)
+        super().__init__("preparing")
 
     def update(self, stage: str, share: float, cost: float) -> None:
         """Show what is being done, the share done of all, 0 to 1, and the lowest cost."""
-        note = f"cost {cost:.5g}"
-        if 0 < share < 1:
-            note += f" · at most {minutes(self.passed * (1 - share) / share)} left"
-        self._bar.update(self._task, description=stage, completed=share, note=note)
-        self._line_if_due(f"{stage} {100 * share:.0f} % · {note}")
+        self._show("fit", stage, share, f"cost {cost:.5g}")
 
 
 def run(args: Identify) -> None:
@@ -139,9 +135,12 @@ def run(args: Identify) -> None:
     if warning := result.warning(identified):
         say(warning)
     _show(identified)
-    save_json(args.json, {"command": command, **result.as_json(identified, args.posterior)})
+    with said_if_slow("Drawing what the recordings allow."):
+        numbers = result.as_json(identified, args.posterior)
+    save_json(args.json, {"command": command, **numbers})
     if args.report:
-        io.write_atomically(args.report, write_fit_report(identified, command, args.threads))
+        with said_if_slow("Writing the report."):
+            io.write_atomically(args.report, write_fit_report(identified, command, args.threads))
     say(*(f"{_FILES[name]}: {path}" for name, path in outputs))
     if warning:
         raise errors.PhysicsError(warning)

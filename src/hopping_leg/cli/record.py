@@ -78,7 +78,7 @@ def run(args: Record) -> None:
     if args.transport is not None:
         _record_motors(args, args.transport, robot, loaded, believed, gains)
         return
-    with ShareProgress() as bar:
+    with ShareProgress(parts=len(loaded)) as bar:
         for number, (stem, excitation) in enumerate(loaded):
             show = partial(bar.show_tick, stem, len(excitation))
             recording = play_excitation.play(

@@ -25,6 +25,7 @@ from hopping_leg.cli.options import JsonFile, save_json, say, say_written
 from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.evaluate import aggregation, comparison, report, result_files, runner, trials
 from hopping_leg.evaluate.video import Animation, fixed_traces, render_video
+from hopping_leg.progress import said_if_slow
 from hopping_leg.robot import load_robot
 
 
@@ -60,10 +61,11 @@ class Page:
 
 def run(args: Figures | Page) -> None:
     """Draw figures or write a page."""
-    if isinstance(args, Figures):
-        _draw(args)
-    else:
-        _write(args)
+    with said_if_slow("Reading and drawing."):
+        if isinstance(args, Figures):
+            _draw(args)
+        else:
+            _write(args)
 
 
 def _write(args: Page) -> None:

@@ -34,7 +34,7 @@ def run(args: Robustness) -> None:
     entries, setup = args.load()
     heights, seeds = args.commands, args.seeds
     suite = make_suite(setup, axes=args.axes, commands=heights, repeats=seeds, seed=args.seed)
-    with progress.ShareProgress() as bar:
+    with progress.ShareProgress(parts=len(entries)) as bar:
         found = run_suite(entries, suite, result_files.ResultCache(args.out), bar.show)
     result = {"command": options.command_line("hop robustness", args), **found}
     file, figure = args.json or args.out / "robustness.json", args.out / "robustness.svg"

@@ -26,7 +26,7 @@ class Skills(evaluate.Conditions):
 def run(args: Skills) -> None:
     """Run all skills, print their tables, write what was asked for."""
     entries, setup = args.load()
-    with progress.ShareProgress() as bar:
+    with progress.ShareProgress(parts=len(entries)) as bar:
         found = run_skills(
             entries,
             setup,

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Literal
 
 from hopping_leg.cli.options import JsonFile, at_least, going_on, save_json
+from hopping_leg.progress import said_if_slow
 from hopping_leg.robot import load_robot
 
 
@@ -63,9 +64,10 @@ class Options:
 
 def run(args: Options) -> None:
     """Train a controller."""
-    from hopping_leg.rl.recipes import change, get_recipe, randomise
-    from hopping_leg.rl.run_folder import read_result
-    from hopping_leg.rl.train import train
+    with said_if_slow("Loading torch."):
+        from hopping_leg.rl.recipes import change, get_recipe, randomise
+        from hopping_leg.rl.run_folder import read_result
+        from hopping_leg.rl.train import train
 
     recipe = get_recipe(args.recipe)
     at_least(0, seed=args.seed)

@@ -19,17 +19,18 @@ Examples:
 """
 
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import tyro
-from rich.progress import Progress
 
 from hopping_leg.cli.options import JsonFile, RobotFile, at_least, save_json, say, show_table
 from hopping_leg.controllers.energy_shaping.tuning import Search, tune
 from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically
 from hopping_leg.locks import hold_folder
+from hopping_leg.progress import LiveProgress, said_if_slow
 from hopping_leg.rl.search_space import Tuning
 from hopping_leg.robot import DEFAULT_ROBOT, load_robot
 
@@ -80,15 +81,19 @@ def run(
         _tune_recipe(args)
 
 
+class SearchProgress(LiveProgress):
+    """Generations done of a search for gains, and the lowest cost, as a context manager."""
+
+    def update(self, generations: int, done: int, lowest: float) -> None:
+        """Show how many of all generations are done, and the lowest cost, mm."""
+        self._show("search", "searching", done / generations, f"lowest cost {lowest:.2f} mm")
+
+
 def _tune_gains(args: GainSearch) -> None:
     """Search, print what came out, write the gains."""
     robot = load_robot(args.robot)
-    with Progress() as progress:
-        task = progress.add_task("searching", total=args.search.generations)
-
-        def report(done: int, lowest: float) -> None:
-            progress.update(task, completed=done, description=f"lowest cost {lowest:.2f} mm")
-
+    with SearchProgress("searching") as progress:
+        report = partial(progress.update, args.search.generations)
         tuned = tune(robot, args.robot, args.start, args.search, args.seed, args.out, report)
     show_table(
         ("command, m", "median before", "after", "std before, mm", "after"),
@@ -108,13 +113,15 @@ def _tune_gains(args: GainSearch) -> None:
 
 def _tune_recipe(args: RecipeSearch) -> None:
     """Search, print the best, write all trials and the figures."""
-    from hopping_leg.figure_style import to_svg
-    from hopping_leg.rl.tuning import tune as tune_recipe
-    from hopping_leg.rl.tuning_figures import FIGURES
+    with said_if_slow("Loading torch and optuna."):
+        from hopping_leg.figure_style import to_svg
+        from hopping_leg.rl.tuning import tune as tune_recipe
+        from hopping_leg.rl.tuning_figures import FIGURES
 
     at_least(1, workers=args.workers)
     out = args.tuning.folder
-    result = tune_recipe(args.tuning, args.workers, args.ray)
+    with said_if_slow(f"Trainings go on in {out}/trial-*."):
+        result = tune_recipe(args.tuning, args.workers, args.ray)
     _show(result)
     for file in (out / "trials.json", args.json):
         save_json(file, result)

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from rich.progress import TextColumn, TimeRemainingColumn
 
 from hopping_leg import errors, io, locks
 from hopping_leg.controllers.policy import Card, Policy
@@ -27,22 +26,26 @@ class TrainingProgress(LiveProgress):
     """Live numbers of a training, as a context manager."""
 
     def __init__(self, title: str, *, quiet: bool = False) -> None:
-        super().__init__(title, columns=(TextColumn("left"), TimeRemainingColumn()), quiet=quiet)
+        super().__init__(f"{title}, preparing", quiet=quiet)
         self._title = title
-        self._first_steps: int | None = None
+        self._first: tuple[float, int] | None = None
 
     def update(self, share: float, steps: int, hops: RecentHops, best: str) -> None:
         """Show the share that is done, 0 to 1, and how accurate the latest hops are."""
-        if self._first_steps is None:
-            self._first_steps = steps
+        if self._first is None:
+            self._first = self.passed, steps
+        seconds, more = self.passed - self._first[0], steps - self._first[1]
         note = f"{hops.count} hops"
         if math.isfinite(hops.mean_error):
             note += f" · apex error {1000 * hops.mean_error:.0f} mm"
-        if steps > self._first_steps:
-            note += f" · {(steps - self._first_steps) / max(self.passed, 1e-9):.0f} steps/s"
+        if more > 0:
+            note += f" · {more / max(seconds, 1e-9):.0f} steps/s"
         note += best
-        self._bar.update(self._task, completed=share, note=note)
-        self._line_if_due(f"{self._title} {100 * share:.0f} % · {note}")
+        self._show("training", self._title, share, note)
+
+    def finish(self, what: str) -> None:
+        """Show what is done after the training itself."""
+        self._show("training", f"{self._title}, {what}", 1.0)
 
 
 SHOWN_EVERY = 0.5
@@ -109,18 +112,18 @@ def train(
         )
     began = time.monotonic()
     torch.set_num_threads(max(threads, 1))
-    fitted = recipe.fit(robot)
-    folder = run_folder.RunFolder(out, fitted, robot, seed, minutes, source)
-    recipe, worst_score = stages.within_reach(fitted, robot)
-    with locks.hold_folder(out, errors.UsageError):
-        tree = folder.begin(resume=resume)
-        trainer = Trainer(recipe, robot, seed, folder, minutes, threads, began)
-        trainer.end_stage(worst_score)
-        trainer.learner.set_logger(loggers.make_logger(folder.path, log, folder.config))
-        trainer.on_snapshot = on_snapshot
-        if tree is not None:
-            trainer.restore(tree)
-        with TrainingProgress(f"{recipe.name} seed {seed}", quiet=quiet) as progress:
+    with TrainingProgress(f"{recipe.name} seed {seed}", quiet=quiet) as progress:
+        fitted = recipe.fit(robot)
+        folder = run_folder.RunFolder(out, fitted, robot, seed, minutes, source)
+        recipe, worst_score = stages.within_reach(fitted, robot)
+        with locks.hold_folder(out, errors.UsageError):
+            tree = folder.begin(resume=resume)
+            trainer = Trainer(recipe, robot, seed, folder, minutes, threads, began)
+            trainer.end_stage(worst_score)
+            trainer.learner.set_logger(loggers.make_logger(folder.path, log, folder.config))
+            trainer.on_snapshot = on_snapshot
+            if tree is not None:
+                trainer.restore(tree)
             return trainer.run(progress)
 
 
@@ -176,6 +179,7 @@ class Trainer:
         self._evaluate()
         learner.logger.close()
         self._show(force=True)
+        progress.finish("selecting and calibrating")
         with self._timed("selection and calibration"):
             content, selected = self._finish()
         minutes, steps = self.elapsed / 60, int(learner.num_timesteps)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from hopping_leg.errors import UsageError
-from hopping_leg.progress import LiveProgress, minutes
+from hopping_leg.progress import LiveProgress
 from hopping_leg.sim import compile_physics
 from hopping_leg.workers import ProcessWorkers
 
@@ -30,7 +30,7 @@ class Board(LiveProgress):
     """
 
     def __init__(self, total: float, at_once: int = 1, *, own_bars: bool = False) -> None:
-        super().__init__("transfer", total, lines=True if own_bars else None)
+        super().__init__("transfer", lines=True if own_bars else None)
         self._total, self.at_once = total, at_once
         self._old, self._new, self._begun = 0.0, 0.0, 0.0
 
@@ -47,14 +47,13 @@ class Board(LiveProgress):
             self._line(self._told(f"done: {name}{left and ' · '}{left}"))
         else:
             self._old += weight
-        self._bar.update(self._task, completed=self._done)
 
     def show(self, notes: Sequence[str], begun: float = 0.0) -> None:
         """Show a note per running job; ``begun`` is the weight of what is done of them."""
         self._begun = begun
-        note = " · ".join([*notes, self._time_left()])
-        self._bar.update(self._task, completed=self._done, note=note)
-        self._line_if_due(self._told(note))
+        share = self._done / max(self._total, 1e-9)
+        left = max(self._total - self._done, 0.0) * self.pace / self.at_once
+        self._show("transfer", "transfer", share, " · ".join(notes), left)
 
     @property
     def _done(self) -> float:
@@ -65,10 +64,6 @@ class Board(LiveProgress):
         """How long work takes, over what the weights say."""
         new = self._new + self._begun
         return (self.passed * self.at_once + _BELIEVED) / (new + _BELIEVED)
-
-    def _time_left(self) -> str:
-        left = (self._total - self._done) * self.pace / self.at_once
-        return f"about {minutes(left)} left" if left > 0 else ""
 
     def _told(self, text: str) -> str:
         return f"{100 * self._done / max(self._total, 1e-9):.0f} % · {text}"
