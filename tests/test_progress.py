@@ -43,8 +43,10 @@ def test_a_study_counts_earlier_jobs_but_not_their_time(capsys, monkeypatch):
         now = 250.0  # twice as long as the weight of what is new says
         board.finish("new", 120.0)
         board.show(["last"])
-    said = "80 % · done: new\ntransfer 80 % · last · about 2:40 left\n"
-    assert capsys.readouterr().err == said
+        board.begin("another")
+    assert capsys.readouterr().err == (
+        "transfer 80 % · done: new · about 2:40 left\ntransfer 80 % · another · about 2:40 left\n"
+    )
     now = 0.0
     with Board(400.0, at_once=2) as board:
         now = 60.0

@@ -104,9 +104,19 @@ class LiveProgress:
         return time.monotonic() - self._began
 
     def _show(
-        self, key: str, label: str, share: float, note: str = "", left: float | None = None
+        self,
+        key: str,
+        label: str,
+        share: float,
+        note: str = "",
+        left: float | None = None,
+        *,
+        at_once: bool = False,
     ) -> None:
-        """Show a share done, 0 to 1, on the bar of a key; ``left`` is a reckoning of one's own."""
+        """Show a share done, 0 to 1, on the bar of a key, or in a line when one is due.
+
+        ``left`` is a reckoning of one's own, s; ``at_once`` writes a line in any case.
+        """
         if self._waiting is not None:
             self._bar.remove_task(self._waiting)
             self._waiting = None
@@ -121,6 +131,8 @@ class LiveProgress:
         said = " · ".join(filter(None, (note, time_left.text(left) if share < 1 else "")))
         self._bar.update(task, description=label, completed=share, note=said)
         self._text = " · ".join(filter(None, (f"{label} {100 * share:.0f} %".strip(), said)))
+        if at_once:
+            self._next_line = 0.0
         self._line_if_due()
 
     def _line(self, text: str) -> None:

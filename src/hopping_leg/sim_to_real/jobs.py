@@ -1,6 +1,7 @@
 """Jobs of a sim-to-real study: each is done once, some at a time in processes of their own."""
 
 import json
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, wait
@@ -16,6 +17,10 @@ _LOOK_EVERY = 1.0
 _MOST_GUESSED = 0.95
 _BELIEVED = 10.0
 """Work, s, after which the pace of this computer counts as much as that of the weights."""
+
+
+_KNOWN = 0.1
+"""Share of the work that is begun when the pace is known though no job has ended."""
 
 
 class Board(LiveProgress):
@@ -36,24 +41,27 @@ class Board(LiveProgress):
 
     def begin(self, name: str) -> None:
         """Say that a job begins in this process."""
-        self._line(self._told(name))
+        self._tell(name, at_once=True)
 
     def finish(self, name: str, weight: float, *, new: bool = True) -> None:
         """Count a job; one that is not new was done by an earlier run."""
         self._begun = max(0.0, self._begun - weight)
         if new:
             self._new += weight
-            left = self._time_left()
-            self._line(self._told(f"done: {name}{left and ' · '}{left}"))
+            self._tell(f"done: {name}", at_once=True)
         else:
             self._old += weight
 
     def show(self, notes: Sequence[str], begun: float = 0.0) -> None:
         """Show a note per running job; ``begun`` is the weight of what is done of them."""
         self._begun = begun
+        self._tell(" · ".join(notes))
+
+    def _tell(self, note: str, *, at_once: bool = False) -> None:
+        known = self._new > 0 or self._begun > _KNOWN * self._total
+        left = (self._total - self._done) * self.pace / self.at_once if known else math.nan
         share = self._done / max(self._total, 1e-9)
-        left = max(self._total - self._done, 0.0) * self.pace / self.at_once
-        self._show("transfer", "transfer", share, " · ".join(notes), left)
+        self._show("transfer", "transfer", share, note, left, at_once=at_once)
 
     @property
     def _done(self) -> float:
@@ -64,9 +72,6 @@ class Board(LiveProgress):
         """How long work takes, over what the weights say."""
         new = self._new + self._begun
         return (self.passed * self.at_once + _BELIEVED) / (new + _BELIEVED)
-
-    def _told(self, text: str) -> str:
-        return f"{100 * self._done / max(self._total, 1e-9):.0f} % · {text}"
 
 
 class Job(ABC):
