@@ -115,9 +115,15 @@ def test_lines_come_while_nothing_is_reported_and_say_which_part_it_is(capsys, m
     assert lines[-3:] == ["2 of 2: slow, soft floor 25 %"] * 3
 
 
-@pytest.mark.parametrize(("seconds", "said"), [(0.0, ""), (0.2, "Loading.")])
-def test_what_is_slow_says_what_it_does(capsys, monkeypatch, seconds, said):
+@pytest.mark.parametrize("terminal", [True, False])
+@pytest.mark.parametrize("seconds", [0.0, 0.5])
+def test_what_is_slow_says_what_it_does(capsys, monkeypatch, seconds, terminal):
     monkeypatch.setattr("hopping_leg.progress._SILENCE", 0.05)
+    monkeypatch.setattr("hopping_leg.progress._LINE_SECONDS", 0.2)
+    monkeypatch.setattr("rich.console.Console.is_terminal", terminal)
     with said_if_slow("Loading."):
         time.sleep(seconds)
-    assert capsys.readouterr().err.strip() == said
+    lines = capsys.readouterr().err.splitlines()
+    assert bool(lines) == bool(seconds)
+    assert ("Loading." in lines) == (terminal and seconds > 0)
+    assert not lines or lines[-1].endswith("so far.")

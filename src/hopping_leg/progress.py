@@ -183,16 +183,17 @@ class ShareProgress(LiveProgress):
 
 @contextlib.contextmanager
 def said_if_slow(text: str) -> Iterator[None]:
-    """Say on stderr what is going on where it is not over at once, and that it still is."""
-    over, began = threading.Event(), time.monotonic()
+    """Say on stderr what is going on: on a terminal soon, elsewhere now and then."""
+    over, began, console = threading.Event(), time.monotonic(), plain_console(stderr=True)
+    first = _SILENCE if console.is_terminal else _LINE_SECONDS
 
     def watch() -> None:
-        for wait in itertools.chain([_SILENCE], itertools.repeat(_LINE_SECONDS)):
+        for wait in itertools.chain([first], itertools.repeat(_LINE_SECONDS)):
             if over.wait(wait):
                 return
             passed = time.monotonic() - began
-            since = f" {minutes(passed)} so far." if passed > _LINE_SECONDS else ""
-            plain_console(stderr=True).print(f"{text}{since}", soft_wrap=True)
+            since = f" {minutes(passed)} so far." if wait == _LINE_SECONDS else ""
+            console.print(f"{text}{since}", soft_wrap=True)
 
     threading.Thread(target=watch, daemon=True).start()
     try:

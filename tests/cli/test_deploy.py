@@ -140,7 +140,14 @@ def test_the_emulator_names_the_terminal_and_ends_with_ctrl_c(tmp_path):
         first = process.stdout.readline()
         assert first == f"Drives 1 and 2 of legv1 behind {link}\n"
         assert link.resolve().parent == Path("/dev/pts")
-        assert f"--transport {link}" in process.stdout.readline()
+        assert process.stdout.readline() == "Next:\n"
+        said = process.stdout.readline().split()
+        assert said == [
+            "hop",
+            "deploy",
+            "energy-shaping",
+            *f"--robot legv1 --transport {link}".split(),
+        ]
         process.send_signal(signal.SIGINT)
         rest, errors = process.communicate(timeout=30)
     finally:

@@ -97,7 +97,7 @@ def test_what_cannot_be_compared_is_one_sentence(folders, tmp_path, judged):
         ([a, str(tmp_path)], "is not a run"),
         ([a, str(skills)], "not an evaluation by the paper's trials"),
         ([a, str(broken)], "not readable as JSON"),
-        ([t0, str(unfinished)], "not finished; go on with `hop train --resume`"),
+        ([t0, str(unfinished)], "not finished; repeat the command that began it, with --resume"),
         ([a, str(lonely)], "no command in common"),
     ):
         with pytest.raises(UsageError, match=re.escape(sentence)):

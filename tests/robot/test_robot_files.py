@@ -1,6 +1,7 @@
 import dataclasses
 import functools
 import math
+import tomllib
 from operator import getitem
 
 import numpy as np
@@ -12,7 +13,15 @@ from hopping_leg.controllers.rollout import RolloutConfig
 from hopping_leg.deploy.drive_link import joint_transforms
 from hopping_leg.envs import HoppingEnv
 from hopping_leg.errors import RobotError
-from hopping_leg.robot import NO_MISMATCH, build_model, load_robot, shipped_robots
+from hopping_leg.robot import (
+    NO_MISMATCH,
+    build_model,
+    load_robot,
+    robot_from_tree,
+    robot_text,
+    robot_tree,
+    shipped_robots,
+)
 from tests.robot.files import UNITS, whole, written
 
 SIGNED = ("lower", "upper", "stop_lower", "stop_upper")
@@ -176,3 +185,10 @@ def test_numbers_that_cannot_be_name_the_fields(tmp_path, path, value, unit, sen
     with pytest.raises(RobotError, match=sentence) as caught:
         load_robot(written(tmp_path / "leg.toml", {path: (value, unit)}, "legv2"))
     assert path.partition(".")[0] in str(caught.value)
+
+
+@pytest.mark.parametrize("name", shipped_robots())
+def test_a_robot_comes_back_from_the_tables_that_are_made_of_it(name):
+    robot = load_robot(name)
+    tables = tomllib.loads(robot_text(robot_tree(robot, "a test")))
+    assert robot_from_tree(tables, "its file") == robot

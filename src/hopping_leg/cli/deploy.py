@@ -80,6 +80,7 @@ def run(args: Deploy) -> None:
         f"{cause} {done.outcome.ticks} ticks, {done.outcome.skipped} left out.",
     )
     options.say_written(done.path)
+    options.say_next(["hop", "report", "figures", done.path])
     if cause.reason not in (stop_reasons.Reason.FINISHED, stop_reasons.Reason.OPERATOR_STOP):
         errors = [event.get("controller_error", "") for event in events]
         words = [f"The leg was stopped: {cause}", *errors, _emulated(args, cause), done.complaint]

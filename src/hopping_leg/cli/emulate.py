@@ -30,7 +30,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from hopping_leg.cli.options import at_least, say, show_table
+from hopping_leg.cli.options import at_least, say, say_next, show_table
+from hopping_leg.controllers.registry import ENERGY_SHAPING, robot_of, shipped_policies
 from hopping_leg.deploy.drive_link import DriveMode, FaultCode
 from hopping_leg.deploy.realtime import prefer_this_thread, uninterrupted
 from hopping_leg.emulator.faults import KINDS, load_faults
@@ -104,7 +105,7 @@ def run(args: Emulate) -> None:
             ids = " and ".join(str(drive.id) for drive in robot.drives)
             where = f"on {port}." if ":" in str(port) else f"behind {port}"
             say(f"Drives {ids} of {robot.robot.name} {where}")
-            say(f"  hop deploy fast --transport {port}")
+            say_next(_deployment(args.robot, str(port)))
             sys.stdout.flush()
             if args.realtime and prefer_this_thread() is not None:
                 say("Without real-time priority the drives may answer late under load.")
@@ -116,6 +117,13 @@ def run(args: Emulate) -> None:
             display.end()
     finally:
         port.close()
+
+
+def _deployment(robot: str, port: str) -> list[str]:
+    """Return the command that drives the leg, with a policy that is made for it, if any is."""
+    fitting = [name for name in shipped_policies() if robot_of([name]) == robot]
+    name = "fast" if "fast" in fitting else [*fitting, ENERGY_SHAPING][0]
+    return ["hop", "deploy", name, "--robot", robot, "--transport", port]
 
 
 def _kind_cells(name: str) -> tuple[str, ...]:

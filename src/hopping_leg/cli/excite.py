@@ -17,7 +17,7 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 
-from hopping_leg.cli.options import JsonFile, RobotFile, save_json, say, show_table
+from hopping_leg.cli.options import JsonFile, RobotFile, save_json, say, say_next, show_table
 from hopping_leg.identify import paper_excitation as paper
 from hopping_leg.identify import recording_format
 from hopping_leg.identify.excitation import (
@@ -106,6 +106,7 @@ def run(
     )
     say(*excitation.description.split("; "))
     save_json(args.json, facts)
+    say_next(["hop", "record", args.out, "--robot", args.robot])
 
 
 def _template(args: MovingBase | MultisineCommand, robot: Robot, limits: HardwareRange) -> Template:

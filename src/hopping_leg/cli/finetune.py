@@ -82,7 +82,9 @@ def run(args: Finetune) -> None:
             resume=args.resume,
             on_trial=lambda row: options.say(line(row)),
         )
-    options.say(f"{result['why_it_ended']} Policy: {args.out / finetuning.POLICY}")
+    written = args.out / finetuning.POLICY
+    options.say(f"{result['why_it_ended']} Policy: {written}")
+    options.say_next(["hop", "evaluate", written, *options.robot_words(args.robot)])
     options.save_json(args.json, result)
 
 

@@ -26,6 +26,7 @@ from hopping_leg.cli.options import (
     going_on,
     save_json,
     say,
+    say_next,
     show_table,
 )
 from hopping_leg.identify import optimizers, plan, recording, result
@@ -144,6 +145,10 @@ def run(args: Identify) -> None:
     say(*(f"{_FILES[name]}: {path}" for name, path in outputs))
     if warning:
         raise errors.PhysicsError(warning)
+    say_next(
+        ["hop", "robots", "check", args.out],
+        ["hop", "train", "--robot", args.out, "--out", f"runs/{args.out.stem}"],
+    )
 
 
 def _bounds(text: str) -> tuple[str, tuple[float, float]]:

@@ -17,7 +17,14 @@ from pathlib import Path
 
 import tyro
 
-from hopping_leg.cli.options import JsonFile, save_json, say, say_written, show_table
+from hopping_leg.cli.options import (
+    JsonFile,
+    save_json,
+    say,
+    say_next,
+    say_written,
+    show_table,
+)
 from hopping_leg.controllers.registry import load_policy, shipped_policies
 from hopping_leg.io import write_atomically
 
@@ -122,6 +129,6 @@ def _pull(args: Pull) -> None:
     card = pulled.policy.card
     say(
         f"Commit {pulled.commit}, recipe {card.recipe}, robot {card.robot}, commands"
-        f" {card.command_low:g} to {card.command_high:g} m. Try it:"
-        f" hop evaluate {folder / policy_hub.POLICY}"
+        f" {card.command_low:g} to {card.command_high:g} m."
     )
+    say_next(["hop", "evaluate", folder / policy_hub.POLICY])

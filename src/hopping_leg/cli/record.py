@@ -78,6 +78,7 @@ def run(args: Record) -> None:
     if args.transport is not None:
         _record_motors(args, args.transport, robot, loaded, believed, gains)
         return
+    files = []
     with ShareProgress(parts=len(loaded)) as bar:
         for number, (stem, excitation) in enumerate(loaded):
             show = partial(bar.show_tick, stem, len(excitation))
@@ -92,8 +93,10 @@ def run(args: Record) -> None:
             )
             file = args.out / f"{robot.name}-{stem}.parquet"
             recording.save(file)
+            files.append(file)
             options.say_written(file)
             options.say(*(f"  {warning}" for warning in recording.warnings))
+    options.say_next(["hop", "identify", *files, "--robot", believed])
 
 
 def _record_motors(

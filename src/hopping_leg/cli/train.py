@@ -17,7 +17,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from hopping_leg.cli.options import JsonFile, at_least, going_on, save_json
+from hopping_leg.cli.options import (
+    JsonFile,
+    at_least,
+    going_on,
+    robot_words,
+    save_json,
+    say_next,
+)
 from hopping_leg.progress import said_if_slow
 from hopping_leg.robot import load_robot
 
@@ -94,5 +101,10 @@ def run(args: Options) -> None:
             log=args.log,
         )
     print(trained.policy.with_name("model_card.md").read_text(encoding="utf-8"))
-    print(f"Policy: {trained.policy}\nJudge it: hop evaluate {trained.policy}")
+    print(f"Policy: {trained.policy}")
+    on_robot = robot_words(args.robot)
+    say_next(
+        ["hop", "evaluate", trained.policy, *on_robot, "--out", out / "evaluation"],
+        ["hop", "view", trained.policy, *on_robot],
+    )
     save_json(args.json, read_result(trained.policy.parent))

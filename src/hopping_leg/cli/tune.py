@@ -25,7 +25,15 @@ from typing import Annotated, Any
 
 import tyro
 
-from hopping_leg.cli.options import JsonFile, RobotFile, at_least, save_json, say, show_table
+from hopping_leg.cli.options import (
+    JsonFile,
+    RobotFile,
+    at_least,
+    save_json,
+    say,
+    say_next,
+    show_table,
+)
 from hopping_leg.controllers.energy_shaping.tuning import Search, tune
 from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically
@@ -107,7 +115,8 @@ def _tune_gains(args: GainSearch) -> None:
         ],
     )
     gains = args.out / "gains.toml"
-    say(f"Gains: {gains}; use: hop evaluate {gains}")
+    say(f"Gains: {gains}")
+    say_next(["hop", "evaluate", gains, "--robot", args.robot])
     save_json(args.json, tuned)
 
 

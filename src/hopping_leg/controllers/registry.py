@@ -6,9 +6,10 @@ from importlib import resources
 from pathlib import Path
 
 from hopping_leg.controllers import energy_shaping, mpc, protocol, user_controllers
-from hopping_leg.controllers.policy import OtherRobot, Policy
+from hopping_leg.controllers.energy_shaping.gains import load_gains
+from hopping_leg.controllers.policy import Card, OtherRobot, Policy
 from hopping_leg.errors import PolicyError, UsageError, unknown_name
-from hopping_leg.robot import DEFAULT_ROBOT, Robot, shipped_robots
+from hopping_leg.robot import DEFAULT_ROBOT, Robot, load_robot, shipped_robots
 from hopping_leg.sim import CONTROL_RATE
 
 ENERGY_SHAPING = "energy-shaping"
@@ -22,6 +23,9 @@ ENERGY_SHAPING_LITERAL = "energy-shaping-literal"
 
 MPC_TRUE_STATE = "mpc-true-state"
 """Plans every push in the true state: in simulation alone."""
+
+ROBOT_FILE = "robot.toml"
+"""The robot of a training, in the folder of its policy."""
 
 _FACTORIES: dict[str, Callable[..., protocol.Controller]] = {
     ENERGY_SHAPING: energy_shaping.tuned_energy_shaping,
@@ -72,15 +76,30 @@ def load_policy(name_or_path: str | Path) -> Policy:
 
 
 def robot_of(controllers: Sequence[str]) -> str:
-    """Return the shipped robot that the first policy among controllers was trained on.
+    """Return the robot that the first policy or gain file among controllers was made for.
 
-    Without such a policy it is the default robot.
+    It is a shipped name, or the file that a training leaves beside its policy; without any, the
+    default robot.
     """
-    for name in controllers:
+    for text in controllers:
+        found = sorted(Path().glob(text)) if "*" in text else []
+        text = str(found[0]) if found else text
+        name = text if Path(text).exists() else text.rpartition("=")[2]
         if name in shipped_policies() or (name.endswith(".onnx") and Path(name).is_file()):
-            robot = load_policy(name).card.robot
-            return robot if robot in shipped_robots() else DEFAULT_ROBOT
+            return _robot_of_policy(load_policy(name).card, Path(name).with_name(ROBOT_FILE))
+        if name.endswith(".toml") and Path(name).is_file():
+            robot = load_gains(name).robot
+            return robot if robot in shipped_robots() or Path(robot).is_file() else DEFAULT_ROBOT
     return DEFAULT_ROBOT
+
+
+def _robot_of_policy(card: Card, beside: Path) -> str:
+    """Return the robot of a card: of that name or the file beside, whichever has its numbers."""
+    shipped = [card.robot] if card.robot in shipped_robots() else []
+    for robot in [*shipped, *([str(beside)] if beside.is_file() else [])]:
+        if load_robot(robot).has_digest(card.robot_digest):
+            return robot
+    return shipped[0] if shipped else DEFAULT_ROBOT
 
 
 def load_controller(

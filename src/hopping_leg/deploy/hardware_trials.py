@@ -4,6 +4,7 @@ import atexit
 import concurrent.futures
 import datetime
 import os
+import shlex
 import signal
 import threading
 import time
@@ -133,10 +134,15 @@ def _run(loop: ControlLoop, signals: list[int], recording: Path) -> LoopOutcome:
                 ending.daemon = True
                 ending.start()
             raise HardwareError(
-                f"{why}: the drives were told to brake. `hop report figures {recording}` shows what"
-                " was recorded."
+                f"{why}: the drives were told to brake. `{_draw(recording)}` shows what was"
+                " recorded."
             )
     return done.result()
+
+
+def _draw(recording: Path) -> str:
+    """Return the command that writes a recording's trace and draws it."""
+    return shlex.join(["hop", "report", "figures", str(recording)])
 
 
 def _pace(outcome: LoopOutcome, rate: float) -> Iterator[str]:
@@ -170,7 +176,7 @@ def _finish(
     except (TraceError, OSError) as error:
         raise TraceError(
             f"The run is over: {outcome.supervisor.stop_cause} {error} All that was recorded is in"
-            f" {kept}; once there is room, `hop report figures {kept}` writes the trace."
+            f" {kept}; once there is room, `{_draw(kept)}` writes the trace."
         ) from error
     if whole and not complaint:
         kept.unlink()

@@ -187,7 +187,7 @@ def _check(
                 f"{found:.6g}",
                 setting.holds(found),
                 f"the {name}'s {setting.name} is {found:.6g} but must be {setting.value:.6g}"
-                f" ({setting.why}); let `hop doctor --write` set it.",
+                f" ({setting.why}); `hop doctor` sets it with --write.",
                 setting.name,
             )
             for setting in required_settings(robot, joint)
@@ -198,7 +198,8 @@ def _check(
             "yes" if facts.home == _HOMED else "no",
             facts.home == _HOMED,
             f"the {name} is not homed: after power-up its encoder is absolute only within a turn"
-            " of its rotor; bring the leg into a pose that you know and run `hop doctor --home`.",
+            " of its rotor; bring the leg into a pose that you know and tell"
+            " `hop doctor` it with --home.",
         ),
         finding(
             "position",

@@ -85,7 +85,8 @@ def _read(label: str, path: Path) -> StoredRun:
     if measured is None and trained is None:
         if (path / "config.json").exists():
             raise UsageError(
-                f"The training in {path} is not finished; go on with `hop train --resume`."
+                f"The training in {path} is not finished; repeat the command that began it, with"
+                " --resume."
             )
         raise UsageError(f"{path} is not a run: it holds neither {_EVALUATION} nor {_TRAINING}.")
     kept = traces if measured and traces.is_dir() else None

@@ -234,7 +234,8 @@ def estimator_table(estimators: Sequence[Estimator]) -> Markup:
 
 
 def print_evaluation(console: Console, evaluation: Evaluation) -> None:
-    """Print the summary, what it was measured on, and notes."""
+    """Print notes, the summary, and what it was measured on."""
+    _print_notes(console, evaluation.notes)
     for one in filter(None, (evaluation, evaluation.secondary)):
         c = one.conditions
         title = (
@@ -256,8 +257,14 @@ def print_evaluation(console: Console, evaluation: Evaluation) -> None:
     own = [evaluation.rows(name) for name in evaluation.controllers]
     lines += [_load_line(rows) for rows in own if math.isfinite(rows[0].rated_torque_share)]
     lines += acceptance_lines(map(dataclasses.asdict, evaluation.summary))
-    for line in [*lines, *(f"Note: {note}" for note in evaluation.notes)]:
+    for line in lines:
         console.print(line, highlight=False)
+
+
+def _print_notes(console: Console, notes: Sequence[str]) -> None:
+    """Print what a reader must know before any table."""
+    for note in notes:
+        console.print(f"Note: {note}", highlight=False)
 
 
 def _load_line(rows: Sequence[Summary]) -> str:
@@ -274,7 +281,8 @@ def _load_line(rows: Sequence[Summary]) -> str:
 
 
 def print_robustness(console: Console, result: dict[str, Any]) -> None:
-    """Print the scores on every axis, what follows a change, and notes."""
+    """Print notes, the scores on every axis, and what follows a change."""
+    _print_notes(console, result["notes"])
     c = result["conditions"]
     marked = {axis["name"]: bool(axis["leaderboard"]) for axis in result["axes"]}
     scores = {(row["controller"], row["axis"]): _score(row) for row in result["scores"]}
@@ -299,8 +307,6 @@ def print_robustness(console: Console, result: dict[str, Any]) -> None:
             f" {'not settled' if settled is None else f'settled after {settled} hops'}.",
             highlight=False,
         )
-    for note in result["notes"]:
-        console.print(f"Note: {note}", highlight=False)
 
 
 def _score(row: dict[str, Any]) -> str:

@@ -39,7 +39,7 @@ One network from joint measurements to joint torques, for robot `{result["robot"
 
 Trials on the selection seeds {", ".join(map(str, selected["seeds"]))}, noise and delay on, physics
 step {1000 * TIMESTEP:g} ms, the first 2 s of each trial dropped. These seeds chose the policy;
-`hop evaluate {result["recipe"]}` judges it on others.
+`hop evaluate policy.onnx` judges it on others, in this folder.
 
 {table(selected["trials"])}
 {missed_commands(selected["trials"])}"""

@@ -1,16 +1,18 @@
 """The folder of one training: what it was asked for, checkpoints, snapshots, results."""
 
 import json
+import shlex
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from hopping_leg.controllers.registry import ROBOT_FILE
 from hopping_leg.errors import UsageError
-from hopping_leg.io import parse_json, versions, write_json
+from hopping_leg.io import parse_json, versions, write_atomically, write_json
 from hopping_leg.locks import FOLDER_LOCK
 from hopping_leg.rl import checkpoint, recipes
 from hopping_leg.rl.recipe import Recipe
-from hopping_leg.robot.parameters import Robot
+from hopping_leg.robot import Robot, load_robot, robot_text, robot_tree, shipped_robots
 
 _LIBRARIES = ("hopping-leg", "mujoco", "numpy", "onnxruntime", "stable-baselines3", "torch")
 
@@ -30,7 +32,7 @@ class RunFolder:
         minutes: float | None,
         source: Path | None = None,
     ) -> None:
-        self.path, self._source = path, source
+        self.path, self._source, self._robot = path, source, robot
         self._defaults = as_stored(asdict(recipes.RECIPES.get(recipe.name, recipe)))
         self.config = as_stored(
             {
@@ -61,13 +63,16 @@ class RunFolder:
         """The command that makes such a run."""
         config = self.config
         recipe = config["options"]["source"] or config["recipe"]
-        words = ["hop train", "--recipe", recipe, "--robot", config["robot"]]
+        robot = config["robot"]
+        if robot not in shipped_robots() or load_robot(robot) != self._robot:
+            robot = str(self.path / ROBOT_FILE)
+        words = ["hop", "train", "--recipe", recipe, "--robot", robot]
         words += ["--seed", str(config["seed"])]
         if config["source"] is not None:
             words += ["--source", config["source"]]
         if config["minutes_budget"] is not None:
             words += ["--minutes", f"{config['minutes_budget']:g}"]
-        return " ".join([*words, *recipes.words_of(config["recipe"], config["options"])])
+        return shlex.join([*words, *recipes.words_of(config["recipe"], config["options"])])
 
     def snapshot(self, steps: int) -> Path:
         """Return the file of the policy as it was after so many steps."""
@@ -87,6 +92,7 @@ class RunFolder:
         tree = checkpoint.read_checkpoint(found[-1]) if found else self._from_source()
         if new:
             self.write("config.json", self.config)
+            write_robot(self.path, self._robot)
         return tree
 
     def _from_source(self) -> checkpoint.Tree | None:
@@ -114,6 +120,12 @@ class RunFolder:
             if isinstance(config.get("source"), str):
                 config["source"] = str(Path(config["source"]).resolve())
         check_same(self.path, stored, asked)
+
+
+def write_robot(folder: Path, robot: Robot) -> None:
+    """Write the robot that a policy is made for into the policy's folder."""
+    tree = robot_tree(robot, f"as '{robot.name}' had it when {folder.name} began")
+    write_atomically(folder / ROBOT_FILE, robot_text(tree).encode())
 
 
 def is_new(folder: Path, *, resume: bool) -> bool:
@@ -168,7 +180,9 @@ def read_result(path: Path) -> dict[str, Any]:
     """Return a finished run's ``result.json``; ``UsageError`` where there is none."""
     file = path / "result.json"
     if not file.exists():
-        raise UsageError(f"{path} holds no finished run; go on with `hop train --resume`.")
+        raise UsageError(
+            f"{path} holds no finished run; repeat the command that began it, with --resume."
+        )
     return read_json(file)
 
 

@@ -35,6 +35,7 @@ from hopping_leg.robot.robot_files import (
     parent_robot,
     robot_from_tree,
     robot_text,
+    robot_tree,
     shipped_robots,
 )
 from hopping_leg.robot.urdf import to_urdf
@@ -75,6 +76,7 @@ __all__ = [
     "parent_robot",
     "robot_from_tree",
     "robot_text",
+    "robot_tree",
     "shipped_robots",
     "to_urdf",
 ]

@@ -1,5 +1,6 @@
 """Robot files: one TOML per leg, every number with its unit and source."""
 
+import dataclasses
 import json
 import logging
 import shlex
@@ -180,6 +181,26 @@ def _merge(parent: Tree, child: Tree) -> Tree:
             value = _merge(inherited, value)
         merged[key] = value
     return merged
+
+
+def robot_tree(part: Any, source: str) -> Tree:  # noqa: ANN401
+    """Return a robot as a file's tables that stand alone, without what is at its default."""
+    tables: Tree = {}
+    for spec in dataclasses.fields(part):
+        value = getattr(part, spec.name)
+        if dataclasses.is_dataclass(value):
+            if value != _default(spec):
+                tables[spec.name] = robot_tree(value, source)
+        elif value is not None and value != spec.default:
+            unit = spec.metadata.get("unit")
+            entry = {"value": value, "unit": unit, "source": source}
+            tables[spec.name] = value if unit is None else entry
+    return tables
+
+
+def _default(spec: Field) -> object:
+    made = spec.default_factory
+    return spec.default if made is dataclasses.MISSING else made()
 
 
 def robot_text(tree: Tree, comment: str = "") -> str:

@@ -7,6 +7,7 @@ call repeats the search from them without simulating.
 import dataclasses
 import itertools
 import json
+import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -296,7 +297,9 @@ def tune(
     ]
     costs = [cost(s, options.flight) for s in scores]
     better = pair[1] if costs[1] < costs[0] else pair[0]
-    save_gains(out / "gains.toml", GainFile(robot_name, _command(start, options, seed), better))
+    save_gains(
+        out / "gains.toml", GainFile(robot_name, _command(robot_name, start, options, seed), better)
+    )
     return {
         "generations": options.generations,
         "seed": seed,
@@ -309,12 +312,15 @@ def tune(
     }
 
 
-def _command(start: str, options: Search, seed: int) -> str:
+def _command(robot: str, start: str, options: Search, seed: int) -> str:
     """Return the command that searches so, what goes without saying left out."""
-    words = ["hop tune energy-shaping", f"--start {start}", f"--seed {seed}"]
+    words = ["hop", "tune", "energy-shaping", "--robot", robot, "--start", start]
+    words += ["--seed", str(seed)]
     usual = vars(Search()) | {"threads": options.threads}
-    words += [f"--{n} {_word(value)}" for n, value in vars(options).items() if value != usual[n]]
-    return " ".join(words)
+    for name, value in vars(options).items():
+        if value != usual[name]:
+            words += [f"--{name}", *_word(value).split()]
+    return shlex.join(words)
 
 
 def _word(value: object) -> str:

@@ -254,6 +254,7 @@ def finetune(
     with hold_folder(out, UsageError):
         if run_folder.is_new(out, resume=resume):
             write_json(out / "config.json", asked)
+            run_folder.write_robot(out, task.robot)
         else:
             run_folder.check_same(out, run_folder.read_json(out / "config.json"), asked)
             run_folder.refuse_finished(out / POLICY)
