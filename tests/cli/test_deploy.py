@@ -131,6 +131,15 @@ def test_a_recording_from_motors_is_one_that_identification_takes(emulate, tmp_p
     assert np.nanmedian(np.abs(torque[1:] - asked[:-1])) < 0.05
 
 
+def test_a_leg_that_folds_onto_its_stop_when_its_torques_fade_has_finished(tmp_path, monkeypatch):
+    motors = ["--motor", "ak80-9", "ak80-6", "--set", "knee.belt_ratio=1.5"]
+    robot = str(tmp_path / "leg.toml")
+    assert main(["robots", "import", "examples/leg.urdf", *motors, "--out", robot]) == 0
+    put_behind(monkeypatch, robot=robot, pose="stand")
+    words = ["--transport", "/dev/null", "--seconds", "2", "--yes", "--out", str(tmp_path)]
+    assert main(["deploy", "energy-shaping", "--robot", robot, *words]) == 0
+
+
 def test_the_emulator_names_the_terminal_and_ends_with_ctrl_c(tmp_path):
     link = tmp_path / "leg"
     words = [sys.executable, "-m", "hopping_leg.cli", "emulate", "--robot", "legv1"]

@@ -63,6 +63,11 @@ class Poses:
     rest: Array
 
 
+_SUNK = 0.1
+"""Angle from the rest posture at which a leg whose torques fade has let go of it, rad: from there
+the braking drives let it down, more slowly than its friction would."""
+
+
 def hopping_poses(robot: Robot) -> Poses:
     """Return the standing start of the simulated trials, and a leg nearly folded, foot below."""
     folded = kinematics.foot_position(robot, np.array([robot.hip.upper, robot.knee.lower]))
@@ -128,6 +133,9 @@ class MotionSequence:
             return SequenceStep((0.0, 0.0), self.commands.at(0.0), Part.WAIT)
         phase, lasted = self.timing.phase(time - self._began)
         q, qd = measurement.q[0, 0], measurement.qd[0, 0]
+        fading = phase is Part.SINK and lasted > self.timing.sink - self.timing.fade
+        if self.finished or (fading and np.abs(q - self.poses.rest).max() > _SUNK):
+            phase = Part.DONE
         if phase is not self._phase and phase in (Part.SINK, Part.DONE):
             self._from = q.copy()
         if phase is Part.HOP and self._phase is not Part.HOP:
