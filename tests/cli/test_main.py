@@ -155,7 +155,11 @@ def test_other_shells_know_every_verb_and_another_is_refused(capsys, refused):
         (["train", "--minutes", "few"], "--minutes is 'few' but must be a number."),
         (["train", "--log", "wand"], "There is no value of --log 'wand'. Did you mean 'wandb'?"),
         (["train", "--resume", "now"], "--resume takes no value, but 'now' stands behind it."),
-        (["train", "more"], "Unrecognized options: more"),
+        (["train", "more"], "hop train takes no word by itself, but 'more' stands there."),
+        (["train", "mine.toml"], "Did you mean --robot mine.toml?"),
+        (["deploy", "fast"], "hop deploy needs --transport NAME: Path of an fdcanusb"),
+        (["robots", "check", "examples/my_log.toml"], "Did you mean examples/my_leg.toml?"),
+        (["evaluate", "leg.urdf"], "make a robot file of it: hop robots import leg.urdf."),
     ],
 )
 def test_wrong_usage_is_one_sentence_with_the_nearest_name(refused, words, sentence):
@@ -193,6 +197,13 @@ def test_only_a_comma_between_entries_parts_a_word(tmp_path, monkeypatch):
     assert lists("x", "--set", "hip.friction=0,1").set == ("hip.friction=0,1",)
     assert lists("x", "--pair=1,2", "--loud", "y") == Lists(("x", "y"), pair=(1.0, 2.0), loud=True)
     assert lists("x", "--files", "c,d", "a,b").files == (Path("c"), Path("d"), Path("a,b"))
+
+
+@pytest.mark.parametrize("columns", [40, 80, 200])
+def test_the_overview_fits_the_terminal(capsys, monkeypatch, columns):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    assert main([]) == 0
+    assert max(map(len, capsys.readouterr().out.splitlines())) <= columns
 
 
 @pytest.mark.parametrize("columns", [40, 80, 200])

@@ -262,8 +262,12 @@ def overview() -> str:
     """Return what ``hop --help`` prints."""
     return "\n\n".join(
         [
-            f"hop {_VERSION}  say which version this is\nhop demo       {VERBS['demo']}",
-            "A one-legged robot hops to commanded heights: simulate, train, evaluate, compare.",
+            option_help.columns(
+                [(f"hop {_VERSION}", "say which version this is"), ("hop demo", VERBS["demo"])]
+            ),
+            option_help.wrapped(
+                "A one-legged robot hops to commanded heights: simulate, train, evaluate, compare."
+            ),
             option_help.columns([entry for entry in VERBS.items() if entry[0] != "demo"]),
             option_help.wrapped(
                 "`hop VERB --help` explains a verb; `hop --tyro-print-completion bash` prints a"

@@ -316,10 +316,21 @@ def tidy_words(options: Any, program: str, words: Sequence[str]) -> list[str]:  
     alone = [option for option in known if option.positional]
     given = _sorted_words(program, known, words[1:] if kinds else words)
     stray = [part for word in given.pop("") for part in _parts(word, alone[0] if alone else None)]
+    if stray and not alone:
+        robot = stray[0].endswith(".toml") and any(option.name == "--robot" for option in known)
+        meant = f" Did you mean --robot {stray[0]}?" if robot else ""
+        raise UsageError(
+            f"{program} takes no word by itself, but '{stray[0]}' stands there.{meant}"
+        )
     if len(stray) < sum(option.default is dataclasses.MISSING for option in alone):
         missing = alone[len(stray)]
         raise UsageError(f"{program} needs {missing.name}: {missing.text}")
     flags = _flags(known)
+    for option in known:
+        if option.default is dataclasses.MISSING and not (
+            option.positional or option.name in given
+        ):
+            raise UsageError(f"{program} needs {option.invocation}: {option.text}")
     for flag, values in given.items():
         _check_values(flag, flags[flag], values)
     behind = [word for flag, values in given.items() for word in (flag, *values)]

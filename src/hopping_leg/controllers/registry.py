@@ -1,5 +1,6 @@
 """Controllers by name: energy shaping, mpc, policies, a user's policy, gain file or class."""
 
+import shlex
 from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import resources
@@ -67,6 +68,9 @@ def load_policy(name_or_path: str | Path) -> Policy:
         return Policy((_SHIPPED / f"{name}.onnx").read_bytes(), f"shipped policy '{name}'", name)
     if name.endswith(".onnx"):
         return Policy.load(Path(name))
+    if name.endswith((".urdf", ".xml")):
+        words = shlex.join(["hop", "robots", "import", name])
+        raise UsageError(f"{name} is no controller; make a robot file of it: {words}.")
     if Path(name).exists():
         raise PolicyError(f"{name} is not a policy file; those end in .onnx.")
     raise UsageError(

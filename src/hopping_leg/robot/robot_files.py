@@ -10,7 +10,7 @@ from multiprocessing import parent_process
 from pathlib import Path
 from typing import Any
 
-from hopping_leg.errors import RobotError, unknown_name
+from hopping_leg.errors import RobotError, nearest_names, unknown_name
 from hopping_leg.io import Field, Tree, is_number, one_line, parse_toml, read_dataclass
 from hopping_leg.robot.parameters import Robot
 from hopping_leg.robot.robot_checks import (
@@ -158,8 +158,11 @@ def _read(name: str) -> Tree:
     if name.endswith(".toml"):
         path = Path(name)
         if not path.is_file():
+            near = nearest_names(path.name, [file.name for file in path.parent.glob("*.toml")])
+            meant = f" Did you mean {path.with_name(near[0])}?" if near else ""
             raise RobotError(
-                f"There is no robot file {path}; give a .toml file or one of: {', '.join(shipped)}."
+                f"There is no robot file {path}; give a .toml file or one of:"
+                f" {', '.join(shipped)}.{meant}"
             )
         content = path.read_bytes()
     elif name in shipped:
