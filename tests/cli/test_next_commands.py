@@ -138,6 +138,7 @@ def test_what_a_training_leaves_names_itself(run, monkeypatch):
     parse(view, monkeypatch)
     card = Path("runs/my run/model_card.md").read_text()
     assert "`hop evaluate policy.onnx`" in card
+    assert "for robot my-leg, `robot.toml` in this folder" in card
     (command,) = (line.strip() for line in card.splitlines() if line.startswith("    hop train"))
     parse(shlex.split(command), monkeypatch)
     assert isinstance(load_policy("runs/my run/policy.onnx"), Policy)

@@ -3,9 +3,10 @@
 from pathlib import Path
 from typing import Any
 
+from hopping_leg.controllers.registry import ROBOT_FILE
 from hopping_leg.io import write_atomically
 from hopping_leg.rl.run_folder import read_result
-from hopping_leg.robot import TIMESTEP
+from hopping_leg.robot import TIMESTEP, shipped_robots
 
 MISSED = 0.02
 """Median error beyond which a policy misses its command, m; the robustness suite's."""
@@ -23,9 +24,11 @@ def render(result: dict[str, Any]) -> str:
     selected, task = result["selected"], result["options"]["task"]
     commands = task["command_range"] or (min(task["commands"]), max(task["commands"]))
     versions = ", ".join(f"{name} {number}" for name, number in result["versions"].items())
+    name = result["robot"]
+    robot = f"`{name}`" if name in shipped_robots() else f"{name}, `{ROBOT_FILE}` in this folder"
     return f"""# Policy `{result["recipe"]}`, seed {result["seed"]}
 
-One network from joint measurements to joint torques, for robot `{result["robot"]}`
+One network from joint measurements to joint torques, for robot {robot}
 (parameters {result["robot_digest"]}), commands {commands[0]:g} to {commands[1]:g} m,
 {task["rate"]:g} Hz. Made by
 
