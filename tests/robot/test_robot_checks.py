@@ -139,6 +139,13 @@ def test_what_cannot_be_is_doubted(tmp_path, path, value, says):
     assert any(f"'{path}'" in sentence and says in sentence for sentence in found)
 
 
+@pytest.mark.parametrize(("upper", "doubted"), [(-0.1, True), (0.25, True), (0.9, False)])
+def test_a_leg_whose_foot_never_comes_below_the_hip_is_doubted(tmp_path, upper, doubted):
+    limits = {"hip.lower": (-1.2, "rad"), "hip.upper": (upper, "rad")}
+    found = doubts(written(tmp_path / "leg.toml", limits))
+    assert any("never comes below the hip" in doubt for doubt in found) == doubted
+
+
 def test_a_weight_beyond_a_links_end_needs_a_word(tmp_path):
     out = {"shank.com": (0.16, "m"), "shank.inertia": (2e-4, "kg m2")}
     (sentence,) = said(written(tmp_path / "leg.toml", out, "legv2"))

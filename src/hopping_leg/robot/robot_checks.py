@@ -4,6 +4,8 @@ import math
 from collections.abc import Iterator
 from operator import attrgetter
 
+import numpy as np
+
 from hopping_leg.errors import RobotError, unknown_name
 from hopping_leg.io import Tree
 from hopping_leg.robot.hardware import contradictions, speed_constant
@@ -170,6 +172,11 @@ def doubts_of_values(robot: Robot, stated: Tree, origin: str) -> Iterator[str]:
                     f"{origin}: '{path}' takes more torque than the motor gives,"
                     f" {joint.torque_limit:g} N m; check both."
                 )
+    if robot.kind == "leg" and not _stands(robot):
+        yield (
+            f"{origin}: within 'hip.lower' to 'knee.upper' the foot never comes below the hip; is a"
+            " joint's sign wrong, or does the knee bend forward?"
+        )
     weight = robot.mass * GRAVITY
     if robot.rail.friction > weight:
         yield (
@@ -179,6 +186,14 @@ def doubts_of_values(robot: Robot, stated: Tree, origin: str) -> Iterator[str]:
     missing = sorted(_STOPS - {path for path, _ in numbers(stated)})
     if missing and robot.kind == "leg":
         yield f"{origin} does not state {', '.join(missing)}; leg V2's mechanical stops are taken."
+
+
+def _stands(robot: Robot) -> bool:
+    """Tell whether some posture within the soft limits has the foot straight below the hip."""
+    knee = np.linspace(robot.knee.lower, robot.knee.upper, 50)
+    thigh, shank = robot.thigh.length, robot.shank.length
+    hip = np.arctan2(-shank * np.sin(knee), thigh + shank * np.cos(knee))
+    return bool(np.any((robot.hip.lower <= hip) & (hip <= robot.hip.upper)))
 
 
 def _slip(value: float, unit: str, low: float, high: float) -> str:
