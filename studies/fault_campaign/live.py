@@ -14,7 +14,7 @@ from hopping_leg.deploy.drive_link import DriveMode
 from hopping_leg.deploy.flight_recorder import SUFFIX, recover
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.stop_reasons import Reason
-from hopping_leg.deploy.transport import opener
+from hopping_leg.deploy.transport import open_transport
 from hopping_leg.emulator.process import EmulatorProcess
 from hopping_leg.emulator.wire_log import WireLog
 from hopping_leg.errors import TraceError
@@ -66,7 +66,7 @@ def play_live(case: Case, family: Family, robot: Robot) -> Result:
 
 def _hop(scene: Scene, emulator: EmulatorProcess, folder: Path) -> Result:
     result = Result(words(scene.mishap))
-    link = MoteusLink(scene.robot, opener(str(emulator.path)))
+    link = MoteusLink(scene.robot, open_transport(str(emulator.path)))
     try:
         done = scene.perform(link, folder, None, realtime=True)
     finally:
@@ -88,7 +88,7 @@ def _killed(scene: Scene, emulator: EmulatorProcess, folder: Path) -> Result:
     child = os.fork()
     if child == 0:
         try:
-            link = MoteusLink(scene.robot, opener(str(emulator.path)))
+            link = MoteusLink(scene.robot, open_transport(str(emulator.path)))
             scene.perform(link, folder, None, realtime=True)
             signal.pause()
         finally:

@@ -65,10 +65,6 @@ class StruckClock:
         """Return the robot's time."""
         return self._lockstep.now()
 
-    def patience(self, until: float) -> float:
-        """Return the time that is left, s."""
-        return self._lockstep.patience(until)
-
     def wait_until(self, deadline: float) -> float:
         """Let the robot move until a deadline, unless the host is struck.
 

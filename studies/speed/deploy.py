@@ -28,7 +28,7 @@ from hopping_leg.deploy.hardware_trials import Performance, header_of, perform
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.motion_sequence import MotionSequence, Part, SequenceTiming, hopping_poses
 from hopping_leg.deploy.safety_limits import hopping_limits
-from hopping_leg.deploy.transport import opener
+from hopping_leg.deploy.transport import open_transport
 from hopping_leg.emulator.process import EmulatorProcess
 from hopping_leg.emulator.server import EmulatorConfig
 from hopping_leg.emulator.virtual_time import Lockstep
@@ -174,7 +174,7 @@ def _real_time(study: Deploy, robot: Robot, on_progress: Callable[[str], None]) 
     while done < wanted - 1 and len(stops) < MOST_STOPS:
         on_progress(f"{(wanted - done) / 60:.1f} minutes in real time")
         with EmulatorProcess(EmulatorConfig(robot=study.robot)) as emulator, _folder() as folder:
-            link, truth = MoteusLink(robot, opener(str(emulator.path))), Truth()
+            link, truth = MoteusLink(robot, open_transport(str(emulator.path))), Truth()
             part = (wanted - done) / len(HEIGHTS)
             schedule = CommandSchedule(tuple((height, part) for height in HEIGHTS))
             sequence = _sequence(study, robot, schedule, wanted - done)

@@ -23,8 +23,8 @@ def put_behind(monkeypatch, *, clamped=False, **start):
         legs = lockstep.robot.leg._legs
         legs.fixed_base = True
         legs.set_robots(legs.robots)
-    monkeypatch.setattr(transport, "opener", lambda name: None)
-    monkeypatch.setattr(moteus_link, "MoteusLink", lambda robot, opener: lockstep.link)
+    monkeypatch.setattr(transport, "open_transport", lambda name: None)
+    monkeypatch.setattr(moteus_link, "MoteusLink", lambda robot, transport: lockstep.link)
     monkeypatch.setattr(hardware_trials, "RealClock", lambda: lockstep)
     quick = functools.partial(SequenceTiming, rise=0.4, settle=0.1, sink=0.5)
     for verb in (deploy, record):

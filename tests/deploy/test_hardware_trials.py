@@ -108,6 +108,13 @@ def test_a_drive_that_is_not_fit_is_refused_with_the_reason(emulated, start, wor
         require_fit(findings)
 
 
+def test_what_is_asked_of_a_drive_is_asked_again_where_an_answer_is_lost(emulated):
+    lost = [Fault("drop_reply", since="start", at=0.002 + 0.007 * k) for k in range(5)]
+    lockstep = emulated(faults=tuple(lost))
+    require_fit(check_drives(LEG, LIMITS, inspect(lockstep.link)))
+    assert len(lockstep.robot.fault_injector.log) == len(lost)
+
+
 def test_configuring_and_homing_make_a_delivered_drive_fit(emulated):
     lockstep = emulated(configured=False, homed=False)
     findings = check_drives(LEG, LIMITS, inspect(lockstep.link))

@@ -286,3 +286,18 @@ def test_what_is_not_permitted_is_a_notice(monkeypatch):
     assert "SCHED_FIFO" in realtime.prefer_this_process()
     with realtime.keeping_time(realtime=False) as notices:
         assert notices == ()
+
+
+def test_processors_are_told_to_stay_awake_as_long_as_the_loop_runs(tmp_path, monkeypatch):
+    told = tmp_path / "latency"
+    told.write_bytes(b"")
+    monkeypatch.setattr(realtime, "_LATENCY", told)
+    with realtime.processors_awake() as notice:
+        assert notice is None
+        assert told.read_bytes() == bytes(4)
+    monkeypatch.setattr(realtime, "_LATENCY", tmp_path)
+    with realtime.processors_awake() as notice:
+        assert "No permission to keep the processors awake" in notice
+    monkeypatch.setattr(realtime, "_LATENCY", tmp_path / "none")
+    with realtime.processors_awake() as notice:
+        assert notice is None

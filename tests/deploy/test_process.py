@@ -134,9 +134,9 @@ def test_a_second_signal_ends_the_process_within_a_second(emulator, tmp_path, co
 HOST = """
 import sys, time
 from hopping_leg.deploy.moteus_link import MoteusLink
-from hopping_leg.deploy.transport import opener
+from hopping_leg.deploy.transport import open_transport
 from hopping_leg.robot import load_robot
-link = MoteusLink(load_robot("legv2-paper"), opener(sys.argv[1]))
+link = MoteusLink(load_robot("legv2-paper"), open_transport(sys.argv[1]))
 print("open", flush=True)
 time.sleep(600)
 """

@@ -8,7 +8,7 @@ import numpy as np
 from moteus.transport_device import Frame as ClientFrame
 from moteus.transport_device import TransportDevice
 
-from hopping_leg.emulator.frames import Frame, padded
+from hopping_leg.deploy.frames import Frame, padded
 from hopping_leg.emulator.robot import EmulatedRobot
 from hopping_leg.robot import load_robot
 

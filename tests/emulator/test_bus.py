@@ -5,8 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from moteus.fdcanusb_device import _append_checksum, _compute_crc8
 
+from hopping_leg.deploy.frames import Frame, crc8, padded
 from hopping_leg.emulator.bus import ReplyWriter
-from hopping_leg.emulator.frames import Frame, LineProtocol, crc8, padded, received_line
+from hopping_leg.emulator.ports import LineProtocol
 from tests.emulator.bench import Bench, R
 
 
@@ -123,7 +124,7 @@ def test_checksums_are_demanded_and_given_once_one_was_seen():
     assert refusal.startswith(b"ERR checksum")
     (refusal,) = protocol.feed(_append_checksum(SEND).replace(b"8001", b"8002") + b"\n")
     assert refusal.startswith(b"ERR checksum")
-    line = protocol.line(received_line(Frame(0x100, b"\x20")))
+    line = protocol.line(Frame(0x100, b"\x20").received)
     assert line == _append_checksum(b"rcv 100 20 e B F") + b"\r\n"
 
 
@@ -139,7 +140,7 @@ def test_endless_noise_takes_no_memory():
     protocol = LineProtocol()
     for _ in range(50):
         protocol.feed(b"x" * 100)
-    assert len(protocol._buffer) <= 512
+    assert len(protocol._lines._rest) <= 512
 
 
 def test_payloads_are_padded_with_nops():

@@ -5,9 +5,10 @@ import pytest
 from moteus.fdcanusb_device import _strip_and_validate_checksum
 
 from hopping_leg.deploy.drive_link import DriveMode, FaultCode
+from hopping_leg.deploy.frames import Frame
 from hopping_leg.emulator.faults import KINDS, Fault, load_faults
-from hopping_leg.emulator.frames import Frame, QueuedReply
 from hopping_leg.emulator.ports import PtyPort
+from hopping_leg.emulator.reply_queue import QueuedReply
 from hopping_leg.errors import UsageError
 from tests.emulator.bench import Bench, R
 

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 def connect(robot: Robot, transport: str) -> "contextlib.closing[MoteusLink]":
     """Open a robot's drives, to be closed; UsageError and HardwareError say why that fails."""
     from hopping_leg.deploy.moteus_link import MoteusLink
-    from hopping_leg.deploy.transport import opener
+    from hopping_leg.deploy.transport import open_transport
 
-    return contextlib.closing(MoteusLink(robot, opener(transport)))
+    return contextlib.closing(MoteusLink(robot, open_transport(transport)))
 
 
 def find(

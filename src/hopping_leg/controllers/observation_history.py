@@ -113,7 +113,7 @@ class Dated(ObservationHistory):
     def __init__(self, period: float) -> None:
         super().__init__(period)
         self._track = SampleHistory(max(*self.LAGS, DELAY_DEPTH) + 1, period)
-        self._lags, self._torque_lags = list(self.LAGS), list(self.TORQUE_LAGS)
+        self._lags, self._torque_lags = np.array(self.LAGS), np.array(self.TORQUE_LAGS)
         self.reset(0)
 
     def reset(self, count: int) -> None:

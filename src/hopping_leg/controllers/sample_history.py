@@ -50,7 +50,6 @@ class SampleHistory:
 
     def reset(self, count: int) -> None:
         """Forget everything; ``count`` legs follow."""
-        self._legs = np.arange(count)[:, None]
         self._known = RingBuffer(np.zeros((self.length, count), np.bool_))
         self._q = RingBuffer(np.zeros((self.length, count, 2)))
         self._qd = RingBuffer(np.zeros((self.length, count, 2)))
@@ -81,7 +80,7 @@ class SampleHistory:
         """Put this tick's three samples in their places."""
         back = np.rint(measurement.age / self.period).astype(np.int64)
         inside = back < self.length
-        slot, legs = back[inside], np.broadcast_to(self._legs, back.shape)[inside]
+        slot, (legs, _) = back[inside], np.nonzero(inside)
         self.known[slot, legs] = True
         self.q[slot, legs] = measurement.q[inside]
         self.qd[slot, legs] = measurement.qd[inside]
@@ -94,11 +93,10 @@ class SampleHistory:
 
     def hold(self, window: int) -> None:
         """Give unknown ticks among the newest ``window`` the last sample known before them."""
-        known_at, histories = self.known, (self.q, self.qd)
-        for i in range(min(window, self.length - 1) - 1, -1, -1):
-            known = known_at[i, :, None]
-            for history in histories:
-                np.copyto(history[i], history[i + 1], where=~known)
+        unknown = ~self.known[: min(window, self.length - 1), :, None]
+        for i in np.flatnonzero(unknown.any(axis=(1, 2)))[::-1]:
+            for history in (self.q, self.qd):
+                np.copyto(history[i], history[i + 1], where=unknown[i])
 
     def state(self) -> dict[str, Any]:
         """Return everything remembered, as arrays."""

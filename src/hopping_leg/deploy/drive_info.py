@@ -1,19 +1,21 @@
 """What the drives say about themselves, asked one by one before anything is armed."""
 
-import asyncio
-import contextlib
 import math
 from collections.abc import Sequence
 from typing import Any
 
-from moteus import CommandError, Stream, multiplex
+from moteus import multiplex
 from moteus.protocol import Register
 
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.preflight import DriveInfo, Setting, required_settings
+from hopping_leg.errors import HardwareError
+from hopping_leg.robot.parameters import JOINTS
 
-_ANSWER_SECONDS, _TALK_SECONDS, _ALL_SECONDS = 1.0, 5.0, 30.0
 _TRIES = 3
+_ANSWER_SECONDS = 1.0  # For a try
+_WRITE_SECONDS = 5.0  # For a try of what goes into the permanent memory
+_POLL_SECONDS = 0.01
 _VERSIONS = (Register.MODEL_NUMBER, Register.FIRMWARE_VERSION, Register.REGISTER_MAP_VERSION)
 _IDENTITY = {int(register): multiplex.INT32 for register in _VERSIONS}
 _SERIAL = {int(Register.SERIAL_NUMBER) + word: multiplex.INT32 for word in range(3)}
@@ -28,22 +30,24 @@ _STATE = {
 
 
 def inspect(link: MoteusLink) -> tuple[DriveInfo, DriveInfo]:
-    """Ask both drives everything that arming depends on.
-
-    Raises:
-        HardwareError: The adapter does not answer.
-    """
-    hip, knee = (link.call(_inspect(link, joint), _ALL_SECONDS) for joint in (0, 1))
-    return hip, knee
+    """Ask both drives everything that arming depends on."""
+    return _inspect(link, 0), _inspect(link, 1)
 
 
 def configure(link: MoteusLink, joint: int, settings: Sequence[Setting]) -> None:
     """Write settings into a stopped drive (0 hip, 1 knee), and into its permanent memory.
 
     Raises:
-        HardwareError: The drive does not answer.
+        HardwareError: The drive does not take one.
     """
-    link.call(_configure(link, joint, settings), _ALL_SECONDS)
+    console = Console(link, joint)
+    for command in (*(f"conf set {s.name} {s.text}" for s in settings), "conf write"):
+        answer = console.ask(command, _WRITE_SECONDS)
+        if answer != "OK":
+            raise HardwareError(
+                f"The drive of the {JOINTS[joint]} answers '{command}' by '{answer}'; check its"
+                " firmware, its power and its wires."
+            )
 
 
 def home(link: MoteusLink, angles: Sequence[float]) -> None:
@@ -56,19 +60,20 @@ def home(link: MoteusLink, angles: Sequence[float]) -> None:
     """
     for joint, angle in enumerate(angles):
         position = link.transforms[joint].motor_position(angle)
-        work = link.controllers[joint].set_output_nearest(position=position, query=True)
-        link.call(asyncio.wait_for(work, _ANSWER_SECONDS), _TALK_SECONDS)
+        command = link.controllers[joint].make_set_output_nearest(position=position, query=True)
+        if not any(link.ask(command, _ANSWER_SECONDS) for _ in range(_TRIES)):
+            raise HardwareError(
+                f"The drive of the {JOINTS[joint]} does not answer; check its power and its wires."
+            )
 
 
-async def _inspect(link: MoteusLink, joint: int) -> DriveInfo:
+def _inspect(link: MoteusLink, joint: int) -> DriveInfo:
     values: dict[int, Any] = {}
     for registers in (_STATE, _IDENTITY, _SERIAL):
-        answer = await _query(link.controllers[joint], registers)
-        if answer is None:
+        answer = _query(link, joint, registers)
+        if not answer:
             return DriveInfo(answers=False)
         values |= answer
-    stream = await _console(link, joint)
-    names = [setting.name for setting in required_settings(link.robot, joint)]
     return DriveInfo(
         answers=True,
         firmware=int(values.get(Register.FIRMWARE_VERSION, 0)),
@@ -80,38 +85,63 @@ async def _inspect(link: MoteusLink, joint: int) -> DriveInfo:
         fault=int(values.get(Register.FAULT, 0)),
         voltage=float(values.get(Register.VOLTAGE, math.nan)),
         temperature=float(values.get(Register.TEMPERATURE, math.nan)),
-        settings={name: await _setting(stream, name) for name in names},
+        settings=_settings(link, joint),
     )
 
 
-async def _query(controller: Any, registers: dict[int, int]) -> dict[int, Any] | None:  # noqa: ANN401
-    """Ask again where no answer comes; None after the last try."""
+def _query(link: MoteusLink, joint: int, registers: dict[int, int]) -> dict[int, Any]:
+    """Ask again where no answer comes; nothing after the last try."""
+    command = link.controllers[joint].make_custom_query(registers)
     for _ in range(_TRIES):
-        with contextlib.suppress(TimeoutError, RuntimeError):
-            answer = await asyncio.wait_for(controller.custom_query(registers), _ANSWER_SECONDS)
-            if answer is not None:
-                return dict(answer.values)
-    return None
+        answer = link.ask(command, _ANSWER_SECONDS)
+        if answer is not None and not registers.keys().isdisjoint(answer.values):
+            return dict(answer.values)
+    return {}
 
 
-async def _console(link: MoteusLink, joint: int) -> Any:  # noqa: ANN401
-    """Return the drive's console with nothing left in it."""
-    stream = Stream(link.controllers[joint])
-    await asyncio.wait_for(stream.write_message(b"tel stop"), _ANSWER_SECONDS)
-    await stream.flush_read()
-    return stream
+def _settings(link: MoteusLink, joint: int) -> dict[str, float]:
+    """Return what is required of a drive as it is; NaN where it is no number."""
+    console, found = Console(link, joint), dict[str, float]()
+    for setting in required_settings(link.robot, joint):
+        answer = console.ask(f"conf get {setting.name}", _ANSWER_SECONDS)
+        if not answer:  # and so will be the others
+            break
+        try:
+            found[setting.name] = float(answer)
+        except ValueError:
+            found[setting.name] = math.nan
+    return found
 
 
-async def _setting(stream: Any, name: str) -> float:  # noqa: ANN401
-    try:
-        work = stream.command(f"conf get {name}".encode(), allow_any_response=True)
-        return float(await asyncio.wait_for(work, _ANSWER_SECONDS))
-    except (ValueError, TimeoutError, CommandError):
-        return math.nan
+class Console:
+    """A stopped drive's text console, tunnelled in frames."""
 
+    def __init__(self, link: MoteusLink, joint: int) -> None:
+        self._link, self._controller = link, link.controllers[joint]
+        self._write("tel stop")
 
-async def _configure(link: MoteusLink, joint: int, settings: Sequence[Setting]) -> None:
-    stream = await _console(link, joint)
-    commands = [f"conf set {setting.name} {setting.text}" for setting in settings]
-    for command in (*commands, "conf write"):
-        await asyncio.wait_for(stream.command(command.encode()), _TALK_SECONDS)
+    def ask(self, line: str, seconds: float) -> str:
+        """Return the first line that answers a line; empty if none comes in some tries."""
+        for _ in range(_TRIES):
+            while self._read():
+                pass
+            self._write(line)
+            text, until = b"", self._link.clock.now() + seconds
+            while self._link.clock.now() < until:
+                new = self._read()
+                text += new
+                if b"\n" in text:
+                    return text.splitlines()[0].decode("latin1").strip()
+                if not new:
+                    self._link.clock.wait_until(self._link.clock.now() + _POLL_SECONDS)
+        return ""
+
+    def _write(self, line: str) -> None:
+        data, most = f"{line}\n".encode(), self._controller.max_diagnostic_write
+        for begin in range(0, len(data), most):
+            piece = data[begin : begin + most]
+            self._link.tell(self._controller.make_diagnostic_write(piece))
+
+    def _read(self) -> bytes:
+        answer = self._link.ask(self._controller.make_diagnostic_read(), _ANSWER_SECONDS)
+        return (answer and answer.data) or b""

@@ -84,13 +84,12 @@ class SampleBuffer:
 
         None as long as no tick has samples of both joints.
         """
-        whole = [t for t, sample in self._ticks.items() if None not in sample and t <= tick]
-        if not whole:
+        newest = sorted((t for t in self._ticks if t <= tick and all(self._ticks[t])), reverse=True)
+        if not newest:
             return None
         self._commands[tick] = command
-        newest = sorted(whole, reverse=True)[:SAMPLES]
-        newest += [newest[-1]] * (SAMPLES - len(newest))
-        chosen = [[reply for reply in self._ticks[t] if reply is not None] for t in newest]
+        newest = [*newest[:SAMPLES], *newest[-1:] * (SAMPLES - len(newest))]
+        chosen = [[reply for reply in self._ticks[t] if reply] for t in newest]
         return Measurement(
             q=np.array([[[reply.position for reply in pair] for pair in chosen]]),
             qd=np.array([[[reply.velocity for reply in pair] for pair in chosen]]),

@@ -1,90 +1,28 @@
-"""Both drives through the ``moteus`` client: a ``DriveLink`` in pure torque mode.
+"""Both drives behind an adapter: a ``DriveLink`` in pure torque mode.
 
-The client waits for a lost reply without bound, loses the healthy drive's reply when it is
-cancelled, and takes late replies as fresh. Here its event loop has a thread of its own, so that
-nothing it does can hang the control loop; frames are judged as they arrive, so that whatever came
-in time counts; and what is not done by its deadline is cancelled.
+Questions and answers go to and fro in the caller's own thread, and never take longer than they may.
+What the frames say is the client library's, ``moteus``.
 """
 
-import asyncio
-import concurrent.futures
-import functools
+import contextlib
 import math
-import threading
-from collections.abc import Callable, Coroutine
-from typing import Any, Protocol, TypeVar
+import struct
+from collections.abc import Iterator
+from typing import Any
 
 from moteus import Controller, QueryResolution, multiplex
+from moteus.command import Command
 from moteus.protocol import Register
 
-from hopping_leg.deploy import drive_link, realtime, replies, transport
-from hopping_leg.errors import HardwareError
+from hopping_leg.deploy import drive_link, frames, realtime, replies
+from hopping_leg.deploy.transport import Transport
 from hopping_leg.robot.parameters import Robot
 
-_SEND_SECONDS = 0.004  # A command that could not leave within this time is dropped: it is outdated
-_OPENING_SECONDS = 10.0
 _NO_POSITION_CONTROL = {"position": math.nan, "velocity": 0.0} | dict.fromkeys(
     ("kp_scale", "kd_scale", "ilimit_scale"), 0.0
 )
-
-Result = TypeVar("Result")
-
-
-class Client(Protocol):
-    """Where the asyncio client's work is done; raises ``HardwareError`` where it takes too long."""
-
-    def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
-        """Begin work; never waits for the motors."""
-
-    def call(self, work: Coroutine[Any, Any, Result], seconds: float) -> Result:
-        """Do work and wait for its result."""
-
-    def close(self) -> None:
-        """End it."""
-
-
-class ClientThread:
-    """Runs an event loop; work is handed over and never waited for without a deadline."""
-
-    def __init__(self, on_error: Callable[[str], None]) -> None:
-        self._on_error = on_error
-        self._tasks: set[asyncio.Task[None]] = set()
-        self.loop = asyncio.new_event_loop()
-        self.loop.set_exception_handler(self._note)
-        run = self.loop.run_forever
-        self._thread = threading.Thread(target=run, name="moteus-client", daemon=True)
-        self._thread.start()
-
-    def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
-        """Begin work in the loop; returns at once."""
-        self.loop.call_soon_threadsafe(self._create, work)
-
-    def call(self, work: Coroutine[Any, Any, Result], seconds: float) -> Result:
-        """Do work in the loop and wait for its result."""
-        future = asyncio.run_coroutine_threadsafe(work, self.loop)
-        try:
-            return future.result(seconds)
-        except concurrent.futures.TimeoutError as error:
-            future.cancel()
-            raise HardwareError(
-                f"The adapter did not answer within {seconds:g} s; unplug it and plug it in again."
-            ) from error
-
-    def close(self) -> None:
-        """End the thread; one that is stuck in a system call is left behind."""
-        self.loop.call_soon_threadsafe(self.loop.stop)
-        self._thread.join(1.0)
-        if not self._thread.is_alive():
-            self.loop.close()
-
-    def _create(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
-        task = self.loop.create_task(work())
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
-
-    def _note(self, _: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-        error = context.get("exception")
-        self._on_error(str(error or context.get("message", "unknown")))
+_PLACE = 1234.5  # Stands where a torque goes, N m
+_PLACE_BYTES = struct.pack("<f", _PLACE)
 
 
 class MoteusLink:
@@ -92,123 +30,115 @@ class MoteusLink:
 
     Args:
         robot: Whose drives.
-        open_transport: Opens the adapter.
+        transport: Carries the frames; the link closes it.
         clock: None takes the computer's.
-        client: Makes what does the client's work, given who is told of its errors.
 
     Attributes:
-        trouble: What went wrong in the client last, for the record.
-
-    Raises:
-        HardwareError: The adapter cannot be opened.
+        controllers: Of the client library; they make commands.
     """
 
     def __init__(
-        self,
-        robot: Robot,
-        open_transport: transport.Opener,
-        clock: realtime.Clock | None = None,
-        client: Callable[[Callable[[str], None]], Client] = ClientThread,
+        self, robot: Robot, transport: Transport, clock: realtime.Clock | None = None
     ) -> None:
-        self._clock = clock or realtime.RealClock()
+        self.clock = clock or realtime.RealClock()
         self.robot, self.transforms = robot, drive_link.joint_transforms(robot)
-        self.trouble = ""
-        self._limits = [joint.motor.torque_limit for joint in (robot.hip, robot.knee)]
+        self.transport = transport
         self._clocks = (replies.DriveClock(), replies.DriveClock())
-        self._client = client(self._note)
-        try:
-            self.transport = self._client.call(self._open(open_transport), _OPENING_SECONDS)
-        except HardwareError:
-            self._client.close()
-            raise
+        resolution = _resolution()
         self.controllers = [
-            Controller(wire.id, query_resolution=_resolution(), transport=self.transport)
-            for wire in self.transforms
+            Controller(wire.id, query_resolution=resolution) for wire in self.transforms
         ]
+        self._made = {
+            (action, query): self._make(action, query=query)
+            for action in drive_link.Action
+            for query in (False, True)
+        }
+
+    @property
+    def trouble(self) -> str:
+        """What went wrong with the adapter last, for the record."""
+        return self.transport.trouble
 
     def exchange(self, outgoing: drive_link.DriveCommand, until: float) -> drive_link.Exchange:
         """Tell both drives what to do and ask for their state in the same frames."""
-        question = replies.Question(self.transforms, self._clocks, self._clock.now())
-        commands = self._commands(outgoing, query=True)
-        for joint, command in enumerate(commands):
-            command.reply_filter = functools.partial(self._judge, question, joint)
-            command.parse = lambda frame: frame
-        self._client.start_soon(lambda: self._ask(question, commands, until))
-        question.done.wait(self._clock.patience(until))
+        question = replies.Question(self.transforms, self._clocks, self.clock.now())
+        self.transport.send(self._frames(outgoing, query=True))
+        for frame in self._arriving(until):
+            question.take(frame, self.clock.now())
+            if question.answered:
+                break
         return question.result()
 
     def send(self, outgoing: drive_link.DriveCommand) -> None:
         """Tell both drives what to do; returns at once."""
-        commands = self._commands(outgoing, query=False)
-        until = self._clock.now() + _SEND_SECONDS
-        self._client.start_soon(lambda: self._cycle(commands, until))
+        self.transport.send(self._frames(outgoing, query=False))
 
-    def call(self, work: Coroutine[Any, Any, Result], seconds: float) -> Result:
-        """Do something slow in the client's thread; not while a leg is armed."""
-        return self._client.call(work, seconds)
+    def tell(self, command: Command) -> None:
+        """Send one of the client library's commands."""
+        self.transport.send([_frame(command)])
+
+    def ask(self, command: Command, seconds: float) -> Any:  # noqa: ANN401
+        """Send one of the client library's commands; return its answer, None if none came."""
+        asked = _frame(command)
+        self.transport.send([asked])
+        for frame in self._arriving(self.clock.now() + seconds):
+            # The library's parsers raise many types on damaged frames.
+            with contextlib.suppress(Exception):
+                if frame.answers(asked) and command.reply_filter(frame):
+                    return command.parse(frame)
+        return None
 
     def close(self) -> None:
         """Give the adapter back; another link may open it then."""
-        try:
-            self._client.call(self._close(), 2.0)
-        except HardwareError as error:
-            self._note(str(error))
-        self._client.close()
+        self.transport.close()
 
-    async def _ask(self, question: replies.Question, commands: list[Any], until: float) -> None:
-        await self._cycle(commands, until)
-        question.done.set()
+    def _arriving(self, until: float) -> Iterator[frames.Frame]:
+        """Yield frames as they arrive; ends at a time, s, however many there are."""
+        while (arrived := self.transport.receive(until)) is not None:
+            yield from arrived
+            if self.clock.now() >= until:
+                return
 
-    async def _cycle(self, commands: list[Any], until: float) -> None:
-        """Send frames, and wait for replies as long as they are worth something."""
-        patience = self._clock.patience(until)
-        if patience <= 0:
-            return
-        try:
-            async with asyncio.timeout(patience):
-                await self.transport.cycle(commands)
-        except TimeoutError:
-            return
-        except Exception as error:
-            # The client and the serial port raise many types when the adapter is gone.
-            self._note(str(error))
+    def _frames(self, outgoing: drive_link.DriveCommand, *, query: bool) -> list[frames.Frame]:
+        """Return the frames of a command; those of a torque differ in its four bytes alone."""
+        made = self._made[outgoing.action, query]
+        if outgoing.action is not drive_link.Action.TORQUE:
+            return made
+        pairs = zip(made, self.transforms, outgoing.torque, strict=True)
+        return [_with_torque(frame, wire.motor_torque(torque)) for frame, wire, torque in pairs]
 
-    def _commands(self, outgoing: drive_link.DriveCommand, *, query: bool) -> list[Any]:
-        pairs = zip(self.controllers, self.transforms, outgoing.torque, self._limits, strict=True)
-        match outgoing.action:
+    def _make(self, action: drive_link.Action, *, query: bool) -> list[frames.Frame]:
+        """Let the client library make the frames of an action."""
+        match action:
             case drive_link.Action.TORQUE:
-                return [
+                commands = [
                     controller.make_position(
                         **_NO_POSITION_CONTROL,
-                        feedforward_torque=transform.motor_torque(torque),
-                        maximum_torque=limit,
+                        feedforward_torque=_PLACE,
+                        maximum_torque=joint.motor.torque_limit,
                         watchdog_timeout=self.robot.hardware.watchdog,
                         query=query,
                     )
-                    for controller, transform, torque, limit in pairs
+                    for controller, joint in zip(
+                        self.controllers, (self.robot.hip, self.robot.knee), strict=True
+                    )
                 ]
             case drive_link.Action.BRAKE:
-                return [controller.make_brake(query=query) for controller in self.controllers]
+                commands = [controller.make_brake(query=query) for controller in self.controllers]
             case drive_link.Action.STOP:
-                return [controller.make_stop(query=query) for controller in self.controllers]
+                commands = [controller.make_stop(query=query) for controller in self.controllers]
+        return [_frame(command) for command in commands]
 
-    def _judge(self, question: replies.Question, joint: int, frame: Any) -> bool:  # noqa: ANN401
-        return question.take(joint, frame, self._clock.now())
 
-    async def _open(self, open_transport: transport.Opener) -> Any:  # noqa: ANN401
-        try:
-            return open_transport()
-        except HardwareError:
-            raise
-        except Exception as error:
-            # Serial ports and python-can raise many types.
-            raise HardwareError(f"Cannot open the adapter: {error}.") from error
+def _with_torque(frame: frames.Frame, torque: float) -> frames.Frame:
+    before, _, after = frame.data.partition(_PLACE_BYTES)
+    return frames.Frame(frame.arbitration_id, before + struct.pack("<f", torque) + after)
 
-    async def _close(self) -> None:
-        self.transport.close()
 
-    def _note(self, words: str) -> None:
-        self.trouble = words
+def _frame(command: Command) -> frames.Frame:
+    wanted = frames.REPLY_WANTED * command.reply_required
+    number = command.destination | wanted | command.source << 8
+    return frames.Frame(number, command.data)
 
 
 def _resolution() -> QueryResolution:

@@ -1,4 +1,4 @@
-"""Time as the loop sees it, and what keeps it: priority, locked memory, no garbage collection."""
+"""Time as the loop sees it, and what keeps it: priority, memory, no collection, no sleep."""
 
 import contextlib
 import ctypes
@@ -20,9 +20,6 @@ class Clock(Protocol):
     def wait_until(self, deadline: float) -> float:
         """Return at a deadline, or at once if it is over; returns the time."""
 
-    def patience(self, until: float) -> float:
-        """Return how many of the computer's seconds something due at a time is worth waiting."""
-
 
 _SPIN_SECONDS = 2e-4
 
@@ -42,10 +39,6 @@ class RealClock:
         while (now := time.monotonic()) < deadline:
             pass
         return now
-
-    def patience(self, until: float) -> float:
-        """Return the time that is left."""
-        return max(until - time.monotonic(), 0.0)
 
 
 _PRIORITY = 60
@@ -98,6 +91,27 @@ def lock_memory() -> str | None:
     )
 
 
+_LATENCY = Path("/dev/cpu_dma_latency")
+"""Takes the time, us, within which processors must wake, as long as it is open."""
+
+
+@contextlib.contextmanager
+def processors_awake() -> Iterator[str | None]:
+    """Keep processors out of sleep, which costs time and caches; yield a notice where forbidden."""
+    with contextlib.ExitStack() as stack:
+        notice = None
+        try:
+            stack.enter_context(_LATENCY.open("wb", buffering=0)).write(bytes(4))
+        except FileNotFoundError:
+            pass  # a computer that has no such sleep
+        except OSError:
+            notice = (
+                f"No permission to keep the processors awake ({_LATENCY}): ticks take longer; run"
+                " as root or permit writing it."
+            )
+        yield notice
+
+
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
     """Hold off garbage collection and hand the interpreter over to waiting threads quickly."""
@@ -117,7 +131,7 @@ def uninterrupted() -> Iterator[None]:
 
 @contextlib.contextmanager
 def keeping_time(*, realtime: bool) -> Iterator[tuple[str, ...]]:
-    """Let a loop run undisturbed, with priority and locked memory, unless time is virtual.
+    """Let a loop run undisturbed, with priority, memory and processors, unless time is virtual.
 
     Yields notices of what the computer does not permit.
     """
@@ -126,8 +140,8 @@ def keeping_time(*, realtime: bool) -> Iterator[tuple[str, ...]]:
         return
     notices = (lock_memory(), prefer_this_process())
     try:
-        with uninterrupted():
-            yield tuple(notice for notice in notices if notice)
+        with processors_awake() as asleep, uninterrupted():
+            yield tuple(notice for notice in (*notices, asleep) if notice)
     finally:
         _schedule_all(os.SCHED_OTHER, 0)
         with contextlib.suppress(OSError, AttributeError):

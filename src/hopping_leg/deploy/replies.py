@@ -1,17 +1,16 @@
 """From a frame of a drive to a dated reply at the joint.
 
-The adapter may deliver a reply late, and the client library takes it as the answer to the next
-question. The drive's own millisecond counter (register 0x070) tells: the smallest difference
-between arrival and counter seen so far is that of a reply that was not held up.
+The adapter may deliver a reply late, as if it answered the next question. The drive's own
+millisecond counter (register 0x070) tells: the smallest difference between arrival and counter seen
+so far is that of a reply that was not held up.
 """
 
 import math
-import threading
-from typing import Any
 
 from moteus.protocol import Register, parse_reply
 
 from hopping_leg.deploy.drive_link import Exchange, JointTransform, Reply
+from hopping_leg.deploy.frames import Frame
 
 _WRAP, _HALF = 1 << 32, 1 << 31
 _DRIFT = 2e-4  # Most that two clocks drift apart, s/s: both are quartzes
@@ -50,36 +49,35 @@ class DriveClock:
 
 
 class Question:
-    """One tick's question to both drives, asked at a time, s; frames are judged as they arrive.
-
-    Lives between two threads: the client's puts frames in, the loop's waits for ``done``.
-    """
+    """One tick's question to both drives, asked at a time, s; frames are judged as they arrive."""
 
     def __init__(
         self,
         transforms: tuple[JointTransform, JointTransform],
-        clocks: tuple[DriveClock, ...],
+        clocks: tuple[DriveClock, DriveClock],
         asked: float,
     ) -> None:
         self._transforms, self._clocks, self._asked = transforms, clocks, asked
         self._fresh: list[Reply | None] = [None, None]
         self._late: list[tuple[int, Reply]] = []
-        self.done = threading.Event()
 
-    def take(self, joint: int, frame: Any, now: float) -> bool:  # noqa: ANN401
-        """Judge a client library's frame that arrived now, s; return whether it answers this."""
-        if self._fresh[joint] is not None:
-            return False
-        reply = read_reply(frame.data, self._transforms[joint], self._clocks[joint], now)
-        if reply is None:
-            return False
-        if reply.taken < self._asked - SLACK:
-            self._late.append((joint, reply))
-            return False
-        self._fresh[joint] = reply
-        if None not in self._fresh:
-            self.done.set()
-        return True
+    @property
+    def answered(self) -> bool:
+        """Whether both drives have answered."""
+        return all(self._fresh)
+
+    def take(self, frame: Frame, now: float) -> None:
+        """Judge a frame that arrived now, s; what is no drive's answer is nothing."""
+        for joint, transform in enumerate(self._transforms):
+            if frame.arbitration_id != transform.id << 8 or self._fresh[joint] is not None:
+                continue
+            reply = read_reply(frame.data, transform, self._clocks[joint], now)
+            if reply is None:
+                continue
+            if reply.taken < self._asked - SLACK:
+                self._late.append((joint, reply))
+            else:
+                self._fresh[joint] = reply
 
     def result(self) -> Exchange:
         """Return what has come so far."""

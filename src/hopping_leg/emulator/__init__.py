@@ -1,8 +1,8 @@
 """Two emulated moteus drives that turn the simulated leg behind a real wire protocol.
 
-    host --bytes--> line_protocol --frames--> bus --registers--> drive --torque--> leg
-         <--bytes--                <--frames--     <--registers--      <--angles---
+    host --bytes--> port --frames--> bus --registers--> drive --torque--> leg
+         <--bytes--      <--frames--     <--registers--      <--angles---
 
-Everything but ``server``, ``can_bus`` and ``process`` takes time as an argument and does nothing by
+Everything but ``server``, ``ports`` and ``process`` takes time as an argument and does nothing by
 itself, so that drive logic is tested with a clock moved by hand.
 """

@@ -13,7 +13,8 @@ from moteus import multiplex
 from moteus.multiplex import FlowStreamSubframe, RegisterSubframe, StreamSubframe, SubframeType
 from moteus.protocol import Register, Writer, scale_register
 
-from hopping_leg.emulator import diagnostic, frames
+from hopping_leg.deploy import frames
+from hopping_leg.emulator import diagnostic
 from hopping_leg.emulator.drive import UNKNOWN_REGISTER, EmulatedDrive
 
 _UUID_MASKS = range(Register.UUID_MASK1, Register.UUID_MASK4 + 1)
@@ -21,7 +22,6 @@ _WORDS_ONLY = range(Register.MODEL_NUMBER, Register.UUID_MASK_CAPABLE)
 """Registers that can be read as 32-bit integers only."""
 _MAX_RUN = 3  # Registers whose count fits in the first byte of a subframe
 
-Subframes = tuple[multiplex.Subframe, ...]
 Errors = list[tuple[int, int]]
 """Register and error code of each write that failed."""
 
@@ -83,39 +83,55 @@ class ReplyWriter:
 
 @dataclass(frozen=True)
 class Message:
-    """A frame and what its payload says.
+    """A frame and what its payload says, up to the first subframe that makes no sense.
 
     Attributes:
         frame: From the host.
-        subframes: Up to the first that makes no sense.
+        writes, reads: Of registers.
+        streams: Of and to consoles.
     """
 
     frame: frames.Frame
-    subframes: Subframes
+    writes: tuple[RegisterSubframe, ...]
+    reads: tuple[RegisterSubframe, ...]
+    streams: tuple[StreamSubframe | FlowStreamSubframe, ...]
 
     @staticmethod
     def read(frame: frames.Frame) -> "Message":
         """Return the message of a frame."""
-        subframes: list[multiplex.Subframe] = []
+        writes: list[RegisterSubframe] = []
+        reads: list[RegisterSubframe] = []
+        streams: list[StreamSubframe | FlowStreamSubframe] = []
         with contextlib.suppress(Exception):  # the parser raises whatever a short buffer leads to
-            subframes.extend(multiplex.parse_frame(frame.data))
-        return Message(frame, tuple(subframes))
+            for s in multiplex.parse_frame(frame.data):
+                if isinstance(s, StreamSubframe | FlowStreamSubframe):
+                    streams.append(s)
+                elif isinstance(s, RegisterSubframe) and s.type is SubframeType.WRITE:
+                    writes.append(s)
+                elif isinstance(s, RegisterSubframe) and s.type is SubframeType.READ:
+                    reads.append(s)
+        return Message(frame, tuple(writes), tuple(reads), tuple(streams))
 
-    def subframes_for(self, drive: EmulatedDrive) -> Subframes:
-        """Return what is meant for a drive: nothing if another is addressed."""
-        if self.frame.destination not in (drive.id, frames.BROADCAST):
-            return ()
-        return self.subframes if _addressed(self.subframes, drive) else ()
+    def is_for(self, drive: EmulatedDrive) -> bool:
+        """Whether it means a drive: by its id, and by its UUID or that's beginning where given."""
+        return (
+            self.frame.destination in (drive.id, frames.BROADCAST)
+            and bool(self.writes or self.reads or self.streams)
+            and all(
+                s.value == drive.identity.get(s.register - Register.UUID_MASK1 + Register.UUID1)
+                for s in self.writes
+                if s.register in _UUID_MASKS
+            )
+        )
 
 
 def act(message: Message, drive: EmulatedDrive, time: float) -> Errors:
-    """Let a drive take what a message writes, if it is meant; return what it could not take."""
+    """Let a drive that is meant take what a message writes; return what it could not take."""
     errors = []
-    for s in message.subframes_for(drive):
-        if isinstance(s, RegisterSubframe) and s.type is SubframeType.WRITE:
-            assert s.value is not None
-            if error := drive.write(s.register, s.resolution, s.value):
-                errors.append((s.register, error))
+    for s in message.writes:
+        assert s.value is not None
+        if error := drive.write(s.register, s.resolution, s.value):
+            errors.append((s.register, error))
     drive.commit(time)
     return errors
 
@@ -123,34 +139,18 @@ def act(message: Message, drive: EmulatedDrive, time: float) -> Errors:
 def answer(
     message: Message, drive: EmulatedDrive, time: float, errors: Errors
 ) -> frames.Frame | None:
-    """Return a drive's answer, which tells its failed writes; None if none is wanted of it."""
-    subframes = message.subframes_for(drive)
-    if not subframes:
-        return None
+    """Return the answer of a drive that is meant, with its failed writes; None if none is due."""
     reply = ReplyWriter()
     for register, code in errors:
         reply.error(register, code, reading=False)
-    _stream(subframes, drive, reply, time)
-    _read(subframes, drive, reply)
+    _stream(message, drive, reply, time)
+    _read(message, drive, reply)
     return message.frame.reply(drive.id, reply.data) if message.frame.wants_reply else None
 
 
-def _addressed(subframes: Subframes, drive: EmulatedDrive) -> bool:
-    """Whether a frame that names a UUID, or its beginning, means this drive."""
-    return all(
-        s.value == drive.identity.get(s.register - Register.UUID_MASK1 + Register.UUID1)
-        for s in subframes
-        if isinstance(s, RegisterSubframe) and s.type is SubframeType.WRITE
-        if s.register in _UUID_MASKS
-    )
-
-
-def _stream(subframes: Subframes, drive: EmulatedDrive, reply: ReplyWriter, time: float) -> None:
-    for s in subframes:
-        if (
-            not isinstance(s, StreamSubframe | FlowStreamSubframe)
-            or s.channel != diagnostic.CHANNEL
-        ):
+def _stream(message: Message, drive: EmulatedDrive, reply: ReplyWriter, time: float) -> None:
+    for s in message.streams:
+        if s.channel != diagnostic.CHANNEL:
             continue
         if s.type is SubframeType.STREAM_CLIENT_TO_SERVER:
             drive.diagnostic.write(s.data, time)
@@ -161,14 +161,12 @@ def _stream(subframes: Subframes, drive: EmulatedDrive, reply: ReplyWriter, time
             reply.stream(s.channel, drive.diagnostic.poll(s.data[0]))
 
 
-def _read(subframes: Subframes, drive: EmulatedDrive, reply: ReplyWriter) -> None:
+def _read(message: Message, drive: EmulatedDrive, reply: ReplyWriter) -> None:
     """Answer reads in runs of consecutive registers of one resolution, as they were asked."""
-    state = drive.state()
+    state = drive.state() if message.reads else {}
     run: list[float] = []
     first = resolution = 0
-    for s in subframes:
-        if not isinstance(s, RegisterSubframe) or s.type is not SubframeType.READ:
-            continue
+    for s in message.reads:
         value = state.get(s.register)
         if value is None:
             value = drive.stored(s.register)

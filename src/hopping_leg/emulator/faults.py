@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
-from hopping_leg.emulator import frames, settings
+from hopping_leg.emulator import reply_queue, settings
 from hopping_leg.errors import UsageError, unknown_name
 from hopping_leg.io import parse_toml, read_dataclass
 from hopping_leg.robot.parameters import JOINTS
@@ -102,7 +102,7 @@ class FaultyRobot(Protocol):
     plugged: bool
     """Whether the adapter is plugged in."""
     leg: "EmulatedLeg"
-    reply_queue: frames.TimedQueue[frames.QueuedReply]
+    reply_queue: reply_queue.TimedQueue[reply_queue.QueuedReply]
 
     @property
     def drives(self) -> "tuple[EmulatedDrive, ...]":
@@ -224,7 +224,7 @@ class _GarbageLine(FaultKind, kind="garbage_line"):
     def begin(self) -> None:
         self.replies_left = 0
         for _ in range(self.fault.count):
-            self.robot.reply_queue.put(self.robot.time, frames.QueuedReply(noise=_NOISE))
+            self.robot.reply_queue.put(self.robot.time, reply_queue.QueuedReply(noise=_NOISE))
 
 
 class _EncoderJump(FaultKind, kind="encoder_jump"):

@@ -13,11 +13,50 @@ from pathlib import Path
 import can
 
 from hopping_leg import locks
-from hopping_leg.emulator.frames import Frame, LineProtocol, QueuedReply, received_line
+from hopping_leg.deploy.frames import Frame, LineBuffer, split_checksum, with_checksum
+from hopping_leg.deploy.transport import message_of, open_bus
+from hopping_leg.emulator.reply_queue import QueuedReply
 from hopping_leg.errors import UsageError
 
 DEFAULT_CHANNELS = {"udp_multicast": "239.74.163.2", "socketcan": "vcan0"}
 """Interfaces of python-can that the emulator serves, with the channel that it takes by default."""
+
+
+class LineProtocol:
+    """The adapter's side of one connection.
+
+    Attributes:
+        checksums: Whether lines carry checksums: since the host sent one, all must.
+    """
+
+    def __init__(self) -> None:
+        self._lines = LineBuffer()
+        self.checksums = False
+
+    def feed(self, data: bytes) -> list[Frame | bytes]:
+        """Take bytes from the host; return, in order, frames for the bus and answers to send.
+
+        A frame's ``OK`` comes before the frame.
+        """
+        return [item for line in self._lines.feed(data) for item in self._take(line)]
+
+    def line(self, text: bytes) -> bytes:
+        """Return a line as sent to the host."""
+        return (with_checksum(text) if self.checksums else text) + b"\r\n"
+
+    def _take(self, line: bytes) -> list[Frame | bytes]:
+        content, right = split_checksum(line)
+        self.checksums |= right is not None
+        if self.checksums and not right:
+            missing = "missing" if right is None else "mismatch"
+            return [self.line(f"ERR checksum {missing}".encode())]
+        words = content.split()
+        if words[:2] != [b"can", b"send"] or len(words) < 4:
+            return [self.line(b"ERR unknown command")]
+        try:
+            return [self.line(b"OK"), Frame.parse(words[2], words[3])]
+        except ValueError:
+            return [self.line(b"ERR malformed frame")]
 
 
 class PtyPort:
@@ -87,9 +126,8 @@ class PtyPort:
             items = self._protocol.feed(os.read(self._master, 65536))
         except BlockingIOError:
             return []
-        for item in items:
-            if not isinstance(item, Frame):
-                self._write(item)
+        if answers := [item for item in items if not isinstance(item, Frame)]:
+            self._write(b"".join(answers))
         return [item for item in items if isinstance(item, Frame)]
 
     def send(self, item: QueuedReply) -> None:
@@ -97,7 +135,7 @@ class PtyPort:
         if item.frame is None:
             self._write(item.noise + b"\r\n")
             return
-        line = self._protocol.line(received_line(item.frame))
+        line = self._protocol.line(item.frame.received)
         if item.flip >= 0:
             line = _flipped(line, 2 * len(item.frame.data), item.flip)
         self._write(line)
@@ -139,7 +177,7 @@ class CanPort:
     def plug_in(self) -> None:
         """Join the bus; a ``UsageError`` tells why it cannot be opened."""
         try:
-            self._bus = can.Bus(interface=self.interface, channel=self.channel, fd=True)
+            self._bus = open_bus(self.interface, self.channel)
         except (can.CanError, OSError, ImportError) as error:
             raise UsageError(
                 f"Cannot open {self.interface} '{self.channel}': {error}; udp_multicast needs a"
@@ -178,15 +216,7 @@ class CanPort:
         """Send a frame; noise and corrupted frames are discarded by CAN controllers."""
         if self._bus is None or item.frame is None or item.flip >= 0:
             return
-        self._bus.send(
-            can.Message(
-                arbitration_id=item.frame.arbitration_id,
-                is_extended_id=item.frame.extended,
-                data=item.frame.data,
-                is_fd=True,
-                bitrate_switch=True,
-            )
-        )
+        self._bus.send(message_of(item.frame))
 
 
 Port = PtyPort | CanPort

@@ -13,10 +13,12 @@ import numpy as np
 from moteus.protocol import Register
 
 from hopping_leg.arrays import Array
+from hopping_leg.deploy.frames import Frame
 from hopping_leg.deploy.preflight import required_settings
-from hopping_leg.emulator import bus, frames, leg, settings, wire_log
+from hopping_leg.emulator import bus, leg, settings, wire_log
 from hopping_leg.emulator.drive import EmulatedDrive
 from hopping_leg.emulator.faults import KINDS, Delivery, Fault, FaultKind
+from hopping_leg.emulator.reply_queue import QueuedReply, TimedQueue
 from hopping_leg.robot import JOINTS, REGISTER_MAP, Robot
 
 _MODEL = 0x0000  # Board r4
@@ -48,14 +50,14 @@ class EmulatedRobot:
         self.leg = leg.EmulatedLeg(robot, q, seed)
         self.drives = tuple(_drive(robot, joint, configured) for joint in range(len(JOINTS)))
         self._latency, self._rng = robot.reality.latency, np.random.default_rng(seed)
-        self._late_messages = frames.TimedQueue[bus.Message]()
+        self._late_messages = TimedQueue[bus.Message]()
         self._last_delivery = 0.0
         for joint, drive in enumerate(self.drives):
             position, *_ = self.leg.sensed(joint)
             drive.boot(position)
             if homed:
                 drive.encoder.set_nearest(position)
-        self.reply_queue = frames.TimedQueue[frames.QueuedReply]()  # What is on its way to the host
+        self.reply_queue = TimedQueue[QueuedReply]()  # What is on its way to the host
         self.wire_time = 0.0  # What a reply takes at least, s
         self.plugged = True  # Whether the adapter is plugged in
         self.log = wire_log.WireLog()  # What went over the wire
@@ -74,7 +76,7 @@ class EmulatedRobot:
         while self.time + leg.TIMESTEP <= until + 1e-9:
             self._step()
 
-    def receive(self, frame: frames.Frame) -> None:
+    def receive(self, frame: Frame) -> None:
         """Take a frame from the host now; the drives' answers go to the reply_queue.
 
         Where the robot's ``reality`` has a latency of commands, the frame acts later but is
@@ -86,9 +88,11 @@ class EmulatedRobot:
             self._last_delivery = max(self.time + late, self._last_delivery)
             self._late_messages.put(self._last_delivery, message)
         for joint, drive in enumerate(self.drives):
+            if not message.is_for(drive):
+                continue
             errors = [] if late else bus.act(message, drive, self.time)
             answer = bus.answer(message, drive, self.time, errors)
-            self.log.record_command(self.time, joint, message, drive)
+            self.log.record_command(self.time, joint, frame)
             if answer is not None:
                 self.log.record_reply(self.time, joint, answer)
                 self.fault_injector.send(answer, joint)
@@ -96,7 +100,7 @@ class EmulatedRobot:
     def _step(self) -> None:
         self.fault_injector.step()
         for message in self._late_messages.take(self.time):
-            for drive in self.drives:
+            for drive in filter(message.is_for, self.drives):
                 bus.act(message, drive, self.time)
         hip, knee = (drive.step(self.time, leg.TIMESTEP) for drive in self.drives)
         if self.held and all(drive.active for drive in self.drives):
@@ -185,7 +189,7 @@ class FaultInjector:
             else:
                 running.update()
 
-    def send(self, frame: frames.Frame, joint: int) -> None:
+    def send(self, frame: Frame, joint: int) -> None:
         """Queue a drive's reply (0 hip, 1 knee), or what becomes of it."""
         delivery = Delivery(self._robot.time + self._robot.wire_time)
         for running in self._running:
@@ -193,7 +197,7 @@ class FaultInjector:
                 running.replies_left -= 1
                 running.on_reply(delivery)
         for _ in range(delivery.copies):
-            self._robot.reply_queue.put(delivery.due, frames.QueuedReply(frame, flip=delivery.flip))
+            self._robot.reply_queue.put(delivery.due, QueuedReply(frame, flip=delivery.flip))
 
     def _phases(self) -> set[str]:
         """Return the phases of this moment; record power and the first lift-off."""

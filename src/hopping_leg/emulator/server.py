@@ -15,6 +15,7 @@ import numpy as np
 
 from hopping_leg.arrays import Array
 from hopping_leg.emulator.faults import Fault
+from hopping_leg.emulator.leg import TIMESTEP
 from hopping_leg.emulator.ports import DEFAULT_CHANNELS, CanPort, Port, PtyPort
 from hopping_leg.emulator.robot import EmulatedRobot
 from hopping_leg.errors import UsageError, unknown_name
@@ -109,7 +110,6 @@ def posture(robot: Robot, pose: str) -> Array:
     return np.array([hip, knee])
 
 
-_IDLE = 0.001  # Longest sleep between two looks at the clock, s
 _FURTHEST = 0.02
 """Most that is caught up with at once after the process was held off, s; the rest is lost."""
 
@@ -123,7 +123,7 @@ class Server:
     def __init__(self, robot: EmulatedRobot, port: Port) -> None:
         self.robot, self.port = robot, port
         self.on_turn: Callable[[], None] = lambda: None
-        """Called every few milliseconds, e.g. to show the state."""
+        """Called after every step, e.g. to show the state."""
         self.lost = 0.0  # Time that was not simulated as the process did not get the processor, s
         self._late: deque[tuple[float, float]] = deque(maxlen=100)
         self._offset = time.monotonic() - robot.time
@@ -136,8 +136,10 @@ class Server:
     def turn(self) -> None:
         """Wait for the host or the clock, then do what is due."""
         waiting = [self.port] if self.port.plugged else []
-        due = self.robot.reply_queue.next_due()
-        patience = _IDLE if due is None else min(max(due - self.robot.time, 0.0), _IDLE)
+        due = self.robot.time + TIMESTEP
+        if (reply := self.robot.reply_queue.next_due()) is not None:
+            due = min(due, reply)
+        patience = max(due + self._offset - time.monotonic(), 0.0)
         ready, _, _ = select.select(waiting, [], [], patience)
         self._catch_up()
         serve(self.robot, self.port, ready=bool(ready))

@@ -7,11 +7,11 @@ soon after a bad answer the host reacted. Times are in s; joint 0 is the hip, 1 
 from collections import deque
 from dataclasses import dataclass
 
-from moteus.multiplex import RegisterSubframe, SubframeType
 from moteus.protocol import Register, parse_reply
 
 from hopping_leg.deploy.drive_link import DriveMode
-from hopping_leg.emulator import bus, frames, mode_machine
+from hopping_leg.deploy.frames import Frame
+from hopping_leg.emulator import bus, mode_machine
 from hopping_leg.emulator.drive import EmulatedDrive
 
 
@@ -56,29 +56,31 @@ class WireLog:
     """Commands, answers and changes of mode in the order of time; the oldest are forgotten."""
 
     def __init__(self) -> None:
-        self.commands: deque[CommandEvent] = deque(maxlen=_REMEMBERED)
+        self._commands: deque[tuple[float, int, Frame]] = deque(maxlen=_REMEMBERED)
         self._replies: deque[tuple[float, int, bytes]] = deque(maxlen=_REMEMBERED)
         self.changes: deque[ModeChange] = deque(maxlen=_REMEMBERED)
         self._modes = [DriveMode.STOPPED, DriveMode.STOPPED]
 
-    def record_command(
-        self, time: float, joint: int, message: bus.Message, drive: EmulatedDrive
-    ) -> None:
-        """Note what a message commands a drive, if it does."""
-        written = {
-            s.register: s.value or 0.0
-            for s in message.subframes_for(drive)
-            if isinstance(s, RegisterSubframe) and s.type is SubframeType.WRITE
-        }
-        if written.get(Register.MODE) in mode_machine.MODES:
-            mode = DriveMode(int(written[Register.MODE]))
-            torque = float(written.get(Register.COMMAND_FEEDFORWARD_TORQUE, 0.0))
-            most = float(written.get(Register.COMMAND_POSITION_MAX_TORQUE, 0.0))
-            self.commands.append(CommandEvent(time, joint, mode, torque, most))
+    def record_command(self, time: float, joint: int, command: Frame) -> None:
+        """Note what the host sent to a drive."""
+        self._commands.append((time, joint, command))
 
-    def record_reply(self, time: float, joint: int, answer: frames.Frame) -> None:
+    def record_reply(self, time: float, joint: int, answer: Frame) -> None:
         """Note a drive's answer."""
         self._replies.append((time, joint, answer.data))
+
+    @property
+    def commands(self) -> list[CommandEvent]:
+        """The commands that wrote a drive's mode."""
+        found = []
+        for time, joint, frame in self._commands:
+            written = {s.register: s.value or 0.0 for s in bus.Message.read(frame).writes}
+            if written.get(Register.MODE) in mode_machine.MODES:
+                mode = DriveMode(int(written[Register.MODE]))
+                torque = float(written.get(Register.COMMAND_FEEDFORWARD_TORQUE, 0.0))
+                most = float(written.get(Register.COMMAND_POSITION_MAX_TORQUE, 0.0))
+                found.append(CommandEvent(time, joint, mode, torque, most))
+        return found
 
     @property
     def answers(self) -> list[ReplyEvent]:
