@@ -6,7 +6,6 @@ other load on the computer cannot touch.
 """
 
 import tempfile
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -35,13 +34,11 @@ from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate.metrics import START_SECONDS
 from hopping_leg.hop_detection import BOUNCE, FLIGHT_CLEARANCE, find_hops
-from hopping_leg.robot import DEFAULT_ROBOT, Robot, SoftLimits, kinematics, load_robot
+from hopping_leg.robot import DEFAULT_ROBOT, Robot, SoftLimits, load_robot
 from hopping_leg.sim import CONTROL_RATE, NO_NOISE, SoftLimiter
 from hopping_leg.trace import Trace
 from studies.shared import host
 from studies.speed.inference import bench_inference
-
-_SAMPLE_SECONDS = 0.01
 
 
 @dataclass
@@ -54,25 +51,13 @@ class Truth:
 
 
 @contextmanager
-def watched(emulator: EmulatorProcess, robot: Robot, truth: Truth) -> Iterator[None]:
-    """Write down what the emulated leg does while a run lasts."""
-    over = threading.Event()
-
-    def watch() -> None:
-        while not over.wait(_SAMPLE_SECONDS):
-            state = emulator.state()
-            truth.time.append(state.time)
-            truth.height.append(state.height)
-            standing = float(kinematics.stance_height(robot, np.array(state.q)))
-            truth.clearance.append(state.height - standing)
-
-    thread = threading.Thread(target=watch, name="truth", daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        over.set()
-        thread.join()
+def watched(emulator: EmulatorProcess, truth: Truth) -> Iterator[None]:
+    """Tell what the emulated leg did until a run is over."""
+    yield
+    for time, height, clearance in emulator.truth():
+        truth.time.append(time)
+        truth.height.append(height)
+        truth.clearance.append(clearance)
 
 
 def apexes_of(trace: Trace, truth: Truth) -> list[tuple[float, float]]:
@@ -183,7 +168,7 @@ def _real_time(study: Deploy, robot: Robot, on_progress: Callable[[str], None]) 
                 sequence,
                 robot,
                 folder / "run.parquet",
-                beside=lambda loop, e=emulator, t=truth: watched(e, robot, t),
+                beside=lambda loop, e=emulator, t=truth: watched(e, t),
             )
             link.close()
         notices = performance.notices

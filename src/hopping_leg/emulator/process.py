@@ -17,6 +17,7 @@ from hopping_leg.emulator.robot import EmulatedRobot
 from hopping_leg.emulator.server import EmulatorConfig, Server
 from hopping_leg.errors import UsageError
 
+_SAMPLE_SECONDS = 0.01
 _PATIENCE = 60.0
 """Longest wait for an answer of the process, s; importing takes long on a busy machine."""
 
@@ -73,6 +74,12 @@ class EmulatorProcess:
         assert isinstance(record, EmulatorRecord)
         return record
 
+    def truth(self) -> list[tuple[float, float, float]]:
+        """Return time, s, base height, m, and the foot's clearance, m, every 10 ms until now."""
+        truth = self._ask("truth")
+        assert isinstance(truth, list)
+        return truth
+
     def inject(self, fault: Fault) -> None:
         """Let a fault happen; its time counts from now."""
         self._ask(fault)
@@ -111,14 +118,23 @@ def _serve(start: EmulatorConfig, pipe: Connection) -> None:
         pipe.send(str(error))
         return
     server = Server(robot, port)
+    truth: list[tuple[float, float, float]] = []
+
+    def watch() -> None:
+        if not truth or robot.time >= truth[-1][0] + _SAMPLE_SECONDS:
+            truth.append((robot.time, robot.leg.height, robot.leg.foot_clearance))
+
+    server.on_turn = watch
     pipe.send(port.path if isinstance(port, ports.PtyPort) else Path())
     prefer_this_thread()
     with uninterrupted():
-        server.run(lambda: not _answer_parent(pipe, robot))
+        server.run(lambda: not _answer_parent(pipe, robot, truth))
     port.close()
 
 
-def _answer_parent(pipe: Connection, robot: EmulatedRobot) -> bool:
+def _answer_parent(
+    pipe: Connection, robot: EmulatedRobot, truth: list[tuple[float, float, float]]
+) -> bool:
     """Answer what the parent asked; return whether it is still there."""
     try:
         while pipe.poll():
@@ -127,6 +143,8 @@ def _answer_parent(pipe: Connection, robot: EmulatedRobot) -> bool:
                 robot.fault_injector.add(request)
             if request == "record":
                 pipe.send(EmulatorRecord(robot.log, tuple(robot.fault_injector.log)))
+            elif request == "truth":
+                pipe.send(truth)
             else:
                 modes = tuple(int(drive.machine.mode) for drive in robot.drives)
                 q, height = tuple(robot.leg.q.tolist()), robot.leg.height
