@@ -103,7 +103,8 @@ def test_the_pi3hat_carries_frames_and_waits_no_longer_than_it_may():
         assert 0 <= time.monotonic() - until < WAIT
         bench.wait(0.009)
         assert bench.modes() == [10, 10]
-        assert [link.ask(drive.make_query(), WAIT).id for drive in link.controllers] == [1, 2]
+        answers = [link.ask(drive.make_query(), WAIT) for drive in link.controllers]
+        assert [answer.source for answer in answers] == [1, 2]
         with pytest.raises(HardwareError, match="pi3hat is in use"):
             pi3hat(bench)
         assert not link.trouble

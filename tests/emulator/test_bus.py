@@ -1,7 +1,7 @@
 import moteus
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from moteus.fdcanusb_device import _append_checksum, _compute_crc8
 
@@ -69,6 +69,7 @@ def test_discovery_finds_both_drives_and_a_uuid_means_one(bench):
 
 
 @given(st.binary(max_size=64))
+@example(bytes([0x10, 0xFF, 0xFF, 0xFF, 0x7F, 0x00]))
 def test_no_payload_breaks_a_drive(bench, data):
     bench.robot.receive(Frame(0x807F, data))
     bench.wait(5e-4)

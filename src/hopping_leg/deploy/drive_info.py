@@ -1,5 +1,6 @@
 """What the drives say about themselves, asked one by one before anything is armed."""
 
+import contextlib
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -9,6 +10,7 @@ from moteus.protocol import Register
 
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.deploy.preflight import DriveInfo, Setting, required_settings
+from hopping_leg.deploy.replies import read_registers
 from hopping_leg.errors import HardwareError
 from hopping_leg.robot.parameters import JOINTS
 
@@ -94,8 +96,10 @@ def _query(link: MoteusLink, joint: int, registers: dict[int, int]) -> dict[int,
     command = link.controllers[joint].make_custom_query(registers)
     for _ in range(_TRIES):
         answer = link.ask(command, _ANSWER_SECONDS)
-        if answer is not None and not registers.keys().isdisjoint(answer.values):
-            return dict(answer.values)
+        with contextlib.suppress(Exception):  # the answer is damaged, or there is none
+            values = read_registers(answer.data if answer else b"")
+            if not registers.keys().isdisjoint(values):
+                return values
     return {}
 
 
@@ -143,5 +147,6 @@ class Console:
             self._link.tell(self._controller.make_diagnostic_write(piece))
 
     def _read(self) -> bytes:
-        answer = self._link.ask(self._controller.make_diagnostic_read(), _ANSWER_SECONDS)
-        return (answer and answer.data) or b""
+        command = self._controller.make_diagnostic_read()
+        answer = self._link.ask(command, _ANSWER_SECONDS)
+        return (answer and command.parse(answer).data) or b""

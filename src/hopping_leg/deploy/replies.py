@@ -6,8 +6,11 @@ so far is that of a reply that was not held up.
 """
 
 import math
+from typing import Any
 
-from moteus.protocol import Register, parse_reply
+from moteus import multiplex
+from moteus.multiplex import SubframeType
+from moteus.protocol import Register, scale_register
 
 from hopping_leg.deploy.drive_link import Exchange, JointTransform, Reply
 from hopping_leg.deploy.frames import Frame
@@ -85,19 +88,33 @@ class Question:
         return Exchange((hip, knee), tuple(self._late))
 
 
+def read_registers(data: bytes) -> dict[int, Any]:
+    """Return the registers that a drive's answer tells.
+
+    Raises:
+        Exception: The frame is damaged; the client library's parser raises many types.
+    """
+    values = {}
+    for part in multiplex.parse_frame(data):
+        if part.type is SubframeType.READ:  # of which the parser yields as many as it says
+            raise ValueError
+        if part.type is SubframeType.RESPONSE:
+            values[part.register] = scale_register(part.register, part.resolution, part.value)
+    return values
+
+
 def read_reply(
     data: bytes, transform: JointTransform, clock: DriveClock, now: float
 ) -> Reply | None:
     """Return the state that a frame reports; None if it is incomplete, senseless or not new."""
     try:
-        values = parse_reply(data)
+        values = read_registers(data)
         counter = values[Register.MILLISECOND_COUNTER]
         mode, fault = int(values[Register.MODE]), int(values[Register.FAULT])
         position, velocity = values[Register.POSITION], values[Register.VELOCITY]
         torque, voltage = values[Register.TORQUE], values[Register.VOLTAGE]
         temperature = values[Register.TEMPERATURE]
     except Exception:
-        # The client's parser raises many types on damaged frames, all derived from Exception only.
         return None
     taken = clock.date(int(counter), now)
     if taken is None or not math.isfinite(taken):

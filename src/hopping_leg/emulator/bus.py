@@ -6,6 +6,7 @@ Scales, saturation and NaN come from the client library, so both ends agree.
 import contextlib
 import functools
 import io
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -20,6 +21,7 @@ from hopping_leg.emulator.drive import UNKNOWN_REGISTER, EmulatedDrive
 _UUID_MASKS = range(Register.UUID_MASK1, Register.UUID_MASK4 + 1)
 _WORDS_ONLY = range(Register.MODEL_NUMBER, Register.UUID_MASK_CAPABLE)
 """Registers that can be read as 32-bit integers only."""
+_MOST = 256  # Subframes that are read: a few bytes may ask for millions of registers
 _MAX_RUN = 3  # Registers whose count fits in the first byte of a subframe
 
 Errors = list[tuple[int, int]]
@@ -103,7 +105,7 @@ class Message:
         reads: list[RegisterSubframe] = []
         streams: list[StreamSubframe | FlowStreamSubframe] = []
         with contextlib.suppress(Exception):  # the parser raises whatever a short buffer leads to
-            for s in multiplex.parse_frame(frame.data):
+            for s in itertools.islice(multiplex.parse_frame(frame.data), _MOST):
                 if isinstance(s, StreamSubframe | FlowStreamSubframe):
                     streams.append(s)
                 elif isinstance(s, RegisterSubframe) and s.type is SubframeType.WRITE:
