@@ -11,8 +11,9 @@ from moteus.pythoncan_device import PythonCanDevice
 
 from hopping_leg.deploy.drive_link import LIMP, STOP
 from hopping_leg.emulator.faults import Fault
+from hopping_leg.emulator.ports import PtyPort
 from hopping_leg.emulator.process import EmulatorProcess
-from hopping_leg.emulator.server import EmulatorConfig
+from hopping_leg.emulator.server import EmulatorConfig, Server
 from hopping_leg.emulator.virtual_time import Lockstep
 from hopping_leg.errors import UsageError
 
@@ -205,3 +206,15 @@ def test_a_link_has_one_emulator(tmp_path):
         assert first.path.exists()
     with EmulatorProcess(config) as second:
         assert second.path.exists()
+
+
+def test_a_computer_that_is_late_stops_the_leg_but_no_drives_clock():
+    robot, port = EmulatorConfig().build(), PtyPort()
+    server = Server(robot, port)
+    server._offset -= 1.0
+    server.turn()
+    port.close()
+    assert robot.time < 0.5
+    assert robot.time + server.lost == pytest.approx(1.0, abs=0.4)
+    for drive in robot.drives:
+        assert drive.uptime == pytest.approx(robot.time + server.lost, abs=1e-3)

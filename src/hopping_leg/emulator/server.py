@@ -154,10 +154,11 @@ class Server:
         behind = now - self.robot.time
         if behind > _NOTICED:
             self._late.append((self.robot.time, behind))
-        if behind > _FURTHEST:
-            self._offset += behind - _FURTHEST
-            self.lost += behind - _FURTHEST
-            now -= behind - _FURTHEST
+        if (lost := behind - _FURTHEST) > 0:
+            self._offset += lost
+            self.lost += lost
+            self.robot.stand_still(lost)
+            now -= lost
         self.robot.advance(now)
 
 
