@@ -7,6 +7,7 @@ import pytest
 
 from hopping_leg.cli import main
 from hopping_leg.cli.finetune import guard_of, line
+from hopping_leg.controllers.registry import robot_of
 from hopping_leg.robot import load_robot
 
 
@@ -65,7 +66,10 @@ def test_a_run_leaves_policy_card_and_numbers(tmp_path, monkeypatch, capsys):
     assert result["policy"] == "fast"
     assert len(result["trials"]) == 2
     assert result["trials"][1]["shifts_m"] != [0.0] * 3
-    assert "used up" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "used up" in said
+    assert said.endswith(f"Next:\n  hop evaluate {out / 'policy.onnx'}\n")
+    assert robot_of([str(out / "policy.onnx")]) == "legv2-identified"
     assert "fast" in (out / "model_card.md").read_text()
     assert main(["policies", "show", str(out / "policy.onnx")]) == 0
     assert main([*words, "--resume"]) == 2
