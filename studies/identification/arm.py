@@ -2,12 +2,13 @@
 
 It shares no code with the package, so that what a fit says of it is judged from outside. Dry
 friction is ``tanh`` of the speed, which creeps where Coulomb's holds; Runge-Kutta's method takes
-steps of 50 microseconds, and the torques of a 200 Hz PD arrive late by any delay.
+steps of 50 microseconds, and the torques of a 200 Hz PD arrive late by any delay and end where the
+motors' torque-speed lines do.
 """
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +20,7 @@ from hopping_leg.arrays import Array
 from hopping_leg.identify.pipeline import IdentifyOptions, identify
 from hopping_leg.identify.recording import Recording, make_recording
 from hopping_leg.identify.recording_format import RecordingMetadata
-from hopping_leg.robot import Robot, load_robot
+from hopping_leg.robot import MotorLimit, Robot, load_robot
 from studies.identification.twin import BELIEVED
 from studies.shared import host
 
@@ -59,22 +60,27 @@ def draw_truth(robot: Robot, rng: np.random.Generator) -> dict[str, float]:
 
 
 def record_arm(
-    robot: Robot, truth: dict[str, float], seconds: float, seed: int, noise: Noise | None = None
+    robot: Robot,
+    truth: dict[str, float],
+    target: float | Array,
+    seed: int | Sequence[int],
+    noise: Noise | None = None,
 ) -> Recording:
-    """Record an arm that tracks multisines under a PD.
+    """Record an arm that tracks targets under a PD.
 
     Args:
         robot: Has what ``truth`` leaves out.
         truth: See ``draw_truth``.
-        seconds: How long.
-        seed: Of the multisine's phases and of the noise.
+        target: Joint angles, rad, (rows, 2); a number is so many seconds of multisines.
+        seed: Of the multisines' phases and of the noise.
         noise: Of the sensors.
     """
     noise = noise or Noise()
     rng = np.random.default_rng(seed)
-    rows = round(seconds * RATE)
+    if isinstance(target, float):
+        target = _multisine(np.arange(round(target * RATE)) / RATE, rng)
+    rows = len(target)
     time = np.arange(rows) / RATE
-    target = _multisine(time, rng)
     p = np.array(
         [
             robot.thigh.length, robot.thigh.mass, truth["thigh.com"], truth["thigh.inertia"],
@@ -84,7 +90,9 @@ def record_arm(
             truth["hip.damping"], truth["knee.damping"], truth["drive.delay"],
         ]
     )  # fmt: skip
-    seen = _track(p, target, np.array(STIFFNESS), np.array(DAMPING))
+    limit = MotorLimit(robot)
+    line = np.stack([limit.limit, limit.peak, limit.peak / robot.of_joints("no_load_speed")])
+    seen = _track(p, line, target, np.array(STIFFNESS), np.array(DAMPING))
     position = seen[:, :2] + rng.normal(scale=noise.position, size=(rows, 2))
     torque = seen[:, 4:] + rng.normal(scale=noise.torque, size=(rows, 2))
     columns = {"time_s": time}
@@ -127,27 +135,31 @@ def _accelerations(p, s, u):  # type: ignore[no-untyped-def]  # noqa: ANN001, AN
 
 
 @numba.njit
-def _track(p, target, kp, kd):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _track(p, line, target, kp, kd):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Return state and torque before each row's command, (rows, 6), after a second at rest."""
     step = 1 / RATE / _SUBSTEPS
     late = p[-1] / step
     seen = np.zeros((len(target), 6))
     s = np.zeros(4)
     s[:2] = target[0]
-    old = np.zeros(2)
+    old, given = np.zeros(2), np.zeros(2)
     settling = int(RATE)
     for n in range(settling + len(target)):
         row = max(n - settling, 0)
         if n >= settling:
-            seen[row, :4], seen[row, 4:] = s, old
+            seen[row, :4], seen[row, 4:] = s, given
         new = kp * (target[row] - s[:2]) - kd * s[2:]
         for k in range(_SUBSTEPS):
             share = min(max(late - k, 0.0), 1.0)
-            u = share * old + (1 - share) * new
-            k1 = _accelerations(p, s, u)
-            k2 = _accelerations(p, s + step / 2 * k1, u)
-            k3 = _accelerations(p, s + step / 2 * k2, u)
-            k4 = _accelerations(p, s + step * k3, u)
+            for j in range(2):
+                drop = line[2, j] * s[2 + j]
+                most = min(max(line[1, j] - drop, 0.0), line[0, j])
+                least = max(min(-line[1, j] - drop, 0.0), -line[0, j])
+                given[j] = min(max(share * old[j] + (1 - share) * new[j], least), most)
+            k1 = _accelerations(p, s, given)
+            k2 = _accelerations(p, s + step / 2 * k1, given)
+            k3 = _accelerations(p, s + step / 2 * k2, given)
+            k4 = _accelerations(p, s + step * k3, given)
             s = s + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         old = new
     return seen

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from hopping_leg.errors import UsageError
+from hopping_leg.identify.excitation import Multisine
 from hopping_leg.identify.parameters import LegHypothesis
 from hopping_leg.identify.plan import make_plan
 from hopping_leg.identify.simulate import WindowSimulator
 from hopping_leg.identify.windows import cut
 from hopping_leg.robot import COARSE_TIMESTEP, load_robot
-from studies.identification import mujoco_sysid
+from studies.identification import excitations, mujoco_sysid
 from studies.identification.bars import bars
 from studies.identification.fits import compare, summary
 from studies.identification.real import real
@@ -39,6 +40,24 @@ def test_plain_loop_and_replay_simulate_the_same(motion, error):
     start = np.array([recordings[0].array("position")[w.start] for w in windows])
     np.testing.assert_allclose(plain[:, 0], start, atol=1e-9)
     assert np.ptp(plain, axis=1).max() > 0.2
+
+
+def test_excitations_are_compared_leg_by_leg(monkeypatch):
+    """The shorter of two multisines errs more; a fit that fails counts as the believed robot."""
+    short, long = [Multisine(duration=8.0)], [Multisine(duration=32.0)]
+    monkeypatch.setattr(excitations, "usual", lambda: {"multisine": long})
+    monkeypatch.setattr(excitations, "optimal", lambda *_: short)
+    monkeypatch.setattr(excitations, "CASES", (("arm", "multisine"),))
+    result = excitations.compare(1, 7, 1, lambda *_: None)
+    usual, shorter = result["rows"]
+    assert (usual["recorded_s"], shorter["recorded_s"]) == (32.0, 8.0)
+    assert usual["error"] < 0.1 < 1.5 * shorter["error"] / usual["error"]
+    assert usual["failed"] == 0
+    (bar,) = bars({"excitations": result})
+    assert bar["measured"] == pytest.approx(shorter["error"] / usual["error"])
+    robot = load_robot("legv2")
+    truth, leg = excitations.draw_leg(robot, [7, 0])
+    assert leg.rail.friction == truth["rail.friction"]
 
 
 def test_work_is_done_once(tmp_path):

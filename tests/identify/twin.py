@@ -79,9 +79,9 @@ def tracked():
     return record(LEG, swing(8.0))
 
 
-def noisy(run, **scales):
+def noisy(run, seed=0, **scales):
     """Return a recording as seen by poor sensors, with these deviations."""
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(seed)
     table = run.trace.table.with_columns(
         run.trace.table[f"{joint}_{name}"] + rng.normal(scale=scale, size=len(run))
         for joint in ("hip", "knee")
