@@ -71,7 +71,8 @@ def usual() -> dict[str, list[Template]]:
 
 def optimal(threads: int, report: Callable[[float, float], None]) -> list[Template]:
     """Return what tells most in a quarter of their time, in the air and on the ground."""
-    robot, found = load_robot(BELIEVED), []
+    robot = load_robot(BELIEVED)
+    found: list[Template] = []
     rigs: tuple[Rig, ...] = ("fixed-base", "rail")
     for rig in rigs:
         design = Design(robot, rig, SHORT, threads=threads)
