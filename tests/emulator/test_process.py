@@ -178,7 +178,7 @@ def test_the_host_lives_on_without_an_adapter():
     seen = replies(run, 40)
     assert seen[5] == (True, True)
     assert set(seen[12:]) == {(False, False)}
-    assert "Input/output error" in run.link.trouble
+    assert run.link.trouble
 
 
 def test_a_run_is_exactly_repeatable():

@@ -8,6 +8,7 @@ import contextlib
 import io
 import json
 import os
+import stat
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -246,12 +247,12 @@ def identify(folder: Path) -> Values:
 
 @contextlib.contextmanager
 def _wire() -> Iterator[list[bytes]]:
-    """Collect what either end writes to a terminal, in order."""
+    """Collect what either end writes to the line, a pair of sockets, in order."""
     frames: list[bytes] = []
     write = os.write
 
     def note(descriptor: int, data: bytes) -> int:
-        if os.isatty(descriptor):
+        if stat.S_ISSOCK(os.fstat(descriptor).st_mode):
             frames.append(bytes(data))
         return write(descriptor, data)
 

@@ -1,4 +1,4 @@
-"""An fdcanusb on a serial line, read and written without ever waiting for it."""
+"""Lines to and from an fdcanusb, read and written without ever waiting for it."""
 
 import os
 import select
@@ -23,33 +23,27 @@ def _wait_readable(descriptor: int, until: float) -> bool:
     return bool(select.select([descriptor], [], [], patience)[0])
 
 
-class Fdcanusb:
-    """A serial line with an fdcanusb, or a drive's UART, at its other end.
+class LineTransport:
+    """Speaks to an fdcanusb over a descriptor that does not block; see ``Transport``.
 
     Args:
-        path: Of the port.
-        checksums: Whether lines carry checksums from the start; None: all but those to a real
-            fdcanusb, whose firmware may know none until it asks for them.
+        descriptor: Is closed with it.
+        checksums: Whether lines carry checksums from the start, or once the adapter asks for them.
         wait: Tells whether a descriptor has something to read until a time.
-
-    Raises:
-        HardwareError: The port is in use or cannot be opened.
     """
 
     def __init__(
         self,
-        path: str,
-        checksums: bool | None = None,
+        descriptor: int,
+        *,
+        checksums: bool,
         wait: Callable[[int, float], bool] = _wait_readable,
     ) -> None:
         self.trouble = ""
         self.gone = False  # Whether the adapter was pulled out
-        self._wait, self._lines = wait, LineBuffer()
-        self._unsent = b""  # End of a line that was cut off
-        self._lock = locks.Lock(Path(path), path, HardwareError)
-        self._port = opened(self._lock, lambda: serial.Serial(path, _BAUD, timeout=0))
-        self._descriptor = self._port.fileno()
-        self.checksums = not _is_fdcanusb(path) if checksums is None else checksums
+        self.checksums = checksums
+        self._descriptor, self._wait = descriptor, wait
+        self._lines, self._unsent = LineBuffer(), b""  # The latter is the end of a cut line
 
     def send(self, frames: Sequence[Frame]) -> None:
         """Write what the port takes at once; the rest is outdated, but for a line's end."""
@@ -78,9 +72,8 @@ class Fdcanusb:
         return [frame for line in self._lines.feed(data) for frame in self._read(line)]
 
     def close(self) -> None:
-        """Close the port."""
-        self._port.close()
-        self._lock.close()
+        """Close the descriptor."""
+        os.close(self._descriptor)
 
     def _read(self, line: bytes) -> list[Frame]:
         """Return the frame of a line, if it is one."""
@@ -98,6 +91,30 @@ class Fdcanusb:
 
     def _lose(self, why: str) -> None:
         self.gone, self.trouble = True, why
+
+
+class Fdcanusb(LineTransport):
+    """An fdcanusb, or a drive's UART, behind a serial port.
+
+    Args:
+        path: Of the port.
+        checksums: None: all lines but those to a real fdcanusb have them, whose firmware may know
+            none until it asks for them.
+
+    Raises:
+        HardwareError: The port is in use or cannot be opened.
+    """
+
+    def __init__(self, path: str, checksums: bool | None = None) -> None:
+        self._lock = locks.Lock(Path(path), path, HardwareError)
+        self._port = opened(self._lock, lambda: serial.Serial(path, _BAUD, timeout=0))
+        wanted = not _is_fdcanusb(path) if checksums is None else checksums
+        super().__init__(self._port.fileno(), checksums=wanted)
+
+    def close(self) -> None:
+        """Close the port; another may be opened after it."""
+        self._port.close()
+        self._lock.close()
 
 
 def opened(lock: locks.Lock, make: Callable[[], Any]) -> Any:  # noqa: ANN401

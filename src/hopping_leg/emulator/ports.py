@@ -8,6 +8,7 @@ import contextlib
 import os
 import termios
 import tty
+from abc import ABC, abstractmethod
 from pathlib import Path
 
 import can
@@ -59,71 +60,43 @@ class LineProtocol:
             return [self.line(b"ERR malformed frame")]
 
 
-class PtyPort:
-    """The adapter's end of a serial line.
+class LinePort(ABC):
+    """The adapter's end of a serial line."""
 
-    The terminal is also offered under the path ``link``, which outlives a pulled plug.
-
-    Raises:
-        UsageError: Another emulator has the link, or it is a file of another kind.
-    """
-
-    def __init__(self, link: Path | None = None) -> None:
-        self._link, self._lock = link, None
-        if link is not None:
-            self._lock = locks.named_lock(f"emulator-{link.absolute()}", str(link), UsageError)
-            if link.exists() and not link.is_symlink():
-                raise UsageError(f"{link} is there and no link to a terminal; give another --link.")
+    def __init__(self) -> None:
         self.plug_in()
-
-    def __str__(self) -> str:
-        return str(self.path)
-
-    @property
-    def path(self) -> Path:
-        """What the host opens."""
-        return self._link or self._terminal
 
     @property
     def plugged(self) -> bool:
-        """Whether there is a terminal."""
-        return self._master >= 0
+        """Whether there is a line."""
+        return self._descriptor >= 0
 
+    @abstractmethod
     def plug_in(self) -> None:
-        """Offer a new terminal."""
-        self._master, self._slave = os.openpty()
-        for descriptor in (self._master, self._slave):
-            tty.setraw(descriptor, termios.TCSANOW)
-        os.set_blocking(self._master, False)
-        self._terminal = Path(os.ttyname(self._slave))
-        self._protocol = LineProtocol()
-        if self._link is not None:
-            self._link.unlink(missing_ok=True)
-            self._link.symlink_to(self._terminal)
+        """Offer a new line; ``connect`` its end."""
+
+    def connect(self, descriptor: int) -> None:
+        """Begin anew on a descriptor that does not block."""
+        self._descriptor, self._protocol = descriptor, LineProtocol()
 
     def unplug(self) -> None:
-        """Take the terminal away; the host's reads and writes fail."""
-        if self._link is not None:
-            self._link.unlink(missing_ok=True)
-        os.close(self._master)
-        os.close(self._slave)
-        self._master = self._slave = -1
+        """Take the line away; the host's reads and writes fail."""
+        os.close(self._descriptor)
+        self._descriptor = -1
 
     def close(self) -> None:
-        """Take the terminal away for good."""
+        """Take the line away for good."""
         if self.plugged:
             self.unplug()
-        if self._lock is not None:
-            self._lock.close()
 
     def fileno(self) -> int:
         """Return the descriptor to wait for; -1 while unplugged."""
-        return self._master
+        return self._descriptor
 
     def receive(self) -> list[Frame]:
         """Return frames that the host sent; lines that are none are answered."""
         try:
-            items = self._protocol.feed(os.read(self._master, 65536))
+            items = self._protocol.feed(os.read(self._descriptor, 65536))
         except BlockingIOError:
             return []
         if answers := [item for item in items if not isinstance(item, Frame)]:
@@ -142,7 +115,58 @@ class PtyPort:
 
     def _write(self, data: bytes) -> None:
         with contextlib.suppress(BlockingIOError):  # a host that does not read loses it
-            os.write(self._master, data)
+            os.write(self._descriptor, data)
+
+
+class PtyPort(LinePort):
+    """A terminal that passes for an fdcanusb.
+
+    It is also offered under the path ``link``, which outlives a pulled plug.
+
+    Raises:
+        UsageError: Another emulator has the link, or it is a file of another kind.
+    """
+
+    def __init__(self, link: Path | None = None) -> None:
+        self._link, self._lock = link, None
+        if link is not None:
+            self._lock = locks.named_lock(f"emulator-{link.absolute()}", str(link), UsageError)
+            if link.exists() and not link.is_symlink():
+                raise UsageError(f"{link} is there and no link to a terminal; give another --link.")
+        super().__init__()
+
+    def __str__(self) -> str:
+        return str(self.path)
+
+    @property
+    def path(self) -> Path:
+        """What the host opens."""
+        return self._link or self._terminal
+
+    def plug_in(self) -> None:
+        """Offer a new terminal."""
+        master, self._slave = os.openpty()
+        for descriptor in (master, self._slave):
+            tty.setraw(descriptor, termios.TCSANOW)
+        os.set_blocking(master, False)
+        self._terminal = Path(os.ttyname(self._slave))
+        self.connect(master)
+        if self._link is not None:
+            self._link.unlink(missing_ok=True)
+            self._link.symlink_to(self._terminal)
+
+    def unplug(self) -> None:
+        """Take the terminal away."""
+        if self._link is not None:
+            self._link.unlink(missing_ok=True)
+        super().unplug()
+        os.close(self._slave)
+
+    def close(self) -> None:
+        """Take the terminal away for good."""
+        super().close()
+        if self._lock is not None:
+            self._lock.close()
 
 
 def _flipped(line: bytes, digits: int, flip: int) -> bytes:
@@ -219,5 +243,5 @@ class CanPort:
         self._bus.send(message_of(item.frame))
 
 
-Port = PtyPort | CanPort
+Port = LinePort | CanPort
 """The adapter between host and drives."""

@@ -1,13 +1,15 @@
 """Host and emulated robot in one process in virtual time: exact, and as fast as it goes.
 
 Who waits, for a time or for bytes, lets the emulated robot move instead. The host's loop, link and
-adapter run unchanged, down to the bytes on a terminal.
+adapter run unchanged, down to the bytes on the line.
 """
 
+import os
 import select
+import socket
 from collections.abc import Sequence
 
-from hopping_leg.deploy.fdcanusb import Fdcanusb
+from hopping_leg.deploy.fdcanusb import LineTransport
 from hopping_leg.deploy.frames import Frame
 from hopping_leg.deploy.moteus_link import MoteusLink
 from hopping_leg.emulator import ports, server
@@ -30,8 +32,8 @@ class Lockstep:
     def __init__(self, robot: EmulatedRobot, *, checksums: bool = True) -> None:
         self.robot, robot.wire_time = robot, _WIRE_TIME
         self.truth: list[tuple[float, float, float]] = []
-        self._port = ports.PtyPort()
-        self.link = MoteusLink(robot.robot, _Terminal(self, self._port, checksums), self)
+        self._port = _Pair()
+        self.link = MoteusLink(robot.robot, _Host(self, self._port, checksums), self)
 
     def now(self) -> float:
         """Return the robot's time."""
@@ -59,11 +61,25 @@ class Lockstep:
         server.serve(self.robot, self._port, ready=False)
 
 
-class _Terminal(Fdcanusb):
-    """The host's end of the emulated line: what is sent arrives at once."""
+class _Pair(ports.LinePort):
+    """A serial line within the process; ``host`` is what the host's end is a duplicate of."""
 
-    def __init__(self, lockstep: Lockstep, port: ports.PtyPort, checksums: bool) -> None:
-        super().__init__(str(port.path), checksums, lockstep.wait_readable)
+    def plug_in(self) -> None:
+        ours, self.host = (end.detach() for end in socket.socketpair())
+        for end in (ours, self.host):
+            os.set_blocking(end, False)
+        self.connect(ours)
+
+    def unplug(self) -> None:
+        super().unplug()
+        os.close(self.host)
+
+
+class _Host(LineTransport):
+    """The host's end of the line: what is sent arrives at once."""
+
+    def __init__(self, lockstep: Lockstep, port: _Pair, checksums: bool) -> None:
+        super().__init__(os.dup(port.host), checksums=checksums, wait=lockstep.wait_readable)
         self._robot, self._end = lockstep.robot, port
 
     def send(self, frames: Sequence[Frame]) -> None:
@@ -72,5 +88,4 @@ class _Terminal(Fdcanusb):
 
     def close(self) -> None:
         super().close()
-        if self._end.plugged:
-            self._end.close()
+        self._end.close()
