@@ -52,7 +52,7 @@ def test_every_hop_is_as_high_as_asked_under_noise(hopped):
 @pytest.mark.parametrize("latency", [0.0012, 0.0035, 0.0049])
 def test_commands_that_arrive_late_within_a_period_are_planned_with(latency):
     robot = replace_at(ROBOT, "reality.latency.command", latency)
-    check_apexes(hop(robot, HEIGHTS[::3]), HEIGHTS[::3])
+    check_apexes(hop(robot, HEIGHTS[::3]), HEIGHTS[::3], most=0.0025)
 
 
 def test_hops_are_calm_and_the_foot_alone_touches_the_ground(hopped):

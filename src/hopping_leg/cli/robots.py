@@ -8,16 +8,17 @@ Examples:
   hop robots show legv2-paper
   hop robots import leg.urdf --motor qdd100
   hop robots check examples/my_leg.toml
+  hop robots draw twins --count 20 --out runs/twins
 """
 
 import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import tyro
 
-from hopping_leg.cli.options import save_json, say, say_next, show_table
+from hopping_leg.cli.options import at_least, save_json, say, say_next, show_table
 from hopping_leg.errors import UsageError
 from hopping_leg.io import write_atomically
 from hopping_leg.robot import Robot, build_model, numbers, robot_files
@@ -81,10 +82,25 @@ class Import:
     """The robot file; default: the file's name with .toml, in this folder."""
 
 
+@dataclass(frozen=True)
+class Draw:
+    """Draw legs that nobody built and write their robot files, e.g. `hop robots draw twins`."""
+
+    kind: tyro.conf.Positional[Literal["twins", "legs"]]
+    """Twins, which differ from leg V2 in what a fit can find and in what it cannot; or legs of
+    other links, masses and motors, whose files tell all of them."""
+    count: int = 20
+    """How many."""
+    seed: int = 0
+    """Seed of the first; each has the next."""
+    out: Path = Path("runs/robots")
+    """Folder for the files."""
+
+
 def run(
-    args: List | Show | Annotated[Import, tyro.conf.subcommand(name="import")] | Check,
+    args: List | Show | Annotated[Import, tyro.conf.subcommand(name="import")] | Check | Draw,
 ) -> None:
-    """List, show, import or check robots."""
+    """List, show, import, check or draw robots."""
     if isinstance(args, List):
         robots = [robot_files.load_robot(name) for name in robot_files.shipped_robots()]
         for robot in robots:
@@ -107,6 +123,16 @@ def run(
         save_json(args.json, facts)
     elif isinstance(args, Import):
         _import(args)
+    elif isinstance(args, Draw):
+        from hopping_leg.sim.any_leg import draw_leg
+        from hopping_leg.sim.randomization import draw_twin
+
+        at_least(1, count=args.count)
+        draw = draw_twin if args.kind == "twins" else draw_leg
+        for seed in range(args.seed, args.seed + args.count):
+            drawn = draw(seed)
+            drawn.save(args.out / f"{drawn.robot.name}.toml")
+        print(f"Wrote {args.count} robot files to {args.out}.")
     else:
         robot = robot_files.robot_from_tree(robot_files.load_tree(args.robot), args.robot)
         doubted = robot_files.doubts(args.robot)

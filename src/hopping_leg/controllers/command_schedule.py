@@ -78,7 +78,7 @@ def command_range(controller: protocol.Controller, robot: Robot) -> Range:
     A policy's are those of its training; others go from folded standing to twice the leg's length.
     """
     if isinstance(controller, policy.Policy):
-        return controller.card.command_low, controller.card.command_high
+        return controller.command_range
     return command_limits(robot)
 
 

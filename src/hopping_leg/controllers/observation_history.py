@@ -5,14 +5,20 @@ policy's graph, so that a policy file needs nothing but encoders and a command.
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 
 from hopping_leg.arrays import Array, Array32, IntArray
+from hopping_leg.controllers import robot_numbers
 from hopping_leg.controllers.sample_history import RingBuffer, SampleHistory
 from hopping_leg.errors import PolicyError, unknown_name
+from hopping_leg.robot import Robot
 from hopping_leg.sim.channel import DELAY_DEPTH, SAMPLES, Measurement
+
+FULL_TORQUE = "full_torque"
+"""Graph input with which the network's actions are multiplied, N m, (n, 2)."""
 
 Inputs = dict[str, Array32]
 """Graph input to its array, (n, ...)."""
@@ -31,6 +37,14 @@ class ObservationHistory(ABC):
 
     def __init__(self, period: float) -> None:
         self.period = period
+
+    @property
+    def network_inputs(self) -> tuple[str, ...]:
+        """Graph inputs that the network sees; others scale what it gives."""
+        return tuple(self.shapes)
+
+    def set_robots(self, robots: Sequence[Robot]) -> None:  # noqa: B027
+        """Say what is believed of the legs: a robot each, or one of all."""
 
     def reset(self, count: int) -> None:  # noqa: B027
         """Forget the past of all legs; the next measurement has ``count`` rows."""
@@ -187,8 +201,89 @@ class DatedLong(Dated):
     shapes: ClassVar[dict[str, tuple[int, ...]]] = _dated_shapes(LAGS, TORQUE_LAGS)
 
 
+class AnyLeg(Dated):
+    """The dated layout in the leg's own units, and what its robot file says of the leg.
+
+    The foot's position below and in front of the hip, (n, lags, 2), is over the leg's length L,
+    about its middle; it follows from the joint samples. Velocities are over sqrt(g / L), ages over
+    25 ms, past torques over ``full_torque``, N m, (n, 2), with which the network's actions are
+    multiplied, too; the command is over L. ``robot`` are the file's numbers, (n, k), see
+    ``robot_numbers``.
+    """
+
+    name: ClassVar[str] = "any-leg"
+    COMMAND_GAIN: ClassVar[float] = 4.0
+    """Of commands over the leg's length, so that they lie about between -1 and 1."""
+    shapes: ClassVar[dict[str, tuple[int, ...]]] = {
+        "foot": (len(Dated.LAGS), 2),
+        "foot_velocity": (len(Dated.LAGS), 2),
+        **Dated.shapes,
+        "robot": (robot_numbers.COUNT,),
+        FULL_TORQUE: (2,),
+    }
+
+    @property
+    def network_inputs(self) -> tuple[str, ...]:
+        """All but the full torque."""
+        return tuple(name for name in self.shapes if name != FULL_TORQUE)
+
+    def set_robots(self, robots: Sequence[Robot]) -> None:
+        """Say what is believed of the legs."""
+        self._numbers = np.array([robot_numbers.robot_numbers(robot) for robot in robots])
+        self.full_torque = np.array([robot_numbers.full_torque(robot) for robot in robots])
+        """Torques of full actions, N m, (n or 1, 2)."""
+        self._length = np.array([[robot_numbers.leg_length(robot)] for robot in robots])
+        self._share = np.array([[[r.thigh.length / robot_numbers.leg_length(r)]] for r in robots])
+        self._foot = np.array([[robot.foot.radius] for robot in robots])
+        self._time = np.array([[[robot_numbers.fall_time(robot)]] for robot in robots])
+
+    def inputs(self) -> Inputs:
+        """Return samples, torques and command in the leg's units, and the leg's numbers."""
+        seen, count = super().inputs(), len(self._command)
+        foot, velocity = self._foot_motion(seen["q"], seen["qd"])
+        height = (self._command[:, None] - self._foot) / self._length
+        return {
+            "foot": foot.astype(np.float32),
+            "foot_velocity": (velocity * self._time).astype(np.float32),
+            "q": seen["q"],
+            "qd": (seen["qd"] * self._time).astype(np.float32),
+            "age": seen["age"] * np.float32(1 / _LATE),
+            "past_torque": (seen["past_torque"] / self.full_torque[:, None]).astype(np.float32),
+            "command": ((height - _MIDDLE) * self.COMMAND_GAIN).astype(np.float32),
+            "robot": _repeat(self._numbers, count),
+            FULL_TORQUE: _repeat(self.full_torque, count),
+        }
+
+    def _foot_motion(self, q: Array32, qd: Array32) -> tuple[Array, Array]:
+        """Return where the foot is below and in front of the hip, and its velocity times L/s."""
+        thigh = np.stack([np.cos(q[..., 0]), np.sin(q[..., 0])], axis=-1)
+        both = q.sum(axis=-1)
+        shank = np.stack([np.cos(both), np.sin(both)], axis=-1)
+        thigh, shank = self._share * thigh, (1 - self._share) * shank
+        rate = qd.sum(axis=-1)[..., None]
+        turned = qd[..., :1] * thigh[..., ::-1] + rate * shank[..., ::-1]
+        return _FOOT_GAIN * (thigh + shank - _FOOT_MIDDLE), _VELOCITY_GAIN * _TURN * turned
+
+
+_TURN = np.array([-1.0, 1.0])
+"""Signs of the derivatives of cosine and sine."""
+
+_FOOT_MIDDLE, _FOOT_GAIN, _VELOCITY_GAIN = np.array([0.7, 0.0]), 4.0, 1.5
+"""Of the foot's position and velocity, so that they lie about between -1 and 1."""
+
+_LATE = 0.025
+"""Age of a sample that is shown as 1, s."""
+
+_MIDDLE = 1.05
+"""Of commands over the leg's length."""
+
+
+def _repeat(values: Array, count: int) -> Array32:
+    return np.broadcast_to(values.astype(np.float32), (count, values.shape[1]))
+
+
 OBSERVATION_HISTORIES: dict[str, type[ObservationHistory]] = {
-    history.name: history for history in (ThreeSamples, Dated, DatedLong)
+    history.name: history for history in (ThreeSamples, Dated, DatedLong, AnyLeg)
 }
 """Classes by the names that policy files, tasks and ``hop train --observation`` know them by."""
 

@@ -17,7 +17,11 @@ from typing import Any, Literal
 import numpy as np
 
 from hopping_leg.arrays import Array, BoolArray, IntArray
-from hopping_leg.controllers.observation_history import ObservationHistory, make_observation_history
+from hopping_leg.controllers.observation_history import (
+    AnyLeg,
+    ObservationHistory,
+    make_observation_history,
+)
 from hopping_leg.errors import PolicyError, UsageError
 from hopping_leg.io import parse_json, read_dataclass
 from hopping_leg.robot.parameters import Robot
@@ -93,6 +97,9 @@ OtherRobot = Literal["refuse", "warn", "accept"]
 """What to do with a policy that was trained for another robot."""
 
 _log = logging.getLogger(__name__)
+HEIGHT = 0.30
+"""Straight height of the leg that cards of policies for any leg give heights for, m."""
+
 _ROUNDING = 1e-9
 _MOST_RATE = 1e4  # Hz
 _MARGIN = 0.25
@@ -196,6 +203,10 @@ class Policy:
             )
         self.card = Card.from_json(text, origin)
         self._layout = make_observation_history(self.card.layout, 1 / self.card.rate)
+        self.for_any_leg = isinstance(self._layout, AnyLeg)
+        """Whether it is for any leg, once it is told which."""
+        self.scale = 1.0
+        """Size of the leg that it is on, over that of the paper's, if it is for any leg."""
         self._memory_size = _check_signature(self._session, self._layout, origin)
         memory = {MEMORY: (self._memory_size,)} if self.remembers else {}
         self.seconds = measure_session(self._session, self._layout.shapes | memory, origin)
@@ -220,6 +231,17 @@ class Policy:
         return self._layout.shapes
 
     @property
+    def command_range(self) -> tuple[float, float]:
+        """Lowest and highest command, m; one for any leg is asked for more on a longer one."""
+        return self.scale * self.card.command_low, self.scale * self.card.command_high
+
+    def set_robot(self, robot: Robot) -> None:
+        """Say what leg it is on, as far as is known: that counts where it is for any leg."""
+        self._layout.set_robots([robot])
+        if self.for_any_leg:
+            self.scale = robot.straight_height / HEIGHT
+
+    @property
     def remembers(self) -> bool:
         """Whether it carries a memory from tick to tick."""
         return self._memory_size > 0
@@ -227,7 +249,7 @@ class Policy:
     def check_robot(
         self, robot: Robot, rate: float | None = None, *, other: OtherRobot = "refuse"
     ) -> None:
-        """Make sure that the policy was trained for this robot and control rate, Hz, if given.
+        """Tell the policy its robot, and make sure that it was trained for that and the rate, Hz.
 
         Raises:
             PolicyError: The rate differs, or the robot where that is refused.
@@ -238,6 +260,7 @@ class Policy:
                 f"{self.origin} was trained at {card.rate:g} Hz and cannot run at {rate:g} Hz;"
                 f" set --rate {card.rate:g}."
             )
+        self.set_robot(robot)
         sentence = self.stranger(robot, self.origin)
         if sentence and other == "refuse":
             raise PolicyError(
@@ -250,7 +273,7 @@ class Policy:
     def stranger(self, robot: Robot, name: str) -> str:
         """Return a sentence that names the policy if a robot is not that of its training, or ""."""
         card = self.card
-        if robot.has_digest(card.robot_digest):
+        if self.for_any_leg or robot.has_digest(card.robot_digest):
             return ""
         return (
             f"{name} was trained on robot '{card.robot}' ({card.robot_digest}), not on"
@@ -289,12 +312,12 @@ class Policy:
         Raises:
             UsageError: A command lies outside the range that the policy was trained for.
         """
-        newest, card = measurement.command[:, 0], self.card
-        fits = (card.command_low - _ROUNDING <= newest) & (newest <= card.command_high + _ROUNDING)
+        newest, (low, high) = measurement.command[:, 0], self.command_range
+        fits = (low - _ROUNDING <= newest) & (newest <= high + _ROUNDING)
         if not fits.all():
             raise UsageError(
-                f"{self.name} was trained for commands from {card.command_low:g} to"
-                f" {card.command_high:g} m, not for {newest[~fits][0]:g} m."
+                f"{self.name} was trained for commands from {low:g} to {high:g} m, not for"
+                f" {newest[~fits][0]:g} m."
             )
         self._layout.update(measurement, self._torque)
         if len(self._forgotten):
@@ -313,6 +336,7 @@ class Policy:
         """Return which input of the first leg is far beyond all that training met, or ""."""
         card = self.card
         values = np.concatenate([measurement.q[0, 0], measurement.qd[0, 0]])
+        values[2:] *= np.sqrt(self.scale)
         for name, value, low, high in zip(
             INPUTS, values, card.input_low, card.input_high, strict=False
         ):

@@ -4,13 +4,52 @@ The foot in the hip's frame: x_down = L1 cos q1 + L2 cos(q1 + q2), y = L1 sin q1
 The paper's base height x is the height of the hip axis above the ground.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from hopping_leg.arrays import Array
+from hopping_leg.arrays import Array, IntArray
 from hopping_leg.robot.parameters import Robot
 
 
-def foot_position(robot: Robot, q: Array) -> Array:
+@dataclass(frozen=True)
+class Lengths:
+    """Links of n legs."""
+
+    length: Array
+    """(n,), m."""
+
+
+@dataclass(frozen=True)
+class Radii:
+    """Balls of n legs."""
+
+    radius: Array
+    """(n,), m."""
+
+
+@dataclass(frozen=True)
+class LegGeometry:
+    """Lengths of n legs that differ; angles and heights given with it have n rows."""
+
+    thigh: Lengths
+    shank: Lengths
+    foot: Radii
+    knee_cap: Radii
+    base: Radii
+
+    def rows(self, ids: IntArray) -> "LegGeometry":
+        """Return some of the legs."""
+        thigh, shank = (Lengths(link.length[ids]) for link in (self.thigh, self.shank))
+        balls = (Radii(ball.radius[ids]) for ball in (self.foot, self.knee_cap, self.base))
+        return LegGeometry(thigh, shank, *balls)
+
+
+Geometry = Robot | LegGeometry
+"""What kinematics depend on."""
+
+
+def foot_position(robot: Geometry, q: Array) -> Array:
     """Return the foot's centre in the hip's frame, (x_down, y), m, (..., 2); angles in rad."""
     thigh, shank = robot.thigh.length, robot.shank.length
     q1, q12 = q[..., 0], q[..., 0] + q[..., 1]
@@ -19,7 +58,7 @@ def foot_position(robot: Robot, q: Array) -> Array:
     return np.stack([down, forward], axis=-1)
 
 
-def joint_angles(robot: Robot, foot: Array) -> Array:
+def joint_angles(robot: Geometry, foot: Array) -> Array:
     """Return the angles, rad, (..., 2), for a foot at (x_down, y), m, (..., 2), with q2 <= 0.
 
     They are NaN where the foot is out of reach.
@@ -38,7 +77,7 @@ def joint_angles(robot: Robot, foot: Array) -> Array:
     return np.where(reachable[..., None], angles, np.nan)
 
 
-def jacobian(robot: Robot, q: Array) -> Array:
+def jacobian(robot: Geometry, q: Array) -> Array:
     """Return d(x_down, y)/d(q1, q2), m/rad, (..., 2, 2)."""
     thigh, shank = robot.thigh.length, robot.shank.length
     q1, q12 = q[..., 0], q[..., 0] + q[..., 1]
@@ -49,30 +88,30 @@ def jacobian(robot: Robot, q: Array) -> Array:
     return np.stack([down, forward], axis=-2)
 
 
-def foot_velocity(robot: Robot, q: Array, qd: Array) -> Array:
+def foot_velocity(robot: Geometry, q: Array, qd: Array) -> Array:
     """Return the foot's velocity in the hip's frame, (x_down, y) rates, m/s, (..., 2)."""
     velocity: Array = np.einsum("...ij,...j->...i", jacobian(robot, q), qd)
     return velocity
 
 
-def stance_height(robot: Robot, q: Array) -> Array:
+def stance_height(robot: Geometry, q: Array) -> Array:
     """Return the base height if the foot stands on flat, hard ground, m, (...)."""
-    lengths = np.array([robot.thigh.length, robot.shank.length])
+    lengths = np.stack([robot.thigh.length, robot.shank.length], axis=-1)
     height: Array = np.vecdot(np.cos(np.add.accumulate(q, axis=-1)), lengths) + robot.foot.radius
     return height
 
 
-def foot_clearance(robot: Robot, height: Array, q: Array) -> Array:
+def foot_clearance(robot: Geometry, height: Array, q: Array) -> Array:
     """Return the gap between the foot and the ground, m, (...); negative when it sinks in."""
     return height - stance_height(robot, q)
 
 
-def knee_clearance(robot: Robot, height: Array, q: Array) -> Array:
+def knee_clearance(robot: Geometry, height: Array, q: Array) -> Array:
     """Return the gap between the knee and the ground, m, (...)."""
     return height - robot.thigh.length * np.cos(q[..., 0]) - robot.knee_cap.radius
 
 
-def base_clearance(robot: Robot, height: Array) -> Array:
+def base_clearance(robot: Geometry, height: Array) -> Array:
     """Return the gap between the base and the ground, m, (...)."""
     return height - robot.base.radius
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hopping_leg.arrays import Array, IntArray
+from hopping_leg.arrays import Array, BoolArray, IntArray
 from hopping_leg.errors import UsageError
 from hopping_leg.sim.compiled import compiled
 
@@ -77,13 +77,20 @@ class Channel:
 
     Every tick calls ``sense``, then ``actuate`` once. Noisy samples enter a buffer of the last ten
     ticks; with probability 0.5 three of them, in order of time, replace the latest three. Sensing
-    again within a tick gives the same noise. ``period`` is the control period, s.
+    again within a tick gives the same noise. ``period`` is the control period, s. Legs that are not
+    ``disturbed``, (n,), have no noise and no delay.
     """
 
     def __init__(
-        self, count: int, disturbance: NoiseAndDelay, period: float, rng: np.random.Generator
+        self,
+        count: int,
+        disturbance: NoiseAndDelay,
+        period: float,
+        rng: np.random.Generator,
+        disturbed: BoolArray | None = None,
     ) -> None:
         self.count, self.disturbance, self.period, self.rng = count, disturbance, period, rng
+        self._share = np.ones(count) if disturbed is None else disturbed.astype(np.float64)
         depth = disturbance.delay_buffer
         self._orders = np.array(list(itertools.combinations(range(depth), SAMPLES)))
         self._buffer = np.zeros((depth, count, 5))
@@ -124,7 +131,7 @@ class Channel:
         samples, disturbance = np.empty((self.count, SAMPLES, 5)), self.disturbance
         _disturb(
             self._draws, self._buffer, self._orders, self._tick, disturbance.joint_noise,
-            disturbance.delay_probability, samples, self._back,
+            disturbance.delay_probability, self._share, samples, self._back,
         )  # fmt: skip
         return samples
 
@@ -163,7 +170,8 @@ class Channel:
         self._set_torque_noise()
 
     def _set_torque_noise(self) -> None:
-        self._torque_noise = 1 + self.disturbance.torque_noise * (2 * self._draws[..., 6:8] - 1)
+        noise = self.disturbance.torque_noise * self._share[:, None]
+        self._torque_noise = 1 + noise * (2 * self._draws[..., 6:8] - 1)
 
 
 @compiled
@@ -174,6 +182,7 @@ def _disturb(
     tick: int,
     joint_noise: float,
     delay_probability: float,
+    share: Array,
     samples: Array,
     back: Array,
 ) -> None:
@@ -185,9 +194,9 @@ def _disturb(
     for leg, draw in enumerate(draws[tick % len(draws)]):
         newest = buffer[tick % depth, leg]
         for i in range(4):
-            newest[i] *= 1 + joint_noise * (2 * draw[i] - 1)
+            newest[i] *= 1 + share[leg] * joint_noise * (2 * draw[i] - 1)
         order = orders[int(draw[5] * len(orders))]
-        late = draw[4] < delay_probability
+        late = draw[4] < share[leg] * delay_probability
         for k in range(SAMPLES):
             ticks = order[k] if late else k
             back[leg, k] = ticks

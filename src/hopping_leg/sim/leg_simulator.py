@@ -14,7 +14,7 @@ from hopping_leg.errors import UsageError
 from hopping_leg.robot import TIMESTEP, Robot
 from hopping_leg.sim import stepper
 from hopping_leg.sim.compiled import compiling_notice
-from hopping_leg.sim.leg_table import LEG, leg_table
+from hopping_leg.sim.leg_table import LEG, leg_geometry, leg_table
 from hopping_leg.sim.simulator import CONTROL_RATE, Simulator
 
 _STEPS_PER_THREAD = 4000
@@ -89,6 +89,7 @@ class LegSimulator(Simulator):
         self.robots = tuple(robots)
         """What each leg is."""
         self.table = table
+        self.geometry = leg_geometry(robots)
         self._jitters = bool(table["command_jitter"].any())
         self._noisy = bool(table["sensor_noise"].any())
         late = bool(table["measurement_latency"].any())

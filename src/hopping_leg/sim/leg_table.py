@@ -7,6 +7,7 @@ import numpy as np
 from hopping_leg.arrays import Records
 from hopping_leg.errors import RobotError
 from hopping_leg.robot import GRAVITY, JOINTS, Joint, Robot, model
+from hopping_leg.robot.kinematics import Geometry, LegGeometry, Lengths, Radii
 
 SENSORS = ("position", "velocity", "torque")
 """What each joint's sensors measure; columns of readings are (hip, knee) of each in turn."""
@@ -65,6 +66,19 @@ def leg_table(
     distinct = {id(robot): robot for robot in robots}  # many times the same one
     rows = {key: _row(robot, timestep, fixed_base, gravity) for key, robot in distinct.items()}
     return np.array([rows[id(robot)] for robot in robots])
+
+
+def leg_geometry(robots: Sequence[Robot]) -> Geometry:
+    """Return the lengths of robots: the first itself where all are as long."""
+
+    def lengths(robot: Robot) -> tuple[float, ...]:
+        balls = (robot.foot, robot.knee_cap, robot.base)
+        return (robot.thigh.length, robot.shank.length, *(ball.radius for ball in balls))
+
+    if len({lengths(robot) for robot in robots}) <= 1:
+        return robots[0]
+    thigh, shank, *balls = np.array([lengths(robot) for robot in robots]).T
+    return LegGeometry(Lengths(thigh), Lengths(shank), *map(Radii, balls))
 
 
 def _row(robot: Robot, timestep: float, fixed_base: bool, gravity: float) -> Records:

@@ -41,6 +41,8 @@ class Simulator(ABC):
     def __init__(self, robot: Robot, count: int, rate: float, timestep: float) -> None:
         self.substeps = _substeps(rate, timestep)
         self.robot, self.count, self.rate, self.timestep = robot, count, rate, timestep
+        self.geometry: kinematics.Geometry = robot
+        """Lengths of the legs."""
         self.period = 1 / rate
 
     def _show(self, state: Array) -> None:
@@ -92,15 +94,15 @@ class Simulator(ABC):
 
     def foot_clearance(self) -> Array:
         """Return the gap between each foot and the ground, m, (n,)."""
-        return kinematics.foot_clearance(self.robot, self.height, self.q)
+        return kinematics.foot_clearance(self.geometry, self.height, self.q)
 
     def knee_clearance(self) -> Array:
         """Return the gap between each knee and the ground, m, (n,)."""
-        return kinematics.knee_clearance(self.robot, self.height, self.q)
+        return kinematics.knee_clearance(self.geometry, self.height, self.q)
 
     def base_clearance(self) -> Array:
         """Return the gap between each base and the ground, m, (n,)."""
-        return kinematics.base_clearance(self.robot, self.height)
+        return kinematics.base_clearance(self.geometry, self.height)
 
 
 def _substeps(rate: float, timestep: float) -> int:

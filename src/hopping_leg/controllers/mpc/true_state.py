@@ -4,7 +4,7 @@ from dataclasses import astuple, dataclass, fields, replace
 
 import numpy as np
 
-from hopping_leg.arrays import Array, Records
+from hopping_leg.arrays import Array, BoolArray, Records
 from hopping_leg.controllers.mpc import hop_law
 from hopping_leg.controllers.protocol import Measurement
 from hopping_leg.errors import UsageError
@@ -169,6 +169,19 @@ class TrueStateMpc:
         if len(elastic):
             self._ground[elastic] = leg_table([robots[k] for k in elastic], how.elastic_timestep)
             self._steps[elastic] = round(self.period / how.elastic_timestep)
+
+    @property
+    def resting(self) -> BoolArray:
+        """Which legs stand where they have to fold first, (n,)."""
+        landing, rate = self._phase == hop_law.LANDING, self._legs.height_rate
+        resting: BoolArray = landing & (np.abs(rate) < hop_law.REST_SPEED)
+        return resting
+
+    @property
+    def pushing(self) -> BoolArray:
+        """Which legs push, (n,)."""
+        pushing: BoolArray = self._phase == hop_law.PUSH
+        return pushing
 
     def look(self) -> tuple[Array, Records]:
         """Return what plans begin with: states, (n, 6), and the stepper's memory, (n,)."""

@@ -21,7 +21,7 @@ class PyBulletSimulator(Simulator):
 
     Raises:
         UsageError: PyBullet is not installed, the physics step does not divide the control period,
-        or the robot has a ``reality`` or friction that grows with load.
+            or the robot has a ``reality`` or friction that grows with load.
     """
 
     def __init__(
