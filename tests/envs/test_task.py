@@ -4,14 +4,16 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
+from hopping_leg.controllers import robot_numbers
 from hopping_leg.controllers.observation_history import OBSERVATION_HISTORIES, ThreeSamples
-from hopping_leg.envs import HoppingTask, TaskConfig, paper_reward
+from hopping_leg.envs import HoppingTask, Reward, TaskConfig, TaskLeg, paper_reward
 from hopping_leg.envs.observation import sample_scaling
 from hopping_leg.errors import UsageError
 from hopping_leg.hop_detection import find_hops
-from hopping_leg.robot import load_robot
+from hopping_leg.robot import kinematics, load_robot
 from hopping_leg.robot.kinematics import joint_angles
 from hopping_leg.sim import NO_NOISE
+from hopping_leg.sim.any_leg import draw_any_leg
 from hopping_leg.sim.randomization import WIDE_RANGES
 
 ROBOT = load_robot("legv2-paper")
@@ -184,3 +186,65 @@ def test_an_observation_history_of_ones_own_is_a_class_and_an_entry(monkeypatch)
     own, usual = task(TaskConfig(observation="newest")), task(TaskConfig())
     seen, whole = own.step(np.zeros((6, 2))).observation, usual.step(np.zeros((6, 2))).observation
     np.testing.assert_allclose(seen, whole[:, :5], atol=1e-5)
+
+
+ANY = TaskConfig(
+    observation="any-leg", episode=0.4, episode_grid=4, reset_distribution="hop",
+    random_episode_start=True, command_resampling_time=(0.05, 0.1),
+)  # fmt: skip
+
+
+def legs_of_any_size(count=5):
+    drawn = [draw_any_leg(seed) for seed in range(count)]
+    return [
+        TaskLeg(leg.believed, leg.true, (0.3 + 0.1 * k, 0.35 + 0.1 * k), k % 2 == 0)
+        for k, leg in enumerate(drawn)
+    ]
+
+
+def mixed(seed=0):
+    rng = np.random.default_rng(seed)
+    return HoppingTask(ROBOT, 5, ANY, Reward(()), rng, 1, legs=legs_of_any_size())
+
+
+def test_legs_that_differ_are_asked_and_told_their_own():
+    task, ends = mixed(), set()
+    low, high = np.array([leg.command_range for leg in task.task_legs]).T
+    for action in actions(200, count=5):
+        step = task.step(action)
+        ends |= {task._tick for _ in np.flatnonzero(step.truncated)}
+        assert ((low <= task.command) & (task.command <= high)).all()
+    assert ends
+    assert {tick % 4 for tick in ends} == {0}
+    size = robot_numbers.COUNT
+    for row, leg in enumerate(task.task_legs):
+        told = robot_numbers.robot_numbers(leg.believed)
+        np.testing.assert_allclose(step.observation[row, -size:], told, rtol=1e-6)
+        full = robot_numbers.full_torque(leg.believed)
+        np.testing.assert_allclose(task.full_torque[row], full)
+
+
+def test_legs_that_differ_do_not_know_of_each_other_and_start_above_the_ground():
+    task = mixed()
+    task.reset()
+    alone = kinematics.foot_clearance(
+        task.task_legs[3].true, task.legs.height[3:4], task.legs.q[3:4]
+    )
+    assert task.legs.foot_clearance()[3] == pytest.approx(alone[0])
+    assert (task.legs.foot_clearance() > -1e-6).all()
+    noisy = np.zeros(5, bool)
+    for action in actions(20, count=5):
+        task.step(action)
+        seen = task.measurement
+        noisy |= (seen.q[:, 0] != task.legs.measured_q).any(axis=1)
+    assert noisy.tolist() == [leg.disturbed for leg in task.task_legs]
+
+
+def test_a_restored_task_of_legs_that_differ_goes_on_exactly():
+    one, other = mixed(seed=0), mixed(seed=0)
+    plan = actions(90, count=5)
+    for action in plan[:30]:
+        last = one.step(action)
+    np.testing.assert_array_equal(other.restore(one.state()), last.observation)
+    for action in plan[30:]:
+        assert fingerprint(one.step(action)) == fingerprint(other.step(action))

@@ -179,9 +179,12 @@ def test_heights_scale_with_the_leg_and_lie_within_its_reach(robot):
 
 
 class FakePolicy:
+    for_any_leg = False
+
     def __init__(self, seed):
         made = {"recipe": "fast", "robot": "other", "robot_digest": "0" * 16, "seed": seed}
         self.card = SimpleNamespace(command_low=0.2, command_high=0.4, **made)
+        self.command_range = (0.2, 0.4)
 
     stranger = Policy.stranger
 

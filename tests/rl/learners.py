@@ -4,11 +4,14 @@ import torch
 from stable_baselines3.common.logger import configure
 
 from hopping_leg.controllers.policy import Card, Policy
-from hopping_leg.rl import policy_evaluation
+from hopping_leg.envs import TaskLeg
+from hopping_leg.rl import policy_evaluation, training_legs
 from hopping_leg.rl.onnx_export import build_policy
 from hopping_leg.rl.recipes.fast import FAST
 from hopping_leg.rl.recipes.paper import PAPER
+from hopping_leg.rl.recipes.universal import UNIVERSAL
 from hopping_leg.robot import COARSE_TIMESTEP, DEFAULT_ROBOT, load_robot
+from hopping_leg.sim.any_leg import draw_any_leg
 from hopping_leg.sim.randomization import WIDE_RANGES
 
 ROBOT = load_robot(DEFAULT_ROBOT)
@@ -28,11 +31,26 @@ STUDENTS = {
     "surprised": TINY_FAST.replace({"task.randomised": WIDE_RANGES}),
 }
 EVERY = {"sac": TINY, **STUDENTS}
+TINY_UNIVERSAL = UNIVERSAL.replace(
+    num_envs=4, steps=2048, n_steps=32, buffer_size=512, gradient_steps=4, batch_size=64,
+    hidden=(8,), size=8, mixing_share=0.4, eval_commands=(0.28, 0.32),
+)  # fmt: skip
+
+
+def some_legs(count=4):
+    """Return drawn legs that are asked for what about any of them reaches."""
+    found = []
+    for seed in range(count):
+        drawn = draw_any_leg(seed)
+        height = drawn.true.straight_height
+        found.append(TaskLeg(drawn.believed, drawn.true, (0.9 * height, height), drawn.disturbed))
+    return found
 
 
 def learner(recipe, seed=3, robot=ROBOT):
     torch.set_num_threads(1)
-    made = recipe.make_learner(robot, seed)
+    legs = some_legs(recipe.schedule.num_envs) if recipe.legs == "any" else ()
+    made = recipe.make_learner(robot, seed, legs=legs)
     made.set_logger(configure(None, []))
     return made
 
@@ -47,9 +65,13 @@ def policy_file(recipe, made):
     task = recipe.task
     about = task.observation, *task.command_bounds, task.action_torque
     card = Card("test", *about, ROBOT.name, ROBOT.digest, task.rate)
-    return Policy(build_policy(made.network(), card), "memory", "test")
+    policy = Policy(build_policy(made.network(), card), "memory", "test")
+    policy.set_robot(ROBOT)
+    return policy
 
 
 def try_briefly(monkeypatch):
     """Let trials of policies take half a second."""
     monkeypatch.setitem(policy_evaluation.evaluate_policy.__kwdefaults__, "seconds", 0.5)
+    monkeypatch.setattr(policy_evaluation, "_RANGE_SECONDS", 0.5)
+    monkeypatch.setattr(training_legs, "_ROUND", 8)

@@ -32,7 +32,7 @@ def made(layout, *, remembers=False):
     sizes = {name: int(np.prod(shape)) for name, shape in shapes(layout).items()}
     total = sum(sizes.values())
     gain = np.concatenate([np.full(k, 5.0 if n == "command" else 0.5) for n, k in sizes.items()])
-    wide = [MEMORY if remembers else total, 8, 2]
+    wide = [MEMORY + total if remembers else total, 8, 2]
     layers = [
         (rng.normal(size=(b, a)) / np.sqrt(a), rng.normal(0, 0.1, b))
         for a, b in itertools.pairwise(wide)
@@ -49,7 +49,9 @@ def feeds(layout, seed=0, *, remembers=False):
     arrays = {n: rng.uniform(-1, 1, (6, *s)).astype(np.float32) for n, s in shapes(layout).items()}
     arrays["command"] = rng.uniform(0.15, 0.5, arrays["command"].shape).astype(np.float32)
     if remembers:
-        arrays["memory"] = rng.uniform(-1, 1, (6, MEMORY)).astype(np.float32)
+        counts = np.zeros((6, 1))
+        remembered = np.concatenate([rng.uniform(-1, 1, (6, MEMORY)), counts], axis=1)
+        arrays["memory"] = remembered.astype(np.float32)
     return arrays
 
 

@@ -10,17 +10,19 @@ from hopping_leg.envs import Reward
 from hopping_leg.errors import UsageError
 from hopping_leg.rl import train as module
 from hopping_leg.rl.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
-from tests.rl.learners import EVERY, ROBOT, TINY, try_briefly
+from tests.rl.learners import EVERY, ROBOT, TINY, TINY_UNIVERSAL, try_briefly
 
 
 class KilledError(Exception):
     pass
 
 
-@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("name", [*EVERY, "universal"])
 def test_a_killed_training_ends_with_the_same_policy(name, tmp_path, monkeypatch):
     try_briefly(monkeypatch)
-    recipe = EVERY[name].replace(eval_every=192, checkpoint_seconds=0)
+    recipe = {**EVERY, "universal": TINY_UNIVERSAL.replace(steps=768)}[name].replace(
+        eval_every=192, checkpoint_seconds=0
+    )
 
     def kill(steps, _):
         if steps >= 384:
@@ -36,7 +38,7 @@ def test_a_killed_training_ends_with_the_same_policy(name, tmp_path, monkeypatch
     results = [json.loads((tmp_path / n / "result.json").read_text()) for n in ("whole", "cut")]
     one, other = ([(s["name"], s["score_m"]) for s in r["stages"]] for r in results)
     assert one == other
-    assert len(one) == (0 if name == "sac" else 4)
+    assert len(one) == {"sac": 0, "universal": 3}.get(name, 4)
 
 
 def test_only_whole_checkpoints_count_two_are_kept_and_none_holds_a_pickle(tmp_path):

@@ -123,7 +123,7 @@ def _refuse(args: Finetune, policy: "Policy", robot: Robot) -> None:
             " leg with --on, and the robot that its file extends with --robot."
         )
     policy.check_robot(robot)
-    low, high = policy.card.command_low, policy.card.command_high
+    low, high = policy.command_range
     for command in args.commands:
         if not low <= command <= high:
             raise errors.UsageError(

@@ -34,11 +34,12 @@ class Options:
     """What to train and where to keep it."""
 
     recipe: str = "fast"
-    """Recipe: `fast` for accurate hopping soon, `precise` for more accurate hopping later, `paper`
-    for the paper's method; or FILE.py:NAME, a recipe of your own."""
+    """Recipe: `fast` for accurate hopping soon, `precise` for more accurate hopping later,
+    `universal` for one policy on any leg, `paper` for the paper's method; or FILE.py:NAME, a recipe
+    of your own."""
     robot: str | None = None
-    """A shipped robot or the path of a .toml file; default: legv2-paper for `paper`, else
-    legv2-identified."""
+    """A shipped robot or the path of a .toml file; default: legv2-paper for `paper`, legv2 for
+    `universal`, which is trained on other legs besides, else legv2-identified."""
     seed: int = 0
     """Seed of weights, exploration, starts, noise and delay."""
     out: Path | None = None
@@ -64,6 +65,9 @@ class Options:
     """Control steps of experience, all legs together, instead of the recipe's."""
     threads: int = 1
     """Threads of the networks and the physics."""
+    ray: str | None = None
+    """Address of a Ray cluster that finds out what the teacher reaches on legs of any size, for
+    `universal`; `local` starts one here. Default: processes of this machine."""
     log: Literal["tensorboard", "wandb", "trackio"] = "tensorboard"
     """Logger besides TensorBoard; wandb and trackio have to be installed."""
     json: JsonFile = None
@@ -99,6 +103,7 @@ def run(args: Options) -> None:
             minutes=args.minutes,
             threads=args.threads,
             log=args.log,
+            ray=args.ray,
         )
     print(trained.policy.with_name("model_card.md").read_text(encoding="utf-8"))
     print(f"Policy: {trained.policy}")

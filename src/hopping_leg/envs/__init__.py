@@ -4,7 +4,7 @@ from hopping_leg.envs.apex_reward import ApexRewardConfig, apex_reward
 from hopping_leg.envs.gymnasium_envs import HoppingEnv, HoppingVectorEnv
 from hopping_leg.envs.paper_reward import PaperRewardConfig, paper_reward
 from hopping_leg.envs.rewards import PerLeg, Reward, RewardTerm, Transition
-from hopping_leg.envs.task import HoppingTask, Step
+from hopping_leg.envs.task import HoppingTask, Step, TaskLeg
 from hopping_leg.envs.task_config import TaskConfig
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "RewardTerm",
     "Step",
     "TaskConfig",
+    "TaskLeg",
     "Transition",
     "apex_reward",
     "paper_reward",

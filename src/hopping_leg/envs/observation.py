@@ -6,7 +6,9 @@ positions run from -1 at the lower to 1 at the upper soft limit, velocities are 
 scale, the command runs from -1 to 1 over its range.
 """
 
+import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,6 +62,11 @@ class Observation(ABC):
     """Where each of the history's joined inputs stands in an observation, (size,)."""
     scaling: Scaling
     """Scaling of the history's joined inputs."""
+
+    @property
+    def command_direction(self) -> Array:
+        """What a command that is lower by a leg's length adds to an observation, (size,)."""
+        return np.zeros(self.size)
 
     def advance(self, samples: Array, channel: Channel, last_action: Array) -> None:  # noqa: B027
         """Update with a tick's samples (q1, q2, qd1, qd2, command), newest first, (n, 3, 5).
@@ -123,8 +130,21 @@ class HistoryObservation(Observation):
         self._layout, self.layout = layout, layout.name
         self.scaling, self._torque = scaling, torque
         self.size = len(scaling.offset)
-        self.order = np.arange(self.size)
+        self.order, self._count = np.arange(self.size), count
         layout.reset(count)
+
+    @property
+    def command_direction(self) -> Array:
+        """What a command that is lower by a leg's length adds to an observation, (size,)."""
+        layout = self._layout
+        if not isinstance(layout, observation_history.AnyLeg):
+            return super().command_direction
+        names = layout.network_inputs
+        parts = [
+            np.full(math.prod(layout.shapes[n]), -layout.COMMAND_GAIN if n == "command" else 0.0)
+            for n in names
+        ]
+        return np.concatenate(parts)
 
     def advance(self, samples: Array, channel: Channel, last_action: Array) -> None:
         """Update the layout with a new tick."""
@@ -136,7 +156,8 @@ class HistoryObservation(Observation):
 
     def view(self, samples: Array) -> Array32:
         """Return the normalised inputs, (n, size)."""
-        parts = [part.reshape(len(part), -1) for part in self._layout.inputs().values()]
+        inputs = self._layout.inputs()
+        parts = [inputs[name].reshape(self._count, -1) for name in self._layout.network_inputs]
         joined = np.concatenate(parts, axis=1, dtype=np.float64)
         return ((joined - self.scaling.offset) * self.scaling.gain).astype(np.float32)
 
@@ -160,12 +181,19 @@ def sample_scaling(robot: Robot, config: TaskConfig) -> Scaling:
     return Scaling(offset, 1 / span)
 
 
-def make_observation(robot: Robot, config: TaskConfig, count: int) -> Observation:
-    """Return the observation that a task asks for."""
+def make_observation(
+    robot: Robot, config: TaskConfig, count: int, believed: Sequence[Robot] = ()
+) -> Observation:
+    """Return the observation that a task asks for, of legs of which something else is believed."""
     sample = sample_scaling(robot, config)
     if config.observation == observation_history.ThreeSamples.name:
         return PaperObservation(sample)
     layout = observation_history.make_observation_history(config.observation, 1 / config.rate)
+    layout.set_robots(believed or [robot])
+    if isinstance(layout, observation_history.AnyLeg):
+        size = sum(math.prod(layout.shapes[name]) for name in layout.network_inputs)
+        unit = Scaling(np.zeros(size), np.ones(size))
+        return HistoryObservation(layout, unit, layout.full_torque, count)
     torque = np.array(config.action_torque)
     parts = {
         "q": (sample.offset[0:2], sample.gain[0:2]),

@@ -2,12 +2,16 @@
 
 import copy
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
 from hopping_leg import errors, hop_detection
 from hopping_leg.arrays import Array, Array32, BoolArray, IntArray
+from hopping_leg.controllers import robot_numbers
+from hopping_leg.controllers.observation_history import AnyLeg
 from hopping_leg.envs import rewards, task_config
 from hopping_leg.envs.observation import (
     PRIVILEGED,
@@ -16,6 +20,7 @@ from hopping_leg.envs.observation import (
     sample_scaling,
 )
 from hopping_leg.robot import Robot, kinematics
+from hopping_leg.robot.kinematics import LegGeometry
 from hopping_leg.sim import LegSimulator, Measurement, Plant, randomization
 from hopping_leg.sim.compiled import compiled
 
@@ -25,17 +30,40 @@ _NEAR_APEX = (-0.06, 0.03)
 """Where the other starts ``hop`` begin, relative to the commanded apex, m."""
 
 
+@dataclass(frozen=True)
+class TaskLeg:
+    """One leg of a task in which legs differ."""
+
+    believed: Robot
+    """What is told of it."""
+    true: Robot
+    """What it is."""
+    command_range: tuple[float, float]
+    """Desired heights that it reaches, m."""
+    disturbed: bool = True
+    """Whether it meets the task's noise and delay."""
+
+
 class ResetSampler:
     """Draws initial states: standing, or dropped in a random posture.
+
+    Legs that differ, each with a scale of the lengths of ``config``, (n,), have a ``geometry``.
 
     Raises:
         RobotError: The robot is no leg.
         UsageError: A start asks for a leg length that the robot does not reach.
     """
 
-    def __init__(self, robot: Robot, config: task_config.TaskConfig) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        config: task_config.TaskConfig,
+        geometry: LegGeometry | None = None,
+        scale: Array | None = None,
+    ) -> None:
         robot.require_leg()
         self.robot, self.config = robot, config
+        self._geometry, self._scale = geometry, scale
         lengths = (config.start_length, *config.drop_length)
         self._standing = kinematics.joint_angles(robot, np.array([lengths[0], 0.0]))
         reach = robot.thigh.length + robot.shank.length
@@ -45,30 +73,34 @@ class ResetSampler:
                 f" take lengths below {reach:g} m."
             )
 
-    def draw(self, command: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    def draw(self, rows: IntArray, command: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         """Draw base heights, m, (k,), and joint angles, rad, (k, 2), for desired heights, m."""
         count, kind = len(command), self.config.reset_distribution
+        leg = self.robot if self._geometry is None else self._geometry.rows(rows)
+        scale = 1.0 if self._scale is None else self._scale[rows]
         if kind == "standing":
             q = np.tile(self._standing, (count, 1))
-            return kinematics.stance_height(self.robot, q), q
-        q, gap = self._drop(count, rng)
+            return kinematics.stance_height(leg, q), q
+        q, gap = self._drop(leg, scale, count, rng)
         if kind == "mixed":
             stands = rng.random(count) < 0.5
             q[stands], gap[stands] = self._standing, 0.0
-        standing = kinematics.stance_height(self.robot, q)
+        standing = kinematics.stance_height(leg, q)
         if kind != "hop":
             return standing + gap, q
         stands = rng.random(count) < _STANDING_SHARE
-        apex = command + rng.uniform(*_NEAR_APEX, count)
+        apex = command + scale * rng.uniform(*_NEAR_APEX, count)
         return np.where(stands, standing, np.maximum(standing, apex)), q
 
-    def _drop(self, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
+    def _drop(
+        self, leg: kinematics.Geometry, scale: Array | float, count: int, rng: np.random.Generator
+    ) -> tuple[Array, Array]:
         config = self.config
-        length = rng.uniform(*config.drop_length, count)
-        offset = rng.uniform(-config.drop_offset, config.drop_offset, count)
-        q = kinematics.joint_angles(self.robot, np.stack([length, offset], axis=-1))
+        length = scale * rng.uniform(*config.drop_length, count)
+        offset = scale * rng.uniform(-config.drop_offset, config.drop_offset, count)
+        q = kinematics.joint_angles(leg, np.stack([length, offset], axis=-1))
         q = np.clip(q, self.robot.of_joints("lower"), self.robot.of_joints("upper"))
-        return q, rng.uniform(0.0, config.drop_clearance, count)
+        return q, scale * rng.uniform(0.0, config.drop_clearance, count)
 
 
 class Step(NamedTuple):
@@ -103,7 +135,8 @@ class HoppingTask:
 
     All randomness comes from ``rng``; the threads, 0 for one per core, change no result. With
     ``autoreset`` the next episode begins within the tick that ends one, else with ``reset``. The
-    reward is copied: what it remembers is of this task's legs alone.
+    reward is copied: what it remembers is of this task's legs alone. Where ``legs`` are given, one
+    for each environment, they differ: what is told of them, what they are, and what is asked.
     """
 
     def __init__(
@@ -116,22 +149,22 @@ class HoppingTask:
         threads: int = 0,
         *,
         autoreset: bool = True,
+        legs: Sequence[TaskLeg] = (),
     ) -> None:
-        self.autoreset = autoreset
+        self.autoreset, self.task_legs = autoreset, tuple(legs)
         self.robot, self.count, self.options = robot, count, options
         self.reward = copy.deepcopy(reward)
-        noise, self._rng, legs = rng.spawn(3)
+        noise, self._rng, numbers = rng.spawn(3)
         self._numbers = np.zeros((count, len(options.randomised)))
         self.legs = LegSimulator(
-            robot, count, rate=options.rate, timestep=options.timestep, threads=threads
-        )
-        self._randomize(int(legs.integers(2**62)))
-        self.plant = Plant(self.legs, options.disturbance, options.soft_limits, noise)
-        self.observation = make_observation(robot, options, count)
+            robot, count, rate=options.rate, timestep=options.timestep, threads=threads,
+            robots=[leg.true for leg in legs],
+        )  # fmt: skip
+        self._randomize(int(numbers.integers(2**62)))
         self._scaling = sample_scaling(robot, options)
-        self._reset_sampler = ResetSampler(robot, options)
-        self._torque = np.array(options.action_torque)
-        self._horizon = max(1, round(options.episode * options.rate))
+        self._take(robot, noise)
+        grid = options.episode_grid
+        self._horizon = max(1, round(options.episode * options.rate / grid)) * grid
         self._never, self._nan = np.zeros(count, np.bool_), np.full(count, np.nan)
         for constant in (self._never, self._nan):
             constant.flags.writeable = False
@@ -143,6 +176,29 @@ class HoppingTask:
         self._switch = np.full(count, np.iinfo(np.int64).max)
         self.last_action, self._rises = np.zeros((count, 2)), np.zeros(count, np.bool_)
         self.reset()
+
+    def _take(self, robot: Robot, noise: np.random.Generator) -> None:
+        """Set what depends on whether legs differ."""
+        options, legs = self.options, self.task_legs
+        self._ranges = np.array([leg.command_range for leg in legs])
+        disturbed = np.array([leg.disturbed for leg in legs]) if legs else None
+        self.plant = Plant(self.legs, options.disturbance, options.soft_limits, noise, disturbed)
+        believed = [leg.believed for leg in legs] or [robot]
+        self.believed = tuple(believed) if legs else (robot,) * self.count
+        """What is told of each leg."""
+        self.full_torque = np.tile(options.action_torque, (self.count, 1))
+        """Joint torques of full actions, N m, (n, 2)."""
+        if options.observation == AnyLeg.name:
+            full = np.array([robot_numbers.full_torque(one) for one in believed])
+            self.full_torque = np.array(np.broadcast_to(full, (self.count, 2)))
+        self.observation = make_observation(robot, options, self.count, believed)
+        length = np.array([robot_numbers.leg_length(one) for one in believed])
+        geometry = self.legs.geometry
+        if isinstance(geometry, LegGeometry):
+            scale = length / robot_numbers.leg_length(robot)
+            self._reset_sampler = ResetSampler(robot, options, geometry, scale)
+        else:
+            self._reset_sampler = ResetSampler(robot, options)
 
     def _randomize(self, seed: int) -> None:
         """Let every leg go on with numbers of its own, the same ones for the same seed."""
@@ -179,7 +235,9 @@ class HoppingTask:
         rows = np.arange(self.count) if ids is None else np.asarray(ids)
         self._begin(rows, command)
         if ids is None and self.options.random_episode_start:
-            self._end[:] = self._tick + self._rng.integers(1, self._horizon + 1, self.count)
+            grid = self.options.episode_grid
+            periods = self._rng.integers(1, self._horizon // grid + 1, self.count)
+            self._end[:] = self._tick + periods * grid
             self._plan()
         return self._see_anew(rows)
 
@@ -191,7 +249,7 @@ class HoppingTask:
         """
         legs = self.legs
         taken, torque = np.array(action, np.float64), np.empty((self.count, 2))
-        if taken.shape != torque.shape or not _clip(taken, self._torque, torque):
+        if taken.shape != torque.shape or not _clip(taken, self.full_torque, torque):
             self._refuse(taken)
         command, height_before = self.command.copy(), legs.height.copy()
         self.applied_torque = self.plant.drive(torque)
@@ -316,8 +374,8 @@ class HoppingTask:
 
     def _begin(self, rows: IntArray, command: Array | None = None) -> None:
         count = len(rows)
-        self.command[rows] = self._draw_commands(count) if command is None else command
-        height, q = self._reset_sampler.draw(self.command[rows], self._rng)
+        self.command[rows] = self._draw_commands(rows) if command is None else command
+        height, q = self._reset_sampler.draw(rows, self.command[rows], self._rng)
         self.legs.place(rows, height, q)
         self._end[rows] = self._tick + self._horizon
         self.last_action[rows], self._rises[rows] = 0.0, False
@@ -334,11 +392,15 @@ class HoppingTask:
 
     def _change_commands(self) -> None:
         due = np.flatnonzero(self._switch <= self._tick)
-        self.command[due] = self._draw_commands(len(due))
+        self.command[due] = self._draw_commands(due)
         self._switch[due] = self._tick + self._draw_holds(len(due))
         self._plan()
 
-    def _draw_commands(self, count: int) -> Array:
+    def _draw_commands(self, rows: IntArray) -> Array:
+        count = len(rows)
+        if len(self._ranges):
+            low, high = self._ranges[rows].T
+            return self._rng.uniform(low, high, count)
         if self.options.command_range is not None:
             low, high = self.options.command_range
             return self._rng.uniform(low, high, count)
@@ -357,7 +419,7 @@ class HoppingTask:
 def _clip(action: Array, full: Array, torque: Array) -> bool:
     """Clip actions to [-1, 1] and set their torques; return whether all are finite.
 
-    ``full`` are the torques of a full action, (2,).
+    ``full`` are the torques of a full action, (n, 2).
     """
     for leg in range(len(action)):
         for joint in range(2):
@@ -365,7 +427,7 @@ def _clip(action: Array, full: Array, torque: Array) -> bool:
                 return False
             if abs(action[leg, joint]) > 1:
                 action[leg, joint] = math.copysign(1.0, action[leg, joint])
-            torque[leg, joint] = action[leg, joint] * full[joint]
+            torque[leg, joint] = action[leg, joint] * full[leg, joint]
     return True
 
 

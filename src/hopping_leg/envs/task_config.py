@@ -44,6 +44,8 @@ class TaskConfig:
     """Length of an episode, s."""
     random_episode_start: bool = False
     """Cut the first episode of each leg at a random length, so that a batch does not end as one."""
+    episode_grid: int = 1
+    """Control periods at whose multiples alone episodes end."""
     fall_clearance: float | None = None
     """Gap between ground and base or knee below which an episode terminates, m; none never does."""
     fall_penalty: float = 0.0

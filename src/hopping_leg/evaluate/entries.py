@@ -108,8 +108,7 @@ def entry_of(label: str, controller: Controller) -> Entry:
     """Return a controller as an entry, a policy with the range of commands that it was made for."""
     if not isinstance(controller, Policy):
         return Entry(label, controller)
-    card = controller.card
-    return Entry(label, controller, (card.command_low, card.command_high))
+    return Entry(label, controller, controller.command_range)
 
 
 def _load(name: str, source: str, robot: Robot, rate: float) -> Entry:

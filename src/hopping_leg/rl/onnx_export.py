@@ -1,7 +1,7 @@
 """Policy files: ONNX graphs built from numpy weights.
 
-Graph: inputs (flattened, joined) -> (x - offset) * gain -> dense layers -> squash -> torque scale;
-what remembers stands before the dense layers.
+Graph: inputs (flattened, joined) -> (x - offset) * gain -> dense layers -> squash -> full torque;
+what remembers stands beside the inputs of the dense layers.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from hopping_leg import errors
 from hopping_leg.arrays import Array
-from hopping_leg.controllers.observation_history import make_observation_history
+from hopping_leg.controllers.observation_history import FULL_TORQUE, make_observation_history
 from hopping_leg.controllers.policy import MEMORY, METADATA_KEY, NEXT_MEMORY, Card
 
 ACTIVATIONS = {"relu": "Relu", "tanh": "Tanh", "elu": "Elu"}
@@ -55,7 +55,10 @@ class Graph:
         self.nodes.append(helper.make_node(operator, inputs, outputs, **attributes))
 
     def dense(self, x: str, layers: Layers, activation: str, prefix: str = "") -> str:
-        """Put dense layers behind values, (n, in), all but the last activated; return theirs."""
+        """Put dense layers behind values, (n, in), all but the last activated; return theirs.
+
+        The hidden ones are called ``hidden_0`` and so on, behind the prefix.
+        """
         for index, (weight, bias) in enumerate(layers):
             names = [
                 x,
@@ -79,33 +82,86 @@ def array_info(name: str, *shape: int) -> Any:  # noqa: ANN401
 
 
 @dataclass(frozen=True)
+class Correction:
+    """The command is shifted until the network no longer guesses that hops miss it.
+
+    With the guess e of how far the last hop missed the command that was shown, and the shift s,
+    both in one unit, every update of the recurrent unit changes s by gain (e - s); the command that
+    is shown is the one asked for less s.
+    """
+
+    of_hidden: Array
+    """Weights of the guess on the last hidden layer, (1, width)."""
+    bias: Array
+    """(1,)."""
+    gain: float
+    most: float
+    """Largest shift."""
+    direction: Array
+    """What a shift of the command adds to the normalised inputs, (size,)."""
+
+    def show(self, graph: Graph, x: str, shift: str) -> str:
+        """Return the inputs with the command shifted."""
+        moved = graph.apply(
+            "Mul", [shift, graph.constant("direction", self.direction)], "command_shift"
+        )
+        return graph.apply("Add", [x, moved], "shown")
+
+    def update(self, graph: Graph, hidden: str, shift: str, due: str) -> str:
+        """Return the next shift."""
+        apply, constant = graph.apply, graph.constant
+        names = [
+            hidden,
+            constant("guess_weight", self.of_hidden.T),
+            constant("guess_bias", self.bias),
+        ]
+        missed = apply("Sub", [apply("Gemm", names, "guess"), shift], "still_missed")
+        share = apply("Mul", [due, constant("correction_gain", self.gain)], "correction_share")
+        moved = apply("Add", [shift, apply("Mul", [share, missed], "correction")], "corrected")
+        return graph.clip(moved, -self.most, self.most, "next_shift", "shift_")
+
+
+@dataclass(frozen=True)
 class RecurrentUnit:
     """A gated recurrent unit with its gates reset, update and candidate in this order, as torch's.
 
-    Weights are (3 k, size) and (3 k, k), biases (3 k,).
+    Weights are (3 k, size) and (3 k, k), biases (3 k,). It is updated ``every`` so many control
+    periods, which the entry of the graph's memory behind its own counts; a correction's shift is
+    the last one.
     """
 
     of_input: Array
     of_memory: Array
     bias_of_input: Array
     bias_of_memory: Array
+    every: int = 1
+    correction: Correction | None = None
 
     @property
     def size(self) -> int:
-        """Entries k of its memory."""
-        return int(self.of_memory.shape[1])
+        """Entries of the graph's memory."""
+        return int(self.of_memory.shape[1]) + 1 + (self.correction is not None)
 
     def build(self, graph: Graph, x: str) -> str:
-        """Show the dense layers what is remembered; ONNX orders gates update, reset, candidate."""
+        """Show the dense layers what is remembered and seen.
+
+        ONNX orders gates update, reset, candidate.
+        """
 
         def ordered(weights: Array) -> Array:
             reset, update, candidate = np.split(weights, 3)
             return np.concatenate([update, reset, candidate])[None]
 
+        own = self.of_memory.shape[1]
+        parts = ["remembered_before", "count", "shift"][: 2 + (self.correction is not None)]
+        sizes = np.array([own, 1, 1][: len(parts)], np.int64)
+        graph.add("Split", [MEMORY, graph.constant("memory_sizes", sizes)], parts, axis=1)
+        if self.correction is not None:
+            x = self.correction.show(graph, x, "shift")
         biases = np.concatenate([ordered(b)[0] for b in (self.bias_of_input, self.bias_of_memory)])
         first = graph.constant("first_axis", np.array([0], np.int64))
         graph.add("Unsqueeze", [x, first], ["sequence"])
-        graph.add("Unsqueeze", [MEMORY, first], ["memory_before"])
+        graph.add("Unsqueeze", ["remembered_before", first], ["memory_before"])
         graph.add(
             "GRU",
             [
@@ -117,11 +173,33 @@ class RecurrentUnit:
                 "memory_before",
             ],
             ["", "memory_after"],
-            hidden_size=self.size,
+            hidden_size=own,
             linear_before_reset=1,
         )
-        graph.add("Squeeze", ["memory_after", first], [NEXT_MEMORY])
-        return NEXT_MEMORY
+        graph.add("Squeeze", ["memory_after", first], ["updated"])
+        due = graph.clip(
+            graph.apply("Sub", [graph.constant("one", 1.0), "count"], "not_due"),
+            0.0,
+            1.0,
+            "due",
+            "due_",
+        )
+        news = graph.apply("Sub", ["updated", "remembered_before"], "news")
+        change = graph.apply("Mul", [due, news], "change")
+        remembered = graph.apply("Add", ["remembered_before", change], "remembered")
+        return graph.apply("Concat", [remembered, x], "remembered_and_seen", axis=1)
+
+    def finish(self, graph: Graph, hidden: str) -> None:
+        """Give the next memory, behind the dense layers' last hidden one."""
+        apply = graph.apply
+        last = apply("Sub", ["count", graph.constant("last", self.every - 2.0)], "since_last")
+        round_over = graph.clip(last, 0.0, 1.0, "round_over", "round_")
+        back = apply("Mul", [round_over, graph.constant("every", float(self.every))], "back")
+        counted = apply("Sub", [apply("Add", ["count", "one"], "next_count"), back], "counted")
+        parts = ["remembered", counted]
+        if self.correction is not None:
+            parts.append(self.correction.update(graph, hidden, "shift", "due"))
+        apply("Concat", parts, NEXT_MEMORY, axis=1)
 
 
 @dataclass(frozen=True)
@@ -158,7 +236,7 @@ class Network:
     bound: float = float("inf")
     """Bound of the last layer's output before the squash."""
     memory: RecurrentUnit | None = None
-    """Memory in front of the dense layers."""
+    """Memory beside the inputs of the dense layers."""
 
     def __post_init__(self) -> None:
         if self.activation not in ACTIVATIONS or self.squash not in SQUASHES:
@@ -173,11 +251,12 @@ def build_policy(network: Network, card: Card) -> bytes:
 
     The actor's input is the layout's arrays, flattened row by row and joined.
     """
-    shapes = make_observation_history(card.layout, 1 / card.rate).shapes
-    graph = Graph()
+    layout = make_observation_history(card.layout, 1 / card.rate)
+    graph, shapes = Graph(), layout.shapes
     apply, constant = graph.apply, graph.constant
     flat = [
-        apply("Flatten", [n], f"{n}_flat", axis=1) if len(s) > 1 else n for n, s in shapes.items()
+        apply("Flatten", [n], f"{n}_flat", axis=1) if len(shapes[n]) > 1 else n
+        for n in layout.network_inputs
     ]
     x = apply("Concat", flat, "joined", axis=1) if len(flat) > 1 else flat[0]
     x = apply("Sub", [x, constant("offset", network.offset)], "centred")
@@ -186,12 +265,15 @@ def build_policy(network: Network, card: Card) -> bytes:
     if memory is not None:
         x = memory.build(graph, x)
     x = graph.dense(x, network.layers, network.activation)
+    if memory is not None:
+        memory.finish(graph, f"hidden_{len(network.layers) - 2}")
     bound = network.bound if network.squash == "tanh" else min(network.bound, 1.0)
     if np.isfinite(bound):
         x = graph.clip(x, -bound, bound, "bounded")
     if network.squash == "tanh":
         x = apply("Tanh", [x], "action")
-    apply("Mul", [x, constant("torque_scale", card.torque_scale)], "torque")
+    full = FULL_TORQUE if FULL_TORQUE in shapes else constant("torque_scale", card.torque_scale)
+    apply("Mul", [x, full], "torque")
     inputs = [array_info(name, *shape) for name, shape in shapes.items()]
     outputs = [array_info("torque", 2)]
     if memory is not None:

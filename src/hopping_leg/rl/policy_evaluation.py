@@ -78,13 +78,15 @@ def evaluate_policy(
     *,
     legs: int = 4,
     seconds: float = 10.0,
+    **world: Any,  # noqa: ANN401
 ) -> list[CommandResult]:
     """Let a controller hop at fixed commands, m, rising, with noise and delay.
 
-    Each seed adds so many legs per command; ``threads`` of 0 are one per core.
+    Each seed adds so many legs per command; ``threads`` of 0 are one per core. What is left are
+    options of ``RolloutConfig``.
     """
     schedule = np.tile(np.repeat(commands, legs), (round(seconds * rate), 1))
-    setup = RolloutConfig(robot, rate=rate, threads=threads)
+    setup = RolloutConfig(robot, rate=rate, threads=threads, **world)
     runs = [rollout(controller, setup, schedule, seed) for seed in seeds]
     return [
         _command_result(runs, command, range(index * legs, (index + 1) * legs), rate)
@@ -95,10 +97,18 @@ def evaluate_policy(
 def input_range(
     controller: Controller, robot: Robot, commands: tuple[float, ...], rate: float
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the least and the largest ``controllers.policy.INPUTS`` in trials at commands, m."""
-    schedule = np.tile(commands, (round(_RANGE_SECONDS * rate), 1))
+    """Return the least and the largest ``controllers.policy.INPUTS`` in trials at commands, m.
+
+    Of a policy for any leg, commands and velocities are those of a leg of the paper's size.
+    """
+    scale = 1.0
+    if isinstance(controller, Policy):
+        controller.set_robot(robot)
+        scale = controller.scale
+    schedule = np.tile(np.multiply(scale, commands), (round(_RANGE_SECONDS * rate), 1))
     run = rollout(controller, RolloutConfig(robot, rate=rate), schedule, FINAL_SEEDS[0])
-    columns = [run.data[name] for pair in ("q", "qd") for name in MEASURED[pair]]
+    units = {"q": 1.0, "qd": np.sqrt(scale)}
+    columns = [unit * run.data[name] for pair, unit in units.items() for name in MEASURED[pair]]
     return tuple(float(c.min()) for c in columns), tuple(float(c.max()) for c in columns)
 
 

@@ -1,9 +1,9 @@
 """What a recipe is: everything that decides how a controller is trained, in parts."""
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 
@@ -72,6 +72,8 @@ class Recipe:
     """Weights of the reward's terms; a student needs none."""
     robot: str = DEFAULT_ROBOT
     """The robot that it is meant for, unless another is named."""
+    legs: Literal["robot", "any"] = "robot"
+    """What it is trained on: the robot, or as many legs of any size as there are environments."""
     heights: tuple[float, float] | None = None
     """Lowest and highest desired height, m, on whatever leg; none takes the task's, which grow with
     the leg."""
@@ -112,14 +114,18 @@ class Recipe:
             found = getattr(found, part)
         return found
 
-    def make_learner(self, robot: Robot, seed: int, threads: int = 1) -> Learner:
-        """Build the algorithm on its environments, untrained."""
+    def make_learner(
+        self, robot: Robot, seed: int, threads: int = 1, legs: Sequence[envs.TaskLeg] = ()
+    ) -> Learner:
+        """Build the algorithm on its environments, of ``legs`` where these differ, untrained."""
         rng, count, options = np.random.default_rng(seed), self.schedule.num_envs, self.task
         if isinstance(self.algorithm, DaggerConfig):
             low, high = options.command_bounds
             beyond = (low, high + self.algorithm.headroom)
             options = dataclasses.replace(options, command_range=beyond)
-        task = envs.HoppingTask(robot, count, options, self.make_reward(robot), rng, threads)
+        task = envs.HoppingTask(
+            robot, count, options, self.make_reward(robot), rng, threads, legs=legs
+        )
         if isinstance(self.algorithm, DaggerConfig):
             assert isinstance(self.network, StudentConfig), "a distillation has a student"
             return Dagger(task, self.algorithm, self.network, seed)

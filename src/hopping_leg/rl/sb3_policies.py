@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
+import numpy as np
 import torch
 from stable_baselines3.common.policies import ContinuousCritic
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
@@ -62,10 +63,13 @@ def dense(inputs: int, hidden: list[int], activation: type[nn.Module]) -> nn.Seq
 _NAMES = {nn.ReLU: "relu", nn.Tanh: "tanh", nn.ELU: "elu"}
 
 
-def dense_network(parts: Sequence[nn.Module], observation: Observation, squash: str) -> Network:
+def dense_network(
+    parts: Sequence[nn.Module], observation: Observation, squash: str, before: int = 0
+) -> Network:
     """Return dense layers, given in order, with the task's normalisation.
 
-    The output is brought to -1..1 by ``squash``; raises ``UsageError`` for other layers.
+    The output is brought to -1..1 by ``squash``; ``before`` entries stand before the observation in
+    what the first layer sees. Raises ``UsageError`` for other layers.
     """
     modules = [leaf for part in parts for leaf in flatten(part)]
     bound = float("inf")
@@ -79,7 +83,8 @@ def dense_network(parts: Sequence[nn.Module], observation: Observation, squash: 
             f"An actor of {sorted(k.__name__ for k in kinds)} cannot be exported; use dense layers"
             f" with one of {', '.join(_NAMES.values())}."
         )
-    layers[0] = (layers[0][0][:, observation.order], layers[0][1])
+    order = np.concatenate([np.arange(before), before + observation.order])
+    layers[0] = (layers[0][0][:, order], layers[0][1])
     scaling = observation.scaling
     return Network(scaling.offset, scaling.gain, layers, _NAMES[kinds.pop()], squash, bound)
 

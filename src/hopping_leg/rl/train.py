@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,14 +12,25 @@ import torch
 
 from hopping_leg import errors, io, locks
 from hopping_leg.controllers.policy import Card, Policy
+from hopping_leg.envs import TaskLeg
 from hopping_leg.progress import LiveProgress
-from hopping_leg.rl import loggers, onnx_export, policy_evaluation, run_folder, stages
+from hopping_leg.rl import (
+    loggers,
+    onnx_export,
+    policy_evaluation,
+    run_folder,
+    stages,
+    training_legs,
+)
 from hopping_leg.rl.checkpoint import write_checkpoint
+from hopping_leg.rl.distillation.dagger import DaggerConfig
 from hopping_leg.rl.learner import RecentHops
 from hopping_leg.rl.model_card import write_card
 from hopping_leg.rl.policy_evaluation import calibrate
 from hopping_leg.rl.recipe import Recipe
 from hopping_leg.robot.parameters import Robot
+from hopping_leg.sim import compile_physics
+from hopping_leg.workers import ProcessWorkers, RayWorkers
 
 
 class TrainingProgress(LiveProgress):
@@ -43,10 +54,17 @@ class TrainingProgress(LiveProgress):
         note += best
         self._show("training", self._title, share, note)
 
+    def prepare(self, what: str, share: float) -> None:
+        """Show the share of what is done before the training, 0 to 1."""
+        self._show(what, f"{self._title}, {what}", share)
+
     def finish(self, what: str) -> None:
         """Show what is done after the training itself."""
         self._show("training", f"{self._title}, {what}", 1.0)
 
+
+_RANGE_LEGS, _RANGE_STRIDE = 24, 5
+"""Legs of any size whose hops tell a policy's range of inputs, and which of their heights do."""
 
 SHOWN_EVERY = 0.5
 """Time between two updates of the progress bar, s."""
@@ -76,6 +94,7 @@ def train(
     threads: int = 1,
     quiet: bool = False,
     log: loggers.Log = "tensorboard",
+    ray: str | None = None,
     on_snapshot: Callable[[int, float], None] = lambda _steps, _score: None,
 ) -> Trained:
     """Train a controller, scaled to the robot's size; leave policy, card and history in ``out``.
@@ -95,6 +114,8 @@ def train(
         threads: Threads of torch and physics; torch's is set for the whole process.
         quiet: Show no progress.
         log: Who gets the curves besides TensorBoard.
+        ray: Address of a Ray cluster that finds out what the teacher reaches on legs of any size;
+            without one, processes of this machine do, as many as ``threads``, at least two.
         on_snapshot: Called with steps and score, m, of every snapshot; may raise to end it.
 
     Raises:
@@ -118,13 +139,38 @@ def train(
         recipe, worst_score = stages.within_reach(fitted, robot)
         with locks.hold_folder(out, errors.UsageError):
             tree = folder.begin(resume=resume)
-            trainer = Trainer(recipe, robot, seed, folder, minutes, threads, began)
+            legs = _find_legs(fitted, seed, folder, max(threads, 2), ray, progress)
+            trainer = Trainer(recipe, robot, seed, folder, minutes, threads, began, legs)
             trainer.end_stage(worst_score)
             trainer.learner.set_logger(loggers.make_logger(folder.path, log, folder.config))
             trainer.on_snapshot = on_snapshot
             if tree is not None:
                 trainer.restore(tree)
             return trainer.run(progress)
+
+
+def _find_legs(
+    recipe: Recipe,
+    seed: int,
+    folder: run_folder.RunFolder,
+    processes: int,
+    ray: str | None,
+    progress: TrainingProgress,
+) -> list[TaskLeg]:
+    """Return the legs of a training for any leg, none for others."""
+    if recipe.legs == "robot":
+        return []
+    assert isinstance(recipe.algorithm, DaggerConfig), "a teacher says what legs reach"
+    teacher = (recipe.algorithm.teacher, recipe.algorithm.planning)
+    count, file = recipe.schedule.num_envs, folder.path / "legs.json"
+    compile_physics()
+    with ProcessWorkers(processes) as local:
+        workers = local if ray is None else RayWorkers(ray)
+        found = training_legs.reach_of_legs(
+            count, seed, recipe.task.command_bounds, teacher, workers, file,
+            lambda known: progress.prepare("trying legs", known / count),
+        )  # fmt: skip
+    return [training_legs.task_leg(reach) for reach in found]
 
 
 class Trainer:
@@ -139,10 +185,12 @@ class Trainer:
         minutes: float | None,
         threads: int,
         began: float,
+        legs: Sequence[TaskLeg] = (),
     ) -> None:
         self.recipe, self.robot, self.seed, self.folder = recipe, robot, seed, folder
+        self.legs = legs
         self._seconds = float("inf") if minutes is None else 60 * minutes
-        self.learner = recipe.make_learner(robot, seed, threads)
+        self.learner = recipe.make_learner(robot, seed, threads, legs)
         self.learner.on_boundary = self._at_boundary
         if minutes is not None:
             self.learner.remaining = lambda: max(0.0, 1 - self.elapsed / self._seconds)
@@ -210,8 +258,15 @@ class Trainer:
             selected |= self.selection.final(content)
             self.end_stage(selected["worst_score_m"])
         policy = Policy(content, "the selected policy", recipe.name)
-        heights = policy_evaluation.every_centimetre(recipe.task.command_bounds)
-        low, high = policy_evaluation.input_range(policy, self.robot, heights, recipe.task.rate)
+        heights, legs = policy_evaluation.every_centimetre(recipe.task.command_bounds), [self.robot]
+        if self.legs:
+            legs += [leg.true for leg in self.legs[:_RANGE_LEGS]]
+            heights = heights[::_RANGE_STRIDE]
+        ranges = [
+            policy_evaluation.input_range(policy, leg, heights, recipe.task.rate) for leg in legs
+        ]
+        low = tuple(map(min, zip(*(least for least, _ in ranges), strict=True)))
+        high = tuple(map(max, zip(*(most for _, most in ranges), strict=True)))
         card = replace(policy.card, input_low=low, input_high=high)
         return onnx_export.with_card(content, card), selected
 
@@ -359,6 +414,7 @@ class Selection:
         """Return score, m, and trials of a policy file, as JSON values."""
         recipe = self._recipe
         policy = Policy(content, "snapshot", recipe.name)
+        policy.set_robot(self._robot)
         results = policy_evaluation.evaluate_policy(
             policy, self._robot, recipe.selection.eval_commands, seeds, recipe.task.rate
         )

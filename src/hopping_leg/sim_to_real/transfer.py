@@ -14,7 +14,6 @@ from hopping_leg import io, trace
 from hopping_leg.arrays import Array
 from hopping_leg.controllers import Controller, RolloutConfig
 from hopping_leg.controllers.command_schedule import command_range
-from hopping_leg.controllers.policy import Policy
 from hopping_leg.controllers.registry import ENERGY_SHAPING, load_controller
 from hopping_leg.errors import UsageError
 from hopping_leg.evaluate import entries, runner
@@ -328,7 +327,9 @@ class HopTrial(StoredJob):
         file: Where what was measured is kept.
         method: Name of what it was trained on.
         seed: Seed of its training.
-        policy: Trained policy; None takes energy shaping, tuned on the believed leg.
+        policy: Trained policy; None takes an untrained controller.
+        untrained: Name of that; the default is energy shaping, tuned on the believed leg.
+        told: Name or file of the robot that the controller is told; empty for the believed one.
     """
 
     file: Path
@@ -338,6 +339,8 @@ class HopTrial(StoredJob):
     policy: Path | None = None
     commands: tuple[float, ...] = COMMANDS
     repeats: int = 3
+    untrained: str = ENERGY_SHAPING
+    told: str = ""
 
     weight: ClassVar[float] = 8.0
 
@@ -354,9 +357,8 @@ class HopTrial(StoredJob):
     @property
     def controller(self) -> Controller:
         """What hops."""
-        if self.policy is None:
-            return load_controller(ENERGY_SHAPING, load_robot(self.twin.believed))
-        return Policy(self.policy.read_bytes(), "the trained policy", "policy")
+        robot = load_robot(self.told or self.twin.believed)
+        return load_controller(self.policy or self.untrained, robot, other="accept")
 
     @property
     def asked(self) -> dict[str, Any]:

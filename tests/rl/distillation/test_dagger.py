@@ -5,9 +5,19 @@ import pytest
 import torch
 
 from hopping_leg.controllers.mpc import TrueStateMpc
+from hopping_leg.envs.hidden_state import OF_MOTION
 from hopping_leg.rl.distillation.dagger import DaggerConfig
-from hopping_leg.sim import leg_simulator
-from tests.rl.learners import ROBOT, STUDENTS, TINY_FAST, learn, learner, policy_file
+from hopping_leg.sim import Measurement, leg_simulator
+from tests.rl.learners import (
+    ROBOT,
+    STUDENTS,
+    TINY_FAST,
+    TINY_UNIVERSAL,
+    learn,
+    learner,
+    policy_file,
+    some_legs,
+)
 
 ROLLOUT = TINY_FAST.algorithm.n_steps * TINY_FAST.schedule.num_envs
 FULL = np.array(TINY_FAST.task.action_torque)
@@ -18,6 +28,12 @@ class Counting:
 
     def __init__(self, count):
         self.count, self.asked = count, 0
+
+    @property
+    def pushing(self):
+        return np.zeros(self.count, bool)
+
+    resting = pushing
 
     def watch(self, legs):
         pass
@@ -41,14 +57,18 @@ def counted(**changes):
 
 
 def trained(recipe, seed, threads=1):
-    made = recipe.make_learner(ROBOT, seed, threads)
+    legs = some_legs() if recipe.legs == "any" else ()
+    made = recipe.make_learner(ROBOT, seed, threads, legs)
     return policy_file(recipe, learn(made, recipe.schedule.steps)).content
 
 
-@pytest.mark.parametrize("name", ["window", "gru"])
+EVERY = {**STUDENTS, "universal": TINY_UNIVERSAL.replace(n_steps=16)}
+
+
+@pytest.mark.parametrize("name", ["window", "gru", "universal"])
 def test_the_seed_alone_decides_on_any_number_of_threads(name, monkeypatch):
     monkeypatch.setattr(leg_simulator, "_STEPS_PER_THREAD", 1)
-    recipe = STUDENTS[name].replace(steps=6 * ROLLOUT)
+    recipe = EVERY[name].replace(steps=6 * ROLLOUT)
     first = trained(recipe, 0)
     torch.rand(10)
     assert trained(recipe, 0, threads=2) == first
@@ -124,6 +144,41 @@ def test_training_goes_beyond_the_highest_command():
     commands = [made.task.command.copy() for _ in range(200) if made._step()]
     assert low <= np.min(commands)
     assert high + 0.03 < np.max(commands) <= high + 0.05
+
+
+def test_a_policy_for_any_leg_acts_on_each_as_the_student_did():
+    """In torques of the leg's size, told what is believed of it, its command corrected."""
+    recipe = TINY_UNIVERSAL.replace(correction=0.2)
+    made = learn(learner(recipe), 3 * recipe.algorithm.n_steps * 4)
+    task, student = made.task, made.student
+    files = []
+    for leg in task.task_legs:
+        files.append(policy_file(recipe, made))
+        files[-1].set_robot(leg.believed)
+        files[-1].reset(1)
+    seen, memory = task.reset(), torch.zeros(4, student.memory_size)
+    for _ in range(60):
+        with torch.no_grad():
+            action, memory = student(torch.from_numpy(seen), memory)
+        m = task.measurement
+        for row, file in enumerate(files):
+            one = Measurement(*(part[row : row + 1] for part in (m.q, m.qd, m.command, m.age)))
+            wanted = action[row].clip(-1, 1).numpy() * task.full_torque[row]
+            np.testing.assert_allclose(file.act(one)[0], wanted, atol=2e-3)
+        seen = task.step(action.numpy()).observation
+    assert np.ptp(memory[:, -1].numpy()) > 1e-3, "commands are corrected, each leg's by its own"
+
+
+def test_a_push_counts_more_and_what_is_hidden_is_guessed():
+    made = learn(learner(TINY_UNIVERSAL), 8 * 32 * 4)
+    state = made._buffer.state()
+    config = TINY_UNIVERSAL.algorithm
+    assert set(np.unique(state["weights"])) == {1.0, config.push_weight, config.rest_weight}
+    hidden = state["hidden"].reshape(-1, made._hidden.size)
+    batch, _, guesses = made.student.recall(made._buffer, 64, made._draws)
+    assert guesses.shape == batch.hidden.shape
+    assert (hidden[:, :OF_MOTION].std(axis=0) > 0).all()
+    assert (hidden[:, OF_MOTION:].std(axis=0) > 0).any()
 
 
 def test_the_student_comes_nearer_to_its_teacher():

@@ -17,6 +17,7 @@ from hopping_leg.rl.finetune.finetuning import POLICY as FILE
 from hopping_leg.rl.finetune.finetuning import StoppingRules, Task, finetune
 from hopping_leg.rl.finetune.simulated import Guard, SimulatedTrials
 from hopping_leg.robot import load_robot
+from tests.rl.learners import TINY_UNIVERSAL, learner, policy_file
 
 from .trials import OPTIONS, POLICY, ROBOT, Imagined
 
@@ -163,3 +164,9 @@ RULES = StoppingRules(minutes=2.0, tolerance=0.004, margin=0.01, patience=3, gai
 def test_it_stops_when_good_enough_without_time_or_without_gain(going_on, ended, says):
     assert not RULES.reason(*going_on, 0.25)
     assert says in RULES.reason(*ended, 0.25)
+
+
+def test_a_policy_for_any_leg_is_refused_it_corrects_itself(tmp_path):
+    made = policy_file(TINY_UNIVERSAL, learner(TINY_UNIVERSAL))
+    with pytest.raises(UsageError, match="corrects its command itself"):
+        finetune(Task(made, ROBOT, 0), Imagined(), OPTIONS, tmp_path)

@@ -16,23 +16,26 @@ class LabelledRollout(NamedTuple):
     """(ticks, n, size)."""
     labels: Array32
     """Actions of the teacher, (ticks, n, 2)."""
+    weights: Array32
+    """How much each label counts, (ticks, n)."""
+    hidden: Array32
+    """What the student cannot see and is asked for beside the action, (ticks, n, k or 0)."""
     begun: BoolArray
     """Whether an episode began with the tick, (ticks, n)."""
     memory: Array32
-    """What the student remembered before the first tick, (n, k)."""
+    """What the student remembered before the first tick, (n, m)."""
 
 
-class Sequences(NamedTuple):
-    """Whole rollouts of some environments."""
+class Batch(NamedTuple):
+    """Ticks at random, (b, ...), or whole rollouts of some environments, (ticks, b, ...)."""
 
     observations: torch.Tensor
-    """(ticks, b, size)."""
     labels: torch.Tensor
-    """(ticks, b, 2)."""
-    valid: torch.Tensor
-    """Which ticks come before the first new episode, (ticks, b)."""
+    weights: torch.Tensor
+    """Zero behind the first new episode of a rollout."""
+    hidden: torch.Tensor
     memory: torch.Tensor
-    """(b, k)."""
+    """Before the first tick, (b, m); of no use to ticks at random."""
 
 
 class RolloutBuffer:
@@ -44,12 +47,17 @@ class RolloutBuffer:
         count: Environments n.
         size: Entries of an observation.
         memory: Entries of the student's memory.
+        hidden: Entries of what it cannot see.
     """
 
-    def __init__(self, rollouts: int, ticks: int, count: int, size: int, memory: int) -> None:
+    def __init__(
+        self, rollouts: int, ticks: int, count: int, size: int, memory: int, hidden: int = 0
+    ) -> None:
         shape = (max(rollouts, 1), ticks, count)
         self._observations = torch.zeros((*shape, size), dtype=torch.float16)
         self._labels = torch.zeros((*shape, 2), dtype=torch.float16)
+        self._weights = torch.zeros(shape, dtype=torch.float16)
+        self._hidden = torch.zeros((*shape, hidden), dtype=torch.float16)
         self._valid = torch.zeros(shape, dtype=torch.bool)
         self._memory = torch.zeros((shape[0], count, memory))
         self.added = 0
@@ -67,26 +75,29 @@ class RolloutBuffer:
         later[0] = False
         self._observations[place] = torch.from_numpy(rollout.observations)
         self._labels[place] = torch.from_numpy(rollout.labels)
+        self._weights[place] = torch.from_numpy(rollout.weights)
+        self._hidden[place] = torch.from_numpy(rollout.hidden)
         self._valid[place] = torch.from_numpy(~np.logical_or.accumulate(later))
         self._memory[place] = torch.from_numpy(rollout.memory * ~rollout.begun[0][:, None])
         self.added += 1
 
-    def ticks(self, count: int, generator: torch.Generator) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return observations, (b, size), and labels, (b, 2), of ``count`` ticks at random."""
-        held = self.filled * self._valid[0].numel()
-        rows = torch.randint(held, (count,), generator=generator)
-        observations = self._observations.view(-1, self._observations.shape[-1])
-        return observations[rows].float(), self._labels.view(-1, 2)[rows].float()
+    def ticks(self, count: int, generator: torch.Generator) -> Batch:
+        """Return ``count`` ticks at random."""
+        rows = torch.randint(self.filled * self._valid[0].numel(), (count,), generator=generator)
+        parts = (self._observations, self._labels, self._weights[..., None], self._hidden)
+        seen, labels, weights, hidden = (part.flatten(0, 2)[rows].float() for part in parts)
+        return Batch(seen, labels, weights[:, 0], hidden, self._memory[0, :0])
 
-    def sequences(self, count: int, generator: torch.Generator) -> Sequences:
+    def sequences(self, count: int, generator: torch.Generator) -> Batch:
         """Return a rollout at random, of as many environments as give ``count`` ticks."""
         place = int(torch.randint(self.filled, (), generator=generator))
         ticks, legs = self._valid[place].shape
         chosen = torch.randperm(legs, generator=generator)[: max(1, count // ticks)]
-        return Sequences(
+        return Batch(
             self._observations[place][:, chosen].float(),
             self._labels[place][:, chosen].float(),
-            self._valid[place][:, chosen],
+            (self._weights[place] * self._valid[place])[:, chosen].float(),
+            self._hidden[place][:, chosen].float(),
             self._memory[place][chosen],
         )
 
@@ -102,4 +113,4 @@ class RolloutBuffer:
             getattr(self, f"_{name}")[: self.filled] = torch.from_numpy(state[name])
 
 
-_ARRAYS = ("observations", "labels", "valid", "memory")
+_ARRAYS = ("observations", "labels", "weights", "hidden", "valid", "memory")

@@ -17,9 +17,11 @@ from typing import Any, Protocol
 import numpy as np
 import torch
 from stable_baselines3.common.logger import Logger
+from torch.nn import functional
 
-from hopping_leg.arrays import Array, BoolArray
-from hopping_leg.controllers.mpc import HopShape, TrueStateMpc
+from hopping_leg.arrays import Array, Array32, BoolArray
+from hopping_leg.controllers.mpc import HopShape, Planning, TrueStateMpc
+from hopping_leg.envs.hidden_state import HiddenState
 from hopping_leg.envs.task import HoppingTask
 from hopping_leg.rl.checkpoint import Tree
 from hopping_leg.rl.distillation.buffer import LabelledRollout, RolloutBuffer
@@ -28,6 +30,10 @@ from hopping_leg.rl.learner import RecentHops
 from hopping_leg.rl.onnx_export import Network
 from hopping_leg.rl.resumable import load_optimizer, to_numpy, to_torch
 from hopping_leg.sim import LegSimulator
+
+_HELD_SECONDS = (0.2, 1.5)
+_HELD_STIFFNESS, _HELD_DAMPING = 2.0, 0.05
+"""Of the stiff legs' joint PD: actions per rad and rad/s."""
 
 
 def cosine(left: float) -> float:
@@ -48,6 +54,16 @@ class Teacher(Protocol):
 
     def torque(self, command: Array) -> Array:
         """Return joint torques for desired apexes, m, (n,), N m, (n, 2)."""
+        ...
+
+    @property
+    def pushing(self) -> BoolArray:
+        """Which legs push, (n,)."""
+        ...
+
+    @property
+    def resting(self) -> BoolArray:
+        """Which legs stand where they have to fold first, (n,)."""
         ...
 
     def state(self) -> dict[str, Array]:
@@ -77,12 +93,24 @@ class DaggerConfig:
     """Share of the training over which the teacher acts ever less in the student's stead."""
     headroom: float = 0.01
     """How far training goes beyond the highest command, m: calibrated commands may lie there."""
+    push_weight: float = 1.0
+    """How much a control period counts in which the leg pushes, over others."""
+    rest_weight: float = 1.0
+    """How much one counts in which it stands where it has to fold first."""
+    held_share: float = 0.0
+    """Share of episodes that begin with a stiff leg for a while, so that it stands still."""
+    outlier: float = 0.0
+    """Difference of actions beyond which the loss grows linearly (Huber); 0 for none."""
+    hidden_weight: float = 0.0
+    """How much guesses of what cannot be seen count, over actions; only on legs that differ."""
     teacher: HopShape = field(default_factory=HopShape)
     """What the hops of the teacher, `mpc-true-state`, are like."""
+    planning: Planning = field(default_factory=Planning)
+    """How the teacher simulates hops."""
 
     def make_teacher(self, task: HoppingTask) -> Teacher:
         """Build the teacher."""
-        return TrueStateMpc(task.robot, self.teacher, rate=task.options.rate)
+        return TrueStateMpc(task.robot, self.teacher, self.planning, rate=task.options.rate)
 
 
 class Dagger:
@@ -104,7 +132,9 @@ class Dagger:
     ) -> None:
         torch.manual_seed(seed)
         self.task, self.config = task, config
-        self.student = network.make(task.observation.size)
+        self._hidden = HiddenState(task.legs, task.believed) if config.hidden_weight else None
+        unseen = self._hidden.size if self._hidden else 0
+        self.student = network.make(task.observation, unseen)
         self.optimizer = torch.optim.Adam(self.student.parameters(), lr=config.learning_rate)
         self.teacher = config.make_teacher(task)
         self.teacher.watch(task.legs)
@@ -114,14 +144,14 @@ class Dagger:
         self.seconds = {"rollouts": 0.0, "gradient steps": 0.0}
         """Time spent on each; they run side by side."""
         self._actor: Student = copy.deepcopy(self.student)
+        self._actor.correction = 0.0
         size = config.n_steps * task.count
         self._buffer = RolloutBuffer(
             config.buffer_size // size, config.n_steps, task.count, task.observation.size,
-            self.student.memory_size,
+            self.student.memory_size, unseen,
         )  # fmt: skip
         self._draws = torch.Generator().manual_seed(seed)
         self._mixing = np.random.default_rng([seed, 1])
-        self._full = np.array(task.options.action_torque)
         self._left = 1.0
         self._begin(task.reset())
 
@@ -129,6 +159,7 @@ class Dagger:
         self.teacher.reset(self.task.count)
         self._seen = observation
         self._begun: BoolArray = np.ones(self.task.count, np.bool_)
+        self._held, self._posture = np.zeros(self.task.count), np.zeros((self.task.count, 2))
         self._memory = torch.zeros(self.task.count, self.student.memory_size)
         self._label = self._teach()
 
@@ -170,25 +201,47 @@ class Dagger:
         began = time.monotonic()
         memory = self._memory.numpy().copy()
         ticks = [self._step() for _ in range(self.config.n_steps)]
-        observations, labels, begun = (np.stack(parts) for parts in zip(*ticks, strict=True))
+        seen, labels, weights, hidden, begun = (np.stack(p) for p in zip(*ticks, strict=True))
         self.seconds["rollouts"] += time.monotonic() - began
-        return LabelledRollout(observations, labels, begun, memory)
+        return LabelledRollout(seen, labels, weights, hidden, begun, memory)
 
-    def _step(self) -> tuple[Any, Any, BoolArray]:
+    def _step(self) -> tuple[Any, ...]:
         seen, label, begun = self._seen, self._label, self._begun
+        weight = self._weigh()
+        hidden = self._hidden.view() if self._hidden else np.empty((len(begun), 0), np.float32)
         with torch.no_grad():
             fresh = torch.from_numpy(~begun)[:, None]
             action, self._memory = self._actor(torch.from_numpy(seen), self._memory * fresh)
         taught = self._mixing.random(len(begun)) < self.mixing
-        step = self.task.step(np.where(taught[:, None], label, action.numpy()))
+        step = self.task.step(self._hold(np.where(taught[:, None], label, action.numpy())))
         self.recent_hops.add(step.apex_error)
+        if self._hidden:
+            self._hidden.update(step.apex_error, step.terminated | step.truncated)
         self._seen, self._begun = step.observation, step.terminated | step.truncated
         self._label = self._teach()
-        return seen, label, begun
+        return seen, label, weight, hidden, begun
+
+    def _weigh(self) -> Array32:
+        config, teacher = self.config, self.teacher
+        weight = np.where(teacher.pushing, config.push_weight, 1.0)
+        return np.where(teacher.resting, config.rest_weight, weight).astype(np.float32)
+
+    def _hold(self, action: Array) -> Array:
+        """Return what is commanded: at the start of some episodes, the posture that they have."""
+        if not self.config.held_share:
+            return action
+        legs, begun = self.task.legs, self._begun
+        seconds = self._mixing.uniform(*_HELD_SECONDS, len(begun))
+        chosen = self._mixing.random(len(begun)) < self.config.held_share
+        until = np.where(chosen, np.rint(seconds * self.task.options.rate), 0)
+        self._held = np.where(begun, until, np.maximum(self._held - 1, 0))
+        self._posture[begun] = legs.q[begun]
+        stiff = _HELD_STIFFNESS * (self._posture - legs.q) - _HELD_DAMPING * legs.qd
+        return np.where(self._held[:, None] > 0, stiff.clip(-1, 1), action)
 
     def _teach(self) -> Any:  # noqa: ANN401
         torque = self.teacher.torque(self.task.command)
-        return (torque / self._full).clip(-1, 1).astype(np.float32)
+        return (torque / self.task.full_torque).clip(-1, 1).astype(np.float32)
 
     def _train(self) -> None:
         if not self._buffer.added:
@@ -201,12 +254,29 @@ class Dagger:
         self.seconds["gradient steps"] += time.monotonic() - began
 
     def _gradient_step(self) -> float:
-        loss = self.student.loss(self._buffer, self.config.batch_size, self._draws)
+        loss = self._loss()
         self.optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self.student.parameters(), 1.0)
         self.optimizer.step()
         return loss.item()
+
+    def _loss(self) -> torch.Tensor:
+        """Return how far the student's actions, and its guesses, are off in some ticks."""
+        config = self.config
+        batch, actions, guesses = self.student.recall(self._buffer, config.batch_size, self._draws)
+        if config.outlier:
+            off = functional.huber_loss(
+                actions, batch.labels, reduction="none", delta=config.outlier
+            )
+        else:
+            off = functional.mse_loss(actions, batch.labels, reduction="none")
+        loss = (off.mean(dim=-1) * batch.weights).sum() / batch.weights.sum()
+        if self._hidden:
+            known = (batch.weights > 0)[..., None]
+            missed = functional.mse_loss(guesses * known, batch.hidden * known)
+            loss = loss + config.hidden_weight * missed
+        return loss
 
     def network(self) -> Network:
         """Return the student as it stands."""
@@ -221,12 +291,15 @@ class Dagger:
             "task": self.task.state(),
             "teacher": self.teacher.state(),
             "begun": self._begun,
+            "held": self._held,
+            "posture": self._posture,
             "memory": self._memory.numpy(),
             "label": self._label,
             "draws": self._draws.get_state().numpy(),
             "mixing": self._mixing.bit_generator.state,
             "steps": self.num_timesteps,
             "recent_hops": self.recent_hops.state(),
+            "hidden": self._hidden.state() if self._hidden else {},
         }
 
     def restore(self, state: Tree) -> None:
@@ -237,8 +310,11 @@ class Dagger:
         self._seen = self.task.restore(state["task"])
         self.teacher.restore(state["teacher"])
         self._begun, self._label = state["begun"], state["label"]
+        self._held, self._posture = np.array(state["held"]), np.array(state["posture"])
         self._memory = torch.from_numpy(state["memory"])
         self._draws.set_state(torch.from_numpy(state["draws"]))
         self._mixing.bit_generator.state = state["mixing"]
         self.num_timesteps = state["steps"]
         self.recent_hops.restore(state["recent_hops"])
+        if self._hidden:
+            self._hidden.restore(state["hidden"])

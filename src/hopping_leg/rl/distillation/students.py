@@ -1,16 +1,20 @@
 """Networks that learn to act like a teacher: on a window of the past, or with a memory."""
 
 from abc import abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
+import numpy as np
 import torch
 from torch import nn
-from torch.nn import functional
 
+from hopping_leg.envs.hidden_state import ERROR_GAIN, MISSED
 from hopping_leg.envs.observation import Observation
 from hopping_leg.rl import onnx_export, sb3_policies
-from hopping_leg.rl.distillation.buffer import RolloutBuffer
+from hopping_leg.rl.distillation.buffer import Batch, RolloutBuffer
+
+_MOST_SHIFT = 0.06
+"""Largest correction of a command, over the leg's length."""
 
 
 @dataclass(frozen=True)
@@ -19,34 +23,43 @@ class StudentConfig:
 
     memory: Literal["window", "gru"] = "window"
     """What it remembers: the samples that the observation shows, or a gated recurrent unit's
-    state."""
+    state besides."""
     hidden: tuple[int, ...] = (256, 128)
-    """Hidden layers, tanh; the recurrent unit has none."""
+    """Hidden layers, tanh, on what is seen and remembered."""
     size: int = 128
     """Entries of the recurrent unit's memory."""
+    update_every: int = 1
+    """Control periods between two updates of the recurrent unit."""
+    correction: float = 0.0
+    """Share by which the command is shifted, at every update, against what the student guesses that
+    its last hop missed; only on legs that differ, and only once it is trained."""
 
-    def make(self, inputs: int) -> "Student":
-        """Build the untrained student of so many inputs."""
+    def make(self, observation: Observation, unseen: int = 0) -> "Student":
+        """Build the untrained student of an observation and of numbers that it cannot see."""
         if self.memory == "gru":
-            return RecurrentStudent(inputs, self.size)
-        return WindowStudent(inputs, list(self.hidden))
+            return RecurrentStudent(self, observation, unseen)
+        return WindowStudent(observation.size, list(self.hidden))
 
 
 class Student(nn.Module):
     """A network from observation and memory to an action."""
 
     memory_size: int
-    """Entries k of its memory."""
+    """Entries m of its memory."""
+    correction: float = 0.0
+    """Gain of a correction of the command, see ``StudentConfig``."""
 
     @abstractmethod
     def forward(
         self, observation: torch.Tensor, memory: torch.Tensor
     ) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return the action, unbounded, (n, 2), and the next memory, (n, k)."""
+        """Return the action, unbounded, (n, 2), and the next memory, (n, m)."""
 
     @abstractmethod
-    def loss(self, buffer: RolloutBuffer, count: int, generator: torch.Generator) -> torch.Tensor:
-        """Return the mean squared difference to the labels of about ``count`` ticks."""
+    def recall(
+        self, buffer: RolloutBuffer, count: int, generator: torch.Generator
+    ) -> tuple[Batch, torch.Tensor, torch.Tensor]:
+        """Return about ``count`` ticks, and its actions and guesses of what is hidden there."""
 
     @abstractmethod
     def network(self, observation: Observation) -> onnx_export.Network:
@@ -69,10 +82,12 @@ class WindowStudent(Student):
         """Return the action; nothing is remembered."""
         return self.layers(observation), memory
 
-    def loss(self, buffer: RolloutBuffer, count: int, generator: torch.Generator) -> torch.Tensor:
-        """Return the loss over ticks drawn at random."""
-        observations, labels = buffer.ticks(count, generator)
-        return functional.mse_loss(self.layers(observations), labels)
+    def recall(
+        self, buffer: RolloutBuffer, count: int, generator: torch.Generator
+    ) -> tuple[Batch, torch.Tensor, torch.Tensor]:
+        """Return ticks drawn at random and its actions; it guesses nothing."""
+        batch = buffer.ticks(count, generator)
+        return batch, self.layers(batch.observations), batch.hidden
 
     def network(self, observation: Observation) -> onnx_export.Network:
         """Return its dense layers."""
@@ -82,36 +97,81 @@ class WindowStudent(Student):
 class RecurrentStudent(Student):
     """A gated recurrent unit (GRU, Cho et al. 2014), which decides itself what to remember.
 
-    Learns by backpropagation through the ticks of whole rollouts, from what it remembered then.
+    Dense layers see its memory and the observation in every control period; the unit is updated in
+    every fourth, say, as the observation shows the periods between, so that there are fewer steps
+    to learn through. It learns by backpropagation through whole rollouts, from what it remembered
+    at their start; a second readout has to guess what it cannot see, so that it remembers what
+    tells of that. Behind the unit's own, its memory has the control periods since an update and the
+    shift of the command, see ``onnx_export.Correction``.
+
+    Episodes must begin with an update: at multiples of ``update_every`` of a rollout's ticks.
     """
 
-    def __init__(self, inputs: int, memory: int) -> None:
+    direction: torch.Tensor
+
+    def __init__(self, config: StudentConfig, observation: Observation, unseen: int) -> None:
         super().__init__()
-        self.memory_size = memory
-        self.unit = nn.GRU(inputs, memory)
-        self.readout = nn.Linear(memory, 2)
+        inputs, self._size = observation.size, config.size
+        self.memory_size, self.every = config.size + 2, config.update_every
+        self.correction = config.correction if unseen else 0.0
+        self.unit = nn.GRU(inputs, config.size)
+        self.layers = sb3_policies.dense(config.size + inputs, list(config.hidden), nn.Tanh)
+        self.action = nn.Linear(config.hidden[-1], 2)
+        self.guess = nn.Linear(config.hidden[-1], unseen) if unseen else None
+        direction = torch.from_numpy(observation.command_direction.astype(np.float32))
+        self.register_buffer("direction", direction, persistent=False)
 
     def forward(
         self, observation: torch.Tensor, memory: torch.Tensor
     ) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return the action, a linear function of the next memory."""
-        _, after = self.unit(observation[None], memory[None])
-        return self.readout(after[0]), after[0]
+        """Return the action and the next memory."""
+        before, count, shift = torch.split(memory, [self._size, 1, 1], dim=-1)
+        due, seen = (1 - count).clamp(0, 1), observation + shift * self.direction
+        if bool(due.any()):
+            _, updated = self.unit(seen[None], before[None].contiguous())
+            before = before + due * (updated[0] - before)
+        known = self.layers(torch.cat([before, seen], dim=-1))
+        if self.guess is not None and self.correction:
+            missed = self.guess(known)[:, MISSED : MISSED + 1] / ERROR_GAIN
+            shift = shift + self.correction * due * (missed - shift)
+            shift = shift.clamp(-_MOST_SHIFT, _MOST_SHIFT)
+        count = count + 1 - self.every * (count - self.every + 2).clamp(0, 1)
+        return self.action(known), torch.cat([before, count, shift], dim=-1)
 
-    def loss(self, buffer: RolloutBuffer, count: int, generator: torch.Generator) -> torch.Tensor:
-        """Return the loss over some environments' sequences, each up to its first new episode."""
-        seen = buffer.sequences(count, generator)
-        remembered, _ = self.unit(seen.observations, seen.memory[None])
-        valid = seen.valid
-        return functional.mse_loss(self.readout(remembered[valid]), seen.labels[valid])
+    def recall(
+        self, buffer: RolloutBuffer, count: int, generator: torch.Generator
+    ) -> tuple[Batch, torch.Tensor, torch.Tensor]:
+        """Return whole rollouts of some environments, its actions and guesses."""
+        batch = buffer.sequences(count, generator)
+        seen, memory = batch.observations, batch.memory[None, :, : self._size]
+        updated, _ = self.unit(seen[:: self.every], memory.contiguous())
+        remembered = updated.repeat_interleave(self.every, dim=0)[: len(seen)]
+        known = self.layers(torch.cat([remembered, seen], dim=-1))
+        guesses = batch.hidden if self.guess is None else self.guess(known)
+        return batch, self.action(known), guesses
 
     def network(self, observation: Observation) -> onnx_export.Network:
-        """Return its recurrent unit and readout."""
+        """Return its recurrent unit and dense layers."""
         with torch.no_grad():
             weights = [w.double().numpy().copy() for w in self.unit.all_weights[0]]
         weights[0] = weights[0][:, observation.order]
-        scaling, memory = observation.scaling, onnx_export.RecurrentUnit(*weights)
-        layers = [sb3_policies.layer_weights(self.readout)]
-        return onnx_export.Network(
-            scaling.offset, scaling.gain, layers, "tanh", "clip", memory=memory
+        network = sb3_policies.dense_network(
+            [self.layers, self.action], observation, "clip", self._size
+        )
+        of_input, of_memory, *biases = weights
+        unit = onnx_export.RecurrentUnit(
+            of_input, of_memory, biases[0], biases[1], self.every, self._correction(observation)
+        )
+        return replace(network, memory=unit)
+
+    def _correction(self, observation: Observation) -> onnx_export.Correction | None:
+        if self.guess is None or not self.correction:
+            return None
+        weight, bias = sb3_policies.layer_weights(self.guess)
+        return onnx_export.Correction(
+            weight[MISSED : MISSED + 1] / ERROR_GAIN,
+            bias[MISSED : MISSED + 1] / ERROR_GAIN,
+            self.correction,
+            _MOST_SHIFT,
+            observation.command_direction[observation.order],
         )

@@ -133,7 +133,7 @@ def doubtful_legs(policy: Policy, robot: Robot, o: ContactConfig) -> Rollout:
     """Let a policy hop on legs that each differ from the believed one."""
     rng = np.random.default_rng(o.seed)
     robots = sample(robot, DOUBTS, o.num_envs, rng)
-    span = (policy.card.command_low, policy.card.command_high)
+    span = policy.command_range
     steps = rng.uniform(*span, (round(o.seconds / o.hold), o.num_envs))
     return simulated.hop_many(
         policy, robot, robots, np.repeat(steps, round(o.hold * 200), axis=0), o.seed

@@ -129,6 +129,11 @@ class Finetuning:
         pretraining: Path | None = None,
         on_trial: Callable[[Row], None] = lambda _: None,
     ) -> None:
+        if task.policy.for_any_leg:
+            raise UsageError(
+                f"{task.policy.name} is for any leg and corrects its command itself, from hop to"
+                " hop; continue a policy that was trained on one leg."
+            )
         self._task, self._robot, self._options, self._folder = task, robot, options, folder
         self._on_trial = on_trial
         self._estimator = apex_estimate.prepare(

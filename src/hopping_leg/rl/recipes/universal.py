@@ -1,0 +1,54 @@
+"""The universal recipe: one network for any leg, which feels what the leg's file does not say.
+
+A recurrent student imitates ``mpc-true-state``, which knows state and parameters of every leg, on
+as many drawn legs as there are environments. It is told what a robot file tells. Payload, gains,
+delay and transmission, and friction, inertia and ground where the file is wrong, it has to infer
+from what its torques did; so that it does, it has to guess them and how far its hops miss. What is
+left of a miss corrects its command.
+"""
+
+from dataclasses import replace
+
+from hopping_leg.controllers.mpc import Planning
+from hopping_leg.controllers.observation_history import AnyLeg
+from hopping_leg.rl import recipe
+from hopping_leg.rl.distillation.dagger import DaggerConfig
+from hopping_leg.rl.distillation.students import StudentConfig
+from hopping_leg.rl.recipes.fast import FAST
+
+UNIVERSAL = recipe.Recipe(
+    name="universal",
+    task=replace(
+        FAST.task,
+        observation=AnyLeg.name,
+        command_range=(0.21, 0.42),
+        episode=10.24,
+        episode_grid=4,
+        timestep=5e-4,
+    ),
+    algorithm=DaggerConfig(
+        learning_rate=2e-3,
+        n_steps=256,
+        buffer_size=1_050_000,
+        gradient_steps=32,
+        batch_size=16_384,
+        mixing_share=0.06,
+        headroom=0.0,
+        push_weight=6.0,
+        rest_weight=10.0,
+        held_share=0.3,
+        outlier=0.15,
+        hidden_weight=0.3,
+        planning=Planning(
+            timestep=1.25e-3, elastic_timestep=5e-4, simulations=3, tolerance=3e-4, every=2
+        ),
+    ),
+    network=StudentConfig(memory="gru", hidden=(192,), size=192, update_every=4, correction=0.01),
+    schedule=recipe.Schedule(num_envs=1024, steps=60_000_000, log_every=8),
+    selection=recipe.SelectionConfig(
+        eval_every=10**9,
+        eval_commands=(0.22, 0.26, 0.30, 0.34, 0.38, 0.40),
+    ),
+    legs="any",
+    robot="legv2",
+)

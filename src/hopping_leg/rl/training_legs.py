@@ -1,0 +1,121 @@
+"""The legs of a training for any leg: each is drawn, and asked for the heights its teacher reaches.
+
+The teacher hops on every leg at heights of the whole range; the longest run of those that it
+reaches is what the leg is asked for in training. Legs with fewer than two of them are left out.
+What was found is kept in a file, so that a training that goes on does not look again.
+"""
+
+import itertools
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hopping_leg import io
+from hopping_leg.controllers.mpc import HopShape, Planning, TrueStateMpc
+from hopping_leg.envs.task import TaskLeg
+from hopping_leg.rl.policy_evaluation import CommandResult, evaluate_policy
+from hopping_leg.sim import NO_NOISE
+from hopping_leg.sim.any_leg import draw_any_leg
+from hopping_leg.workers import Workers
+
+_HEIGHTS, _LEAST = 9, 2  # tried, and reached at least
+_SECONDS, _STEP = 3.5, 5e-4
+_REACHED = 0.006
+"""Median error with which the teacher reaches a height of a leg of the paper's size, m."""
+
+_AT_ONCE, _ROUND = 8, 64
+"""Legs in one task of a worker, and in all tasks until what they found is kept."""
+
+_BETWEEN_SEEDS = 1_000_000
+"""Legs of which no two trainings draw the same."""
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Heights, m, that the teacher reaches on a drawn leg."""
+
+    leg: int
+    """Seed of the leg."""
+    low: float
+    high: float
+
+
+def find_reach(
+    leg: int, heights: tuple[float, float], shape: HopShape, planning: Planning
+) -> Reach | None:
+    """Return the heights that the teacher reaches on a leg, None for hardly any.
+
+    The range, m, is that of a leg of the paper's size and grows with the leg.
+    """
+    robot = draw_any_leg(leg).true
+    scale = robot.straight_height / 0.30
+    asked = tuple(scale * float(h) for h in np.linspace(*heights, _HEIGHTS))
+    results = evaluate_policy(
+        TrueStateMpc(robot, shape, planning), robot, asked, legs=1, seconds=_SECONDS,
+        disturbance=NO_NOISE, timestep=_STEP, threads=1,
+    )  # fmt: skip
+    runs = [list(run) for good, run in itertools.groupby(results, key=_reached(scale)) if good]
+    longest = max(runs, key=len, default=[])
+    if len(longest) < _LEAST:
+        return None
+    return Reach(leg, longest[0].command_m, longest[-1].command_m)
+
+
+def _reached(scale: float) -> Callable[[CommandResult], bool]:
+    def judge(result: CommandResult) -> bool:
+        hops = result.hops > 0 and result.skipped_hops == 0 and result.body_contact_ticks == 0
+        return hops and abs(result.median_error_m) <= scale * _REACHED
+
+    return judge
+
+
+def _find_some(
+    legs: range, heights: tuple[float, float], shape: HopShape, planning: Planning
+) -> list[Reach]:
+    found = (find_reach(leg, heights, shape, planning) for leg in legs)
+    return [reach for reach in found if reach is not None]
+
+
+def reach_of_legs(
+    count: int,
+    seed: int,
+    heights: tuple[float, float],
+    teacher: tuple[HopShape, Planning],
+    workers: Workers,
+    file: Path,
+    on_progress: Callable[[int], None],
+) -> list[Reach]:
+    """Return the reach of so many legs; the same for the same seed, whoever does the work.
+
+    What ``file`` holds already is not done again; ``on_progress`` is told how many are known.
+
+    Raises:
+        UsageError: The file is damaged.
+    """
+    asked = io.plain(
+        {"seed": seed, "heights": heights, "teacher": [asdict(part) for part in teacher]}
+    )
+    tried, found = 0, list[Reach]()
+    if file.exists():
+        stored = io.parse_json(file.read_bytes(), str(file))
+        if stored.get("asked") == asked:
+            found = [io.read_dataclass(Reach, row, str(file)) for row in stored["legs"]]
+            tried = stored["tried"]
+    while len(found) < count:
+        first = seed * _BETWEEN_SEEDS + tried
+        parts = [range(first + k, first + k + _AT_ONCE) for k in range(0, _ROUND, _AT_ONCE)]
+        for reaches in workers.map(_find_some, [(legs, heights, *teacher) for legs in parts]):
+            found += reaches
+        tried += _ROUND
+        rows = [asdict(reach) for reach in found]
+        io.write_json(file, {"asked": asked, "tried": tried, "legs": rows})
+        on_progress(min(len(found), count))
+    return found[:count]
+
+
+def task_leg(reach: Reach) -> TaskLeg:
+    """Return the leg for a task."""
+    leg = draw_any_leg(reach.leg)
+    return TaskLeg(leg.believed, leg.true, (reach.low, reach.high), leg.disturbed)
